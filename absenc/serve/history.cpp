@@ -91,9 +91,27 @@ struct HistoryWriter::Database {
   Sqlite sqlite;
 };
 
+namespace {
+
+// Two servers would write the same seconds. What else is wrong with the file SQLite says.
+std::unique_ptr<os::KeptFile> lock(const std::string& path) {
+  try {
+    return std::make_unique<os::KeptFile>(path);
+  } catch (const os::Failure& failure) {
+    if (failure.kind() != os::Failure::Kind::in_use) return nullptr;
+    throw Failure(fmt::format(
+        "another server keeps its history in {}: end it, or give this one a file of its own with --history", path));
+  }
+}
+
+}  // namespace
+
 HistoryWriter::HistoryWriter(std::string path, const HistoryLimits& limits)
-    : database_(std::make_unique<Database>(path)), limits_(limits) {
-  trim();
+    : lock_(lock(path)), database_(std::make_unique<Database>(path)), limits_(limits) {
+  // A clock that is not set yet, or wrong, would make all of it old.
+  const std::int64_t newest =
+      database_->sqlite.number("SELECT ifnull(max((SELECT max(at) FROM second WHERE encoder = id)), 0) FROM encoder");
+  if (calendar_ms() / 1000 - newest < 24 * 3600) trim();
 }
 HistoryWriter::~HistoryWriter() = default;
 

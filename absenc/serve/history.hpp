@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "absenc/client/text/json.hpp"
+#include "absenc/os/kept_file.hpp"
 #include "absenc/serve/happening.hpp"
 #include "absenc/serve/watch.hpp"
 
@@ -47,6 +48,7 @@ class HistoryWriter {
   struct Database;
   void note_loss(std::size_t rows, const std::string& why);
 
+  std::unique_ptr<os::KeptFile> lock_;  // until the database is closed
   std::unique_ptr<Database> database_;
   HistoryLimits limits_;
   std::string trouble_;

@@ -9,6 +9,7 @@
 #include <filesystem>
 #include <string>
 
+#include "absenc/client/error.hpp"
 #include "absenc/serve/chronicler.hpp"
 
 namespace absenc::serve {
@@ -45,8 +46,45 @@ TEST(ClockWatch, DoubtsTheClockForAnHourAfterTheStartAndAfterEachJump) {
   EXPECT_TRUE(clock.is_trusted(now));
 }
 
+std::string new_path() {
+  static int number = 0;
+  return testing::TempDir() + "absenc-history-" + std::to_string(::getpid()) + "-" + std::to_string(++number);
+}
+
+void remove_history(const std::string& path) {
+  for (const char* ending : {"", "-wal", "-shm"}) std::filesystem::remove(path + ending);
+}
+
+// The clock stands years behind the last second that was written.
+TEST(History, IsNotDeletedAtTheStartByAClockThatMayBeWrong) {
+  const std::string path = new_path();
+  Second old;
+  old.at_s = 1'000'000'000;
+  old.readings = 1;
+  EXPECT_TRUE(HistoryWriter(path, {}).write({{"one", old}}, {}));
+  { const HistoryWriter again(path, {}); }
+  HistoryReader reader(path);
+  EXPECT_NE(reader.seconds("one", {0, 2'000'000'000}, 10).line(), "[]");
+  remove_history(path);
+}
+
+TEST(History, IsWrittenByOneServer) {
+  const std::string path = new_path();
+  {
+    const HistoryWriter first(path, {});
+    try {
+      const HistoryWriter second(path, {});
+      FAIL() << "both write it";
+    } catch (const client::Failure& failure) {
+      EXPECT_NE(std::string(failure.what()).find("another server"), std::string::npos) << failure.what();
+    }
+  }
+  { const HistoryWriter third(path, {}); }
+  remove_history(path);
+}
+
 TEST(History, SecondThatComesTwiceHasTheReadingsOfBoth) {
-  const std::string path = testing::TempDir() + "absenc-history-" + std::to_string(::getpid()) + ".sqlite";
+  const std::string path = new_path();
   {
     HistoryWriter writer(path, {});
     const auto second = [](std::uint64_t readings, double least, double greatest) {
@@ -71,7 +109,7 @@ TEST(History, SecondThatComesTwiceHasTheReadingsOfBoth) {
       EXPECT_NE(found.find(part), std::string::npos) << part << " in " << found;
     }
   }
-  for (const char* ending : {"", "-wal", "-shm"}) std::filesystem::remove(path + ending);
+  remove_history(path);
 }
 
 }  // namespace
