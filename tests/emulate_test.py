@@ -391,6 +391,11 @@ class Console(EmulateCase):
         self.assertEqual(tell("temperature=-20"), "ok: temperature is -20 degC")
         self.assertEqual(self.temperature(place), -20)
 
+    def test_an_alarm_that_nothing_reports_is_refused(self):
+        _, tell = self.told("--option", "carries=ssi", "--option", "singleturn_bits=13", protocol="e201")
+        self.assertIn("the alarm error cannot be shown", tell("alarm error"))
+        self.assertEqual(tell("clear error"), "ok: lowered error")
+
     def test_power_without_a_battery(self):
         emulator, tell = self.told("--multiturn", "7")
         place = f"tformat:{emulator.path}?latency=300"

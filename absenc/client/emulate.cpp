@@ -197,7 +197,7 @@ void Emulation::power_on(bool real) {
 }
 
 void Emulation::raise_alarm(std::string_view name) {
-  const std::uint32_t bits = require_alarms(unit(), std::array{std::string(name)});
+  const std::uint32_t bits = require_alarms(unit(), service_->device.options(), std::array{std::string(name)});
   service_->carry_out([this, bits](Time) { service_->device.raise_alarms(bits); });
 }
 

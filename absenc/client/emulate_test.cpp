@@ -77,6 +77,14 @@ TEST(ClientEmulation, WhatIsDoneToItIsSoAtOnce) {
   EXPECT_THAT(thrown_by<UsageError>([&] { emulation.set_condition("temperature", 1000); }), HasSubstr("must be"));
 }
 
+TEST(ClientEmulation, AnAlarmThatNothingReportsIsRefused) {
+  Emulation without = emulate("e201?carries=ssi&singleturn_bits=13");
+  EXPECT_THAT(thrown_by<UsageError>([&] { without.raise_alarm("error"); }),
+              HasSubstr("the alarm error cannot be shown"));
+  without.lower_alarm("error");
+  emulate("e201?singleturn_bits=13").raise_alarm("error");
+}
+
 TEST(ClientEmulation, APortThatGoesIsWaitedFor) {
   const std::string link = own_path("link");
   std::optional<Emulation> emulation = emulate("tformat?singleturn=7", {.link = link});

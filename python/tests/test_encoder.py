@@ -48,6 +48,13 @@ def test_conditions_while_it_runs(absenc_emulate):
         assert encoder.run("temperature")["temperature_c"] == 71
 
 
+def test_an_alarm_that_nothing_reports_is_refused(absenc_emulate):
+    virtual = absenc_emulate("e201", carries="ssi", singleturn_bits=13)
+    with pytest.raises(absenc.UsageError, match="the alarm error cannot be shown"):
+        virtual.raise_alarm("error")
+    absenc_emulate("e201", singleturn_bits=13).raise_alarm("error")
+
+
 def test_names_that_are_wrong_name_the_nearest(absenc_emulate):
     virtual = absenc_emulate("tformat")
     with pytest.raises(absenc.UsageError, match="over_heat"):

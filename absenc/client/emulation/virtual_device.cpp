@@ -67,7 +67,8 @@ sim::FaultRate require_fault(std::string_view text) {
 }
 
 VirtualDevice::VirtualDevice(const Unit& unit, const Options& options, const DeviceSettings& settings)
-    : motion_(motion_of(unit, options, settings)),
+    : options_(options),
+      motion_(motion_of(unit, options, settings)),
       storage_(std::make_unique<std::byte[]>(unit.device_storage)),
       device_(unit.device(options, motion_, {storage_.get(), unit.device_storage})),
       rates_(rates_of(settings)),

@@ -46,6 +46,8 @@ class VirtualDevice {
 
   // ---- What happens to it while it runs. Not from another thread than that of its machine.
 
+  /// As they were at the start.
+  [[nodiscard]] const Options& options() const { return options_; }
   [[nodiscard]] bool is_on() const { return is_on_; }
   /// `real`: with the document's start-up time. Nothing, when it is on.
   void switch_on(Time now, bool real);
@@ -77,6 +79,7 @@ class VirtualDevice {
   template <class Use>
   void each(Use use);
 
+  Options options_;
   sim::Motion motion_;
   std::unique_ptr<std::byte[]> storage_;
   Any<Device> device_;
