@@ -259,6 +259,70 @@ class Settings(Case):
                              (16777215, 24, bits))
 
 
+def crc(bits, polynomial, width):
+    """Of a text of bits, inverted, as BiSS has it: written from the document alone."""
+    remainder = 0
+    for bit in bits:
+        top = (remainder >> (width - 1) & 1) != int(bit)
+        remainder = (remainder << 1 & ((1 << width) - 1)) ^ (polynomial if top else 0)
+    return format(remainder ^ ((1 << width) - 1), f"0{width}b")
+
+
+def safety_words(position, counter):
+    """CPW of 24 bits and SPW of 16 bits of one position."""
+    cpw = format(position, "024b") + "11"
+    spw = format(position >> 8, "016b") + "11" + format(counter, "06b")
+    return cpw + crc(cpw, 0x03, 6) + spw + crc(spw, 0x90D9, 16)
+
+
+def counted_word(position, counter):
+    word = format(position, "019b") + "11" + format(counter, "06b")
+    return word + crc(word, 0x03, 6)
+
+
+def draw_frames(words):
+    """A VCD of frames at 1 MHz with 20 us of timeout, edge by edge."""
+    lines = ["$timescale 1 ns $end", "$var wire 1 c clock $end", "$var wire 1 d data $end", "$enddefinitions $end",
+             "#0", "1c", "1d"]
+    now = 100_000
+    for word in words:
+        samples = "11" + "0000" + "10" + word + "0"
+        for sample in samples[1:]:
+            lines += [f"#{now}", "0c", f"#{now + 500}", "1c", f"#{now + 510}", f"{sample}d"]
+            now += 1000
+        lines += [f"#{now + 19_500}", "1d"]
+        now += 100_000
+    return "\n".join([*lines, f"#{now}", ""])
+
+
+class LifeCounter(Case):
+    def errors(self, unit, words):
+        options = {"biss": ["--option", "life_counter=true"], "biss-safety": []}[unit]
+        path = self.file("frames.vcd", draw_frames(words))
+        return [row.get("error") for row in json_lines(absenc("decode", unit, path, "--json", *options).stdout)]
+
+    def test_a_capture_whose_counter_stands_or_jumps_says_so(self):
+        wrong = "sequence_mismatch"
+        for unit, word in (("biss", counted_word), ("biss-safety", safety_words)):
+            with self.subTest(unit):
+                def of(counters):
+                    return [word(1000 + 300 * i, counter) for i, counter in enumerate(counters)]
+                self.assertEqual(self.errors(unit, of([62, 63, 0, 1])), [None] * 4)
+                self.assertEqual(self.errors(unit, of([7] * 24)), [None] + [wrong] * 23)
+                self.assertEqual(self.errors(unit, of([1, 2, 5, 6, 6, 7])), [None, None, wrong, None, wrong, None])
+                # Behind a damaged frame it may be any number, but not the same.
+                damaged = of([1, 2, 3, 5])
+                damaged[2] = damaged[2][:3] + ("0" if damaged[2][3] == "1" else "1") + damaged[2][4:]
+                self.assertEqual(self.errors(unit, damaged), [None, None, "bad_checksum", None])
+
+    def test_both_words_show_the_same_place(self):
+        words = [safety_words(5000, 1), safety_words(5000, 2)]
+        other = safety_words(5000 + (3 << 11), 2)
+        mixed = words[1][:32] + other[32:]
+        self.assertEqual(self.errors("biss-safety", words), [None, None])
+        self.assertEqual(self.errors("biss-safety", [words[0], mixed]), [None, "cross_check_failed"])
+
+
 class Start(Case):
     def test_an_encoder_that_waits_for_its_start_is_started(self):
         for encoder in ("sim:biss?start_sequence=true", "sim:biss-safety?start_sequence=true",

@@ -12,10 +12,11 @@ namespace absenc {
 enum class Role : std::uint8_t {
   other,  // only its unit knows
   // Of a reading
-  position,     // field: the counts of the position, or of a linear encoder its place
-  turns,        // field: the turns
-  of_position,  // field: what holds as long as the position does: the same in degrees, or of a second channel
-  sequence,     // field: counts the replies, so that one that was seen before can be told
+  position,      // field: the counts of the position, or of a linear encoder its place
+  turns,         // field: the turns
+  of_position,   // field: what holds as long as the position does: the same in degrees, or of a second channel
+  sequence,      // field: counts the replies, so that one that was seen before can be told
+  life_counter,  // field: counts the frames, 0 to 63 and on at 0: that of the next frame is the one behind it
   // Of a line
   encoder,   // option, field: which of the encoders on the line; in a scan a new record begins with it
   identity,  // field: says which encoder it is: its type, its serial number

@@ -4,14 +4,16 @@
 
 #include <cstdint>
 #include <map>
-#include <optional>
+#include <utility>
 
 #include "absenc/capture/annotate/annotation.hpp"
 
 namespace absenc::client {
 
-/// Hands annotations on. A reply whose counter (a field of the role sequence) stands where that encoder's last one
-/// stood becomes a `sequence_mismatch`, as a host that looks at counters would have it.
+/// Hands annotations on. A reply becomes a `sequence_mismatch`, as a host that looks at counters would have it, when
+/// the first of its fields of the role sequence stands where that encoder's last one stood, or when a field of the role
+/// life_counter is not one further than in the frame before. Where damaged frames lie between, that may have moved on
+/// by any number, but may not stand.
 class SequenceWatch final : public capture::AnnotationSink {
  public:
   /// `sink` must outlive it.
@@ -19,16 +21,10 @@ class SequenceWatch final : public capture::AnnotationSink {
 
   void put(const capture::Annotation& annotation) override {
     ++count_;
-    Counter counter;
-    if (!annotation.reply.empty()) {
-      for (const FieldValue& field : annotation.contents.fields) counter.put(field);
-    }
-    if (!counter.value) return sink_.put(annotation);
-    const Seen now{*counter.value, count_};
-    const auto [last, is_first] = last_.try_emplace(counter.address, now);
-    const bool stands = !is_first && last->second.value == now.value && now.at - last->second.at < most_between;
-    last->second = now;
-    if (!stands) return sink_.put(annotation);
+    const bool is_wrong = !annotation.reply.empty() && !annotation.composed && is_out_of_sequence(annotation);
+    const bool is_whole = annotation.error == Error::none && annotation.remark != capture::Remark::cut;
+    if (!annotation.composed && !is_whole) damaged_at_ = count_;
+    if (!is_wrong) return sink_.put(annotation);
     capture::Annotation repeated = annotation;
     repeated.error = Error::sequence_mismatch;
     repeated.contents = {};
@@ -38,23 +34,39 @@ class SequenceWatch final : public capture::AnnotationSink {
  private:
   // With more in between, a counter of 7 bits may have come round.
   static constexpr std::uint64_t most_between = 100;
+  static constexpr std::int64_t life_counter_end = 64;
 
-  struct Counter {
-    void put(const FieldValue& field) {
-      if (field.info->role == Role::encoder) address = field.number;
-      if (!value && field.info->role == Role::sequence) value = field.number;
-    }
-    std::int64_t address = 0;
-    std::optional<std::int64_t> value;
-  };
   struct Seen {
     std::int64_t value;
     std::uint64_t at;
   };
 
+  bool is_out_of_sequence(const capture::Annotation& annotation) {
+    std::int64_t address = 0;
+    for (const FieldValue& field : annotation.contents.fields) {
+      if (field.info->role == Role::encoder) address = field.number;
+    }
+    bool is_wrong = false;
+    bool has_sequence = false;
+    for (const FieldValue& field : annotation.contents.fields) {
+      const bool is_life_counter = field.info->role == Role::life_counter;
+      if (!is_life_counter && (field.info->role != Role::sequence || std::exchange(has_sequence, true))) continue;
+      const Seen now{field.number, count_};
+      const auto [last, is_first] = last_.try_emplace({address, is_life_counter ? field.info : nullptr}, now);
+      const Seen before = std::exchange(last->second, now);
+      if (is_first) continue;
+      const bool stands = before.value == now.value && now.at - before.at < (is_life_counter ? 64 : most_between);
+      const bool follows = !is_life_counter || now.value == (before.value + 1) % life_counter_end;
+      is_wrong = is_wrong || stands || (!follows && damaged_at_ < before.at);
+    }
+    return is_wrong;
+  }
+
   capture::AnnotationSink& sink_;
-  std::map<std::int64_t, Seen> last_;  // by the address of the encoder
+  // By the address of the encoder; life counters also by their field.
+  std::map<std::pair<std::int64_t, const FieldInfo*>, Seen> last_;
   std::uint64_t count_ = 0;
+  std::uint64_t damaged_at_ = 0;
 };
 
 }  // namespace absenc::client

@@ -71,10 +71,35 @@ void add_said(Changes<Item>& all, void (*say)(std::vector<Item>&, Step<Item>&)) 
   add_said<Item>(all, [say](Mutant<Item>& m) { m.say = say; });
 }
 
+/// Repeats its first reply as a whole; or puts its first bits before the rest of a later one.
+template <class Item>
+void add_stale(Changes<Item>& all, const Clause& clause) {
+  if constexpr (std::is_same_v<Item, std::uint8_t>) {
+    const auto add = [&](std::size_t kept_bits) {
+      add_said<Item>(all, [kept_bits](Mutant<Item>& m) {
+        const auto first = std::make_shared<ByteList>();
+        m.mutated = 1;
+        m.always = true;
+        m.say = [first, kept_bits](ByteList& said, ByteStep&) {
+          if (first->empty()) *first = said;
+          for (std::size_t bit = 0; bit < std::min(kept_bits, bits_of(said)); ++bit) {
+            const auto mask = static_cast<std::uint8_t>(0x80U >> bit % 8);
+            said[bit / 8] = static_cast<std::uint8_t>((said[bit / 8] & ~mask) | ((*first)[bit / 8] & mask));
+          }
+        };
+      });
+    };
+    if ((clause.errors & any_of(Error::sequence_mismatch)) != 0) add(SIZE_MAX);
+    for (std::size_t bits = 1; bits < 160 && (clause.errors & any_of(Error::cross_check_failed)) != 0; ++bits)
+      add(bits);
+  }
+}
+
 template <class Item>
 Changes<Item> of_frames(const EncoderAddress& address, const Clause& clause) {
   using List = std::vector<Item>;
   Changes<Item> all;
+  add_stale(all, clause);
   if constexpr (std::is_same_v<Item, CanFrame>) {
     add_said<Item>(all, [](List& said, Step<Item>&) { said.front().extended = true; });
     add_said<Item>(all, [](List& said, Step<Item>&) { said.front().size = 7; });

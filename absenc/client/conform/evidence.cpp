@@ -115,6 +115,7 @@ std::size_t changes_noticed(const Unit& unit, const Options& options, const Hear
     try_one(good.request, changed);
   }
   for (const HeardFrame& request : other_requests(unit, options)) try_one(request, good.reply);
+  if (unit.link == LinkKind::clocked) return noticed;  // no check is the last byte there
   // A checksum hides what stands before it: wrong bits with a last byte that makes it right again.
   HeardFrame changed = good.reply;
   for (std::size_t bit = 0; noticed == 0 && changed.bytes.size() > 2 && bit < bits_of(good.reply) - 8; ++bit) {

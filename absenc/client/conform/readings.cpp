@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <set>
 
 #include "absenc/client/conform/evidence.hpp"
 #include "absenc/client/error.hpp"
@@ -16,6 +17,32 @@ namespace {
 std::string words_of(const Attempted& one) {
   const std::string_view name = error_texts[static_cast<std::size_t>(one.error)].name;
   return one.detail.empty() ? std::string(name) : fmt::format("{} {}", name, one.detail);
+}
+
+std::size_t counters_seen(const Readings& readings) {
+  std::set<std::int64_t> values;
+  for (const Attempted& one : readings.all) {
+    if (one.error == Error::none && one.counter) values.insert(*one.counter);
+  }
+  return values.size();
+}
+
+// The first bits of one good reply and the rest of another, whose parts are each right.
+std::size_t mixtures_noticed(const Unit& unit, const Options& options, const Readings& readings, Errors errors) {
+  const Attempted* const one = readings.first_good();
+  std::size_t noticed = 0;
+  for (const Attempted& other : readings.all) {
+    const std::size_t bits = one->exchange.reply.bits;
+    if (noticed != 0 || other.error != Error::none || other.exchange.reply.bits != bits) continue;
+    capture::HeardExchange mixed = other.exchange;
+    for (std::size_t bit = 0; bit < bits; ++bit) {
+      const auto mask = static_cast<std::uint8_t>(0x80U >> bit % 8);
+      std::uint8_t& byte = mixed.reply.bytes[bit / 8];
+      byte = static_cast<std::uint8_t>((byte & ~mask) | (one->exchange.reply.bytes[bit / 8] & mask));
+      noticed += (errors & any_of(unit.check(options, mixed.request.frame(), mixed.reply.frame()))) != 0 ? 1 : 0;
+    }
+  }
+  return noticed;
 }
 
 }  // namespace
@@ -95,10 +122,21 @@ void judge_frames(const Unit& unit, const Options& options, const Readings& read
                         ? "no good reply came"
                         : "all bits were alike, as on a line that nobody drives: turn the shaft a little";
   if (good == nullptr) return;
-  const std::size_t noticed = changes_noticed(unit, options, good->exchange, errors);
-  result.evidence = "with these options nothing could be wrong with it";
-  if (noticed == 0) return;
-  conclude(result, true, fmt::format("{}; of one changed it would be seen in {} ways", seen, noticed));
+  const bool about_counters = errors == any_of(Error::sequence_mismatch);  // which no single reply shows
+  const std::size_t noticed = about_counters ? 0 : changes_noticed(unit, options, good->exchange, errors);
+  if (noticed != 0) {
+    return conclude(result, true, fmt::format("{}; of one changed it would be seen in {} ways", seen, noticed));
+  }
+  if (about_counters) {
+    const std::size_t counters = counters_seen(readings);
+    result.evidence = "no reply carried a counter that moved";
+    if (counters < 2) return;
+    return conclude(result, true, fmt::format("{}; their counters had {} values", seen, counters));
+  }
+  const std::size_t mixed = mixtures_noticed(unit, options, readings, errors);
+  result.evidence = "with these options nothing could be wrong with it while the shaft stands still: turn it a little";
+  if (mixed == 0) return;
+  conclude(result, true, fmt::format("{}; of two mixed together it would be seen in {} ways", seen, mixed));
 }
 
 }  // namespace absenc::client

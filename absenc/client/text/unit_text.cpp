@@ -423,11 +423,29 @@ std::string to_text(Time time) {
 }
 
 std::string_view name_of(Role role) {
-  static constexpr std::array<std::string_view, 22> names{
-      "",           "position",       "turns",   "of_position", "sequence",    "encoder",
-      "identity",   "clash",          "trouble", "rate",        "check_width", "check_polynomial",
-      "check_init", "check_inverted", "address", "page",        "count",       "force",
-      "value",      "data",           "written", "exchange"};
+  static constexpr std::array<std::string_view, 23> names{"",
+                                                          "position",
+                                                          "turns",
+                                                          "of_position",
+                                                          "sequence",
+                                                          "life_counter",
+                                                          "encoder",
+                                                          "identity",
+                                                          "clash",
+                                                          "trouble",
+                                                          "rate",
+                                                          "check_width",
+                                                          "check_polynomial",
+                                                          "check_init",
+                                                          "check_inverted",
+                                                          "address",
+                                                          "page",
+                                                          "count",
+                                                          "force",
+                                                          "value",
+                                                          "data",
+                                                          "written",
+                                                          "exchange"};
   return names[static_cast<std::size_t>(role)];
 }
 

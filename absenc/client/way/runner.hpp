@@ -71,7 +71,8 @@ class CounterSink final : public FieldSink {
  public:
   explicit CounterSink(Attempted& attempt) : attempt_(attempt) {}
   void put(const FieldValue& value) override {
-    if (value.info->role != Role::sequence || attempt_.counter) return;
+    const bool counts = value.info->role == Role::sequence || value.info->role == Role::life_counter;
+    if (!counts || attempt_.counter) return;
     attempt_.counter = value.number;
     attempt_.counter_field = value.info;
   }

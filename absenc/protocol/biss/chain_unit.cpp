@@ -122,7 +122,7 @@ constexpr std::array<FieldInfo, in_all> channel_fields_of{{
     {name_of<i, "singleturn">, FieldInfo::Kind::counts, "counts", "its position", {}, Role::of_position},
     {name_of<i, "error">, FieldInfo::Kind::boolean, "", "it says that its position is wrong"},
     {name_of<i, "warning">, FieldInfo::Kind::boolean, "", "it works near its limits"},
-    {name_of<i, "life_counter">, FieldInfo::Kind::number, "", "counts up with every frame"},
+    {name_of<i, "life_counter">, FieldInfo::Kind::number, "", "counts up with every frame", {}, Role::life_counter},
     {name_of<i, "crc">, FieldInfo::Kind::number, "", "as sent"},
 }};
 template <std::size_t... channel>

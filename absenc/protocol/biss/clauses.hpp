@@ -8,9 +8,10 @@
 
 namespace absenc::biss {
 
-inline constexpr std::array<Clause, 5> clauses{{
-    {"crc", "BiSS C timing diagram, CRC", "six bits of CRC, inverted, over position and status", Demand::checked},
-    {"header", "BiSS C timing diagram", "ACK, start bit and CDS bit come before the position", Demand::as_drawn},
+inline constexpr Errors header_errors = any_of(Error::bad_framing, Error::line_stuck);
+
+// Of the registers of every encoder.
+inline constexpr std::array<Clause, 3> register_clauses{{
     {.id = "bank",
      .paragraph = "BiSS C Protocol Description rev D2, register 40",
      .words = "the bank that was selected is read again",
@@ -35,19 +36,62 @@ inline constexpr std::array<Clause, 5> clauses{{
      .field = "bank"},
 }};
 
+template <std::size_t count>
+constexpr std::array<Clause, count + register_clauses.size()> with_registers(const std::array<Clause, count>& own) {
+  std::array<Clause, count + register_clauses.size()> all{};
+  for (std::size_t i = 0; i < count; ++i) all[i] = own[i];
+  for (std::size_t i = 0; i < register_clauses.size(); ++i) all[count + i] = register_clauses[i];
+  return all;
+}
+
+inline constexpr auto clauses = with_registers(std::array<Clause, 3>{{
+    {"crc", "BiSS C timing diagram, CRC", "six bits of CRC, inverted, over position and status", Demand::checked},
+    {.id = "header",
+     .paragraph = "BiSS C timing diagram",
+     .words = "ACK, start bit and CDS bit come before the position",
+     .demand = Demand::as_drawn,
+     .errors = header_errors},
+    {.id = "life-counter",
+     .paragraph = "BiSS Safety, LC",
+     .words = "from frame to frame the life counter goes on by one",
+     .demand = Demand::as_drawn,
+     .needs = "life_counter=true",
+     .errors = any_of(Error::sequence_mismatch),
+     .shown_with = "life_counter=true"},
+}});
+
 // BiSS Safety: a control word and a safety word, each with its own check.
-inline constexpr std::array<Clause, 2> safety_clauses{{
+inline constexpr auto safety_clauses = with_registers(std::array<Clause, 4>{{
     {"crc", "BiSS Safety, CPW and SPW", "CRC-6 over the control word, CRC-16 over the safety word, both inverted",
      Demand::checked},
-    {"header", "BiSS C timing diagram", "ACK, start bit and CDS bit come before the words", Demand::as_drawn},
-}};
+    {.id = "header",
+     .paragraph = "BiSS C timing diagram",
+     .words = "ACK, start bit and CDS bit come before the words",
+     .demand = Demand::as_drawn,
+     .errors = header_errors},
+    {.id = "life-counter",
+     .paragraph = "BiSS Safety, LC",
+     .words = "from frame to frame the life counter of the safety word goes on by one",
+     .demand = Demand::as_drawn,
+     .needs = "spw_life_counter=true",
+     .errors = any_of(Error::sequence_mismatch)},
+    {.id = "agreement",
+     .paragraph = "BiSS Safety, CPW and SPW",
+     .words = "the positions of both words agree within one count of the bits that are compared",
+     .demand = Demand::as_drawn,
+     .errors = any_of(Error::cross_check_failed),
+     .shown_with = "motion=rpm=60"},
+}});
 
-inline constexpr std::array<Clause, 2> chain_clauses{{
+inline constexpr auto chain_clauses = with_registers(std::array<Clause, 2>{{
     {"crc", "BiSS C timing diagram, CRC", "each encoder's CRC, inverted, over its own position and status",
      Demand::checked},
-    {"header", "BiSS C timing diagram", "ACK, start bit and CDS bit come before the first encoder's word",
-     Demand::as_drawn},
-}};
+    {.id = "header",
+     .paragraph = "BiSS C timing diagram",
+     .words = "ACK, start bit and CDS bit come before the first encoder's word",
+     .demand = Demand::as_drawn,
+     .errors = header_errors},
+}});
 
 // Of one encoder, of two words or of a chain: the line is the same.
 inline constexpr std::array<HostClause, 7> host_clauses{{

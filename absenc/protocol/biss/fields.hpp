@@ -13,7 +13,7 @@ enum FieldIndex : std::size_t { field_ack_bits, field_crc, field_life_counter, f
 inline constexpr std::array<FieldInfo, 5> own_fields{{
     {"ack_bits", FieldInfo::Kind::number, "", "clocks until the encoder was ready"},
     {"crc", FieldInfo::Kind::number, "", "as sent: inverted"},
-    {"life_counter", FieldInfo::Kind::number, "", "counts up with every reading (BiSS Safety)"},
+    {"life_counter", FieldInfo::Kind::number, "", "counts up with every frame (BiSS Safety)", {}, Role::life_counter},
     {"line_delay_clocks", FieldInfo::Kind::number, "", "whole clocks by which the line is late, there and back"},
     {"line_delay_us", FieldInfo::Kind::real, "us", "the same at the clock of ma_khz: 100 m of cable make 1 us"},
 }};

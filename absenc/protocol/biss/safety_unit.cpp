@@ -55,13 +55,13 @@ constexpr std::array<FieldInfo, 14> safety_fields{{
     {"angle_deg", Kind::real, "deg", "position within the turn", {}, Role::of_position},
     {"cpw_error", Kind::boolean, "", "the encoder says that its position is wrong"},
     {"cpw_warning", Kind::boolean, "", "the encoder works near its limits"},
-    {"cpw_life_counter", Kind::number, "", "counts up with every frame"},
+    {"cpw_life_counter", Kind::number, "", "counts up with every frame", {}, Role::life_counter},
     {"cpw_crc", Kind::number, "", "as sent: inverted"},
     {"spw_multiturn", Kind::counts, "revolutions", "turns of the safety word", {}, Role::of_position},
     {"spw_singleturn", Kind::counts, "counts", "position of the safety word", {}, Role::of_position},
     {"spw_error", Kind::boolean, "", "the safety word says that its position is wrong"},
     {"spw_warning", Kind::boolean, "", "the safety word warns"},
-    {"spw_life_counter", Kind::number, "", "counts up with every frame, 63 and then 0"},
+    {"spw_life_counter", Kind::number, "", "counts up with every frame, 63 and then 0", {}, Role::life_counter},
     {"spw_crc", Kind::number, "", "as sent: inverted"},
     {"alarms", Kind::flags, "", "error and warning of either word", word_flags},
 }};
@@ -170,12 +170,12 @@ constexpr void put_safety_reply(FieldSink& sink, const SafetyFormat& format, con
   put_word_of(sink, format.cpw, reply.cpw, false);
   put_word_of(sink, format.spw, reply.spw, true);
 }
-Explanation explain_safety(const SafetyFormat& format, Error error, Bytes, Bytes) {
+Explanation explain_safety(const SafetyFormat& format, Error error, Bytes request, Bytes reply) {
   if (error == Error::sequence_mismatch) {
     return {"the life counter of the safety word did not go on by one: a frame was lost, or sent twice"};
   }
   if (error == Error::cross_check_failed) return {"control word and safety word show different positions"};
-  return explain_frame(format, error);
+  return explain_frame(format, error, request, reply);
 }
 
 constexpr Report<ProtocolOf<SafetyFormat>> safety_report{.put_reply = put_safety_reply, .explain = explain_safety};
