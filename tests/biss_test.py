@@ -323,6 +323,42 @@ class LifeCounter(Case):
         self.assertEqual(self.errors("biss-safety", [words[0], mixed]), [None, "cross_check_failed"])
 
 
+class Wires(Case):
+    """When the data line changes, in nanoseconds, as a VCD file has it."""
+
+    def changes(self, encoder):
+        path = self.file("wires.vcd")
+        self.assert_good(absenc("wave", encoder, path, "--force"))
+        wires = {'!': [], '"': []}
+        now = 0
+        with open(path, encoding="utf-8") as file:
+            for line in file.read().split("$enddefinitions $end\n")[1].splitlines():
+                if line.startswith("#"):
+                    now = int(line[1:])
+                else:
+                    wires[line[1]].append((now, line[0]))
+        return wires['!'], wires['"']
+
+    def test_the_timeout_and_the_monoflop_are_drawn(self):
+        for encoder, low in (("biss", 20_000), ("biss?timeout_us=12.5", 12_500), ("biss?timeout_us=40", 40_000),
+                             ("biss?adaptive_timeout=true", 1500), ("biss?adaptive_timeout=true&ma_khz=100", 15_000),
+                             ("biss-chain?slaves=8", 20_000), ("biss-safety", 20_000),
+                             ("ssi", 500_000), ("ssi?monoflop_us=9", 9000), ("ssi?monoflop_us=41", 41_000)):
+            with self.subTest(encoder):
+                clock, data = self.changes(encoder)
+                last_edge = clock[-1][0]
+                self.assertEqual((clock[-1][1], data[-1]), ("1", (last_edge + low, "1")))
+
+    def test_each_slave_of_a_chain_takes_one_clock(self):
+        for slaves in (1, 2, 8):
+            answer, = json_lines(absenc("read", f"sim:biss-chain?slaves={slaves}", "--json").stdout)
+            self.assertTrue(answer["singleturn_valid"])
+            path = self.file(f"{slaves}.vcd")
+            self.assert_good(absenc("wave", f"biss-chain?slaves={slaves}", path))
+            row, = json_lines(absenc("decode", "biss-chain", path, "--option", f"slaves={slaves}", "--json").stdout)
+            self.assertEqual(row["fields"]["ack_bits"], 10 + slaves - 1)
+
+
 class Start(Case):
     def test_an_encoder_that_waits_for_its_start_is_started(self):
         for encoder in ("sim:biss?start_sequence=true", "sim:biss-safety?start_sequence=true",
@@ -372,7 +408,7 @@ class ChangedRegisters(Case):
             self.assert_good(result)
             settings = json.loads(result.stdout)["settings"]
             self.assertEqual({name: fields[name.replace("-", "_")] for name, fields in settings.items()},
-                             {"bank": 0, "eds-bank": 3, "profile": 0, "serial-number": slave + 1,
+                             {"bank": 0, "eds-bank": 0, "profile": 0, "serial-number": slave + 1,
                               "device-id": b"Absenc".hex(), "manufacturer": "ve"})
             self.assertEqual({fields["slave_id"] for fields in settings.values()}, {slave})
 

@@ -40,6 +40,7 @@ class Line {
     std::span<const Item> in;
     Time lead{};
     Time held_low = never;  // clocked: since when the clock line was held low before `start`; never: it was idle
+    Time low_after{};       // clocked: from the last edge of the clock the device drives the data line low for so long
   };
   /// Called for every transfer of SPI or clocked bits, at its end.
   using TransferObserver = std::function<void(const Transfer& transfer)>;

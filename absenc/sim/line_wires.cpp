@@ -139,6 +139,7 @@ void Line<Item>::begin_transfer(Node node) {
     if (nodes_[other]->role == Role::host) continue;
     nodes_[other]->doing = Step<Item>::Kind::wait;
     nodes_[other]->out.clear();
+    nodes_[other]->width = {};
     const Time period = kind_ == LinkKind::clocked ? host.settings.bits(1) : Time{};
     feed(other, {.kind = Event<Item>::Kind::selected, .at = now_, .held_low = host.hold_low, .width = period});
   }
@@ -151,8 +152,10 @@ void Line<Item>::end_transfer(Node node) {
   if constexpr (std::is_same_v<Item, std::uint8_t>) {
     State& host = *nodes_[node];
     std::vector<Item> in(host.expect, 0xFF);  // nobody drives: pulled up
+    Time low_after{};
     for (const auto& other : nodes_) {
       if (other->role == Role::host) continue;
+      low_after = std::max(low_after, other->width);
       for (std::size_t i = 0; i < std::min(in.size(), other->out.size()); ++i) in[i] &= other->out[i];
     }
     const std::size_t unclocked = in.size() * 8 - host.bits;
@@ -161,7 +164,8 @@ void Line<Item>::end_transfer(Node node) {
     out.resize(host.expect, 0);
     const std::size_t bits = host.bits;
     if (transfer_observer_ && bits > 0) {
-      transfer_observer_({host.start, now_, bits, out, in, host.lead, host.hold_low ? host.taken_up : never});
+      transfer_observer_(
+          {host.start, now_, bits, out, in, host.lead, host.hold_low ? host.taken_up : never, low_after});
     }
     for (Node other = 0; other < nodes_.size(); ++other) {
       if (nodes_[other]->role == Role::host) continue;

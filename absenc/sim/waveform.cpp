@@ -136,6 +136,8 @@ void Waveform::draw_clocked(const Line<std::uint8_t>::Transfer& seen) {
     const Time from = i + idle == 0 ? seen.start : half(2 * (i + idle) - 1);
     if (!BitView{seen.in, seen.bits}[static_cast<std::size_t>(i)]) drive(data, from, half(2 * (i + idle) + 1));
   }
+  const Time last_edge = half(2 * (bits + idle) - 1);
+  drive(data, last_edge, last_edge + seen.low_after);
 }
 
 // CPHA 0: data stands before the leading edge, which takes it. CPHA 1: it comes with the leading edge.

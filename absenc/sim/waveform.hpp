@@ -22,7 +22,8 @@ namespace absenc::sim {
 /// - beside these, when there were pulses: `trigger`, `clear`, which a pulse pulls to 0
 /// - spi: `cs`, `sck`, `mosi`, `miso`; nobody on miso is 1
 /// - clocked: `clock`, idle high, and `data`, which changes at its rising edges. The host takes each bit at the falling
-///   edge behind. With `idle_clocks` that is so many clocks more than there are bits.
+///   edge behind. With `idle_clocks` that is so many clocks more than there are bits. Behind the last edge the device
+///   may hold `data` low: the timeout of BiSS, the monoflop of SSI.
 /// - CAN: `can`, recessive is 1; every frame is acknowledged
 class Waveform {
  public:

@@ -157,6 +157,44 @@ TEST(Waveform, ClockedBits) {
             "#3500\n1!\n0\"\n#4000\n0!\n#4500\n1!\n1\"\n#14500\n");
 }
 
+TEST(Waveform, DataIsLowForTheTimeoutBehindTheLastEdge) {
+  const std::array<std::uint8_t, 1> ones{0xE0};
+  Picture picture(LinkKind::clocked, slow);
+  Line<std::uint8_t>::Transfer seen{1us, 4us, 3, {}, ones};
+  seen.low_after = 20us;
+  picture.transfer(seen);
+  EXPECT_THAT(body(picture), ::testing::EndsWith("#3000\n0!\n#3500\n1!\n0\"\n#23500\n1\"\n#33500\n"));
+
+  // BiSS: 20 us, or one and a half periods; SSI: the monoflop, which runs from the edge behind the last bit.
+  biss::Format biss{};
+  const auto biss_low = [&] {
+    biss::testing::Bench bench(biss::line_settings, biss);
+    Time low{};
+    bench.line.observe_transfers([&low](const auto& one) { low = one.low_after; });
+    biss::ReadPosition read(biss);
+    bench.run(read);
+    EXPECT_EQ(read.error(), Error::none);
+    return low;
+  };
+  EXPECT_EQ(biss_low(), 20us);
+  biss.timeout = biss::Timeout::fixed(12'500ns);
+  EXPECT_EQ(biss_low(), 12'500ns);
+  biss.timeout = biss::Timeout::adaptive();
+  EXPECT_EQ(biss_low(), 1'500ns);
+  const auto ssi_low = [](const ssi::Format& format) {
+    biss::testing::ClockedBench<ssi::VirtualEncoder> bench(ssi::line_settings, format);
+    Time low{};
+    bench.line.observe_transfers([&low](const auto& one) { low = one.low_after; });
+    ssi::ReadPosition read(format);
+    bench.run(read);
+    EXPECT_EQ(read.error(), Error::none);
+    return low;
+  };
+  EXPECT_EQ(ssi_low({}), 20us);
+  EXPECT_EQ(ssi_low({.monoflop = 9us}), 9us);
+  EXPECT_EQ(ssi_low({.after_word = ssi::AfterWord::one}), 0us);
+}
+
 TEST(Waveform, PulsesHaveWiresOfTheirOwn) {
   Picture waveform(LinkKind::full_duplex, slow);
   waveform.pulse(ExtraWire::trigger, 1us, 3us);

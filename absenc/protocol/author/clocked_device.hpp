@@ -29,9 +29,12 @@ class ClockedDevice : public EncoderOn<std::uint8_t> {
   virtual void selected(Time at, Time period, bool held_low, DrivenBits& bits) = 0;
   /// The host has stopped after so many clocks, one at least.
   virtual void clocked(Time at, std::size_t clocks) = 0;
+  /// For `selected`: from the last edge of the clock the line is driven low for so long.
+  void hold_low(Time time) { low_after_ = time; }
 
  private:
   DrivenBits bits_;
+  Time low_after_{};
   bool pending_ = false;  // to be driven
   bool driving_ = false;
 };

@@ -47,6 +47,8 @@ struct ChainFormat {
   return bits;
 }
 
+[[nodiscard]] constexpr unsigned passing_bits(const ChainFormat& format) { return format.count - 1u; }
+
 struct ChainReply {
   unsigned ack_bits = 1;
   std::array<ChannelData, ChainFormat::most> channels{};
@@ -68,9 +70,13 @@ struct ChainReply {
 }
 
 template <std::size_t Capacity>
-constexpr bool encode(const ChainFormat& format, const ChainReply& reply, BitBuffer<Capacity>& out) {
+constexpr bool encode(const ChainFormat& format, const ChainReply& reply, BitBuffer<Capacity>& out,
+                      std::uint8_t silent = 0) {
   if (!detail::append_head(reply, data_bits(format), out)) return false;
-  for (unsigned i = 0; i < format.count; ++i) detail::append_data(format.channels[i], reply.channels[i], out);
+  for (unsigned i = 0; i < format.count; ++i) {
+    const bool is_silent = (silent >> (format.count - 1u - i) & 1) != 0;
+    if (!is_silent) detail::append_data(format.channels[i], reply.channels[i], out);
+  }
   return true;
 }
 

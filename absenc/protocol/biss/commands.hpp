@@ -134,7 +134,7 @@ template <const auto& report, class F>
 }
 
 template <class F>
-[[nodiscard]] Explanation explain_frame(const F& format, Error error, Bytes = {}, Bytes = {}) {
+[[nodiscard]] Explanation explain_frame(const F& format, Error error, Bytes = {}, Bytes reply = {}) {
   switch (error) {
     case Error::invalid_argument:
       if (ProtocolOf<F>::clocks(format) <= ProtocolOf<F>::most_clocks) return {};
@@ -142,6 +142,10 @@ template <class F>
     case Error::truncated:
       return {"ACK and line take longer than latency_us allows at this clock: raise it, or lower the MA clock"};
     case Error::bad_checksum:
+      if (typename ProtocolOf<F>::Reply head; !reply.empty() && is_empty_frame({reply, reply.size() * 8}, head)) {
+        return {"zeros alone follow the start bit: the process data of the encoder are switched off",
+                "switch them on: `absenc run ... control-command 1 0`, or switch the supply off and on"};
+      }
       return {"the delay of the line may not suit this MA clock: try another one"};
     default:
       return {};

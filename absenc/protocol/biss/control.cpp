@@ -202,7 +202,7 @@ bool ControlSlaves::step(bool cdm, ControlTarget& target) {
   switch (state_) {
     case State::header:
       bits_ = static_cast<std::uint16_t>(bits_ << 1 | (cdm ? 1 : 0));
-      if (at_++ == header_bits) return end_header();
+      if (at_++ == header_bits) return end_header(target);
       return at_ <= more_slaves_at && at_ - 1 < count_;
     case State::direction:
       return direction(cdm, target);
@@ -221,14 +221,13 @@ bool ControlSlaves::step(bool cdm, ControlTarget& target) {
 }
 
 // Who receives a wrong one is silent.
-bool ControlSlaves::end_header() {
+bool ControlSlaves::end_header(const ControlTarget& target) {
   const Result<ControlRequest> request = request_of_header(bits_);
-  const unsigned known = std::min(count_, control_slaves);
   if (!request) return end();
   request_ = *request;
   if (request_.is_command()) {
     state_ = State::command;
-  } else if (request_.slave < known) {
+  } else if (is_there(request_.slave, target)) {
     state_ = State::direction;
   } else {
     return end();
@@ -314,7 +313,7 @@ bool ControlSlaves::command(bool cdm, ControlTarget& target) {
     return end();
   }
   const unsigned slave = at - direction_at;
-  const bool mine = slave < std::min(count_, control_slaves) && (request_.slaves >> slave & 1) != 0;
+  const bool mine = is_there(slave, target) && (request_.slaves >> slave & 1) != 0;
   return mine && target.obeys(slave, request_.command);
 }
 

@@ -154,6 +154,8 @@ struct ControlTarget {
   [[nodiscard]] virtual bool stop_bit(bool next_allowed) const { return !next_allowed; }
   /// Whether the byte can begin now: the encoder has it, or can take it.
   [[nodiscard]] virtual bool is_ready() const = 0;
+  /// Whether the slave takes part: the command that ends that is taken back by another, which all hear.
+  [[nodiscard]] virtual bool listens(unsigned) const { return true; }
   /// Whether the slave does this.
   [[nodiscard]] virtual bool obeys(unsigned slave, unsigned command) const = 0;
   virtual void execute(std::uint8_t slaves, unsigned command) = 0;
@@ -175,7 +177,7 @@ class ControlSlaves {
  private:
   enum class State : std::uint8_t { idle, header, direction, start, read, write, command };
   bool step(bool cdm, ControlTarget& target);
-  bool end_header();
+  bool end_header(const ControlTarget& target);
   bool direction(bool cdm, ControlTarget& target);
   bool begin_byte(ControlTarget& target);
   bool read(bool cdm, ControlTarget& target);
@@ -183,6 +185,9 @@ class ControlSlaves {
   bool command(bool cdm, ControlTarget& target);
   bool end(bool cds = false);
   [[nodiscard]] bool next_allowed(const ControlTarget& target) const;
+  [[nodiscard]] bool is_there(unsigned slave, const ControlTarget& target) const {
+    return slave < count_ && slave < control_slaves && target.listens(slave);
+  }
 
   unsigned count_;
   State state_ = State::idle;

@@ -42,7 +42,7 @@ VirtualRegisters::VirtualRegisters(unsigned slaves, RegisterOrder order, StopBit
   const unsigned lowest = registers::serial_number + (order == RegisterOrder::big ? 3 : 0);
   for (unsigned slave = 0; slave < most_slaves; ++slave) {
     const MutableBytes own = MutableBytes(memory_).subspan(slave * slave_size + direct);
-    own[registers::eds_bank - registers::bank_size] = banks - 1;
+    own[registers::eds_bank - registers::bank_size] = 0;  // there is no electronic data sheet
     own[registers::profile - registers::bank_size] = 0;
     own[registers::profile + 1 - registers::bank_size] = 0;
     own[lowest - registers::bank_size] = static_cast<std::uint8_t>(slave + 1);
@@ -50,7 +50,11 @@ VirtualRegisters::VirtualRegisters(unsigned slaves, RegisterOrder order, StopBit
   }
 }
 
-void VirtualRegisters::power_on() { bank_ = {}; }
+void VirtualRegisters::power_on() {
+  bank_ = {};
+  silent_ = 0;
+  closed_ = 0;
+}
 
 void VirtualRegisters::set_time(Time at, Time delay) {
   now_ = at;
@@ -98,9 +102,20 @@ bool VirtualRegisters::is_ready() const {
   return now_ - asked_at_ >= delay_;
 }
 
-// The commands of the standard, all of which only have to do with the line.
+// The commands of the standard; 2 and 3 are the maker's own.
 bool VirtualRegisters::obeys(unsigned, unsigned command) const { return command < 2; }
 
-void VirtualRegisters::execute(std::uint8_t, unsigned) {}
+void VirtualRegisters::execute(std::uint8_t slaves, unsigned command) {
+  const auto process_data = [&](std::uint8_t whose, bool on) {
+    silent_ = static_cast<std::uint8_t>(on ? silent_ & ~whose : silent_ | whose);
+  };
+  const auto control = [&](std::uint8_t whose, bool on) {
+    closed_ = static_cast<std::uint8_t>(on ? closed_ & ~whose : closed_ | whose);
+  };
+  const bool broadcast = slaves == 0;
+  const auto whose = static_cast<std::uint8_t>(broadcast ? 0xFF : slaves);
+  if (command == 0) process_data(whose, !broadcast);
+  if (command == 1) control(whose, broadcast);
+}
 
 }  // namespace absenc::biss

@@ -48,15 +48,17 @@ class EncoderOf {
       return;
     }
     typename ProtocolOf<F>::Reply reply;
-    reply.ack_bits = ack_bits(behaviour_.latency, period);
+    reply.ack_bits = head_bits(format_, behaviour_.latency, period);
     reply.cds = cds;
     show(format_, shaft_->at(at), alarms_, life_counter_, reply);
-    if (!encode(format_, reply, samples)) {  // not ready within all the clocks that anybody gives
+    if (!encode(format_, reply, samples, silent_)) {  // not ready within all the clocks that anybody gives
       samples.clear();
       samples.append(low_mask(idle_bits), idle_bits);
       while (samples.size() < Samples::capacity()) samples.append(0, 1);
     }
     life_counter_ = static_cast<std::uint8_t>((life_counter_ + 1u) & low_mask(life_counter_bits));
+    const std::size_t whole = std::min<std::size_t>(clocks(format_, behaviour_.latency, period), Samples::capacity());
+    while (samples.size() < whole) samples.append(0, 1);  // of slaves that are silent
     delay_.apply(behaviour_, period, samples);
     while (samples.size() % 8 != 0) samples.append(0, 1);
   }
@@ -67,6 +69,8 @@ class EncoderOf {
   [[nodiscard]] bool is_powered() const { return powered_; }
   void set_power(bool on) { powered_ = on; }
   void set_alarms(std::uint32_t alarms) { alarms_ = alarms; }
+  /// Slaves whose process data are switched off: bit n is slave n.
+  void set_silent(std::uint8_t slaves) { silent_ = slaves; }
 
  private:
   F format_;
@@ -74,6 +78,7 @@ class EncoderOf {
   Behaviour behaviour_;
   bool powered_ = false;
   std::uint32_t alarms_ = 0;
+  std::uint8_t silent_ = 0;
   std::uint8_t life_counter_ = 0;
   LineDelay delay_;
 };
@@ -93,12 +98,15 @@ class VirtualRegisters final : public ControlTarget {
   void set_time(Time at, Time delay);
   [[nodiscard]] MutableBytes memory() { return MutableBytes(memory_).first(std::size_t{slaves_} * slave_size); }
   [[nodiscard]] std::uint32_t written() const { return written_; }
+  /// Slaves whose process data are switched off.
+  [[nodiscard]] std::uint8_t silent() const { return silent_; }
 
   [[nodiscard]] bool allows(unsigned slave, unsigned address, bool write) const override;
   [[nodiscard]] std::uint8_t read(unsigned slave, unsigned address) override;
   void write(unsigned slave, unsigned address, std::uint8_t value) override;
   [[nodiscard]] bool stop_bit(bool next_allowed) const override;
   [[nodiscard]] bool is_ready() const override;
+  [[nodiscard]] bool listens(unsigned slave) const override { return (closed_ >> slave & 1) == 0; }
   [[nodiscard]] bool obeys(unsigned slave, unsigned command) const override;
   void execute(std::uint8_t slaves, unsigned command) override;
 
@@ -114,6 +122,8 @@ class VirtualRegisters final : public ControlTarget {
   mutable Time asked_at_{};
   mutable bool asked_ = false;
   std::uint32_t written_ = 0;
+  std::uint8_t silent_ = 0;  // process data off: bit n is slave n
+  std::uint8_t closed_ = 0;  // control communication off
 };
 
 /// How many slaves these frames carry words of.
@@ -144,19 +154,22 @@ class VirtualEncoderOf final : public author::ClockedDevice {
     if (period == Time{}) period = line_settings.bits(1);
     expect(period >= shortest_period, "MA faster than 10 MHz", at);
     needed_ = 0;
+    timeout_ = encoder_.format().timeout.of_encoder(period);
+    period_ = period;
+    if (period / 2 < timeout_) hold_low(timeout_);
     // Else SLO is still low.
     if (!expect(at >= free_at_, "clocked before the BiSS timeout has passed", at)) {
       samples.append(0, 64);
       return;
     }
-    timeout_ = encoder_.format().timeout.of_encoder(period);
     expect(period / 2 < timeout_, "MA slower than the BiSS timeout allows", at);
-    if (behaviour.start_sequence && !woken_) return;
+    if (behaviour.start_sequence && !woken_) return hold_low({});
     registers_.set_time(at, behaviour.register_delay);
     const std::uint32_t written = registers_.written();
     if (clocked_before_) slaves_.take(held_low, registers_);
     if (registers_.written() != written) change_memory();
     encoder_.set_alarms(raised());
+    encoder_.set_silent(registers_.silent());
     encoder_.sample(at, period, samples, slaves_.cds());
     needed_ = clocks(encoder_.format(), behaviour.latency, period);
   }
@@ -169,7 +182,7 @@ class VirtualEncoderOf final : public author::ClockedDevice {
       count_answer();
     }
     clocked_before_ = true;
-    free_at_ = at + timeout_;
+    free_at_ = at - period_ / 2 + timeout_;  // from the last rising edge
   }
   void started(Time) override {
     registers_.power_on();
@@ -185,6 +198,7 @@ class VirtualEncoderOf final : public author::ClockedDevice {
   VirtualRegisters registers_;
   unsigned needed_ = 0;  // clocks of this frame; 0: there is none
   Time timeout_{};       // of this frame
+  Time period_{};        // of MA
   Time free_at_{};       // the timeout after the last clock
   bool clocked_before_ = false;
   bool woken_ = false;  // by the start sequence

@@ -51,6 +51,7 @@ TEST(BissDevice, ReportsWhatItsHostDoesWrong) {
 }
 
 TEST(BissDevice, TimeoutIsThatOfItsFormat) {
+  // `pause`: behind the last period, half of which is behind the last edge.
   const auto allows = [](Timeout timeout, std::uint32_t rate, Time pause) {
     Format format = bits_19;
     format.timeout = timeout;
@@ -59,16 +60,16 @@ TEST(BissDevice, TimeoutIsThatOfItsFormat) {
     bench.clock(64, pause, rate);
     return bench.last_rule() != "clocked before the BiSS timeout has passed";
   };
-  EXPECT_FALSE(allows({}, 1'000'000, 19'900ns));
-  EXPECT_TRUE(allows({}, 1'000'000, 20us));
+  EXPECT_FALSE(allows({}, 1'000'000, 19'400ns));
+  EXPECT_TRUE(allows({}, 1'000'000, 19'500ns));
   for (const Time fixed : {12'500ns, 20'000ns, 40'000ns}) {
-    EXPECT_FALSE(allows(Timeout::fixed(fixed), 1'000'000, fixed - 100ns)) << fixed.count();
-    EXPECT_TRUE(allows(Timeout::fixed(fixed), 1'000'000, fixed)) << fixed.count();
+    EXPECT_FALSE(allows(Timeout::fixed(fixed), 1'000'000, fixed - 600ns)) << fixed.count();
+    EXPECT_TRUE(allows(Timeout::fixed(fixed), 1'000'000, fixed - 500ns)) << fixed.count();
   }
-  EXPECT_FALSE(allows(Timeout::adaptive(), 1'000'000, 1'400ns));
-  EXPECT_TRUE(allows(Timeout::adaptive(), 1'000'000, 1'500ns));
-  EXPECT_FALSE(allows(Timeout::adaptive(), 100'000, 14'900ns));
-  EXPECT_TRUE(allows(Timeout::adaptive(), 100'000, 15us));
+  EXPECT_FALSE(allows(Timeout::adaptive(), 1'000'000, 900ns));
+  EXPECT_TRUE(allows(Timeout::adaptive(), 1'000'000, 1us));
+  EXPECT_FALSE(allows(Timeout::adaptive(), 100'000, 9'900ns));
+  EXPECT_TRUE(allows(Timeout::adaptive(), 100'000, 10us));
 }
 
 TEST(BissDevice, ItsOwnTimeIsThatOfTheOptionsOrTenMicroseconds) {

@@ -103,10 +103,22 @@ struct Format {
   return std::max(1u, static_cast<unsigned>((needed + clock - 1) / clock));
 }
 
+/// Clocks that the slaves between an encoder and the host add to the ACK: each passes it on one clock later.
+template <class AnyFormat>
+[[nodiscard]] constexpr unsigned passing_bits(const AnyFormat&) {
+  return 0;
+}
+
+/// Clocks before the start bit, behind those of the idle line.
+template <class AnyFormat>
+[[nodiscard]] constexpr unsigned head_bits(const AnyFormat& format, Time latency, Time period) {
+  return ack_bits(latency, period) + passing_bits(format);
+}
+
 /// Clocks that a whole frame needs.
 template <class AnyFormat>
 [[nodiscard]] constexpr unsigned clocks(const AnyFormat& format, Time latency, Time period) {
-  return idle_bits + ack_bits(latency, period) + 2 + data_bits(format);
+  return idle_bits + head_bits(format, latency, period) + 2 + data_bits(format);
 }
 
 template <class WordType>
@@ -220,11 +232,12 @@ template <const Format& format>
   return detail::decode_by(Known<format>{}, samples, cds);
 }
 
-/// Appends idle bits, ACK, start, CDS, word and check; `reply.crc` is not used. False when `out` is too small.
+/// Appends idle bits, ACK, start, CDS, word and check; `reply.crc` is not used. `silent`: a bit for each slave whose
+/// process data are switched off. False when `out` is too small.
 template <std::size_t Capacity>
-constexpr bool encode(const Format& format, const Reply& reply, BitBuffer<Capacity>& out) {
+constexpr bool encode(const Format& format, const Reply& reply, BitBuffer<Capacity>& out, std::uint8_t silent = 0) {
   if (!detail::append_head(reply, data_bits(format), out)) return false;
-  detail::append_data(format, reply, out);
+  if ((silent & 1) == 0) detail::append_data(format, reply, out);
   return true;
 }
 
@@ -260,6 +273,14 @@ template <const Format& format>
 [[nodiscard]] constexpr Reading reading_of(const KnownFormat<format>&, const ReplyTo<format>& reply) {
   constexpr WordContents contents = contents_of(format.word);
   return to_reading(contents, reply.word, format.scale);
+}
+
+/// Whether zeros alone follow the CDS: process data are switched off. `head` gets what is before them.
+template <class ReplyType>
+[[nodiscard]] constexpr bool is_empty_frame(BitView samples, ReplyType& head) {
+  std::size_t first = 0;
+  if (detail::take_head(samples, 0, Cds::any, head, first) != Error::none) return false;
+  return first < samples.size && !samples[first] && samples.end_of_run(first) == samples.size;
 }
 
 /// Whether these samples end before a frame does, whose encoder or line may need longer than was thought.

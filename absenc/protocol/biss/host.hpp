@@ -116,7 +116,8 @@ class PositionReader : public author::ClockedHostOf<ProtocolOf<F>> {
         return this->clock(P::all_clocks(this->format()));
       }
       const unsigned head = this->last().delay_bits + this->last().ack_bits;
-      const bool expected = tries_ == 0 && head <= ack_bits(this->format().latency, this->format().period());
+      const bool expected =
+          tries_ == 0 && head <= head_bits(this->format(), this->format().latency, this->format().period());
       const bool late = error == Error::none ? !expected && !late_.is_again(head) : needs_more(error, samples);
       if (late && tries_++ < most_late) return this->clock(P::all_clocks(this->format()));
       if (late) return this->conclude(Error::truncated);

@@ -251,10 +251,12 @@ Procedure read_info(ControlDialog<F>& dialog, Found& found) {
   co_return done;
 }
 
-/// The slaves of a mask; 0: all, who do not answer. Its last bit is said behind one frame more.
+/// The slaves of a mask; 0: all, who do not answer. Its last bit is said behind one frame more. The frames may have no
+/// process data, before the command or behind it.
 template <class F>
 Procedure send_command(ControlDialog<F>& dialog, Found& found, Arguments arguments) {
   ControlMaster master;
+  dialog.take_empty_frames();
   master.command(static_cast<std::uint8_t>(arguments[0]), static_cast<unsigned>(arguments[1]));
   dialog.changes();
   const Error error = co_await carry(dialog, master);

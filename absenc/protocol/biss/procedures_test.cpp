@@ -60,6 +60,28 @@ TEST(BissProcedures, StopBitDoesNotEndWhatIsRead) {
   EXPECT_EQ(Questions().ask<read_memory<Format>>({0, 9, 1}, Error::request_rejected).bytes.size(), 0u);
 }
 
+TEST(BissProcedures, CommandsOfTheStandardAreObeyed) {
+  Questions one;
+  const auto position = [&one] {
+    FindPosition<Format> read(one.format);
+    one.line.replace(one.node, read);
+    EXPECT_TRUE(one.line.run(one.node, one.line.now() + 10s));
+    return read.error();
+  };
+  one.ask<read_setting<Format>, registers::profile>({});
+  EXPECT_EQ(position(), Error::none);
+  EXPECT_EQ(one.ask<send_command<Format>>({0, 0}).executed, true);  // process data of all off
+  EXPECT_EQ(position(), Error::bad_checksum);
+  EXPECT_EQ(one.ask<send_command<Format>>({1, 0}).executed, true);  // those of slave 0 on
+  EXPECT_EQ(position(), Error::none);
+  EXPECT_EQ(one.ask<send_command<Format>>({1, 1}).executed, true);  // control communication of slave 0 off
+  one.ask<read_setting<Format>, registers::profile>({}, Error::timeout);
+  EXPECT_EQ(position(), Error::none);
+  EXPECT_EQ(one.ask<send_command<Format>>({0, 1}).executed, true);  // that of all on
+  one.ask<read_setting<Format>, registers::profile>({});
+  one.ask<send_command<Format>>({1, 2}, Error::request_rejected);  // the maker's own
+}
+
 /// An encoder that does not keep what is written.
 struct Forgets final : Machine<std::uint8_t> {
   explicit Forgets(VirtualEncoder& of) : encoder(of) {}

@@ -248,7 +248,7 @@ TEST(BissRegisters, WithALifeCounterNoDamagedFrameIsAPosition) {
 
 TEST(BissRegisters, EachThatHasANameIsReadAlone) {
   Questions one;
-  EXPECT_EQ((one.ask<read_setting<Format>, registers::eds_bank>().eds_bank), 3);
+  EXPECT_EQ((one.ask<read_setting<Format>, registers::eds_bank>().eds_bank), 0);
   EXPECT_EQ((one.ask<read_setting<Format>, registers::profile>().profile), 0);
   EXPECT_EQ((one.ask<read_setting<Format>, registers::serial_number>().serial_number), 1u);
   EXPECT_EQ((one.ask<read_setting<Format>, registers::device_id>().device_id.size()), 6u);

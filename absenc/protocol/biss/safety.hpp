@@ -109,10 +109,11 @@ constexpr std::uint64_t promised(const Channel& channel, const Word& word, unsig
 }
 
 template <std::size_t Capacity>
-constexpr bool encode(const SafetyFormat& format, const SafetyReply& reply, BitBuffer<Capacity>& out) {
+constexpr bool encode(const SafetyFormat& format, const SafetyReply& reply, BitBuffer<Capacity>& out,
+                      std::uint8_t silent = 0) {
   if (!detail::append_head(reply, data_bits(format), out)) return false;
-  detail::append_data(format.cpw, reply.cpw, out);
-  detail::append_data(format.spw, reply.spw, out);
+  if ((silent & 2) == 0) detail::append_data(format.cpw, reply.cpw, out);
+  if ((silent & 1) == 0) detail::append_data(format.spw, reply.spw, out);
   return true;
 }
 

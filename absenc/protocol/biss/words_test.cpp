@@ -117,6 +117,19 @@ TEST(BissWords, ClocksFollowTheClock) {
   expect_clocks_of_ten_microseconds<SafetyFormat>();
 }
 
+TEST(BissWords, EachSlaveOfAChainPassesTheStartBitOnOneClockLater) {
+  for (unsigned count = 1; count <= ChainFormat::most; ++count) {
+    ChainFormat format;
+    format.count = static_cast<std::uint8_t>(count);
+    testing::ClockedBench<VirtualEncoderOf<ChainFormat>> bench(line_settings, format);
+    PositionReader<ChainFormat, false> read(format);
+    ASSERT_EQ(bench.run(read).error(), Error::none) << count;
+    EXPECT_EQ(read.last().ack_bits, 10 + count - 1);
+    EXPECT_EQ(bench.encoder.violation_count(), 0u);
+    EXPECT_EQ(bench.clock(4 + 10 + count - 1, 1ms, 1'000'000).find('1', 2), 2 + 10 + count - 1);
+  }
+}
+
 TEST(BissWords, TheEncodersBitStandsBehindTheStartBit) {
   const auto place = [](std::initializer_list<std::uint8_t> bytes, std::size_t bits) {
     return place_of_cds({.bytes = {bytes.begin(), bytes.size()}, .bits = bits});

@@ -21,6 +21,8 @@ void VirtualEncoder::selected(Time at, Time period, bool, author::DrivenBits& bi
     latched_ = word_of(format_.word, shaft_->at(at), raised());
     shifted_ = 0;
   }
+  // Behind ones the line stays high.
+  if (format_.after_word != AfterWord::one) hold_low(monoflop());
   BitBuffer<WordFormat::maximum_bits> coded;
   encode_whole(format_, latched_, coded);
   const std::size_t wanted = std::max(2 * format_.word.bits(), clocks(format_));
@@ -31,7 +33,7 @@ void VirtualEncoder::selected(Time at, Time period, bool, author::DrivenBits& bi
 void VirtualEncoder::clocked(Time at, std::size_t clocks) {
   shifted_ += clocks;
   expect(shifted_ >= format_.word.bits(), "fewer clocks than the word has bits", at);
-  free_at_ = at + (format_.monoflop == Time{} ? format_.pause : std::min(format_.monoflop, format_.pause));
+  free_at_ = at + monoflop();
   count_answer();
 }
 

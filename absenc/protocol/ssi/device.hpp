@@ -2,6 +2,8 @@
 // A virtual SSI encoder: a shift register that is loaded when its pause is over.
 #pragma once
 
+#include <algorithm>
+
 #include "absenc/core/shaft.hpp"
 #include "absenc/protocol/author/clocked_device.hpp"
 #include "absenc/protocol/ssi/frame.hpp"
@@ -16,6 +18,10 @@ class VirtualEncoder final : public author::ClockedDevice {
  private:
   void selected(Time at, Time period, bool held_low, author::DrivenBits& bits) override;
   void clocked(Time at, std::size_t clocks) override;
+
+  [[nodiscard]] Time monoflop() const {
+    return format_.monoflop == Time{} ? format_.pause : std::min(format_.monoflop, format_.pause);
+  }
 
   Format format_;
   const Shaft* shaft_;
