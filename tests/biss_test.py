@@ -2,6 +2,7 @@
 """BiSS of the command: frames of many encoders, safety words, chains, control frames, and registers."""
 import json
 import os
+import random
 import subprocess
 import tempfile
 import unittest
@@ -280,17 +281,58 @@ def counted_word(position, counter):
     return word + crc(word, 0x03, 6)
 
 
-def draw_frames(words):
-    """A VCD of frames at 1 MHz with 20 us of timeout, edge by edge."""
+def control_crc(bits):
+    return crc(bits, 0x3, 4)
+
+
+def register_frame(slave, address, data, write=False, delays=None):
+    """CDM and CDS of one control frame, frame by frame, as D2 draws them. `delays`: frames until each start bit."""
+    delays = delays or [0] * len(data)
+    header = "1" + format(slave, "03b") + format(address, "07b")
+    cdm = "0" * 14 + "1" + header + control_crc(header) + ("011" if write else "101")
+    cds = "0" * 15 + "1" * (slave + 1) + "0" * (8 - slave - 1) + "0" * 8 + ("01" if write else "10")
+    for index, (byte, delay) in enumerate(zip(data, delays)):
+        bits = format(byte, "08b") + control_crc(format(byte, "08b"))
+        cdm += "1" * delay + (bits + "0" if write else "0" * 13) + ("1" if index + 1 < len(data) else "0")
+        cds += "0" * delay + "1" + bits + "0"
+    return cdm + "0" * 14, cds + "0" * 14
+
+
+def command_frame(slaves, command):
+    """The same of a command, which all that it addresses acknowledge."""
+    header = "0" + "".join("1" if slaves >> i & 1 else "0" for i in range(8)) + format(command, "02b")
+    there = max(slaves.bit_length(), 1)
+    cdm = "0" * 14 + "1" + header + control_crc(header) + "1"
+    cds = "0" * 15 + "1" * there + "0" * (8 - there) + "0" * 8
+    if slaves:
+        cdm += "0" * 7 + "1"
+        cds += "".join("1" if slaves >> i & 1 else "0" for i in range(8))
+    else:
+        cdm += "1"
+        cds += "0"
+    size = max(len(cdm), len(cds)) + 14
+    return cdm.ljust(size, "0"), cds.ljust(size, "0")
+
+
+def plain_word(position):
+    word = format(position, "019b") + "11"
+    return word + crc(word, 0x03, 6)
+
+
+def draw_frames(words, cdm="", cds=""):
+    """A VCD of frames at 1 MHz with 20 us of timeout, edge by edge; bit by bit with what is said in control frames."""
     lines = ["$timescale 1 ns $end", "$var wire 1 c clock $end", "$var wire 1 d data $end", "$enddefinitions $end",
              "#0", "1c", "1d"]
     now = 100_000
-    for word in words:
-        samples = "11" + "0000" + "10" + word + "0"
+    for index, word in enumerate(words):
+        samples = "11" + "0000" + "1" + (cds[index] if cds else "0") + word + "0"
         for sample in samples[1:]:
             lines += [f"#{now}", "0c", f"#{now + 500}", "1c", f"#{now + 510}", f"{sample}d"]
             now += 1000
+        held = cdm[index:index + 1] == "1"
+        lines += [f"#{now}", "0c"] if held else []
         lines += [f"#{now + 19_500}", "1d"]
+        lines += [f"#{now + 99_500}", "1c"] if held else []
         now += 100_000
     return "\n".join([*lines, f"#{now}", ""])
 
@@ -418,12 +460,12 @@ class ChangedRegisters(Case):
             self.assert_wrong_usage(refused, f"{name} of biss can only be read")
 
     def test_info_shows_them_once(self):
-        shown = absenc("info", "sim:biss").stdout
+        shown = absenc("info", "sim:biss", "--all").stdout
         for name in ("serial_number", "eds_bank", "device_id", "manufacturer", "profile"):
             self.assertEqual(shown.count(f"  {name} "), 1, shown)
         self.assertNotIn("serial-number", shown)
         self.assertIn("\n  bank ", shown)
-        silent = absenc("info", "sim:biss?slave=3")
+        silent = absenc("info", "sim:biss?slave=3", "--all")
         self.assertEqual((silent.returncode, silent.stdout.count("FAILED")), (1, 2), silent.stdout)
         self.assertIn("say slave=N", silent.stderr)
 
@@ -440,6 +482,60 @@ class Requests(Case):
             self.assertEqual(set(cdm), {"0", "1", " "})
             asked = json.loads(absenc("decode", unit, "--request", cdm, "--json").stdout)["fields"]
             self.assertEqual((asked["operation"], asked["address"], asked["data"]), ("write", 5, "42"))
+
+
+class ControlFrames(Case):
+    """Control frames that are written here from the document alone, against those of the command."""
+
+    def control(self, cdm, cds):
+        return decode("biss", "--request", cdm, "--hex", cds)
+
+    def test_what_is_asked_is_the_same(self):
+        for slave, address, value in ((0, 5, 0x42), (7, 127, 0xFF), (3, 64, 0)):
+            unit = ["biss", "--option", f"slave={slave}"]
+            written, _ = register_frame(slave, address, [value], write=True)
+            force = ["0", "1"]
+            self.assertEqual(absenc("encode", unit[0], "memory-write", str(address), hex(value), *force, *unit[1:])
+                             .stdout.replace(" ", "").strip(), written)
+            for count in (1, 2, 64 if address < 64 else 1):
+                if address + count > 128:
+                    continue
+                read, _ = register_frame(slave, address, [0] * count)
+                told = absenc("encode", unit[0], "memory-read", str(address), "0", str(count), *unit[1:]).stdout
+                self.assertEqual(told.replace(" ", "").strip(), read, (slave, address, count))
+
+    def test_what_is_answered_is_understood(self):
+        chosen = random.Random(7)
+        for _ in range(60):
+            count = chosen.choice((1, 1, 2, 5, 64))
+            slave, address = chosen.randrange(8), chosen.randrange(128 - count)
+            data = bytes(chosen.randrange(256) for _ in range(count))
+            write = chosen.random() < 0.5
+            delays = [chosen.choice((0, 0, 1, 9)) for _ in data]
+            if write:
+                delays = [0] * count
+            answer = self.control(*register_frame(slave, address, data, write, delays))
+            self.assertTrue(answer["ok"], answer)
+            fields = answer["fields"]
+            self.assertEqual((fields["operation"], fields["slave_id"], fields["address"], fields["data"]),
+                             ("write" if write else "read", slave, address, data.hex()))
+            told = numbers(fields["start_delay"])  # has room for 48 of them at least
+            self.assertEqual(told, delays[:max(48, len(told))])
+            self.assertTrue(fields["next_address_accepted"])
+        for slaves, command in ((0, 0), (0, 1), (1, 0), (0b101, 1), (0xFF, 3)):
+            fields = self.control(*command_frame(slaves, command))["fields"]
+            self.assertEqual((fields["operation"], fields["command"], fields["broadcast"], fields["executed"]),
+                             ("command", command, slaves == 0, True))
+            self.assertEqual(numbers(fields.get("acknowledged", "")), [i for i in range(8) if slaves >> i & 1])
+
+    def test_on_the_wires_they_are_rows_beside_the_positions(self):
+        cdm, cds = register_frame(0, 68, [1, 2, 0xFE], delays=[0, 4, 0])
+        path = self.file("control.vcd", draw_frames([plain_word(100 + i) for i in range(len(cdm))], cdm, cds))
+        rows = json_lines(absenc("decode", "biss", path, "--json").stdout)
+        self.assertEqual([row["fields"]["singleturn"] for row in rows if row["kind"] == "reply"],
+                         list(range(100, 100 + len(cdm))))
+        control, = [row for row in rows if row["kind"] == "exchange"]
+        self.assertEqual((control["ok"], control["fields"]["address"], control["fields"]["data"]), (True, 68, "0102fe"))
 
 
 if __name__ == "__main__":
