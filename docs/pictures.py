@@ -28,7 +28,7 @@ def picture(name):
 
 def page(browser, folder):
     """The overview with one encoder lost and one with an alarm, and the page of one."""
-    emulator = Emulator(folder, "--motion", "rpm=20")
+    emulator = Emulator(tempfile.gettempdir(), "--motion", "rpm=20", name="press-2")  # the page shows its path
     path, tokens = os.path.join(folder, "absenc.toml"), os.path.join(folder, "tokens")
     with open(path, "w", encoding="utf-8") as file:
         file.write(config({"press-2": ("tformat", "latency=300"), **KINDS}, {"press-2": emulator.path}))
@@ -44,7 +44,7 @@ def page(browser, folder):
         for name, width, height, dark, place in (
                 ("serve-overview", 1400, 900, False, {}), ("serve-overview-dark", 1920, 1000, True, {}),
                 ("serve-encoder", 1400, 900, False, {"encoder": "wrist"}),
-                ("serve-phone", 390, 844, True, {})):
+                ("serve-phone", 390, 844, True, {"encoder": "elbow"})):
             browser.window(width, height, dark)
             browser.go(server.url, **place)
             wait_until(lambda: browser.ask("return Boolean(document.querySelector('.spark .line[d], .plot canvas'))"), "it is drawn")

@@ -87,7 +87,7 @@ class Screen(MonitorCase):
             r"  \d+ good; the port went away: 0",
             "  over_heat: the encoder is or was hotter than its threshold. What to do: let it",
             "  cool, then `absenc clear-alarms`",
-            "  data_id 3 +status alarm +encoder_id 0x11",
+            "  status alarm +encoder_id 0x11",
             "",
             r"      \d\.\d{3}  .*")
         self.assertEqual(screen.splitlines()[23].rstrip(), KEYS)

@@ -26,7 +26,7 @@ KINDS = {
     "spindle": ("tformat", "model=23-bit&motion=rpm=-90&multiturn=30512"),
     "lift": ("biss", "model=linear-32-0.05um&singleturn=1579271"),
     "gripper": ("amt21", "motion=rpm=-30&max_rpm=100"),
-    "wrist": ("tformat", "motion=sine=4,0.3&singleturn=15000&multiturn=3&fault=corrupt=0.02&seed=1"),
+    "wrist": ("tformat", "motion=sine=4,0.08&singleturn=15000&multiturn=3&fault=corrupt=0.02&seed=1"),
     "elbow": ("tformat", "alarm=battery_alarm&singleturn=49789&multiturn=12"),
 }
 

@@ -43,7 +43,8 @@ class OtherFields final : public FieldSink {
     // Of two channels the line has no room for the flags.
     const FieldInfo* in_line = unit_->alarms != nullptr ? unit_->alarms : unit_->status;
     const bool is_in_line = &info == in_line && unit_->second_status == nullptr && unit_->second_alarms == nullptr;
-    if (is_in_line || info.role == Role::position || info.role == Role::turns) return;
+    const bool is_exchange = info.role == Role::exchange;  // what was asked for
+    if (is_in_line || is_exchange || info.role == Role::position || info.role == Role::turns) return;
     const std::string shown = fmt::format("{}{}{}", to_text(value), info.unit.empty() ? "" : " ", info.unit);
     fields_.emplace_back(info, shown);
   }
