@@ -4,9 +4,8 @@
 
 #include <gtest/gtest.h>
 
-#include <unistd.h>
-
 #include <filesystem>
+#include <random>
 #include <string>
 
 #include "absenc/client/error.hpp"
@@ -46,10 +45,7 @@ TEST(ClockWatch, DoubtsTheClockForAnHourAfterTheStartAndAfterEachJump) {
   EXPECT_TRUE(clock.is_trusted(now));
 }
 
-std::string new_path() {
-  static int number = 0;
-  return testing::TempDir() + "absenc-history-" + std::to_string(::getpid()) + "-" + std::to_string(++number);
-}
+std::string new_path() { return testing::TempDir() + "absenc-history-" + std::to_string(std::random_device()()); }
 
 void remove_history(const std::string& path) {
   for (const char* ending : {"", "-wal", "-shm"}) std::filesystem::remove(path + ending);

@@ -15,7 +15,7 @@ namespace absenc::client {
 
 namespace {
 
-std::optional<std::int64_t> number_of(const Value& value) {
+std::optional<std::int64_t> integer_in(const Value& value) {
   if (const auto* one = std::get_if<std::int64_t>(&value)) return *one;
   if (const auto* one = std::get_if<std::uint64_t>(&value); one != nullptr && *one <= INT64_MAX) {
     return static_cast<std::int64_t>(*one);
@@ -77,7 +77,7 @@ void ChangeRecord::look_at_memory() {
   const std::optional<Answer> answer = ask(connection_, *reader, where);
   if (!answer) return;
   for (std::size_t i = 0; i < answer->columns.size(); ++i) {
-    if (answer->columns[i].name == "value") old_value_ = number_of(answer->values[i]);
+    if (answer->columns[i].name == "value") old_value_ = integer_in(answer->values[i]);
   }
 }
 
@@ -90,12 +90,12 @@ void ChangeRecord::find_old_value(bool good) {
   if (good) connection_.report(written);
   std::vector<std::int64_t> candidates;
   for (std::size_t i = 0; i < old_->columns.size(); ++i) {
-    const std::optional<std::int64_t> value = number_of(old_->values[i]);
+    const std::optional<std::int64_t> value = integer_in(old_->values[i]);
     if (!value || old_->columns[i].look.is_exchange) continue;
     bool fits = !good;
     for (std::size_t j = 0; j < written.answer.columns.size(); ++j) {
       fits = fits || (written.answer.columns[j].name == old_->columns[i].name &&
-                      number_of(written.answer.values[j]) == arguments_.front());
+                      integer_in(written.answer.values[j]) == arguments_.front());
     }
     if (fits) candidates.push_back(*value);
   }

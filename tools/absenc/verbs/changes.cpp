@@ -5,6 +5,7 @@
 #include <array>
 #include <vector>
 
+#include "absenc/client/text/json.hpp"
 #include "absenc/client/way/journal.hpp"
 #include "tools/absenc/error.hpp"
 #include "tools/absenc/parameters.hpp"
