@@ -38,18 +38,23 @@ class Timeout {
   /// The time that the host leaves. An encoder that measures the period may be three of its own samples late (iC-PVS,
   /// table 50): 1 us is more than that of any known.
   [[nodiscard]] constexpr Time of_host(Time period) const {
-    if (code_ == 0) return timeout_maximum;
-    return code_ == is_adaptive ? period + period / 2 + 1us : code_ * Time(500);
+    if (code_ == is_adaptive) return Time(static_cast<std::int32_t>(one_and_a_half(period) + 1000));
+    return Time(static_cast<std::int32_t>((code_ != 0 ? code_ : 80u) * 500u));
   }
   /// The time that the virtual encoder takes.
   [[nodiscard]] constexpr Time of_encoder(Time period) const {
-    if (code_ == 0) return 20us;
-    return code_ == is_adaptive ? period + period / 2 : code_ * Time(500);
+    if (code_ == is_adaptive) return Time(one_and_a_half(period));
+    return Time((code_ != 0 ? code_ : 40u) * 500u);
   }
   friend constexpr bool operator==(const Timeout&, const Timeout&) = default;
 
  private:
   static constexpr std::uint8_t is_adaptive = 1;
+  // 32 bits: the longest period is 100 us.
+  static constexpr std::uint32_t one_and_a_half(Time period) {
+    const auto clock = static_cast<std::uint32_t>(period.count());
+    return clock + clock / 2;
+  }
   explicit constexpr Timeout(std::uint8_t code) : code_(code) {}
 
   std::uint8_t code_ = 0;  // halves of a microsecond
