@@ -423,7 +423,7 @@ export class One {
     const rest = sorted.filter((command) => !shown.includes(command));
     this.commands.replaceChildren(...shown.map(button), this.doctorButton,
       ...(rest.length === 0 ? [] : [element("details", {}, element("summary", {}, "More commands"), ...rest.map(button))]),
-      element("p", {class: "faint"}, "What a command changes is shown before, and stands in the history with the name of your token."));
+      element("p", {class: "faint"}, "Each command shows the value that it changes, and asks first. The history names your token."));
   }
 
   alarmsText() {
@@ -431,7 +431,7 @@ export class One {
     return alarms || (this.one.alarms === null ? "alarms not reported" : "no alarms");
   }
 
-  /** What the command would change, as it is now: of a setting and of a byte the encoder is asked. "": nothing to show. */
+  /** Returns the value that the command changes; the encoder is asked for a setting or a byte. "": nothing to show. */
   async now(command, values) {
     if (command.verb === "zero") {
       const {text, unit} = figure(this.one);

@@ -62,7 +62,7 @@ class Asked {
     setText(this.status, words);
   }
 
-  /** What was read is not shown as if it still were so. */
+  /** Removes a value that may no longer hold. */
   wipe(why) {
     this.wiped = `what was read is no longer shown: ${why}`;
     if (this.result.childElementCount === 0) return;
@@ -98,7 +98,7 @@ class Doctor extends Asked {
 
 class Settings extends Asked {
   constructor(name) {
-    super("Settings", "Read the settings", "What the encoder says of itself, and what it is set to. ");
+    super("Settings", "Read the settings", "The identity of the encoder and its settings. ");
     this.run = () => this.ask("the settings are being read", pathOf(name, "settings"), {});
   }
 

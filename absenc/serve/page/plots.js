@@ -8,7 +8,7 @@ const style = (name) => getComputedStyle(document.documentElement).getPropertyVa
 const scaled = (pixels) => pixels * parseFloat(getComputedStyle(document.documentElement).fontSize) / 16;
 const NONE = [NaN, NaN, NaN];
 
-/** What can be drawn: unit, value of [position, speed], smallest range. `past`: from the history alone. */
+/** Returns the quantities that can be drawn: unit, value of [position, speed], smallest range. `past`: from the history alone. */
 export function quantities(one) {
   if (one.linear) {
     return {

@@ -59,7 +59,7 @@ export function lastText(last) {
   return last.position_mm !== null ? `${numberText(last.position_mm, 4)} mm` : "";
 }
 
-/** What stands below the large figure, in parts that are not broken. */
+/** Returns the line below the large figure, in parts that are not broken. */
 export function belowFigure(one, now) {
   if (one.state !== "live") {
     if (one.last_reading === null) return ["no reading yet"];
@@ -124,7 +124,7 @@ export function fieldText(value, missing = "INVALID") {
   return Array.isArray(value) ? value.map(plain).join(", ") || "none" : String(value);
 }
 
-/** What happened, as [kind, words]. */
+/** Kinds of events, as [kind, words]. */
 const HAPPENED = {
   alarm: ["bad", "alarm raised"], alarm_over: ["good", "alarm over"], acknowledged: ["plain", "acknowledged"], lost: ["bad", "lost"], silent: ["warn", "no reply"],
   failing: ["warn", "replies fail"], back: ["good", "back"], restarted: ["warn", "position restarted"], ended: ["bad", "stopped"],
