@@ -214,7 +214,7 @@ void MqttSender::send_retained(MqttClient& client, const Retained& retained) {
   known->second = retained.condition;
   const std::optional<int> number = client.publish(retained.topic, retained.payload, 1, true);
   if (!number) throw Failure(client.trouble());
-  outstanding_[*number] = 0;
+  outstanding_[*number] = {0, retained.topic};
 }
 
 // Until the broker has taken one, one at a time, for a while: mosquitto hangs up behind its refusal, which is lost in
@@ -226,7 +226,7 @@ void MqttSender::send_messages(MqttClient& client) {
   for (const Message& one : spool_->after(last_sent_, has_taken_ ? most_messages_out - messages_out_ : 1)) {
     const std::optional<int> number = client.publish(one.topic, one.payload, 1, false);
     if (!number) throw Failure(client.trouble());
-    outstanding_[*number] = one.id;
+    outstanding_[*number] = {one.id, one.topic};
     ++messages_out_;
     last_sent_ = one.id;
   }
@@ -239,11 +239,12 @@ void MqttSender::settle(MqttClient& client) {
   for (const MqttClient::Acknowledgement& one : client.take_acknowledgements()) {
     const auto found = outstanding_.find(one.number);
     if (found == outstanding_.end()) continue;  // of QoS 0
-    if (found->second != 0) --messages_out_;
+    const Outstanding& sent = found->second;
+    if (sent.message != 0) --messages_out_;
     if (!one.refused.empty()) {
-      refused = one.refused;
-    } else if (found->second != 0) {
-      arrived.push_back(found->second);
+      refused = fmt::format("{} ({})", one.refused, sent.topic);
+    } else if (sent.message != 0) {
+      arrived.push_back(sent.message);
     }
     outstanding_.erase(found);
   }

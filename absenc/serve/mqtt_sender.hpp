@@ -59,9 +59,13 @@ class MqttSender {
 
   // Of the thread alone.
   MqttClient::Version version_ = MqttClient::Version::v5;
-  Time next_message_{};                                // while the broker has taken none
-  std::unordered_map<int, std::int64_t> outstanding_;  // ids of messages, 0 of states, by the number of the library
-  std::size_t messages_out_ = 0;                       // of those
+  Time next_message_{};  // while the broker has taken none
+  struct Outstanding {
+    std::int64_t message = 0;  // its id; 0: of a state
+    std::string topic{};
+  };
+  std::unordered_map<int, Outstanding> outstanding_;  // by the number of the library
+  std::size_t messages_out_ = 0;                      // of those
   std::int64_t last_sent_ = 0;
   std::set<std::string> served_;                 // encoders of which the broker may keep something
   std::map<std::string, std::string> retained_;  // by topic: the condition that was sent
