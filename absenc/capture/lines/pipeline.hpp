@@ -46,6 +46,7 @@ AsyncOutcome decode_async(Reader& reader, std::span<const AsyncLine> lines, unsi
 struct PauseReading {
   Tick pause = 0;
   std::vector<Burst> bursts{};
+  bool timed_out = false;  // the data line changed in every rest that ended a word: a timeout or a monoflop was over
 };
 
 struct ClockedLine {

@@ -129,6 +129,22 @@ std::vector<Burst> bursts_until(Tick last, const std::vector<Levels>& parts, con
   return bursts;
 }
 
+// Whether the data line changed in each rest between two of these words, which no edge of the clock brought about.
+bool changes_in_rests(const std::vector<Burst>& bursts, const std::vector<Levels>& parts, const Wires& wires,
+                      Tick settle) {
+  if (!wires.in || bursts.size() < 2) return false;
+  std::vector<Tick> changes;
+  for (const Levels& levels : parts) {
+    const Changes& data = levels.changes[*wires.in];
+    changes.insert(changes.end(), data.at.begin(), data.at.end());
+  }
+  for (std::size_t i = 1; i < bursts.size(); ++i) {
+    const auto change = std::upper_bound(changes.begin(), changes.end(), bursts[i - 1].end + settle);
+    if (change == changes.end() || *change >= bursts[i].begin) return false;
+  }
+  return true;
+}
+
 // "": `format` has its times.
 std::string look_for_pause(LevelReader& reader, const Wires& wires, const ClockedLine& line, std::vector<Levels>& parts,
                            ClockedFormat& format) {
@@ -158,6 +174,7 @@ std::string look_for_pause(LevelReader& reader, const Wires& wires, const Clocke
     ClockedFormat with = format;
     with.pause = pause;
     readings.push_back({pause, bursts_until(last, parts, wires, with)});
+    readings.back().timed_out = changes_in_rests(readings.back().bursts, parts, wires, format.settle);
   }
   format.pause = rests->pauses[line.choose(readings)];
   return {};

@@ -224,6 +224,23 @@ TEST_F(ClockedLines, SsiOfAnyClockMonoflopAndNumberOfClocks) {
   EXPECT_GT(cells, 90u);
 }
 
+// The monoflop runs out behind the second copy alone: the first rest ends no word.
+TEST_F(ClockedLines, AMonoflopThatIsOverEndsAWord) {
+  Wires wires;
+  for (unsigned word = 0; word < 12; ++word) {
+    for (unsigned copy = 0; copy < 2; ++copy) {
+      wires.burst(5000, ssi_bits + copy,
+                  [&](std::size_t at) { return at <= ssi_bits && (0x0AAAu >> (at - 1) & 1) != 0; });
+      wires.wait(copy == 0 ? 30'000 : 40'000);
+    }
+    wires.data(true, 0);
+    wires.wait(50'000);
+  }
+  const Rows rows = decode(wires, "ssi", {"bits=13"});
+  EXPECT_TRUE(notes_.empty()) << notes_[0];
+  EXPECT_EQ(rows.words, 12u);
+}
+
 // Two words with a shorter rest between them are two words, or one that was read twice.
 TEST_F(ClockedLines, TwoWaysToCutAreSaid) {
   Wires wires;

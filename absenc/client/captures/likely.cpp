@@ -144,6 +144,10 @@ std::size_t CaptureRun::likely_pause(std::span<const capture::PauseReading> read
   const auto differs = [&](std::size_t i) { return readings[i].bursts.size() != readings[best].bursts.size(); };
   const auto other = std::find_if(faultless.begin(), faultless.end(), differs);
   if (other == faultless.end() || is_proved) return best;
+  // The shortest of those whose rests the data line shows to be over: in a shorter rest the old word would go on.
+  const auto shown =
+      std::find_if(faultless.begin(), faultless.end(), [&](std::size_t i) { return readings[i].timed_out; });
+  if (shown != faultless.end()) return *shown;
   const auto length = [clock = TickClock(ticks_per_second())](Tick ticks) {
     return clock.has_time() ? fmt::format("{:g} us", clock.seconds(ticks) * 1e6) : fmt::format("{} ticks", ticks);
   };
