@@ -110,7 +110,7 @@ class Interface(InterfaceCase):
             self.assert_good(absenc("run", f"e201:{emulator.path}", "clear-zero", "--yes"))
             self.assertEqual(counts(emulator.path), 1000)
         with self.emulator("--motion", "rpm=60") as emulator:
-            self.assert_failed(absenc("run", f"e201:{emulator.path}", "set-zero", "--yes"), "stand still")
+            self.assert_failed(absenc("run", f"e201:{emulator.path}", "set-zero", "--yes"), "not_still", "standing still")
 
     def test_a_line_that_is_too_long(self):
         with self.emulator("--option", "line_delay_ns=3600") as emulator:

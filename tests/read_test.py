@@ -387,7 +387,7 @@ class Ends(EncoderCase):
             pass
         status, _, err = end(process, signal.SIGINT)
         self.assertEqual(status, 1)
-        self.assert_sentence(err, "interrupted in the middle of zero", "not known")
+        self.assert_sentence(err, "interrupted in the middle of zero", "Change: not sent")  # it only looked
 
     def test_interrupted_wait_for_an_answer(self):
         emulator = self.emulator("--fault", "silence=1")
@@ -469,7 +469,8 @@ class Run(EncoderCase):
         for value, written in (("0x42", True), ("66", False)):
             result = absenc("run", address, "memory-write", "5", value, "3", "--yes", "--json")
             self.assertEqual(json.loads(result.stdout),
-                             {"ok": True, "fields": {"page": 3, "address": 5, "value": 66, "written": written}})
+                             {"ok": True, "fields": {"page": 3, "address": 5, "value": 66, "written": written},
+                              "change": "confirmed" if written else "not_sent"})
         result = absenc("run", address, "memory-read", "4", "3", "3", "--json")
         self.assertEqual(json.loads(result.stdout)["fields"]["data"], "004200")
 

@@ -49,7 +49,7 @@ class Verbs(Case):
         self.assertNotIn("bits", info["options"])
         self.assertEqual(info["model"], None)
         self.assertEqual(info["resolution"], {"singleturn_bits": 24, "multiturn_bits": 12})
-        self.assertRegex(absenc("info", "sim:ssi", *OPTION).stdout, f"options +word={WORD}\n +after_word")
+        self.assertRegex(absenc("info", "sim:ssi", *OPTION, "--all").stdout, f"options +word={WORD}\n +after_word")
 
     def test_run_decode_and_encode(self):
         self.assertEqual(self.json_of("run", "sim:ssi?singleturn=9", "position", *OPTION)["fields"],

@@ -85,10 +85,12 @@ constexpr Result<std::uint8_t> guess_request(const Format&, Bytes reply) {
   return static_cast<std::uint8_t>(reply[0] - 1);
 }
 
+constexpr auto known_as = std::array<std::string_view, 1>{"maker"};
 constexpr Declaration<Toy, Encoder> smallest{
     .id = "smallest",
     .name = "toy",
     .document = "none",
+    .known_as = known_as,
     .link = LinkKind::half_duplex,
     .options = options.infos,
     .format = format_of<options>,
@@ -271,6 +273,11 @@ constexpr Declaration<Toy, Encoder> decoding{
     .report = report,
     .decode = [](const Format&, Frame, Frame, FieldSink&) { return Error::line_stuck; },
 };
+
+TEST(Declaration, IsKnownByItsMakers) {
+  ASSERT_EQ(unit.known_as.size(), 1u);
+  EXPECT_EQ(unit.known_as.front(), "maker");
+}
 
 TEST(Declaration, SizesReplies) {
   constexpr Unit made = Descriptor<sized>::make();

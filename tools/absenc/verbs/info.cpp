@@ -76,20 +76,20 @@ Json identity_json(const EncoderAddress& uri, const Resolution& resolution) {
       .set("options", options_to_json(unit, uri.options));
 }
 
-/// A card has what tells one encoder from another, and its temperature.
+/// A card has what tells one encoder from another, how it is reached, and its temperature.
 class CardRows final : public FieldSink {
  public:
   explicit CardRows(const Command& command) : command_(command) {}
 
   void put(const FieldValue& value) override {
     const FieldInfo& info = *value.info;
-    if (command_.verb == Verb::temperature && info.unit == "degC") {
-      rows.push_back({std::string(command_.name), fmt::format("{} degC", to_text(value))});
-    } else if (info.role == Role::identity && info.unit.empty()) {
-      std::string name(info.name);
-      std::replace(name.begin(), name.end(), '_', ' ');
-      rows.push_back({name, to_text(value)});
-    }
+    std::string name(info.name);
+    std::replace(name.begin(), name.end(), '_', ' ');
+    const std::string text = info.unit.empty() ? to_text(value) : fmt::format("{} {}", to_text(value), info.unit);
+    if (command_.verb == Verb::temperature && info.unit == "degC") rows.push_back({std::string(command_.name), text});
+    if (command_.verb == Verb::info && info.role == Role::identity && info.unit.empty()) rows.push_back({name, text});
+    const bool is_way = info.role == Role::encoder || info.role == Role::rate;
+    if (command_.verb == Verb::config_get && is_way) rows.push_back({name, text});
   }
 
   Rows rows;
@@ -220,9 +220,7 @@ int run_info(const Invocation& invocation) {
   const bool all = json || invocation.has("--all");
   if (!json) print_line(table(identity_rows(uri, all)) + '\n');
   Survey survey(uri, all);
-  for (const Command* command : questions(*uri.unit, uri.options)) {
-    if (all || command->verb != Verb::config_get) survey.ask(*command);
-  }
+  for (const Command* command : questions(*uri.unit, uri.options)) survey.ask(*command);
   if (find_command(*uri.unit, Verb::read) != nullptr) survey.read();
   const bool good = survey.troubles.empty();
   if (json) {
