@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What is installed and packaged: all is there and nothing else, it works from another place, others can use it."""
 import gzip
+import json
 import os
 import re
 import shlex
@@ -341,7 +342,11 @@ class Completion(Case):
 
     def test_protocols(self):
         listed = set(re.findall(r"^([a-z]\S+) ", absenc("list").stdout, re.MULTILINE))
-        self.assertEqual(set(self.complete("list", "")), listed)
+        units = [json.loads(line) for line in absenc("list", "--json").stdout.splitlines()]
+        known = {name for unit in units for name in [*unit["known_as"], *(model["name"] for model in unit["models"])]}
+        self.assertIn("Tamagawa", known)
+        self.assertEqual(set(self.complete("list", "")), listed | {name for name in known if " " not in name})
+        self.assertEqual(set(self.complete("emulate", "")), listed)
         self.assertEqual(set(self.complete("read", "")), {f"{id}:" for id in listed} | {f"sim:{id}" for id in listed})
         self.assertEqual(set(self.complete("read", "sim", ":")), listed)
 

@@ -229,7 +229,7 @@ class Session {
       }
       ++counters_.errors[static_cast<std::size_t>(error)];
       if (error == Error::timeout) doubt();  // it may have been switched off
-      if (number >= attempts || error == Error::invalid_argument) return conversation;
+      if (number >= attempts || error == Error::invalid_argument || error == Error::not_still) return conversation;
       if (error == Error::timeout && late() != late_before) return conversation;  // it would be late again
       ++counters_.repeated;
     }

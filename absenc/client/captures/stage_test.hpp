@@ -160,6 +160,7 @@ class Stage {
       said.is_verdict = has_bytes && address.unit->check(address.options, {.bytes = last.sent},
                                                          {.bytes = last.received}) == Error::none;
     }
+    said.is_verdict = said.is_verdict || said.error == Error::not_still;  // of two good replies
     // A clock is in the capture.
     const bool can_follow = !port.moved || address.unit->link == LinkKind::clocked;
     if (can_follow && said.error != Error::unsupported) live.push_back(std::move(said));

@@ -297,6 +297,7 @@ Json unit_json(const Unit& unit) {
       .set("protocol", unit.id)
       .set("name", unit.name)
       .set("document", unit.document)
+      .set("known_as", Json::list(unit.known_as))
       .set("link", name_of(unit.link))
       .set("line", Json::object()
                        .set("rate", unit.line.rate == 0 ? Json() : Json(unit.line.rate))
