@@ -4,6 +4,7 @@ import contextlib
 import itertools
 import json
 import os
+import re
 import select
 import shutil
 import signal
@@ -46,6 +47,17 @@ def end(process, number=signal.SIGTERM):
         process.send_signal(number)
     out, err = process.communicate(timeout=PATIENCE)
     return process.returncode, out.decode(), err.decode()
+
+
+def wait_for_handler(process):
+    """Until it catches SIGINT, which would kill it before."""
+    deadline = time.monotonic() + PATIENCE
+    while time.monotonic() < deadline:
+        with open(f"/proc/{process.pid}/status", encoding="ascii") as file:
+            caught = int(re.search(r"^SigCgt:\s*(\w+)$", file.read(), re.MULTILINE).group(1), 16)
+        if caught >> (signal.SIGINT - 1) & 1:
+            return
+    raise AssertionError(f"in vain waited until process {process.pid} catches SIGINT")
 
 
 class Emulator:

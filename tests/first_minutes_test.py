@@ -3,9 +3,11 @@
 import json
 import re
 import shlex
+import signal
+import subprocess
 import unittest
 
-from command_support import Case, Emulator, absenc
+from command_support import ABSENC, Case, Emulator, absenc, end, wait_for_handler
 
 TYPED = re.compile(r"absenc (?:identify|read) (?:\"[^\"]*\"|[^\s`\"]+)")
 
@@ -56,6 +58,21 @@ class FirstMinutes(Case):
         with Emulator(self.directory, "--fault", "silence=1") as emulator:
             result = absenc("doctor", emulator.path)
             self.assert_failed(result, "which encoder is on", "nothing came back")
+
+    def test_doctor_of_a_port_where_chance_could_answer_as_well(self):
+        with Emulator(self.directory, protocol="raa38") as emulator:  # the same frame again and again
+            result = absenc("doctor", emulator.path)
+            self.assert_failed(result, "It may be raa38", "may be chance")
+            command = shlex.split(re.search(r"`absenc (doctor [^`]*)`", result.stderr).group(1))
+            self.assert_good(absenc(*command, "--readings", "10"))
+
+    def test_doctor_of_a_port_ends_at_once(self):
+        with Emulator(self.directory, "--motion", "rpm=1") as emulator:
+            doctor = subprocess.Popen([ABSENC, "doctor", emulator.path], stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+            wait_for_handler(doctor)
+            status, out, err = end(doctor, signal.SIGINT)
+            self.assertEqual((status, out), (1, ""))
+            self.assertIn("interrupted", err)
 
     def test_ports(self):
         alone = absenc()

@@ -10,7 +10,7 @@ import subprocess
 import time
 import unittest
 
-from command_support import ABSENC, PATIENCE, Case, Emulator, absenc, end
+from command_support import ABSENC, PATIENCE, Case, Emulator, absenc, end, wait_for_handler
 
 PAGES, ADDRESSES = 6, 127
 HEADER = "absenc dump 1\nprotocol: tformat\nmodel: TS5700N8500\n"
@@ -364,18 +364,10 @@ class Interruptions(MemoryCase):
     def test_interrupted_before_anything_was_written(self):
         emulator = self.emulator("--fault", "silence=1")
         process = self.start(f"tformat:{emulator.path}?latency=60000")
-        deadline = time.monotonic() + PATIENCE
-        while not self.handles_interrupts(process.pid) and time.monotonic() < deadline:
-            pass
+        wait_for_handler(process)
         status, _, err = end(process, signal.SIGINT)
         self.assertEqual(status, 1)
         self.assertIn("nothing was written", err)
-
-    @staticmethod
-    def handles_interrupts(pid):
-        with open(f"/proc/{pid}/status", encoding="ascii") as file:
-            mask = int(re.search(r"^SigCgt:\s*(\w+)$", file.read(), re.MULTILINE).group(1), 16)
-        return bool(mask >> (signal.SIGINT - 1) & 1)
 
     def test_unplugged(self):
         emulator = self.emulator()

@@ -12,7 +12,8 @@ import subprocess
 import time
 import unittest
 
-from command_support import ABSENC, PATIENCE, Emulator, EncoderCase, FakeEncoder, absenc, end, json_lines, read_line
+from command_support import (ABSENC, PATIENCE, Emulator, EncoderCase, FakeEncoder, absenc, end, json_lines, read_line,
+                             wait_for_handler)
 
 GOOD_REPLY = bytes([0x1A, 0, 0, 0, 0, 0x11, 0, 0, 0, 0, 0x0B])
 NOBODY = 65534
@@ -382,9 +383,7 @@ class Ends(EncoderCase):
     def test_interrupted_change(self):
         emulator = self.emulator("--fault", "silence=1")
         process = self.start("zero", f"tformat:{emulator.path}?latency=60000", "--yes")
-        deadline = time.monotonic() + PATIENCE
-        while not self.handles_interrupts(process.pid) and time.monotonic() < deadline:
-            pass
+        wait_for_handler(process)
         status, _, err = end(process, signal.SIGINT)
         self.assertEqual(status, 1)
         self.assert_sentence(err, "interrupted in the middle of zero", "Change: not sent")  # it only looked
@@ -392,16 +391,8 @@ class Ends(EncoderCase):
     def test_interrupted_wait_for_an_answer(self):
         emulator = self.emulator("--fault", "silence=1")
         process = self.start("read", f"tformat:{emulator.path}?latency=60000")
-        deadline = time.monotonic() + PATIENCE
-        while not self.handles_interrupts(process.pid) and time.monotonic() < deadline:
-            pass
+        wait_for_handler(process)
         self.assertEqual(end(process, signal.SIGINT)[::2], (1, "absenc: interrupted\n"))
-
-    @staticmethod
-    def handles_interrupts(pid):
-        with open(f"/proc/{pid}/status", encoding="ascii") as file:
-            mask = int(re.search(r"^SigCgt:\s*(\w+)$", file.read(), re.MULTILINE).group(1), 16)
-        return bool(mask >> (signal.SIGINT - 1) & 1)
 
     def test_a_reader_that_goes_away(self):
         for form in ([], ["--json"], ["--csv"]):

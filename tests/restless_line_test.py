@@ -4,7 +4,7 @@ import signal
 import time
 import unittest
 
-from command_support import BabblingLine, EncoderCase, absenc, end
+from command_support import BabblingLine, EncoderCase, absenc, end, wait_for_handler
 
 PROTOCOLS = ["tformat", "esl", "encolink", "e201", "raa38-modbus"]
 
@@ -39,15 +39,8 @@ class AnEndThatHolds(EncoderCase):
             for arguments in (["monitor"], ["record", "--output", self.file("log.csv")]):
                 with self.subTest(arguments):
                     process = self.start(*arguments, f"encolink:{line.path}", "--for", "600")
-                    while not self.handles_interrupts(process.pid):
-                        pass
+                    wait_for_handler(process)
                     self.assertEqual(end(process, signal.SIGINT)[0], 1)
-
-    @staticmethod
-    def handles_interrupts(pid):
-        with open(f"/proc/{pid}/status", encoding="ascii") as file:
-            mask = next(line for line in file if line.startswith("SigCgt:")).split()[1]
-        return bool(int(mask, 16) >> (signal.SIGINT - 1) & 1)
 
 
 if __name__ == "__main__":

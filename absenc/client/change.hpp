@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What became of a command that changes an encoder: one of four states, with the word that programs compare and the
-// sentence for people. Whatever a changing command throws carries it.
+// A command that changes an encoder ends in one of four states. Programs compare its word, people read its sentence,
+// and each exception of such a command carries it.
 #pragma once
 
 #include <cstdint>
@@ -34,7 +34,7 @@ struct Change {
   [[nodiscard]] std::string text() const;
 };
 
-/// What a failure says, with the change in a line of its own.
+/// Adds the change to the text of a failure, in a line of its own.
 [[nodiscard]] std::string with_change(std::string_view what, const Change& change);
 
 /// A failure that knows what became of a change.

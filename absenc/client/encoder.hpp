@@ -129,7 +129,7 @@ class Encoder {
   /// true. Empty: never. Returns what was so before.
   std::function<bool()> end_when(std::function<bool()> over);
 
-  /// What became of the last command that changes the encoder; what it threw says the same (change.hpp).
+  /// The state of the last command that changes the encoder; its exception carries the same (change.hpp).
   [[nodiscard]] const Change& change() const;
 
   /// The position starts again from the next reading: after a command that moves the zero.

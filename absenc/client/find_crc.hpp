@@ -53,7 +53,8 @@ struct CheckOptions {
   std::vector<std::string> options;  // "crc_width=16"; none where it has this check anyhow
 };
 
-/// The units whose words can have such a check at their end. `frame_size`: of the shortest frame; `link`: of the frames.
+/// The units whose words can have such a check at their end. `frame_size`: of the shortest frame; `link`: of the
+/// frames.
 [[nodiscard]] std::vector<CheckOptions> options_for(const FoundCheck& check, std::size_t frame_size, LinkKind link);
 
 }  // namespace absenc::client

@@ -113,7 +113,7 @@ class MemoryChange {
   [[nodiscard]] const MemoryImage& differing() const { return differing_; }
   [[nodiscard]] const MemoryImage& written() const { return written_; }
   [[nodiscard]] MemoryImage not_written() const;
-  /// What became of the last byte that was to be written; not_sent while there was none.
+  /// The state of the last byte to be written; not_sent before the first.
   [[nodiscard]] ChangeState state() const { return state_; }
   /// At most one byte, of which nobody knows whether it was written.
   [[nodiscard]] MemoryImage unknown() const;

@@ -22,8 +22,8 @@ struct Column {
     std::string_view format{};  // of a real, as for std::format: "{:.6f}"; "": as short as it is exact
     bool is_detail = false;     // left out where a row is a line of a table
     bool in_hex = false;        // a number that people read in hexadecimal; tables of values have it in decimal
-    bool is_exchange =
-        false;  // what was asked for, or the bytes of the answer: nothing that the encoder says of itself
+    /// It repeats the request, or shows the bytes of the answer: the encoder says nothing of itself by it.
+    bool is_exchange = false;
   };
 
   std::string_view name;

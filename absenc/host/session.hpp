@@ -130,7 +130,7 @@ class Session {
     if (current_ != nullptr) current_->report_left(sink);
   }
 
-  /// What the last conversation sent that changes the encoder, also when its port threw.
+  /// Tells whether the last conversation sent a request that changes the encoder, also when its port threw.
   [[nodiscard]] ChangeSent change_sent() const {
     return current_ != nullptr ? current_->change_sent() : ChangeSent::no;
   }

@@ -10,30 +10,16 @@
 #include <algorithm>
 #include <cctype>
 #include <cerrno>
-#include <charconv>
 #include <fstream>
 #include <string_view>
+
+#include "absenc/os/sys_file.hpp"
 
 namespace absenc::os {
 
 namespace {
 
 namespace fs = std::filesystem;
-
-std::string first_line(const fs::path& path) {
-  std::ifstream file(path);
-  std::string line;
-  std::getline(file, line);
-  return line;
-}
-
-std::optional<std::uint32_t> decimal_of(const fs::path& path) {
-  const std::string text = first_line(path);
-  std::uint32_t number = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
-  if (error != std::errc{}) return std::nullopt;
-  return number;
-}
 
 bool is_number(std::string_view text) {
   return !text.empty() && std::all_of(text.begin(), text.end(), [](unsigned char c) { return std::isdigit(c) != 0; });
@@ -141,7 +127,7 @@ std::vector<std::string> serial_ports(const fs::path& sys) {
 }
 
 std::optional<unsigned> latency_timer(const std::string& terminal, const fs::path& sys) {
-  return decimal_of(sys / terminal / "device" / "latency_timer");
+  return first_number(sys / terminal / "device" / "latency_timer");
 }
 
 std::string driver_of(const std::string& terminal, const fs::path& sys) {
@@ -172,8 +158,8 @@ ListedPort look_at(const std::string& path, const fs::path& sys, const fs::path&
                   latency_timer(terminal, sys)};
   const AdapterChip* chip = port.usb ? chip_of(*port.usb) : nullptr;
   if (chip != nullptr) port.highest_rate = chip->highest_rate;
-  // Of a UART of the computer: sixteen periods of its clock are a bit (Documentation/ABI/testing/sysfs-tty).
-  const std::uint32_t clock = decimal_of(sys / terminal / "uartclk").value_or(0);
+  // A bit of a UART takes sixteen periods of its clock (Documentation/ABI/testing/sysfs-tty).
+  const std::uint32_t clock = first_number(sys / terminal / "uartclk").value_or(0);
   if (clock >= 16) port.highest_rate = clock / 16;
   if (::access(path.c_str(), R_OK | W_OK) != 0) port.refusal = open_failure(path, errno).what();
   port.holder = holder_of(path);

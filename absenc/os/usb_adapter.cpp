@@ -3,8 +3,8 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
-#include <fstream>
+
+#include "absenc/os/sys_file.hpp"
 
 namespace absenc::os {
 
@@ -12,19 +12,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-std::string line_of(const fs::path& path) {
-  std::ifstream file(path);
-  std::string line;
-  std::getline(file, line);
-  return line;
-}
-
-std::uint16_t hex_of(const fs::path& path) {
-  const std::string text = line_of(path);
-  std::uint16_t number = 0;
-  std::from_chars(text.data(), text.data() + text.size(), number, 16);
-  return number;
-}
+// Four hexadecimal digits.
+std::uint16_t number_of(const fs::path& path) { return static_cast<std::uint16_t>(first_number(path, 16).value_or(0)); }
 
 struct KnownChip {
   std::uint16_t vendor;
@@ -63,8 +52,9 @@ std::optional<UsbAdapter> usb_adapter(const std::string& terminal, const fs::pat
   // The terminal lies below an interface of the device, and that below the device, which alone has an idVendor.
   for (; folder.has_relative_path(); folder = folder.parent_path()) {
     if (!fs::exists(folder / "idVendor", error)) continue;
-    return UsbAdapter{hex_of(folder / "idVendor"),      hex_of(folder / "idProduct"), hex_of(folder / "bcdDevice"),
-                      line_of(folder / "manufacturer"), line_of(folder / "product"),  line_of(folder / "serial")};
+    return UsbAdapter{number_of(folder / "idVendor"),  number_of(folder / "idProduct"),
+                      number_of(folder / "bcdDevice"), first_line(folder / "manufacturer"),
+                      first_line(folder / "product"),  first_line(folder / "serial")};
   }
   return std::nullopt;
 }

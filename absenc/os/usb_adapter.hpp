@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a USB adapter says of itself, and how fast its chip is.
+// The identity of a USB adapter, and the greatest rate of its chip.
 #pragma once
 
 #include <cstdint>
@@ -25,7 +25,8 @@ struct AdapterChip {
   std::uint32_t highest_rate;  // bits a second, by its data sheet
 };
 
-/// Of the terminal ("ttyUSB0"); empty when it is not on USB. `sys` is a parameter for tests.
+/// Reads the identity of the adapter behind a terminal ("ttyUSB0"); empty when it is not on USB. `sys` is a parameter
+/// for tests.
 [[nodiscard]] std::optional<UsbAdapter> usb_adapter(const std::string& terminal,
                                                     const std::filesystem::path& sys = "/sys/class/tty");
 

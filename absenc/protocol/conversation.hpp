@@ -35,7 +35,7 @@ struct StreamCounts {
   std::uint64_t discarded = 0;
 };
 
-/// What a conversation has sent that changes the encoder.
+/// Tells whether a conversation has sent a request that changes the encoder.
 enum class ChangeSent : std::uint8_t {
   no,
   yes,      // or it may have been

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the history keeps when the calendar's clock is wrong.
+// The history keeps its seconds when the calendar's clock is wrong.
 #include "absenc/serve/history.hpp"
 
 #include <gtest/gtest.h>

@@ -24,10 +24,6 @@ namespace {
 
 using namespace std::chrono_literals;
 
-constexpr std::size_t most_points = 4096;
-constexpr std::int64_t recent_ms = 20'000;
-constexpr std::int64_t between_recent_ms = 10;
-constexpr std::size_t most_seconds = 120;  // that wait for the history
 constexpr Time between_summaries = 1s;
 constexpr Time between_tellings = 1s;    // of failures, which may come with each reading
 constexpr Time before_another_try = 5s;  // of what cannot be read as it is
@@ -54,13 +50,6 @@ std::string trouble_words(const Trouble& trouble) {
 std::string_view name_of(State state) {
   constexpr std::array<std::string_view, 7> names{"opening", "live", "silent", "failing", "lost", "ended", "examined"};
   return names[static_cast<std::size_t>(state)];
-}
-
-void Spread::add(double value) {
-  least = count == 0 ? value : std::min(least, value);
-  greatest = count == 0 ? value : std::max(greatest, value);
-  sum += value;
-  ++count;
 }
 
 Watch::Watch(std::string name, const EncoderAddress& address, double rate, Time offset, Happenings& happenings)
@@ -108,9 +97,7 @@ Snapshot Watch::snapshot() const {
   Snapshot snapshot = known_;
   snapshot.age = os::now() - known_at_;
   snapshot.state = state_now(snapshot.age);
-  for (std::size_t i = 0; i < minute_.errors.size(); ++i) {
-    if (now_s - minute_.at_s[i] < 60) snapshot.errors_last_minute += minute_.errors[i];
-  }
+  snapshot.errors_last_minute = series_.errors_last_minute(now_s);
   return snapshot;
 }
 
@@ -121,20 +108,17 @@ Details Watch::details() const {
 
 void Watch::trace(bool on) {
   const std::lock_guard lock(mutex_);
-  traced_ = on;
-  if (!on) points_.clear();
+  series_.trace(on);
 }
 
 std::vector<Point> Watch::take_points() {
   const std::lock_guard lock(mutex_);
-  std::vector<Point> taken(points_.begin(), points_.end());
-  points_.clear();
-  return taken;
+  return series_.take_points();
 }
 
 std::vector<Point> Watch::recent_points() const {
   const std::lock_guard lock(mutex_);
-  return {recent_.begin(), recent_.end()};
+  return series_.recent_points();
 }
 
 Outbox::Taken Watch::take_passing(Outlet outlet) {
@@ -149,18 +133,12 @@ void Watch::stop_passing(Outlet outlet) {
 
 std::vector<Second> Watch::last_minute() const {
   const std::lock_guard lock(mutex_);
-  return {last_minute_.begin(), last_minute_.end()};
+  return series_.last_minute();
 }
 
 std::vector<Second> Watch::take_seconds() {
-  const std::int64_t now_s = calendar_ms() / 1000;
   const std::lock_guard lock(mutex_);
-  if (second_.at_s != 0 && second_.at_s < now_s) {
-    seconds_.push_back(std::exchange(second_, {}));
-  }
-  std::vector<Second> taken(seconds_.begin(), seconds_.end());
-  seconds_.clear();
-  return taken;
+  return series_.take_seconds(calendar_ms() / 1000);
 }
 
 std::string Watch::acknowledge(std::string_view alarm, const std::string& token, const std::string& who) {
@@ -305,7 +283,12 @@ void Watch::summarize(const Encoder& live, const Sample& sample) {
   const std::lock_guard lock(mutex_);
   const std::uint64_t before = known_.counters.bad();
   const std::uint64_t errors = bad < before ? bad : bad - before;  // anew after it had ended
-  count_second(sample, errors);
+  const std::int64_t at_ms = calendar_ms();
+  series_.count_errors(at_ms, errors);
+  if (sample.kind == Sample::Kind::reading) {
+    series_.count_reading(at_ms, sample.position_valid ? std::optional(place_of(sample)) : std::nullopt,
+                          sample.speed_valid ? std::optional(sample.speed) : std::nullopt);
+  }
   pass_on(sample);
   if (errors != 0) details_.bad = live.bad_exchanges();
   known_.counters = encoder.counters();
@@ -323,43 +306,6 @@ void Watch::summarize(const Encoder& live, const Sample& sample) {
   const host::Latencies& latencies = encoder.latencies();
   known_.latency = {latencies.percentile(0.5),        latencies.percentile(0.99), latencies.longest(),
                     latencies.within(latency_limits), latencies.count(),          latencies.sum()};
-}
-
-void Watch::count_second(const Sample& sample, std::uint64_t errors) {
-  const std::int64_t at_ms = calendar_ms();
-  const std::int64_t at_s = at_ms / 1000;
-  if (at_s != second_.at_s) {
-    if (second_.at_s != 0) {
-      seconds_.push_back(second_);
-      if (second_.readings != 0) last_minute_.push_back(second_);
-      if (last_minute_.size() > 60) last_minute_.pop_front();
-    }
-    if (seconds_.size() > most_seconds) seconds_.pop_front();
-    second_ = {};
-    second_.at_s = at_s;
-  }
-  second_.errors += errors;
-  const auto slot = static_cast<std::size_t>(at_s % 60);
-  if (minute_.at_s[slot] != at_s) minute_.errors[slot] = 0;
-  minute_.at_s[slot] = at_s;
-  minute_.errors[slot] += errors;
-  if (sample.kind != Sample::Kind::reading) return;
-  ++second_.readings;
-  if (!sample.position_valid) return;
-  Point point{at_ms, place_of(sample), {}};
-  second_.place.add(point.place);
-  second_.last_place = point.place;
-  if (sample.speed_valid) {
-    point.speed = sample.speed;
-    second_.speed.add(sample.speed);
-  }
-  if (recent_.empty() || at_ms - recent_.back().at_ms >= between_recent_ms || at_ms < recent_.back().at_ms) {
-    recent_.push_back(point);
-    while (recent_.front().at_ms < at_ms - recent_ms || recent_.front().at_ms > at_ms) recent_.pop_front();
-  }
-  if (!traced_) return;
-  points_.push_back(point);
-  if (points_.size() > most_points) points_.pop_front();
 }
 
 void Watch::pass_on(const Sample& sample) {

@@ -5,7 +5,6 @@
 #include <array>
 #include <condition_variable>
 #include <cstdint>
-#include <deque>
 #include <functional>
 #include <mutex>
 #include <optional>
@@ -20,6 +19,7 @@
 #include "absenc/serve/happening.hpp"
 #include "absenc/serve/order.hpp"
 #include "absenc/serve/passing.hpp"
+#include "absenc/serve/time_series.hpp"
 
 namespace absenc::serve {
 
@@ -89,32 +89,6 @@ struct Details {
   client::Json reply{};                        // the same for people: `shown_values`
 };
 
-/// Position, continued past the end of a turn, and speed: in degrees and rpm, of linear encoders mm and mm/s.
-struct Point {
-  std::int64_t at_ms = 0;
-  double place = 0;
-  std::optional<double> speed{};
-};
-
-/// Least, greatest and mean of what there was in a second.
-struct Spread {
-  std::uint64_t count = 0;
-  double least = 0;
-  double greatest = 0;
-  double sum = 0;
-
-  void add(double value);
-  [[nodiscard]] double mean() const { return sum / static_cast<double>(count); }
-};
-struct Second {
-  std::int64_t at_s = 0;  // calendar
-  std::uint64_t readings = 0;
-  std::uint64_t errors = 0;
-  Spread place{};
-  Spread speed{};
-  std::optional<double> last_place{};  // a mean says nothing where a turn begins anew
-};
-
 class Watch {
  public:
   /// The first reading comes `offset` after the start. `happenings` outlives it.
@@ -130,20 +104,19 @@ class Watch {
 
   [[nodiscard]] Snapshot snapshot() const;
   [[nodiscard]] Details details() const;
-  /// From now on points are kept until they are taken, the newest `most_points` of them.
+  /// The functions of TimeSeries, for any thread.
   void trace(bool on);
   [[nodiscard]] std::vector<Point> take_points();
-  /// The newest of the last 20 seconds in which it was read, 10 ms or more apart; the oldest first.
   [[nodiscard]] std::vector<Point> recent_points() const;
+  [[nodiscard]] std::vector<Second> take_seconds();
+  [[nodiscard]] std::vector<Second> last_minute() const;
+
   /// All good readings since the last time: each of those who send them on has them all.
   enum class Outlet : std::uint8_t { mqtt, udp };
   [[nodiscard]] Outbox::Taken take_passing(Outlet outlet);
   /// Nobody takes them any more.
   void stop_passing(Outlet outlet);
-  /// The seconds that are over.
-  [[nodiscard]] std::vector<Second> take_seconds();
-  /// The last 60 seconds that are over and in which it was read, the oldest first: of a lost encoder those before.
-  [[nodiscard]] std::vector<Second> last_minute() const;
+
   /// "", or why it is not taken: another waits, an examination runs, or it has ended.
   [[nodiscard]] std::string_view give(Order order);
 
@@ -160,7 +133,6 @@ class Watch {
   void read_on(const std::stop_token& stop);
   void publish(const client::Encoder& live, const client::Sample& sample);
   void summarize(const client::Encoder& live, const client::Sample& sample);
-  void count_second(const client::Sample& sample, std::uint64_t errors);
   void pass_on(const client::Sample& sample);
   void tell_alarms(const Reading& reading);
   void become(State state, const std::string& message);
@@ -187,17 +159,8 @@ class Watch {
   std::optional<Order> order_;
   bool over_ = false;      // nobody takes orders any more
   bool examines_ = false;  // and takes none meanwhile
-  bool traced_ = false;
-  std::deque<Point> points_;
-  std::deque<Point> recent_;
+  TimeSeries series_;
   std::array<Outbox, 2> outboxes_;  // by Outlet
-  Second second_{};
-  std::deque<Second> seconds_;
-  std::deque<Second> last_minute_;
-  struct Minute {
-    std::array<std::uint64_t, 60> errors{};  // by second
-    std::array<std::int64_t, 60> at_s{};
-  } minute_;
 
   // Of the thread alone.
   Time next_summary_{};

@@ -219,7 +219,7 @@ class Encoder:
 
     @property
     def change(self) -> Optional[str]:
-        """What became of the last call that was to change the encoder: "not_sent", "confirmed", "refused", or "unknown":
+        """The state of the last call that was to change the encoder: "not_sent", "confirmed", "refused", or "unknown":
         it was sent, and nothing good came back. None: there was none. What such a call raises has it too."""
         return self._encoder.change or None
 

@@ -119,7 +119,8 @@ class Parser {
     }
     const Parameter* option = find_parameter(parameter::option.name);
     if (option == nullptr) {
-      throw UsageError(fmt::format("{} takes no settings behind the protocol: \"{}\"", subcommand_->name, setting));
+      throw UsageError(
+          fmt::format("{} takes no settings: give the protocol without \"{}\"", subcommand_->name, setting));
     }
     invocation_.add(option->name, std::string(setting));
   }
@@ -259,7 +260,7 @@ int run(const Subcommand& subcommand, const Invocation& invocation) {
   return exit_failed;
 }
 
-// Who types nothing has just plugged something in.
+// Somebody who types nothing has just plugged something in.
 int welcome() {
   const int status = ports_subcommand.run({});
   print_line("\n`absenc --help` shows all that absenc does, `absenc list` all encoders.");

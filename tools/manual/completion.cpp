@@ -243,7 +243,7 @@ std::vector<std::string_view> command_names(const Unit& unit) {
   return names;
 }
 
-// Of makers, families and models, each once. A name of two words would be two.
+// Names of makers, families and models, each once; a name of two words would be completed as two.
 std::set<std::string_view> known_names(std::span<const Unit* const> units) {
   std::set<std::string_view> names;
   for (const Unit* unit : units) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Which units may be on a line, in which ways each of them is asked, and which requests could harm another one.
+// Selects the units that may be on a line, the ways to ask each of them, and the requests that could harm another one.
 #pragma once
 
 #include <cstdint>

@@ -6,10 +6,10 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <cmath>
 
 #include "absenc/client/error.hpp"
+#include "absenc/client/text/known_name.hpp"
 #include "absenc/client/text/nearest.hpp"
 #include "absenc/client/text/wire_text.hpp"
 #include "absenc/protocol/all.hpp"
@@ -25,15 +25,6 @@ std::vector<std::string_view> names_of(std::span<const Named> all) {
     if (!one.name.empty()) names.push_back(one.name);
   }
   return names;
-}
-
-// In small letters: what people mean when they write a name in another way.
-std::string letters_and_digits(std::string_view name) {
-  std::string text;
-  for (const unsigned char c : name) {
-    if (std::isalnum(c) != 0) text += static_cast<char>(std::tolower(c));
-  }
-  return text;
 }
 
 std::string sentence(const Unit& unit, const OptionError& error, std::span<const std::string_view> extra_names) {
@@ -81,38 +72,6 @@ template <class Given>
 }
 
 }  // namespace
-
-std::string KnownName::sentence() const {
-  std::vector<std::string_view> ids;
-  for (const Unit* unit : units) ids.push_back(unit->id);
-  const std::span<const std::string_view> all(ids);
-  const std::string protocols = ids.size() == 1
-                                    ? std::string(ids.front())
-                                    : fmt::format("{} and {}", fmt::join(all.first(all.size() - 1), ", "), all.back());
-  if (is_model) return fmt::format("{} is a model of {}", name, protocols);
-  return fmt::format("{}: the protocol{} {}", name, ids.size() == 1 ? " is" : "s are", protocols);
-}
-
-std::optional<KnownName> find_known_name(std::string_view word) {
-  const std::string wanted = letters_and_digits(word);
-  if (wanted.empty() || find_unit(word) != nullptr) return std::nullopt;
-  KnownName known;
-  for (const Unit* unit : all_units()) {
-    std::string_view found;
-    for (const std::string_view name : unit->known_as) {
-      if (letters_and_digits(name) == wanted) found = name;
-    }
-    for (const Model& model : unit->models) {
-      if (letters_and_digits(model.name) != wanted) continue;
-      found = model.name;
-      known.is_model = true;
-    }
-    if (found.empty()) continue;
-    known.name = found;
-    known.units.push_back(unit);
-  }
-  return known.units.empty() ? std::nullopt : std::optional(known);
-}
 
 const Unit& require_unit(std::string_view id) {
   if (const Unit* unit = find_unit(id)) return *unit;
@@ -203,6 +162,11 @@ Options options_behind(const Unit& unit, const Options& options, const Command& 
     changed.values[i] = option.choices.empty() ? value : choice - option.choices.begin();
   }
   return changed;
+}
+
+std::int64_t role_value(const Command& command, std::span<const std::int64_t> arguments, Role role) {
+  const Argument* const argument = find_role(command.arguments, role);
+  return argument != nullptr ? arguments[static_cast<std::size_t>(argument - command.arguments.data())] : 0;
 }
 
 std::vector<std::int64_t> role_arguments(const Command& command, std::initializer_list<RoleArgument> values) {
@@ -306,6 +270,14 @@ std::string to_text(const WordFormat& word) {
     text += fmt::format("{}{}{}:{}{}", text.empty() ? "" : " ", name, meaning, field.bits, field.active_low ? "!" : "");
   }
   return word.gray() ? text + " gray" : text;
+}
+
+std::string option_text(const Unit& unit, const Options& options, std::string_view name) {
+  for (std::size_t i = 0; i < unit.options.size(); ++i) {
+    const Option& option = unit.options[i];
+    if (option.name == name) return fmt::format("{}={}", name, to_text(option, options[i]));
+  }
+  return {};
 }
 
 std::vector<std::string> option_texts(const Unit& unit, const Options& options) {

@@ -4,7 +4,6 @@
 
 #include <cstdint>
 #include <initializer_list>
-#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -13,19 +12,6 @@
 #include "absenc/protocol/unit.hpp"
 
 namespace absenc::client {
-
-/// A maker, a family or a model, and the protocols of its encoders.
-struct KnownName {
-  std::string_view name;
-  bool is_model = false;
-  std::vector<const Unit*> units;
-
-  /// "AksIM-2 is a model of encolink and encolink-spi", "RLS: the protocols are encolink, e201 and biss"
-  [[nodiscard]] std::string sentence() const;
-};
-
-/// Upper and lower case, '-' and spaces make no difference. Empty for a word that is none, also for a protocol.
-[[nodiscard]] std::optional<KnownName> find_known_name(std::string_view word);
 
 /// Throws UsageError, which names the protocols of a maker or model, or else the nearest.
 [[nodiscard]] const Unit& require_unit(std::string_view id);
@@ -59,6 +45,9 @@ struct RoleArgument {
 [[nodiscard]] std::vector<std::int64_t> role_arguments(const Command& command,
                                                        std::initializer_list<RoleArgument> values);
 
+/// The argument with this role; 0 when the command has none.
+[[nodiscard]] std::int64_t role_value(const Command& command, std::span<const std::int64_t> arguments, Role role);
+
 /// The bits of the flags with these names. Throws UsageError.
 [[nodiscard]] std::uint32_t require_alarms(const Unit& unit, std::span<const std::string> names);
 /// Names of those that an encoder with these options can report.
@@ -86,6 +75,9 @@ struct RoleArgument {
 [[nodiscard]] std::string to_text(const Option& option, std::int64_t value);
 /// Of an option with decimals: the number that the user writes.
 [[nodiscard]] double real_value(const Option& option, std::int64_t value);
+
+/// "baud=57600", as it stands behind an encoder; "" when the unit has no such option.
+[[nodiscard]] std::string option_text(const Unit& unit, const Options& options, std::string_view name);
 
 /// As it was written, or would be: "multiturn:12 position:24 gray"
 [[nodiscard]] std::string to_text(const WordFormat& word);

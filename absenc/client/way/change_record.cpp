@@ -59,10 +59,7 @@ ChangeRecord::ChangeRecord(Connection& connection, const Command& command, Argum
   if (command.verb == Verb::memory_write) look_at_memory();
 }
 
-std::int64_t ChangeRecord::argument(Role role) const {
-  const Argument* const found = find_role(command_.arguments, role);
-  return found != nullptr ? arguments_[static_cast<std::size_t>(found - command_.arguments.data())] : 0;
-}
+std::int64_t ChangeRecord::argument(Role role) const { return role_value(command_, arguments_, role); }
 
 void ChangeRecord::look_at_setting() {
   const Command* const getter = find_command(connection_.unit(), command_.reads_back);

@@ -23,19 +23,6 @@ Frame to_frame(std::span<const CanFrame> frames, std::size_t = 0) {
   return {.can = frames.empty() ? nullptr : &frames.front()};
 }
 
-// "baud=57600", as it stands behind an address.
-std::string option_text(const Unit& unit, const Options& options, std::string_view name) {
-  for (std::size_t i = 0; i < unit.options.size(); ++i) {
-    const Option& option = unit.options[i];
-    if (option.name != name) continue;
-    const std::int64_t value = options.values[i];
-    const auto choice = static_cast<std::size_t>(value);
-    if (choice < option.choices.size()) return fmt::format("{}={}", name, option.choices[choice]);
-    return fmt::format("{}={}", name, value);
-  }
-  return {};
-}
-
 // "it is reached with baud=57600 now", or "".
 std::string new_way(const EncoderAddress& before, const Command& command, Arguments arguments) {
   if (command.changes_option.empty()) return {};
@@ -44,7 +31,7 @@ std::string new_way(const EncoderAddress& before, const Command& command, Argume
   return fmt::format("it is reached with {} now", option_text(*before.unit, behind, command.changes_option));
 }
 
-// How to see what an encoder is now that may have been changed.
+// Says how to look at an encoder that may have been changed.
 std::string advice_to_look(const EncoderAddress& before, const Command& command, Arguments arguments) {
   const Unit& unit = *before.unit;
   const std::string address = address_of(before);
@@ -58,13 +45,9 @@ std::string advice_to_look(const EncoderAddress& before, const Command& command,
     return fmt::format("`absenc config get {} {}` shows what it is now", address, command.reads_back);
   }
   if (command.verb == Verb::memory_write && find_command(unit, Verb::memory_read) != nullptr) {
-    const auto of_role = [&](Role role) -> std::int64_t {
-      const Argument* argument = find_role(command.arguments, role);
-      return argument != nullptr ? arguments[static_cast<std::size_t>(argument - command.arguments.data())] : 0;
-    };
-    const std::int64_t page = of_role(Role::page);
-    return fmt::format("`absenc memory read {} 0x{:02X}{}` shows what is there now", address, of_role(Role::address),
-                       page != 0 ? fmt::format(" --page {}", page) : "");
+    const std::int64_t page = role_value(command, arguments, Role::page);
+    return fmt::format("`absenc memory read {} 0x{:02X}{}` shows what is there now", address,
+                       role_value(command, arguments, Role::address), page != 0 ? fmt::format(" --page {}", page) : "");
   }
   return fmt::format("`absenc read {}` shows how the encoder is now; look before you send it again", address);
 }

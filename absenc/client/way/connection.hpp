@@ -52,7 +52,7 @@ class Connection {
   virtual Outcome run(const Command& command, Arguments arguments, const std::function<void()>& on_emit = {}) = 0;
   /// For the journal: what the next command that changes the encoder will overwrite, so that it is not read again.
   void know_before(std::int64_t value) { known_before_ = value; }
-  /// What became of the last command that changes the encoder, also when it has thrown.
+  /// The state of the last command that changes the encoder, also when it has thrown.
   [[nodiscard]] virtual const Change& change() const = 0;
   /// The fields of the last outcome, and its reading.
   virtual void report(FieldSink& sink) const = 0;

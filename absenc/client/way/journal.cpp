@@ -51,7 +51,8 @@ std::string line_of(const JournalEntry& entry) {
 std::string journal_path() {
   if (const std::string path = of_environment("ABSENC_CHANGES"); !path.empty()) return path == "none" ? "" : path;
   constexpr std::string_view name = "changes.tsv";
-  if (const std::string folder = of_environment("STATE_DIRECTORY"); !folder.empty()) return folder + "/changes.tsv";
+  if (const std::string folder = of_environment("STATE_DIRECTORY"); !folder.empty())
+    return fmt::format("{}/{}", folder, name);
   // The XDG Base Directory Specification: what is not absolute is to be ignored.
   const std::string state = of_environment("XDG_STATE_HOME");
   if (state.starts_with('/')) return fmt::format("{}/absenc/{}", state, name);

@@ -64,7 +64,7 @@ class Routine {
   /// Bytes of storage that its frames took at the most.
   [[nodiscard]] std::size_t frames_size() const { return most_used_; }
 
-  /// What is sent from here on may change the encoder.
+  /// Marks that requests from here on may change the encoder.
   void changes() { change_ = ChangeSent::yes; }
   /// The encoder is as it was before `changes`: it said so, or reading back shows it.
   void refused() { change_ = ChangeSent::refused; }

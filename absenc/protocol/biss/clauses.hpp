@@ -10,7 +10,7 @@ namespace absenc::biss {
 
 inline constexpr Errors header_errors = any_of(Error::bad_framing, Error::line_stuck);
 
-// Of the registers of every encoder.
+// Clauses of the registers that every encoder has.
 inline constexpr std::array<Clause, 3> register_clauses{{
     {.id = "bank",
      .paragraph = "BiSS C Protocol Description rev D2, register 40",

@@ -53,7 +53,7 @@ Error take_bytes(const ControlBits& cdm, const ControlBits& cds, bool write, Con
   }
 }
 
-// What the host writes, by CDM alone. While an encoder is not ready the host repeats its start bit.
+// Reads the data that the host writes, by CDM alone. While an encoder is not ready the host repeats its start bit.
 Error take_written(const ControlBits& cdm, ControlFrame& frame) {
   for (unsigned at = direction_at + 3;; at += byte_bits + 2) {
     while (!frame.data.empty() && cdm.has(at + byte_bits) && cdm[at] && !is_good_byte(cdm.load(at, byte_bits))) ++at;

@@ -27,7 +27,8 @@ inline constexpr Time shortest_period = 100ns;  // of MA: 10 MHz
 inline constexpr Time timeout_maximum = 40us;   // SLO stays low for 12.5 to 40 us after the last clock
 inline constexpr unsigned start_pulses = 2;     // of MA after power on, with 40 us before and behind them
 
-/// How long SLO stays low behind the last clock: fixed, or one and a half periods of MA (adaptive), in one byte.
+/// The time for which SLO stays low behind the last clock: fixed, or one and a half periods of MA (adaptive), in one
+/// byte.
 class Timeout {
  public:
   constexpr Timeout() = default;  // not known
@@ -60,7 +61,7 @@ class Timeout {
   std::uint8_t code_ = 0;  // halves of a microsecond
 };
 
-/// What the virtual encoder answers as P, behind each register.
+/// The bit P that the virtual encoder answers behind each register.
 enum class StopBit : std::uint8_t { next, zero, one };
 inline constexpr std::array<std::string_view, 3> stop_bit_choices{"next", "zero", "one"};
 

@@ -192,7 +192,7 @@ Part<bool> read(Dialog& dialog, Found& found, RegisterIndex index) {
   return read(dialog, found, registers[index].address, registers[index].size);
 }
 
-// Of a procedure that writes twice only a refusal of the first write leaves the encoder as it was.
+// A procedure may write twice: only a refusal of the first write leaves the encoder as it was.
 void note_refusal(Dialog& dialog, const Found& found, Fate fate) {
   if (fate == Fate::refused && found.why.error == Error::request_rejected && !found.changed) dialog.refused();
 }

@@ -96,11 +96,11 @@ inline constexpr std::uint8_t shown_in_status = over_heat | multiturn_error | ba
 inline constexpr std::uint8_t turns_lost = over_speed | multiturn_error | battery_error;
 /// Held until a reset request or, some of them, until power off (6.5).
 inline constexpr std::uint8_t latched = over_speed | counter_overflow | over_heat | multiturn_error | battery_error;
-/// What an encoder without a battery shows, and is no fault of it (2 (1), 6.5).
+/// Alarms that an encoder without a battery always shows: no fault (2 (1), 6.5).
 inline constexpr std::uint8_t without_battery = battery_error | battery_alarm;
 }  // namespace alarms
 
-/// What a model's frames carry, and how strictly they are checked.
+/// The contents of a model's frames, and how strictly they are checked.
 struct Format {
   unsigned singleturn_bits = 17;  // 1 to 24
   unsigned multiturn_bits = 16;   // 0 to 24

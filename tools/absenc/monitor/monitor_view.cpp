@@ -40,7 +40,7 @@ bool has_position(const Snapshot& snapshot) {
   return is_live(snapshot) && reading.ready && reading.singleturn_valid();
 }
 
-// Of a reading that is no longer quite new: " (0.3 s old)".
+// Names the age of a reading that is older than a tenth of a second: " (0.3 s old)".
 std::string age(const Snapshot& snapshot) {
   if (snapshot.age < std::chrono::milliseconds(100)) return {};
   return fmt::format("   ({:.1f} s old)", std::chrono::duration<double>(snapshot.age).count());

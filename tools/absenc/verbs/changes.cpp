@@ -50,7 +50,9 @@ int run_changes(const Invocation& invocation) {
   }
   if (invocation.has("--json")) return exit_good;
   if (rows.size() == 1) {
-    print_line(path.empty() ? "no journal is kept" : fmt::format("no changes are in {}", path));
+    print_line(path.empty() ? "no journal is kept: ABSENC_CHANGES is \"none\", or there is no home folder; "
+                              "ABSENC_CHANGES=FILE names one"
+                            : fmt::format("no changes are in {}", path));
     return exit_good;
   }
   print_line(table(rows));

@@ -32,10 +32,19 @@ std::string identified(const std::string& port, Progress& progress) {
   search.progress = [&](const std::string& what) { progress.show(what); };
   const LineFindings findings = search_line(search);
   progress.clear();
-  if (findings.candidates.empty() || !is_found(findings.candidates.front())) {
+  if (findings.interrupted) throw os::Interrupted{};
+  if (findings.candidates.empty()) {
     throw Failure(fmt::format("which encoder is on {}? {}", search.place, advice_for(findings, search)));
   }
-  const std::string address = address_of(findings.candidates.front(), search.place);
+  const Candidate& best = findings.candidates.front();
+  const std::string address = address_of(best, search.place);
+  if (!is_found(best)) {
+    throw Failure(
+        fmt::format("which encoder is on {0}? It may be {1}, but what came may be chance\n"
+                    "  Try: turn the shaft a little while it is asked; `absenc doctor \"{2}\"`, which examines it "
+                    "as {1}",
+                    search.place, best.unit->id, address));
+  }
   print_message(fmt::format("{}: this is examined", address));
   return address;
 }

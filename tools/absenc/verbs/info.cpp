@@ -36,7 +36,7 @@ std::string resolution_text(const Resolution& resolution) {
   return fmt::format("{}", fmt::join(parts, ", "));
 }
 
-// Of the options only those that are not at their defaults.
+// Names the options that differ from their defaults.
 std::string options_in_short(const EncoderAddress& uri) {
   const std::vector<std::string> settings = settings_for(*uri.unit, uri.options);
   return settings.empty() ? "all at their defaults" : fmt::format("{}", fmt::join(settings, " "));

@@ -4,6 +4,7 @@
 
 #include <array>
 
+#include "absenc/client/text/known_name.hpp"
 #include "absenc/client/text/unit_text.hpp"
 #include "absenc/client/way/address.hpp"
 #include "absenc/client/way/named_encoder.hpp"

@@ -114,7 +114,8 @@ constexpr std::array<Example, 2> ports_examples{{
 const Subcommand ports_subcommand{
     "ports",
     "show the ports of this computer: adapter, greatest rate, who holds it, what to type next",
-    "No port is opened: that would reset some boards. absenc without a verb does the same. Of a program of another user,\n"
+    "No port is opened: that would reset some boards. absenc without a verb does the same. Of a program of another "
+    "user,\n"
     "only root sees that it holds a port.",
     ports_parameters,
     ports_examples,

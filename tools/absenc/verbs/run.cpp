@@ -39,7 +39,7 @@ void show_progress(Progress& progress, const Connection& encoder, const Command&
   progress.show(fmt::format("{}: {}: {}", command.name, newest[0], newest[1]));
 }
 
-// What is there before somebody is asked whether to change it: that it is the right encoder, and where it stands.
+// Shows the position before the question, so that somebody sees which encoder it is and where it stands.
 void show_before(Connection& encoder) {
   if (find_command(encoder.unit(), Verb::read) == nullptr) return;
   const Outcome outcome = encoder.read();

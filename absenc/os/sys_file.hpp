@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: Apache-2.0
+// Values in /sys and /proc: files of one line.
+#pragma once
+
+#include <charconv>
+#include <cstdint>
+#include <filesystem>
+#include <fstream>
+#include <optional>
+#include <string>
+
+namespace absenc::os {
+
+/// "" when there is no such file.
+[[nodiscard]] inline std::string first_line(const std::filesystem::path& path) {
+  std::ifstream file(path);
+  std::string line;
+  std::getline(file, line);
+  return line;
+}
+
+/// The number at the beginning of the file; empty when there is none, or it has more than 32 bits.
+[[nodiscard]] inline std::optional<std::uint32_t> first_number(const std::filesystem::path& path, int base = 10) {
+  const std::string text = first_line(path);
+  std::uint32_t number = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number, base);
+  if (error != std::errc{}) return std::nullopt;
+  return number;
+}
+
+}  // namespace absenc::os
