@@ -22,10 +22,29 @@ class Abuse(ServeCase):
         wait_until(lambda: self.served.encoder()["state"] == "live", "it answers")
         self.assertIsNone(self.served.process.poll())
 
-    def connect(self):
-        connection = socket.create_connection(("127.0.0.1", self.served.port), timeout=PATIENCE)
+    def connect(self, address="127.0.0.1"):
+        connection = socket.create_connection(("127.0.0.1", self.served.port), PATIENCE, (address, 0))
         self.addCleanup(connection.close)
         return connection
+
+    def status(self, path="/healthz", address="127.0.0.1"):
+        """Of an answer on a connection of its own; None: it was closed without one."""
+        with socket.create_connection(("127.0.0.1", self.served.port), PATIENCE, (address, 0)) as connection:
+            with contextlib.suppress(ConnectionError):
+                connection.sendall(f"GET {path} HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n".encode())
+                return int(connection.recv(100).split()[1])
+
+    def allow_many_files(self):
+        soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+        resource.setrlimit(resource.RLIMIT_NOFILE, (min(4096, hard), hard))
+        self.addCleanup(resource.setrlimit, resource.RLIMIT_NOFILE, (soft, hard))
+
+    def open_streams(self, count, address="127.0.0.1"):
+        """None of them is read; their statuses."""
+        connections = [self.connect(address) for _ in range(count)]
+        for connection in connections:
+            connection.sendall(b"GET /api/stream HTTP/1.1\r\nHost: localhost\r\n\r\n")
+        return [int(connection.recv(15).split()[1]) for connection in connections]
 
     def memory_kb(self):
         with open(f"/proc/{self.served.process.pid}/status", encoding="ascii") as file:
@@ -106,30 +125,35 @@ class Abuse(ServeCase):
         self.assert_well()
         self.assertLess(self.memory_kb() - before, 64_000)
 
-    def test_connections_of_one_address_shut_nobody_else_out(self):
-        soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
-        resource.setrlimit(resource.RLIMIT_NOFILE, (min(4096, hard), hard))
-        self.addCleanup(resource.setrlimit, resource.RLIMIT_NOFILE, (soft, hard))
+    def test_connections_of_one_address_shut_nobody_out(self):
+        self.allow_many_files()
         for _ in range(2000):
             self.connect()
-        longest = 0.0
-        for _ in range(20):
-            begin = time.monotonic()
-            with socket.create_connection(("127.0.0.1", self.served.port), PATIENCE, ("127.0.0.2", 0)) as other:
-                other.sendall(b"GET /healthz HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n")
-                self.assertIn(b"200", other.recv(100))
-            longest = max(longest, time.monotonic() - begin)
-        self.assertLess(longest, 1.0)  # 3 ms on a machine of its own
+        # Neither itself, because its oldest idle one goes first, nor others.
+        self.assertEqual([self.status() for _ in range(20)], [200] * 20)
 
-    def test_more_streams_than_there_may_be(self):
-        statuses = []
-        for _ in range(320):
-            connection = self.connect()
-            connection.sendall(b"GET /api/stream HTTP/1.1\r\nHost: localhost\r\n\r\n")
-            statuses.append(connection.recv(15)[9:12])
-        self.assertIn(b"503", statuses)
-        self.assertGreaterEqual(statuses.count(b"200"), 200)
-        self.assert_well()
+        def longest():
+            begin = time.monotonic()
+            self.assertEqual(self.status("/api/encoders", "127.0.0.2"), 200)
+            return time.monotonic() - begin
+        # 4 ms at the most on a machine of its own; on a busy one some round is undisturbed.
+        wait_until(lambda: max(longest() for _ in range(20)) < 0.1, "another address is served within 100 ms")
+
+    def test_idle_connections_of_many_addresses_shut_nobody_out(self):
+        self.allow_many_files()
+        for i in range(10):
+            for _ in range(100):
+                self.connect(f"127.0.1.{i + 1}")
+        begin = time.monotonic()
+        self.assertEqual([self.status("/api/encoders", f"127.0.2.{i + 1}") for i in range(20)], [200] * 20)
+        self.assertLess(time.monotonic() - begin, 5)  # before the others end by themselves, after 10 s
+
+    def test_streams_that_are_never_read_leave_room_for_those_of_others(self):
+        statuses = self.open_streams(300)
+        self.assertEqual((statuses.count(200), statuses.count(503)), (200, 100))
+        self.assertEqual(self.open_streams(100, "127.0.0.2"), [200] * 100)
+        self.assertEqual(self.open_streams(20, "127.0.0.3"), [200] * 20)  # though there are 300
+        self.assertEqual(self.status(address="127.0.0.4"), 200)
 
     def test_many_who_want_the_same_encoder(self):
         asked = [f"{method} {of('sim:tformat?motion=rpm=60', part)}".encode()

@@ -177,7 +177,7 @@ void Api::get(const Request& request, const Reply& reply) {
   if (path == "/api/minute") return reply.send(json_response(last_minute(fleet_->all())));
   if (path == "/api/token") return reply.send(token(request));
   const bool wants_all = request.value("encoder").empty() && request.value("trace").empty();
-  if (path == "/api/stream" && wants_all && request.method == "GET") return stream("", reply);
+  if (path == "/api/stream" && wants_all && request.method == "GET") return stream("", request, reply);
   if (path == "/api/events" && wants_all) return past("", true, request, reply);
   if (path == "/api/mqtt") return reply.send(json_response(sending_->json()));
   throw NotFound(unknown_path(request));
@@ -196,7 +196,7 @@ void Api::get_of(const std::shared_ptr<Watch>& watch, std::string_view part, con
     response.headers.emplace_back("Allow", method);
     return reply.send(response);
   }
-  if (part == "stream") return stream(watch->name(), reply);
+  if (part == "stream") return stream(watch->name(), request, reply);
   const Unit& unit = *watch->address().unit;
   if (part == "settings") return give(*watch, settings_order(unit, request.value("setting")), request, reply);
   give(*watch, memory_order(unit, number_in(request, "page", -1, 0, UINT16_MAX)), request, reply);
@@ -241,8 +241,8 @@ Response Api::token(const Request& request) const {
       Json::object().set("tokens", access_->has_tokens()).set("name", who.empty() ? Json() : Json(who)));
 }
 
-void Api::stream(const std::string& trace, const Reply& reply) {
-  const std::shared_ptr<Stream> stream = streams_->open(trace);
+void Api::stream(const std::string& trace, const Request& request, const Reply& reply) {
+  const std::shared_ptr<Stream> stream = streams_->open(trace, request.peer);
   if (stream == nullptr) return reply.send(error_response(503, "too many streams are open"));
   reply.send(stream);
 }

@@ -34,7 +34,7 @@ class Api {
   [[nodiscard]] Response health() const;
   [[nodiscard]] Response token(const Request& request) const;
   void get_of(const std::shared_ptr<Watch>& watch, std::string_view part, const Request& request, const Reply& reply);
-  void stream(const std::string& trace, const Reply& reply);
+  void stream(const std::string& trace, const Request& request, const Reply& reply);
   void command(Watch& watch, const Request& request, const Reply& reply);
   void acknowledge(Watch& watch, const Request& request, const Reply& reply);
   void doctor(Watch& watch, const Request& request, const Reply& reply);

@@ -15,20 +15,18 @@
 
 #include "absenc/client/error.hpp"
 #include "absenc/os/signals.hpp"
+#include "absenc/serve/connections.hpp"
 
 namespace absenc::serve {
 
 namespace {
 
-using namespace std::chrono_literals;
-
-constexpr unsigned most_connections = 512;
-constexpr unsigned most_of_an_address = 384;        // so that one client, or one proxy, leaves room for others
+// The library would leave new ones waiting at its limit: Connections has ended others before.
+constexpr unsigned most_connections = Connections::most + Connections::reserve + 64;
 constexpr std::size_t memory_for_each = 64 * 1024;  // headers and what waits to be written; more is refused with 431
 constexpr std::uint64_t most_body = 4096;           // nothing here takes one
 constexpr std::uint64_t most_read = 1 << 20;        // of a body of unknown length, until it is answered at its end
 constexpr unsigned idle_seconds = 15;
-constexpr Time request_time = 10s;  // in which it must have come; a byte now and then is not enough
 constexpr std::size_t block = 16 * 1024;
 
 std::string header_of(MHD_Connection* connection, const char* name) {
@@ -69,6 +67,16 @@ MHD_Result add_argument(void* query, MHD_ValueKind, const char* name, const char
   return MHD_YES;
 }
 
+std::string peer_of(MHD_Connection* connection) {
+  const MHD_ConnectionInfo* info = ::MHD_get_connection_info(connection, MHD_CONNECTION_INFO_CLIENT_ADDRESS);
+  return info != nullptr && info->client_addr != nullptr ? os::host_text(*info->client_addr) : std::string();
+}
+
+int socket_of(MHD_Connection* connection) {
+  const MHD_ConnectionInfo* info = ::MHD_get_connection_info(connection, MHD_CONNECTION_INFO_CONNECTION_FD);
+  return info != nullptr ? info->connect_fd : -1;
+}
+
 Request request_of(MHD_Connection* connection, const char* path, const char* method) {
   Request request{.method = method,
                   .path = path,
@@ -83,8 +91,7 @@ Request request_of(MHD_Connection* connection, const char* path, const char* met
   request.origin = header_of(connection, "Origin");
   request.fetch_site = header_of(connection, "Sec-Fetch-Site");
   request.authorization = header_of(connection, "Authorization");
-  const MHD_ConnectionInfo* info = ::MHD_get_connection_info(connection, MHD_CONNECTION_INFO_CLIENT_ADDRESS);
-  if (info != nullptr && info->client_addr != nullptr) request.peer = os::host_text(*info->client_addr);
+  request.peer = peer_of(connection);
   return request;
 }
 
@@ -118,6 +125,8 @@ struct Stream::Sending {
   std::deque<Text> queue;
   std::size_t sent_of_first = 0;
   MHD_Connection* suspended = nullptr;
+  int socket = -1;  // while it is sent
+  Time taken_at = os::now();
   bool ended = false;  // nothing more comes
   bool over = false;   // nobody listens
   std::uint64_t dropped = 0;
@@ -130,6 +139,7 @@ struct Stream::Sending {
   ssize_t take(MHD_Connection* connection, char* buffer, std::size_t size) {
     {
       const std::lock_guard lock(mutex);
+      taken_at = os::now();
       if (!queue.empty()) return take_some(buffer, size);
       if (ended) return MHD_CONTENT_READER_END_OF_STREAM;
       suspended = connection;
@@ -182,6 +192,15 @@ void Stream::end() {
   sending_->resume();
 }
 
+void Stream::break_off() {
+  const std::lock_guard lock(sending_->mutex);
+  sending_->ended = true;
+  sending_->queue.clear();
+  sending_->sent_of_first = 0;
+  if (sending_->socket >= 0) os::end_connection(sending_->socket);
+  sending_->resume();
+}
+
 bool Stream::over() const {
   const std::lock_guard lock(sending_->mutex);
   return sending_->over;
@@ -190,6 +209,11 @@ bool Stream::over() const {
 std::uint64_t Stream::dropped() const {
   const std::lock_guard lock(sending_->mutex);
   return sending_->dropped;
+}
+
+Time Stream::taken_at() const {
+  const std::lock_guard lock(sending_->mutex);
+  return sending_->taken_at;
 }
 
 // ---- Replies
@@ -222,16 +246,13 @@ struct HttpServer::Daemon {
   using Exchange = Reply::Exchange;
 
   Handler handler;
+  std::vector<std::string> vital;
   os::Listener listener;
   MHD_Daemon* daemon = nullptr;
 
   std::mutex mutex;  // guards what follows
   bool ending = false;
-  struct Open {
-    int socket;
-    Time since;  // of the begin of the request that is awaited; `never`: it has come
-  };
-  std::unordered_map<MHD_Connection*, Open> connections;
+  Connections connections{os::end_connection};
   std::unordered_map<Exchange*, std::weak_ptr<Exchange>> exchanges;
   std::unordered_map<Stream*, std::weak_ptr<Stream>> streams;
 
@@ -267,6 +288,7 @@ struct HttpServer::Daemon {
     const std::lock_guard lock(sending.mutex);
     sending.over = true;
     sending.suspended = nullptr;
+    sending.socket = -1;
     sending.queue.clear();
   }
 
@@ -275,6 +297,10 @@ struct HttpServer::Daemon {
       const std::lock_guard lock(mutex);
       if (ending) stream->end();
       streams.emplace(stream.get(), stream);
+    }
+    {
+      const std::lock_guard lock(stream->sending_->mutex);
+      stream->sending_->socket = socket_of(connection);
     }
     MHD_Response* response = ::MHD_create_response_from_callback(MHD_SIZE_UNKNOWN, block, read_stream,
                                                                  new Carried{this, connection, stream}, free_stream);
@@ -299,7 +325,13 @@ struct HttpServer::Daemon {
             const std::shared_ptr<Exchange>& exchange) {
     {
       const std::lock_guard lock(mutex);
-      if (const auto open = connections.find(connection); open != connections.end()) open->second.since = never;
+      connections.begin_request(connection);
+      const bool is_vital = std::find(vital.begin(), vital.end(), path) != vital.end();
+      if (connections.is_of_reserve(connection) && !is_vital) {
+        return exchange->answer(
+            Response{503, "text/plain", "too many connections are open: try again later\n", {{"Connection", "close"}}},
+            nullptr);
+      }
       exchanges.emplace(exchange.get(), exchange);
       if (ending) return exchange->answer(Response{503, "text/plain", "the server ends\n"}, nullptr);
     }
@@ -344,9 +376,7 @@ struct HttpServer::Daemon {
     auto& daemon = *static_cast<Daemon*>(self);
     {
       const std::lock_guard lock(daemon.mutex);
-      if (const auto open = daemon.connections.find(connection); open != daemon.connections.end()) {
-        open->second.since = os::now();  // another request may come
-      }
+      daemon.connections.await_request(connection, os::now());
     }
     if (*context == nullptr) return;
     const std::unique_ptr<std::shared_ptr<Exchange>> exchange(static_cast<std::shared_ptr<Exchange>*>(*context));
@@ -363,21 +393,16 @@ struct HttpServer::Daemon {
   static void connected(void* self, MHD_Connection* connection, void**, MHD_ConnectionNotificationCode code) {
     auto& daemon = *static_cast<Daemon*>(self);
     const std::lock_guard lock(daemon.mutex);
-    if (code == MHD_CONNECTION_NOTIFY_CLOSED) {
-      daemon.connections.erase(connection);
-      return;
-    }
-    const MHD_ConnectionInfo* info = ::MHD_get_connection_info(connection, MHD_CONNECTION_INFO_CONNECTION_FD);
-    if (info != nullptr) daemon.connections[connection] = {info->connect_fd, os::now()};
+    if (code == MHD_CONNECTION_NOTIFY_CLOSED) return daemon.connections.remove(connection);
+    daemon.connections.add(connection, socket_of(connection), peer_of(connection), os::now());
   }
 
   void start() {
-    daemon = ::MHD_start_daemon(MHD_USE_EPOLL_INTERNAL_THREAD | MHD_ALLOW_SUSPEND_RESUME, listener.port, nullptr,
-                                nullptr, &access, this, MHD_OPTION_LISTEN_SOCKET, listener.socket.get(),
-                                MHD_OPTION_CONNECTION_LIMIT, most_connections, MHD_OPTION_PER_IP_CONNECTION_LIMIT,
-                                most_of_an_address, MHD_OPTION_CONNECTION_MEMORY_LIMIT, memory_for_each,
-                                MHD_OPTION_CONNECTION_TIMEOUT, idle_seconds, MHD_OPTION_NOTIFY_COMPLETED, &completed,
-                                this, MHD_OPTION_NOTIFY_CONNECTION, &connected, this, MHD_OPTION_END);
+    daemon = ::MHD_start_daemon(
+        MHD_USE_EPOLL_INTERNAL_THREAD | MHD_ALLOW_SUSPEND_RESUME, listener.port, nullptr, nullptr, &access, this,
+        MHD_OPTION_LISTEN_SOCKET, listener.socket.get(), MHD_OPTION_CONNECTION_LIMIT, most_connections,
+        MHD_OPTION_CONNECTION_MEMORY_LIMIT, memory_for_each, MHD_OPTION_CONNECTION_TIMEOUT, idle_seconds,
+        MHD_OPTION_NOTIFY_COMPLETED, &completed, this, MHD_OPTION_NOTIFY_CONNECTION, &connected, this, MHD_OPTION_END);
     if (daemon == nullptr)
       throw client::Failure("the web server cannot be started: too many files are open, or no memory");
     static_cast<void>(listener.socket.release());  // the daemon closes it
@@ -404,7 +429,9 @@ struct HttpServer::Daemon {
   }
 };
 
-HttpServer::HttpServer(os::Listener listener, Handler handler) : daemon_(std::make_unique<Daemon>()) {
+HttpServer::HttpServer(os::Listener listener, Handler handler, std::vector<std::string> vital)
+    : daemon_(std::make_unique<Daemon>()) {
+  daemon_->vital = std::move(vital);
   daemon_->listener = std::move(listener);
   daemon_->handler = std::move(handler);
   daemon_->start();
@@ -413,14 +440,8 @@ HttpServer::HttpServer(os::Listener listener, Handler handler) : daemon_(std::ma
 HttpServer::~HttpServer() { daemon_->stop(); }
 
 void HttpServer::end_half_sent() {
-  const Time now = os::now();
   const std::lock_guard lock(daemon_->mutex);
-  for (auto& [connection, open] : daemon_->connections) {
-    if (open.since != never && now - open.since > request_time) {
-      os::end_connection(open.socket);
-      open.since = never;
-    }
-  }
+  daemon_->connections.end_half_sent(os::now());
 }
 
 }  // namespace absenc::serve

@@ -14,6 +14,7 @@
 #include <utility>
 #include <vector>
 
+#include "absenc/core/time.hpp"
 #include "absenc/os/listener.hpp"
 
 namespace absenc::serve {
@@ -54,9 +55,13 @@ class Stream {
   void push(Text text);
   /// What is in the queue is sent first.
   void end();
+  /// Ends the connection at once, also of a client that takes nothing.
+  void break_off();
   /// Nobody takes it any more.
   [[nodiscard]] bool over() const;
   [[nodiscard]] std::uint64_t dropped() const;
+  /// When the client last took something.
+  [[nodiscard]] Time taken_at() const;
 
  private:
   friend class HttpServer;
@@ -82,8 +87,9 @@ class HttpServer {
  public:
   using Handler = std::function<void(const Request&, Reply)>;
 
-  /// `handler` is called from the thread of the connections and must return soon. Throws Failure.
-  HttpServer(os::Listener listener, Handler handler);
+  /// `handler` is called from the thread of the connections and must return soon. `vital`: paths that are answered
+  /// however many connections are open. Throws Failure.
+  HttpServer(os::Listener listener, Handler handler, std::vector<std::string> vital);
   /// Breaks off what is still being sent. Whoever streams must have ended before.
   ~HttpServer();
   HttpServer(const HttpServer&) = delete;

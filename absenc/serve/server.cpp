@@ -46,8 +46,9 @@ struct Server::Parts {
     if (!choices.history.empty()) chronicler.emplace(choices.history, choices.limits, fleet);
     Chronicler* history = chronicler ? &*chronicler : nullptr;
     api.emplace(fleet, access, streams, worker, happenings, history, choices.history, sending);
-    http.emplace(std::move(listener),
-                 [this](const Request& request, const Reply& reply) { api->answer(request, reply); });
+    http.emplace(
+        std::move(listener), [this](const Request& request, const Reply& reply) { api->answer(request, reply); },
+        std::vector<std::string>{"/healthz", "/metrics"});
     teller = std::jthread([this](const std::stop_token& stop) { tell(stop); });
   }
 

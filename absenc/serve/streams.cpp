@@ -4,6 +4,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <map>
+
+#include "absenc/os/signals.hpp"
 
 namespace absenc::serve {
 
@@ -15,14 +18,42 @@ Stream::Text event_text(std::string_view event, const client::Json& data) {
 
 }  // namespace
 
-std::shared_ptr<Stream> Streams::open(const std::string& trace) {
+std::shared_ptr<Stream> Streams::open(const std::string& trace, const std::string& peer) {
   auto stream = std::make_shared<Stream>("text/event-stream");
   // A browser that has lost it comes back after a second.
   stream->push(std::make_shared<const std::string>("retry: 1000\n\n"));
   const std::lock_guard lock(mutex_);
-  if (open_.size() >= most) return nullptr;
-  open_.push_back({stream, trace});
+  if (!make_room(peer)) return nullptr;
+  open_.push_back({stream, trace, peer});
   return stream;
+}
+
+bool Streams::make_room(const std::string& peer) {
+  std::map<std::string, std::size_t> counts;
+  for (const Open& one : open_) ++counts[one.peer];
+  if (counts[peer] >= most_of_address) return break_off_slowest(peer, os::now() - patience);
+  if (open_.size() < most) return true;
+  const auto busiest =
+      std::max_element(counts.begin(), counts.end(), [](const auto& a, const auto& b) { return a.second < b.second; });
+  if (busiest->second > counts[peer] + 1) return break_off_slowest(busiest->first, never);
+  return break_off_slowest(peer, os::now() - patience);
+}
+
+// Of those whose client took nothing since `taken_before`.
+bool Streams::break_off_slowest(const std::string& peer, Time taken_before) {
+  auto slowest = open_.end();
+  for (auto one = open_.begin(); one != open_.end(); ++one) {
+    const Time at = one->stream->taken_at();
+    if (one->peer == peer && at < taken_before) {
+      slowest = one;
+      taken_before = at;
+    }
+  }
+  if (slowest == open_.end()) return false;
+  slowest->stream->break_off();
+  dropped_before_ += slowest->stream->dropped();
+  open_.erase(slowest);
+  return true;
 }
 
 void Streams::tell(std::string_view event, const client::Json& data) {
