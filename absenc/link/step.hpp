@@ -42,8 +42,12 @@ struct Step {
   Time at{};                    // transfer, pulse: not before; wait: a `timer` event is due then, if that lies ahead
   Time answer{};                // transfer, wait: `silence` when nothing has come this long after `sent`; 0: no limit
   Time gap{};    // transfer, wait: `silence` when the line was quiet this long after an item; 0: no limit
-  Time width{};  // pulse; transfer of the device on a clocked link: from the last edge of the clock it drives the data
-                 // line low for so long
+  Time width{};  // pulse; transfer of the device on a clocked link: behind `out`, and for so long after the last edge
+                 // of the clock, it drives the data line low
+
+  /// transfer of the device on an SPI or clocked link: what the host samples behind `out`. A line that nobody drives is
+  /// pulled up.
+  [[nodiscard]] constexpr std::uint8_t behind_out() const { return width > Time{} ? 0x00 : 0xFF; }
 };
 
 /// What happened. `at` is the time at which it was complete: the end of the last bit.

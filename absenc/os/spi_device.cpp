@@ -69,6 +69,7 @@ void SpiDevice::wake(Time now) {
 void SpiDevice::select(Time at, Time period) {
   selected_ = true;
   driven_.clear();
+  behind_driven_ = ByteStep{}.behind_out();
   heard_.clear();
   clocks_ = 0;
   last_out_ = false;
@@ -117,6 +118,7 @@ void SpiDevice::ask(Time now) {
     switch (step.kind) {
       case ByteStep::Kind::transfer:
         driven_.assign(step.out.begin(), step.out.end());
+        behind_driven_ = step.behind_out();
         break;
       case ByteStep::Kind::wait:
         timer_ = step.at > now ? step.at : never;
@@ -155,7 +157,8 @@ bool SpiDevice::driven(std::size_t clock, std::uint8_t mode) const {
   }
   if (shifts < before_first_bit) return true;
   const std::size_t bit = shifts - before_first_bit;
-  return bit >= 8 * driven_.size() || BitView{driven_, 8 * driven_.size()}[bit];
+  if (bit >= 8 * driven_.size()) return behind_driven_ != 0;
+  return BitView{driven_, 8 * driven_.size()}[bit];
 }
 
 }  // namespace absenc::os

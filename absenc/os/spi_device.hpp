@@ -73,6 +73,7 @@ class SpiDevice {
   // Since the chip was selected, or the first clock:
   bool selected_ = false;
   std::vector<std::uint8_t> driven_;
+  std::uint8_t behind_driven_ = 0xFF;
   std::vector<std::uint8_t> heard_;
   std::size_t clocks_ = 0;
   bool last_out_ = false;

@@ -10,6 +10,8 @@
 #include "absenc/protocol/encolink/host.hpp"
 #include "absenc/protocol/ssi/device.hpp"
 #include "absenc/protocol/ssi/host.hpp"
+#include "absenc/sim/rough_line.hpp"
+#include "absenc/sim/sim_port.hpp"
 #include "tests/shape_toys.hpp"
 
 namespace absenc::os {
@@ -45,6 +47,34 @@ TEST_F(SpiEncoder, SsiOfEveryLength) {
     }
     EXPECT_EQ(encoder.violation_count(), 0u) << encoder.violations()[0].rule;
   }
+}
+
+// The same 1000 clocks, of which the frame needs 41, on each thing that carries a clocked line.
+TEST_F(SpiEncoder, SloIsLowBehindTheCrcWhateverCarriesIt) {
+  constexpr std::size_t clocks = 1000;
+  const auto samples = [&](Port<std::uint8_t>& port) {
+    port.begin({.kind = ByteStep::Kind::transfer, .bits = clocks, .at = port.now() + 1ms});
+    ByteEvent event{};
+    while (event.kind != ByteEvent::Kind::received) event = port.wait({.at = never});
+    return Data(event.items.begin(), event.items.end());
+  };
+  const auto encoder_on = [&](auto& encoder) -> Machine<std::uint8_t>& {
+    encoder.power_on(Time{}, Device<std::uint8_t>::PowerOn::skip);
+    return encoder;
+  };
+  shaft.state.position = 0x95C6'1234;
+  biss::VirtualEncoder on_line({}, shaft), on_rough_line({}, shaft), on_controller({}, shaft);
+  sim::SimPort<std::uint8_t> line(LinkKind::clocked, biss::line_settings, encoder_on(on_line));
+  sim::RoughLine<std::uint8_t> rough_line(LinkKind::clocked, biss::line_settings, encoder_on(on_rough_line), 1);
+  kernel.connect(LinkKind::clocked, biss::line_settings, encoder_on(on_controller));
+  SpiPort controller(FakeSpi::path, LinkKind::clocked, biss::line_settings, {}, kernel);
+
+  const Data expected = samples(line);
+  ASSERT_EQ(expected.size(), clocks / 8);
+  const auto behind = static_cast<std::size_t>((biss::clocks(biss::Format{}, 10us, 1us) + 7) / 8);
+  EXPECT_EQ(Data(expected.begin() + behind, expected.end()), Data(expected.size() - behind, 0));
+  EXPECT_EQ(samples(rough_line), expected);
+  EXPECT_EQ(samples(controller), expected);
 }
 
 TEST_F(SpiEncoder, SsiReadTwice) {

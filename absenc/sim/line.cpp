@@ -224,6 +224,7 @@ void Line<Item>::take_up(Node node, const Step<Item>& step) {
   state.bits = step.bits;
   state.expect = step.expect;
   state.width = step.width;
+  state.behind_out = step.behind_out();
   state.pulse_wire = step.wire;
   state.hold_low = step.hold_low;
   state.taken_up = now_;

@@ -39,6 +39,7 @@ struct Line<Item>::State {
   std::size_t bits = 0;
   std::size_t expect = 0;
   Time width{};
+  std::uint8_t behind_out = 0xFF;  // on a clocked link: what the host samples behind `out`
   bool hold_low = false;  // clocked: the level of the clock before the transfer
   Time taken_up{};        // when it was asked for
   Time lead{};            // spi: from chip select to the first clock

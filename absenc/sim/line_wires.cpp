@@ -140,6 +140,7 @@ void Line<Item>::begin_transfer(Node node) {
     nodes_[other]->doing = Step<Item>::Kind::wait;
     nodes_[other]->out.clear();
     nodes_[other]->width = {};
+    nodes_[other]->behind_out = 0xFF;
     const Time period = kind_ == LinkKind::clocked ? host.settings.bits(1) : Time{};
     feed(other, {.kind = Event<Item>::Kind::selected, .at = now_, .held_low = host.hold_low, .width = period});
   }
@@ -156,7 +157,8 @@ void Line<Item>::end_transfer(Node node) {
     for (const auto& other : nodes_) {
       if (other->role == Role::host) continue;
       low_after = std::max(low_after, other->width);
-      for (std::size_t i = 0; i < std::min(in.size(), other->out.size()); ++i) in[i] &= other->out[i];
+      const std::size_t driven = std::min(in.size(), other->out.size());
+      for (std::size_t i = 0; i < in.size(); ++i) in[i] &= i < driven ? other->out[i] : other->behind_out;
     }
     const std::size_t unclocked = in.size() * 8 - host.bits;
     if (unclocked != 0) in.back() = static_cast<Item>(in.back() >> unclocked << unclocked);

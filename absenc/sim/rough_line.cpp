@@ -99,12 +99,13 @@ void RoughLine<Item>::transfer(const Step<Item>& step) {
     request_.assign(step.out.begin(), step.out.end());
     request_.resize(size, 0);
     out_.clear();
+    behind_out_ = Step<Item>{}.behind_out();
     const Time start = time_;
     const Time period = settings_.bits(1);
     const Time lead = clocked ? Time{} : settings_.select_lead;
     feed({.kind = Kind::selected, .at = time_, .held_low = step.hold_low, .width = clocked ? period : Time{}});
     run_until(time_ + lead + settings_.bits(bits_));
-    out_.resize(size, 0xFF);  // nobody drives: pulled up
+    out_.resize(size, behind_out_);
     const std::size_t unclocked = size * 8 - bits_;
     if (unclocked != 0) out_.back() = static_cast<Item>(out_.back() >> unclocked << unclocked);
     hold(start, time_, time_, out_);
@@ -242,6 +243,7 @@ bool RoughLine<Item>::carry_out(const Step<Item>& step) {
 template <class Item>
 void RoughLine<Item>::send(const Step<Item>& step) {
   copy(step.out, out_);
+  behind_out_ = step.behind_out();
   if (driven()) return;
   const Time start = std::max(step.at, time_);
   side_.sending = true;

@@ -118,6 +118,7 @@ class RoughLine final : public Port<Item> {
   Side side_;
   std::vector<Item> request_;
   std::vector<Item> out_;  // of the device
+  std::uint8_t behind_out_ = 0xFF;
   std::size_t bits_ = 0;
   std::vector<Held> held_;  // from front_ to back_; what was told is used again
   std::size_t front_ = 0;

@@ -30,6 +30,16 @@ TEST(BissDevice, PutsExample4OnTheLine) {
   EXPECT_EQ(bench.encoder.answer_count(), 1u);
 }
 
+TEST(BissDevice, SloIsLowBehindTheCrc) {
+  Bench bench(line_settings, format_with(Format{}.latency, 2us, 2300ns));
+  bench.shaft.state.position = std::int64_t{275087} << 13;
+  const std::string samples = bench.clock(200, 1ms, 1'000'000);
+  EXPECT_EQ(samples.substr(0, 35), "11110010100001100101000111111110011");
+  EXPECT_EQ(samples.find('1', 35), std::string::npos);
+  // Within the timeout, too.
+  EXPECT_EQ(bench.clock(200, 10us, 1'000'000), std::string(200, '0'));
+}
+
 TEST(BissDevice, ReportsWhatItsHostDoesWrong) {
   Bench bench(line_settings, bits_19);
   bench.clock(41, 1ms, 1'000'000);

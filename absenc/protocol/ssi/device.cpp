@@ -25,8 +25,8 @@ void VirtualEncoder::selected(Time at, Time period, bool, author::DrivenBits& bi
   if (format_.after_word != AfterWord::one) hold_low(monoflop());
   BitBuffer<WordFormat::maximum_bits> coded;
   encode_whole(format_, latched_, coded);
-  const std::size_t wanted = std::max(2 * format_.word.bits(), clocks(format_));
-  const std::size_t count = std::min(frame_capacity, (wanted + 7) / 8 * 8);
+  const bool repeats = format_.after_word == AfterWord::repeat || format_.after_word == AfterWord::separated;
+  const std::size_t count = repeats ? author::DrivenBits::capacity() : (format_.word.bits() + 7) / 8 * 8;
   for (std::size_t i = 0; i < count; ++i) bits.append(bit_behind(format_, coded.view(), shifted_ + i) ? 1 : 0, 1);
 }
 
