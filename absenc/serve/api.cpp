@@ -223,14 +223,18 @@ Response Api::health() const {
   const Fleet::Watches watches = fleet_->all();
   for (const auto& watch : watches) live += watch->snapshot().state == State::live ? 1 : 0;
   const Chronicler::Health history = chronicler_ != nullptr ? chronicler_->health() : Chronicler::Health{};
+  const MqttHealth mqtt = sending_->mqtt_health();
   return json_response(Json::object()
-                           .set("ok", history.trouble.empty())
+                           .set("ok", history.trouble.empty() && mqtt.state() != "failing")
                            .set("encoders", watches.size())
                            .set("live", live)
                            .set("history", chronicler_ == nullptr    ? "none"
                                            : history.trouble.empty() ? "good"
                                                                      : "failing")
-                           .set("history_lost", history.lost));
+                           .set("history_lost", history.lost)
+                           .set("mqtt", mqtt.state())
+                           .set("mqtt_client_deaths", mqtt.client_deaths)
+                           .set("mqtt_dropped", mqtt.dropped));
 }
 
 // Whether there are tokens, and whose this one is.

@@ -11,6 +11,12 @@
 
 namespace absenc::serve {
 
+std::string_view MqttHealth::state() const {
+  if (broker.empty()) return "none";
+  if (failing) return "failing";
+  return connected ? "good" : "away";
+}
+
 client::Json MqttHealth::json() const {
   using client::Json;
   Json numbers = Json::object();
@@ -24,6 +30,7 @@ client::Json MqttHealth::json() const {
       .set("waiting_bytes", waiting_bytes)
       .set("sent", sent)
       .set("dropped", dropped)
+      .set("client_deaths", client_deaths)
       .set("taken", numbers);
 }
 
@@ -37,6 +44,8 @@ std::string MqttHealth::metrics() const {
   add("absenc_mqtt_waiting_bytes", "gauge", "bytes of messages in the spool", waiting_bytes);
   add("absenc_mqtt_sent_total", "counter", "messages that the broker has taken", sent);
   add("absenc_mqtt_dropped_total", "counter", "readings that the spool had no room for", dropped);
+  add("absenc_mqtt_client_deaths_total", "counter", "how often a packet of the broker ended the MQTT client's process",
+      client_deaths);
   return text;
 }
 
@@ -68,9 +77,11 @@ MqttHealth Mqtt::health() const {
   health.prefix = parts_->settings.prefix;
   health.connected = sent.connected;
   health.trouble = collected.trouble.empty() ? sent.trouble : collected.trouble;
+  health.failing = !collected.trouble.empty() || collected.drops;
   health.waiting = parts_->spool.held().messages;
   health.waiting_bytes = parts_->spool.held_bytes();
   health.sent = sent.sent;
+  health.client_deaths = sent.client_deaths;
   health.dropped = collected.dropped;
   health.taken = collected.taken;
   return health;

@@ -7,6 +7,7 @@
 #include <map>
 #include <memory>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "absenc/client/text/json.hpp"
@@ -20,12 +21,16 @@ struct MqttHealth {
   std::string prefix{};
   bool connected = false;
   std::string trouble{};      // why it is not, or why nothing can be spooled; "": nothing is wrong
+  bool failing = false;       // what is read cannot be spooled, or the spool drops the oldest of it
   std::uint64_t waiting = 0;  // messages in the spool
   std::int64_t waiting_bytes = 0;
-  std::uint64_t sent = 0;     // messages that the broker has taken since the start
-  std::uint64_t dropped = 0;  // readings since the start: the spool was full, or could not be written
+  std::uint64_t sent = 0;           // messages that the broker has taken since the start
+  std::uint64_t dropped = 0;        // readings since the start: the spool was full, or could not be written
+  std::uint64_t client_deaths = 0;  // of the process that speaks to the broker, since the start
   std::map<std::string, std::uint64_t> taken{};  // by encoder: up to this number, its readings are in the spool or sent
 
+  /// "none", "good", "away" (the broker: what it shall have waits on disk) or "failing": readings are being dropped.
+  [[nodiscard]] std::string_view state() const;
   [[nodiscard]] client::Json json() const;
   /// Lines for Prometheus.
   [[nodiscard]] std::string metrics() const;

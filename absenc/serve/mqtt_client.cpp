@@ -1,18 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
-// The only file that includes libmosquitto's header.
 #include "absenc/serve/mqtt_client.hpp"
 
 #include <fmt/format.h>
-#include <mosquitto.h>
-#include <mqtt_protocol.h>
 
-#include <cerrno>
-#include <cstring>
+#include <algorithm>
 #include <utility>
 
 #include "absenc/client/error.hpp"
 #include "absenc/os/network.hpp"
-#include "absenc/serve/secret_file.hpp"
+#include "absenc/os/signals.hpp"
+#include "absenc/serve/mqtt_process.hpp"
 
 namespace absenc::serve {
 
@@ -20,154 +17,139 @@ using namespace client;
 
 namespace {
 
-constexpr int keepalive_s = 15;
-constexpr int most_in_flight = 1000;  // as far as the broker allows it
-constexpr const char* trusted_here = "/etc/ssl/certs";
+using namespace std::chrono_literals;
 
-void require(int error, const std::string& what) {
-  if (error == MOSQ_ERR_SUCCESS) return;
-  throw Failure(what + ": " + (error == MOSQ_ERR_ERRNO ? std::strerror(errno) : ::mosquitto_strerror(error)));
+constexpr std::size_t most_in_frame = 4096;  // of a frame from the process: it sends numbers and short texts
+constexpr Time time_to_start = 10s;
+constexpr Time longest_silence = 10s;  // of a connected one, which says each second that it lives
+constexpr Time time_to_end = 500ms;    // to leave the broker, or to be done with a dump
+
+// As words of the broker's may stand in it.
+std::string printable(std::string text) {
+  std::replace_if(
+      text.begin(), text.end(), [](unsigned char c) { return c < 0x20 || c > 0x7E; }, '?');
+  return text;
 }
 
 }  // namespace
 
 std::string Broker::text() const { return fmt::format("{}://{}:{}", tls ? "mqtts" : "mqtt", host, port); }
 
-struct MqttClient::Library {
-  Library(const Broker& to, const Identity& identity, Version spoken) : broker(to), version(spoken) {
-    static const int ready = ::mosquitto_lib_init();
-    require(ready, "MQTT");
-    client = ::mosquitto_new(identity.id.c_str(), true, this);
-    if (client == nullptr) throw Failure("MQTT: no memory");
-    try {
-      set_up(identity);
-    } catch (...) {
-      ::mosquitto_destroy(client);
-      throw;
-    }
-  }
-  ~Library() { ::mosquitto_destroy(client); }
-  Library(const Library&) = delete;
-  Library& operator=(const Library&) = delete;
+MqttClient::MqttClient(const Broker& broker, const MqttIdentity& identity, MqttVersion version)
+    : process_({"absenc", std::string(mqtt_process_verb)}), incoming_(most_in_frame), heard_(os::now()) {
+  WireFrame frame(Wire::begin);
+  frame.add(broker.host).add(broker.port).add(broker.tls ? 1U : 0U);
+  for (const auto* file : {&broker.login_file, &broker.ca_file, &broker.cert_file, &broker.key_file}) frame.add(*file);
+  frame.add(identity.id).add(identity.will_topic).add(identity.will).add(static_cast<std::uint32_t>(version));
+  outgoing_ = frame.bytes();
+  wait_until_ready();
+}
 
-  void set_up(const Identity& identity) {
-    ::mosquitto_int_option(client, MOSQ_OPT_PROTOCOL_VERSION,
-                           version == Version::v5 ? MQTT_PROTOCOL_V5 : MQTT_PROTOCOL_V311);
-    ::mosquitto_int_option(client, MOSQ_OPT_SEND_MAXIMUM, most_in_flight);
-    ::mosquitto_int_option(client, MOSQ_OPT_TCP_NODELAY, 1);
-    ::mosquitto_connect_v5_callback_set(client, &on_connect);
-    ::mosquitto_disconnect_v5_callback_set(client, &on_disconnect);
-    ::mosquitto_publish_v5_callback_set(client, &on_publish);
-    if (!broker.login_file.empty()) {
-      const Secret login = read_secret(broker.login_file);
-      require(::mosquitto_username_pw_set(client, login.name.c_str(), login.secret.c_str()), broker.login_file);
-    }
-    if (broker.tls) {
-      const char* file = broker.ca_file.empty() ? nullptr : broker.ca_file.c_str();
-      require(::mosquitto_tls_set(client, file, file == nullptr ? trusted_here : nullptr, or_null(broker.cert_file),
-                                  or_null(broker.key_file), nullptr),
-              "the files for TLS to " + broker.text());
-    }
-    const auto size = static_cast<int>(identity.will.size());
-    require(::mosquitto_will_set(client, identity.will_topic.c_str(), size, identity.will.data(), 1, true),
-            identity.will_topic);
-  }
-
-  static const char* or_null(const std::string& text) { return text.empty() ? nullptr : text.c_str(); }
-
-  // Reasons of version 3.1.1 have numbers of their own, below 128.
-  void connect_answered(int reason) {
-    if (reason == 0) {
-      state = State::connected;
-      return;
-    }
-    wrong_version = version == Version::v5 &&
-                    (reason == MQTT_RC_UNSUPPORTED_PROTOCOL_VERSION || reason == CONNACK_REFUSED_PROTOCOL_VERSION);
-    lose(fmt::format("the broker refuses: {}",
-                     reason >= 128 ? ::mosquitto_reason_string(reason) : ::mosquitto_connack_string(reason)));
-  }
-
-  void note(int error) {
-    if (error == MOSQ_ERR_SUCCESS) return;
-    lose(error == MOSQ_ERR_ERRNO && errno != 0 ? std::strerror(errno) : ::mosquitto_strerror(error));
-  }
-
-  void lose(const std::string& why) {
-    if (state == State::lost) return;
-    state = State::lost;
-    trouble = why;
-  }
-
-  static void on_connect(mosquitto*, void* self, int reason, int, const mosquitto_property*) {
-    static_cast<Library*>(self)->connect_answered(reason);
-  }
-  static void on_disconnect(mosquitto*, void* self, int reason, const mosquitto_property*) {
-    const bool told = reason >= 128;
-    static_cast<Library*>(self)->lose(told ? fmt::format("the broker ended it: {}", ::mosquitto_reason_string(reason))
-                                           : "the connection was lost");
-  }
-  static void on_publish(mosquitto*, void* self, int number, int reason, const mosquitto_property*) {
-    const char* refused = reason >= 128 ? ::mosquitto_reason_string(reason) : "";
-    static_cast<Library*>(self)->acknowledgements.push_back({number, refused});
-  }
-
-  Broker broker;
-  Version version;
-  mosquitto* client = nullptr;
-  State state = State::connecting;
-  std::string trouble{};
-  bool wrong_version = false;
-  std::vector<Acknowledgement> acknowledgements{};
-};
-
-MqttClient::MqttClient(const Broker& broker, const Identity& identity, Version version)
-    : library_(std::make_unique<Library>(broker, identity, version)) {}
-MqttClient::~MqttClient() = default;
+void MqttClient::wait_until_ready() {
+  const Time deadline = os::now() + time_to_start;
+  while (!ready_ && state_ != State::lost && os::now() < deadline) work(20ms);
+  if (ready_) return;
+  throw Failure(state_ == State::lost ? trouble_ : "the process of the MQTT client does not start");
+}
 
 void MqttClient::connect(const std::string& host, bool try_all) {
-  Library& library = *library_;
-  const auto begin = try_all ? &::mosquitto_connect : &::mosquitto_connect_async;
-  library.note(begin(library.client, host.c_str(), library.broker.port, keepalive_s));
+  outgoing_ += WireFrame(Wire::connect).add(host).add(try_all ? 1U : 0U).bytes();
 }
 
-// mosquitto_loop would do the same with select(), which knows descriptors below 1024 only: many encoders have more.
 MqttClient::State MqttClient::work(Time longest) {
-  Library& library = *library_;
-  if (library.state == State::lost) return library.state;
-  const int socket = ::mosquitto_socket(library.client);
-  if (socket < 0) {
-    library.lose("the connection was lost");
-    return library.state;
+  if (state_ == State::lost) return state_;
+  const os::Ready ready = os::wait_for_socket(process_.channel().get(), !outgoing_.empty(), longest);
+  if (ready.to_read) receive();
+  // A process that ended closes its end: receiving tells what it said before.
+  if (state_ != State::lost && !process_.channel().send(outgoing_)) note_end();
+  if (state_ == State::connected && os::now() - heard_ > longest_silence) {
+    process_.end({});
+    lose("the process of the MQTT client does not answer");
   }
-  const os::Ready ready = os::wait_for_socket(socket, ::mosquitto_want_write(library.client), longest);
-  errno = 0;  // the library looks at it after calls that do not set it
-  int error = MOSQ_ERR_SUCCESS;
-  // TLS begins by reading, also when it wants to write.
-  const bool begins = library.broker.tls && library.state == State::connecting && ready.to_write;
-  if (ready.to_read || begins) error = ::mosquitto_loop_read(library.client, 1);
-  errno = 0;
-  if (error == MOSQ_ERR_SUCCESS && ready.to_write) error = ::mosquitto_loop_write(library.client, 1);
-  if (error == MOSQ_ERR_SUCCESS) error = ::mosquitto_loop_misc(library.client);
-  library.note(error);
-  return library.state;
+  return state_;
 }
 
-const std::string& MqttClient::trouble() const { return library_->trouble; }
-bool MqttClient::wrong_version() const { return library_->wrong_version; }
+void MqttClient::receive() {
+  const bool open = process_.channel().receive(incoming_.bytes);
+  heard_ = os::now();
+  try {
+    while (std::optional<WireFields> frame = incoming_.next()) take(std::move(*frame));
+  } catch (const Failure& failure) {
+    process_.end({});
+    return lose(failure.what());
+  }
+  if (!open) note_end();
+}
 
-std::optional<int> MqttClient::publish(const std::string& topic, const std::string& payload, int qos, bool retain) {
-  int number = 0;
-  const int error = ::mosquitto_publish(library_->client, &number, topic.c_str(), static_cast<int>(payload.size()),
-                                        payload.data(), qos, retain);
-  if (error == MOSQ_ERR_SUCCESS) return number;
-  library_->lose(fmt::format("{}: {}", topic, ::mosquitto_strerror(error)));
-  return {};
+void MqttClient::take(WireFields frame) {
+  switch (frame.kind) {
+    case Wire::ready:
+      ready_ = true;
+      break;
+    case Wire::failed:
+      lose(printable(frame.text()));
+      break;
+    case Wire::connected:
+      if (state_ == State::connecting) state_ = State::connected;
+      break;
+    case Wire::lost: {
+      const std::string why = frame.text();
+      wrong_version_ = frame.number() != 0;
+      lose(printable(why));
+      break;
+    }
+    case Wire::acknowledged: {
+      const std::uint32_t number = frame.number();
+      if (number == 0 || number > static_cast<std::uint32_t>(last_number_)) {
+        throw Failure("the process of the MQTT client acknowledges a message that it never had");
+      }
+      acknowledgements_.push_back({static_cast<int>(number), printable(frame.text())});
+      break;
+    }
+    case Wire::alive:
+      break;
+    default:
+      throw Failure("the process of the MQTT client sends what only absenc sends");
+  }
+  frame.end();
+}
+
+void MqttClient::lose(const std::string& why) {
+  if (state_ == State::lost) return;
+  state_ = State::lost;
+  trouble_ = why;
+}
+
+// A library that ends its process does so at a packet that it cannot stand: nothing else reaches it from outside.
+void MqttClient::note_end() {
+  const std::string how = process_.end(time_to_end);
+  if (state_ == State::lost) return;
+  died_ = true;
+  lose(how.empty() ? "the MQTT client ended"
+                   : fmt::format("the MQTT client ended {} after a packet of the broker", how));
+}
+
+int MqttClient::publish(const std::string& topic, const std::string& payload, int qos, bool retain) {
+  ++last_number_;
+  outgoing_ += WireFrame(Wire::publish)
+                   .add(static_cast<std::uint32_t>(last_number_))
+                   .add(topic)
+                   .add(payload)
+                   .add(static_cast<std::uint32_t>(qos))
+                   .add(retain ? 1U : 0U)
+                   .bytes();
+  return last_number_;
 }
 
 std::vector<MqttClient::Acknowledgement> MqttClient::take_acknowledgements() {
-  return std::exchange(library_->acknowledgements, {});
+  return std::exchange(acknowledgements_, {});
 }
 
-void MqttClient::end() { ::mosquitto_disconnect(library_->client); }
+void MqttClient::end() {
+  outgoing_ += WireFrame(Wire::leave).bytes();
+  const Time deadline = os::now() + time_to_end;
+  while (work(20ms) != State::lost && os::now() < deadline) {
+  }
+}
 
 }  // namespace absenc::serve

@@ -19,6 +19,7 @@ namespace {
 
 constexpr std::size_t most_in_a_message = 250;                       // 15 kB: less than any broker refuses
 constexpr Time between_dropped_tellings = std::chrono::seconds(10);  // each is a message itself
+constexpr Time time_drops_show = std::chrono::seconds(30);           // in the health, after the last one
 
 }  // namespace
 
@@ -46,7 +47,9 @@ void MqttCollector::add(const std::vector<Happening>& happenings) {
 
 MqttCollector::Figures MqttCollector::figures() const {
   const std::lock_guard lock(mutex_);
-  return figures_;
+  Figures figures = figures_;
+  figures.drops = figures.dropped != 0 && os::now() - last_dropped_ < time_drops_show;
+  return figures;
 }
 
 void MqttCollector::work(const std::stop_token& stop) {
@@ -128,6 +131,7 @@ void MqttCollector::note_dropped(const Spool::Counts& dropped, const std::string
   untold_why_ = why;
   const std::lock_guard lock(mutex_);
   figures_.dropped += dropped.readings;
+  last_dropped_ = os::now();
 }
 
 }  // namespace absenc::serve

@@ -28,6 +28,7 @@ class MqttCollector {
   struct Figures {
     std::string trouble{};      // why the spool cannot be written
     std::uint64_t dropped = 0;  // readings
+    bool drops = false;         // some within the last seconds
     std::map<std::string, std::uint64_t> taken{};
   };
   [[nodiscard]] Figures figures() const;
@@ -56,6 +57,7 @@ class MqttCollector {
   std::condition_variable_any changed_;
   std::vector<Happening> waiting_;
   Figures figures_;
+  Time last_dropped_{};
   std::jthread thread_;  // last: it uses all of the others
 };
 

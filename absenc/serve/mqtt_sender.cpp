@@ -32,6 +32,8 @@ constexpr Time first_pause = 500ms;  // between two attempts to connect; each is
 constexpr Time longest_pause = 5s;
 constexpr Time time_to_connect = 10s;
 constexpr Time time_to_finish = 1s;
+constexpr Time time_to_hold = 10s;  // a connection that lasts longer is good: the next pause is the first again
+constexpr Time between_connected_tellings = 60s;  // of a connection that comes and goes; else one that holds is told
 
 }  // namespace
 
@@ -47,7 +49,7 @@ MqttSender::~MqttSender() {
   thread_.join();
 }
 
-MqttClient::Identity MqttSender::identity() const {
+MqttIdentity MqttSender::identity() const {
   return {"absenc-" + spool_->source(), topic_of(settings_->prefix, "", "state"),
           server_state_text("offline", "the connection was lost")};
 }
@@ -60,7 +62,7 @@ MqttSender::Figures MqttSender::figures() const {
 void MqttSender::work(const std::stop_token& stop) {
   Time pause = first_pause;
   while (!stop.stop_requested()) {
-    const MqttClient::Version tried = version_;
+    const MqttVersion tried = version_;
     try {
       attend(stop);
     } catch (const Failure& failure) {
@@ -69,7 +71,8 @@ void MqttSender::work(const std::stop_token& stop) {
       become_lost(failure.what());
     }
     if (version_ != tried) continue;
-    if (has_taken_) pause = first_pause;
+    const bool held = connected_at_ != Time{} && os::now() - connected_at_ >= time_to_hold;
+    if (has_taken_ && held) pause = first_pause;
     std::unique_lock lock(mutex_);
     changed_.wait_for(lock, stop, pause, [] { return false; });
     pause = std::min(2 * pause, longest_pause);
@@ -82,6 +85,7 @@ void MqttSender::attend(const std::stop_token& stop) {
   messages_out_ = 0;
   last_sent_ = 0;
   has_taken_ = false;
+  connected_at_ = {};
   retained_.clear();
   next_states_ = {};
   std::vector<std::string> hosts = os::addresses_of(settings_->broker.host);
@@ -94,13 +98,14 @@ void MqttSender::attend(const std::stop_token& stop) {
     const MqttClient::State state = connect(client, host, try_all, stop);
     if (stop.stop_requested()) return;
     if (client.wrong_version()) {
-      version_ = MqttClient::Version::v3_1_1;
+      version_ = MqttVersion::v3_1_1;
       return;
     }
     if (state == MqttClient::State::connected) {
       begin();
       return deliver(client, stop);
     }
+    note_death(client);
     why = state == MqttClient::State::lost ? client.trouble() : "it does not answer";
   }
   throw Failure(why);
@@ -118,14 +123,22 @@ MqttClient::State MqttSender::connect(MqttClient& client, const std::string& hos
 }
 
 void MqttSender::begin() {
-  told_lost_ = false;
+  connected_at_ = os::now();
+  told_connected_ = false;
   next_message_ = os::now() + between_first_messages;
-  {
-    const std::lock_guard lock(mutex_);
-    figures_.connected = true;
-    figures_.trouble = refusal_;
-  }
-  const bool old = version_ == MqttClient::Version::v3_1_1;
+  const std::lock_guard lock(mutex_);
+  figures_.connected = true;
+  figures_.trouble = refusal_;
+}
+
+// A connection that comes and goes is no event each time: after one, the next is told when it has held.
+void MqttSender::tell_connected() {
+  if (told_connected_) return;
+  if (os::now() < next_told_connected_ && os::now() - connected_at_ < time_to_hold) return;
+  told_connected_ = true;
+  next_told_connected_ = os::now() + between_connected_tellings;
+  told_lost_.clear();
+  const bool old = version_ == MqttVersion::v3_1_1;
   happenings_->add(
       {calendar_ms(), "", "mqtt",
        fmt::format("connected to {}{}", settings_->broker.text(),
@@ -149,10 +162,19 @@ void MqttSender::deliver(MqttClient& client, const std::stop_token& stop) {
 }
 
 void MqttSender::step(MqttClient& client) {
+  tell_connected();
   send_messages(client);
   const bool lost = client.work(one_wait) == MqttClient::State::lost;
   settle(client);  // also what came before it was lost
-  if (lost) throw Failure(client.trouble());
+  if (!lost) return;
+  note_death(client);
+  throw Failure(client.trouble());
+}
+
+void MqttSender::note_death(const MqttClient& client) {
+  if (!client.died()) return;
+  const std::lock_guard lock(mutex_);
+  ++figures_.client_deaths;
 }
 
 void MqttSender::finish(MqttClient& client) {
@@ -202,9 +224,7 @@ void MqttSender::send_values(MqttClient& client) {
     const Snapshot snapshot = watch->snapshot();
     if (snapshot.state != State::live) continue;
     const std::string text = overview(*watch, snapshot).line();
-    if (!client.publish(topic_of(settings_->prefix, watch->name(), "value"), text, 0, false)) {
-      throw Failure(client.trouble());
-    }
+    client.publish(topic_of(settings_->prefix, watch->name(), "value"), text, 0, false);
   }
 }
 
@@ -212,9 +232,7 @@ void MqttSender::send_retained(MqttClient& client, const Retained& retained) {
   const auto [known, is_new] = retained_.try_emplace(retained.topic);
   if (!is_new && known->second == retained.condition) return;
   known->second = retained.condition;
-  const std::optional<int> number = client.publish(retained.topic, retained.payload, 1, true);
-  if (!number) throw Failure(client.trouble());
-  outstanding_[*number] = {0, retained.topic};
+  outstanding_[client.publish(retained.topic, retained.payload, 1, true)] = {0, retained.topic};
 }
 
 // Until the broker has taken one, one at a time, for a while: mosquitto hangs up behind its refusal, which is lost in
@@ -224,9 +242,7 @@ void MqttSender::send_messages(MqttClient& client) {
   if (!has_taken_ && !outstanding_.empty() && os::now() < next_message_) return;
   next_message_ = os::now() + between_first_messages;
   for (const Message& one : spool_->after(last_sent_, has_taken_ ? most_messages_out - messages_out_ : 1)) {
-    const std::optional<int> number = client.publish(one.topic, one.payload, 1, false);
-    if (!number) throw Failure(client.trouble());
-    outstanding_[*number] = {one.id, one.topic};
+    outstanding_[client.publish(one.topic, one.payload, 1, false)] = {one.id, one.topic};
     ++messages_out_;
     last_sent_ = one.id;
   }
@@ -266,7 +282,7 @@ void MqttSender::become_lost(const std::string& why) {
     figures_.connected = false;
     figures_.trouble = refusal_.empty() ? why : refusal_;
   }
-  if (std::exchange(told_lost_, true)) return;
+  if (!told_lost_.insert(why).second) return;
   happenings_->add(
       {calendar_ms(), "", "mqtt",
        fmt::format("nothing reaches {}: {}; what it shall have waits on disk", settings_->broker.text(), why)});

@@ -31,6 +31,7 @@ class MqttSender {
     bool connected = false;
     std::string trouble{};
     std::uint64_t sent = 0;
+    std::uint64_t client_deaths = 0;  // of the process that speaks to the broker
   };
   [[nodiscard]] Figures figures() const;
 
@@ -50,7 +51,9 @@ class MqttSender {
   void send_messages(MqttClient& client);
   void settle(MqttClient& client);
   void become_lost(const std::string& why);
-  [[nodiscard]] MqttClient::Identity identity() const;
+  void tell_connected();
+  void note_death(const MqttClient& client);
+  [[nodiscard]] MqttIdentity identity() const;
 
   const MqttSettings* settings_;
   Spool* spool_;
@@ -58,7 +61,7 @@ class MqttSender {
   Happenings* happenings_;
 
   // Of the thread alone.
-  MqttClient::Version version_ = MqttClient::Version::v5;
+  MqttVersion version_ = MqttVersion::v5;
   Time next_message_{};  // while the broker has taken none
   struct Outstanding {
     std::int64_t message = 0;  // its id; 0: of a state
@@ -72,7 +75,10 @@ class MqttSender {
   Time next_states_{};
   Time next_values_{};
   bool has_taken_ = false;  // the broker, a message on this connection
-  bool told_lost_ = false;
+  Time connected_at_{};
+  bool told_connected_ = false;  // of this connection
+  Time next_told_connected_{};
+  std::set<std::string> told_lost_;  // why nothing arrives, since a connection was told
   std::string refusal_;  // of the last message that was refused, until one is taken: brokers then also just hang up
 
   mutable std::mutex mutex_;  // guards what follows

@@ -49,6 +49,11 @@ void Sending::add(const std::vector<Happening>& happenings) {
   if (const std::shared_ptr<Mqtt> to = mqtt()) to->add(happenings);
 }
 
+MqttHealth Sending::mqtt_health() const {
+  const std::shared_ptr<Mqtt> of = mqtt();
+  return of ? of->health() : MqttHealth{};
+}
+
 client::Json Sending::json() const {
   const std::shared_ptr<Mqtt> of = mqtt();
   return of ? of->health().json() : client::Json();

@@ -22,6 +22,8 @@ class Sending {
   std::string change_to(const Outlets& outlets);
 
   void add(const std::vector<Happening>& happenings);
+  /// Its state is "none" when there is none.
+  [[nodiscard]] MqttHealth mqtt_health() const;
   /// Of MQTT, null when there is none.
   [[nodiscard]] client::Json json() const;
   /// For Prometheus.

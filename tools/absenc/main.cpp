@@ -16,6 +16,7 @@
 #include "absenc/os/error.hpp"
 #include "absenc/os/process.hpp"
 #include "absenc/os/signals.hpp"
+#include "absenc/serve/mqtt_process.hpp"
 #include "tools/absenc/error.hpp"
 #include "tools/absenc/help.hpp"
 #include "tools/absenc/parameters.hpp"
@@ -287,6 +288,7 @@ int main(int argument_count, char** arguments) {
   std::string understood;
   std::vector<char*> words(arguments, arguments + argument_count);
   words.erase(words.begin(), words.begin() + std::min(argument_count, 1));  // POSIX allows none at all
+  if (words.size() == 1 && words.front() == absenc::serve::mqtt_process_verb) return absenc::serve::run_mqtt_process();
   std::string help_option = "--help", version_option = "--version";
   // `absenc help read` is `absenc read --help`: people type both.
   if (!words.empty() && std::string_view(words.front()) == "help") {

@@ -1,0 +1,260 @@
+// SPDX-License-Identifier: Apache-2.0
+// The only file that includes libmosquitto's header.
+#include "absenc/serve/mqtt_process.hpp"
+
+#include <fmt/format.h>
+#include <mosquitto.h>
+#include <mqtt_protocol.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <cstring>
+#include <memory>
+#include <string>
+#include <unordered_map>
+#include <utility>
+
+#include "absenc/client/error.hpp"
+#include "absenc/os/child_process.hpp"
+#include "absenc/os/signals.hpp"
+#include "absenc/serve/mqtt_client.hpp"
+#include "absenc/serve/mqtt_wire.hpp"
+#include "absenc/serve/secret_file.hpp"
+
+namespace absenc::serve {
+
+using namespace client;
+
+namespace {
+
+using namespace std::chrono_literals;
+
+constexpr int keepalive_s = 15;
+constexpr int most_in_flight = 1000;  // as far as the broker allows it
+constexpr const char* trusted_here = "/etc/ssl/certs";
+constexpr std::size_t most_memory = 128'000'000;  // a packet of MQTT may be 256 MB, which nobody here waits for
+constexpr std::size_t most_frame = 256'000'000;   // of the parent
+constexpr std::size_t much_outgoing = 100'000;    // then nothing more is read of the broker until the parent takes it
+constexpr Time between_signs_of_life = 1s;
+
+void require(int error, const std::string& what) {
+  if (error == MOSQ_ERR_SUCCESS) return;
+  throw Failure(what + ": " + (error == MOSQ_ERR_ERRNO ? std::strerror(errno) : ::mosquitto_strerror(error)));
+}
+
+/// One process, one connection.
+class MqttProcess {
+ public:
+  explicit MqttProcess(os::Channel parent) : parent_(std::move(parent)) {}
+  ~MqttProcess() { ::mosquitto_destroy(client_); }
+  MqttProcess(const MqttProcess&) = delete;
+  MqttProcess& operator=(const MqttProcess&) = delete;
+
+  void run() {
+    while (!over_ || !outgoing_.empty()) {
+      if (!wait_and_talk()) return;  // without its parent nobody needs it
+      if (!over_) turn_library();
+      if (os::now() < next_sign_) continue;
+      next_sign_ = os::now() + between_signs_of_life;
+      outgoing_ += WireFrame(Wire::alive).bytes();
+    }
+  }
+
+ private:
+  // False: the parent is gone.
+  bool wait_and_talk() {
+    const int broker = client_ == nullptr || over_ ? -1 : ::mosquitto_socket(client_);
+    const bool reads = outgoing_.size() < much_outgoing;
+    const bool writes = broker >= 0 && ::mosquitto_want_write(client_);
+    const auto events = [](bool in, bool out) { return static_cast<short>((in ? POLLIN : 0) | (out ? POLLOUT : 0)); };
+    std::array<pollfd, 2> watched{
+        {{parent_.get(), events(true, !outgoing_.empty()), 0}, {broker, events(reads, writes), 0}}};
+    os::wait_for(watched, std::min(next_sign_, os::now() + between_signs_of_life));
+    broker_events_ = watched[1].revents;
+    if (!parent_.receive(incoming_.bytes)) return false;
+    while (std::optional<WireFields> frame = incoming_.next()) take(*frame);
+    return parent_.send(outgoing_);
+  }
+
+  void take(WireFields& frame) {
+    switch (frame.kind) {
+      case Wire::begin:
+        begin(frame);
+        break;
+      case Wire::connect: {
+        const std::string host = frame.text();
+        // The first of a name's addresses that takes the connection, and waits for that; else one address, and does
+        // not.
+        const auto connect = frame.number() != 0 ? &::mosquitto_connect : &::mosquitto_connect_async;
+        if (client_ != nullptr) note(connect(client_, host.c_str(), broker_.port, keepalive_s));
+        break;
+      }
+      case Wire::publish:
+        publish(frame);
+        break;
+      case Wire::leave:
+        if (client_ != nullptr) ::mosquitto_disconnect(client_);
+        break;
+      default:
+        throw Failure("the parent sends a frame of its child");
+    }
+  }
+
+  void begin(WireFields& frame) {
+    broker_.host = frame.text();
+    broker_.port = static_cast<std::uint16_t>(frame.number());
+    broker_.tls = frame.number() != 0;
+    for (auto* file : {&broker_.login_file, &broker_.ca_file, &broker_.cert_file, &broker_.key_file}) {
+      *file = frame.text();
+    }
+    MqttIdentity identity;
+    for (auto* text : {&identity.id, &identity.will_topic, &identity.will}) *text = frame.text();
+    version_ = frame.number() == 0 ? MqttVersion::v5 : MqttVersion::v3_1_1;
+    try {
+      require(::mosquitto_lib_init(), "MQTT");
+      client_ = ::mosquitto_new(identity.id.c_str(), true, this);
+      if (client_ == nullptr) throw Failure("MQTT: no memory");
+      set_up(identity);
+      outgoing_ += WireFrame(Wire::ready).bytes();
+    } catch (const Failure& failure) {
+      outgoing_ += WireFrame(Wire::failed).add(std::string_view(failure.what())).bytes();
+      over_ = true;
+    }
+  }
+
+  void set_up(const MqttIdentity& identity) {
+    ::mosquitto_int_option(client_, MOSQ_OPT_PROTOCOL_VERSION,
+                           version_ == MqttVersion::v5 ? MQTT_PROTOCOL_V5 : MQTT_PROTOCOL_V311);
+    ::mosquitto_int_option(client_, MOSQ_OPT_SEND_MAXIMUM, most_in_flight);
+    ::mosquitto_int_option(client_, MOSQ_OPT_TCP_NODELAY, 1);
+    ::mosquitto_connect_v5_callback_set(client_, &on_connect);
+    ::mosquitto_disconnect_v5_callback_set(client_, &on_disconnect);
+    ::mosquitto_publish_v5_callback_set(client_, &on_publish);
+    if (!broker_.login_file.empty()) {
+      const Secret login = read_secret(broker_.login_file);
+      require(::mosquitto_username_pw_set(client_, login.name.c_str(), login.secret.c_str()), broker_.login_file);
+    }
+    if (broker_.tls) {
+      const char* file = or_null(broker_.ca_file);
+      require(::mosquitto_tls_set(client_, file, file == nullptr ? trusted_here : nullptr, or_null(broker_.cert_file),
+                                  or_null(broker_.key_file), nullptr),
+              "the files for TLS to " + broker_.text());
+    }
+    const auto size = static_cast<int>(identity.will.size());
+    require(::mosquitto_will_set(client_, identity.will_topic.c_str(), size, identity.will.data(), 1, true),
+            identity.will_topic);
+  }
+
+  static const char* or_null(const std::string& text) { return text.empty() ? nullptr : text.c_str(); }
+
+  void publish(WireFields& frame) {
+    const std::uint32_t number = frame.number();
+    const std::string topic = frame.text();
+    const std::string payload = frame.text();
+    const auto qos = static_cast<int>(frame.number());
+    const bool retain = frame.number() != 0;
+    if (client_ == nullptr || over_) return;
+    int given = 0;
+    const int error = ::mosquitto_publish(client_, &given, topic.c_str(), static_cast<int>(payload.size()),
+                                          payload.data(), qos, retain);
+    const bool only_this = error == MOSQ_ERR_OVERSIZE_PACKET || error == MOSQ_ERR_QOS_NOT_SUPPORTED ||
+                           error == MOSQ_ERR_RETAIN_NOT_SUPPORTED;
+    if (error == MOSQ_ERR_SUCCESS) {
+      if (qos != 0) numbers_[given] = number;
+    } else if (only_this) {
+      acknowledge(number, ::mosquitto_strerror(error));
+    } else {
+      lose(fmt::format("{}: {}", topic, ::mosquitto_strerror(error)));
+    }
+  }
+
+  // As mosquitto_loop does, which would wait for the broker alone.
+  void turn_library() {
+    if (client_ == nullptr || !connects_) return;
+    if (::mosquitto_socket(client_) < 0) return lose("the connection was lost");
+    const bool is_over = (broker_events_ & (POLLERR | POLLHUP | POLLNVAL)) != 0;  // reading will tell why
+    const bool reads = is_over || (broker_events_ & POLLIN) != 0;
+    const bool writes = (broker_events_ & POLLOUT) != 0;
+    errno = 0;  // the library looks at it after calls that do not set it
+    int error = MOSQ_ERR_SUCCESS;
+    // TLS begins by reading, also when it wants to write.
+    const bool begins = broker_.tls && !connected_ && writes;
+    if (reads || begins) error = ::mosquitto_loop_read(client_, 1);
+    errno = 0;
+    if (error == MOSQ_ERR_SUCCESS && writes) error = ::mosquitto_loop_write(client_, 1);
+    if (error == MOSQ_ERR_SUCCESS) error = ::mosquitto_loop_misc(client_);
+    note(error);
+  }
+
+  // Reasons of version 3.1.1 have numbers of their own, below 128.
+  void connect_answered(int reason) {
+    if (reason == 0) {
+      connected_ = true;
+      outgoing_ += WireFrame(Wire::connected).bytes();
+      return;
+    }
+    const bool wrong_version = version_ == MqttVersion::v5 && (reason == MQTT_RC_UNSUPPORTED_PROTOCOL_VERSION ||
+                                                               reason == CONNACK_REFUSED_PROTOCOL_VERSION);
+    lose(fmt::format("the broker refuses: {}",
+                     reason >= 128 ? ::mosquitto_reason_string(reason) : ::mosquitto_connack_string(reason)),
+         wrong_version);
+  }
+
+  void note(int error) {
+    connects_ = true;
+    if (error == MOSQ_ERR_SUCCESS) return;
+    lose(error == MOSQ_ERR_ERRNO && errno != 0 ? std::strerror(errno) : ::mosquitto_strerror(error));
+  }
+
+  void lose(const std::string& why, bool wrong_version = false) {
+    if (std::exchange(over_, true)) return;
+    outgoing_ += WireFrame(Wire::lost).add(std::string_view(why)).add(wrong_version ? 1U : 0U).bytes();
+  }
+
+  void acknowledge(std::uint32_t number, const char* refused) {
+    outgoing_ += WireFrame(Wire::acknowledged).add(number).add(std::string_view(refused)).bytes();
+  }
+
+  static void on_connect(mosquitto*, void* self, int reason, int, const mosquitto_property*) {
+    static_cast<MqttProcess*>(self)->connect_answered(reason);
+  }
+  static void on_disconnect(mosquitto*, void* self, int reason, const mosquitto_property*) {
+    const bool told = reason >= 128;
+    static_cast<MqttProcess*>(self)->lose(
+        told ? fmt::format("the broker ended it: {}", ::mosquitto_reason_string(reason)) : "the connection was lost");
+  }
+  static void on_publish(mosquitto*, void* self, int given, int reason, const mosquitto_property*) {
+    auto& process = *static_cast<MqttProcess*>(self);
+    const auto number = process.numbers_.find(given);
+    if (number == process.numbers_.end()) return;
+    process.acknowledge(number->second, reason >= 128 ? ::mosquitto_reason_string(reason) : "");
+    process.numbers_.erase(number);
+  }
+
+  os::Channel parent_;
+  std::string outgoing_{};
+  WireReader incoming_{most_frame};
+  Broker broker_{};
+  MqttVersion version_ = MqttVersion::v5;
+  mosquitto* client_ = nullptr;
+  std::unordered_map<int, std::uint32_t> numbers_{};  // by the library's number: the parent's
+  short broker_events_ = 0;
+  Time next_sign_{};
+  bool connects_ = false;
+  bool connected_ = false;
+  bool over_ = false;
+};
+
+}  // namespace
+
+int run_mqtt_process() {
+  try {
+    MqttProcess(os::become_child("absenc-mqtt", most_memory)).run();
+    return 0;
+  } catch (const std::exception&) {
+    return 1;  // the parent sees it
+  }
+}
+
+}  // namespace absenc::serve

@@ -1,0 +1,151 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A broker of our own that keeps to MQTT 5, until a script makes it say something else."""
+import json
+import socket
+import threading
+
+from command_support import PATIENCE
+
+CONNECT, CONNACK, PUBLISH, PUBACK, PINGREQ, PINGRESP, DISCONNECT = 1, 2, 3, 4, 12, 13, 14
+NOT_AUTHORIZED = 0x87
+
+
+def packet(kind, body, flags=0):
+    size, left = b"", len(body)
+    while True:
+        left, low = left >> 7, left & 127
+        size += bytes((low | (128 if left else 0),))
+        if not left:
+            return bytes((kind << 4 | flags,)) + size + body
+
+
+class Closed(Exception):
+    pass
+
+
+class Connection:
+    """One conversation with one client."""
+
+    def __init__(self, connection):
+        self.socket = connection
+        self.socket.settimeout(PATIENCE)
+
+    def read(self, count):
+        data = b""
+        while len(data) < count:
+            try:
+                piece = self.socket.recv(count - len(data))
+            except OSError as error:
+                raise Closed from error
+            if not piece:
+                raise Closed
+            data += piece
+        return data
+
+    def packet(self):
+        """(kind, flags, body)"""
+        first, size, shift = self.read(1)[0], 0, 0
+        while True:
+            byte = self.read(1)[0]
+            size |= (byte & 127) << shift
+            shift += 7
+            if byte < 128:
+                return first >> 4, first & 15, self.read(size)
+
+    def send(self, data):
+        try:
+            self.socket.sendall(data)
+        except OSError as error:
+            raise Closed from error
+
+    def close(self):
+        try:
+            self.socket.shutdown(socket.SHUT_RDWR)
+        except OSError:
+            pass
+        self.socket.close()
+
+
+def published(flags, body):
+    """(topic, number of the packet or None, payload) of a PUBLISH of MQTT 5 or 3.1.1 without properties"""
+    size = int.from_bytes(body[:2], "big")
+    topic, rest = body[2:2 + size].decode(), body[2 + size:]
+    number = None
+    if flags & 6:
+        number, rest = int.from_bytes(rest[:2], "big"), rest[2:]
+    return topic, number, rest[1:]
+
+
+class FakeBroker:
+    """`answer(broker, connection, kind, flags, body)` says what comes back to a packet; None: what MQTT 5 says.
+    `opened(connection)` makes what it needs for one conversation."""
+
+    def __init__(self, answer=None):
+        self.answer = answer
+        self.messages = []  # (topic, payload as JSON or None)
+        self.connections = 0
+        self.lock = threading.Lock()
+        self.open = set()
+        self.listener = socket.create_server(("127.0.0.1", 0), backlog=100)
+        self.port = self.listener.getsockname()[1]
+        self.url = f"mqtt://127.0.0.1:{self.port}"
+        threading.Thread(target=self.accept, daemon=True).start()
+
+    def accept(self):
+        while True:
+            try:
+                connection = Connection(self.listener.accept()[0])
+            except OSError:
+                return
+            with self.lock:
+                connection.index = self.connections
+                self.connections += 1
+                self.open.add(connection)
+            threading.Thread(target=self.talk, args=(connection,), daemon=True).start()
+
+    def talk(self, connection):
+        try:
+            while True:
+                kind, flags, body = connection.packet()
+                if kind == PUBLISH:
+                    self.keep(flags, body)
+                usual = self.usual(kind, flags, body)
+                if self.answer is not None:
+                    usual = self.answer(self, connection, kind, flags, body, usual)
+                if usual:
+                    connection.send(usual)
+                if kind == DISCONNECT:
+                    raise Closed
+        except Closed:
+            pass
+        finally:
+            connection.close()
+            with self.lock:
+                self.open.discard(connection)
+
+    def keep(self, flags, body):
+        topic, _, payload = published(flags, body)
+        with self.lock:
+            self.messages.append((topic, json.loads(payload) if payload else None))
+
+    @staticmethod
+    def usual(kind, flags, body):
+        if kind == CONNECT:
+            return packet(CONNACK, bytes((0, 0, 0)))
+        if kind == PUBLISH and flags & 6:
+            return packet(PUBACK, published(flags, body)[1].to_bytes(2, "big"))
+        return packet(PINGRESP, b"") if kind == PINGREQ else b""
+
+    def all(self, ending):
+        """Payloads of the topics that end in this."""
+        with self.lock:
+            return [payload for topic, payload in self.messages if topic.endswith(ending)]
+
+    def drop_all(self):
+        with self.lock:
+            for one in self.open:
+                one.close()
+
+    def end(self):
+        self.listener.close()
+        self.drop_all()

@@ -1,0 +1,154 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`absenc serve` at a broker that breaks MQTT: the encoders are read all the same, and no message is lost."""
+import os
+import signal
+import unittest
+
+from command_support import PATIENCE
+from mqtt_fake import CONNACK, CONNECT, PUBLISH, FakeBroker
+from mqtt_support import numbers
+from serve_support import ServeCase, wait_until
+
+ONE = "sim:tformat?motion=rpm=60"
+DEADLY = {  # each ended the server: assertions of libmosquitto 2.0.11
+    "CONNACK with an unknown property": bytes.fromhex("20050000027f00"),
+    "DISCONNECT with an unknown property": bytes.fromhex("e00487027f00"),
+    "PUBACK with an unknown property": bytes.fromhex("4006000100027f00"),
+    "PUBLISH that is too short": bytes.fromhex("30050001615859"),
+}
+
+
+class BrokerCase(ServeCase):
+    def fake(self, answer=None):
+        broker = FakeBroker(answer)
+        self.addCleanup(broker.end)
+        return broker
+
+    def sender(self, url, *arguments, **settings):
+        return self.without_history(ONE, "--mqtt", url, "--mqtt-prefix", "plant/hall", "--mqtt-spool",
+                                    os.path.join(self.directory, "spool"), *arguments, **settings)
+
+    def mqtt(self, server):
+        return server.json("/api/mqtt")
+
+    def children(self, server):
+        """(number, state, arguments) of the processes that the server started, zombies too."""
+        found = []
+        for name in filter(str.isdigit, os.listdir("/proc")):
+            try:
+                with open(f"/proc/{name}/stat", encoding="ascii", errors="replace") as file:
+                    state, parent = file.read().rsplit(")", 1)[1].split()[:2]
+                if int(parent) == server.process.pid:
+                    with open(f"/proc/{name}/cmdline", "rb") as file:
+                        found.append((int(name), state, file.read()))
+            except (FileNotFoundError, ProcessLookupError):
+                continue
+        return found
+
+    def events(self, broker):
+        """Each once, also where it came again."""
+        return list({one["id"]: one["text"] for one in broker.all("/event")}.values())
+
+
+class BadPackets(BrokerCase):
+    def test_packets_that_end_the_client_do_not_end_the_server(self):
+        for name, bad in DEADLY.items():
+            with self.subTest(name):
+                def answer(_broker, connection, kind, _flags, _body, usual, bad=bad):
+                    if connection.index:
+                        return usual
+                    return bad if (kind == CONNECT) == (bad[0] >> 4 == CONNACK) else usual
+                broker = self.fake(answer)
+                server = self.sender(broker.url)
+                wait_until(lambda b=broker: b.connections > 1, "it connects again")
+                died = wait_until(lambda s=server: self.mqtt(s)["client_deaths"], "the death is counted")
+                self.assertEqual(died, 1)
+                self.assertIn("absenc_mqtt_client_deaths_total{} 1\n", server.ask("/metrics")[1])
+                self.assertEqual(server.json("/healthz")["mqtt_client_deaths"], 1)
+                wait_until(lambda b=broker: [one for one in self.events(b) if "ended by signal 6 (Aborted)" in one],
+                           "an event says so")
+                wait_until(lambda b=broker: len(numbers(b.all("/readings"), ONE)) > 100, "readings come")
+                found = numbers(broker.all("/readings"), ONE)
+                self.assertEqual(found, list(range(1, len(found) + 1)))
+                self.assertLessEqual({state for _, state, _ in self.children(server)}, {"S", "R", "D"}, "no zombie")
+                server.process.kill()
+                server.process.wait()
+                os.remove(os.path.join(self.directory, "spool"))
+
+    def test_a_client_that_is_killed_is_begun_again(self):
+        broker = self.fake()
+        server = self.sender(broker.url)
+        wait_until(lambda: self.mqtt(server)["sent"], "it sends")
+        os.kill(self.children(server)[0][0], signal.SIGKILL)
+        wait_until(lambda: broker.connections > 1 and self.mqtt(server)["connected"], "it connects again")
+        self.assertEqual(self.mqtt(server)["client_deaths"], 1)
+
+    def test_a_client_that_hangs_is_ended(self):
+        broker = self.fake()
+        server = self.sender(broker.url)
+        wait_until(lambda: self.mqtt(server)["sent"], "it sends")
+        number = self.children(server)[0][0]
+        os.kill(number, signal.SIGSTOP)
+        wait_until(lambda: broker.connections > 1, "it connects again")
+        self.assertFalse(os.path.exists(f"/proc/{number}"))
+        self.assertEqual(server.encoder()["state"], "live")
+
+    def test_a_broker_that_comes_and_goes_is_no_flood_of_events(self):
+        def answer(_broker, connection, kind, _flags, _body, usual):
+            connection.seen = getattr(connection, "seen", 0) + (kind == PUBLISH)
+            return DEADLY["PUBLISH that is too short"] if connection.seen > 3 and connection.index < 4 else usual
+        broker = self.fake(answer)
+        server = self.sender(broker.url)
+        wait_until(lambda: broker.connections > 4, "it connects again and again")
+        wait_until(lambda: len(numbers(broker.all("/readings"), ONE)) > 200, "readings come")
+        self.assertEqual(len([one for one in self.events(broker) if "nothing reaches" in one]), 1)
+        self.assertEqual(len([one for one in self.events(broker) if one.startswith("connected")]), 1)
+
+
+class Process(BrokerCase):
+    def started(self, *arguments, **settings):
+        broker = self.fake()
+        server = self.sender(broker.url, *arguments, **settings)
+        wait_until(lambda: self.mqtt(server)["sent"], "it sends")
+        return broker, server
+
+    def test_it_has_no_secret_and_no_port_of_its_parent(self):
+        login = self.file("login", "bench secret-of-plants\n")
+        os.chmod(login, 0o600)
+        inherited = os.open("/dev/zero", os.O_RDONLY)
+        self.addCleanup(os.close, inherited)
+        _, server = self.started("--mqtt-login-file", login, preexec_fn=lambda: os.set_inheritable(inherited, True))
+        (number, _, arguments), = self.children(server)
+        self.assertNotIn(b"secret", arguments)
+        with open(f"/proc/{number}/environ", "rb") as file:
+            self.assertNotIn(b"secret-of-plants", file.read())
+        links, of_parent = self.links(number), self.links(server.process.pid)
+        self.assertTrue([one for one in of_parent if "spool" in one], of_parent)
+        self.assertFalse((links & of_parent) - {"/dev/null"})
+        self.assertNotIn("/dev/zero", links)
+
+    def links(self, number):
+        """Files and sockets that a process has open."""
+        folder = f"/proc/{number}/fd"
+        return {os.readlink(f"{folder}/{one}") for one in os.listdir(folder)}
+
+    def test_it_ends_with_its_parent(self):
+        for ending in (signal.SIGKILL, signal.SIGTERM):
+            with self.subTest(ending):
+                _, server = self.started()
+                (number, _, _), = self.children(server)
+                server.process.send_signal(ending)
+                server.process.wait(PATIENCE)
+                wait_until(lambda n=number: not os.path.exists(f"/proc/{n}"), "it is gone")
+
+    def test_the_broker_is_left_in_order_when_all_processes_get_a_signal(self):
+        """As from Ctrl-C and systemd."""
+        broker, server = self.started(preexec_fn=os.setsid)
+        os.killpg(server.process.pid, signal.SIGTERM)
+        self.assertEqual(server.process.wait(PATIENCE), 0)
+        ended = [one for one in broker.all("plant/hall/state") if one["why"] == "it ended"]
+        self.assertEqual(len(ended), 1)
+
+
+if __name__ == "__main__":
+    unittest.main()
