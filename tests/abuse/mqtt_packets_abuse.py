@@ -1,0 +1,138 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Conversations in which a broker breaks MQTT: no server ends, no reading is missing.
+
+ABSENC_ABUSE_SEED=N begins with that seed; conversation I of a run has the seed N + I."""
+from abuse_support import often
+
+import os
+import random
+import time
+import unittest
+
+from command_support import PATIENCE
+from mqtt_fake import (CONNACK, CONNECT, DISCONNECT, PINGRESP, PUBACK, PUBLISH, Closed, FakeBroker, packet)
+from mqtt_support import numbers
+from serve_support import BUSY, ServeCase, wait_until
+
+ONE = "sim:tformat?motion=rpm=60"
+SEED = int(os.environ.get("ABSENC_ABUSE_SEED", "1"))
+CONVERSATIONS = often(150, 10_000)
+SERVERS = often(20, 60)  # each pauses for up to 5 s between two conversations
+KNOWN = [bytes.fromhex(one) for one in ("20050000027f00", "4006000100027f00", "e00487027f00", "30050001615859")]
+KINDS = (CONNACK, PUBACK, 9, PUBLISH, DISCONNECT, PINGRESP, 15)  # 9: SUBACK, 15: AUTH
+
+
+def properties(random_):
+    """A list of properties: known ones, unknown ones, cut ones."""
+    body = bytes(random_.choice((0x11, 0x12, 0x1F, 0x21, 0x26, 0x27, 0x7F, random_.randrange(256)))
+                 for _ in range(random_.randrange(1, 4))) + random_.randbytes(random_.randrange(12))
+    return bytes((random_.choice((len(body), random_.randrange(128))),)) + body
+
+
+def body(random_, kind, number):
+    """Of a packet that a broker may send, as it should be."""
+    if kind == CONNACK:
+        return bytes((0, 0, 0))
+    if kind in (PUBACK, 9):
+        return number.to_bytes(2, "big") + random_.choice((b"", b"\0", b"\0\0", b"\x87\0"))
+    if kind == PUBLISH:
+        return b"\0\3a/b" + random_.choice((b"\0", b"\0\1\0")) + b"{}"
+    return random_.choice((b"", b"\x87\0")) if kind == DISCONNECT else b""
+
+
+def bad_packet(random_, kind, number):
+    way = random_.randrange(8)
+    good = body(random_, kind, number)
+    if way == 0:
+        return random_.choice(KNOWN)
+    if way == 1:
+        return random_.randbytes(random_.randrange(1, 64))
+    if way == 2:  # properties
+        start = {CONNACK: b"\0\0", PUBACK: number.to_bytes(2, "big") + b"\0", PUBLISH: b"\0\1a", 9: b"\0\1"}
+        return packet(kind, start.get(kind, b"\0") + properties(random_))
+    if way == 3:  # cut, and what follows is taken for its rest
+        whole = packet(kind, good + properties(random_))
+        return whole[:random_.randrange(1, len(whole))]
+    if way == 4:  # a size that is another: too large, 256 MB, five bytes long
+        size = random_.choice((b"\x7f", b"\xff\xff\xff\x7f", b"\xff\xff\xff\xff\x7f", b"\0"))
+        return bytes((kind << 4,)) + size + good
+    if way == 5:  # flags
+        return packet(kind, good, random_.randrange(16))
+    if way == 6:  # very often
+        return packet(kind, good) * random_.randrange(2, 2000)
+    mutated = bytearray(packet(kind, good + random_.choice((b"", properties(random_)))))
+    for _ in range(random_.randrange(1, 4)):
+        mutated[random_.randrange(len(mutated))] ^= 1 << random_.randrange(8)
+    return bytes(mutated)
+
+
+class Conversation:
+    def __init__(self, seed):
+        self.random = random.Random(seed)
+        # Half of them in place of the CONNACK, or right after it.
+        self.good_packets = self.random.choice((0, 0, 0, 1, 2, 3, 5, 8))
+        self.seen = 0
+        self.ends = None
+
+
+class Packets(ServeCase):
+    def setUp(self):
+        super().setUp()
+        self.good = False
+        self.broker = FakeBroker(self.answer)
+        self.addCleanup(self.broker.end)
+
+    def answer(self, _broker, connection, kind, _flags, body_, usual):
+        if self.good and not hasattr(connection, "conversation"):
+            return usual
+        if not hasattr(connection, "conversation"):
+            connection.conversation = Conversation(SEED + connection.index)
+        talk = connection.conversation
+        if talk.ends is not None:
+            if time.monotonic() > talk.ends:
+                raise Closed
+            return b"" if talk.random.random() < 0.5 else usual
+        talk.seen += 1
+        if talk.seen <= talk.good_packets:
+            return usual
+        talk.ends = time.monotonic() + 0.3
+        expected = {CONNECT: CONNACK, PUBLISH: PUBACK}.get(kind, PINGRESP)
+        wrong = expected if talk.random.random() < 0.5 else talk.random.choice(KINDS)
+        bad = b"".join(bad_packet(talk.random, wrong, talk.random.randrange(1, 9))
+                       for _ in range(talk.random.choice((1, 1, 1, 2, 5))))
+        return talk.random.choice((bad, usual + bad))
+
+    def test_no_server_ends_and_no_reading_is_missing(self):
+        servers = [self.without_history(ONE, "--rate", "20", "--mqtt", self.broker.url, "--mqtt-prefix", f"plant/{index}",
+                                        "--mqtt-spool", os.path.join(self.directory, f"spool{index}"))
+                   for index in range(SERVERS)]
+        deadline = time.monotonic() + CONVERSATIONS * 6 / SERVERS + PATIENCE
+        while self.broker.connections < CONVERSATIONS:
+            self.assertLess(time.monotonic(), deadline, f"{self.broker.connections} conversations")
+            for server in servers:
+                self.assertIsNone(server.process.poll(), f"a server ended; seeds {SEED} to {SEED + self.broker.connections}")
+            time.sleep(0.1)  # between two looks; nothing is expected of it
+        self.good = True
+        conversations = self.broker.connections
+        deaths = sum(server.json("/api/mqtt")["client_deaths"] for server in servers)
+        self.assertGreater(deaths, CONVERSATIONS / 20, "some of them end a client, or this tests nothing")
+        for index, server in enumerate(servers):
+            self.assertIsNone(server.process.poll())
+            self.assertEqual(server.encoder()["state"], "live")
+            goal = server.json("/api/mqtt")["taken"][ONE]
+            readings = f"plant/{index}/{ONE.replace(':', '%3A').replace('?', '%3F').replace('=', '%3D')}/readings"
+            wait_until(lambda r=readings, g=goal: (self.of(r) or [0])[-1] >= g, "the rest comes")
+            found = sorted(set(self.of(readings)))
+            self.assertEqual(found, list(range(1, found[-1] + 1)), "numbers of readings")
+            self.assertEqual(server.json("/api/mqtt")["dropped"], 0)
+            times = sorted({reading[0] for one in self.broker.all(readings) for reading in one["readings"]})
+            gap = max(later - earlier for earlier, later in zip(times, times[1:]))
+            self.assertLess(gap, 1_000_000 * BUSY, "microseconds without a reading")
+        print(f"{conversations} conversations, {deaths} ended a client, no server", flush=True)
+
+    def of(self, topic):
+        return numbers(self.broker.all(topic), ONE)
+
+
+if __name__ == "__main__":
+    unittest.main()
