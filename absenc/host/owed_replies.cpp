@@ -51,6 +51,8 @@ auto OwedReplies<Item>::owed_to(Items reply) -> Owed* {
 
 template <class Item>
 void OwedReplies<Item>::add(Items request, std::size_t expect, Time sent_at) {
+  widest_ = owed_.empty() ? Time{} : std::max(widest_, sent_at - newest_);
+  newest_ = sent_at;
   Owed* owed = find(request);
   if (owed == nullptr) {
     Owed fresh;

@@ -2,6 +2,7 @@
 // The requests on one line that were not answered, and whose reply may still come: the memory of ReplyGuard.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -64,6 +65,8 @@ class OwedReplies {
   /// One of them came, the oldest.
   void came(Owed& owed);
   void clear() { owed_.clear(); }
+  /// The longest time between one of them and the next, whatever they ask, and from the last of them until `now`.
+  [[nodiscard]] Time widest(Time now) const { return std::max(widest_, now - newest_); }
   /// All whose newest was sent before.
   void forget(Time before);
 
@@ -75,6 +78,8 @@ class OwedReplies {
   const Unit* unit_ = nullptr;
   const Options* options_ = nullptr;
   Buffer<Owed, most> owed_{};
+  Time newest_{};
+  Time widest_{};  // between two that were added
 };
 
 /// Without the first `count`, which there must be.

@@ -11,6 +11,7 @@ using namespace std::chrono_literals;
 
 constexpr int quiet_limits = 4;         // how many limits a line is quiet before a request is repeated
 constexpr Time longest_quiet = 2500ms;  // no reply that is later has been seen but on a line that is always late
+constexpr Time stall_quiet = 500ms;     // how long a line that stalled is quiet before what it held back is lost
 constexpr Time longest_way = 10s;       // what has not come by then is lost
 constexpr Time noise_limit = 100ms;     // no reply goes on for so long
 constexpr Time tick{1};
@@ -283,7 +284,12 @@ void ReplyGuard<Item>::strip_late(Time at) {
 template <class Item>
 void ReplyGuard<Item>::count_late(Owed* owed, Time at) {
   Time sent_at = sent_at_;
-  if (owed != nullptr) sent_at = owed->sent_at.empty() ? owed->lost_last : owed->sent_at[0];
+  if (owed != nullptr) {
+    sent_at = owed->sent_at.empty() ? owed->lost_last : owed->sent_at[0];
+    // The first late reply of several that are owed may be to any of them: the next one tells. On CAN it may also have
+    // been sent unasked.
+    if (!is_can && lateness_ == Time{}) sent_at = owed->newest();
+  }
   lateness_ = std::max(lateness_, std::min(at - sent_at, longest_way));
   // One too many, where nothing was late yet, is more likely to have come twice.
   if (owed == nullptr && late_ == 0) return;
@@ -298,7 +304,7 @@ void ReplyGuard<Item>::conclude_asking(bool silent) {
   if (!reply_.empty()) {
     if (const Owed* owed = owed_.owed_to(reply_)) {
       suspected_ = first_at_ - owed->oldest();
-      until_ = std::min(sent_at_ + std::clamp(suspected_ * 5 / 4, quiet_time(), longest_wait()), latest_);
+      until_ = std::min(sent_at_ + holding_time(), latest_);
       if (may_repeat_) until_ = std::max(until_, received_at_ + owed_.pause_after(request_));
       reply_.clear();
       phase_ = Phase::holding;
@@ -315,6 +321,17 @@ void ReplyGuard<Item>::conclude_asking(bool silent) {
   tell_silence_ = silent || !heard_;
   doubtful_ = !(heard_ && !damaged_ && owed_.is_reply(request_, reply_));
   if (!doubtful_) owed_.clear();  // the line keeps the order: whatever was to come before this has come, or is lost
+}
+
+// A reply that was late by `suspected_` is followed by the next at the distance of their requests, if the line is
+// always late by so much. Where that time passes in silence, and nothing was nearly so late before, the line had
+// stalled, and the requests that it held back are lost. A CAN bus holds nothing back.
+template <class Item>
+Time ReplyGuard<Item>::holding_time() const {
+  const Time always_late = std::clamp(suspected_ * 5 / 4, quiet_time(), longest_wait());
+  if (is_can || lateness_ * 2 > suspected_) return always_late;
+  const Time next_due = received_at_ - sent_at_ + owed_.widest(sent_at_) * 5 / 4;
+  return std::min(always_late, std::max({next_due, quiet_time(), stall_quiet}));
 }
 
 // On a line that is never silent nothing tells whose a reply is: the conversation, which is to take none of what came,

@@ -23,7 +23,8 @@ namespace absenc::host {
 ///    much again as the latest reply was late;
 /// 2. what then comes first is not taken: it may be the owed reply;
 /// 3. the line is listened to for four times the limit, and for a quarter more than that reply would have been late: if
-///    it was, the present request's own is coming;
+///    it was, the present request's own is coming. Where nothing was nearly so late before, half a second and
+///    a quarter more than their requests were apart is enough: a line that is always late keeps their distance;
 /// 4. the request is sent once more where it may be, and its reply is taken; elsewhere the conversation is told that
 ///    none came.
 ///
@@ -82,6 +83,7 @@ class ReplyGuard final : public Machine<Item> {
   [[nodiscard]] bool ends_with_reply(std::span<const Item> request, std::size_t expect) const;
   void end_late(Owed* owed, Time at);
   void conclude_asking(bool silent);
+  [[nodiscard]] Time holding_time() const;
   void conclude_noise();
   Step<Item> end_holding(Time now);
 

@@ -15,7 +15,7 @@ namespace absenc::sim::testing {
 template <class Item>
 class LatePort final : public Port<Item> {
  public:
-  /// `delay()`: of what comes next; it is asked once for each reply.
+  /// `delay()`: of what comes next, `never` if it is lost; it is asked once for each reply.
   LatePort(SimPort<Item>& inner, std::function<Time()> delay) : inner_(&inner), delay_(std::move(delay)) {}
 
   Time now() override {
@@ -82,6 +82,7 @@ class LatePort final : public Port<Item> {
 
   void hold(const Event<Item>& event) {
     if (!std::exchange(answering_, true)) late_ = delay_();
+    if (late_ == never) return;
     const Time at = std::max(event.at + late_, held_.empty() ? Time{} : held_.back().at);
     held_.push_back({at, {event.items.begin(), event.items.end()}});
   }
