@@ -32,6 +32,7 @@ std::optional<ClockRests> find_rests(const Changes& clock) {
   std::nth_element(periods.begin(), middle, periods.end());
   ClockRests found{.half_period = std::max<Tick>(*middle / 2, 1), .pauses = {3 * *middle}};
   std::sort(rests.begin(), rests.end());
+  found.longest = rests.back();
   for (std::size_t i = 1; i < rests.size() && found.pauses.size() <= most_lengths; ++i) {
     const Tick shorter = rests[i - 1];
     const Tick longer = rests[i];
@@ -132,9 +133,22 @@ void ClockedDecoder::look_behind() {
   burst_.has_last = true;
 }
 
+// A data line that changes together with the clock at `until` was sampled too coarsely to tell which was first.
+void ClockedDecoder::look_for_change(Tick until) {
+  if (format_.change_pause == 0 || !has_in_ || until - last_ <= format_.settle) return;
+  if (open_) look_behind();
+  in_.before(last_ + format_.settle);
+  changed_ = changed_ || in_.next() <= until;
+}
+
+bool ClockedDecoder::is_over(Tick rest) const {
+  return rest > format_.pause || (changed_ && rest > format_.change_pause);
+}
+
 bool ClockedDecoder::clock_changes(Tick at, Targets* targets, std::vector<Burst>& bursts) {
   if (!format_.has_select) {
-    if (at - last_ > format_.pause) {
+    look_for_change(at);
+    if (is_over(at - last_)) {
       seen_pause_ = true;
       if (open_) {
         look_behind();
@@ -144,7 +158,7 @@ bool ClockedDecoder::clock_changes(Tick at, Targets* targets, std::vector<Burst>
     if (!open_ && open(at, !seen_pause_, targets)) return true;
   }
   lone_ = open_ && at == burst_.begin;
-  burst_.has_last = false;
+  burst_.has_last = changed_ = false;
   clock_.step();
   last_ = at;
   if (open_ && clock_.level == format_.rising) take(at, bursts);
@@ -169,10 +183,11 @@ bool ClockedDecoder::run(const ClockedPart& part, Targets* targets, std::vector<
     if (clock <= select ? clock_changes(clock, targets, bursts) : select_changes(select, targets, bursts)) return true;
   }
   if (!format_.has_select && open_ && part.end - last_ > format_.settle) look_behind();
+  look_for_change(part.end);
   // What the data did behind the last clock counts for the next part.
   in_.before(no_change);
   out_.before(no_change);
-  if (!format_.has_select && open_ && part.end - last_ > format_.pause) {
+  if (!format_.has_select && open_ && is_over(part.end - last_)) {
     seen_pause_ = true;
     close(last_, false, bursts);
   }

@@ -17,11 +17,14 @@ struct ClockedFormat {
   bool select_high = false;  // chip select is active high
   Tick pause = 0;            // without chip select: a clock that rests for longer ends a word
   Tick settle = 0;           // then: so long behind the last change its bit stands on the line; 0: not looked at
+  Tick change_pause = 0;     // then: a clock that rests for longer ends a word, too, if the data line changes in the
+                             // rest, behind `settle`: a timeout or a monoflop is over; 0: it does not
 };
 
 /// The pauses of a clock, as its first changes show them.
 struct ClockRests {
   Tick half_period = 0;
+  Tick longest = 0;
   std::vector<Tick> pauses;  // a clock that rests for longer ends a word: first three periods, then one between each
                              // two lengths of its rests that differ clearly, the shortest first
 };
@@ -84,6 +87,8 @@ class ClockedDecoder {
   bool open(Tick at, bool cut, Targets* targets);
   void close(Tick at, bool cut, std::vector<Burst>& bursts);
   void take(Tick at, std::vector<Burst>& bursts);
+  void look_for_change(Tick until);
+  [[nodiscard]] bool is_over(Tick rest) const;
   void look_behind();
 
   ClockedFormat format_;
@@ -97,7 +102,8 @@ class ClockedDecoder {
   Tick last_ = 0;  // change of the clock, or where the capture began
   bool seen_pause_ = false;
   bool open_ = false;
-  bool lone_ = false;  // the clock has changed once in this burst
+  bool lone_ = false;     // the clock has changed once in this burst
+  bool changed_ = false;  // the data line, in this rest
   Burst burst_;
 };
 

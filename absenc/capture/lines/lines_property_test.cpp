@@ -221,7 +221,9 @@ RC_GTEST_PROP(LinesProperty, ClockedIsTheSameHoweverItIsDecoded, (std::uint64_t 
   const ClockedFormat format{.rising = below(random, 2) == 0,
                              .has_select = has_select,
                              .select_high = active,
-                             .pause = 2 * half + below(random, 5 * half)};
+                             .pause = 2 * half + below(random, 5 * half),
+                             .settle = has_select ? 0 : below(random, half),
+                             .change_pause = has_select ? 0 : below(random, 2) * (half + below(random, 2 * half))};
   const std::vector<Burst> wanted = SlowClocked{wires.levels, format}.decode();
   const ClockedLine line{.clock = 0,
                          .in = 1,
@@ -229,7 +231,9 @@ RC_GTEST_PROP(LinesProperty, ClockedIsTheSameHoweverItIsDecoded, (std::uint64_t 
                          .select = has_select ? std::optional(3u) : std::nullopt,
                          .rising = format.rising,
                          .select_high = active,
-                         .pause = format.pause};
+                         .pause = format.pause,
+                         .settle = format.settle,
+                         .change_pause = format.change_pause};
   for (const Way& way : ways) {
     MemoryReader reader(wires, way.content, any_block_size(random, ticks), random());
     std::vector<Burst> found;

@@ -45,6 +45,7 @@ AsyncOutcome decode_async(Reader& reader, std::span<const AsyncLine> lines, unsi
 /// The beginning of a capture, as it reads when a clock that rests for longer than `pause` ends a word.
 struct PauseReading {
   Tick pause = 0;
+  bool by_change = false;  // and one that is shorter, too, if the data line changes in it
   std::vector<Burst> bursts{};
   bool timed_out = false;  // the data line changed in every rest that ended a word: a timeout or a monoflop was over
 };
@@ -57,7 +58,9 @@ struct ClockedLine {
   bool rising = false;               // the change of the clock that takes a bit
   bool select_high = false;          // chip select is active high
   Tick pause = 0;                    // without chip select: a clock that rests for longer ends a word; 0: `choose`
-  /// Chooses one of the pauses that the beginning of the capture allows, by its index. Null: three periods of the
+  Tick settle = 0;                   // with `pause`: as ClockedFormat has them
+  Tick change_pause = 0;
+  /// Chooses one of the ways to cut that the beginning of the capture allows, by its index. Null: three periods of the
   /// clock.
   std::function<std::size_t(std::span<const PauseReading>)> choose{};
 };

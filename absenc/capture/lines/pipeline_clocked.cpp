@@ -167,16 +167,26 @@ std::string look_for_pause(LevelReader& reader, const Wires& wires, const Clocke
   }
   format.settle = rests->half_period;
   format.pause = rests->pauses.front();
-  if (!line.choose || rests->pauses.size() == 1) return {};
+  if (!line.choose) return {};
   const Tick last = clock.at[std::min(clock.at.size(), enough_clocks) - 1];
-  std::vector<PauseReading> readings;
+  std::vector<ClockedFormat> ways;
   for (const Tick pause : rests->pauses) {
-    ClockedFormat with = format;
-    with.pause = pause;
-    readings.push_back({pause, bursts_until(last, parts, wires, with)});
+    ways.push_back(format);
+    ways.back().pause = pause;
+  }
+  // Rests in words and between them may be of all lengths, but only between them a timeout or a monoflop ends.
+  if (wires.in) {
+    ways.push_back(ways.back());
+    // A silent encoder changes nothing: rests that are half as long as the longest end its words.
+    ways.back().pause = std::max(rests->longest / 2, *std::max_element(rests->pauses.begin(), rests->pauses.end()));
+    ways.back().change_pause = 2 * rests->half_period;
+  }
+  std::vector<PauseReading> readings;
+  for (const ClockedFormat& way : ways) {
+    readings.push_back({way.pause, way.change_pause != 0, bursts_until(last, parts, wires, way)});
     readings.back().timed_out = changes_in_rests(readings.back().bursts, parts, wires, format.settle);
   }
-  format.pause = rests->pauses[line.choose(readings)];
+  format = ways[line.choose(readings)];
   return {};
 }
 
@@ -192,7 +202,8 @@ ClockedOutcome decode_clocked(Reader& source, const ClockedLine& line, unsigned 
   if (!outcome.problem.empty()) return outcome;
 
   std::vector<Levels> parts;
-  ClockedFormat format{line.rising, line.select.has_value(), line.select_high, line.pause};
+  ClockedFormat format{line.rising, line.select.has_value(), line.select_high, line.pause,
+                       line.settle, line.change_pause};
   if (!line.select && line.pause == 0) {
     outcome.problem = look_for_pause(reader, wires, line, parts, format);
     if (!outcome.problem.empty()) return outcome;

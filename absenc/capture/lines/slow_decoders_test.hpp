@@ -149,12 +149,23 @@ struct SlowClocked {
     add(burst.out, levels[2][i - 1] != 0);
     ++burst.bits;
   }
+  // Whether the data line changes behind the clock's change at `last`, up to `until`.
+  bool changes(Tick last, Tick until) const {
+    for (Tick i = std::max<Tick>(last + format.settle, 1); i <= until && i < levels[1].size(); ++i) {
+      if (levels[1][i] != levels[1][i - 1]) return true;
+    }
+    return false;
+  }
+  bool is_over(Tick last, Tick now) const {
+    if (now - last > format.pause) return true;
+    return format.change_pause != 0 && now - last > format.change_pause && changes(last, now);
+  }
   std::vector<Burst> decode() {
     Tick last = 0;
     bool paused = false;
     if (format.has_select && (levels[3][0] != 0) == format.select_high) begin(0, true);
     for (std::size_t i = 1; i < levels[0].size(); ++i) {
-      if (!format.has_select && i - last > format.pause) {
+      if (!format.has_select && is_over(last, i)) {
         end(last, false);
         paused = true;
       }
@@ -171,7 +182,7 @@ struct SlowClocked {
           end(i, false);
       }
     }
-    if (!format.has_select && levels[0].size() - last > format.pause) end(last, false);
+    if (!format.has_select && is_over(last, levels[0].size())) end(last, false);
     end(last, true);
     return found;
   }

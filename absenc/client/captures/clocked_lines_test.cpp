@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <fstream>
 #include <map>
+#include <random>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -169,6 +170,32 @@ TEST_F(ClockedLines, BissOfAnyClockTimeoutAndMaster) {
     }
   }
   EXPECT_GT(cells, 200u);
+}
+
+// A host that is interrupted: its clock rests in a word for as long as the timeout allows, and between words for
+// hardly longer. SLO alone shows where the timeout is over.
+TEST_F(ClockedLines, ATimeoutThatIsOverEndsAWordWhoseClockRestsAsLong) {
+  constexpr std::int64_t timeout = 12'500;
+  const std::string frame = biss_frame(17, false);
+  std::mt19937 random(1);
+  Wires wires;
+  std::int64_t rest = 0;
+  for (unsigned word = 0; word < 60; ++word) {
+    for (std::size_t first = 0; first < frame.size(); first += 8) {
+      wires.burst(1000, std::min<std::size_t>(8, frame.size() - first),
+                  [&](std::size_t at) { return first + at < frame.size() && frame[first + at] == '1'; });
+      rest = std::min<std::int64_t>(rest + 1 + random() % 300, timeout - 20);
+      if (first + 8 < frame.size()) wires.wait(rest);
+    }
+    wires.wait(timeout);
+    wires.data(true, 0);
+    wires.wait(word < 50 ? 20 * word : 30 * word * word);
+  }
+  const Rows rows = decode(wires, "biss");
+  EXPECT_EQ(rows.bad, 0u);
+  EXPECT_EQ(rows.words, 60u);
+  EXPECT_EQ(rows.positions, std::vector<std::uint64_t>(60, 17));
+  EXPECT_TRUE(notes_.empty());
 }
 
 TEST_F(ClockedLines, AControlFrameThatTheFileCutsIsCut) {

@@ -104,7 +104,8 @@ CaptureRun::Speed CaptureRun::likely_speed(const Lines& lines) const {
 }
 
 // The rests of a clock have several lengths: pauses between words, and between the bytes of a host that gives eight
-// clocks at a time. Only one way to cut makes frames of all of them.
+// clocks at a time. Only one way to cut makes frames of all of them. Lengths come first: the data line also changes in
+// a rest of a word when it is long, and late.
 std::size_t CaptureRun::likely_pause(std::span<const capture::PauseReading> readings,
                                      std::vector<std::string>& notes) const {
   struct Words final : capture::AnnotationSink {
@@ -148,14 +149,15 @@ std::size_t CaptureRun::likely_pause(std::span<const capture::PauseReading> read
   const auto shown =
       std::find_if(faultless.begin(), faultless.end(), [&](std::size_t i) { return readings[i].timed_out; });
   if (shown != faultless.end()) return *shown;
-  const auto length = [clock = TickClock(ticks_per_second())](Tick ticks) {
-    return clock.has_time() ? fmt::format("{:g} us", clock.seconds(ticks) * 1e6) : fmt::format("{} ticks", ticks);
+  const auto length = [clock = TickClock(ticks_per_second())](const capture::PauseReading& reading) {
+    const std::string ticks = clock.has_time() ? fmt::format("{:g} us", clock.seconds(reading.pause) * 1e6)
+                                               : fmt::format("{} ticks", reading.pause);
+    return ticks + (reading.by_change ? ", or in which the data line changes" : "");
   };
   notes.push_back(fmt::format(
       "a word is taken to end where the clock rests for more than {}, which makes {} words of the beginning; {} would "
       "make {}, and nothing in a word without a check says which is right",
-      length(readings[best].pause), readings[best].bursts.size(), length(readings[*other].pause),
-      readings[*other].bursts.size()));
+      length(readings[best]), readings[best].bursts.size(), length(readings[*other]), readings[*other].bursts.size()));
   return best;
 }
 
