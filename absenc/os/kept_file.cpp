@@ -4,6 +4,7 @@
 #include <fcntl.h>
 #include <sys/file.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 #include <cerrno>
 #include <utility>
@@ -16,11 +17,18 @@ namespace {
 
 bool is_regular(const struct stat& status) { return S_ISREG(status.st_mode); }
 
+FileIdentity identity_of(const struct stat& status) { return {status.st_dev, status.st_ino}; }
+
 void require_regular(bool regular, const std::string& path) {
   if (!regular) throw Failure(Failure::Kind::unsupported, path + " is no regular file");
 }
 
 }  // namespace
+
+FileIdentity identity_of(const std::string& path) {
+  struct stat named {};
+  return ::stat(path.c_str(), &named) == 0 ? identity_of(named) : FileIdentity{};
+}
 
 KeptFile::KeptFile(const std::string& path) : path_(path) {
   constexpr int most_tries = 100;
@@ -42,7 +50,7 @@ KeptFile::KeptFile(const std::string& path) : path_(path) {
       throw Failure(Failure::Kind::in_use, "another program keeps " + path);
     }
     // Until it was locked it may have been replaced.
-    if (::stat(path.c_str(), &named) == 0 && named.st_ino == opened.st_ino && named.st_dev == opened.st_dev) return;
+    if (identity_of(path) == identity_of(opened)) return;
   }
   throw system_failure("opening " + path, ELOOP);  // a link to itself; or somebody replaces it all the time
 }
@@ -52,6 +60,25 @@ void KeptFile::replace(std::string_view content, Durable durable) {
   if (::flock(file.descriptor(), LOCK_EX | LOCK_NB) < 0) throw system_failure("locking " + path_, errno);
   file.write(content);
   file_ = file.take_place(durable);
+}
+
+bool KeptFile::has_its_name() const {
+  struct stat opened {};
+  return ::fstat(file_.get(), &opened) == 0 && identity_of(path_) == identity_of(opened);
+}
+
+KeptFile::State KeptFile::state() const {
+  struct stat opened {};
+  if (::fstat(file_.get(), &opened) < 0) throw system_failure("reading " + path_, errno);
+  return {opened.st_size, opened.st_mtim.tv_sec * std::int64_t{1'000'000'000} + opened.st_mtim.tv_nsec};
+}
+
+std::string KeptFile::beginning(std::size_t size) const {
+  std::string bytes(size, '\0');
+  const ssize_t count = ::pread(file_.get(), bytes.data(), bytes.size(), 0);
+  if (count < 0) throw system_failure("reading " + path_, errno);
+  bytes.resize(static_cast<std::size_t>(count));
+  return bytes;
 }
 
 }  // namespace absenc::os

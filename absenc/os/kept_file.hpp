@@ -2,6 +2,7 @@
 // A file that one process keeps up to date, as the memory of a virtual encoder.
 #pragma once
 
+#include <cstdint>
 #include <string>
 #include <string_view>
 
@@ -9,6 +10,17 @@
 #include "absenc/os/process.hpp"
 
 namespace absenc::os {
+
+/// Which file it is, whatever its name.
+struct FileIdentity {
+  std::uint64_t device = 0;
+  std::uint64_t number = 0;  // 0: there is no file
+
+  bool operator==(const FileIdentity&) const = default;
+};
+
+/// Of what stands at `path`.
+[[nodiscard]] FileIdentity identity_of(const std::string& path);
 
 /// Locked (flock) from the constructor to the end of the object, also while it is replaced: the lock is on the file
 /// itself, and on each new one before it takes the place. Whoever opened the old one looks whether it still has its
@@ -25,6 +37,17 @@ class KeptFile {
   /// There is always a whole file, the old one or the new one. Afterwards the system has it, whatever becomes of this
   /// process; with `Durable::yes` the disk has it too. Throws Failure.
   void replace(std::string_view content, Durable durable);
+
+  /// Whether the path still leads to this file.
+  [[nodiscard]] bool has_its_name() const;
+  struct State {
+    std::int64_t size = 0;         // bytes
+    std::int64_t modified_ns = 0;  // calendar time of the last write
+  };
+  /// Throws Failure.
+  [[nodiscard]] State state() const;
+  /// The first `size` bytes, or as many as there are. Throws Failure.
+  [[nodiscard]] std::string beginning(std::size_t size) const;
 
  private:
   std::string path_;

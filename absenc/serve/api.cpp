@@ -128,16 +128,14 @@ Json state_json(const Fleet& fleet, const Chronicler* chronicler) {
 }
 
 Api::Api(Fleet& fleet, const Access& access, Streams& streams, Worker& worker, const Happenings& happenings,
-         Chronicler* chronicler, const std::string& history_path, const Sending& sending)
+         Chronicler* chronicler, const Sending& sending)
     : fleet_(&fleet),
       access_(&access),
       streams_(&streams),
       worker_(&worker),
       happenings_(&happenings),
       chronicler_(chronicler),
-      sending_(&sending) {
-  if (chronicler != nullptr) reader_ = std::make_shared<HistoryReader>(history_path);
-}
+      sending_(&sending) {}
 
 void Api::answer(const Request& request, const Reply& reply) {
   try {
@@ -310,22 +308,22 @@ void Api::give(Watch& watch, Order order, const Request& request, const Reply& r
 }
 
 void Api::past(const std::string& encoder, bool events, const Request& request, const Reply& reply) {
-  if (reader_ == nullptr) return reply.send(error_response(404, "no history is kept: see --history"));
+  if (chronicler_ == nullptr) return reply.send(error_response(404, "no history is kept: see --history"));
   const Range range = range_in(request);
   const std::int64_t rows = number_in(request, "rows", 1000, 1, most_rows);
-  const auto job = [reader = reader_, range, rows, encoder, events, reply] {
+  const auto job = [reader = &chronicler_->reader(), range, rows, encoder, events, reply] {
     try {
       reply.send(
           json_response(events ? reader->happenings(encoder, range, rows) : reader->seconds(encoder, range, rows)));
     } catch (const std::exception& error) {
-      reply.send(error_response(500, error.what()));
+      reply.send(error_response(503, error.what()));
     }
   };
   if (!worker_->add(job)) reply.send(error_response(503, "too many others ask for history"));
 }
 
 void Api::past_as_csv(const std::string& encoder, const Request& request, const Reply& reply) {
-  if (reader_ == nullptr) return reply.send(error_response(404, "no history is kept: see --history"));
+  if (chronicler_ == nullptr) return reply.send(error_response(404, "no history is kept: see --history"));
   struct Rest {
     std::string encoder;
     Range range;
@@ -333,7 +331,7 @@ void Api::past_as_csv(const std::string& encoder, const Request& request, const 
   };
   const auto rest = std::make_shared<Rest>(Rest{encoder, range_in(request)});
   // A page each time that the client has taken the one before.
-  const auto next = [reader = reader_, rest] {
+  const auto next = [reader = &chronicler_->reader(), rest] {
     const std::shared_ptr<Stream> stream = rest->stream.lock();
     if (stream == nullptr || stream->over()) return;
     try {

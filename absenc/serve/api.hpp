@@ -24,7 +24,7 @@ class Api {
  public:
   /// All of them outlive it; `chronicler` null: there is no history.
   Api(Fleet& fleet, const Access& access, Streams& streams, Worker& worker, const Happenings& happenings,
-      Chronicler* chronicler, const std::string& history_path, const Sending& sending);
+      Chronicler* chronicler, const Sending& sending);
 
   void answer(const Request& request, const Reply& reply);
 
@@ -49,7 +49,6 @@ class Api {
   const Happenings* happenings_;
   Chronicler* chronicler_;
   const Sending* sending_;
-  std::shared_ptr<HistoryReader> reader_;  // of the worker's thread; null: there is no history
 };
 
 }  // namespace absenc::serve

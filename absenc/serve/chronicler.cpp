@@ -30,8 +30,12 @@ std::int64_t ClockWatch::look(std::int64_t calendar, Time now) {
   return jump;
 }
 
-Chronicler::Chronicler(const std::string& path, const HistoryLimits& limits, const Fleet& fleet)
-    : writer_(path, limits), fleet_(&fleet), thread_([this](const std::stop_token& stop) { work(stop); }) {}
+Chronicler::Chronicler(const std::string& path, const HistoryLimits& limits, const Fleet& fleet, Happenings& happenings)
+    : writer_(path, limits),
+      fleet_(&fleet),
+      told_(&happenings),
+      health_{writer_.trouble(), 0},
+      thread_([this](const std::stop_token& stop) { work(stop); }) {}
 
 Chronicler::~Chronicler() {
   thread_.request_stop();
@@ -81,10 +85,9 @@ void Chronicler::look_at_clock() {
   const std::int64_t jump = clock_.look(at_ms, os::now());
   if (jump == 0) return;
   const Time size = std::chrono::milliseconds(std::abs(jump));
-  const std::lock_guard lock(mutex_);
-  happenings_.push_back({at_ms, "", "history",
-                         fmt::format("the clock went {} by {}: nothing is deleted for its age within the next hour",
-                                     jump > 0 ? "forward" : "back", client::to_text(size))});
+  told_->add({at_ms, "", "history",
+              fmt::format("the clock went {} by {}: nothing is deleted for its age within the next hour",
+                          jump > 0 ? "forward" : "back", client::to_text(size))});
 }
 
 void Chronicler::write() {
@@ -100,6 +103,7 @@ void Chronicler::write() {
     added = added_;
   }
   writer_.write(seconds, happenings);
+  for (std::string& note : writer_.take_notes()) told_->add({calendar_ms(), "", "history", std::move(note)});
   std::vector<std::function<void()>> served;
   {
     const std::lock_guard lock(mutex_);

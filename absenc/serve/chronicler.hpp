@@ -37,8 +37,8 @@ class ClockWatch {
 
 class Chronicler {
  public:
-  /// `fleet` outlives it. Throws Failure.
-  Chronicler(const std::string& path, const HistoryLimits& limits, const Fleet& fleet);
+  /// `fleet` and `happenings`, which is told what happens to the history, outlive it. Throws HistoryInUse.
+  Chronicler(const std::string& path, const HistoryLimits& limits, const Fleet& fleet, Happenings& happenings);
   /// Writes what there still is.
   ~Chronicler();
 
@@ -53,6 +53,7 @@ class Chronicler {
     std::uint64_t lost = 0;
   };
   [[nodiscard]] Health health() const;
+  [[nodiscard]] HistoryReader& reader() { return writer_.reader(); }
 
  private:
   void work(const std::stop_token& stop);
@@ -62,6 +63,7 @@ class Chronicler {
 
   HistoryWriter writer_;
   const Fleet* fleet_;
+  Happenings* told_;
   ClockWatch clock_;
   mutable std::mutex mutex_;  // guards what follows
   std::condition_variable_any changed_;

@@ -8,28 +8,13 @@
 #include <utility>
 
 #include "absenc/client/error.hpp"
-#include "absenc/serve/sqlite.hpp"
+#include "absenc/os/error.hpp"
 
 namespace absenc::serve {
 
 using namespace client;
 
 namespace {
-
-constexpr std::int64_t version = 1;
-
-// A write-ahead log keeps what was committed when the process is killed, and lets others read meanwhile.
-constexpr const char* schema = R"(
-CREATE TABLE IF NOT EXISTS encoder (id INTEGER PRIMARY KEY, name TEXT NOT NULL UNIQUE);
-CREATE TABLE IF NOT EXISTS second (
-  encoder INTEGER NOT NULL, at INTEGER NOT NULL, readings INTEGER NOT NULL, errors INTEGER NOT NULL,
-  least REAL, mean REAL, greatest REAL, speed_least REAL, speed_mean REAL, speed_greatest REAL,
-  PRIMARY KEY (encoder, at)) WITHOUT ROWID;
-CREATE TABLE IF NOT EXISTS happening (
-  id INTEGER PRIMARY KEY, at_ms INTEGER NOT NULL, encoder TEXT NOT NULL, kind TEXT NOT NULL, text TEXT NOT NULL,
-  who TEXT NOT NULL);
-CREATE INDEX IF NOT EXISTS happening_at ON happening (at_ms);
-)";
 
 // A second comes twice when the clock was set back, or the server began anew within it: it has the readings of both.
 constexpr const char* add_second = R"(
@@ -72,53 +57,98 @@ std::string csv_text(std::string_view text) {
 
 }  // namespace
 
-struct HistoryWriter::Database {
-  explicit Database(const std::string& path) : sqlite("the history", path, Sqlite::For::writing) {
-    sqlite.run("PRAGMA auto_vacuum = INCREMENTAL; PRAGMA journal_mode = WAL; PRAGMA synchronous = NORMAL");
-    const std::int64_t found = sqlite.number("PRAGMA user_version");
-    if (found > version) throw Failure(fmt::format("the history {} was written by a newer absenc", path));
-    sqlite.run(schema);
-    sqlite.run(fmt::format("PRAGMA user_version = {}", version));
-  }
-
-  void roll_back() {
-    try {
-      if (sqlite.in_transaction()) sqlite.run("ROLLBACK");
-    } catch (const Failure&) {  // then it has ended by itself
-    }
-  }
-
-  Sqlite sqlite;
-};
-
-namespace {
-
-// Two servers would write the same seconds. What else is wrong with the file SQLite says.
-std::unique_ptr<os::KeptFile> lock(const std::string& path) {
-  try {
-    return std::make_unique<os::KeptFile>(path);
-  } catch (const os::Failure& failure) {
-    if (failure.kind() != os::Failure::Kind::in_use) return nullptr;
-    throw Failure(fmt::format(
-        "another server keeps its history in {}: end it, or give this one a file of its own with --history", path));
-  }
-}
-
-}  // namespace
-
 HistoryWriter::HistoryWriter(std::string path, const HistoryLimits& limits)
-    : lock_(lock(path)), database_(std::make_unique<Database>(path)), limits_(limits) {
+    : path_(std::move(path)), reader_(path_), limits_(limits) {
+  try {
+    open();
+  } catch (const HistoryInUse&) {
+    throw;
+  } catch (const Failure& failure) {
+    trouble_ = failure.what();
+    reader_.refuse(trouble_);
+  }
   // A clock that is not set yet, or wrong, would make all of it old.
+  if (!file_) return;
   const std::int64_t newest =
-      database_->sqlite.number("SELECT ifnull(max((SELECT max(at) FROM second WHERE encoder = id)), 0) FROM encoder");
+      file_->sqlite().number("SELECT ifnull(max((SELECT max(at) FROM second WHERE encoder = id)), 0) FROM encoder");
   if (calendar_ms() / 1000 - newest < 24 * 3600) trim();
 }
 HistoryWriter::~HistoryWriter() = default;
 
-bool HistoryWriter::write(const std::vector<Entry>& seconds, const std::vector<Happening>& happenings) {
-  Sqlite& sqlite = database_->sqlite;
+// What stands at the path before there was a history of this server there is left alone: it may be somebody else's.
+void HistoryWriter::open() {
   try {
-    sqlite.run("BEGIN IMMEDIATE");
+    file_.emplace(path_);
+  } catch (const DamagedFile& damaged) {
+    if (!was_open_) {
+      throw Failure(fmt::format("{}: move it away, and within a second a new history begins there", damaged.what()));
+    }
+    notes_.push_back(
+        fmt::format("{}: it is kept as {}, and a new history begins", damaged.what(), HistoryFile::set_aside(path_)));
+    file_.emplace(path_);
+  }
+  was_open_ = true;
+  reader_.accept();
+}
+
+// Makes sure that what is written goes to a whole file at the path.
+void HistoryWriter::require_file() {
+  if (file_) {
+    const HistoryFile::State state = file_->look();
+    if (state == HistoryFile::State::whole) return;
+    if (state == HistoryFile::State::damaged) {
+      set_aside("was cut off or overwritten");
+    } else {
+      leave(state);
+    }
+  }
+  open();
+}
+
+void HistoryWriter::leave(HistoryFile::State state) {
+  const std::string_view what = state == HistoryFile::State::changed ? "was changed by another program: it goes on"
+                                : state == HistoryFile::State::gone  ? "was moved or removed: a new one begins"
+                                                                     : "was replaced by another file: it goes on there";
+  notes_.push_back(fmt::format("the history {} {}", path_, what));
+  reader_.refuse(notes_.back());
+  state == HistoryFile::State::changed ? file_->close() : file_->leave();
+  file_.reset();
+}
+
+void HistoryWriter::set_aside(std::string_view why) {
+  reader_.refuse(fmt::format("the history {} {}", path_, why));
+  notes_.push_back(
+      fmt::format("the history {} {}: it is kept as {}, and a new one begins", path_, why, file_->set_aside()));
+  file_.reset();
+}
+
+void HistoryWriter::write(const std::vector<Entry>& seconds, const std::vector<Happening>& happenings) {
+  try {
+    require_file();
+    try {
+      insert(seconds, happenings);
+    } catch (const DamagedFile& damaged) {
+      set_aside(fmt::format("is damaged ({})", damaged.what()));
+      open();
+      insert(seconds, happenings);
+    }
+    if (lost_now_ != 0) {
+      notes_.push_back(
+          fmt::format("{} rows since {} could not be written: {}", lost_now_, lost_since_ms_ / 1000, trouble_));
+    }
+    lost_now_ = 0;
+    trouble_.clear();
+  } catch (const Failure& failure) {
+    note_loss(seconds.size() + happenings.size(), failure.what());
+  } catch (const os::Failure& failure) {
+    note_loss(seconds.size() + happenings.size(), failure.what());
+  }
+}
+
+void HistoryWriter::insert(const std::vector<Entry>& seconds, const std::vector<Happening>& happenings) {
+  Sqlite& sqlite = file_->sqlite();
+  sqlite.run("BEGIN IMMEDIATE");
+  {
     Statement name(sqlite, "INSERT OR IGNORE INTO encoder (name) VALUES (?)");
     Statement second(sqlite, add_second);
     for (const Entry& entry : seconds) {
@@ -130,40 +160,43 @@ bool HistoryWriter::write(const std::vector<Entry>& seconds, const std::vector<H
       second.bind(10, entry.encoder).run();
     }
     Statement happening(sqlite, "INSERT INTO happening (at_ms, encoder, kind, text, who) VALUES (?, ?, ?, ?, ?)");
-    const auto tell = [&](const Happening& one) {
+    for (const Happening& one : happenings) {
       happening.bind(1, one.at_ms).bind(2, one.encoder).bind(3, one.kind).bind(4, one.text).bind(5, one.who).run();
-    };
-    for (const Happening& one : happenings) tell(one);
-    if (lost_now_ != 0) {
-      tell({calendar_ms(), "", "history",
-            fmt::format("{} rows since {} could not be written: {}", lost_now_, lost_since_ms_ / 1000, trouble_)});
     }
-    sqlite.run("COMMIT");
-    lost_now_ = 0;
-    trouble_.clear();
-    return true;
-  } catch (const Failure& failure) {
-    note_loss(seconds.size() + happenings.size(), failure.what());
-    return false;
   }
+  sqlite.run("COMMIT");
+  file_->note_written();
 }
 
 void HistoryWriter::note_loss(std::size_t rows, const std::string& why) {
   if (lost_now_ == 0) lost_since_ms_ = calendar_ms();
+  if (trouble_.empty()) notes_.push_back(fmt::format("the history cannot be written: {}", why));
   lost_ += rows;
   lost_now_ += rows;
   trouble_ = why;
-  database_->roll_back();
+  if (!file_) reader_.refuse(why);
+  roll_back();
 }
 
+void HistoryWriter::roll_back() {
+  try {
+    if (file_ && file_->sqlite().in_transaction()) file_->sqlite().run("ROLLBACK");
+  } catch (const Failure&) {  // then it has ended by itself
+  }
+}
+
+std::vector<std::string> HistoryWriter::take_notes() { return std::exchange(notes_, {}); }
+
 void HistoryWriter::trim() {
-  Sqlite& sqlite = database_->sqlite;
+  if (!file_) return;
+  Sqlite& sqlite = file_->sqlite();
   try {
     const auto delete_before = [&](std::int64_t at_s) {
       sqlite.run(
           fmt::format("BEGIN IMMEDIATE; DELETE FROM second WHERE at < {} AND encoder IN (SELECT id FROM encoder);"
                       "DELETE FROM happening WHERE at_ms < {}; COMMIT; PRAGMA incremental_vacuum",
                       at_s, at_s * 1000));
+      file_->note_written();
     };
     delete_before(calendar_ms() / 1000 - limits_.seconds);
     const std::int64_t page = sqlite.number("PRAGMA page_size");
@@ -175,24 +208,38 @@ void HistoryWriter::trim() {
                                          sqlite.number("SELECT ifnull(min(at_ms) / 1000, 9e15) FROM happening"));
     const std::int64_t now = calendar_ms() / 1000;
     if (oldest < now) delete_before(oldest + (now - oldest) / 10 + 1);
-  } catch (const Failure& failure) {
+  } catch (const std::exception& failure) {
     trouble_ = failure.what();
-    database_->roll_back();
+    roll_back();
   }
 }
 
-struct HistoryReader::Database {
-  explicit Database(const std::string& path) : sqlite("the history", path, Sqlite::For::reading) {}
-  Sqlite sqlite;
-};
-
-HistoryReader::HistoryReader(const std::string& path) : database_(std::make_unique<Database>(path)) {}
+HistoryReader::HistoryReader(std::string path) : path_(std::move(path)) {}
 HistoryReader::~HistoryReader() = default;
+
+void HistoryReader::refuse(const std::string& why) {
+  const std::lock_guard lock(mutex_);
+  database_.reset();
+  refused_ = why;
+}
+
+void HistoryReader::accept() {
+  const std::lock_guard lock(mutex_);
+  refused_.clear();
+}
+
+// With the mutex held.
+Sqlite& HistoryReader::database() {
+  if (!refused_.empty()) throw Failure(refused_);
+  if (!database_) database_.emplace("the history", path_, Sqlite::For::reading);
+  return *database_;
+}
 
 Json HistoryReader::seconds(const std::string& encoder, Range range, std::int64_t most) {
   const std::int64_t step =
       std::max<std::int64_t>(1, (range.to_s - range.from_s) / std::max<std::int64_t>(1, most) + 1);
-  Statement rows(database_->sqlite,
+  const std::lock_guard lock(mutex_);
+  Statement rows(database(),
                  "SELECT at / ?1 * ?1, min(least), avg(mean), max(greatest), min(speed_least), avg(speed_mean), "
                  "max(speed_greatest), sum(readings), sum(errors) FROM second "
                  "WHERE encoder = (SELECT id FROM encoder WHERE name = ?2) AND at BETWEEN ?3 AND ?4 GROUP BY at / ?1 "
@@ -209,7 +256,8 @@ Json HistoryReader::seconds(const std::string& encoder, Range range, std::int64_
 }
 
 Json HistoryReader::happenings(const std::string& encoder, Range range, std::int64_t most) {
-  Statement rows(database_->sqlite,
+  const std::lock_guard lock(mutex_);
+  Statement rows(database(),
                  "SELECT at_ms, encoder, kind, text, who FROM happening WHERE at_ms BETWEEN ?1 AND ?2 AND (?3 = '' OR "
                  "encoder = ?3) ORDER BY at_ms DESC, id DESC LIMIT ?4");
   rows.bind(1, range.from_s * 1000).bind(2, range.to_s * 1000 + 999).bind(3, encoder).bind(4, most);
@@ -225,7 +273,8 @@ std::string_view HistoryReader::csv_header() {
 }
 
 std::pair<std::string, std::int64_t> HistoryReader::csv(const std::string& encoder, Range range, std::int64_t most) {
-  Statement rows(database_->sqlite,
+  const std::lock_guard lock(mutex_);
+  Statement rows(database(),
                  "SELECT at, readings, errors, least, mean, greatest, speed_least, speed_mean, speed_greatest FROM "
                  "second WHERE encoder = (SELECT id FROM encoder WHERE name = ?1) AND at BETWEEN ?2 AND ?3 ORDER BY at "
                  "LIMIT ?4");

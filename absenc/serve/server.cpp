@@ -43,9 +43,9 @@ struct Server::Parts {
         fleet(choices.encoders, choices.rate, happenings),
         sending(fleet, happenings) {
     sending.change_to(read_outlets(choices.outlets));
-    if (!choices.history.empty()) chronicler.emplace(choices.history, choices.limits, fleet);
+    if (!choices.history.empty()) chronicler.emplace(choices.history, choices.limits, fleet, happenings);
     Chronicler* history = chronicler ? &*chronicler : nullptr;
-    api.emplace(fleet, access, streams, worker, happenings, history, choices.history, sending);
+    api.emplace(fleet, access, streams, worker, happenings, history, sending);
     http.emplace(
         std::move(listener), [this](const Request& request, const Reply& reply) { api->answer(request, reply); },
         std::vector<std::string>{"/healthz", "/metrics"});
@@ -128,6 +128,9 @@ Server::Server(const Choices& choices) : parts_(std::make_unique<Parts>(choices)
 Server::~Server() = default;
 
 const std::string& Server::url() const { return parts_->url; }
+std::string Server::history_trouble() const {
+  return parts_->chronicler ? parts_->chronicler->health().trouble : std::string();
+}
 std::size_t Server::encoders() const { return parts_->fleet.all().size(); }
 
 std::string Server::reload() {

@@ -36,6 +36,8 @@ class Server {
   /// "http://127.0.0.1:8420/"
   [[nodiscard]] const std::string& url() const;
   [[nodiscard]] std::size_t encoders() const;
+  /// Why the history cannot be written; "" when nothing is wrong, or none is kept.
+  [[nodiscard]] std::string history_trouble() const;
   /// Reads absenc.toml again; returns what changed, in words. Throws UsageError: then nothing did. From one thread.
   std::string reload();
 

@@ -4,8 +4,6 @@
 #include <fmt/format.h>
 #include <sqlite3.h>
 
-#include "absenc/client/error.hpp"
-
 namespace absenc::serve {
 
 namespace {
@@ -27,7 +25,12 @@ Sqlite::Sqlite(const std::string& title, const std::string& path, For what) : ti
 
 Sqlite::~Sqlite() { ::sqlite3_close(handle_); }
 
-void Sqlite::fail() const { throw client::Failure(fmt::format("{}: {}", title_, ::sqlite3_errmsg(handle_))); }
+void Sqlite::fail() const {
+  const std::string words = fmt::format("{}: {}", title_, ::sqlite3_errmsg(handle_));
+  const int error = ::sqlite3_errcode(handle_) & 0xff;
+  if (error == SQLITE_CORRUPT || error == SQLITE_NOTADB) throw DamagedFile(words);
+  throw client::Failure(words);
+}
 
 void Sqlite::run(const std::string& sql) {
   if (::sqlite3_exec(handle_, sql.c_str(), nullptr, nullptr, nullptr) != SQLITE_OK) fail();
@@ -37,6 +40,8 @@ std::int64_t Sqlite::number(const std::string& sql) {
   Statement statement(*this, sql);
   return statement.next() ? statement.integer(0) : 0;
 }
+
+void Sqlite::leave_log() { ::sqlite3_db_config(handle_, SQLITE_DBCONFIG_NO_CKPT_ON_CLOSE, 1, nullptr); }
 
 bool Sqlite::in_transaction() const { return ::sqlite3_get_autocommit(handle_) == 0; }
 

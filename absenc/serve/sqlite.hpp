@@ -7,10 +7,17 @@
 #include <string>
 #include <string_view>
 
+#include "absenc/client/error.hpp"
+
 struct sqlite3;
 struct sqlite3_stmt;
 
 namespace absenc::serve {
+
+/// The file is no database, or damaged.
+struct DamagedFile : client::Failure {
+  using client::Failure::Failure;
+};
 
 /// An open database. Everything throws client::Failure, in the words of SQLite.
 class Sqlite {
@@ -27,6 +34,8 @@ class Sqlite {
   [[nodiscard]] std::int64_t number(const std::string& sql);
   /// Whether a transaction is open: a full disk may have ended it.
   [[nodiscard]] bool in_transaction() const;
+  /// When it is closed, the write-ahead log stays as it is: neither written to the database nor deleted.
+  void leave_log();
 
  private:
   friend class Statement;

@@ -93,6 +93,9 @@ int run_serve(const Invocation& invocation) {
   print_line(server.url());
   print_message(fmt::format("{} encoder{}; Ctrl-C ends, SIGHUP reads absenc.toml again", server.encoders(),
                             server.encoders() == 1 ? "" : "s"));
+  if (const std::string trouble = server.history_trouble(); !trouble.empty()) {
+    print_message(fmt::format("the encoders are read, but nothing of it is kept: {}", trouble));
+  }
   try {
     while (!os::interrupted()) {
       pollfd watched{hangups.get(), POLLIN, 0};

@@ -1,0 +1,158 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "absenc/serve/history_file.hpp"
+
+#include <fmt/chrono.h>
+#include <fmt/format.h>
+
+#include <ctime>
+#include <filesystem>
+#include <system_error>
+
+namespace absenc::serve {
+
+using namespace client;
+
+namespace {
+
+constexpr std::int64_t version = 1;
+
+// A write-ahead log keeps what was committed when the process is killed, and lets others read meanwhile.
+constexpr const char* schema = R"(
+CREATE TABLE IF NOT EXISTS encoder (id INTEGER PRIMARY KEY, name TEXT NOT NULL UNIQUE);
+CREATE TABLE IF NOT EXISTS second (
+  encoder INTEGER NOT NULL, at INTEGER NOT NULL, readings INTEGER NOT NULL, errors INTEGER NOT NULL,
+  least REAL, mean REAL, greatest REAL, speed_least REAL, speed_mean REAL, speed_greatest REAL,
+  PRIMARY KEY (encoder, at)) WITHOUT ROWID;
+CREATE TABLE IF NOT EXISTS happening (
+  id INTEGER PRIMARY KEY, at_ms INTEGER NOT NULL, encoder TEXT NOT NULL, kind TEXT NOT NULL, text TEXT NOT NULL,
+  who TEXT NOT NULL);
+CREATE INDEX IF NOT EXISTS happening_at ON happening (at_ms);
+)";
+
+std::string log_of(const std::string& path) { return path + "-wal"; }
+std::string index_of(const std::string& path) { return path + "-shm"; }
+
+std::unique_ptr<os::KeptFile> lock(const std::string& path) {
+  try {
+    return std::make_unique<os::KeptFile>(path);
+  } catch (const os::Failure& failure) {
+    if (failure.kind() != os::Failure::Kind::in_use) throw Failure(fmt::format("the history: {}", failure.what()));
+    throw HistoryInUse(fmt::format(
+        "another server keeps its history in {}: end it, or give this one a file of its own with --history", path));
+  }
+}
+
+void remove_if_same(const std::string& path, const os::FileIdentity& identity) {
+  std::error_code ignored;
+  if (identity.number != 0 && os::identity_of(path) == identity) std::filesystem::remove(path, ignored);
+}
+
+void rename_to(const std::string& path, const std::string& name) {
+  std::error_code error;
+  std::filesystem::rename(path, name, error);
+  if (error) throw Failure(fmt::format("the history {} cannot be renamed to {}: {}", path, name, error.message()));
+}
+
+std::string new_name_beside(const std::string& path) {
+  const std::string name = fmt::format("{}.damaged-{:%Y%m%dT%H%M%SZ}", path, fmt::gmtime(std::time(nullptr)));
+  std::string free_name = name;
+  for (int i = 2; os::identity_of(free_name).number != 0; ++i) free_name = fmt::format("{}-{}", name, i);
+  return free_name;
+}
+
+std::uint32_t big_endian(std::string_view bytes) {
+  std::uint32_t value = 0;
+  for (const char byte : bytes) value = value << 8 | static_cast<unsigned char>(byte);
+  return value;
+}
+
+}  // namespace
+
+HistoryFile::HistoryFile(const std::string& path) : path_(path), kept_(lock(path)) {
+  sqlite_.emplace("the history", path, Sqlite::For::writing);
+  sqlite_->run("PRAGMA auto_vacuum = INCREMENTAL; PRAGMA journal_mode = WAL; PRAGMA synchronous = NORMAL");
+  const std::int64_t found = sqlite_->number("PRAGMA user_version");
+  if (found > version) throw Failure(fmt::format("the history {} was written by a newer absenc", path));
+  sqlite_->run(schema);
+  sqlite_->run(fmt::format("PRAGMA user_version = {}", version));
+  log_ = os::identity_of(log_of(path));
+  index_ = os::identity_of(index_of(path));
+  // After kill -9 it is as long as it says once the log is written to it.
+  const bool is_in_file = sqlite_->number("PRAGMA wal_checkpoint(FULL)") == 0;
+  if (is_in_file && is_shorter_than_it_says()) throw DamagedFile(fmt::format("the history {} was cut off", path));
+  note_written();
+}
+
+// https://www.sqlite.org/fileformat.html, 1.3: the size of a page at 16, their number at 28.
+bool HistoryFile::is_shorter_than_it_says() const {
+  constexpr std::string_view magic{"SQLite format 3\0", 16};
+  const std::string header = kept_->beginning(32);
+  if (header.size() < 32 || !header.starts_with(magic)) return true;
+  const std::uint32_t written = big_endian(header.substr(16, 2));
+  const std::int64_t page = written == 1 ? 65536 : written;
+  return kept_->state().size < page * std::int64_t{big_endian(header.substr(28, 4))};
+}
+
+// By a connection of its own, which has nothing of the file in memory.
+bool HistoryFile::is_sound() const {
+  if (kept_->state().size == 0) return false;  // SQLite would delete the log of an empty file
+  try {
+    Sqlite other("the history", path_, Sqlite::For::reading);
+    Statement check(other, "PRAGMA quick_check(1)");
+    return check.next() && check.text(0) == "ok";
+  } catch (const DamagedFile&) {
+    return false;
+  }
+}
+
+HistoryFile::State HistoryFile::look() const {
+  if (!kept_->has_its_name()) {
+    return os::identity_of(path_).number == 0 ? State::gone : State::replaced;
+  }
+  // By SQLite of another program, which may also write our log to the file; or by `cp`, which mixes our log into it.
+  const bool is_changed = kept_->state().modified_ns != modified_ns_;
+  if (!is_changed && !is_shorter_than_it_says()) return State::whole;
+  if (!is_sound()) return State::damaged;
+  return is_changed ? State::changed : State::whole;
+}
+
+void HistoryFile::note_written() { modified_ns_ = kept_->state().modified_ns; }
+
+void HistoryFile::close() {
+  sqlite_->leave_log();
+  sqlite_.reset();
+  kept_.reset();
+}
+
+void HistoryFile::leave() {
+  bool is_in_file = false;
+  try {
+    is_in_file = sqlite_->number("PRAGMA wal_checkpoint(FULL)") == 0;
+  } catch (const Failure&) {  // then the log is kept
+  }
+  close();
+  // A log that stays beside the path would be taken for that of the next file there.
+  if (is_in_file) {
+    remove_if_same(log_of(path_), log_);
+  } else if (os::identity_of(log_of(path_)) == log_ && log_.number != 0) {
+    rename_to(log_of(path_), new_name_beside(path_) + ".wal");
+  }
+  remove_if_same(index_of(path_), index_);
+}
+
+std::string HistoryFile::set_aside() {
+  const std::string name = set_aside(path_);
+  remove_if_same(index_of(path_), index_);
+  close();
+  return name;
+}
+
+// Its log gets a name by which SQLite does not take it for that of the damaged file, and then writes it there.
+std::string HistoryFile::set_aside(const std::string& path) {
+  std::string name = new_name_beside(path);
+  rename_to(path, name);
+  if (os::identity_of(log_of(path)).number != 0) rename_to(log_of(path), name + ".wal");
+  return name;
+}
+
+}  // namespace absenc::serve

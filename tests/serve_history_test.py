@@ -1,0 +1,234 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The history of `absenc serve` while others move, remove, replace or damage its file, and where there is none to write."""
+import contextlib
+import glob
+import json
+import os
+import resource
+import shutil
+import signal
+import sqlite3
+import time
+import unittest
+
+from command_support import PATIENCE, end
+from serve_support import TOKEN, ServeCase, Server, of, wait_until
+
+NAME = "sim:tformat?motion=rpm=60"
+GARBAGE = b"no database, but what somebody else wrote here\n" * 200
+NOTICED_S = 5
+
+
+def seconds_in(path):
+    """The seconds of a history that is whole."""
+    with contextlib.closing(sqlite3.connect(path)) as database:
+        assert database.execute("PRAGMA integrity_check").fetchall() == [("ok",)]
+        return {at for at, in database.execute("SELECT at FROM second")}
+
+
+class Disturbed(ServeCase):
+    """Whatever is done to the file: within 5 s it is told and a history is kept again, and nothing that was is lost."""
+
+    def setUp(self):
+        super().setUp()
+        self.path = self.file("history.sqlite")
+        self.disturbed_at = 0
+        self.served = self.server(NAME, "--history", self.path)
+        wait_until(lambda: len(self.rows()) >= 2, "it has two seconds")
+
+    def rows(self):
+        return self.served.json(of(NAME, "history"), rows=5000)["rows"]
+
+    def begins_anew_after(self, disturb, words):
+        """Returns the seconds of before."""
+        before = {row[0] for row in self.rows()}
+        begin = self.disturbed_at = time.time()
+        disturb()
+        self.assertEqual(self.served.encoder()["state"], "live")
+        told = wait_until(lambda: self.tells(words), f"it tells {words!r}")
+        late = time.time() - begin
+        wait_until(lambda: self.is_kept_since(begin), "seconds are kept again")
+        self.assertTrue(self.served.json("/healthz")["ok"])
+        self.assertLess(told["at_ms"] / 1000 - begin, NOTICED_S, late)
+        return before
+
+    def tells(self, words):
+        status, body = self.served.ask("/api/events")
+        if status == 503:  # between the two
+            return None
+        events = [event for event in json.loads(body)["events"] if event["kind"] == "history"]
+        return next((one for one in events if words in one["text"] and one["at_ms"] > 1000 * self.disturbed_at), None)
+
+    def is_kept_since(self, begin):
+        status, body = self.served.ask(of(NAME, "history"), rows=5000)
+        return status == 200 and any(row[0] > begin for row in json.loads(body)["rows"])
+
+    def kept_as(self):
+        kept, = glob.glob(self.path + ".damaged-*Z")
+        return kept
+
+    def test_moved(self):
+        before = self.begins_anew_after(lambda: os.rename(self.path, self.path + ".old"), "was moved or removed")
+        self.assertLessEqual(before, seconds_in(self.path + ".old"))
+        self.assertTrue(seconds_in(self.path).isdisjoint(before))
+
+    def test_moved_with_its_log(self):
+        def move():
+            for ending in ("", "-wal", "-shm"):
+                os.rename(self.path + ending, self.path + ".old" + ending)
+        before = self.begins_anew_after(move, "was moved or removed")
+        self.assertLessEqual(before, seconds_in(self.path + ".old"))
+
+    def test_moved_with_its_folder(self):
+        end(self.served.process)
+        folder = self.file("folder")
+        os.mkdir(folder)
+        self.path = os.path.join(folder, "history.sqlite")
+        self.served = self.server(NAME, "--history", self.path)
+        wait_until(lambda: len(self.rows()) >= 2, "it has two seconds")
+        before = {row[0] for row in self.rows()}
+        os.rename(folder, folder + ".old")
+        wait_until(lambda: self.served.json("/healthz")["history"] == "failing", "it says so")
+        self.assertEqual(self.served.encoder()["state"], "live")
+        self.assertEqual(self.served.ask(of(NAME, "history"))[0], 503)
+        os.mkdir(folder)
+        wait_until(lambda: self.served.json("/healthz")["history"] == "good", "it is well again")
+        wait_until(lambda: self.tells("could not be written"), "the rows that are missing are told")
+        self.assertLessEqual(before, seconds_in(os.path.join(folder + ".old", "history.sqlite")))
+
+    def test_removed(self):
+        self.begins_anew_after(lambda: os.unlink(self.path), "was moved or removed")
+
+    def test_all_of_it_removed(self):
+        def remove():
+            for ending in ("", "-wal", "-shm"):
+                os.unlink(self.path + ending)
+        self.begins_anew_after(remove, "was moved or removed")
+
+    def test_replaced_by_a_copy(self):
+        copy = self.path + ".copy"
+        with contextlib.closing(sqlite3.connect(self.path)) as database:
+            database.execute("VACUUM INTO ?", (copy,))
+        copied = seconds_in(copy)
+        self.begins_anew_after(lambda: os.rename(copy, self.path), "was replaced")
+        self.assertLessEqual(copied, seconds_in(self.path))
+
+    def test_replaced_by_something_else(self):
+        other = self.file("other", "")
+        with open(other, "wb") as file:
+            file.write(GARBAGE)
+        self.begins_anew_after(lambda: os.replace(other, self.path), "it is kept as")
+        with open(self.kept_as(), "rb") as file:
+            self.assertEqual(file.read(), GARBAGE)
+
+    def test_truncated(self):
+        self.begins_anew_after(lambda: os.truncate(self.path, 0), "it is kept as")
+        self.assertTrue(self.kept_as())
+
+    def test_cut_off(self):
+        self.write_to_the_file()
+        size = os.path.getsize(self.path)
+        with open(self.path, "rb") as file:
+            half = file.read(size // 2)
+        self.begins_anew_after(lambda: os.truncate(self.path, size // 2), "it is kept as")
+        with open(self.kept_as(), "rb") as file:
+            self.assertEqual(file.read(), half)
+
+    def test_overwritten_by_a_copy(self):
+        """As by `cp`: the file stays the same one. With the log of before, the copy would be neither."""
+        self.write_to_the_file()
+        copy = self.path + ".copy"
+        with contextlib.closing(sqlite3.connect(self.path)) as database:
+            database.execute("VACUUM INTO ?", (copy,))
+        with contextlib.closing(sqlite3.connect(copy)) as database:
+            database.execute("DELETE FROM second WHERE at % 7 = 0")
+            database.commit()
+            database.execute("VACUUM")
+        self.begins_anew_after(lambda: shutil.copyfile(copy, self.path), f"the history {self.path} ")
+        if kept := glob.glob(self.path + ".damaged-*Z"):  # otherwise what came of both is whole
+            self.assertEqual(seconds_in(copy), seconds_in(kept[0]))
+        self.assertTrue(seconds_in(self.path))
+
+    def test_overwritten_by_something_else(self):
+        def overwrite():
+            with open(self.path, "r+b") as file:
+                file.write(GARBAGE)
+        self.begins_anew_after(overwrite, "it is kept as")
+        with open(self.kept_as(), "rb") as file:
+            self.assertEqual(file.read()[:len(GARBAGE)], GARBAGE)
+
+    def write_to_the_file(self, rows=5000):
+        """And not to its log alone."""
+        with contextlib.closing(sqlite3.connect(self.path, timeout=PATIENCE)) as database:
+            database.executemany("INSERT INTO second SELECT id, ?, 50, 0, 1, 2, 3, NULL, NULL, NULL FROM encoder",
+                                 [(1_000_000 + i,) for i in range(rows)])
+            database.commit()
+            database.execute("PRAGMA wal_checkpoint(FULL)")
+        wait_until(lambda: self.tells("was changed by another program"), "it tells that another has written")
+        begin = time.time()
+        wait_until(lambda: self.is_kept_since(begin), "it goes on")
+
+
+class Unusable(ServeCase):
+    """Where no history can be written, encoders are read and shown, and health says so."""
+
+    def assert_failing(self, path, words, **settings):
+        server = self.server(NAME, "--history", path, "--token-file", self.tokens(), **settings)
+        wait_until(lambda: server.encoder()["state"] == "live", "it is read")
+        health = server.json("/healthz")
+        self.assertEqual((health["ok"], health["history"]), (False, "failing"))
+        self.assertIn(words, server.json("/api/encoders")["history"]["trouble"])
+        self.assertEqual(server.ask(of(NAME, "history"))[0], 503)
+        status, answer = server.command(NAME, "memory-write", {"Authorization": f"Bearer {TOKEN}"}, argument=["5", "66"])
+        self.assertEqual(status, 200, answer)
+        return server
+
+    def assert_well_again(self, server):
+        wait_until(lambda: server.json("/healthz")["history"] == "good", "it is written")
+        wait_until(lambda: server.ask(of(NAME, "history"))[0] == 200 and server.json(of(NAME, "history"))["rows"], "it has rows")
+
+    def test_garbage(self):
+        path = self.file("history.sqlite")
+        with open(path, "wb") as file:
+            file.write(GARBAGE)
+        server = self.assert_failing(path, "move it away")
+        with open(path, "rb") as file:
+            self.assertEqual(file.read(), GARBAGE)  # it may be of somebody else
+        os.rename(path, path + ".old")
+        self.assert_well_again(server)
+
+    def test_no_folder(self):
+        folder = self.file("folder")
+        server = self.assert_failing(os.path.join(folder, "history.sqlite"), "No such file")
+        os.mkdir(folder)
+        self.assert_well_again(server)
+
+    def test_a_folder_that_cannot_be_written(self):
+        self.assert_failing("/sys/absenc-history.sqlite", "/sys/absenc-history.sqlite")  # not even by root
+
+    def test_a_full_disk(self):
+        def limit():
+            signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+            resource.setrlimit(resource.RLIMIT_FSIZE, (0, resource.RLIM_INFINITY))
+        server = self.assert_failing(self.file("history.sqlite"), "history.sqlite", preexec_fn=limit)
+        resource.prlimit(server.process.pid, resource.RLIMIT_FSIZE, (resource.RLIM_INFINITY, resource.RLIM_INFINITY))
+        self.assert_well_again(server)
+
+    def test_locked_by_another_program(self):
+        path = self.file("history.sqlite")
+        with contextlib.closing(sqlite3.connect(path)) as database:
+            database.execute("CREATE TABLE other (number INTEGER)")
+            database.commit()
+            database.execute("BEGIN EXCLUSIVE")
+            server = self.assert_failing(path, "locked")
+        self.assert_well_again(server)
+
+    def test_kept_by_another_server(self):
+        path = self.file("history.sqlite")
+        self.server(NAME, "--history", path)
+        with self.assertRaisesRegex(AssertionError, "another server keeps its history"):
+            Server(NAME, "--history", path)
+
+
+if __name__ == "__main__":
+    unittest.main()
