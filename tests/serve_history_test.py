@@ -230,5 +230,73 @@ class Unusable(ServeCase):
             Server(NAME, "--history", path)
 
 
+DAY = 86_400
+
+
+class WrongClock(ServeCase):
+    """The computer's clock jumps while the server reads (libfaketime; the clock of readings goes on as it was)."""
+
+    def setUp(self):
+        super().setUp()
+        self.path = self.file("history.sqlite")
+        library = glob.glob("/usr/lib/*/faketime/libfaketimeMT.so.1")
+        self.assertTrue(library, "the package faketime is missing")
+        self.settings = {"LD_PRELOAD": library[0], "FAKETIME_TIMESTAMP_FILE": self.file("clock"), "FAKETIME_NO_CACHE": "1",
+                         "FAKETIME_DONT_FAKE_MONOTONIC": "1"}
+        self.wrong_by(0)
+
+    def wrong_by(self, seconds):
+        new = self.file("clock.new", f"{seconds:+d}\n")
+        os.rename(new, self.settings["FAKETIME_TIMESTAMP_FILE"])
+
+    def serve(self):
+        return self.server(NAME, "--history", self.path, **self.settings)
+
+    def wait_for_event(self, server, words):
+        everything = {"from": 0, "to": int(time.time()) + 500 * DAY}
+        wait_until(lambda: any(words in event["text"] for event in server.json("/api/events", **everything)["events"]),
+                   f"it tells {words!r}")
+
+    def wait_for_readings(self, server, more=150):
+        """Returns how many there are."""
+        before = server.json(of(NAME))["readings"]
+        wait_until(lambda: server.json(of(NAME))["readings"] >= before + more, "it is read")
+        return server.json(of(NAME))["readings"]
+
+    def kept(self, condition="1"):
+        with contextlib.closing(sqlite3.connect(self.path)) as database:
+            return database.execute(f"SELECT ifnull(sum(readings), 0) FROM second WHERE {condition}").fetchone()[0]
+
+    def test_days_ahead_for_a_while_delete_nothing_also_when_the_server_starts_meanwhile(self):
+        server = self.serve()
+        self.wait_for_readings(server)
+        self.wrong_by(400 * DAY)
+        self.wait_for_event(server, "the clock went forward by 400 days")
+        self.wait_for_readings(server)
+        end(server.process)
+        now = int(time.time())
+        before = self.kept(f"at < {now + DAY}")
+        self.assertGreater(before, 0)
+        self.assertGreater(self.kept(f"at > {now + 300 * DAY}"), 0)
+        server = self.serve()
+        self.wait_for_readings(server)
+        self.wrong_by(0)
+        self.wait_for_event(server, "the clock went back by 400 days")
+        end(server.process)
+        self.assertGreaterEqual(self.kept(f"at < {now + DAY}"), before)
+
+    def test_a_step_back_loses_no_readings(self):
+        server = self.serve()
+        self.wait_for_readings(server)
+        self.wrong_by(-600)
+        self.wait_for_event(server, "the clock went back by 10 minutes")
+        self.wait_for_readings(server)
+        self.wrong_by(-602)  # too little to be told: some seconds come twice
+        readings = self.wait_for_readings(server)
+        self.wait_for_readings(server)  # the second that is under way then is over
+        end(server.process)
+        self.assertGreaterEqual(self.kept(), readings)
+
+
 if __name__ == "__main__":
     unittest.main()

@@ -876,7 +876,9 @@ class History(ServeCase):
         wait_until(lambda: self.rows(server), "it has a second")
         end(server.process)
         with contextlib.closing(sqlite3.connect(path)) as database:
-            database.execute("INSERT INTO second SELECT id, 1, 50, 0, 1, 2, 3, NULL, NULL, NULL FROM encoder")
+            hours = [(int(time.time()) - 3600 * i,) for i in range(1, 25)]  # nothing is old before a day was recorded
+            database.executemany("INSERT INTO second SELECT id, ?, 50, 0, 1, 2, 3, NULL, NULL, NULL FROM encoder",
+                                 [(1,), *hours])
             database.commit()
         end(self.server(self.NAME, "--history", path, "--history-days", "2").process)
         with contextlib.closing(sqlite3.connect(path)) as database:

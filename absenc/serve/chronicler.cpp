@@ -4,10 +4,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cstdlib>
 #include <utility>
 
-#include "absenc/client/text/unit_text.hpp"
 #include "absenc/os/signals.hpp"
 
 namespace absenc::serve {
@@ -16,18 +16,30 @@ namespace {
 
 constexpr Time between_trims = std::chrono::seconds(60);
 
+// "400 days", "1.5 hours"
+std::string rough_words(std::int64_t ms) {
+  struct Measure {
+    double ms;
+    std::string_view name;
+  };
+  constexpr std::array<Measure, 3> measures{{{86'400'000.0, "days"}, {3'600'000.0, "hours"}, {60'000.0, "minutes"}}};
+  for (const Measure& measure : measures) {
+    if (static_cast<double>(ms) >= 2 * measure.ms) {
+      return fmt::format("{:.4g} {}", static_cast<double>(ms) / measure.ms, measure.name);
+    }
+  }
+  return fmt::format("{} seconds", ms / 1000);
+}
+
 }  // namespace
 
 std::int64_t ClockWatch::look(std::int64_t calendar, Time now) {
-  if (!looked_) trusted_at_ = now + doubt;  // it may begin with a clock that is not set yet
   const std::int64_t passed = std::chrono::duration_cast<std::chrono::milliseconds>(now - at_).count();
   const std::int64_t jump = looked_ ? calendar - calendar_ - passed : 0;
   looked_ = true;
   calendar_ = calendar;
   at_ = now;
-  if (std::abs(jump) < smallest_jump_ms) return 0;
-  trusted_at_ = now + doubt;
-  return jump;
+  return std::abs(jump) < smallest_jump_ms ? 0 : jump;
 }
 
 Chronicler::Chronicler(const std::string& path, const HistoryLimits& limits, const Fleet& fleet, Happenings& happenings)
@@ -72,7 +84,7 @@ void Chronicler::work(const std::stop_token& stop) {
     look_at_clock();
     write();
     if (os::now() >= next_trim) {
-      if (clock_.is_trusted(os::now())) writer_.trim();
+      writer_.trim();
       next_trim = os::now() + between_trims;
     }
     std::unique_lock lock(mutex_);
@@ -84,10 +96,9 @@ void Chronicler::look_at_clock() {
   const std::int64_t at_ms = calendar_ms();
   const std::int64_t jump = clock_.look(at_ms, os::now());
   if (jump == 0) return;
-  const Time size = std::chrono::milliseconds(std::abs(jump));
   told_->add({at_ms, "", "history",
-              fmt::format("the clock went {} by {}: nothing is deleted for its age within the next hour",
-                          jump > 0 ? "forward" : "back", client::to_text(size))});
+              fmt::format("the clock went {} by {}: nothing is deleted for its age before a day was recorded by it",
+                          jump > 0 ? "forward" : "back", rough_words(std::abs(jump)))});
 }
 
 void Chronicler::write() {

@@ -17,22 +17,18 @@
 
 namespace absenc::serve {
 
-/// Whether what the calendar's clock says of age may delete anything: a clock that is wrong for a minute must not cost
-/// the history.
+/// Notices when the calendar's clock jumps.
 class ClockWatch {
  public:
-  static constexpr Time doubt = std::chrono::hours(1);      // after the start, and after each jump
   static constexpr std::int64_t smallest_jump_ms = 10'000;  // NTP moves it by less
 
   /// Returns by how much it has jumped since the last look, in milliseconds; 0: it has not. `now`: of os::now.
   std::int64_t look(std::int64_t calendar_ms, Time now);
-  [[nodiscard]] bool is_trusted(Time now) const { return looked_ && now >= trusted_at_; }
 
  private:
   bool looked_ = false;
   std::int64_t calendar_ = 0;
   Time at_{};
-  Time trusted_at_{};
 };
 
 class Chronicler {

@@ -67,11 +67,7 @@ HistoryWriter::HistoryWriter(std::string path, const HistoryLimits& limits)
     trouble_ = failure.what();
     reader_.refuse(trouble_);
   }
-  // A clock that is not set yet, or wrong, would make all of it old.
-  if (!file_) return;
-  const std::int64_t newest =
-      file_->sqlite().number("SELECT ifnull(max((SELECT max(at) FROM second WHERE encoder = id)), 0) FROM encoder");
-  if (calendar_ms() / 1000 - newest < 24 * 3600) trim();
+  trim();
 }
 HistoryWriter::~HistoryWriter() = default;
 
@@ -189,29 +185,58 @@ std::vector<std::string> HistoryWriter::take_notes() { return std::exchange(note
 
 void HistoryWriter::trim() {
   if (!file_) return;
-  Sqlite& sqlite = file_->sqlite();
   try {
-    const auto delete_before = [&](std::int64_t at_s) {
-      sqlite.run(
-          fmt::format("BEGIN IMMEDIATE; DELETE FROM second WHERE at < {} AND encoder IN (SELECT id FROM encoder);"
-                      "DELETE FROM happening WHERE at_ms < {}; COMMIT; PRAGMA incremental_vacuum",
-                      at_s, at_s * 1000));
-      file_->note_written();
-    };
-    delete_before(calendar_ms() / 1000 - limits_.seconds);
+    const std::int64_t too_old = calendar_ms() / 1000 - limits_.seconds;
+    if (was_recorded_since(too_old)) delete_before(too_old);
+    Sqlite& sqlite = file_->sqlite();
     const std::int64_t page = sqlite.number("PRAGMA page_size");
     const std::int64_t used = page * (sqlite.number("PRAGMA page_count") - sqlite.number("PRAGMA freelist_count"));
-    if (used <= limits_.bytes) return;
-    // The oldest tenth: so this is rare.
-    const std::int64_t oldest = std::min(sqlite.number("SELECT ifnull(min((SELECT min(at) FROM second WHERE "
-                                                       "encoder = id)), 9e15) FROM encoder"),
-                                         sqlite.number("SELECT ifnull(min(at_ms) / 1000, 9e15) FROM happening"));
-    const std::int64_t now = calendar_ms() / 1000;
-    if (oldest < now) delete_before(oldest + (now - oldest) / 10 + 1);
+    if (used > limits_.bytes) delete_before(end_of_oldest_tenth());
   } catch (const std::exception& failure) {
     trouble_ = failure.what();
     roll_back();
   }
+}
+
+// In 24 different hours, by one encoder. A clock that is wrong for a shorter time makes nothing old, also when the
+// server was started meanwhile.
+bool HistoryWriter::was_recorded_since(std::int64_t at_s) {
+  constexpr std::int64_t hours = 24;
+  Statement encoders(file_->sqlite(), "SELECT id FROM encoder");
+  Statement found(file_->sqlite(),
+                  "WITH RECURSIVE hour(at) AS (SELECT (SELECT min(at) FROM second WHERE encoder = ?1 AND at >= ?2) "
+                  "UNION ALL SELECT (SELECT min(at) FROM second WHERE encoder = ?1 AND at >= (hour.at / 3600 + 1) * "
+                  "3600) FROM hour WHERE hour.at IS NOT NULL LIMIT ?3) SELECT count(at) FROM hour");
+  while (encoders.next()) {
+    found.reset();
+    found.bind(1, encoders.integer(0)).bind(2, at_s).bind(3, hours);
+    if (found.next() && found.integer(0) == hours) return true;
+  }
+  return false;
+}
+
+// By the number of rows, because a clock that was wrong may have put some of them anywhere.
+std::int64_t HistoryWriter::end_of_oldest_tenth() {
+  Sqlite& sqlite = file_->sqlite();
+  const std::int64_t most = sqlite.number(
+      "SELECT ifnull((SELECT id FROM encoder ORDER BY (SELECT count(*) FROM second WHERE encoder = id) DESC LIMIT 1), "
+      "0)");
+  const auto tenth = [&](std::string_view column, const std::string& rows) {
+    return sqlite.number(
+        fmt::format("SELECT ifnull((SELECT {0} FROM {1} ORDER BY {0} LIMIT 1 OFFSET (SELECT count(*) / "
+                    "10 FROM {1})), 0)",
+                    column, rows));
+  };
+  const std::int64_t second = tenth("at", fmt::format("second WHERE encoder = {}", most));
+  return second != 0 ? second + 1 : tenth("at_ms", "happening") / 1000 + 1;
+}
+
+void HistoryWriter::delete_before(std::int64_t at_s) {
+  file_->sqlite().run(
+      fmt::format("BEGIN IMMEDIATE; DELETE FROM second WHERE at < {} AND encoder IN (SELECT id FROM encoder);"
+                  "DELETE FROM happening WHERE at_ms < {}; COMMIT; PRAGMA incremental_vacuum",
+                  at_s, at_s * 1000));
+  file_->note_written();
 }
 
 HistoryReader::HistoryReader(std::string path) : path_(std::move(path)) {}

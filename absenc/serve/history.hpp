@@ -77,7 +77,7 @@ class HistoryWriter {
   /// All of it or, when the disk is full, nothing: what was lost is counted. Begins anew where the file was moved,
   /// removed, replaced, truncated or damaged; a damaged one is kept under another name.
   void write(const std::vector<Entry>& seconds, const std::vector<Happening>& happenings);
-  /// Deletes what is beyond the limits; cheap when there is nothing.
+  /// Deletes what is beyond the limits; cheap when there is nothing. By its age only once a day was recorded since.
   void trim();
 
   /// Why the last `write` failed; "" when it did not.
@@ -95,6 +95,9 @@ class HistoryWriter {
   void insert(const std::vector<Entry>& seconds, const std::vector<Happening>& happenings);
   void note_loss(std::size_t rows, const std::string& why);
   void roll_back();
+  [[nodiscard]] bool was_recorded_since(std::int64_t at_s);
+  [[nodiscard]] std::int64_t end_of_oldest_tenth();
+  void delete_before(std::int64_t at_s);
 
   std::string path_;
   HistoryReader reader_;

@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <random>
 #include <string>
@@ -16,7 +17,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-TEST(ClockWatch, DoubtsTheClockForAnHourAfterTheStartAndAfterEachJump) {
+TEST(ClockWatch, NoticesJumpsAndNotWhatNtpDoes) {
   ClockWatch clock;
   Time now = 100s;
   std::int64_t calendar = 1'700'000'000'000;
@@ -25,24 +26,16 @@ TEST(ClockWatch, DoubtsTheClockForAnHourAfterTheStartAndAfterEachJump) {
     calendar += std::chrono::duration_cast<std::chrono::milliseconds>(time).count();
     return clock.look(calendar, now);
   };
-  EXPECT_FALSE(clock.is_trusted(now));
   EXPECT_EQ(clock.look(calendar, now), 0);
-  EXPECT_FALSE(clock.is_trusted(now));
   EXPECT_EQ(pass(59min), 0);
-  EXPECT_FALSE(clock.is_trusted(now));
-  EXPECT_EQ(pass(2min), 0);
-  EXPECT_TRUE(clock.is_trusted(now));
   constexpr std::int64_t days_400 = 400LL * 86'400'000;
   calendar += days_400;
   EXPECT_EQ(pass(1s), days_400);
-  EXPECT_FALSE(clock.is_trusted(now));
   EXPECT_EQ(pass(65s), 0);
   calendar -= days_400;
   EXPECT_EQ(pass(1s), -days_400);
-  EXPECT_FALSE(clock.is_trusted(now));
-  calendar += 500;  // as NTP sets it
+  calendar += 500;
   EXPECT_EQ(pass(1h), 0);
-  EXPECT_TRUE(clock.is_trusted(now));
 }
 
 std::string new_path() { return testing::TempDir() + "absenc-history-" + std::to_string(std::random_device()()); }
@@ -51,16 +44,55 @@ void remove_history(const std::string& path) {
   for (const char* ending : {"", "-wal", "-shm"}) std::filesystem::remove(path + ending);
 }
 
-// The clock stands years behind the last second that was written.
-TEST(History, IsNotDeletedAtTheStartByAClockThatMayBeWrong) {
+HistoryWriter::Entry second_of(std::string encoder, std::int64_t at_s) {
+  HistoryWriter::Entry entry{std::move(encoder), {}};
+  entry.second.at_s = at_s;
+  entry.second.readings = 1;
+  return entry;
+}
+
+std::size_t seconds_in(HistoryWriter& writer, const std::string& encoder) {
+  const std::string rows = writer.reader().csv(encoder, {0, 4'000'000'000}, 1'000'000).first;
+  return static_cast<std::size_t>(std::count(rows.begin(), rows.end(), '\n'));
+}
+
+// A minute of a clock that is 400 days ahead, during which the server may be started, is as this: all else is old.
+TEST(History, IsDeletedForItsAgeOnceADayWasRecordedSince) {
   const std::string path = new_path();
-  Second old;
-  old.at_s = 1'000'000'000;
-  old.readings = 1;
-  HistoryWriter(path, {}).write({{"one", old}}, {});
-  { const HistoryWriter again(path, {}); }
-  HistoryReader reader(path);
-  EXPECT_NE(reader.seconds("one", {0, 2'000'000'000}, 10).line(), "[]");
+  {
+    HistoryWriter writer(path, {});
+    const std::int64_t now = calendar_ms() / 1000;
+    std::vector<HistoryWriter::Entry> seconds;
+    for (std::int64_t i = 0; i < 100; ++i) seconds.push_back(second_of("one", now - 400 * 86'400 + i));
+    for (std::int64_t i = 0; i < 60; ++i) seconds.push_back(second_of("two", now - i));
+    writer.write(seconds, {});
+  }
+  HistoryWriter writer(path, {});
+  writer.trim();
+  EXPECT_EQ(seconds_in(writer, "one"), 100U);
+  std::vector<HistoryWriter::Entry> hours;
+  for (std::int64_t i = 1; i <= 24; ++i) hours.push_back(second_of("two", calendar_ms() / 1000 - i * 3600));
+  writer.write(hours, {});
+  writer.trim();
+  EXPECT_EQ(seconds_in(writer, "one"), 0U);
+  EXPECT_EQ(seconds_in(writer, "two"), 84U);
+  remove_history(path);
+}
+
+// Also when the clock, and some rows, are years ahead.
+TEST(History, BeyondItsSizeLosesTheOldestTenthOfItsRows) {
+  const std::string path = new_path();
+  HistoryLimits limits;
+  limits.bytes = 10'000;
+  {
+    HistoryWriter writer(path, {});
+    std::vector<HistoryWriter::Entry> seconds;
+    for (std::int64_t i = 0; i < 10'000; ++i) seconds.push_back(second_of("one", 1'000'000'000 + i));
+    seconds.push_back(second_of("one", 3'000'000'000));
+    writer.write(seconds, {});
+  }
+  HistoryWriter writer(path, limits);
+  EXPECT_EQ(seconds_in(writer, "one"), 9000U);
   remove_history(path);
 }
 
