@@ -2,7 +2,9 @@
 """A broker of our own and a receiver for the tests of `absenc serve` with MQTT."""
 import json
 import os
+import pathlib
 import socket
+import struct
 import subprocess
 import threading
 import time
@@ -10,8 +12,9 @@ import time
 import paho.mqtt.client as paho
 
 from command_support import PATIENCE, end
-from serve_support import wait_until
+from serve_support import ServeCase, wait_until
 
+ONE = "sim:tformat?motion=rpm=60"
 MOSQUITTO = "/usr/sbin/mosquitto"
 
 
@@ -136,8 +139,47 @@ def twice(messages):
     return len(messages) - len({one["id"] for one in messages})
 
 
+def waiting_in(spool):
+    """The payloads that wait in the files of a spool (absenc/serve/spool_file.hpp)."""
+    found = []
+    for path in sorted(pathlib.Path(spool).glob("*.part")):
+        data, at = path.read_bytes(), 0
+        while at < len(data):
+            size, kind, state = struct.unpack_from("<Icc", data, at + 4)
+            if (kind, state) == (b"m", b"w"):
+                topic, = struct.unpack_from("<I", data, at + 26)
+                found.append(json.loads(data[at + 34 + topic:at + 10 + size]))
+            at += 10 + size
+    return found
+
+
 def now():
     return time.monotonic()
 
 
-__all__ = ["Broker", "Daemon", "Receiver", "answers", "end", "free_port", "now", "numbers", "twice"]
+class MqttCase(ServeCase):
+    def broker(self, *settings, **more):
+        broker = Broker(self.directory, *settings, **more)
+        self.addCleanup(broker.end)
+        return broker
+
+    def receiver(self, broker, *arguments, **settings):
+        receiver = Receiver(broker.port, *arguments, **settings)
+        self.addCleanup(receiver.end)
+        return receiver
+
+    def spool(self):
+        return os.path.join(self.directory, "spool")
+
+    def sender(self, url, *arguments, **settings):
+        return self.without_history(*arguments, "--mqtt", url, "--mqtt-prefix", "plant/hall", "--mqtt-spool",
+                                    self.spool(), **settings)
+
+    def mqtt(self, server):
+        return server.json("/api/mqtt")
+
+    def taken(self, server, encoder=ONE):
+        return self.mqtt(server)["taken"].get(encoder, 0)
+
+
+__all__ = ["ONE", "Broker", "Daemon", "MqttCase", "Receiver", "answers", "end", "free_port", "now", "numbers", "twice", "waiting_in"]

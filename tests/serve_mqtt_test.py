@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
 """`absenc serve` with MQTT: what a broker of Debian's gets, and what happens when it, or the server, is killed."""
-import contextlib
 import json
 import os
 import pathlib
@@ -8,49 +7,22 @@ import re
 import resource
 import signal
 import socket
-import sqlite3
 import subprocess
 import unittest
 
 import jsonschema
 
 from command_support import ABSENC, PATIENCE, Emulator, absenc, end, read_line
-from mqtt_support import Broker, Receiver, free_port, now, numbers, twice
+from mqtt_support import ONE, Broker, MqttCase, free_port, now, numbers, twice, waiting_in
 from serve_support import BUSY, TOKEN, ServeCase, of, wait_until
 
 SOURCE = pathlib.Path(os.environ.get("ABSENC_SOURCE_DIR", pathlib.Path(__file__).resolve().parent.parent))
 SCHEMA = json.loads((SOURCE / "docs/mqtt-schema.json").read_text(encoding="utf-8"))
-ONE = "sim:tformat?motion=rpm=60"
 ONE_LEVEL = "sim%3Atformat%3Fmotion%3Drpm%3D60"
 
 
 def check(kind, payload):
     jsonschema.validate(payload, {**SCHEMA, "$ref": f"#/$defs/{kind}"}, jsonschema.Draft202012Validator)
-
-
-class MqttCase(ServeCase):
-    def broker(self, *settings, **more):
-        broker = Broker(self.directory, *settings, **more)
-        self.addCleanup(broker.end)
-        return broker
-
-    def receiver(self, broker, *arguments, **settings):
-        receiver = Receiver(broker.port, *arguments, **settings)
-        self.addCleanup(receiver.end)
-        return receiver
-
-    def spool(self):
-        return os.path.join(self.directory, "spool")
-
-    def sender(self, url, *arguments, **settings):
-        return self.without_history(*arguments, "--mqtt", url, "--mqtt-prefix", "plant/hall", "--mqtt-spool",
-                                    self.spool(), **settings)
-
-    def mqtt(self, server):
-        return server.json("/api/mqtt")
-
-    def taken(self, server, encoder=ONE):
-        return self.mqtt(server)["taken"].get(encoder, 0)
 
 
 class What(MqttCase):
@@ -156,8 +128,7 @@ class State(MqttCase):
         status, _, err = end(server.process)
         self.assertEqual(status, 0, err)
         self.assertEqual(receiver.until("state", lambda one: one["state"] == "offline")["why"], "it ended")
-        with contextlib.closing(sqlite3.connect(self.spool())) as database:
-            self.assertEqual(database.execute("SELECT count(*) FROM message").fetchone()[0], 0)
+        self.assertEqual(waiting_in(self.spool()), [])
 
     def test_an_encoder_that_is_no_longer_served(self):
         broker = self.broker()
@@ -242,7 +213,7 @@ class Spool(MqttCase):
         self.sender(broker.url, ONE, "--mqtt-spool-mb", "1")
         found = wait_until(lambda: self.numbers(receiver), "they come")
         self.assertGreater(found[0], 1)
-        self.assertLess(os.path.getsize(self.spool()), 4_000_000)
+        self.assertLess(sum(one.stat().st_size for one in os.scandir(self.spool())), 4_000_000)
 
     def test_two_servers_do_not_share_one(self):
         url = f"mqtt://127.0.0.1:{free_port()}"
@@ -263,7 +234,7 @@ class Spool(MqttCase):
         self.assertGreater(max(int(one) for one in os.listdir(f"/proc/{server.process.pid}/fd")), 1024)
 
     def test_a_full_disk_is_told(self):
-        server = self.sender(f"mqtt://127.0.0.1:{free_port()}", ONE,
+        server = self.sender(f"mqtt://127.0.0.1:{free_port()}", ONE, "--rate", "500", "--mqtt-spool-mb", "1",
                              preexec_fn=lambda: signal.signal(signal.SIGXFSZ, signal.SIG_IGN))
         shown = wait_until(lambda: self.taken(server) > 20 and self.taken(server), "readings are spooled")
         # A limit of the kernel for the size of files is to the writer what a full disk is.

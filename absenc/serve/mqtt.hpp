@@ -20,7 +20,7 @@ struct MqttHealth {
   std::string broker{};
   std::string prefix{};
   bool connected = false;
-  std::string trouble{};      // why it is not, or why nothing can be spooled; "": nothing is wrong
+  std::string trouble{};      // why it is not, what it refuses, or why the spool cannot be written; "": nothing
   bool failing = false;       // what is read cannot be spooled, or the spool drops the oldest of it
   std::uint64_t waiting = 0;  // messages in the spool
   std::int64_t waiting_bytes = 0;

@@ -86,7 +86,7 @@ void MqttCollector::collect() {
     const std::int64_t id = next_id_ + static_cast<std::int64_t>(messages.size());
     messages.push_back({id, topic_of(settings_->prefix, one.encoder, "event"), event_text(id_text(id), one), 0});
   }
-  if (!messages.empty()) spool(messages, changed);
+  spool(messages, changed);
   if (untold_.messages + untold_.readings == 0 || os::now() < next_told_) return;
   next_told_ = os::now() + between_dropped_tellings;
   const Spool::Counts told = std::exchange(untold_, {});
@@ -109,20 +109,18 @@ void MqttCollector::collect_readings(const Watch& watch, std::vector<Passing> re
 }
 
 void MqttCollector::spool(const std::vector<Message>& messages, const std::map<std::string, std::uint64_t>& changed) {
-  try {
-    const Spool::Counts dropped = spool_->add(messages, changed);
-    next_id_ += static_cast<std::int64_t>(messages.size());
-    if (dropped.messages != 0) note_dropped(dropped, "the spool is full");
-    const std::lock_guard lock(mutex_);
-    for (const auto& [name, next] : changed) figures_.taken[name] = next - 1;
-    figures_.trouble.clear();
-  } catch (const Failure& failure) {
-    Spool::Counts lost{messages.size(), 0};
-    for (const Message& one : messages) lost.readings += one.readings;
-    note_dropped(lost, failure.what());
-    const std::lock_guard lock(mutex_);
-    figures_.trouble = failure.what();
-  }
+  spool_->add(messages, changed);
+  next_id_ += static_cast<std::int64_t>(messages.size());
+  for (const std::string& note : spool_->take_notes()) happenings_->add({calendar_ms(), "", "mqtt", note});
+  const Spool::Dropped dropped = spool_->take_dropped();
+  if (dropped.counts.messages != 0) note_dropped(dropped.counts, dropped.why);
+  const Spool::Condition condition = spool_->condition();
+  for (const auto& [name, next] : changed) not_on_disk_[name] = next - 1;
+  const std::lock_guard lock(mutex_);
+  figures_.trouble = condition.trouble;
+  if (condition.in_memory) return;
+  for (const auto& [name, number] : not_on_disk_) figures_.taken[name] = number;
+  not_on_disk_.clear();
 }
 
 void MqttCollector::note_dropped(const Spool::Counts& dropped, const std::string& why) {

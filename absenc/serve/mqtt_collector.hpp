@@ -49,6 +49,7 @@ class MqttCollector {
   // Of the thread alone.
   std::int64_t next_id_;
   std::map<std::string, std::uint64_t> next_numbers_;  // of readings, by encoder
+  std::map<std::string, std::uint64_t> not_on_disk_;   // by encoder: up to this number they wait, partly in memory
   Spool::Counts untold_{};                             // of what was dropped
   std::string untold_why_;
   Time next_told_{};

@@ -7,7 +7,9 @@
 #include <cstdint>
 #include <optional>
 #include <string>
-#include <string_view>
+#include <utility>
+
+#include "absenc/serve/fields.hpp"
 
 namespace absenc::serve {
 
@@ -29,31 +31,26 @@ enum class Wire : std::uint8_t {
 /// Builds one frame.
 class WireFrame {
  public:
-  explicit WireFrame(Wire kind);
-  WireFrame& add(std::uint32_t number);
-  WireFrame& add(std::string_view text);
+  explicit WireFrame(Wire kind) : kind_(kind) {}
+  template <class Field>
+  WireFrame& add(const Field& field) {
+    fields_.add(field);
+    return *this;
+  }
 
   /// The bytes to send.
-  [[nodiscard]] const std::string& bytes();
+  [[nodiscard]] std::string bytes() const;
 
  private:
-  std::string bytes_;
+  Wire kind_;
+  FieldWriter fields_;
 };
 
-/// The fields of one frame. Reading past its end or a text longer than the rest throws client::Failure.
-class WireFields {
- public:
-  WireFields(Wire what, std::string_view fields) : kind(what), rest_(fields) {}
-
-  [[nodiscard]] std::uint32_t number();
-  [[nodiscard]] std::string text();
-  /// Nothing may follow. Throws client::Failure.
-  void end() const;
+/// One frame that was received.
+struct WireFields : FieldReader {
+  WireFields(Wire what, FieldReader fields) : FieldReader(std::move(fields)), kind(what) {}
 
   Wire kind;
-
- private:
-  std::string rest_;
 };
 
 /// Puts received bytes together to frames.

@@ -151,7 +151,7 @@ MqttSettings mqtt_of(const Given& given) {
   settings.broker = broker_of(given);
   settings.prefix = given.text("prefix", usual_prefix());
   if (given.has("prefix")) check_prefix(given, "prefix", settings.prefix);
-  settings.spool = given.has("spool") ? given.text("spool") : state_file("mqtt-spool.sqlite", "spool in [serve.mqtt]");
+  settings.spool = given.has("spool") ? given.text("spool") : state_file("mqtt-spool", "spool in [serve.mqtt]");
   settings.spool_bytes = given.number("spool_mb", 256, 1, 1'000'000) * 1'000'000;
   settings.batch = std::chrono::milliseconds(given.number("batch_ms", 100, 10, 60'000));
   settings.home_assistant = given.text("home_assistant");

@@ -15,7 +15,7 @@ namespace absenc::serve {
 struct MqttSettings {
   Broker broker{};
   std::string prefix{};          // of all topics
-  std::string spool{};           // the file
+  std::string spool{};           // the folder
   std::int64_t spool_bytes = 0;  // at most
   Time batch{};                  // what comes within it goes as one message
   std::string home_assistant{};  // the prefix of its discovery; "": it is not used

@@ -4,177 +4,285 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <filesystem>
+#include <random>
 
 #include "absenc/client/error.hpp"
+#include "absenc/os/error.hpp"
 
 namespace absenc::serve {
 
 using namespace client;
+namespace fs = std::filesystem;
 
 namespace {
 
-constexpr std::int64_t spool_version = 1;
-constexpr std::int64_t bytes_of_a_row = 32;         // beside its texts
-constexpr std::int64_t pages_worth_freeing = 1000;  // of 4096 bytes: after a broker was away for long
+constexpr std::size_t bytes_of_a_write = 65536;  // a disk that is nearly full may still take so much
 
-// AUTOINCREMENT: an id is never given again, however much was removed.
-constexpr const char* spool_schema = R"(
-CREATE TABLE IF NOT EXISTS message (
-  id INTEGER PRIMARY KEY AUTOINCREMENT, topic TEXT NOT NULL, payload TEXT NOT NULL, readings INTEGER NOT NULL);
-CREATE TABLE IF NOT EXISTS encoder (name TEXT PRIMARY KEY, next INTEGER NOT NULL) WITHOUT ROWID;
-CREATE TABLE IF NOT EXISTS source (id TEXT NOT NULL);
-INSERT INTO source SELECT lower(hex(randomblob(8))) WHERE NOT EXISTS (SELECT * FROM source);
-)";
+std::int64_t memory_bytes(std::int64_t most) { return std::clamp<std::int64_t>(most / 16, 64'000, 4'000'000); }
 
-std::int64_t size_of(std::size_t topic, std::size_t payload) {
-  return static_cast<std::int64_t>(topic + payload) + bytes_of_a_row;
+std::string random_text() {
+  std::random_device random;
+  return fmt::format("{:08x}{:08x}", random(), random());
 }
 
 }  // namespace
 
-Spool::Spool(const std::string& path, std::int64_t bytes)
-    : sqlite_("the spool", path, Sqlite::For::writing), most_bytes_(bytes) {
-  // Two servers that send the same would be told apart by nobody: the file is locked while it is open.
-  sqlite_.run("PRAGMA locking_mode = EXCLUSIVE; PRAGMA auto_vacuum = INCREMENTAL; PRAGMA journal_mode = WAL");
-  sqlite_.run("PRAGMA synchronous = NORMAL");
-  if (sqlite_.number("PRAGMA user_version") > spool_version) {
-    throw Failure(fmt::format("the spool {} was written by a newer absenc", path));
-  }
-  sqlite_.run(spool_schema);
-  sqlite_.run(fmt::format("PRAGMA user_version = {}", spool_version));
-  Statement names(sqlite_, "SELECT id, lower(hex(randomblob(8))) FROM source");
-  if (names.next()) {
-    source_ = names.text(0);
-    run_ = names.text(1);
-  }
-  Statement held(sqlite_,
-                 "SELECT count(*), ifnull(sum(readings), 0), "
-                 "ifnull(sum(length(CAST(topic AS BLOB)) + length(CAST(payload AS BLOB))), 0) FROM message");
-  if (!held.next()) return;
-  held_.counts = {static_cast<std::uint64_t>(held.integer(0)), static_cast<std::uint64_t>(held.integer(1))};
-  held_.bytes = held.integer(2) + held.integer(0) * bytes_of_a_row;
+Spool::Counts& Spool::Counts::operator+=(const Counts& other) {
+  messages += other.messages;
+  readings += other.readings;
+  return *this;
 }
 
-template <class Work>
-void Spool::commit(const Work& work) {
+Spool::Counts& Spool::Counts::operator-=(const Counts& other) {
+  messages -= other.messages;
+  readings -= other.readings;
+  return *this;
+}
+
+Spool::Spool(std::string path, std::int64_t bytes) : path_(std::move(path)), most_bytes_(bytes), run_(random_text()) {
   try {
-    sqlite_.run("BEGIN IMMEDIATE");
-    work();
-    sqlite_.run("COMMIT");
-  } catch (const Failure&) {
-    try {
-      if (sqlite_.in_transaction()) sqlite_.run("ROLLBACK");
-    } catch (const Failure&) {  // then it has ended by itself
-    }
-    throw;
+    open_folder();
+    load();
+    if (facts_.source.empty()) facts_.source = random_text();
+    begin_part();
+    tidy();
+  } catch (const os::Failure& failure) {
+    const bool is_ours = failure.kind() != os::Failure::Kind::in_use && failure.kind() != os::Failure::Kind::not_found;
+    if (!is_ours) throw Failure(fmt::format("the spool {}: {}", path_, failure.what()));
+    fail(failure.what());
   }
+  if (facts_.source.empty()) facts_.source = random_text();
+  show();
 }
 
 std::map<std::string, std::uint64_t> Spool::next_numbers() {
   const std::lock_guard lock(mutex_);
-  std::map<std::string, std::uint64_t> all;
-  Statement rows(sqlite_, "SELECT name, next FROM encoder");
-  while (rows.next()) all[rows.text(0)] = static_cast<std::uint64_t>(rows.integer(1));
-  return all;
+  return facts_.next_numbers;
 }
 
 std::int64_t Spool::next_id() {
   const std::lock_guard lock(mutex_);
-  return sqlite_.number("SELECT ifnull(max(seq), 0) + 1 FROM sqlite_sequence WHERE name = 'message'");
+  return facts_.next_id;
 }
 
-Spool::Counts Spool::add(const std::vector<Message>& messages,
-                         const std::map<std::string, std::uint64_t>& next_numbers) {
+void Spool::add(const std::vector<Message>& messages, const std::map<std::string, std::uint64_t>& next_numbers) {
   const std::lock_guard lock(mutex_);
-  Held after = held_;
-  Held dropped;
-  commit([&] {
-    Statement insert(sqlite_, "INSERT INTO message (id, topic, payload, readings) VALUES (?, ?, ?, ?)");
-    for (const Message& one : messages) {
-      insert.bind(1, one.id).bind(2, one.topic).bind(3, one.payload);
-      insert.bind(4, static_cast<std::int64_t>(one.readings)).run();
-      ++after.counts.messages;
-      after.counts.readings += one.readings;
-      after.bytes += size_of(one.topic.size(), one.payload.size());
-    }
-    Statement number(sqlite_, "INSERT OR REPLACE INTO encoder (name, next) VALUES (?, ?)");
-    for (const auto& [name, next] : next_numbers) number.bind(1, name).bind(2, static_cast<std::int64_t>(next)).run();
-    if (after.bytes > most_bytes_) dropped = drop_oldest(after.bytes - most_bytes_);
-  });
-  after.counts.messages -= dropped.counts.messages;
-  after.counts.readings -= dropped.counts.readings;
-  after.bytes -= dropped.bytes;
-  hold(after);
-  return dropped.counts;
+  for (const Message& one : messages) {
+    memory_.push_back(one);
+    memory_counts_ += {1, one.readings};
+    memory_bytes_ += spool_bytes(one);
+    facts_.next_id = std::max(facts_.next_id, one.id + 1);
+  }
+  for (const auto& [name, next] : next_numbers) facts_.next_numbers[name] = unwritten_numbers_[name] = next;
+  try {
+    look_at_folder();
+    write_waiting();
+  } catch (const os::Failure& failure) {
+    fail(failure.what());
+  }
+  drop_for_room();
+  show();
 }
 
-Spool::Held Spool::drop_oldest(std::int64_t bytes) {
-  Held dropped;
-  std::int64_t last = 0;
-  Statement rows(sqlite_,
-                 "SELECT id, readings, length(CAST(topic AS BLOB)) + length(CAST(payload AS BLOB)) FROM message "
-                 "ORDER BY id");
-  while (dropped.bytes < bytes && rows.next()) {
-    last = rows.integer(0);
-    ++dropped.counts.messages;
-    dropped.counts.readings += static_cast<std::uint64_t>(rows.integer(1));
-    dropped.bytes += rows.integer(2) + bytes_of_a_row;
+void Spool::write_waiting() {
+  if (newest_ == nullptr) begin_part();
+  while (write_some()) {
+    const std::size_t bytes = parts_.back().bytes;
+    if (bytes > part_limit_ && bytes > part_limit_ + spool_record(facts_).size()) begin_part();
   }
-  rows.reset();
-  Statement(sqlite_, "DELETE FROM message WHERE id <= ?").bind(1, last).run();
-  return dropped;
+  const std::lock_guard lock(shown_mutex_);
+  if (std::exchange(condition_.trouble, {}).empty()) return;
+  notes_.push_back(fmt::format("the spool {} can be written again", path_));
+}
+
+// As much as one write takes. False when nothing waits.
+bool Spool::write_some() {
+  if (memory_.empty() && unwritten_numbers_.empty()) return false;
+  std::string bytes;
+  // The numbers first: a write that is cut costs numbers, and gives none twice.
+  if (!unwritten_numbers_.empty()) bytes = spool_record({facts_.source, facts_.next_id, unwritten_numbers_});
+  std::vector<std::size_t> offsets;
+  const std::size_t start = newest_->log().size();
+  for (const Message& one : memory_) {
+    if (!offsets.empty() && bytes.size() > bytes_of_a_write) break;
+    offsets.push_back(start + bytes.size());
+    bytes += spool_record(one);
+  }
+  if (const int error = newest_->log().append(bytes); error != 0) {
+    throw os::system_failure("writing " + path_of(parts_.back().number), error);
+  }
+  unwritten_numbers_.clear();
+  Part& part = parts_.back();
+  part.bytes = newest_->log().size();
+  for (const std::size_t offset : offsets) {
+    const Message& one = memory_.front();
+    if (part.first_id == 0) part.first_id = one.id;
+    part.last_id = one.id;
+    part.waiting += {1, one.readings};
+    part.waiting_bytes += spool_bytes(one);
+    memory_counts_ -= {1, one.readings};
+    memory_bytes_ -= spool_bytes(one);
+    if (const auto place = places_.find(one.id); place != places_.end()) {
+      place->second.part = part.number;
+      place->second.offset = offset;
+    }
+    memory_.pop_front();
+  }
+  return true;
+}
+
+void Spool::drop_for_room() {
+  std::int64_t bytes = 0;
+  for (const Part& part : parts_) bytes += static_cast<std::int64_t>(part.bytes);
+  while (bytes > most_bytes_ && parts_.size() > 1) {
+    bytes -= static_cast<std::int64_t>(parts_.front().bytes);
+    drop_part(0, "the spool is full");
+  }
+  while (memory_bytes_ > memory_bytes(most_bytes_) && !memory_.empty()) {
+    const Message& oldest = memory_.front();
+    drop({1, oldest.readings}, condition_.trouble);
+    memory_counts_ -= {1, oldest.readings};
+    memory_bytes_ -= spool_bytes(oldest);
+    places_.erase(oldest.id);
+    memory_.pop_front();
+  }
 }
 
 std::vector<Message> Spool::after(std::int64_t id, std::size_t most) {
   const std::lock_guard lock(mutex_);
   std::vector<Message> found;
-  Statement rows(sqlite_, "SELECT id, topic, payload, readings FROM message WHERE id > ? ORDER BY id LIMIT ?");
-  rows.bind(1, id).bind(2, static_cast<std::int64_t>(most));
-  while (rows.next()) {
-    found.push_back({rows.integer(0), rows.text(1), rows.text(2), static_cast<std::uint64_t>(rows.integer(3))});
+  for (std::size_t i = 0; i < parts_.size() && found.size() < most; ++i) {
+    Part& part = parts_[i];
+    if (part.waiting.messages == 0 || part.last_id <= id) continue;
+    try {
+      collect_of(part, id, most, found);
+    } catch (const os::Failure&) {
+      std::error_code error;
+      if (fs::exists(path_of(part.number), error)) break;  // another time
+      drop_part(i--, fmt::format("{} was removed", path_of(part.number)));
+    }
   }
+  for (auto one = memory_.begin(); one != memory_.end() && found.size() < most; ++one) {
+    if (one->id <= id) continue;
+    places_[one->id] = {0, 0, one->readings, spool_bytes(*one)};
+    found.push_back(*one);
+  }
+  show();
   return found;
+}
+
+void Spool::collect_of(Part& part, std::int64_t id, std::size_t most, std::vector<Message>& found) {
+  const SpoolFile& file = file_of(part);
+  const bool goes_on = read_to_.part == part.number && read_to_.id <= id;
+  std::size_t offset = goes_on ? read_to_.offset : 0;
+  while (found.size() < most) {
+    std::optional<SpoolFile::Found> one = file.next(offset, nullptr);
+    if (!one) {
+      if (offset < part.bytes && !part.damaged) count_again(part);
+      return;
+    }
+    read_to_ = {part.number, one->message.id, offset};
+    if (one->arrived || one->message.id <= id || unmarked_.contains(one->message.id)) continue;
+    places_[one->message.id] = {part.number, one->offset, one->message.readings, spool_bytes(one->message)};
+    found.push_back(std::move(one->message));
+  }
 }
 
 void Spool::remove(const std::vector<std::int64_t>& ids) {
   const std::lock_guard lock(mutex_);
-  Held after = held_;
-  commit([&] {
-    Statement remove(sqlite_,
-                     "DELETE FROM message WHERE id = ? RETURNING readings, "
-                     "length(CAST(topic AS BLOB)) + length(CAST(payload AS BLOB))");
-    for (const std::int64_t id : ids) {
-      remove.bind(1, id);
-      while (remove.next()) {  // unless it was dropped meanwhile
-        --after.counts.messages;
-        after.counts.readings -= static_cast<std::uint64_t>(remove.integer(0));
-        after.bytes -= remove.integer(1) + bytes_of_a_row;
-      }
-    }
-  });
-  hold(after);
-  if (held_.counts.messages != 0 || sqlite_.number("PRAGMA freelist_count") < pages_worth_freeing) return;
-  sqlite_.run("PRAGMA incremental_vacuum");
+  for (const std::int64_t id : ids) {
+    const auto place = places_.find(id);
+    if (place == places_.end()) continue;  // it was dropped meanwhile
+    settle_one(id, place->second);
+    places_.erase(id);
+  }
+  tidy();
+  show();
+}
+
+void Spool::settle_one(std::int64_t id, const Place& place) {
+  if (place.part == 0) {
+    const auto found = std::find_if(memory_.begin(), memory_.end(), [&](const Message& one) { return one.id == id; });
+    if (found == memory_.end()) return;
+    memory_counts_ -= {1, place.readings};
+    memory_bytes_ -= place.bytes;
+    memory_.erase(found);
+    return;
+  }
+  Part* part = find_part(place.part);
+  if (part == nullptr) return;
+  part->waiting -= {1, place.readings};
+  part->waiting_bytes -= place.bytes;
+  try {
+    if (file_of(*part).mark_arrived(place.offset) == 0) return;
+  } catch (const os::Failure&) {  // the file is gone: the mark is not needed
+  }
+  unmarked_.insert(id);
 }
 
 void Spool::forget(const std::string& encoder) {
   const std::lock_guard lock(mutex_);
-  Statement(sqlite_, "DELETE FROM encoder WHERE name = ?").bind(1, encoder).run();
+  facts_.next_numbers.erase(encoder);
+  unwritten_numbers_.erase(encoder);
+  if (newest_ == nullptr) return;
+  // Without room the number stays until a newer file is begun, which harms nobody.
+  [[maybe_unused]] const int ignored = newest_->log().append(spool_record_without(encoder));
+  parts_.back().bytes = newest_->log().size();
 }
 
-void Spool::hold(const Held& now) {
-  const std::lock_guard lock(held_mutex_);
-  held_ = now;
+void Spool::fail(const std::string& why) {
+  const std::lock_guard lock(shown_mutex_);
+  if (std::exchange(condition_.trouble, "the spool: " + why).empty()) {
+    notes_.push_back(
+        fmt::format("the spool cannot be written: {}; new messages wait in memory, at most {} kB of them, and "
+                    "are sent from there",
+                    why, memory_bytes(most_bytes_) / 1000));
+  }
+}
+
+void Spool::drop(const Counts& counts, const std::string& why) {
+  const std::lock_guard lock(shown_mutex_);
+  dropped_.counts += counts;
+  dropped_.why = why;
+}
+
+void Spool::show() {
+  Counts held = memory_counts_;
+  std::int64_t bytes = memory_bytes_;
+  for (const Part& part : parts_) {
+    held += part.waiting;
+    bytes += part.waiting_bytes;
+  }
+  const std::lock_guard lock(shown_mutex_);
+  held_ = held;
+  held_bytes_ = bytes;
+  condition_.in_memory = !memory_.empty();
 }
 
 Spool::Counts Spool::held() const {
-  const std::lock_guard lock(held_mutex_);
-  return held_.counts;
+  const std::lock_guard lock(shown_mutex_);
+  return held_;
 }
 
 std::int64_t Spool::held_bytes() const {
-  const std::lock_guard lock(held_mutex_);
-  return held_.bytes;
+  const std::lock_guard lock(shown_mutex_);
+  return held_bytes_;
+}
+
+Spool::Condition Spool::condition() const {
+  const std::lock_guard lock(shown_mutex_);
+  return condition_;
+}
+
+Spool::Dropped Spool::take_dropped() {
+  const std::lock_guard lock(shown_mutex_);
+  return std::exchange(dropped_, {});
+}
+
+std::vector<std::string> Spool::take_notes() {
+  const std::lock_guard lock(shown_mutex_);
+  return std::exchange(notes_, {});
 }
 
 }  // namespace absenc::serve

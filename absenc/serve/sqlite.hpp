@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// As much of SQLite as history and spool need, with errors thrown. The library behind it is seen by sqlite.cpp alone.
+// As much of SQLite as the history needs, with errors thrown. The library behind it is seen by sqlite.cpp alone.
 #pragma once
 
 #include <cstdint>
