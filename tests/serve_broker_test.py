@@ -1,11 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """`absenc serve` at a broker that breaks MQTT: the encoders are read all the same, and no message is lost."""
+import json
 import os
+import shutil
 import signal
 import unittest
 
 from command_support import PATIENCE
-from mqtt_fake import CONNACK, CONNECT, PUBLISH, FakeBroker
+from mqtt_fake import CONNACK, CONNECT, NOT_AUTHORIZED, PUBACK, PUBLISH, Closed, FakeBroker, packet, published
 from mqtt_support import numbers
 from serve_support import ServeCase, wait_until
 
@@ -73,7 +75,7 @@ class BadPackets(BrokerCase):
                 self.assertLessEqual({state for _, state, _ in self.children(server)}, {"S", "R", "D"}, "no zombie")
                 server.process.kill()
                 server.process.wait()
-                os.remove(os.path.join(self.directory, "spool"))
+                shutil.rmtree(os.path.join(self.directory, "spool"))
 
     def test_a_client_that_is_killed_is_begun_again(self):
         broker = self.fake()
@@ -103,6 +105,76 @@ class BadPackets(BrokerCase):
         wait_until(lambda: len(numbers(broker.all("/readings"), ONE)) > 200, "readings come")
         self.assertEqual(len([one for one in self.events(broker) if "nothing reaches" in one]), 1)
         self.assertEqual(len([one for one in self.events(broker) if one.startswith("connected")]), 1)
+
+
+class Refused(BrokerCase):
+    """One of two encoders whose readings the broker does not take, until it does."""
+    BAD, GOOD = "/bad/readings", "/good/readings"
+
+    def serve(self, answer):
+        broker = self.fake(answer)
+        path = self.file("absenc.toml", "".join(f'[encoder.{name}]\nprotocol = "tformat"\nport = "sim"\n'
+                                                for name in ("bad", "good")))
+        server = self.without_history("--mqtt", broker.url, "--mqtt-prefix", "plant", "--mqtt-spool",
+                                      os.path.join(self.directory, "spool"), ABSENC_CONFIG=path)
+        return broker, server
+
+    def check(self, broker, server, connections, how):
+        good, bad = (lambda: numbers(broker.all(self.GOOD), "good")), (lambda: numbers(broker.taken(self.BAD), "bad"))
+        wait_until(lambda: len(good()) > 300, "the others go on")
+        self.assertEqual(good(), list(range(1, len(good()) + 1)))
+        self.assertEqual(bad(), [])
+        self.assertLessEqual(broker.connections, connections)
+        about = [one for one in self.events(broker) if "plant/bad/readings" in one]
+        self.assertEqual(len(about), 1, about)
+        self.assertIn(how, about[0])
+        self.assertIn("(plant/bad/readings)", self.mqtt(server)["trouble"])
+        behind = server.json("/api/mqtt")["taken"]["good"] - good()[-1]
+        self.assertLess(behind, 100, "they are not starved")
+        broker.permits = True
+        goal = self.mqtt(server)["taken"]["bad"]
+        wait_until(lambda: (bad() or [0])[-1] >= goal, "it comes, too")
+        self.assertEqual(bad(), list(range(1, len(bad()) + 1)))
+        wait_until(lambda: [one for one in self.events(broker) if one == "the broker takes plant/bad/readings again"],
+                   "an event says so")
+        self.assertEqual(self.mqtt(server)["trouble"], "")
+        self.assertEqual(self.mqtt(server)["dropped"], 0)
+
+    def refuses(self, broker, kind, flags, body):
+        topic, number, payload = published(flags, body) if kind == PUBLISH else ("", 0, b"")
+        is_bad = topic.endswith(self.BAD) and not getattr(broker, "permits", False)
+        if topic.endswith(self.BAD) and not is_bad:
+            broker.kept = getattr(broker, "kept", []) + [json.loads(payload)]
+        broker.taken = lambda _: getattr(broker, "kept", [])
+        return number if is_bad else None
+
+    def test_by_a_reason(self):
+        def answer(broker, _connection, kind, flags, body, usual):
+            number = self.refuses(broker, kind, flags, body)
+            return usual if number is None else packet(PUBACK, number.to_bytes(2, "big") + bytes((NOT_AUTHORIZED,)))
+        broker, server = self.serve(answer)
+        self.check(broker, server, 1, "Not authorized")
+
+    def test_by_the_end_of_the_connection(self):
+        """As by brokers of MQTT 3.1.1, and by some of 5."""
+        def answer(broker, _connection, kind, flags, body, usual):
+            if self.refuses(broker, kind, flags, body) is not None:
+                raise Closed
+            return usual
+        broker, server = self.serve(answer)
+        self.check(broker, server, 6, "ends the connection")
+
+    def test_states_too(self):
+        def answer(_broker, _connection, kind, flags, body, usual):
+            topic, number, _ = published(flags, body) if kind == PUBLISH else ("", 0, b"")
+            if topic != "plant/bad/state":
+                return usual
+            return packet(PUBACK, number.to_bytes(2, "big") + bytes((NOT_AUTHORIZED,)))
+        broker, server = self.serve(answer)
+        wait_until(lambda: len(broker.all("/bad/state")) > 1, "it is tried again")
+        self.assertEqual(broker.connections, 1)
+        self.assertEqual(len([one for one in self.events(broker) if "plant/bad/state" in one]), 1)
+        self.assertIn("(plant/bad/state)", self.mqtt(server)["trouble"])
 
 
 class Process(BrokerCase):

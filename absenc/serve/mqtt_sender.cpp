@@ -22,7 +22,6 @@ namespace {
 using namespace std::chrono_literals;
 
 constexpr std::size_t most_messages_out = 500;  // that are not acknowledged yet
-constexpr Time between_first_messages = 200ms;  // where nothing is acknowledged
 constexpr Time one_wait = 20ms;
 constexpr Time between_state_looks = 200ms;
 constexpr Time between_many_state_looks = 1s;  // of more encoders than many
@@ -82,8 +81,9 @@ void MqttSender::work(const std::stop_token& stop) {
 // One connection, from its begin to its end. What was not acknowledged in it begins anew in the next, in order.
 void MqttSender::attend(const std::stop_token& stop) {
   outstanding_.clear();
-  messages_out_ = 0;
-  last_sent_ = 0;
+  messages_out_.clear();
+  looked_to_ = 0;
+  refusals_.begin_connection();
   has_taken_ = false;
   connected_at_ = {};
   retained_.clear();
@@ -125,10 +125,9 @@ MqttClient::State MqttSender::connect(MqttClient& client, const std::string& hos
 void MqttSender::begin() {
   connected_at_ = os::now();
   told_connected_ = false;
-  next_message_ = os::now() + between_first_messages;
   const std::lock_guard lock(mutex_);
   figures_.connected = true;
-  figures_.trouble = refusal_;
+  figures_.trouble = refusals_.text();
 }
 
 // A connection that comes and goes is no event each time: after one, the next is told when it has held.
@@ -139,16 +138,14 @@ void MqttSender::tell_connected() {
   next_told_connected_ = os::now() + between_connected_tellings;
   told_lost_.clear();
   const bool old = version_ == MqttVersion::v3_1_1;
-  happenings_->add(
-      {calendar_ms(), "", "mqtt",
-       fmt::format("connected to {}{}", settings_->broker.text(),
-                   old ? ", which knows MQTT 3.1.1 only: it does not say when it refuses a message" : "")});
+  tell(fmt::format("connected to {}{}", settings_->broker.text(),
+                   old ? ", which knows MQTT 3.1.1 only: it does not say when it refuses a message" : ""));
 }
 
 void MqttSender::deliver(MqttClient& client, const std::stop_token& stop) {
   send_retained(client, {topic_of(settings_->prefix, "", "state"), "online", server_state_text("online", "")});
   while (!stop.stop_requested()) {
-    if (os::now() >= next_states_) {
+    if (os::now() >= next_states_ || refusals_.has_suspects()) {
       next_states_ = os::now() + (fleet_->all().size() > many ? between_many_state_looks : between_state_looks);
       send_states(client);
     }
@@ -168,7 +165,17 @@ void MqttSender::step(MqttClient& client) {
   settle(client);  // also what came before it was lost
   if (!lost) return;
   note_death(client);
+  note_lost_connection();
   throw Failure(client.trouble());
+}
+
+// A broker that may not say why it refuses a message ends the connection instead.
+void MqttSender::note_lost_connection() {
+  std::set<std::string> topics;
+  for (const auto& [number, sent] : outstanding_) topics.insert(sent.topic);
+  const bool soon = os::now() - connected_at_ < time_to_hold;
+  const std::string refused = refusals_.end_connection(topics, soon, os::now());
+  if (!refused.empty()) tell(fmt::format("the broker refuses {}: it ends the connection there", refused));
 }
 
 void MqttSender::note_death(const MqttClient& client) {
@@ -229,63 +236,82 @@ void MqttSender::send_values(MqttClient& client) {
 }
 
 void MqttSender::send_retained(MqttClient& client, const Retained& retained) {
-  const auto [known, is_new] = retained_.try_emplace(retained.topic);
-  if (!is_new && known->second == retained.condition) return;
-  known->second = retained.condition;
+  const auto known = retained_.find(retained.topic);
+  if (known != retained_.end() && known->second == retained.condition) return;
+  if (refusals_.verdict(retained.topic, outstanding_.size(), os::now()) != MqttRefusals::Verdict::send) return;
+  retained_[retained.topic] = retained.condition;
   outstanding_[client.publish(retained.topic, retained.payload, 1, true)] = {0, retained.topic};
+  refusals_.sent(retained.topic);
 }
 
-// Until the broker has taken one, one at a time, for a while: mosquitto hangs up behind its refusal, which is lost in
-// what is still being sent to it.
 void MqttSender::send_messages(MqttClient& client) {
-  if (messages_out_ >= most_messages_out || spool_->held().messages <= messages_out_) return;
-  if (!has_taken_ && !outstanding_.empty() && os::now() < next_message_) return;
-  next_message_ = os::now() + between_first_messages;
-  for (const Message& one : spool_->after(last_sent_, has_taken_ ? most_messages_out - messages_out_ : 1)) {
+  if (refusals_.take_due(os::now())) looked_to_ = 0;
+  if (messages_out_.size() >= most_messages_out || spool_->held().messages <= messages_out_.size()) return;
+  for (const Message& one : spool_->after(looked_to_, most_messages_out)) {
+    const MqttRefusals::Verdict verdict = refusals_.verdict(one.topic, outstanding_.size(), os::now());
+    const bool is_out = messages_out_.contains(one.id);
+    if (!is_out && (verdict == MqttRefusals::Verdict::wait || messages_out_.size() >= most_messages_out)) return;
+    looked_to_ = one.id;
+    if (is_out || verdict == MqttRefusals::Verdict::skip) continue;
     outstanding_[client.publish(one.topic, one.payload, 1, false)] = {one.id, one.topic};
-    ++messages_out_;
-    last_sent_ = one.id;
+    messages_out_.insert(one.id);
+    refusals_.sent(one.topic);
   }
 }
 
 // A message leaves the spool when the broker has said that it has it, and in no other way but for want of room.
 void MqttSender::settle(MqttClient& client) {
   std::vector<std::int64_t> arrived;
-  std::string refused;
   for (const MqttClient::Acknowledgement& one : client.take_acknowledgements()) {
     const auto found = outstanding_.find(one.number);
     if (found == outstanding_.end()) continue;  // of QoS 0
-    const Outstanding& sent = found->second;
-    if (sent.message != 0) --messages_out_;
-    if (!one.refused.empty()) {
-      refused = fmt::format("{} ({})", one.refused, sent.topic);
-    } else if (sent.message != 0) {
-      arrived.push_back(sent.message);
-    }
+    const Outstanding sent = found->second;
     outstanding_.erase(found);
+    messages_out_.erase(sent.message);
+    if (!one.refused.empty()) {
+      settle_refused(sent, one.refused);
+      continue;
+    }
+    settle_taken(sent);
+    if (sent.message != 0) arrived.push_back(sent.message);
   }
-  if (!arrived.empty()) {
-    spool_->remove(arrived);
-    has_taken_ = true;
-    refusal_.clear();
+  if (arrived.empty()) return;
+  spool_->remove(arrived);
+  has_taken_ = true;
+  const std::lock_guard lock(mutex_);
+  figures_.sent += arrived.size();
+}
+
+void MqttSender::settle_refused(const Outstanding& sent, const std::string& why) {
+  const bool is_new = refusals_.refuse(sent.topic, why, os::now());
+  if (sent.message == 0) retained_.erase(sent.topic);  // to be sent when its pause is over
+  {
     const std::lock_guard lock(mutex_);
-    figures_.sent += arrived.size();
+    figures_.trouble = refusals_.text();
   }
-  if (refused.empty()) return;
-  refusal_ = "the broker refuses a message: " + refused;
-  throw Failure(refusal_);
+  if (is_new) tell(fmt::format("the broker refuses {}: {}", sent.topic, why));
+}
+
+void MqttSender::settle_taken(const Outstanding& sent) {
+  if (!refusals_.take(sent.topic)) return;
+  looked_to_ = 0;  // the others of this topic were skipped
+  {
+    const std::lock_guard lock(mutex_);
+    figures_.trouble = refusals_.text();
+  }
+  tell(fmt::format("the broker takes {} again", sent.topic));
 }
 
 void MqttSender::become_lost(const std::string& why) {
   {
     const std::lock_guard lock(mutex_);
     figures_.connected = false;
-    figures_.trouble = refusal_.empty() ? why : refusal_;
+    figures_.trouble = refusals_.text().empty() ? why : refusals_.text();
   }
   if (!told_lost_.insert(why).second) return;
-  happenings_->add(
-      {calendar_ms(), "", "mqtt",
-       fmt::format("nothing reaches {}: {}; what it shall have waits on disk", settings_->broker.text(), why)});
+  tell(fmt::format("nothing reaches {}: {}; what it shall have waits on disk", settings_->broker.text(), why));
 }
+
+void MqttSender::tell(const std::string& text) { happenings_->add({calendar_ms(), "", "mqtt", text}); }
 
 }  // namespace absenc::serve

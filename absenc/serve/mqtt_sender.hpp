@@ -15,6 +15,7 @@
 #include "absenc/serve/fleet.hpp"
 #include "absenc/serve/mqtt_client.hpp"
 #include "absenc/serve/mqtt_messages.hpp"
+#include "absenc/serve/mqtt_refusals.hpp"
 #include "absenc/serve/outlets.hpp"
 #include "absenc/serve/spool.hpp"
 
@@ -36,6 +37,11 @@ class MqttSender {
   [[nodiscard]] Figures figures() const;
 
  private:
+  struct Outstanding {
+    std::int64_t message = 0;  // its id; 0: of a state
+    std::string topic{};
+  };
+
   void work(const std::stop_token& stop);
   void attend(const std::stop_token& stop);
   MqttClient::State connect(MqttClient& client, const std::string& host, bool try_all,
@@ -50,6 +56,10 @@ class MqttSender {
   void clear_gone(MqttClient& client, const Fleet::Watches& watches);
   void send_messages(MqttClient& client);
   void settle(MqttClient& client);
+  void settle_refused(const Outstanding& sent, const std::string& why);
+  void settle_taken(const Outstanding& sent);
+  void note_lost_connection();
+  void tell(const std::string& text);
   void become_lost(const std::string& why);
   void tell_connected();
   void note_death(const MqttClient& client);
@@ -62,14 +72,10 @@ class MqttSender {
 
   // Of the thread alone.
   MqttVersion version_ = MqttVersion::v5;
-  Time next_message_{};  // while the broker has taken none
-  struct Outstanding {
-    std::int64_t message = 0;  // its id; 0: of a state
-    std::string topic{};
-  };
   std::unordered_map<int, Outstanding> outstanding_;  // by the number of the library
-  std::size_t messages_out_ = 0;                      // of those
-  std::int64_t last_sent_ = 0;
+  std::set<std::int64_t> messages_out_;               // ids, of those
+  std::int64_t looked_to_ = 0;  // the id up to which messages were sent, or skipped because their topic is refused
+  MqttRefusals refusals_;
   std::set<std::string> served_;                 // encoders of which the broker may keep something
   std::map<std::string, std::string> retained_;  // by topic: the condition that was sent
   Time next_states_{};
@@ -79,7 +85,6 @@ class MqttSender {
   bool told_connected_ = false;  // of this connection
   Time next_told_connected_{};
   std::set<std::string> told_lost_;  // why nothing arrives, since a connection was told
-  std::string refusal_;  // of the last message that was refused, until one is taken: brokers then also just hang up
 
   mutable std::mutex mutex_;  // guards what follows
   std::condition_variable_any changed_;
