@@ -63,9 +63,12 @@ constexpr std::string_view read_44_answer = "00000000000000010000000000000001010
 struct Master {
   std::int64_t period;
   std::int64_t timeout;
-  bool releases = false;  // MA rises again when the timeout is over; else it is held until the next frame
-  int clocks = 0;         // more than the frame has bits
+  bool releases = false;   // MA rises again when the timeout is over; else it is held until the next frame
+  int clocks = 0;          // more than the frame has bits and the idle one
+  std::int64_t pause = 0;  // behind the timeout, and behind an MA that is released
 };
+
+constexpr int biss_bits = 32;  // of the frame, with the one idle bit behind which it begins
 
 // Idle, one ACK bit, start, CDS, 19 bits, nError, nWarning, and the CRC, bit by bit.
 std::string biss_frame(std::uint32_t position, bool cds) {
@@ -93,12 +96,14 @@ void draw_biss(Wires& wires, const Master& master, std::string_view cdm, std::st
     }
     wires.wait(master.timeout);
     wires.data(true, 0);
-    if (!low) continue;
-    if (master.releases) {
+    if (!low) {
+      wires.wait(master.pause);
+    } else if (master.releases) {
       wires.wait(10);
       wires.clock(true);
-      wires.wait(master.timeout);
+      wires.wait(std::max(master.pause, master.timeout));
     } else {
+      wires.wait(master.pause);
       wires.wait(10);
       wires.clock(true);
       wires.wait(master.period / 2);
@@ -154,22 +159,25 @@ TEST_F(ClockedLines, BissOfAnyClockTimeoutAndMaster) {
          {3 * period / 2, std::int64_t{12'500}, std::int64_t{20'000}, std::int64_t{40'000}}) {
       if (timeout < 6 * period / 10) continue;  // it would be over between two edges of the clock
       for (const bool releases : {false, true}) {
-        for (const int more : {-1, 0, 1, 5}) {
-          ++cells;
-          SCOPED_TRACE(std::to_string(khz) + " kHz, timeout " + std::to_string(timeout) + " ns, " +
-                       (releases ? "released, " : "held, ") + std::to_string(more) + " clocks more");
-          Wires wires;
-          draw_biss(wires, {period, timeout, releases, more}, read_44, read_44_answer);
-          const Rows rows = decode(wires, "biss");
-          EXPECT_EQ(rows.bad, 0u);
-          EXPECT_EQ(rows.exchanges, 1u);
-          EXPECT_EQ(rows.positions, positions(read_44.size()));
-          EXPECT_TRUE(notes_.empty());
+        for (const int more : {-1, 0, 5, biss_bits - 1}) {
+          for (const std::int64_t pause : {0, 1'000, 300'000}) {
+            ++cells;
+            SCOPED_TRACE(std::to_string(khz) + " kHz, timeout " + std::to_string(timeout) + " ns, " +
+                         (releases ? "released, " : "held, ") + std::to_string(more) + " clocks more, pause " +
+                         std::to_string(pause) + " ns");
+            Wires wires;
+            draw_biss(wires, {period, timeout, releases, more, pause}, read_44, read_44_answer);
+            const Rows rows = decode(wires, "biss");
+            EXPECT_EQ(rows.bad, 0u);
+            EXPECT_EQ(rows.exchanges, 1u);
+            EXPECT_EQ(rows.positions, positions(read_44.size()));
+            EXPECT_TRUE(notes_.empty());
+          }
         }
       }
     }
   }
-  EXPECT_GT(cells, 200u);
+  EXPECT_GT(cells, 600u);
 }
 
 // A host that is interrupted: its clock rests in a word for as long as the timeout allows, and between words for
@@ -215,7 +223,8 @@ TEST_F(ClockedLines, AControlFrameThatTheFileCutsIsCut) {
 constexpr unsigned ssi_bits = 13;
 
 // `copies` words with a zero between them; the monoflop runs from the last edge of the clock.
-void draw_ssi(Wires& wires, std::int64_t period, std::int64_t monoflop, std::size_t clocks, unsigned words) {
+void draw_ssi(Wires& wires, std::int64_t period, std::int64_t monoflop, std::int64_t pause, std::size_t clocks,
+              unsigned words) {
   for (unsigned word = 0; word < words; ++word) {
     const std::uint32_t position = 17 + 321 * word;
     wires.burst(period, clocks, [&](std::size_t at) {
@@ -224,31 +233,34 @@ void draw_ssi(Wires& wires, std::int64_t period, std::int64_t monoflop, std::siz
     });
     wires.wait(monoflop);
     wires.data(true, 0);
-    wires.wait(500);
+    wires.wait(pause);
   }
 }
 
 TEST_F(ClockedLines, SsiOfAnyClockMonoflopAndNumberOfClocks) {
   unsigned cells = 0;
-  for (const std::int64_t khz : {50, 80, 100, 250, 1000, 2000}) {
+  for (const std::int64_t khz : {30, 50, 80, 100, 250, 1000, 2000, 10'000}) {
     const std::int64_t period = 1'000'000 / khz;
-    for (const std::int64_t monoflop : {9'000, 20'000, 25'000, 41'000, 500'000}) {
-      if (monoflop < 6 * period / 10) continue;
+    for (const std::int64_t monoflop : {9'000, 12'500, 20'000, 25'000, 41'000, 500'000}) {
+      if (monoflop < 6 * period / 10) continue;  // it would be over between two edges of the clock
       for (const std::size_t clocks : {ssi_bits, ssi_bits + 1, 2 * ssi_bits + 1, 2 * ssi_bits + 2}) {
-        ++cells;
-        SCOPED_TRACE(std::to_string(khz) + " kHz, monoflop " + std::to_string(monoflop) + " ns, " +
-                     std::to_string(clocks) + " clocks");
-        Wires wires;
-        draw_ssi(wires, period, monoflop, clocks, 20);
-        const Rows rows = decode(wires, "ssi", {"bits=13", "after_word=separated"});
-        EXPECT_EQ(rows.bad, 0u);
-        std::vector<std::uint64_t> expected;
-        for (unsigned word = 0; word < 20; ++word) expected.push_back(17 + 321 * word);
-        EXPECT_EQ(rows.positions, expected);
+        for (const std::int64_t pause : {0, 500, 30'000, 1'000'000}) {
+          ++cells;
+          SCOPED_TRACE(std::to_string(khz) + " kHz, monoflop " + std::to_string(monoflop) + " ns, " +
+                       std::to_string(clocks) + " clocks, pause " + std::to_string(pause) + " ns");
+          Wires wires;
+          draw_ssi(wires, period, monoflop, pause, clocks, 20);
+          const Rows rows = decode(wires, "ssi", {"bits=13", "after_word=separated"});
+          EXPECT_EQ(rows.bad, 0u);
+          std::vector<std::uint64_t> expected;
+          for (unsigned word = 0; word < 20; ++word) expected.push_back(17 + 321 * word);
+          EXPECT_EQ(rows.positions, expected);
+          EXPECT_TRUE(notes_.empty());
+        }
       }
     }
   }
-  EXPECT_GT(cells, 90u);
+  EXPECT_GT(cells, 600u);
 }
 
 // The monoflop runs out behind the second copy alone: the first rest ends no word.
