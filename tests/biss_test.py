@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """BiSS of the command: frames of many encoders, safety words, chains, control frames, and registers."""
+import bisect
 import json
 import os
 import random
@@ -337,6 +338,72 @@ def draw_frames(words, cdm="", cds=""):
     return "\n".join([*lines, f"#{now}", ""])
 
 
+def wires_of(path):
+    """When clock and data change in a VCD of `wave`, in nanoseconds: (time, level) of each."""
+    wires = {'!': [], '"': []}
+    now = 0
+    with open(path, encoding="utf-8") as file:
+        for line in file.read().split("$enddefinitions $end\n")[1].splitlines():
+            if line.startswith("#"):
+                now = int(line[1:])
+            else:
+                wires[line[1]].append((now, line[0]))
+    return wires['!'], wires['"']
+
+
+def level_at(wire, time):
+    """The level just before `time`."""
+    return wire[bisect.bisect_left(wire, (time, "")) - 1][1]
+
+
+def read_frames(path):
+    """The frames on two wires, from the document alone: position, CDM and CDS of each. MA's rising edges take what SLO
+    was; a frame ends where SLO rises while MA has no edge, and the level of MA there is CDM, inverted."""
+    clock, data = wires_of(path)
+    ends = [at for at, level in data[1:] if level == "1"]
+    edges = [at for at, level in clock[1:] if level == "1"]
+    frames, samples = [], ""
+    for edge, following in zip(edges, edges[1:] + [clock[-1][0] + 10**9]):
+        samples += level_at(data, edge)
+        falls = clock[bisect.bisect_right(clock, (edge, "1"))][0] if edge < clock[-1][0] else 10**12
+        end = next((at for at in ends[bisect.bisect_right(ends, edge + 1000):][:1] if at < following), None)
+        if end is None or (falls < end and level_at(clock, end) == "1"):
+            continue
+        head = samples.find("1", samples.find("0"))
+        if samples.startswith("1") and head > 0:
+            word = samples[head + 2:head + 29]
+            assert crc(word[:21], 0x03, 6) == word[21:], samples
+            frames.append((int(word[:19], 2), "1" if level_at(clock, end) == "0" else "0", samples[head + 1]))
+        samples = ""
+    return frames
+
+
+def registers_in(frames):
+    """The control frames of registers: (slave, address, bytes, whether they were written)."""
+    cdm, cds = ("".join(frame[which] for frame in frames) for which in (1, 2))
+    found, at = [], cdm.find("0" * 14 + "1")
+    while at >= 0:
+        at += 14
+        assert cdm[at + 1] == "1" and control_crc(cdm[at + 1:at + 12]) == cdm[at + 12:at + 16], cdm[at:]
+        slave, address = int(cdm[at + 2:at + 5], 2), int(cdm[at + 5:at + 12], 2)
+        assert cds[at + 1:at + 9] == "1" + "0" * 7, cds[at:]
+        write = cdm[at + 16:at + 19] == "011"
+        assert cds[at + 17:at + 19] == cdm[at + 16:at + 18], cds[at:]
+        values, start = [], at + 19
+        while True:
+            start = cds.index("1", start)
+            byte = cds[start + 1:start + 9]
+            assert control_crc(byte) == cds[start + 9:start + 13], cds[start:]
+            assert not write or cdm[start:start + 12] == cds[start + 1:start + 13], cdm[start:]
+            values.append(int(byte, 2))
+            if cdm[start + 13] == "0":
+                break
+            start += 14
+        found.append((slave, address, values, write))
+        at = cdm.find("0" * 14 + "1", start)
+    return found
+
+
 class LifeCounter(Case):
     def errors(self, unit, words):
         options = {"biss": ["--option", "life_counter=true"], "biss-safety": []}[unit]
@@ -366,20 +433,10 @@ class LifeCounter(Case):
 
 
 class Wires(Case):
-    """When the data line changes, in nanoseconds, as a VCD file has it."""
-
     def changes(self, encoder):
         path = self.file("wires.vcd")
         self.assert_good(absenc("wave", encoder, path, "--force"))
-        wires = {'!': [], '"': []}
-        now = 0
-        with open(path, encoding="utf-8") as file:
-            for line in file.read().split("$enddefinitions $end\n")[1].splitlines():
-                if line.startswith("#"):
-                    now = int(line[1:])
-                else:
-                    wires[line[1]].append((now, line[0]))
-        return wires['!'], wires['"']
+        return wires_of(path)
 
     def test_the_timeout_and_the_monoflop_are_drawn(self):
         for encoder, low in (("biss", 20_000), ("biss?timeout_us=12.5", 12_500), ("biss?timeout_us=40", 40_000),
@@ -390,6 +447,17 @@ class Wires(Case):
                 clock, data = self.changes(encoder)
                 last_edge = clock[-1][0]
                 self.assertEqual((clock[-1][1], data[-1]), ("1", (last_edge + low, "1")))
+
+    def test_slo_is_low_behind_the_crc(self):
+        """A line whose delay is found by many clocks more than the frame has."""
+        path = self.file("wires.vcd")
+        self.assert_good(absenc("wave", "biss?line_delay_ns=4300&singleturn=275087", path))
+        rows = json_lines(absenc("decode", "biss", path, "--json").stdout)
+        for row in rows[1:]:
+            samples = row["reply"].replace(" ", "")
+            self.assertEqual((samples[:45].rstrip("0"), set(samples[45:])),
+                             ("111111" + "0" * 10 + "10" + plain_word(275087).rstrip("0"), {"0"}), row)
+            self.assertGreater(len(samples), 100)
 
     def test_each_slave_of_a_chain_takes_one_clock(self):
         for slaves in (1, 2, 8):
@@ -527,6 +595,23 @@ class ControlFrames(Case):
             self.assertEqual((fields["operation"], fields["command"], fields["broadcast"], fields["executed"]),
                              ("command", command, slaves == 0, True))
             self.assertEqual(numbers(fields.get("acknowledged", "")), [i for i in range(8) if slaves >> i & 1])
+
+    def test_those_that_wave_draws_are_as_the_document_has_them(self):
+        for settings in ("", "&timeout_us=12.5", "&timeout_us=40&ma_khz=250", "&adaptive_timeout=true",
+                         "&adaptive_timeout=true&ma_khz=100", "&register_delay_us=700"):
+            with self.subTest(settings):
+                path = self.file("drawn.vcd")
+                self.assert_good(absenc("wave", f"biss?motion=rpm=600{settings}", path, "--force",
+                                        "--command", "memory-read 68 0 4", "--command", "memory-write 3 0x5A 0 0"))
+                frames = read_frames(path)
+                rows = json_lines(absenc("decode", "biss", path, "--json").stdout)
+                self.assertEqual([frame[0] for frame in frames],
+                                 [row["fields"]["singleturn"] for row in rows if row["kind"] == "reply"])
+                self.assertGreater(len({frame[0] for frame in frames}), 100)
+                read, *written = registers_in(frames)
+                self.assertEqual(read, (0, 68, [0, 0, 0, 1], False))
+                self.assertIn((0, 3, [0x5A], True), written)
+                self.assertEqual(written[-1], (0, 3, [0x5A], False))
 
     def test_on_the_wires_they_are_rows_beside_the_positions(self):
         cdm, cds = register_frame(0, 68, [1, 2, 0xFE], delays=[0, 4, 0])

@@ -59,6 +59,7 @@ struct Burst {
   // Without chip select:
   bool low_before = false;   // the clock rested at its low level before it
   bool low_after = false;    // and rests there behind it
+  bool fell_before = false;  // the clock, high behind the word before, fell in the rest between the two
   bool has_last = false;     // what stood on the line behind the last change of the clock is known
   bool last = false;         // that level of `in`: a host that gives n clocks for n bits takes its last bit there
 };

@@ -26,10 +26,10 @@ Frame BurstAnnotator::word_of(const Burst& burst, bool with_last) {
 
 void BurstAnnotator::put(const Burst& burst) {
   if (burst.bits == 0) return;
-  bool ends_control = false;
+  if (control_.settle(burst.fell_before)) sink_.put(control_.annotation(judge_));
   Annotation annotation{.kind = Annotation::Kind::reply, .begin = burst.begin, .end = burst.end};
   if (judge_.unit().link == LinkKind::clocked) {
-    ends_control = decode_word(burst, annotation);
+    decode_word(burst, annotation);
   } else {
     decode_exchange(burst, annotation);
   }
@@ -40,7 +40,6 @@ void BurstAnnotator::put(const Burst& burst) {
     annotation.remark = Remark::cut;
   }
   sink_.put(annotation);
-  if (ends_control) sink_.put(control_.annotation(judge_));
 }
 
 // Decodes a word; what is decoded goes to `word`, without the encoder's bit of control communication, which is
@@ -57,8 +56,7 @@ Error BurstAnnotator::decode_as(const Burst& burst, bool with_last, Frame& word,
   return judge_.decode({}, word);
 }
 
-// Whether a control frame ends with this word.
-bool BurstAnnotator::decode_word(const Burst& burst, Annotation& annotation) {
+void BurstAnnotator::decode_word(const Burst& burst, Annotation& annotation) {
   bool answered = false;
   annotation.error = decode_as(burst, false, annotation.reply, answered);
   // A host that gives a clock for each bit and no more takes the last bit behind it.
@@ -66,10 +64,11 @@ bool BurstAnnotator::decode_word(const Burst& burst, Annotation& annotation) {
     const bool good = decode_as(burst, true, annotation.reply, answered) == Error::none;
     annotation.error = good ? Error::none : decode_as(burst, false, annotation.reply, answered);
   }
-  return judge_.unit().control_bit != nullptr && control_.put(burst, answered, annotation.error);
+  if (judge_.unit().control_bit != nullptr) control_.put(burst, answered, annotation.error);
 }
 
 void BurstAnnotator::finish() {
+  if (control_.settle(false)) sink_.put(control_.annotation(judge_));
   if (!control_.finish()) return;
   Annotation annotation = control_.annotation(judge_);
   if (annotation.error != Error::none) {
@@ -86,21 +85,28 @@ void ControlFrames::Bits::add(bool bit) {
   ++size;
 }
 
-bool ControlFrames::put(const Burst& burst, bool answered, Error error) {
+void ControlFrames::put(const Burst& burst, bool answered, Error error) {
+  pending_ = {burst.begin, burst.end, burst.low_after, answered, error};
+}
+
+bool ControlFrames::settle(bool fell) {
+  if (!pending_) return false;
+  const Pending word = *std::exchange(pending_, std::nullopt);
+  const bool asks = word.low_after || fell;
   const unsigned before = quiet_;
-  quiet_ = burst.low_after ? 0 : std::min(quiet_ + 1, zeros);
+  quiet_ = asks ? 0 : std::min(quiet_ + 1, zeros);
   if (!open_) {
-    if (!burst.low_after || before < zeros) return false;
+    if (!asks || before < zeros) return false;
     open_ = true;
     asked_ = {};
     answered_ = {};
-    begin_ = burst.begin;
+    begin_ = word.begin;
     error_ = Error::none;
   }
-  asked_.add(burst.low_after);
-  answered_.add(answered);
-  end_ = burst.end;
-  if (error_ == Error::none) error_ = error;
+  asked_.add(asks);
+  answered_.add(word.answered);
+  end_ = word.end;
+  if (error_ == Error::none) error_ = word.error;
   open_ = quiet_ < zeros;
   return !open_;
 }

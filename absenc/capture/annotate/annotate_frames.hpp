@@ -5,6 +5,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -22,8 +23,11 @@ class ControlFrames {
 
   /// Whether the encoder's bit may be 1: something is asked for.
   [[nodiscard]] bool may_answer() const { return open_; }
-  /// The next word, and what was wrong with it. True: it is the last of a control frame.
-  bool put(const Burst& burst, bool answered, Error error);
+  /// The next word, and what was wrong with it. `settle` comes before the next.
+  void put(const Burst& burst, bool answered, Error error);
+  /// The next word comes, or the end; whether the clock fell before it. True: the word that was put is the last of a
+  /// control frame.
+  bool settle(bool fell);
   /// The capture ends. True: a control frame goes on.
   bool finish() { return std::exchange(open_, false); }
   /// The one that has ended, decoded; valid until the next word, and until `judge` decodes the next.
@@ -37,6 +41,16 @@ class ControlFrames {
     [[nodiscard]] Frame frame() const { return {.bytes = bytes, .bits = size}; }
   };
 
+  // A word whose rest is not over.
+  struct Pending {
+    Tick begin;
+    Tick end;
+    bool low_after;
+    bool answered;
+    Error error;
+  };
+
+  std::optional<Pending> pending_;
   Bits asked_;
   Bits answered_;
   Tick begin_ = 0;
@@ -59,7 +73,7 @@ class BurstAnnotator {
  private:
   void decode_exchange(const Burst& burst, Annotation& annotation);
   Error decode_as(const Burst& burst, bool with_last, Frame& word, bool& answered);
-  bool decode_word(const Burst& burst, Annotation& annotation);
+  void decode_word(const Burst& burst, Annotation& annotation);
   [[nodiscard]] Frame word_of(const Burst& burst, bool with_last);
 
   Judge judge_;

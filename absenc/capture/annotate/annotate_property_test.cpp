@@ -87,6 +87,7 @@ class Truth {
     }
   }
   void add(const Burst& burst, const Unit& unit) {
+    if (control_.settle(false)) add(control_.annotation(judge_));
     std::size_t idle = unit.link == LinkKind::clocked ? unit.line.idle_clocks : 0;
     if (burst.low_before && unit.control_bit != nullptr) ++idle;
     Wire bits((burst.bits - idle + 7) / 8);
@@ -116,17 +117,7 @@ class Truth {
                         bits,
                         reading(error),
                         {}});
-    if (unit.control_bit == nullptr || !control_.put(burst, says_one, error)) return;
-    const Annotation said = control_.annotation(judge_);
-    expected.push_back({said.kind,
-                        said.remark,
-                        said.error,
-                        said.begin,
-                        said.end,
-                        Wire(said.request.bytes.begin(), said.request.bytes.end()),
-                        Wire(said.reply.bytes.begin(), said.reply.bytes.end()),
-                        {},
-                        {}});
+    if (unit.control_bit != nullptr) control_.put(burst, says_one, error);
   }
 
   std::vector<Kept> expected;
@@ -137,6 +128,18 @@ class Truth {
   std::optional<Reading> reading(Error error) {
     return error == Error::none && judge_.contents().reading != nullptr ? std::optional(*judge_.contents().reading)
                                                                         : std::nullopt;
+  }
+
+  void add(const Annotation& control) {
+    expected.push_back({control.kind,
+                        control.remark,
+                        control.error,
+                        control.begin,
+                        control.end,
+                        Wire(control.request.bytes.begin(), control.request.bytes.end()),
+                        Wire(control.reply.bytes.begin(), control.reply.bytes.end()),
+                        {},
+                        {}});
   }
 
   void add(Kind kind, Remark remark, Error error, const Said& said, std::optional<Reading> read) {

@@ -94,13 +94,14 @@ bool ClockedDecoder::open(Tick at, bool cut, Targets* targets) {
     while (targets->next < targets->bursts.size() && targets->bursts[targets->next].begin < at) ++targets->next;
     const Burst* const target =
         targets->next < targets->bursts.size() ? &targets->bursts[targets->next] : targets->open;
-    targets->met = target != nullptr && target->begin == at && !target->cut;
+    targets->met = target != nullptr && target->begin == at && !target->cut && target->fell_before == fell_;
     if (targets->met) return true;
   }
   open_ = lone_ = true;
   burst_ = {};
   burst_.begin = at;
   burst_.cut = cut;
+  burst_.fell_before = fell_;
   burst_.low_before = !format_.has_select && !clock_.level;
   return false;
 }
@@ -111,6 +112,7 @@ void ClockedDecoder::close(Tick at, bool cut, std::vector<Burst>& bursts) {
   burst_.cut = burst_.cut || cut;
   burst_.low_after = !format_.has_select && !clock_.level;
   const bool is_word = burst_.bits > 0 && (format_.has_select || !lone_);
+  fell_ = !is_word && (fell_ || burst_.low_after);
   if (is_word) bursts.push_back(std::move(burst_));
   burst_ = {};
 }

@@ -43,7 +43,7 @@ struct ClockedPart {
 };
 
 /// Decodes part after part. A burst whose beginning or end was not seen is marked as cut. A lone change of the clock
-/// between two pauses is none: a host that held the clock low lets it rise again.
+/// between two pauses is none: a host holds the clock low, or lets it rise again.
 class ClockedDecoder {
  public:
   static constexpr std::size_t most_bits = 65536;  // of a burst; a longer one is cut
@@ -103,6 +103,7 @@ class ClockedDecoder {
   bool seen_pause_ = false;
   bool open_ = false;
   bool lone_ = false;     // the clock has changed once in this burst
+  bool fell_ = false;     // since the last word the clock has changed once, and rested low
   bool changed_ = false;  // the data line, in this rest
   Burst burst_;
 };

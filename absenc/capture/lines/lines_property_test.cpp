@@ -20,7 +20,9 @@ namespace {
 auto tied(const Character& c) {
   return std::tuple(c.begin, c.end, c.value, c.channel, c.bad_parity, c.bad_stop, c.is_break);
 }
-auto tied(const Burst& b) { return std::tuple(b.begin, b.end, b.bits, b.in, b.out, b.cut, b.low_before, b.low_after); }
+auto tied(const Burst& b) {
+  return std::tuple(b.begin, b.end, b.bits, b.in, b.out, b.cut, b.low_before, b.low_after, b.fell_before);
+}
 
 template <class Item>
 bool equal(const std::vector<Item>& a, const std::vector<Item>& b) {

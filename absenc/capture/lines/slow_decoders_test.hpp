@@ -120,6 +120,7 @@ struct SlowClocked {
   Burst burst{};
   bool open = false;
   unsigned edges = 0;
+  bool fell = false;
 
   void end(Tick at, bool cut) {
     burst.end = at;
@@ -129,6 +130,7 @@ struct SlowClocked {
     if (format.settle != 0 && at + format.settle <= levels[1].size()) {
       burst.last = levels[1][at + format.settle - 1] != 0;
     }
+    if (open) fell = is_lone && (fell || burst.low_after);
     if (open && burst.bits > 0 && !is_lone) found.push_back(burst);
     open = false;
   }
@@ -136,6 +138,7 @@ struct SlowClocked {
     burst = {};
     burst.begin = at;
     burst.cut = cut;
+    burst.fell_before = fell;
     burst.low_before = !format.has_select && at > 0 && levels[0][at - 1] == 0;
     edges = 0;
     open = true;

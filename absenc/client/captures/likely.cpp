@@ -135,6 +135,7 @@ std::size_t CaptureRun::likely_pause(std::span<const capture::PauseReading> read
     Words words(unit_, options_);
     capture::BurstAnnotator annotator(unit_, options_, words);
     for (const capture::Burst& burst : readings[i].bursts) annotator.put(burst);
+    annotator.finish();
     is_proved = is_proved || words.is_proved;
     if (words.bad == 0 && words.good > 1) faultless.push_back(i);
     // That fewer are bad is no reason: a longer pause hides a silent word in the next.
