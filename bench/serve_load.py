@@ -90,7 +90,7 @@ class Streams:
         where = urllib.parse.urlparse(server.url)
         for i in range(STREAMS):
             stream = socket.create_connection((where.hostname, where.port))
-            stream.sendall(f"GET /api/stream?trace=e{i % encoders} HTTP/1.0\r\nHost: {where.netloc}\r\n\r\n".encode())
+            stream.sendall(f"GET /api/encoders/e{i % encoders}/stream HTTP/1.0\r\nHost: {where.netloc}\r\n\r\n".encode())
             self.selector.register(stream, selectors.EVENT_READ, i)
             if i < min(PARSED, encoders):
                 self.texts[i], self.times[i] = b"", []

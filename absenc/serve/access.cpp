@@ -44,16 +44,31 @@ std::string_view name_in(std::string_view host) {
   return host.substr(0, end);
 }
 
-// A page of another site can make a browser ask us under that site's own name, for which it has the answer read.
 bool names_loopback(std::string_view host) {
   const std::string_view name = name_in(host);
   return same_word(name, "localhost") || name == "127.0.0.1" || name == "[::1]";
 }
 
-bool from_own_page(const Request& request) {
-  if (!request.fetch_site.empty() && request.fetch_site != "same-origin" && request.fetch_site != "none") return false;
-  if (request.origin.empty()) return true;  // no browser
-  return request.origin == "http://" + request.host || request.origin == "https://" + request.host;
+bool is_loopback_address(std::string_view address) { return address.starts_with("127.") || address == "::1"; }
+
+// "encoders.example:8443" of "https://encoders.example:8443"
+std::string_view host_in(std::string_view origin) {
+  return origin.substr(std::min(origin.find("//") + 2, origin.size()));
+}
+
+// The origin of a URL, as browsers send it.
+std::string origin_of(std::string_view url) {
+  if (url.empty()) return {};
+  const std::size_t host = url.starts_with("https://") ? 8 : url.starts_with("http://") ? 7 : 0;
+  const std::size_t end = std::min(url.find('/', host), url.size());
+  if (host == 0 || host == end || url.find_first_of("@?# ") != std::string_view::npos) {
+    throw UsageError(fmt::format(
+        "--public-url is \"{}\", but must be where browsers find the page, as https://encoders.example", url));
+  }
+  std::string_view origin = url.substr(0, end);
+  const std::string_view usual = host == 8 ? ":443" : ":80";
+  if (origin.ends_with(usual)) origin.remove_suffix(usual.size());
+  return std::string(origin);
 }
 
 }  // namespace
@@ -62,13 +77,16 @@ Response error_response(unsigned status, std::string_view sentence) {
   return {status, "application/json", Json::object().set("error", sentence).line() + "\n"};
 }
 
-Access::Access(const std::string& token_file, bool on_loopback, Happenings& happenings)
-    : token_file_(token_file), on_loopback_(on_loopback), happenings_(&happenings) {
-  if (token_file.empty()) {
-    if (on_loopback) return;
+Access::Access(const Choices& choices, Happenings& happenings)
+    : token_file_(choices.token_file),
+      public_origin_(origin_of(choices.public_url)),
+      on_loopback_(choices.on_loopback),
+      happenings_(&happenings) {
+  if (token_file_.empty()) {
+    if (on_loopback_) return;
     throw UsageError("whoever can reach this address could read the encoders: give --token-file too");
   }
-  tokens_ = read_secrets("token", token_file, least_token);
+  tokens_ = read_secrets("token", token_file_, least_token);
 }
 
 void Access::reload() {
@@ -115,14 +133,50 @@ std::string Access::who(const Request& request) const {
   return name;
 }
 
+// A page of another site can make a browser ask us under that site's own name, for which it has the answer read.
+bool Access::names_us(std::string_view host) const {
+  return names_loopback(host) ||
+         (!public_origin_.empty() && same_word(name_in(host), name_in(host_in(public_origin_))));
+}
+
+bool Access::is_from_own_page(const Request& request) const {
+  if (!request.fetch_site.empty() && request.fetch_site != "same-origin" && request.fetch_site != "none") return false;
+  if (request.origin.empty()) return true;  // no browser
+  return same_word(request.origin, "http://" + request.host) || same_word(request.origin, "https://" + request.host) ||
+         (!public_origin_.empty() && same_word(request.origin, public_origin_));
+}
+
+// A proxy need not say that it is one: where there is one, whoever only looks needs a token on this computer, too.
+bool Access::needs_token(const Request& request, To what) const {
+  if (what == To::anybody || what == To::change || !on_loopback_) return what != To::anybody;
+  return has_tokens() && (request.is_forwarded || !public_origin_.empty());
+}
+
+// The last one of X-Forwarded-For is what the proxy itself saw. Only where there is one, and from this computer:
+// anybody can send such a header.
+std::string Access::client_of(const Request& request) const {
+  if (public_origin_.empty() || !is_loopback_address(request.peer)) return request.peer;
+  const std::string& list = request.forwarded_for;
+  const std::string last = list.substr(list.find_last_of(", ") + 1);
+  const bool is_address = last.size() <= 45 && last.find_first_not_of("0123456789abcdefABCDEF.:") == std::string::npos;
+  return last.empty() || !is_address ? request.peer : last;
+}
+
 std::optional<Response> Access::refusal(const Request& request, To what) const {
-  if (on_loopback_ && !names_loopback(request.host)) {
-    return error_response(403, "this server answers to localhost, 127.0.0.1 and [::1] only");
+  if (on_loopback_ && !names_us(request.host)) {
+    return error_response(
+        403, public_origin_.empty()
+                 ? "this server answers to localhost, 127.0.0.1 and [::1] only: the name of a proxy is given by "
+                   "--public-url"
+                 : fmt::format("this server answers to localhost, 127.0.0.1, [::1] and the name in {} only",
+                               public_origin_));
   }
-  if (what >= To::ask && !from_own_page(request)) {
-    return error_response(403, "no other site may change anything here, or have an encoder asked");
+  if (what >= To::ask && !is_from_own_page(request)) {
+    return error_response(403,
+                          "no other site may change anything here, or have an encoder asked: where a proxy shows the "
+                          "page to others, --public-url names it");
   }
-  if (what == To::anybody || (what != To::change && on_loopback_)) return {};
+  if (!needs_token(request, what)) return {};
   if (token_file_.empty()) {
     return error_response(403, "nothing can be changed here: the server was started without --token-file");
   }

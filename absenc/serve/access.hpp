@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Who may what. On loopback everybody of this computer may look; elsewhere, and to change an encoder, it takes a token.
+// Who may what. On loopback everybody of this computer may look; elsewhere, behind a proxy, and to change an encoder,
+// it takes a token.
 #pragma once
 
 #include <cstdint>
@@ -26,10 +27,14 @@ class Access {
     change,
   };
 
-  /// `token_file`: lines of a name and a token; "": there is none, which is for loopback only. Throws Failure: when it
-  /// cannot be read, others may read it, or a token is shorter than 16 characters; UsageError. `happenings` outlives
-  /// it.
-  Access(const std::string& token_file, bool on_loopback, Happenings& happenings);
+  struct Choices {
+    std::string token_file{};  // lines of a name and a token; "": there is none, which is for loopback only
+    std::string public_url{};  // where a proxy on this computer shows the page to others; "": there is none
+    bool on_loopback = false;  // nobody on another computer can reach the server itself
+  };
+  /// Throws Failure when the file cannot be read, others may read it, or a token is shorter than 16 characters;
+  /// UsageError. `happenings` outlives it.
+  Access(const Choices& choices, Happenings& happenings);
 
   /// Reads the file again: tokens that are no longer in it end at once. Throws Failure as the constructor; then those
   /// of before count.
@@ -37,6 +42,8 @@ class Access {
 
   /// Why this is refused; nothing: it is not.
   [[nodiscard]] std::optional<Response> refusal(const Request& request, To what) const;
+  /// The address of whoever asks: by the word of a proxy on this computer where there is one.
+  [[nodiscard]] std::string client_of(const Request& request) const;
   /// The name of the token that came with it, or "".
   [[nodiscard]] std::string who(const Request& request) const;
   /// What answers a request whose token is missing or wrong; a wrong one is counted.
@@ -51,8 +58,12 @@ class Access {
     unsigned count = 0;
   };
   [[nodiscard]] bool may_guess_on(const std::string& peer) const;
+  [[nodiscard]] bool names_us(std::string_view host) const;
+  [[nodiscard]] bool is_from_own_page(const Request& request) const;
+  [[nodiscard]] bool needs_token(const Request& request, To what) const;
 
   std::string token_file_;
+  std::string public_origin_;  // "https://encoders.example:8443"; "": there is no proxy
   bool on_loopback_;
   Happenings* happenings_;
   mutable std::mutex mutex_;  // guards what follows

@@ -137,7 +137,8 @@ Api::Api(Fleet& fleet, const Access& access, Streams& streams, Worker& worker, c
       chronicler_(chronicler),
       sending_(&sending) {}
 
-void Api::answer(const Request& request, const Reply& reply) {
+void Api::answer(Request request, const Reply& reply) {
+  request.peer = access_->client_of(request);
   try {
     if (request.method == "GET" || request.method == "HEAD") return get(request, reply);
     if (request.method == "POST") return post(request, reply);

@@ -26,7 +26,7 @@ class Api {
   Api(Fleet& fleet, const Access& access, Streams& streams, Worker& worker, const Happenings& happenings,
       Chronicler* chronicler, const Sending& sending);
 
-  void answer(const Request& request, const Reply& reply);
+  void answer(Request request, const Reply& reply);
 
  private:
   void get(const Request& request, const Reply& reply);

@@ -5,8 +5,6 @@
 #include <microhttpd.h>
 
 #include <algorithm>
-#include <cctype>
-#include <cstdlib>
 #include <cstring>
 #include <optional>
 #include <string_view>
@@ -16,6 +14,7 @@
 #include "absenc/client/error.hpp"
 #include "absenc/os/signals.hpp"
 #include "absenc/serve/connections.hpp"
+#include "absenc/serve/http_request.hpp"
 
 namespace absenc::serve {
 
@@ -28,72 +27,6 @@ constexpr std::uint64_t most_body = 4096;           // nothing here takes one
 constexpr std::uint64_t most_read = 1 << 20;        // of a body of unknown length, until it is answered at its end
 constexpr unsigned idle_seconds = 15;
 constexpr std::size_t block = 16 * 1024;
-
-std::string header_of(MHD_Connection* connection, const char* name) {
-  const char* value = ::MHD_lookup_connection_value(connection, MHD_HEADER_KIND, name);
-  return value == nullptr ? std::string() : value;
-}
-
-std::size_t headers_named(MHD_Connection* connection, std::string_view name) {
-  std::pair<std::string_view, std::size_t> wanted{name, 0};
-  const auto count = [](void* found, MHD_ValueKind, const char* header, const char*) {
-    auto& [own_name, number] = *static_cast<std::pair<std::string_view, std::size_t>*>(found);
-    const std::string_view other = header;
-    const bool same = std::equal(own_name.begin(), own_name.end(), other.begin(), other.end(), [](char a, char b) {
-      return std::tolower(static_cast<unsigned char>(a)) == std::tolower(static_cast<unsigned char>(b));
-    });
-    if (same) ++number;
-    return MHD_YES;
-  };
-  ::MHD_get_connection_values(connection, MHD_HEADER_KIND, count, &wanted);
-  return wanted.second;
-}
-
-// RFC 9112 3.2 and 6.3: a proxy before us may read such a request otherwise, and take a part of it for another one.
-// Returns what is wrong, or "".
-std::string_view ambiguity(MHD_Connection* connection) {
-  const std::size_t lengths = headers_named(connection, "Content-Length");
-  if (lengths > 1) return "two Content-Length";
-  if (lengths != 0 && headers_named(connection, "Transfer-Encoding") != 0) {
-    return "Content-Length and Transfer-Encoding";
-  }
-  if (headers_named(connection, "Host") > 1) return "two Host";
-  if (header_of(connection, "Host").find('@') != std::string::npos) return "a user in Host";
-  return {};
-}
-
-MHD_Result add_argument(void* query, MHD_ValueKind, const char* name, const char* value) {
-  static_cast<std::multimap<std::string, std::string>*>(query)->emplace(name, value == nullptr ? "" : value);
-  return MHD_YES;
-}
-
-std::string peer_of(MHD_Connection* connection) {
-  const MHD_ConnectionInfo* info = ::MHD_get_connection_info(connection, MHD_CONNECTION_INFO_CLIENT_ADDRESS);
-  return info != nullptr && info->client_addr != nullptr ? os::host_text(*info->client_addr) : std::string();
-}
-
-int socket_of(MHD_Connection* connection) {
-  const MHD_ConnectionInfo* info = ::MHD_get_connection_info(connection, MHD_CONNECTION_INFO_CONNECTION_FD);
-  return info != nullptr ? info->connect_fd : -1;
-}
-
-Request request_of(MHD_Connection* connection, const char* path, const char* method) {
-  Request request{.method = method,
-                  .path = path,
-                  .query = {},
-                  .peer = {},
-                  .host = {},
-                  .origin = {},
-                  .fetch_site = {},
-                  .authorization = {}};
-  ::MHD_get_connection_values(connection, MHD_GET_ARGUMENT_KIND, add_argument, &request.query);
-  request.host = header_of(connection, "Host");
-  request.origin = header_of(connection, "Origin");
-  request.fetch_site = header_of(connection, "Sec-Fetch-Site");
-  request.authorization = header_of(connection, "Authorization");
-  request.peer = peer_of(connection);
-  return request;
-}
 
 // For every answer: nothing is kept, framed, guessed or taken from elsewhere.
 void add_headers(MHD_Response* response, const std::string& type) {
@@ -108,11 +41,6 @@ void add_headers(MHD_Response* response, const std::string& type) {
 }
 
 }  // namespace
-
-std::string Request::value(const std::string& name) const {
-  const auto found = query.find(name);
-  return found == query.end() ? std::string() : found->second;
-}
 
 // ---- Streams
 
@@ -357,7 +285,7 @@ struct HttpServer::Daemon {
                                   "the request is ambiguous: " + std::string(wrong) + "\n",
                                   {{"Connection", "close"}}});
       }
-      const bool announced = std::strtoull(header_of(connection, "Content-Length").c_str(), nullptr, 10) > most_body;
+      const bool announced = announced_length(connection) > most_body;
       return announced ? queue(connection, too_large()) : MHD_YES;
     }
     const auto& exchange = *static_cast<std::shared_ptr<Exchange>*>(*context);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // HTTP, apart from what is served: one thread for all connections, answers from any thread, limits for everything that
-// a client can do. The library behind it is seen by http.cpp alone.
+// a client can do. The library behind it is seen by http.cpp and http_request.cpp alone.
 #pragma once
 
 #include <cstdint>
@@ -28,6 +28,8 @@ struct Request {
   std::string origin;
   std::string fetch_site;
   std::string authorization;
+  bool is_forwarded = false;  // a header says that a proxy passed it on
+  std::string forwarded_for;  // X-Forwarded-For, where there is one
 
   /// The first of this name, or "".
   [[nodiscard]] std::string value(const std::string& name) const;

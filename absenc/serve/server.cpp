@@ -39,7 +39,7 @@ struct Server::Parts {
   explicit Parts(const Choices& choices)
       : listener(os::listen_at(choices.host, choices.port)),
         url(url_of(choices.host, listener.port)),
-        access(choices.token_file, listener.on_loopback, happenings),
+        access({choices.token_file, choices.public_url, listener.on_loopback}, happenings),
         fleet(choices.encoders, choices.rate, happenings),
         sending(fleet, happenings) {
     sending.change_to(read_outlets(choices.outlets));

@@ -18,6 +18,7 @@ struct Choices {
   double rate = 50;                     // readings a second, where absenc.toml has no rate_hz; 0: as fast as can be
   std::string host = "127.0.0.1";
   std::uint16_t port = 8420;  // 0: any that is free
+  std::string public_url{};   // of a proxy; "": none
   std::string token_file{};   // "": none
   std::string history{};      // the file; "": none is kept
   HistoryLimits limits{};

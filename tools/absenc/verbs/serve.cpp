@@ -77,6 +77,7 @@ int run_serve(const Invocation& invocation) {
   choices.rate = readings_a_second(invocation, 50);
   set_place(choices, invocation.text("--listen", usual_host));
   choices.token_file = invocation.text("--token-file");
+  choices.public_url = invocation.text("--public-url");
   choices.history = invocation.has("--history")
                         ? std::string(invocation.text("--history"))
                         : serve::state_file("history.sqlite", "--history FILE, or --history none");
@@ -106,12 +107,15 @@ int run_serve(const Invocation& invocation) {
   return exit_good;
 }
 
-constexpr std::array<Parameter, 15> serve_parameters{{
+constexpr std::array<Parameter, 16> serve_parameters{{
     {"encoders", "", "as for `absenc read`", "all of absenc.toml", false, true},
     {"--listen", "HOST:PORT", "where the page is; beyond this computer only with --token-file", "127.0.0.1:8420"},
     {"--rate", "HZ", "readings a second of each for which absenc.toml has no rate_hz; 0: as many as the line allows",
      "50"},
     {"--token-file", "FILE", "lines of NAME TOKEN: who may change encoders, and look from other computers"},
+    {"--public-url", "URL",
+     "where a proxy on this computer shows the page to others, as https://encoders.example: looking then needs a "
+     "token"},
     {"--history", "FILE", "where the past is kept, in SQLite's format; none: nowhere",
      "history.sqlite in $STATE_DIRECTORY or ~/.local/state/absenc"},
     {"--history-days", "DAYS", "what is older is deleted", "30"},
