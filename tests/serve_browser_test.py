@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The page of `absenc serve` in Debian's chromium: what somebody sees, does by keyboard and is told."""
 import os
+import signal
 import subprocess
 import time
 import unittest
@@ -192,6 +193,23 @@ class Page(ServeCase):
         served = self.without_history("sim:tformat")
         self.browser.get(served.url + "#encoder=%")
         self.wait_for('There is no encoder "%" here', "#connection")
+
+    def test_the_page_of_an_encoder_that_is_removed_says_so(self):
+        both = '[encoder.elbow]\nprotocol = "tformat"\nport = "sim"\n[encoder.wrist]\nprotocol = "esl"\nport = "sim"\n'
+        served = self.without_history(ABSENC_CONFIG=self.file("absenc.toml", both))
+        self.window.go(served.url, encoder="elbow")
+        self.wait_for("good", ".state")
+        self.file("absenc.toml", both[both.index("[encoder.wrist]"):])
+        served.process.send_signal(signal.SIGHUP)
+        self.wait_for("elbow is not served any more: absenc.toml was read again", "#connection")
+        self.wait_for("not served", ".state")
+        self.assertEqual(self.text(".digits"), "—")
+        self.assertNotIn("onnection to the server", self.text())
+        self.file("absenc.toml", both)
+        served.process.send_signal(signal.SIGHUP)
+        self.wait_for("good", ".state")
+        wait_until(lambda: self.text("#connection") == "", "the page is as before")
+        self.assert_no_errors()
 
     def test_the_server_is_lost(self):
         self.open()

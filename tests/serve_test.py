@@ -563,6 +563,15 @@ class WhoMayWhat(ServeCase):
         self.assertEqual(server.ask("/")[0], 200)
         self.assertEqual(server.ask("/api/encoders", headers={"Authorization": f"Bearer {TOKEN}"})[0], 200)
 
+    def test_names_of_this_computer_in_any_case(self):
+        server = self.without_history(self.name, "--token-file", self.tokens())
+        self.counts(server)
+        headers = {"Authorization": f"BEARER {TOKEN}", "Host": f"LocalHost:{server.port}"}
+        command = {"argument": ["5", "66"]}
+        for origin, expected in ((f"http://LOCALHOST:{server.port}", 200), (f"http://LOCALHOSTS:{server.port}", 403)):
+            status, body = server.command(self.name, "memory-write", {**headers, "Origin": origin}, **command)
+            self.assertEqual(status, expected, body)
+
     def test_other_names_of_this_computer(self):
         server = self.without_history(self.name)
         self.assertEqual(server.ask("/api/encoders", headers={"Host": "evil.example"})[0], 403)

@@ -37,13 +37,17 @@ function explain(why, refused) {
 
 function take(event, data) {
   if (event === "state") {
-    if (!connection.hidden) greet();
+    if (!connection.hidden && view.isServed !== false) greet();
     connection.hidden = true;
     setText(time, clock(data.at_ms).split(", ").at(-1));
     const trouble = data.history?.trouble ?? "";
     historyTrouble.hidden = trouble === "";
     setText(historyTrouble, trouble === "" ? "" : `The history is not being written: ${trouble}. Rows lost so far: ${data.history.lost}.`);
     view.show(data);
+    if (view.isServed === false) {  // since absenc.toml was read again
+      connection.hidden = false;
+      setText(connection, `${shown} is not served any more: absenc.toml was read again, without it. Nothing on this page is live.`);
+    }
   }
   if (event === "happening") {
     setText(announcements, `${data.encoder} ${data.kind}: ${data.text}`);

@@ -195,7 +195,8 @@ export class One {
 
   show(state) {
     const one = state.encoders.find((other) => other.encoder === this.name);
-    if (one === undefined) return this.lose("this encoder is not served any more");
+    this.isServed = one !== undefined;
+    if (!this.isServed) return this.lose("this encoder is not served any more", "not served");
     const first = this.one === undefined || !this.known;
     const changed = this.one?.state !== one.state;
     this.one = one;
@@ -262,7 +263,7 @@ export class One {
       ...(alarm ? [element("button", {type: "button", class: "acknowledge", "data-acknowledge": alarm, onclick: () => this.acknowledge(alarm)}, "Acknowledge…")] : []))));
   }
 
-  lose(why = "no connection to the server") {
+  lose(why = "no connection to the server", word = "not known") {
     this.loss += 1;
     this.known = false;
     if (this.one !== undefined) {
@@ -278,7 +279,7 @@ export class One {
     } else {
       setText(this.noTrace, sentence(why));
     }
-    showState(this.state, {kind: "bad", word: "not known"});
+    showState(this.state, {kind: "bad", word});
     for (const node of [this.fields, this.latencies, this.errors, this.bad, this.line, this.commands]) node.replaceChildren();
     this.offered = undefined;
     this.examine.lose(why);
