@@ -28,6 +28,7 @@ class Connection:
 
     def __init__(self, connection):
         self.socket = connection
+        self.old = False  # it speaks MQTT 3.1.1
         self.socket.settimeout(PATIENCE)
 
     def read(self, count):
@@ -66,14 +67,14 @@ class Connection:
         self.socket.close()
 
 
-def published(flags, body):
-    """(topic, number of the packet or None, payload) of a PUBLISH of MQTT 5 or 3.1.1 without properties"""
+def published(flags, body, old=False):
+    """(topic, number of the packet or None, payload) of a PUBLISH without properties; `old`: of MQTT 3.1.1."""
     size = int.from_bytes(body[:2], "big")
     topic, rest = body[2:2 + size].decode(), body[2 + size:]
     number = None
     if flags & 6:
         number, rest = int.from_bytes(rest[:2], "big"), rest[2:]
-    return topic, number, rest[1:]
+    return topic, number, rest if old else rest[1:]
 
 
 class FakeBroker:
@@ -107,9 +108,11 @@ class FakeBroker:
         try:
             while True:
                 kind, flags, body = connection.packet()
+                if kind == CONNECT:
+                    connection.old = body[6] < 5
                 if kind == PUBLISH:
-                    self.keep(flags, body)
-                usual = self.usual(kind, flags, body)
+                    self.keep(*published(flags, body, connection.old))
+                usual = self.usual(kind, flags, body, connection.old)
                 if self.answer is not None:
                     usual = self.answer(self, connection, kind, flags, body, usual)
                 if usual:
@@ -123,15 +126,14 @@ class FakeBroker:
             with self.lock:
                 self.open.discard(connection)
 
-    def keep(self, flags, body):
-        topic, _, payload = published(flags, body)
+    def keep(self, topic, _number, payload):
         with self.lock:
             self.messages.append((topic, json.loads(payload) if payload else None))
 
     @staticmethod
-    def usual(kind, flags, body):
+    def usual(kind, flags, body, old):
         if kind == CONNECT:
-            return packet(CONNACK, bytes((0, 0, 0)))
+            return packet(CONNACK, bytes(2 if old else 3))
         if kind == PUBLISH and flags & 6:
             return packet(PUBACK, published(flags, body)[1].to_bytes(2, "big"))
         return packet(PINGRESP, b"") if kind == PINGREQ else b""

@@ -70,6 +70,7 @@ void MqttSender::work(const std::stop_token& stop) {
       become_lost(failure.what());
     }
     if (version_ != tried) continue;
+    version_ = MqttVersion::v5;  // a broker that was updated, or whose answer was a mistake
     const bool held = connected_at_ != Time{} && os::now() - connected_at_ >= time_to_hold;
     if (has_taken_ && held) pause = first_pause;
     std::unique_lock lock(mutex_);

@@ -103,7 +103,7 @@ class Packets(ServeCase):
         return talk.random.choice((bad, usual + bad))
 
     def test_no_server_ends_and_no_reading_is_missing(self):
-        servers = [self.without_history(ONE, "--rate", "20", "--mqtt", self.broker.url, "--mqtt-prefix", f"plant/{index}",
+        servers = [self.without_history(ONE, "--rate", "10", "--mqtt", self.broker.url, "--mqtt-prefix", f"plant/{index}",
                                         "--mqtt-spool", os.path.join(self.directory, f"spool{index}"))
                    for index in range(SERVERS)]
         deadline = time.monotonic() + CONVERSATIONS * 6 / SERVERS + PATIENCE
