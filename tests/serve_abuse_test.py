@@ -85,6 +85,12 @@ class Abuse(ServeCase):
         for request in (hello + b"Content-Length: 5\r\nContent-Length: 6\r\n\r\nhello!",
                         hello + b"Content-Length: 5\r\n" + chunk + b"\r\n5\r\nhello\r\n0\r\n\r\n",
                         hello + chunk + b"content-length: 5\r\n\r\n5\r\nhello\r\n0\r\n\r\n",
+                        hello + b"Content-Length : 5\r\n\r\nhello",
+                        hello + b"Transfer-Encoding : chunked\r\n\r\n0\r\n\r\n",
+                        hello + chunk + chunk + b"\r\n0\r\n\r\n",
+                        hello + b"Transfer-Encoding: gzip, chunked\r\n\r\n0\r\n\r\n",
+                        hello.replace(b"1.1", b"1.0") + chunk + b"\r\n0\r\n\r\n",
+                        b"GET /healthz HTTP/1.1\r\n\r\n",
                         b"GET /healthz HTTP/1.1\r\nHost: localhost\r\nhost: localhost\r\n\r\n",
                         b"GET /healthz HTTP/1.1\r\nHost: user@localhost\r\n\r\n"):
             with self.subTest(request):

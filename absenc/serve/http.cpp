@@ -274,12 +274,12 @@ struct HttpServer::Daemon {
     }
   }
 
-  static MHD_Result access(void* self, MHD_Connection* connection, const char* path, const char* method, const char*,
-                           const char*, std::size_t* size, void** context) {
+  static MHD_Result access(void* self, MHD_Connection* connection, const char* path, const char* method,
+                           const char* version, const char*, std::size_t* size, void** context) {
     auto& daemon = *static_cast<Daemon*>(self);
     if (*context == nullptr) {
       *context = new std::shared_ptr<Exchange>(std::make_shared<Exchange>());
-      if (const std::string_view wrong = ambiguity(connection); !wrong.empty()) {
+      if (const std::string_view wrong = ambiguity(connection, version); !wrong.empty()) {
         return queue(connection, {MHD_HTTP_BAD_REQUEST,
                                   "text/plain",
                                   "the request is ambiguous: " + std::string(wrong) + "\n",

@@ -45,12 +45,23 @@ std::string Request::value(const std::string& name) const {
   return found == query.end() ? std::string() : found->second;
 }
 
-std::string_view ambiguity(MHD_Connection* connection) {
+std::string_view ambiguity(MHD_Connection* connection, std::string_view version) {
+  bool has_wrong_name = false;
+  const auto look = [](void* found, MHD_ValueKind, const char* header, const char*) {
+    const std::string_view name = header;
+    if (name.empty() || name.find_first_of(" \t") != std::string_view::npos) *static_cast<bool*>(found) = true;
+    return MHD_YES;
+  };
+  ::MHD_get_connection_values(connection, MHD_HEADER_KIND, look, &has_wrong_name);
+  if (has_wrong_name) return "a space in the name of a header";
   const std::size_t lengths = headers_named(connection, "Content-Length");
+  const std::size_t encodings = headers_named(connection, "Transfer-Encoding");
   if (lengths > 1) return "two Content-Length";
-  if (lengths != 0 && headers_named(connection, "Transfer-Encoding") != 0) {
-    return "Content-Length and Transfer-Encoding";
-  }
+  if (lengths != 0 && encodings != 0) return "Content-Length and Transfer-Encoding";
+  if (encodings > 1) return "two Transfer-Encoding";
+  if (encodings != 0 && header_of(connection, "Transfer-Encoding") != "chunked") return "an unknown Transfer-Encoding";
+  if (encodings != 0 && version != "HTTP/1.1") return "Transfer-Encoding in HTTP/1.0";
+  if (version == "HTTP/1.1" && headers_named(connection, "Host") == 0) return "no Host";
   if (headers_named(connection, "Host") > 1) return "two Host";
   if (header_of(connection, "Host").find('@') != std::string::npos) return "a user in Host";
   return {};
