@@ -167,6 +167,11 @@ class Session {
     pair_ = never;
     first_.start_again();
   }
+  /// The last command ended well, and what it read is wrong all the same, as only its caller can know.
+  void refuse_last(Error error) {
+    --counters_.good;
+    ++counters_.errors[static_cast<std::size_t>(error)];
+  }
   /// Whether the last reading was compared with another, and agreed.
   [[nodiscard]] bool confirmed() const { return confirmed_; }
   [[nodiscard]] const Counters& counters() const { return counters_; }

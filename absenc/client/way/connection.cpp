@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <map>
 
 #include "absenc/client/doctor/observations.hpp"
 #include "absenc/client/error.hpp"
@@ -52,6 +53,26 @@ std::string advice_to_look(const EncoderAddress& before, const Command& command,
   return fmt::format("`absenc read {}` shows how the encoder is now; look before you send it again", address);
 }
 
+/// The life counters of one reading against those of the good one before it.
+class LifeCounters final : public FieldSink {
+ public:
+  void clear() { before_.clear(); }
+  /// A reading is over; `put` takes its fields, if it was good.
+  void begin() { stand_ = false; }
+  void put(const FieldValue& field) override {
+    if (field.info->role != Role::life_counter) return;
+    const auto [known, is_first] = before_.try_emplace(field.info, field.number);
+    stand_ = stand_ || (!is_first && known->second == field.number);
+    known->second = field.number;
+  }
+  /// Whether one of them is what it was. Any number further on is right: there may have been errors and other hosts.
+  [[nodiscard]] bool stand() const { return stand_; }
+
+ private:
+  std::map<const FieldInfo*, std::int64_t> before_;
+  bool stand_ = false;
+};
+
 template <class Item>
 class ConnectionOn final : public Connection {
  public:
@@ -73,6 +94,7 @@ class ConnectionOn final : public Connection {
     }
     session_.share(link_->guard<Item>());
     session_.doubt();
+    life_counters_.clear();
   }
 
   void disconnect() override { link_.reset(); }
@@ -82,9 +104,15 @@ class ConnectionOn final : public Connection {
   Outcome read(host::Take take) override {
     const Command* command = uri().reads != nullptr ? uri().reads : find_command(unit(), Verb::read);
     if (command == nullptr) throw UsageError(fmt::format("{} has no command that reads the position", unit().id));
-    return outcome(*command, link_->take_turn([&] {
-      return runner_.converse([&](host::Session<Item>& session) { return session.read(*command, take); });
-    }));
+    Outcome ended = read_once(*command, take);
+    // Another host may have taken 64 frames since the last reading, but not since this one.
+    if (life_counters_.stand()) ended = read_once(*command, take);
+    if (!life_counters_.stand()) return ended;
+    session_.refuse_last(Error::sequence_mismatch);
+    return {.error = Error::sequence_mismatch,
+            .detail = "the life counter stands still from one reading to the next: the encoder repeats an old frame",
+            .advice = "do not use the position; switch the encoder off and on, and ask its maker if it comes again",
+            .aborted = ended.aborted};
   }
 
   Outcome run(const Command& command, Arguments arguments, const std::function<void()>& on_emit) override {
@@ -177,6 +205,15 @@ class ConnectionOn final : public Connection {
     trouble.advice = diagnosis.advice.empty() ? std::string(advice) : diagnosis.advice;
     tell_lateness(trouble);
     return trouble;
+  }
+
+  Outcome read_once(const Command& command, host::Take take) {
+    const Outcome ended = outcome(command, link_->take_turn([&] {
+      return runner_.converse([&](host::Session<Item>& session) { return session.read(command, take); });
+    }));
+    life_counters_.begin();
+    if (ended.error == Error::none && !ended.aborted) last_->report(life_counters_);
+    return ended;
   }
 
   Outcome carry_out(const Command& command, Arguments arguments, const std::function<void()>& on_emit) {
@@ -316,6 +353,7 @@ class ConnectionOn final : public Connection {
   const LineExchange<Item>& line_ = runner_.last();
   host::Statistics<Item> statistics_;
   const Conversation<Item>* last_ = nullptr;
+  LifeCounters life_counters_;
   Change change_{};
   std::uint64_t requests_before_ = 0;  // the last command that changes the encoder
 };
