@@ -13,7 +13,6 @@ using namespace std::chrono_literals;
 
 constexpr Time first_refusal_pause = 2s;
 constexpr Time longest_refusal_pause = 60s;
-constexpr Time longest_pause_of_an_end = 300s;  // each costs the others their connection
 constexpr const char* connection_ends = "the broker ends the connection at it";
 
 }  // namespace

@@ -166,7 +166,7 @@ void MqttSender::step(MqttClient& client) {
   settle(client);  // also what came before it was lost
   if (!lost) return;
   note_death(client);
-  note_lost_connection();
+  if (!client.died()) note_lost_connection();  // else a packet ended it, and no topic
   throw Failure(client.trouble());
 }
 

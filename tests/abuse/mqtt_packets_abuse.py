@@ -87,6 +87,7 @@ class Packets(ServeCase):
             return usual
         if not hasattr(connection, "conversation"):
             connection.conversation = Conversation(SEED + connection.index)
+            connection.socket.settimeout(1)  # a client that has nothing to say ends it
         talk = connection.conversation
         if talk.ends is not None:
             if time.monotonic() > talk.ends:
