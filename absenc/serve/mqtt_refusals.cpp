@@ -38,9 +38,7 @@ bool MqttRefusals::refuse(const std::string& topic, const std::string& why, Time
   refused.why = why;
   if (!is_new && !refused.is_tried) return is_another;  // one that was sent before the first was refused
   refused.ends_connection = why == connection_ends;
-  refused.pause =
-      is_new ? first_refusal_pause
-             : std::min(2 * refused.pause, refused.ends_connection ? longest_pause_of_an_end : longest_refusal_pause);
+  refused.pause = is_new ? first_refusal_pause : std::min(2 * refused.pause, longest_refusal_pause);
   refused.retry = now + refused.pause;
   refused.is_tried = refused.is_due = false;
   return is_another;
