@@ -207,7 +207,9 @@ class Named(EncoderCase):
         self.assert_good(result)
         self.assertEqual((found["ok"], found["findings"]), (True, []))
         _, found = doctor("sim:tformat?battery=false&alarm=over_heat")
-        self.assertEqual([finding["evidence"] for finding in found["findings"]], ["the encoder reports over_heat in all 300 readings"])
+        evidence = [finding["evidence"] for finding in found["findings"]]
+        self.assertEqual(len(evidence), 1, found)
+        self.assertRegex(evidence[0], r"^the encoder reports over_heat in all \d+ readings$")
         self.assertIn("battery=false", doctor("sim:tformat?condition=battery=0")[1]["findings"][0]["action"])
 
     def test_replies_that_come_late(self):

@@ -56,6 +56,7 @@ enum class Ailment : std::uint8_t {
   damaged_bursts,
   sometimes_damaged,
   sometimes_silent,
+  comes_and_goes,
   requests_damaged,
   refused,
   counter_stands,
@@ -71,6 +72,8 @@ enum class Ailment : std::uint8_t {
   // The position
   position_noise,
   position_jumps,
+  position_frozen,
+  turns_stand,
   stuck_bits,
 };
 
@@ -100,11 +103,21 @@ struct Reported {
   std::string missing{};   // the alarms that no reading reports, as "over_speed, over_heat"
 };
 
+/// How the readings were come by.
+struct Measured {
+  Time time{};          // from the first to the last of them
+  double failures = 1;  // the share of failures is below it, at 95 % confidence (Wilson)
+  Time quickest{};      // from the end of a request to the end of its reply; 0: not known
+  Time slowest{};       // of good ones
+  bool turned = false;  // the position was looked at while the shaft was turned
+};
+
 struct Examination {
   std::vector<Finding> findings{};  // in the order in which they are to be mended
   std::size_t tried = 0;            // readings
   std::size_t good = 0;             // of them
   Reported reported{};
+  Measured measured{};
   bool complete = true;  // false: it was interrupted
 
   /// Whether nothing is to be mended.
@@ -116,8 +129,8 @@ struct Examination {
 };
 
 struct DoctorChoices {
-  std::size_t readings = 300;
-  Time limit = std::chrono::seconds(3);  // of all these readings
+  std::size_t readings = 100'000;        // at most
+  Time limit = std::chrono::seconds(3);  // how long it reads
   Time turning{};                        // how long the shaft is then read while somebody turns it by hand; 0: not
   std::function<void(const std::string& what)> progress{};  // what is done now
   std::function<bool()> over{};  // true: it ends with Cancelled. Asked all the time. Empty: never

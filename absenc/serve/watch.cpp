@@ -417,6 +417,7 @@ Done Watch::examine(Encoder& live, const std::stop_token& stop) {
     if (!live.connection().connected()) live.connect();
     surroundings.open = [&](const EncoderAddress&) { return live.connection().lend(); };
   } else {
+    surroundings.on_the_clock = true;
     live.connection().disconnect();
   }
   DoctorChoices choices;

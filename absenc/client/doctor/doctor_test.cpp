@@ -8,6 +8,7 @@
 
 #include "absenc/client/doctor/examine.hpp"
 #include "absenc/client/doctor/lines_test.hpp"
+#include "absenc/client/doctor/observed_test.hpp"
 #include "absenc/client/doctor/words.hpp"
 #include "absenc/client/error.hpp"
 #include "absenc/core/crc.hpp"
@@ -24,17 +25,7 @@ using testing::IsEmpty;
 
 namespace {
 
-using ByteList = std::vector<std::uint8_t>;
-
-std::vector<std::string> ids(const Examination& examination) {
-  std::vector<std::string> all;
-  for (const Finding& one : examination.findings) all.emplace_back(one.id);
-  return all;
-}
-
 // ---- Examinations
-
-constexpr const char* serial = "tformat:/dev/ttyABSENC";
 
 /// Of a serial encoder; nothing is known of its port.
 Examination examine_with(std::string_view text, const std::function<Link(const EncoderAddress&)>& open,
@@ -64,31 +55,6 @@ Examination examine_sim(std::string_view text) {
 
 Link refused(os::Failure::Kind kind, os::Failure::Bus bus = os::Failure::Bus::unknown) {
   throw os::Failure(kind, "the port is not to be had", bus);
-}
-
-/// To 1A: 17 bits and 16 of turns, both 0, no alarm.
-const ByteList& good_reply() {
-  static const ByteList reply{0x1A, 0, 0, 0, 0, 0x11, 0, 0, 0, 0, 0x0B};
-  return reply;
-}
-
-/// Readings of positions, a millisecond apart.
-Observations positions(const std::function<std::uint64_t(std::size_t)>& place, unsigned bits = 17) {
-  Observations seen;
-  for (std::size_t i = 0; i < 200; ++i) {
-    Attempted one{.heard = true};
-    one.reading = Reading{.singleturn = place(i) & low_mask(bits),
-                          .singleturn_bits = bits,
-                          .singleturn_valid_bits = bits,
-                          .latched = static_cast<std::int64_t>(i) * 1ms};
-    seen.readings.push_back(one);
-  }
-  return seen;
-}
-
-Examination judged(const Observations& seen) {
-  static const EncoderAddress address = parse_address("sim:tformat");
-  return judge(*address.unit, address.options, seen);
 }
 
 // ---- Each fault, and how it comes about
@@ -279,6 +245,14 @@ std::vector<Fault> other_faults() {
   faults.push_back(
       {"stuck_bits",
        [] { return judged(positions([](std::size_t i) { return (i * i * 3 + i * 7) & ~std::uint64_t{0x10}; })); }});
+  faults.push_back({"position_frozen", [] {
+                      return judged(turned_by_hand([](std::size_t) { return 77; }, [](std::size_t) { return 3; }));
+                    }});
+  faults.push_back({"turns_stand", [] {
+                      return judged(
+                          turned_by_hand([](std::size_t i) { return i * hand_counts; }, [](std::size_t) { return 3; }));
+                    }});
+  faults.push_back({"comes_and_goes", [] { return examine_contact(4s, [](Time at) { return at % 1s < 300ms; }); }});
   return faults;
 }
 

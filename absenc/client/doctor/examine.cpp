@@ -5,12 +5,15 @@
 
 #include <algorithm>
 #include <array>
+#include <chrono>
+#include <optional>
 #include <set>
 
 #include "absenc/client/doctor/examiner.hpp"
 #include "absenc/client/error.hpp"
 #include "absenc/client/text/unit_text.hpp"
 #include "absenc/os/signals.hpp"
+#include "absenc/os/wakeup_watch.hpp"
 
 namespace absenc::client {
 
@@ -195,7 +198,10 @@ class Doctor {
       }
       tell("reading");
       try {
+        std::optional<os::WakeupWatch> watch;
+        if (surroundings_.on_the_clock && address_.place != Place::sim) watch.emplace();
         examiner.read(*read_, choices_.readings, choices_.limit, seen_.readings);
+        if (watch) seen_.woken_late = watch->latest();
         if (any_good() && choices_.turning > Time{}) {
           tell("turn the shaft by hand now");
           examiner.read(*read_, most_turned, choices_.turning, seen_.turned);
@@ -283,6 +289,7 @@ Examination examine(std::string_view text, std::span<const std::string> settings
 }
 
 Json to_json(const Examination& examination) {
+  const auto in_seconds = [](Time time) { return std::chrono::duration<double>(time).count(); };
   const Json findings = Json::list(examination.findings, [](const Finding& one) {
     return Json::object()
         .set("id", one.id)
@@ -293,6 +300,12 @@ Json to_json(const Examination& examination) {
   });
   Json json = Json::object().set("ok", examination.healthy()).set("findings", findings);
   json.set("readings", examination.tried).set("good", examination.good).set("complete", examination.complete);
+  const Measured& measured = examination.measured;
+  json.set("seconds", in_seconds(measured.time)).set("failures_below", measured.failures);
+  if (measured.slowest > Time{}) {
+    json.set("quickest_reply_ms", in_seconds(measured.quickest) * 1e3);
+    json.set("slowest_reply_ms", in_seconds(measured.slowest) * 1e3);
+  }
   return json.set("verdict", examination.verdict());
 }
 

@@ -58,7 +58,7 @@ class Examiner {
       if (one.error == Error::none && behind != Time{} && !streams_) runner_.settle(behind, longest_reply);
       return one;
     };
-    runner_.repeat({.count = count, .limit = limit, .patience = never}, attempt, into);
+    runner_.repeat({.count = count, .limit = limit, .patience = never, .least = longest_gap}, attempt, into);
   }
 
   /// Fields of another command that only reads. Throws as the port.
@@ -81,6 +81,7 @@ class Examiner {
   static constexpr unsigned pieces = 5;
   static constexpr Time piece_time = std::chrono::milliseconds(20);
   static constexpr std::size_t most_heard = 4096;
+  static constexpr Time longest_gap = std::chrono::milliseconds(500);  // of a contact that is loose now and then
   static constexpr Time longest_reply = std::chrono::milliseconds(100);
 
   Link link_;

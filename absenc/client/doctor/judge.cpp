@@ -6,6 +6,7 @@
 #include <set>
 #include <utility>
 
+#include "absenc/client/campaign.hpp"
 #include "absenc/client/doctor/damage.hpp"
 #include "absenc/client/doctor/judges.hpp"
 #include "absenc/client/doctor/words.hpp"
@@ -98,8 +99,12 @@ void judge_lateness(const Case& one, std::vector<Finding>& findings) {
   // On a CAN bus encoders send unasked: what comes behind a request that was not answered is no late answer to it.
   if (seen.late == 0 || one.unit.link == LinkKind::can) return;
   // A single one may be this computer, which was busy. The verdict counts it all the same.
-  const bool often = seen.late * 10 >= tried;
+  const bool often = seen.late * 10 >= tried || count(seen.readings, was_heard) == 0;
   if (!often && seen.late < 2) return;
+  Time limit{};
+  for (const Attempted& attempt : seen.readings) limit = std::max(limit, attempt.limit);
+  const bool is_ours = seen.woken_late > Time{} && seen.lateness - limit <= seen.woken_late;
+  if (!often && is_ours) return;  // no later than this computer itself
   const auto allowance = std::chrono::ceil<std::chrono::milliseconds>(seen.lateness * 3 / 2).count();
   findings.push_back(finding(often ? Ailment::reply_late : Ailment::sometimes_late,
                              {fmt::format("{}", std::min<std::size_t>(seen.late, tried)), fmt::format("{}", tried),
@@ -312,6 +317,20 @@ std::set<std::string_view> alarm_names(const Unit& unit, std::uint32_t mask) {
   return names;
 }
 
+Measured measured_of(const Observations& seen, std::size_t good) {
+  Measured measured;
+  if (seen.readings.empty()) return measured;
+  measured.time = seen.readings.back().began - seen.readings.front().began;
+  measured.failures = Share{seen.readings.size() - good, seen.readings.size()}.high();
+  measured.turned = !seen.turned.empty();
+  for (const Attempted& one : seen.readings) {
+    if (one.error != Error::none || one.after <= Time{}) continue;
+    measured.quickest = measured.slowest == Time{} ? one.after : std::min(measured.quickest, one.after);
+    measured.slowest = std::max(measured.slowest, one.after);
+  }
+  return measured;
+}
+
 Reported reported_by(const Unit& unit, const Observations& seen) {
   Reported reported;
   const std::size_t all = alarm_names(unit, ~0u).size();
@@ -334,6 +353,7 @@ Reported reported_by(const Unit& unit, const Observations& seen) {
 Examination judge(const Unit& unit, const Options& options, const Observations& seen) {
   Examination result{.tried = seen.readings.size(), .complete = seen.complete};
   result.good = count(seen.readings, [](const Attempted& one) { return one.error == Error::none; });
+  result.measured = measured_of(seen, result.good);
   const Case one{unit, options, seen, result.good};
   judge_port(one, result.findings);
   judge_line(one, result.findings);
@@ -351,6 +371,14 @@ Examination judge(const Unit& unit, const Options& options, const Observations& 
     result.reported = reported_by(unit, seen);
     judge_position(one, seen.readings, false, result.findings);
     judge_position(one, seen.turned, true, result.findings);
+  }
+  if (result.good == 0 && result.tried != 0 && result.first() == nullptr) {
+    // Nothing was good, and nothing above explains it.
+    const std::string all = fmt::format("{}", result.tried);
+    result.findings.push_back(
+        count(seen.readings, was_heard) == 0
+            ? finding(Ailment::no_answer, {all, ""})
+            : finding(Ailment::always_damaged, {all, "none was taken for a reply", shown(seen.readings.back())}));
   }
   std::stable_sort(result.findings.begin(), result.findings.end(),
                    [](const Finding& before, const Finding& after) { return before.ailment < after.ailment; });

@@ -353,6 +353,10 @@ Finding finding_of(const Unit& unit, const Options& options, const Attempted& la
 }
 
 void judge_mixed_frames(const Case& one, std::vector<Finding>& findings) {
+  if (std::optional<Finding> bursts = coming_and_going(one)) {
+    findings.push_back(std::move(*bursts));
+    return;
+  }
   All all = damaged(one);
   const auto take = [&all](const auto& is) {
     All taken;

@@ -9,6 +9,7 @@
 
 #include "absenc/client/doctor/judges.hpp"
 #include "absenc/client/doctor/words.hpp"
+#include "absenc/client/text/unit_text.hpp"
 #include "absenc/host/speed_limit.hpp"
 
 namespace absenc::client {
@@ -29,6 +30,9 @@ struct Walk {
   std::int64_t lowest = 0;  // as it goes on past the end of a turn, from the first
   std::int64_t highest = 0;
   std::int64_t end = 0;
+  std::set<std::int64_t> turns{};  // that were reported as valid
+  std::size_t zero_crossings = 0;
+  Time time{};  // from the first to the last
 
   [[nodiscard]] std::int64_t span() const { return highest - lowest; }
 };
@@ -42,11 +46,15 @@ Walk walk_of(const std::vector<Attempted>& readings) {
     walk.bits = now.singleturn_bits;
     walk.unit_um = now.unit_um;
     walk.places.push_back(now.singleturn);
+    if (now.multiturn_bits != 0 && now.multiturn_validity() == Validity::valid) walk.turns.insert(now.multiturn);
     if (before != nullptr) {
       const std::int64_t step = wrapped_difference(now.singleturn, before->singleturn, walk.bits);
       walk.steps.push_back(step);
       walk.pauses.push_back(now.latched - before->latched);
       walk.end += step;
+      const bool up = now.singleturn > before->singleturn;
+      walk.zero_crossings += step != 0 && (step > 0) != up ? 1 : 0;
+      walk.time += walk.pauses.back();
       walk.lowest = std::min(walk.lowest, walk.end);
       walk.highest = std::max(walk.highest, walk.end);
     }
@@ -91,7 +99,9 @@ double reach(const Walk& walk, Time pause, const host::SpeedLimit& limit) {
   return 1.25 * counts * seconds + static_cast<double>(quiet(walk));
 }
 
-void judge_jumps(const Walk& walk, const host::SpeedLimit& limit, std::vector<Finding>& findings) {
+// `damaged`: so many readings were seen to be. A checksum of 8 bits passes one of 256 that are, and each goes there and
+// back: few jumps beside many damaged readings are damage, too.
+void judge_jumps(const Walk& walk, const host::SpeedLimit& limit, std::size_t damaged, std::vector<Finding>& findings) {
   std::size_t jumps = 0;
   std::int64_t furthest = 0;
   for (std::size_t i = 0; i < walk.steps.size(); ++i) {
@@ -100,8 +110,23 @@ void judge_jumps(const Walk& walk, const host::SpeedLimit& limit, std::vector<Fi
     ++jumps;
     furthest = std::max(furthest, way);
   }
-  if (jumps == 0) return;
+  if (jumps * 5 <= damaged) return;
   findings.push_back(finding(Ailment::position_jumps, {fmt::format("{}", jumps), fmt::format("{}", furthest)}));
+}
+
+// A shaft that turns under the hand moves, and somewhere on a whole turn its turns are counted.
+void judge_turning(const Walk& walk, std::vector<Finding>& findings) {
+  constexpr std::size_t enough = 20;
+  if (walk.steps.size() < enough) return;
+  if (walk.span() <= quiet(walk)) {
+    findings.push_back(finding(Ailment::position_frozen, {fmt::format("{}", std::max(walk.span(), std::int64_t{1})),
+                                                          fmt::format("{}", walk.places.size()), to_text(walk.time)}));
+  }
+  const bool went_round = walk.unit_um == 0 && walk.span() >> walk.bits >= 1;
+  if (went_round && walk.turns.size() == 1) {
+    findings.push_back(finding(Ailment::turns_stand,
+                               {fmt::format("{}", *walk.turns.begin()), fmt::format("{}", walk.zero_crossings)}));
+  }
 }
 
 // A bit that stays as it is though the position went past several of its changes, at uneven steps: even ones may always
@@ -130,8 +155,13 @@ void judge_position(const Case& one, const std::vector<Attempted>& readings, boo
   if (walk.steps.empty()) return;
   host::SpeedLimit limit = one.seen.limit;
   if (by_hand) limit.rpm = std::min(limit.rpm, hand_rpm);
-  if (!by_hand) judge_noise(walk, findings);
-  judge_jumps(walk, limit, findings);
+  if (by_hand) {
+    judge_turning(walk, findings);
+  } else {
+    judge_noise(walk, findings);
+  }
+  const auto is_damaged = [](const Attempted& reading) { return reading.error != Error::none && reading.heard; };
+  judge_jumps(walk, limit, static_cast<std::size_t>(std::ranges::count_if(readings, is_damaged)), findings);
   judge_bits(walk, findings);
 }
 

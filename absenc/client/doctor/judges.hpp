@@ -2,6 +2,7 @@
 // The parts of the judgement: each adds what it finds.
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "absenc/client/doctor/observations.hpp"
@@ -20,6 +21,8 @@ void judge_port(const Case& one, std::vector<Finding>& findings);
 void judge_line(const Case& one, std::vector<Finding>& findings);
 /// Of replies of which none is good.
 void judge_bad_frames(const Case& one, std::vector<Finding>& findings);
+/// Failures that come together, with pauses between them.
+[[nodiscard]] std::optional<Finding> coming_and_going(const Case& one);
 /// Of replies of which some are.
 void judge_mixed_frames(const Case& one, std::vector<Finding>& findings);
 void judge_state(const Case& one, std::vector<Finding>& findings);

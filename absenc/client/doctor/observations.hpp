@@ -48,6 +48,7 @@ struct Observations {
   std::uint64_t overfull = 0;       // good replies behind which more came
   std::vector<std::uint8_t> overfull_example{};
   std::vector<Trial> trials{};
+  Time woken_late{};         // how late this computer woke who waited meanwhile, at most
   host::SpeedLimit limit{};  // how fast it may move
   std::string clash{};       // "address 3": whatever answers there is damaged every time
   bool complete = true;

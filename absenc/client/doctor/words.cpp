@@ -6,6 +6,9 @@
 
 #include <algorithm>
 #include <array>
+#include <chrono>
+
+#include "absenc/client/text/unit_text.hpp"
 
 namespace absenc::client {
 
@@ -126,6 +129,9 @@ constexpr auto table = std::to_array<Words>({
     {Ailment::sometimes_silent, "sometimes_silent", warning, "{0} of {1} requests were not answered",
      "the request does not always arrive, or a contact is loose",
      "check plugs, supply and termination; a busy computer needs latency=MS behind the encoder"},
+    {Ailment::comes_and_goes, "comes_and_goes", warning, "{0} of {1} readings failed, in {2} bursts{3}",
+     "a loose contact, or something nearby that is switched on and off",
+     "move cable and plugs while `absenc monitor` looks on; find what has this period"},
     {Ailment::requests_damaged, "requests_damaged", warning, "{0} of {1} requests were refused: {2}",
      "the request is damaged on its way to the encoder",
      "check termination, shielding and plugs, and that nobody else sends on the line"},
@@ -165,6 +171,14 @@ constexpr auto table = std::to_array<Words>({
     {Ailment::position_jumps, "position_jumps", fault,
      "{0} times the position went further than a shaft can turn, by up to {1} counts",
      "a damaged track or magnet, or a fault of the encoder", "turn it slowly past the place; replace the encoder"},
+    {Ailment::position_frozen, "position_frozen", fault,
+     "the position stayed within {0} counts in {1} readings over {2}, in which the shaft was to be turned",
+     "the shaft was not turned, its coupling or magnet is loose, or the encoder repeats one position",
+     "turn the shaft by more than a degree; look at coupling, magnet and gap"},
+    {Ailment::turns_stand, "turns_stand", fault,
+     "the number of turns stayed at {0} while the position went past its zero {1} times",
+     "turns are not counted: no battery, a counter that is switched off, or a fault of the encoder",
+     "look at battery and alarms; `absenc run` with the protocol's command that resets the turns"},
     {Ailment::stuck_bits, "stuck_bits", fault, "of the position {0} never changed while it went {1} counts",
      "the resolution is another one, or codes are missing", "check the resolution of the model; replace the encoder"},
 });
@@ -221,13 +235,20 @@ bool Examination::healthy() const { return complete && first() == nullptr; }
 std::string Examination::verdict() const {
   if (const Finding* one = first()) return fmt::format("first: {}: {}", one->id, one->action);
   if (!complete) return "interrupted: nothing was found until then";
-  std::string evidence = fmt::format("good: {} of {} readings", good, tried);
+  std::string evidence = fmt::format("good: {} of {} readings in {:.3g} s", good, tried,
+                                     std::chrono::duration<double>(measured.time).count());
   if (good < tried) evidence += fmt::format(" ({} failed)", tried - good);
+  evidence += fmt::format(" (95 %: less than {:.2g} % fail)", 100 * measured.failures);
   evidence += reported.valid == good ? ", each with a valid position"
                                      : fmt::format(", {} with a position that is said to be valid", reported.valid);
   if (good != 0 && reported.alarms == good) evidence += " and no alarm";
   if (reported.valid < good) evidence += "; whether the others hold is not reported";
   if (!reported.missing.empty()) evidence += fmt::format("; not reported: {}", reported.missing);
+  if (measured.slowest > Time{}) {
+    const auto ms = [](Time time) { return std::chrono::duration<double, std::milli>(time).count(); };
+    evidence += fmt::format("; replies took {:.3f} to {:.3f} ms", ms(measured.quickest), ms(measured.slowest));
+  }
+  if (!measured.turned) evidence += "; not looked at: a turning shaft (--turn)";
   return evidence;
 }
 

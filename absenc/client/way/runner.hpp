@@ -26,6 +26,7 @@ struct Attempted {
   Error error = Error::none;
   std::string detail{};               // in the words of the unit
   std::string advice{};               // of the unit; "": none
+  Time began{};                       // on the port's clock
   capture::HeardExchange exchange{};  // the last one, without echo
   std::vector<std::uint8_t> raw{};    // all bytes that came, echo included
   bool heard = false;                 // something came, be it an echo
@@ -86,7 +87,8 @@ struct Series {
   std::size_t count = 0;
   Time limit = never;                       // of all of them
   Time patience = std::chrono::seconds(2);  // since the last good one
-  std::size_t most_silent = 8;              // in vain, until nobody is there
+  std::size_t most_silent = 8;              // in vain, until nobody is there,
+  Time least{};                             // but no sooner than this
   std::size_t most_bad = 24;                // without a good one
 };
 
@@ -167,8 +169,9 @@ class Runner {
   /// The same, as a record.
   Attempted once(const Command& command, Arguments arguments = {}) {
     const std::uint64_t discarded = session_->counters().discarded;
-    const Conversation<Item>* ended = run(command, arguments);
     Attempted one;
+    one.began = port_.now();
+    const Conversation<Item>* ended = run(command, arguments);
     if (ended == nullptr) {
       one.error = Error::unsupported;
       one.possible = false;
@@ -208,7 +211,8 @@ class Runner {
     for (std::size_t i = 0; i < series.count; ++i) {
       const Time now = port_.now();
       if (now >= end || now - good_at >= series.patience) return;
-      if (good == 0 && ((heard == 0 && i >= series.most_silent) || i >= series.most_bad)) return;
+      const bool is_nobody = i >= series.most_silent && now - begin >= series.least;
+      if (good == 0 && (heard == 0 ? is_nobody : i >= series.most_bad)) return;
       try {
         into.push_back(attempt());
       } catch (const OutOfTime&) {

@@ -61,7 +61,7 @@ int run_doctor(const Invocation& invocation) {
     return std::chrono::duration_cast<Time>(time);
   };
   DoctorChoices choices;
-  choices.readings = static_cast<std::size_t>(invocation.number("--readings", 300, 10, 1'000'000));
+  choices.readings = static_cast<std::size_t>(invocation.number("--readings", 100'000, 10, 1'000'000));
   choices.limit = seconds("--for", 3, 0.1);
   choices.turning = seconds("--turn", 0, 0);
   choices.progress = [&](const std::string& what) { progress.show(what); };
@@ -79,9 +79,10 @@ int run_doctor(const Invocation& invocation) {
 
 constexpr std::array<Parameter, 6> doctor_parameters{{
     parameter::encoder,
-    {"--readings", "N", "how many readings are looked at", "300"},
-    {"--for", "SECONDS", "how long they may take", "3"},
-    {"--turn", "SECONDS", "then look on while you turn the shaft by hand: jumps, codes that are missing", "0"},
+    {"--for", "SECONDS", "how long it reads, as fast as it can", "3"},
+    {"--readings", "N", "it ends after so many readings", "100000"},
+    {"--turn", "SECONDS",
+     "then look on while you turn the shaft by hand: a position that stands, jumps, codes that are missing", "0"},
     parameter::json,
     parameter::option,
 }};

@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: Apache-2.0
+// What doctor needs to have looked at before it calls an encoder good or ill.
+#include <gmock/gmock-more-matchers.h>
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "absenc/client/doctor/observed_test.hpp"
+
+namespace absenc::client {
+
+using testing::AllOf;
+using testing::Contains;
+using testing::HasSubstr;
+using testing::IsEmpty;
+using testing::Not;
+using testing::StartsWith;
+
+/// As long as it is told to, and not until so many readings: a contact that is loose now and then would not be seen.
+TEST(Doctor, FailuresThatComeAndGoAreToldWithTheirPeriod) {
+  const Examination even = examine_contact(5s, [](Time at) { return at % 1s < 300ms; });
+  EXPECT_THAT(even.findings.at(0).evidence, AllOf(HasSubstr("bursts of about 3"), HasSubstr("one every 1 s")));
+  const Examination uneven = examine_contact(
+      6s, [](Time at) { return (at > 1s && at < 1100ms) || (at > 1900ms && at < 2s) || (at > 5s && at < 5100ms); });
+  EXPECT_THAT(uneven.findings.at(0).evidence, AllOf(HasSubstr("in 3 bursts"), HasSubstr("at uneven distances")));
+  // Independent of each other: no bursts.
+  std::mt19937 random(5);
+  const Examination any = examine_contact(5s, [&](Time) { return random() % 10 == 0; });
+  EXPECT_THAT(ids(any), Contains("sometimes_silent"));
+  EXPECT_THAT(ids(any), Not(Contains("comes_and_goes")));
+}
+
+/// The shaft is turned, and every encoder follows: the counter of turns changes where the position passes zero.
+TEST(Doctor, AShaftThatFollowsTheHandGivesNoFinding) {
+  const auto place = [](std::size_t i) { return i * hand_counts; };
+  EXPECT_THAT(ids(judged(turned_by_hand(
+                  place, [](std::size_t i) { return static_cast<std::int64_t>(i * hand_counts >> 17); }))),
+              IsEmpty());
+  const auto less_than_a_turn = [](std::size_t i) { return i * 600; };  // 120 000 counts of 131 072
+  EXPECT_THAT(ids(judged(turned_by_hand(less_than_a_turn, [](std::size_t) { return 3; }))), IsEmpty());
+}
+
+/// What is late by no more than this computer itself tells nothing of the encoder.
+TEST(Doctor, ALatenessOfThisComputerIsNotTheEncoders) {
+  Observations seen = positions([](std::size_t) { return 5; });
+  for (Attempted& one : seen.readings) one.limit = 3ms;
+  seen.late = 4;
+  seen.lateness = 15ms;
+  EXPECT_THAT(ids(judged(seen)), Contains("sometimes_late"));
+  seen.woken_late = 11ms;
+  EXPECT_THAT(ids(judged(seen)), Contains("sometimes_late"));
+  seen.woken_late = 13ms;
+  EXPECT_THAT(ids(judged(seen)), IsEmpty());
+}
+
+TEST(Doctor, GoodSaysHowMuchWasLookedAt) {
+  const Examination good = examine_contact(2s, [](Time) { return false; });
+  EXPECT_TRUE(good.healthy());
+  EXPECT_GT(good.tried, 1000u);
+  EXPECT_THAT(good.verdict(), AllOf(HasSubstr(" in 2 s"), HasSubstr("95 %: less than 0."),
+                                    HasSubstr("not looked at: a turning shaft")));
+  EXPECT_LT(good.measured.failures, 4.0 / static_cast<double>(good.tried));
+  EXPECT_GE(good.measured.time, 1900ms);
+}
+
+TEST(Doctor, NothingIsCalledGoodOfWhichNothingWas) {
+  for (const Error error : {Error::timeout, Error::bad_checksum, Error::wrong_length, Error::unexpected_reply}) {
+    for (const bool heard : {false, true}) {
+      for (const std::size_t late : {0, 1, 30}) {
+        Observations seen = positions([](std::size_t) { return 5; });
+        for (Attempted& one : seen.readings) one = {.error = error, .heard = heard};
+        seen.late = late;
+        seen.lateness = 5ms;
+        seen.woken_late = 10ms;
+        EXPECT_THAT(judged(seen).verdict(), Not(StartsWith("good"))) << heard << " " << late;
+        EXPECT_FALSE(judged(seen).healthy());
+      }
+    }
+  }
+}
+
+}  // namespace absenc::client

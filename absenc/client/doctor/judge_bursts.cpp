@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: Apache-2.0
+// Whether readings fail in bursts, and with which period.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "absenc/client/doctor/judges.hpp"
+#include "absenc/client/doctor/words.hpp"
+#include "absenc/client/text/unit_text.hpp"
+
+namespace absenc::client {
+
+namespace {
+
+/// Readings that failed one after the other.
+struct Burst {
+  Time begin{};
+  Time end{};
+  std::size_t count = 0;
+};
+
+// Those that are too long for failures that are independent of each other.
+std::vector<Burst> bursts_of(const std::vector<Attempted>& readings, std::size_t failed) {
+  constexpr double chance = 1e-3;  // that one so long is among all these readings
+  const auto all = static_cast<double>(readings.size());
+  const double longest = std::log(chance / all) / std::log(static_cast<double>(failed) / all);
+  const auto least = static_cast<std::size_t>(std::max(3.0, std::ceil(longest)));
+  std::vector<Burst> bursts;
+  Burst burst;
+  for (const Attempted& one : readings) {
+    if (one.error != Error::none) {
+      if (burst.count++ == 0) burst.begin = one.began;
+      continue;
+    }
+    burst.end = one.began;
+    if (burst.count >= least) bursts.push_back(burst);
+    burst = {};
+  }
+  return bursts;  // the last one, which may go on, is left out
+}
+
+// "of about 300 ms each, one every 1 s", where they come at even distances.
+std::string rhythm(const std::vector<Burst>& bursts) {
+  std::vector<Time> lengths;
+  std::vector<Time> periods;
+  for (std::size_t i = 0; i < bursts.size(); ++i) {
+    lengths.push_back(bursts[i].end - bursts[i].begin);
+    if (i > 0) periods.push_back(bursts[i].begin - bursts[i - 1].begin);
+  }
+  std::ranges::sort(lengths);
+  std::ranges::sort(periods);
+  const std::string length = fmt::format(" of about {}", to_text(lengths[lengths.size() / 2]));
+  const Time period = periods[periods.size() / 2];
+  const bool even = periods.back() - periods.front() < period / 5;
+  return length + (even ? fmt::format(", one every {}", to_text(period)) : ", at uneven distances");
+}
+
+}  // namespace
+
+std::optional<Finding> coming_and_going(const Case& one) {
+  constexpr std::size_t enough = 3;
+  const std::vector<Attempted>& readings = one.seen.readings;
+  const std::size_t failed = readings.size() - one.good;
+  if (failed == 0) return std::nullopt;
+  const std::vector<Burst> bursts = bursts_of(readings, failed);
+  std::size_t in_bursts = 0;
+  for (const Burst& burst : bursts) in_bursts += burst.count;
+  if (bursts.size() < enough || in_bursts * 10 < failed * 7) return std::nullopt;
+  return finding(Ailment::comes_and_goes, {fmt::format("{}", failed), fmt::format("{}", readings.size()),
+                                           fmt::format("{}", bursts.size()), rhythm(bursts)});
+}
+
+}  // namespace absenc::client

@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: Apache-2.0
+// For tests of doctor: what it saw, made up, and lines that come and go.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "absenc/client/doctor/examine.hpp"
+#include "absenc/client/doctor/lines_test.hpp"
+#include "absenc/client/doctor/observations.hpp"
+
+namespace absenc::client {
+
+using ByteList = std::vector<std::uint8_t>;
+
+constexpr const char* serial = "tformat:/dev/ttyABSENC";
+
+inline std::vector<std::string> ids(const Examination& examination) {
+  std::vector<std::string> all;
+  for (const Finding& one : examination.findings) all.emplace_back(one.id);
+  return all;
+}
+
+/// To 1A: 17 bits and 16 of turns, both 0, no alarm.
+inline const ByteList& good_reply() {
+  static const ByteList reply{0x1A, 0, 0, 0, 0, 0x11, 0, 0, 0, 0, 0x0B};
+  return reply;
+}
+
+/// Readings of positions, a millisecond apart.
+inline Observations positions(const std::function<std::uint64_t(std::size_t)>& place, unsigned bits = 17) {
+  Observations seen;
+  for (std::size_t i = 0; i < 200; ++i) {
+    Attempted one{.heard = true};
+    one.reading = Reading{.singleturn = place(i) & low_mask(bits),
+                          .singleturn_bits = bits,
+                          .singleturn_valid_bits = bits,
+                          .latched = static_cast<std::int64_t>(i) * 1ms};
+    seen.readings.push_back(one);
+  }
+  return seen;
+}
+
+inline Examination judged(const Observations& seen) {
+  static const EncoderAddress address = parse_address("sim:tformat");
+  return judge(*address.unit, address.options, seen);
+}
+
+/// A reading a millisecond while the shaft is turned by hand.
+inline Observations turned_by_hand(const std::function<std::uint64_t(std::size_t)>& place,
+                                   const std::function<std::int64_t(std::size_t)>& turns) {
+  Observations seen = positions([](std::size_t) { return 5; });
+  seen.turned = positions(place).readings;
+  for (std::size_t i = 0; i < seen.turned.size(); ++i) {
+    Reading& reading = *seen.turned[i].reading;
+    reading.multiturn = turns(i);
+    reading.multiturn_bits = 16;
+    reading.multiturn_valid = true;
+  }
+  return seen;
+}
+
+constexpr std::uint64_t hand_counts = 1201;  // a millisecond: 550 rpm
+
+/// For so long, of a line that is dead for a part of each period.
+inline Examination examine_contact(Time time, const std::function<bool(Time)>& dead) {
+  const Surroundings surroundings{[&](const EncoderAddress&) {
+                                    auto port = std::make_shared<ScriptedPort<std::uint8_t>>();
+                                    port->answer = [&dead, &port = *port](const ByteList&) {
+                                      return dead(port.now()) ? ByteList{} : good_reply();
+                                    };
+                                    return link_to(std::move(port));
+                                  },
+                                  [](const std::string&) { return os::PortFacts{}; }};
+  return examine(parse_address(serial), {.limit = time}, surroundings);
+}
+
+}  // namespace absenc::client

@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: Apache-2.0
+// How late this computer wakes who waits: a reply that is late by no more than that tells nothing of its encoder.
+#pragma once
+
+#include <atomic>
+#include <chrono>
+#include <thread>
+
+#include "absenc/core/time.hpp"
+#include "absenc/os/signals.hpp"
+
+namespace absenc::os {
+
+/// Waits for a millisecond, again and again, in a thread of its own, as long as it exists.
+class WakeupWatch {
+ public:
+  /// The longest that it was woken too late.
+  [[nodiscard]] Time latest() const { return Time(latest_.load()); }
+
+ private:
+  static constexpr std::chrono::milliseconds pause{1};
+
+  void watch(const std::stop_token& stop) {
+    while (!stop.stop_requested()) {
+      const Time due = now() + pause;
+      std::this_thread::sleep_for(pause);
+      const Time::rep late = (now() - due).count();
+      if (late > latest_.load()) latest_.store(late);
+    }
+  }
+
+  std::atomic<Time::rep> latest_{0};
+  std::jthread thread_{[this](const std::stop_token& stop) { watch(stop); }};
+};
+
+}  // namespace absenc::os
