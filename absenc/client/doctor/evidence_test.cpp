@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What doctor needs to have looked at before it calls an encoder good or ill.
+// An encoder is called good or ill only after enough of it was looked at.
 #include <gmock/gmock-more-matchers.h>
 #include <gtest/gtest.h>
 
@@ -40,7 +40,7 @@ TEST(Doctor, AShaftThatFollowsTheHandGivesNoFinding) {
   EXPECT_THAT(ids(judged(turned_by_hand(less_than_a_turn, [](std::size_t) { return 3; }))), IsEmpty());
 }
 
-/// What is late by no more than this computer itself tells nothing of the encoder.
+/// A reply that is no later than this computer itself tells nothing of the encoder.
 TEST(Doctor, ALatenessOfThisComputerIsNotTheEncoders) {
   Observations seen = positions([](std::size_t) { return 5; });
   for (Attempted& one : seen.readings) one.limit = 3ms;
