@@ -28,6 +28,40 @@ constexpr std::uint64_t most_read = 1 << 20;        // of a body of unknown leng
 constexpr unsigned idle_seconds = 15;
 constexpr std::size_t block = 16 * 1024;
 
+Headers headers_of(MHD_Connection* connection) {
+  Headers headers;
+  const auto add = [](void* into, MHD_ValueKind, const char* name, const char* value) {
+    static_cast<Headers*>(into)->add(name, value == nullptr ? "" : value);
+    return MHD_YES;
+  };
+  ::MHD_get_connection_values(connection, MHD_HEADER_KIND, add, &headers);
+  return headers;
+}
+
+std::string peer_of(MHD_Connection* connection) {
+  const MHD_ConnectionInfo* info = ::MHD_get_connection_info(connection, MHD_CONNECTION_INFO_CLIENT_ADDRESS);
+  return info != nullptr && info->client_addr != nullptr ? os::host_text(*info->client_addr) : std::string();
+}
+
+int socket_of(MHD_Connection* connection) {
+  const MHD_ConnectionInfo* info = ::MHD_get_connection_info(connection, MHD_CONNECTION_INFO_CONNECTION_FD);
+  return info != nullptr ? info->connect_fd : -1;
+}
+
+Request request_of(MHD_Connection* connection, const char* path, const char* method) {
+  Request request;
+  request.method = method;
+  request.path = path;
+  const auto add = [](void* query, MHD_ValueKind, const char* name, const char* value) {
+    static_cast<decltype(Request::query)*>(query)->emplace(name, value == nullptr ? "" : value);
+    return MHD_YES;
+  };
+  ::MHD_get_connection_values(connection, MHD_GET_ARGUMENT_KIND, add, &request.query);
+  headers_of(connection).hand_on(request);
+  request.peer = peer_of(connection);
+  return request;
+}
+
 // For every answer: nothing is kept, framed, guessed or taken from elsewhere.
 void add_headers(MHD_Response* response, const std::string& type) {
   ::MHD_add_response_header(response, "Content-Type", type.c_str());
@@ -279,13 +313,14 @@ struct HttpServer::Daemon {
     auto& daemon = *static_cast<Daemon*>(self);
     if (*context == nullptr) {
       *context = new std::shared_ptr<Exchange>(std::make_shared<Exchange>());
-      if (const std::string_view wrong = ambiguity(connection, version); !wrong.empty()) {
+      const Headers headers = headers_of(connection);
+      if (const std::string_view wrong = headers.ambiguity(version); !wrong.empty()) {
         return queue(connection, {MHD_HTTP_BAD_REQUEST,
                                   "text/plain",
                                   "the request is ambiguous: " + std::string(wrong) + "\n",
                                   {{"Connection", "close"}}});
       }
-      const bool announced = announced_length(connection) > most_body;
+      const bool announced = headers.announced_length() > most_body;
       return announced ? queue(connection, too_large()) : MHD_YES;
     }
     const auto& exchange = *static_cast<std::shared_ptr<Exchange>*>(*context);
