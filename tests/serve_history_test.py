@@ -242,6 +242,7 @@ class WrongClock(ServeCase):
         library = glob.glob("/usr/lib/*/faketime/libfaketimeMT.so.1")
         self.assertTrue(library, "the package faketime is missing")
         self.settings = {"LD_PRELOAD": library[0], "FAKETIME_TIMESTAMP_FILE": self.file("clock"), "FAKETIME_NO_CACHE": "1",
+                         "NO_FAKE_STAT": "1",  # the times of files are those of the disk
                          "FAKETIME_DONT_FAKE_MONOTONIC": "1"}
         self.wrong_by(0)
 

@@ -37,7 +37,8 @@ struct Step {
   bool hold_low = false;        // transfer on a clocked link: until `at` the clock line, which idles high, is held low
   std::span<const Item> out{};  // valid until the next feed
   std::size_t expect = 0;       // transfer, wait: items still due; 0: unknown, or none
-  std::size_t bits = 0;         // transfer on a clocked link: number of clocks
+  std::size_t bits = 0;         // transfer on a clocked link: number of clocks; of the device: that hosts take, if it
+                                // drives more
   std::uint32_t rate = 0;       // configure: bits a second
   Time at{};                    // transfer, pulse: not before; wait: a `timer` event is due then, if that lies ahead
   Time answer{};                // transfer, wait: `silence` when nothing has come this long after `sent`; 0: no limit

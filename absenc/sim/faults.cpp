@@ -120,10 +120,11 @@ bool FaultyDevice::damage(Step<std::uint8_t>& reply, Time now) {
   if (strikes(FaultKind::silence)) reply_.clear();
   if (!reply_.empty()) {
     if (strikes(FaultKind::repeat)) reply_.insert(reply_.end(), reply.out.begin(), reply.out.end());
-    if (strikes(FaultKind::corrupt)) flip_bits(reply_);
-    if (reply_.size() > 1 && strikes(FaultKind::truncate)) reply_.resize(1 + random_.below(reply_.size() - 1));
-    if (strikes(FaultKind::drop))
-      reply_.erase(reply_.begin() + static_cast<std::ptrdiff_t>(random_.below(reply_.size())));
+    // A fault behind the bits that the host takes would be none.
+    const auto taken = [&] { return reply.bits == 0 ? reply_.size() : std::min(reply_.size(), (reply.bits + 7) / 8); };
+    if (strikes(FaultKind::corrupt)) flip_bits(std::span(reply_).first(taken()));
+    if (taken() > 1 && strikes(FaultKind::truncate)) reply_.resize(1 + random_.below(taken() - 1));
+    if (strikes(FaultKind::drop)) reply_.erase(reply_.begin() + static_cast<std::ptrdiff_t>(random_.below(taken())));
     if (strikes(FaultKind::garbage)) {
       for (std::uint64_t more = 1 + random_.below(4); more > 0; --more) {
         reply_.insert(reply_.begin(), static_cast<std::uint8_t>(random_.below(256)));

@@ -99,7 +99,8 @@ void judge_lateness(const Case& one, std::vector<Finding>& findings) {
   // On a CAN bus encoders send unasked: what comes behind a request that was not answered is no late answer to it.
   if (seen.late == 0 || one.unit.link == LinkKind::can) return;
   // A single one may be this computer, which was busy. The verdict counts it all the same.
-  const bool often = seen.late * 10 >= tried || count(seen.readings, was_heard) == 0;
+  const bool nothing_else = one.good == 0 && count(seen.readings, was_heard) * 10 < tried;
+  const bool often = seen.late * 10 >= tried || nothing_else;
   if (!often && seen.late < 2) return;
   Time limit{};
   for (const Attempted& attempt : seen.readings) limit = std::max(limit, attempt.limit);
@@ -372,13 +373,19 @@ Examination judge(const Unit& unit, const Options& options, const Observations& 
     judge_position(one, seen.readings, false, result.findings);
     judge_position(one, seen.turned, true, result.findings);
   }
-  if (result.good == 0 && result.tried != 0 && result.first() == nullptr) {
-    // Nothing was good, and nothing above explains it.
+  const std::size_t failed = result.tried - result.good;
+  if (failed * 20 > result.tried && result.first() == nullptr) {
+    // Nothing above explains it, and it is not good.
+    const std::size_t silent = result.tried - count(seen.readings, was_heard);
     const std::string all = fmt::format("{}", result.tried);
-    result.findings.push_back(
-        count(seen.readings, was_heard) == 0
-            ? finding(Ailment::no_answer, {all, ""})
-            : finding(Ailment::always_damaged, {all, "none was taken for a reply", shown(seen.readings.back())}));
+    if (silent * 2 < failed) {
+      const std::string last = shown(seen.readings.back());
+      result.findings.push_back(finding(Ailment::always_damaged, {all, "none was taken for a reply", last}));
+    } else {
+      const bool is_nobody = silent == result.tried;
+      result.findings.push_back(is_nobody ? finding(Ailment::no_answer, {all, ""})
+                                          : finding(Ailment::sometimes_silent, {fmt::format("{}", failed), all}));
+    }
   }
   std::stable_sort(result.findings.begin(), result.findings.end(),
                    [](const Finding& before, const Finding& after) { return before.ailment < after.ailment; });

@@ -336,6 +336,7 @@ void judge_bad_frames(const Case& one, std::vector<Finding>& findings) {
       return;
     }
   }
+  if (all.size() * 10 < one.seen.readings.size()) return;  // silence is what is to be explained
   findings.push_back(finding(Ailment::always_damaged,
                              {fmt::format("{}", all.size()), errors_of(one.seen.readings), shown(*all.front())}));
 }

@@ -31,11 +31,14 @@ class ClockedDevice : public EncoderOn<std::uint8_t> {
   virtual void clocked(Time at, std::size_t clocks) = 0;
   /// For `selected`: from the last edge of the clock the line is driven low for so long.
   void hold_low(Time time) { low_after_ = time; }
+  /// For `selected`: of the bits that are driven hosts take so many, and a fault of the line strikes those.
+  void hosts_take(std::size_t bits) { taken_ = bits; }
 
  private:
   DrivenBits bits_;
   Time low_after_{};
-  bool pending_ = false;  // to be driven
+  std::size_t taken_ = 0;  // 0: all
+  bool pending_ = false;   // to be driven
   bool driving_ = false;
 };
 
