@@ -176,9 +176,8 @@ class TheCommand(SpidevCase):
         """A BiSS encoder that nobody knows: its word, and by its registers its serial number."""
         self.serve("biss", "--motion", "rpm=60")
         candidates = json.loads(self.good("identify", "spi:/dev/spidev9.0", "--json").stdout)["candidates"]
-        # A chain of one slave has the same frames: which of both is named first is a matter of a few bits of chance.
-        found = next(one for one in candidates if one["protocol"] == "biss")
-        self.assertEqual(found["options"]["singleturn_bits"], 19, candidates)
+        found = candidates[0]
+        self.assertEqual((found["protocol"], found["options"].get("singleturn_bits")), ("biss", 19), candidates)
         self.assertEqual(found["identity"]["serial_number"], 1)
         self.assertEqual(bytes.fromhex(found["identity"]["device_id"]), b"Absenc")
 

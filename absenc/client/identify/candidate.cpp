@@ -8,7 +8,6 @@
 
 #include "absenc/client/text/unit_text.hpp"
 #include "absenc/client/way/address.hpp"
-#include "absenc/protocol/all.hpp"
 
 namespace absenc::client {
 
@@ -50,15 +49,6 @@ void rank(std::vector<Candidate>& candidates, std::size_t searches) {
   std::stable_sort(candidates.begin(), candidates.end(), [](const Candidate& one, const Candidate& other) {
     return capture::is_likelier(one.hypothesis, other.hypothesis);
   });
-  if (candidates.empty()) return;
-  // Frames of an encoder alone are those of a chain of one, too: of protocols that are as likely, the one listed first.
-  const auto as_likely = std::find_if_not(candidates.begin(), candidates.end(),
-                                          [&](const Candidate& one) { return is_as_likely(one, candidates.front()); });
-  const auto place_of = [](const Candidate& one) { return std::ranges::find(all_units(), one.unit); };
-  const auto first = std::min_element(candidates.begin(), as_likely, [&](const Candidate& one, const Candidate& other) {
-    return place_of(one) < place_of(other);
-  });
-  std::rotate(candidates.begin(), first, std::next(first));
 }
 
 std::vector<std::string> settings_for(const Unit& unit, const Options& options) {

@@ -60,8 +60,11 @@ struct SafetyReply {
 
 namespace detail {
 
-template <class Bits>
-constexpr Error take_channel(const Channel& channel, const Bits& samples, std::size_t first, ChannelData& data) {
+// SLO is low behind the last word of a frame: zeros are no word that somebody sent, although a CRC that is not inverted
+// would be right for them (as sent it would be an encoder at zero whose nE and nW both report).
+constexpr Error take_channel(const Channel& channel, BitView samples, std::size_t first, ChannelData& data) {
+  const std::size_t end = first + data_bits(channel);
+  if (channel.check.width != 0 && !samples[first] && samples.end_of_run(first) >= end) return Error::line_stuck;
   return take_data(Given<Channel>{channel, channel.word}, samples, first, data);
 }
 

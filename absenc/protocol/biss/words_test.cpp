@@ -111,6 +111,25 @@ void expect_clocks_of_ten_microseconds() {
   }
 }
 
+// Behind the frame of an encoder alone SLO is low: identify would take the zeros for another word.
+TEST(BissWords, ZerosBehindAFrameAreNoWord) {
+  ChainFormat chain;
+  chain.count = 2;
+  chain.channels[1].check.inverted = false;
+  BitBuffer<512> frame;
+  ASSERT_TRUE(encode(Format{.word = chain.channels[0].word, .check = chain.channels[0].check}, {}, frame));
+  ASSERT_EQ(detail::decoded(chain, frame.view()).error(), Error::truncated);
+  for (int i = 0; i < 200; ++i) frame.append(0, 1);
+  EXPECT_EQ(detail::decoded(chain, frame.view()).error(), Error::line_stuck);
+
+  SafetyFormat safety;
+  safety.spw.check.inverted = false;
+  frame.clear();
+  ASSERT_TRUE(encode(Format{.word = safety.cpw.word, .check = safety.cpw.check}, {}, frame));
+  for (int i = 0; i < 200; ++i) frame.append(0, 1);
+  EXPECT_EQ(detail::decoded(safety, frame.view()).error(), Error::line_stuck);
+}
+
 TEST(BissWords, ClocksFollowTheClock) {
   expect_clocks_of_ten_microseconds<Format>();
   expect_clocks_of_ten_microseconds<ChainFormat>();
