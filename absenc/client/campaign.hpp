@@ -9,6 +9,8 @@
 #include <string_view>
 #include <vector>
 
+#include "absenc/client/share.hpp"
+
 namespace absenc::client {
 
 /// A fault of the line, or of what the encoder sends.
@@ -31,16 +33,6 @@ struct CampaignChoices {
   /// `absenc read` does it; none: it is put somewhere else before every reading, and none is confirmed.
   std::optional<double> rpm{};
   std::uint32_t maximum_rpm = 0;  // that the host is told, or mm/s; 0: as the model says, or as is usual
-};
-
-/// How many of how many, with the interval of 95 % confidence in which the true rate is (Wilson).
-struct Share {
-  std::uint64_t count = 0;
-  std::uint64_t of = 0;
-
-  [[nodiscard]] double rate() const { return of == 0 ? 0 : static_cast<double>(count) / static_cast<double>(of); }
-  [[nodiscard]] double low() const;
-  [[nodiscard]] double high() const;
 };
 
 /// What follows from the check's code for replies whose bits are damaged independently at the rate of the fault `bit`,

@@ -36,7 +36,7 @@ struct Ends {
   Descriptor ours, other;
 };
 
-/// What posix_spawn does in the child before the program begins.
+/// posix_spawn takes these steps in the child before the program begins.
 struct SpawnSteps {
   explicit SpawnSteps(int channel) {
     ::posix_spawn_file_actions_init(&files);

@@ -49,8 +49,8 @@ class ChildProcess {
   pid_t number_ = -1;
 };
 
-/// What the child calls first: takes its end of the channel, and from then on ends with its parent, has `name` in lists
-/// of processes, leaves no core file and takes at most `bytes` of memory more than it has now.
+/// The child calls this first and gets its end of the channel. From then on the process ends with its parent, has
+/// `name` in lists of processes, leaves no core file and takes at most `bytes` of memory more than it has now.
 [[nodiscard]] Channel become_child(const char* name, std::size_t bytes);
 
 }  // namespace absenc::os

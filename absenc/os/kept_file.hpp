@@ -11,7 +11,7 @@
 
 namespace absenc::os {
 
-/// Which file it is, whatever its name.
+/// Tells files apart, whatever their names.
 struct FileIdentity {
   std::uint64_t device = 0;
   std::uint64_t number = 0;  // 0: there is no file
@@ -19,7 +19,7 @@ struct FileIdentity {
   bool operator==(const FileIdentity&) const = default;
 };
 
-/// Of what stands at `path`.
+/// Of the file at `path`.
 [[nodiscard]] FileIdentity identity_of(const std::string& path);
 
 /// Locked (flock) from the constructor to the end of the object, also while it is replaced: the lock is on the file

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// How late this computer wakes who waits: a reply that is late by no more than that tells nothing of its encoder.
+// Measures how late this computer wakes a thread: a reply that is no later than that tells nothing of its encoder.
 #pragma once
 
 #include <atomic>

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Which open connections stay when there are too many: no address shuts others out, and the oldest idle one goes first.
+// Chooses the connection that goes when too many are open: no address shuts others out, and the oldest idle one goes
+// first.
 #pragma once
 
 #include <cstddef>

@@ -71,7 +71,7 @@ HistoryWriter::HistoryWriter(std::string path, const HistoryLimits& limits)
 }
 HistoryWriter::~HistoryWriter() = default;
 
-// What stands at the path before there was a history of this server there is left alone: it may be somebody else's.
+// A file that stood at the path before this server wrote a history there is left alone: it may be somebody else's.
 void HistoryWriter::open() {
   try {
     file_.emplace(path_);

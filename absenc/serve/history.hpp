@@ -83,7 +83,7 @@ class HistoryWriter {
   /// Why the last `write` failed; "" when it did not.
   [[nodiscard]] const std::string& trouble() const { return trouble_; }
   [[nodiscard]] std::uint64_t lost() const { return lost_; }
-  /// What happened to the history since the last time, for people.
+  /// Sentences about what happened to the history since the last call.
   [[nodiscard]] std::vector<std::string> take_notes();
   [[nodiscard]] HistoryReader& reader() { return reader_; }
 

@@ -32,7 +32,7 @@ class HistoryFile {
     replaced,
     damaged,
   };
-  /// What has become of it since `note_written`.
+  /// Compares the file at the path with the one that `note_written` saw.
   [[nodiscard]] State look() const;
   /// After each transaction: who else writes to the file is known by the time of its change.
   void note_written();

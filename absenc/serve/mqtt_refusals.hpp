@@ -39,7 +39,7 @@ class MqttRefusals {
 
   /// Whether a topic's pause is over and it was not tried since; each is returned once.
   [[nodiscard]] bool take_due(Time now);
-  /// What is refused, for people; "": nothing.
+  /// A sentence that names the refused topics; "": none is.
   [[nodiscard]] std::string text() const;
   [[nodiscard]] bool has_suspects() const { return !suspects_.empty(); }
 

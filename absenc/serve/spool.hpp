@@ -72,7 +72,7 @@ class Spool {
   };
   /// Since the last call.
   [[nodiscard]] Dropped take_dropped();
-  /// What happened to the files, for people, since the last call.
+  /// Sentences about what happened to the files since the last call.
   [[nodiscard]] std::vector<std::string> take_notes();
 
  private:

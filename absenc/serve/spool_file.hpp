@@ -23,12 +23,12 @@ struct Message {
   std::uint64_t readings = 0;  // in it
 };
 
-/// What a message counts for in the spool: its texts, and what is beside them.
+/// The bytes that a message takes in the spool: its texts, and its record around them.
 [[nodiscard]] inline std::int64_t spool_bytes(const Message& message) {
   return static_cast<std::int64_t>(message.topic.size() + message.payload.size()) + 32;
 }
 
-/// What each file begins with, so that the others may be deleted.
+/// Each file begins with these, so that the others may be deleted.
 struct SpoolFacts {
   std::string source{};
   std::int64_t next_id = 1;

@@ -16,7 +16,7 @@ namespace {
 
 constexpr std::string_view part_suffix = ".part";
 
-// Of one file. On a small disk it is smaller, because only what is deleted makes room.
+// The size of one file. On a small disk it is smaller, because only what is deleted makes room.
 std::size_t part_bytes(std::int64_t most, const std::string& folder) {
   std::error_code error;
   const std::uintmax_t free = fs::space(folder, error).available;
@@ -147,7 +147,7 @@ void Spool::drop_part(std::size_t index, const std::string& why) {
   fs::remove(path_of(part.number), ignored);
 }
 
-// What cannot be read any more is lost.
+// Counts the messages that can still be read; the others are lost.
 void Spool::count_again(Part& part) {
   Counts readable;
   std::int64_t bytes = 0;
@@ -167,8 +167,8 @@ void Spool::count_again(Part& part) {
   drop(lost, fmt::format("{} cannot be read from byte {} of {} on", path_of(part.number), offset, part.bytes));
 }
 
-// Of the files whose messages have all arrived, the last one stays: it has the numbers. While nothing can be written it
-// gives back its room.
+// Deletes the files whose messages have all arrived, but for the last one, which has the numbers. While nothing can be
+// written that one gives back its room.
 void Spool::tidy() {
   if (newest_ != nullptr && !condition_.trouble.empty() && parts_.back().waiting.messages == 0) {
     if (newest_->log().shrink_to(spool_record(facts_))) {

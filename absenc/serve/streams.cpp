@@ -39,7 +39,7 @@ bool Streams::make_room(const std::string& peer) {
   return break_off_slowest(peer, os::now() - patience);
 }
 
-// Of those whose client took nothing since `taken_before`.
+// Breaks off the slowest of the streams whose client took nothing since `taken_before`.
 bool Streams::break_off_slowest(const std::string& peer, Time taken_before) {
   auto slowest = open_.end();
   for (auto one = open_.begin(); one != open_.end(); ++one) {

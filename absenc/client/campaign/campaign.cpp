@@ -3,9 +3,7 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <array>
-#include <cmath>
 #include <ctime>
 #include <deque>
 #include <type_traits>
@@ -195,22 +193,7 @@ std::optional<CheckWorth> worth_of(const Unit& unit, const Options& options, dou
   return worth;
 }
 
-// Wilson's score interval: holds also where nothing, or all, was counted.
-double wilson(const Share& share, double side) {
-  if (share.of == 0) return side > 0 ? 1 : 0;
-  if (share.count == 0 && side < 0) return 0;  // not what rounding leaves
-  constexpr double z = 1.96;
-  const auto n = static_cast<double>(share.of);
-  const double p = share.rate();
-  const double middle = p + z * z / (2 * n);
-  const double half = z * std::sqrt(p * (1 - p) / n + z * z / (4 * n * n));
-  return std::clamp((middle + side * half) / (1 + z * z / n), 0.0, 1.0);
-}
-
 }  // namespace
-
-double Share::low() const { return wilson(*this, -1); }
-double Share::high() const { return wilson(*this, 1); }
 
 std::span<const LineFault> line_faults() { return all_faults; }
 

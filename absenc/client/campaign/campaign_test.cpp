@@ -132,13 +132,5 @@ TEST(CampaignTest, TellsWhatCannotBe) {
   EXPECT_THROW((void)run("tformatt", {}), UsageError);
 }
 
-// By the formula's own example values: 0 of 100 and 10 of 100.
-TEST(ShareTest, HasWilsonsInterval) {
-  EXPECT_NEAR((Share{0, 100}).low(), 0, 1e-12);
-  EXPECT_NEAR((Share{0, 100}).high(), 0.037, 1e-3);
-  EXPECT_NEAR((Share{10, 100}).low(), 0.0552, 1e-3);
-  EXPECT_NEAR((Share{10, 100}).high(), 0.1744, 1e-3);
-}
-
 }  // namespace
 }  // namespace absenc::client

@@ -16,14 +16,16 @@ struct Surroundings {
   std::function<os::PortFacts(const std::string& path)> facts = [](const std::string& path) {
     return os::port_facts(path);
   };
-  bool on_the_clock = false;  // what is late may be this computer, which is watched meanwhile
+  bool on_the_clock = false;  // the port keeps real time: how late this computer wakes a thread is measured meanwhile
 };
 
 /// As the one of client/doctor.hpp.
 [[nodiscard]] Examination examine(const EncoderAddress& address, const DoctorChoices& choices,
                                   const Surroundings& surroundings = {.on_the_clock = true});
 
-/// {"ok","findings":[{"id","severity","evidence","cause","action"}],"readings","good","complete","verdict"}
+/// {"ok","findings":[{"id","severity","evidence","cause","action"}],"readings","good","complete","seconds",
+/// "failures_below","verdict"}; with the times of replies, where there are some,
+/// "quickest_reply_ms","slowest_reply_ms".
 [[nodiscard]] Json to_json(const Examination& examination);
 
 }  // namespace absenc::client

@@ -6,11 +6,11 @@
 #include <set>
 #include <utility>
 
-#include "absenc/client/campaign.hpp"
 #include "absenc/client/doctor/damage.hpp"
 #include "absenc/client/doctor/judges.hpp"
 #include "absenc/client/doctor/words.hpp"
 #include "absenc/client/reading.hpp"
+#include "absenc/client/share.hpp"
 #include "absenc/client/text/unit_text.hpp"
 #include "absenc/client/text/wire_text.hpp"
 

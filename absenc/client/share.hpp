@@ -1,0 +1,19 @@
+// SPDX-License-Identifier: Apache-2.0
+// A share that was counted, and how sure it is.
+#pragma once
+
+#include <cstdint>
+
+namespace absenc::client {
+
+/// How many of how many, with the interval of 95 % confidence in which the true rate is (Wilson).
+struct Share {
+  std::uint64_t count = 0;
+  std::uint64_t of = 0;
+
+  [[nodiscard]] double rate() const { return of == 0 ? 0 : static_cast<double>(count) / static_cast<double>(of); }
+  [[nodiscard]] double low() const;
+  [[nodiscard]] double high() const;
+};
+
+}  // namespace absenc::client
