@@ -167,7 +167,7 @@ export class One {
     this.shownChoices = key;
     const focused = document.activeElement?.dataset?.value;
     const ranges = Object.entries(RANGES).map(([value, [text]]) => [value, text]);
-    this.ranges.replaceChildren(this.hasHistory ? choice("range", ranges, this.range, (value) => this.set("range", value)) : element("p", {class: "faint"}, "Live. No history is kept: see --history."));
+    this.ranges.replaceChildren(this.hasHistory ? choice("range", ranges, this.range, (value) => this.set("range", value)) : element("p", {class: "faint"}, "The latest readings. No history is kept: see --history."));
     this.units.replaceChildren(choice("unit", possible.map(([value, one]) => [value, one.text]), unit, (value) => this.set("unit", value)));
     if (focused) this.node(`[data-value="${focused}"]`)?.focus();
     this.quantity = all[unit];
