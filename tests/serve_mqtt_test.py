@@ -205,7 +205,7 @@ class Spool(MqttCase):
         stream = self.stream(server)
         dropped = wait_until(lambda: self.mqtt(server)["dropped"] > 500 and self.mqtt(server), "some were dropped")
         self.assertLessEqual(dropped["waiting_bytes"], 1_000_000)
-        told = stream.until(lambda event, data: event == "happening" and "dropped" in data["text"])
+        told = stream.until(lambda event, data: event == "happening" and "the spool is full" in data["text"])
         self.assertRegex(told["text"], r"^\d+ readings in \d+ messages were dropped, the oldest first: the spool is full")
         end(server.process, signal.SIGKILL)
         broker = self.broker()

@@ -401,7 +401,8 @@ void judge_mixed_frames(const Case& one, std::vector<Finding>& findings) {
                          one.seen.readings.begin(), one.seen.readings.end(),
                          [](const Attempted& attempt) { return attempt.error != Error::none && !attempt.heard; }));
   const std::size_t late = one.unit.link == LinkKind::can ? 0 : one.seen.late;
-  if (silent > 2 * late) {  // a late reply can cost the next reading, too
+  // A late reply can cost the next reading, too.
+  if (silent > 2 * late && !may_be_the_computer(one.seen, silent)) {
     findings.push_back(
         finding(Ailment::sometimes_silent, {fmt::format("{}", silent), fmt::format("{}", one.seen.readings.size())}));
   }

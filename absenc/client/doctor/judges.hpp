@@ -17,6 +17,13 @@ struct Case {
   std::size_t good = 0;
 };
 
+/// Whether so many replies that were late or did not come may be due to this computer, which was busy: the encoder may
+/// be a program on it, or an adapter whose driver waits, too.
+[[nodiscard]] inline bool may_be_the_computer(const Observations& seen, std::size_t some) {
+  constexpr Time busy = std::chrono::milliseconds(1);
+  return seen.woken_late >= busy && some * 1000 < seen.readings.size();
+}
+
 void judge_port(const Case& one, std::vector<Finding>& findings);
 void judge_line(const Case& one, std::vector<Finding>& findings);
 /// Of replies of which none is good.
