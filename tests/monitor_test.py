@@ -11,7 +11,7 @@ import unittest
 
 from command_support import ABSENC, PATIENCE, Emulator, EncoderCase, absenc, end, json_lines, read_line
 
-KEYS = " q quit   space pause   z zero   tab next   e errors   h help"
+KEYS = " q quit  p pause  z zero  c clear  tab next  e errors  h help"
 
 
 class Terminal:
@@ -124,11 +124,40 @@ class Screen(MonitorCase):
         terminal.press("z")
         terminal.wait_for("y: yes")
         terminal.press("y")
-        screen = terminal.wait_for("zero: done, and verified by reading back")
+        screen = terminal.wait_for("zero: sent and confirmed")
         terminal.wait_for(r"live +0\.000")
         terminal.press("q")
         self.assertEqual(terminal.exit_status(), 0, screen)
         self.assertEqual(json.loads(absenc("read", f"tformat:{emulator.path}", "--json").stdout)["singleturn"], 0)
+
+    def test_clearing_alarms_asks(self):
+        emulator = self.emulator("--alarm", "over_speed")
+        terminal = Terminal(self, f"tformat:{emulator.path}?latency=300")
+        terminal.wait_for("over_speed: ")
+        terminal.press("c")
+        terminal.wait_for(r"clear all latched alarms\? y: yes, any other key: no")
+        terminal.press("n")
+        self.assertIn("over_speed: ", terminal.wait_for(f"^{KEYS}"))
+        terminal.press("c")
+        terminal.wait_for("y: yes")
+        terminal.press("y")
+        terminal.wait_for("clear-alarms: sent and confirmed")
+        terminal.wait_for("no alarms")
+
+    def test_an_alarm_whose_cause_is_still_there(self):
+        emulator = self.emulator("--condition", "temperature=127")
+        terminal = Terminal(self, f"tformat:{emulator.path}?latency=300")
+        terminal.wait_for("over_heat: ")
+        terminal.press("c")
+        terminal.wait_for("y: yes")
+        terminal.press("y")
+        terminal.wait_for("clear-alarms failed: .*over_heat")
+
+    def test_an_encoder_whose_alarms_cannot_be_cleared(self):
+        terminal = Terminal(self, "sim:ssi")
+        terminal.wait_for(" live ")
+        terminal.press("c")
+        terminal.wait_for("ssi has no command that clears alarms")
 
     def test_pause(self):
         emulator = self.emulator()

@@ -320,10 +320,11 @@ void draw_encoder(Screen& screen, int row, int end, const Shown& shown, bool err
 }
 
 void draw_help(Screen& screen, int row, int end) {
-  constexpr std::array<std::string_view, 7> keys{
+  constexpr std::array<std::string_view, 8> keys{
       "q, Ctrl-C     quit",
       "space, p      pause: nothing is read; again: go on",
       "z             make this position the zero of this encoder: asks first",
+      "c             clear the latched alarms of this encoder: asks first",
       "tab, n, down  the next encoder",
       "up            the one before",
       "e             the last bad exchanges, byte by byte; again: the trace",
@@ -367,7 +368,7 @@ void draw(Screen& screen, const View& view) {
   } else {
     draw_encoder(screen, row, last, selected, view.below == View::Below::errors);
   }
-  const std::string_view keys = " q quit   space pause   z zero   tab next   e errors   h help";
+  const std::string_view keys = " q quit  p pause  z zero  c clear  tab next  e errors  h help";
   screen.fill(last, view.question.empty() ? std::string(keys) : question_in(view, screen.columns()), Style::title);
   screen.show();
 }

@@ -58,6 +58,8 @@ Key key_of(int key) {
       return Key::pause;
     case 'z':
       return Key::zero;
+    case 'c':
+      return Key::clear_alarms;
     case 'n':
     case '\t':
     case KEY_DOWN:

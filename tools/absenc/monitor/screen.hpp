@@ -12,7 +12,20 @@ namespace absenc::tool {
 
 enum class Style : std::uint8_t { plain, faint, bold, title, good, warning, bad };
 
-enum class Key : std::uint8_t { none, quit, pause, zero, next, previous, errors, help, yes, other, resized };
+enum class Key : std::uint8_t {
+  none,
+  quit,
+  pause,
+  zero,
+  clear_alarms,
+  next,
+  previous,
+  errors,
+  help,
+  yes,
+  other,
+  resized,
+};
 
 class Screen {
  public:

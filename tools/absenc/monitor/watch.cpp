@@ -115,6 +115,11 @@ void Watch::run(const Command& command) {
   changed_.notify_all();
 }
 
+void Watch::notify(std::string text) {
+  const std::lock_guard lock(mutex_);
+  known_.notice = std::move(text);
+}
+
 void Watch::work(const std::stop_token& stop) {
   try {
     Pace pace(rate_, offset_);
@@ -233,21 +238,23 @@ void Watch::add_line(Time at, const std::string& text) {
   if (lines_.size() > most_lines) lines_.pop_front();
 }
 
-void Watch::run_command(Encoder& live, const Command& command) {
-  std::string notice;
-  if (!live.connection().connected()) {
-    notice = fmt::format("{} was not done: the port is away", command.name);
-  } else {
-    try {
-      const Outcome outcome = live.connection().run(command, {});
-      live.forget_position();
-      notice = outcome.error == Error::none
-                   ? fmt::format("{}: done, and verified by reading back", command.name)
-                   : fmt::format("{} failed: {}", command.name, live.connection().trouble(outcome).message);
-    } catch (const os::Failure& failure) {  // the next reading will find the port lost
-      notice = fmt::format("{} was broken off, read whether it was done: {}", command.name, failure.what());
+std::string Watch::result_of(Encoder& live, const Command& command) {
+  Connection& connection = live.connection();
+  if (!connection.connected()) return fmt::format("{}: not sent: the port is away", command.name);
+  try {
+    const Outcome outcome = connection.run(command, {});
+    live.forget_position();
+    if (outcome.error != Error::none) {
+      return fmt::format("{} failed: {}", command.name, connection.trouble(outcome).message);
     }
+    return fmt::format("{}: {}", command.name, outcome.change.text());
+  } catch (const os::Failure& failure) {  // the next reading will find the port lost
+    return fmt::format("{} was broken off, read whether it was done: {}", command.name, failure.what());
   }
+}
+
+void Watch::run_command(Encoder& live, const Command& command) {
+  const std::string notice = result_of(live, command);
   add_line(os::now(), notice);
   const std::lock_guard lock(mutex_);
   known_.notice = notice;

@@ -67,6 +67,8 @@ class Watch {
   void pause(bool paused);
   /// Runs a command without arguments between two readings; the notice tells how it ended.
   void run(const Command& command);
+  /// Shows the text in place of how the last command ended.
+  void notify(std::string text);
 
   [[nodiscard]] const std::string& name() const { return name_; }
   [[nodiscard]] const EncoderAddress& uri() const { return uri_; }
@@ -78,6 +80,7 @@ class Watch {
   void trace(const Encoder& live, const Sample& sample);
   void add_line(Time at, const std::string& text);
   void run_command(Encoder& live, const Command& command);
+  [[nodiscard]] static std::string result_of(Encoder& live, const Command& command);
   void end(const std::string& why);
 
   std::string name_;

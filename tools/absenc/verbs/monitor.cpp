@@ -37,7 +37,7 @@ std::vector<Shown> look_at(const Watches& watches, std::size_t selected) {
 
 // ---- On a terminal
 
-/// Keys change what is shown, and may ask for the zero.
+/// Keys change what is shown, and ask before they change an encoder.
 class Controls {
  public:
   explicit Controls(Watches& watches) : watches_(&watches) {}
@@ -46,7 +46,7 @@ class Controls {
   bool take(Key key) {
     const bool answers = !view_.question.empty() && key != Key::none && key != Key::resized;
     if (answers) {
-      if (key == Key::yes) selected().run(*find_command(*selected().uri().unit, Verb::zero));
+      if (key == Key::yes) selected().run(*asked_);
       view_.question.clear();
       return true;
     }
@@ -58,7 +58,10 @@ class Controls {
         for (const auto& watch : *watches_) watch->pause(view_.paused);
         break;
       case Key::zero:
-        ask_for_zero();
+        ask_for(Verb::zero);
+        break;
+      case Key::clear_alarms:
+        ask_for(Verb::clear_alarms);
         break;
       case Key::next:
         view_.selected = (view_.selected + 1) % watches_->size();
@@ -88,14 +91,19 @@ class Controls {
 
   void toggle(View::Below below) { view_.below = view_.below == below ? View::Below::trace : below; }
 
-  void ask_for_zero() {
-    const Command* command = find_command(*selected().uri().unit, Verb::zero);
-    if (command == nullptr) return;
-    view_.question = fmt::format(" {}? y: yes, any other key: no", command->meaning);
+  void ask_for(Verb verb) {
+    const Unit& unit = *selected().uri().unit;
+    asked_ = find_command(unit, verb);
+    if (asked_ == nullptr) {
+      const std::string_view what = verb == Verb::zero ? "sets a zero" : "clears alarms";
+      return selected().notify(fmt::format("{} has no command that {}", unit.id, what));
+    }
+    view_.question = fmt::format(" {}? y: yes, any other key: no", asked_->meaning);
   }
 
   Watches* watches_;
   View view_;
+  const Command* asked_ = nullptr;  // what the question is about
 };
 
 void run_on_screen(Screen& screen, Watches& watches, Time end) {
