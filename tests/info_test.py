@@ -30,7 +30,7 @@ class Info(EncoderCase):
         self.assertNotIn("FAILED", result.stdout)
         for row in [rf"^encoder +tformat:{self.directory}/encoder$", r"^protocol +Tamagawa T-format",
                     r"^model +TS5700N8500: ", r"^line +RS-485 half duplex, 2\.5 Mbit/s$",
-                    r"^resolution +17 bits in a turn, 16 bits of turns$",
+                    r"^resolution +17 bits in a turn, 16 bits of turns \(0 to 65535\)$",
                     r"^options +singleturn_bits=17$", r"^ +strict=true$", r"^  encoder_id +0x11 ",
                     r"^  temperature_c +35 degC ", r"^  overheat_threshold_c +90 degC ",
                     r"^ *204\.799 deg +74565 counts +4660 turns +no alarms$"]:
@@ -73,7 +73,7 @@ class Info(EncoderCase):
         answers = info.pop("answers")
         self.assertEqual(info, {
             "encoder": address.split("?")[0], "protocol": "tformat", "model": "23-bit", "link": "half_duplex",
-            "rate": 1000000, "resolution": {"singleturn_bits": 23, "multiturn_bits": 16},
+            "rate": 1000000, "resolution": {"singleturn_bits": 23, "multiturn_bits": 16, "multiturn_signed": False},
             "options": {"singleturn_bits": 23, "multiturn_bits": 16, "encoder_id": 23, "strict": True,
                         "battery": True}, "ok": True})
         self.assertEqual(list(answers), questions())

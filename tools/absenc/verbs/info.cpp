@@ -28,11 +28,18 @@ namespace {
 
 using Rows = std::vector<std::vector<std::string>>;
 
+// Turns are shown as the encoder counts them: most count on from 0 backwards to their greatest number.
+std::string turns_text(const Resolution& resolution) {
+  const std::int64_t count = std::int64_t{1} << resolution.multiturn_bits;
+  const std::int64_t least = resolution.multiturn_signed ? -count / 2 : 0;
+  return fmt::format("{} bits of turns ({} to {})", resolution.multiturn_bits, least, least + count - 1);
+}
+
 std::string resolution_text(const Resolution& resolution) {
   if (resolution.unit_um > 0) return fmt::format("{} bits of {} um", resolution.singleturn_bits, resolution.unit_um);
   std::vector<std::string> parts;
   if (resolution.singleturn_bits != 0) parts.push_back(fmt::format("{} bits in a turn", resolution.singleturn_bits));
-  if (resolution.multiturn_bits != 0) parts.push_back(fmt::format("{} bits of turns", resolution.multiturn_bits));
+  if (resolution.multiturn_bits != 0) parts.push_back(turns_text(resolution));
   return fmt::format("{}", fmt::join(parts, ", "));
 }
 
@@ -65,6 +72,7 @@ Json identity_json(const EncoderAddress& uri, const Resolution& resolution) {
   const Unit& unit = *uri.unit;
   Json bits = Json::object().set("singleturn_bits", resolution.singleturn_bits);
   bits.set("multiturn_bits", resolution.multiturn_bits);
+  if (resolution.multiturn_bits != 0) bits.set("multiturn_signed", resolution.multiturn_signed);
   if (resolution.unit_um > 0) bits.set("unit_um", resolution.unit_um);
   return Json::object()
       .set("encoder", address_of(uri))
@@ -176,7 +184,10 @@ class Survey {
   }
 
   static Resolution resolution_of(const Reading& reading) {
-    return {reading.singleturn_bits, reading.multiturn_bits, reading.unit_um};
+    return {.singleturn_bits = reading.singleturn_bits,
+            .multiturn_bits = reading.multiturn_bits,
+            .unit_um = reading.unit_um,
+            .multiturn_signed = reading.multiturn_signed};
   }
   static bool same(const Resolution& a, const Resolution& b) {
     return a.singleturn_bits == b.singleturn_bits && a.multiturn_bits == b.multiturn_bits && a.unit_um == b.unit_um;
