@@ -83,7 +83,7 @@ class FakeBroker:
 
     def __init__(self, answer=None):
         self.answer = answer
-        self.messages = []  # (topic, payload as JSON or None)
+        self.payloads = {}  # by topic, as JSON or None, in the order in which they came
         self.connections = 0
         self.lock = threading.Lock()
         self.open = set()
@@ -128,7 +128,7 @@ class FakeBroker:
 
     def keep(self, topic, _number, payload):
         with self.lock:
-            self.messages.append((topic, json.loads(payload) if payload else None))
+            self.payloads.setdefault(topic, []).append(json.loads(payload) if payload else None)
 
     @staticmethod
     def usual(kind, flags, body, old):
@@ -141,7 +141,13 @@ class FakeBroker:
     def all(self, ending):
         """Payloads of the topics that end in this."""
         with self.lock:
-            return [payload for topic, payload in self.messages if topic.endswith(ending)]
+            return [payload for topic, payloads in self.payloads.items() if topic.endswith(ending)
+                    for payload in payloads]
+
+    def after(self, topic, count):
+        """Payloads of the topic behind the first `count`: who looks again and again takes only what is new."""
+        with self.lock:
+            return self.payloads.get(topic, [])[count:]
 
     def drop_all(self):
         with self.lock:

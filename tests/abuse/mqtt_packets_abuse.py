@@ -122,20 +122,28 @@ class Packets(ServeCase):
             self.assertEqual(server.encoder()["state"], "live")
             goal = server.json("/api/mqtt")["taken"][ONE]
             readings = f"plant/{index}/{ONE.replace(':', '%3A').replace('?', '%3F').replace('=', '%3D')}/readings"
-            late = time.monotonic() + 90 + PATIENCE  # a topic that was taken for refused is tried again after a minute
-            while max(self.of(readings) or [0]) < goal:
-                self.assertLess(time.monotonic(), late, "the rest comes")
-                time.sleep(0.2)  # between two looks
-            found = sorted(set(self.of(readings)))
+            messages = self.wait_for(readings, goal, server)
+            found = sorted(set(numbers(messages, ONE)))
             self.assertEqual(found, list(range(1, found[-1] + 1)), "numbers of readings")
             self.assertEqual(server.json("/api/mqtt")["dropped"], 0)
-            times = sorted({reading[0] for one in self.broker.all(readings) for reading in one["readings"]})
+            times = sorted({reading[0] for one in messages for reading in one["readings"]})
             gap = max(later - earlier for earlier, later in zip(times, times[1:]))
             self.assertLess(gap, 1_000_000 * BUSY, "microseconds without a reading")
         print(f"{conversations} conversations, {deaths} ended a client, no server", flush=True)
 
-    def of(self, topic):
-        return numbers(self.broker.all(topic), ONE)
+    def wait_for(self, topic, goal, server):
+        """All messages of the topic, as soon as the reading of this number is among them."""
+        messages = []
+        last = 0
+        while last < goal:
+            # While messages come it takes as long as it takes; a topic that was refused is tried again after a minute.
+            late = time.monotonic() + 90 + PATIENCE
+            while not (new := self.broker.after(topic, len(messages))):
+                self.assertLess(time.monotonic(), late, f"reading {goal} comes after {last}: {server.json('/api/mqtt')}")
+                time.sleep(0.05)  # between two looks
+            messages += new
+            last = max([last, *numbers(new, ONE)])
+        return messages
 
 
 if __name__ == "__main__":
