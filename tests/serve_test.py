@@ -5,12 +5,14 @@ import json
 import os
 import re
 import resource
+import shlex
 import signal
 import sqlite3
 import subprocess
 import threading
 import time
 import unittest
+import unittest.mock
 import urllib.parse
 
 import jsonschema
@@ -364,8 +366,28 @@ class HeldPort(ServeCase):
             refused = absenc("read", f"tformat:{emulator.path}")
             self.assertEqual(refused.returncode, 1)
             self.assertIn(f"in use by absenc serve (process {served.process.pid})", refused.stderr)
-            self.assertIn("its page and its API", refused.stderr)
             self.assertNotIn("end it", refused.stderr)
+
+    def test_who_finds_the_port_in_use_is_led_to_the_server(self):
+        with unittest.mock.patch.dict(os.environ, {"XDG_RUNTIME_DIR": self.directory}), \
+             Emulator(self.directory) as emulator:
+            served = self.without_history(f"tformat:{emulator.path}")
+            wait_until(lambda: served.encoder()["state"] == "live", "it is read")
+            refused = absenc("read", f"tformat:{emulator.path}").stderr
+            command = re.search(r"`(curl --silent \S+)` prints what it reads", refused)
+            self.assertIsNotNone(command, refused)
+            printed = subprocess.run(shlex.split(command.group(1)), capture_output=True, text=True, check=True).stdout
+            self.assertEqual(json.loads(printed)["encoders"][0]["encoder"], f"tformat:{emulator.path}")
+            folder = os.path.join(self.directory, "absenc")
+            (notice,) = os.listdir(folder)
+            # What another process wrote, which is there no more, says nothing of who has the port.
+            with open(os.path.join(folder, notice), "w", encoding="utf-8") as file:
+                file.write("1 http://127.0.0.1:1/\n")
+            refused = absenc("read", f"tformat:{emulator.path}").stderr
+            self.assertNotIn("127.0.0.1:1/", refused)
+            self.assertIn("its page and its API", refused)
+            end(served.process)
+            self.assertEqual(os.listdir(folder), [])
 
 
 class Losses(ServeCase):

@@ -13,6 +13,7 @@
 #include <fstream>
 #include <string_view>
 
+#include "absenc/os/served_port.hpp"
 #include "absenc/os/sys_file.hpp"
 
 namespace absenc::os {
@@ -78,10 +79,14 @@ std::string opener(const fs::path& file) {
 Failure in_use(const std::string& path) {
   std::string holder = holder_of(path);
   // A server reads for many: who ended it would take the encoder from all of them.
-  if (holder.starts_with("absenc serve ")) {
-    return {Failure::Kind::in_use,
-            "the port " + path + " is in use by " + holder +
-                ": its page and its API (/api/encoders) show what it reads; or use another port"};
+  constexpr std::string_view server = "absenc serve (process ";
+  if (holder.starts_with(server)) {
+    const std::string process = holder.substr(server.size(), holder.size() - server.size() - 1);
+    const std::string page = page_of_server(path, process);
+    const std::string where =
+        page.empty() ? "its page and its API (/api/encoders) show what it reads"
+                     : "`curl --silent " + page + "api/encoders` prints what it reads, and " + page + " shows it";
+    return {Failure::Kind::in_use, "the port " + path + " is in use by " + holder + ": " + where};
   }
   if (holder.empty()) holder = "another program";
   return {Failure::Kind::in_use, "the port " + path + " is in use by " + holder + ": end it, or use another port"};

@@ -11,6 +11,7 @@
 #include <thread>
 
 #include "absenc/client/error.hpp"
+#include "absenc/os/served_port.hpp"
 #include "absenc/os/signals.hpp"
 #include "absenc/serve/api.hpp"
 #include "absenc/serve/sending.hpp"
@@ -39,6 +40,7 @@ struct Server::Parts {
   explicit Parts(const Choices& choices)
       : listener(os::listen_at(choices.host, choices.port)),
         url(url_of(choices.host, listener.port)),
+        served_ports(url),
         access({choices.token_file, choices.public_url, listener.on_loopback}, happenings),
         fleet(choices.encoders, choices.rate, happenings),
         sending(fleet, happenings) {
@@ -49,6 +51,7 @@ struct Server::Parts {
     http.emplace(
         std::move(listener), [this](const Request& request, const Reply& reply) { api->answer(request, reply); },
         std::vector<std::string>{"/healthz", "/metrics"});
+    tell_ports();
     teller = std::jthread([this](const std::stop_token& stop) { tell(stop); });
   }
 
@@ -59,6 +62,15 @@ struct Server::Parts {
     fleet.end();   // what a command tells at its end goes into the history
     tell_happenings();
     sending.change_to({});
+  }
+
+  // Who finds one of the ports in use is led here.
+  void tell_ports() {
+    std::vector<std::string> ports;
+    for (const std::shared_ptr<Watch>& watch : fleet.all()) {
+      if (!watch->address().path.empty()) ports.push_back(watch->address().path);
+    }
+    served_ports.set(ports);
   }
 
   void tell(const std::stop_token& stop) {
@@ -110,6 +122,7 @@ struct Server::Parts {
   Happenings happenings;
   os::Listener listener;
   std::string url;
+  os::ServedPorts served_ports;
   Access access;
   Fleet fleet;
   Sending sending;
@@ -141,6 +154,7 @@ std::string Server::reload() {
     throw client::UsageError(failure.what());
   }
   std::string changed = parts_->fleet.reload();
+  parts_->tell_ports();
   changed += parts_->sending.change_to(outlets);
   parts_->happenings.add({calendar_ms(), "", "change", "absenc.toml was read again: " + changed});
   return changed;
