@@ -4,10 +4,14 @@ import errno
 import fcntl
 import json
 import os
+import random
+import select
 import signal
 import struct
 import subprocess
 import termios
+import threading
+import tty
 
 from command_support import Emulator, EncoderCase, absenc, end
 
@@ -63,6 +67,37 @@ def divisor():
         return latch
 
 
+class EncoderAtOneRate(threading.Thread):
+    """Answers at OTHER, well while PORT has its rate. At others the frames are garbled, which the UARTs of a virtual
+    machine do not do by themselves."""
+
+    REPLY = bytes.fromhex("1a 00000000 11 000000 00 0b")  # to 1A: 17 bits and 16 of turns, both 0, no alarm
+
+    def __init__(self, rate):
+        super().__init__()
+        self.rate = rate
+        self.line = os.open(OTHER, os.O_RDWR | os.O_NOCTTY)
+        tty.setraw(self.line)
+        self.wake, self.waker = os.pipe()
+
+    def run(self):
+        noise = random.Random(5)
+        while self.wake not in select.select([self.line, self.wake], [], [])[0]:
+            for _ in os.read(self.line, 64):
+                is_heard = settings(PORT)[-1] == self.rate
+                os.write(self.line, self.REPLY if is_heard else noise.randbytes(len(self.REPLY)))
+
+    def __enter__(self):
+        self.start()
+        return self
+
+    def __exit__(self, *_):
+        os.write(self.waker, b"x")
+        self.join()
+        for descriptor in (self.line, self.wake, self.waker):
+            os.close(descriptor)
+
+
 class Uart(EncoderCase):
     def emulator(self, *arguments, baud, protocol="tformat"):
         emulator = Emulator("/dev", *arguments, protocol=protocol, name=f"{OTHER}?baud={baud}", line="--port")
@@ -95,6 +130,19 @@ class Uart(EncoderCase):
         self.assert_failed(result, f"the port {PORT} cannot do 2500000 baud", "nearest rate is 115200")
         result = absenc("emulate", "tformat", "--port", PORT, "--for", "5")
         self.assert_failed(result, "cannot do 2500000 baud")
+
+    def doctor(self, baud):
+        found = json.loads(absenc("doctor", f"tformat:{PORT}?latency=300&baud={baud}", "--for", "1", "--json").stdout)
+        return found["verdict"]
+
+    def test_the_doctor_names_the_rate(self):
+        for rate, said in ((19200, 57600), (57600, 9600)):
+            with self.subTest(rate), EncoderAtOneRate(rate):
+                self.assertRegex(self.doctor(said), f"^first: wrong_baud: set baud={rate}$")
+                self.assertRegex(self.doctor(rate), "^good: ")
+
+    def test_the_doctor_names_a_rate_that_the_uart_cannot_do(self):
+        self.assertRegex(self.doctor(2500000), "^first: port_rate: ")
 
     def test_a_uart_that_is_only_listed(self):
         self.assert_failed(absenc("read", "tformat:/dev/ttyS3"), "the port /dev/ttyS3 is there", "no hardware")
