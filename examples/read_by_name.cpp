@@ -2,6 +2,7 @@
 // Any encoder by its name, as the command has it: tformat:/dev/ttyUSB0, ssi:spi:/dev/spidev0.0, sim:esl, elbow.
 #include <cstdio>
 #include <exception>
+#include <optional>
 
 #include "absenc/client/encoder.hpp"
 
@@ -17,7 +18,9 @@ int main(int argc, char** argv) try {
     }
     const Reading& reading = sample.reading;
     if (!reading.singleturn_valid()) continue;  // nobody confirmed it, or the encoder says so itself
-    std::printf("%.4f degrees, %.1f rpm\n", degrees(reading.singleturn, reading.singleturn_bits), sample.speed);
+    std::printf("%.4f degrees\n", degrees(reading.singleturn, reading.singleturn_bits));
+    const std::optional<client::Estimate> speed = sample.speed_rpm();
+    if (speed) std::printf("%.1f rpm, within %.1f\n", speed->value, speed->uncertainty);
   }
   // [readme]
 } catch (const std::exception& failure) {

@@ -86,7 +86,7 @@ class Recording(Case):
         header, rows = read_csv(self.record("log.csv"))
         self.assertEqual(list(rows[0]), ["time_s", "position_mm", "position_um", "singleturn", "singleturn_valid",
                                          "multiturn", "multiturn_valid", "status", "alarms", "position", "unwrapped_mm",
-                                         "speed_mm_s", "speed_delay_s", "missed", "event"])
+                                         "speed_mm_s", "speed_uncertainty_mm_s", "speed_delay_s", "missed", "event"])
         for name in ("position_mm", "position_um", "unwrapped_mm", "speed_mm_s"):
             self.assertIn(name, header)
         self.assert_motion(rows)
@@ -135,7 +135,7 @@ class SpeedLimit(Case):
 class Monitor(Case):
     def test_lines(self):
         text = absenc("monitor", FAST, "--for", "1").stdout
-        self.assertRegex(text, r"\d\.\d{3} mm .* 6710\d\.\d mm/s ")
+        self.assertRegex(text, r"\d\.\d{3} mm .* 6710\d\.\d+ ± 0\.\d+ mm/s ")
         shown = json_lines(absenc("monitor", FAST, "--for", "1", "--json").stdout)[-1]
         self.assertAlmostEqual(shown["speed_mm_s"], 2**26 / 1000, delta=5)
         self.assertEqual(shown["unwrapped_mm"], shown["position"] / 1000)
@@ -147,7 +147,7 @@ class Monitor(Case):
         self.assertRegex(screen, r"state +mm +turns +mm/s +a second")
         self.assertIn("33554.432 mm", screen)
         self.assertRegex(screen, r"0 \|-+\+-+O-+\+-+\| 67108\.9 mm")
-        terminal.wait_for(r"speed 0\.0 mm/s, .*; position 33554\.432 mm")
+        terminal.wait_for(r"speed 0\.0+ \+/- 0\.\d+ mm/s, .*; position 33554\.432 mm")
 
     def test_beside_a_rotary_encoder(self):
         terminal = Terminal(self, "sim:biss?model=linear-26-1um", "sim:tformat")

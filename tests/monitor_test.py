@@ -78,11 +78,11 @@ class Screen(MonitorCase):
             screen,
             f" absenc monitor   {re.escape(address[:62])}.*",
             "  encoder                  state     degrees   turns       rpm a second failed",
-            rf"> {re.escape(address[:11])}\.\.{re.escape(address[-11:])} live      180\.000      12       0\.0 +\d+\.\d      0 !",
+            rf"> {re.escape(address[:11])}\.\.{re.escape(address[-11:])} live      180\.000      12 +0\.0+ +\d+\.\d      0 !",
             "",
             "  180.000 deg    65536 counts      12 turns   alarms: over_heat",
             r"  0 \|-{17}\+-{16}O-{16}\+-{16}\| 360",
-            r"  speed 0\.0 rpm, [\d.]+ ms ago; position 1638400 counts",
+            r"  speed 0\.0+ \+/- 0\.\d+ rpm, [\d.]+ ms ago; position 1638400 counts",
             r"  \d+\.\d a second; latency 50 % [\d.]+ .s, 99 % [\d.]+ .s, longest [\d.]+ .s",
             r"  \d+ good; the port went away: 0",
             "  over_heat: the encoder is or was hotter than its threshold. What to do: let it",
@@ -305,7 +305,8 @@ class Lines(MonitorCase):
         lines = result.stdout.splitlines()
         self.assertGreaterEqual(len(lines), 3)
         self.assertTrue(lines[-1].startswith(f"{address}: 180.000 deg    65536 counts       0 turns   alarms: "
-                                             "battery_alarm   0.0 rpm   "), lines[-1])
+                                             "battery_alarm   0.0"), lines[-1])
+        self.assertRegex(lines[-1], r"battery_alarm   0\.0+ ± 0\.\d+ rpm   ")
         self.assertIn(f"{address} is live", result.stderr)
         self.assertIn("of processor time each", result.stderr)
 

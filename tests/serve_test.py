@@ -40,9 +40,9 @@ class Values(ServeCase):
             data = stream.until(lambda event, _: event == "points")
             self.assertEqual(data["encoder"], name)
             points += data["points"]
-        times = [at for at, _, _ in points]
+        times = [at for at, _, _, _ in points]
         self.assertEqual(times, sorted(times))
-        self.assertEqual(len(set(place for _, place, _ in points)), len(points))
+        self.assertEqual(len(set(place for _, place, _, _ in points)), len(points))
 
     def test_alarms_in_words(self):
         server = self.without_history("sim:tformat?alarm=over_heat")
@@ -207,7 +207,7 @@ class Values(ServeCase):
         server = self.without_history(name, "--rate", "100")
         wait_until(lambda: len(server.json(of(name, "points"))["points"]) > 100, "it was read for a second")
         points = server.json(of(name, "points"))["points"]
-        times = [at_ms for at_ms, _, _ in points]
+        times = [at_ms for at_ms, _, _, _ in points]
         steps = sorted(after - before for before, after in zip(times, times[1:]))
         self.assertGreaterEqual(steps[0], 10)
         self.assertLess(steps[len(steps) // 2], 50)

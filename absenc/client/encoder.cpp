@@ -238,23 +238,29 @@ Sample Encoder::take(Reading reading) {
   Sample sample{.kind = Sample::Kind::reading, .at = reading.latched, .confirmed = connection_->confirmed()};
   sample.doubtful = reading.ready && reading.singleturn_valid() && !sample.confirmed;
   sample.reading = reading = checked(reading, sample.confirmed);
+  host::LatchTime latched = connection_->latch_time();
+  latched.earliest += offset_;
+  latched.latest += offset_;
   const bool jumped = unwrapper_.jumps(reading);
   if (jumped) forget_position();
-  const host::Unwrapper::Joined joined = unwrapper_.add(reading);
+  const host::Unwrapper::Joined joined = unwrapper_.add(reading, latched);
   if (joined == host::Unwrapper::Joined::ignored) return sample;
   if (joined != host::Unwrapper::Joined::continued) velocity_.restart();
-  if (jumped || joined == host::Unwrapper::Joined::restarted) note_restart(sample, jumped);
-  unwrapped_at_ = reading.latched;
-  velocity_.add(unwrapper_.position(), reading.latched);
+  if (jumped || joined == host::Unwrapper::Joined::restarted) {
+    note_restart(sample, jumped, latched.latest - unwrapped_at_);
+  }
+  unwrapped_at_ = latched.earliest;
+  velocity_.add(unwrapper_.position(), latched);
   sample.position_valid = true;
   sample.position = unwrapper_.position();
   sample.speed_valid = velocity_.valid();
   sample.speed = speed_of(reading, velocity_.counts_per_second());
-  sample.speed_delay = velocity_.delay();
+  sample.speed_uncertainty = std::abs(speed_of(reading, velocity_.uncertainty()));
+  if (sample.speed_valid) sample.speed_delay = velocity_.delay() - (latched.middle() - reading.latched);
   return sample;
 }
 
-void Encoder::note_restart(Sample& sample, bool jumped) {
+void Encoder::note_restart(Sample& sample, bool jumped, Time pause) {
   ++restarts_;
   sample.restarted = true;
   const std::string limit = limit_text(connection_->uri(), sample.reading);
@@ -270,7 +276,7 @@ void Encoder::note_restart(Sample& sample, bool jumped) {
   sample.message = fmt::format(
       "{} between two readings are too long to know how far it went meanwhile, at up to {}: the position starts again "
       "from the encoder's own{}",
-      to_text(sample.reading.latched - unwrapped_at_), limit,
+      to_text(pause), limit,
       rotates ? ". If the shaft is slower, say so with max_rpm=RPM" : ". If it is slower, say so with max_mm_s=MM/S");
 }
 
@@ -290,6 +296,15 @@ PositionState Sample::position_state() const {
   }
   return PositionState::none;
 }
+
+std::optional<Estimate> Sample::measured_speed() const {
+  if (!speed_valid) return {};
+  return Estimate{speed, speed_uncertainty};
+}
+
+std::optional<Estimate> Sample::speed_rpm() const { return reading.unit_um > 0 ? std::nullopt : measured_speed(); }
+
+std::optional<Estimate> Sample::speed_mm_s() const { return reading.unit_um > 0 ? measured_speed() : std::nullopt; }
 
 std::string_view text_of(PositionState state) {
   switch (state) {

@@ -8,12 +8,14 @@
 #include <functional>
 #include <initializer_list>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "absenc/client/input_range.hpp"
+#include "absenc/client/estimate.hpp"
 #include "absenc/client/memory.hpp"
 #include "absenc/client/row.hpp"
 #include "absenc/client/settings.hpp"
@@ -53,10 +55,14 @@ struct Sample {
   bool confirmed = false;  // two readings in a row agreed
   bool doubtful = false;   // it looked valid, but none agreed with it: it is marked invalid
   bool position_valid = false;
-  std::int64_t position = 0;  // counts, continued past the end of the counter
-  bool restarted = false;     // it jumped, or how far it went meanwhile is not known: `position` starts again
-  bool speed_valid = false;
-  double speed = 0;  // `speed_delay` before `at`: rpm, of linear encoders mm/s
+  std::int64_t position = 0;     // counts, continued past the end of the counter
+  bool restarted = false;        // it jumped, or how far it went meanwhile is not known: `position` starts again
+  bool speed_valid = false;      // the times of the positions leave little of it open; otherwise there is none
+  double speed = 0;              // rpm, of linear encoders mm/s: the mean between two positions, as it was
+                                 // `speed_delay` before `at`
+  double speed_uncertainty = 0;  // the same unit: how far that mean can be from the true one between the instants at
+                                 // which the two were latched. From the times of requests and replies and from one
+                                 // count of each position; errors and noise of the encoder are not in it
   Time speed_delay{};
   Trouble trouble{};      // failed
   std::string message{};  // lost, absent, back, restarted
@@ -64,6 +70,13 @@ struct Sample {
   /// Whether `reading.singleturn` can be used. Of turns `reading.multiturn_validity()` says it, of the position that
   /// goes on past the counter's end `position_valid`.
   [[nodiscard]] PositionState position_state() const;
+
+  /// The speed with its uncertainty where it is valid, in rpm, of linear encoders in mm/s.
+  [[nodiscard]] std::optional<Estimate> measured_speed() const;
+  /// The same of a rotary encoder; nothing of a linear one.
+  [[nodiscard]] std::optional<Estimate> speed_rpm() const;
+  /// The same of a linear encoder; nothing of a rotary one.
+  [[nodiscard]] std::optional<Estimate> speed_mm_s() const;
 
   /// Why there is no reading, or what happened; "" of a reading that goes on.
   [[nodiscard]] std::string text() const { return kind == Kind::failed ? trouble.text() : message; }
@@ -170,7 +183,7 @@ class Encoder {
   Sample search();
   Reading read_now();
   Sample take(Reading reading);
-  void note_restart(Sample& sample, bool jumped);
+  void note_restart(Sample& sample, bool jumped, Time pause);
 
   std::unique_ptr<std::atomic<bool>> cancelled_;
   std::function<bool()> over_{};
@@ -185,7 +198,7 @@ class Encoder {
   bool was_there_ = false;
   std::uint64_t readings_ = 0;
   std::uint64_t losses_ = 0;
-  Time unwrapped_at_{};  // of the last valid position
+  Time unwrapped_at_{};  // the earliest time at which the last valid position was latched
   std::uint64_t restarts_ = 0;
 };
 

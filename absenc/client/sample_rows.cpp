@@ -42,6 +42,10 @@ void SampleRows::add_motion() {
   const std::string_view mean = "mean over twice speed_delay_s";
   add(is_linear ? Column{"speed_mm_s", "mm/s", Type::real, mean, rounded}
                 : Column{"speed_rpm", "rpm", Type::real, mean, rounded});
+  const std::string_view most = "how far the true mean is from it at most: what times and counts leave open";
+  const Column::Look short_look{.format = "{:.3g}"};
+  add(is_linear ? Column{"speed_uncertainty_mm_s", "mm/s", Type::real, most, short_look}
+                : Column{"speed_uncertainty_rpm", "rpm", Type::real, most, short_look});
   const std::string_view before =
       is_linear ? "how long before time_s it was so fast" : "how long before time_s the shaft had that speed";
   add({"speed_delay_s", "s", Type::real, before, {.format = "{:.6f}"}});
@@ -87,6 +91,7 @@ void SampleRows::fill_motion(const Sample& sample) {
   put(sample.position_valid, sample.position);
   if (unit_um_ > 0) put(sample.position_valid, micrometres(sample.position, unit_um_) / 1000);
   put(sample.speed_valid, sample.speed);
+  put(sample.speed_valid, sample.speed_uncertainty);
   put(sample.speed_valid, seconds(sample.speed_delay));
 }
 

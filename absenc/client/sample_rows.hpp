@@ -15,7 +15,8 @@ namespace absenc::client {
 /// A row for each sample, and for readings that were due and not taken. Columns: `time_s`, `protocol`; `angle_deg`, of
 /// linear encoders `position_mm` and `position_um`; `singleturn`, `multiturn` with their bits and whether they are
 /// valid; flags; `confirmed`, `ok`; with motion `position`, `unwrapped_mm` (linear), `speed_rpm` or `speed_mm_s`,
-/// `speed_delay_s`, `missed`; `event`, `message`, `sent`, `received`, which tell what came in place of a reading.
+/// the same as `speed_uncertainty_...`, `speed_delay_s`, `missed`; `event`, `message`, `sent`, `received`, which tell
+/// what came in place of a reading.
 class SampleRows {
  public:
   enum class With : std::uint8_t { reading, motion };

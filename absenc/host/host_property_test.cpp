@@ -101,9 +101,10 @@ RC_GTEST_PROP(VelocityProperty, IsThatOfTheMiddleOfItsWindow, ()) {
     if (!velocity.valid()) continue;
     const double delay = std::chrono::duration<double>(velocity.delay()).count();
     const double wanted = speed + acceleration * (seconds - delay);
-    const double one_count = 1 / (2 * delay);
-    RC_ASSERT(std::abs(velocity.counts_per_second() - wanted) <= one_count + 1e-6 * std::abs(wanted) + 1e-3);
-    RC_ASSERT(velocity.delay() <= std::max(Time(std::chrono::milliseconds(25)), Time(3 * period / 4)));
+    RC_ASSERT(std::abs(velocity.counts_per_second() - wanted) <=
+              velocity.uncertainty() + 1e-6 * std::abs(wanted) + 1e-3);
+    RC_ASSERT(velocity.uncertainty() <= 1 / (2 * delay) * (1 + 1e-9) + 1e-9);
+    RC_ASSERT(velocity.delay() <= std::chrono::milliseconds(520));
   }
 }
 

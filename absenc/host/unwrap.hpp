@@ -6,6 +6,7 @@
 
 #include "absenc/core/angle.hpp"
 #include "absenc/host/apart.hpp"
+#include "absenc/host/latch_time.hpp"
 #include "absenc/host/speed_limit.hpp"
 
 namespace absenc::host {
@@ -23,15 +24,18 @@ class Unwrapper {
   };
 
   explicit constexpr Unwrapper(const SpeedLimit& limit = {}, Times times = Times::latched)
-      : limit_(limit), apart_(times) {}
+      : limit_(limit), times_(times), apart_(times) {}
 
-  constexpr Joined add(const Reading& reading) {
+  constexpr Joined add(const Reading& reading) { return add(reading, latch_time(reading)); }
+  /// A reply may be late because the encoder was: what counts is how far apart the two positions can have been latched.
+  constexpr Joined add(const Reading& reading, const LatchTime& at) {
     if (!has_position(reading)) return Joined::ignored;
     const bool first = !started_;
-    const bool joins = !first && is_near(reading);
+    const bool joins = !first && is_near(reading) && are_surely_near(reading, at);
     position_ = joins ? position_ + static_cast<std::uint64_t>(way(reading)) : absolute(reading);
     apart_.add(reading.latched);
     last_ = reading;
+    last_at_ = at;
     started_ = true;
     return first ? Joined::started : joins ? Joined::continued : Joined::restarted;
   }
@@ -78,6 +82,12 @@ class Unwrapper {
     return apart(reading) < longest_gap(resolution_of(reading), limit_);
   }
 
+  // `longest_gap` leaves a sixteenth for times that are not known to the microsecond: this is all of it.
+  [[nodiscard]] constexpr bool are_surely_near(const Reading& reading, const LatchTime& at) const {
+    const Time gap = longest_gap(resolution_of(reading), limit_);
+    return times_ == Times::arrived || gap == never || at.latest - last_at_.earliest < gap / 15 * 16;
+  }
+
   [[nodiscard]] constexpr Time apart(const Reading& reading) const { return apart_.since_last(reading.latched); }
 
   [[nodiscard]] constexpr std::int64_t way(const Reading& reading) const {
@@ -89,10 +99,12 @@ class Unwrapper {
   }
 
   SpeedLimit limit_;
+  Times times_;
   Apart apart_;
   bool started_ = false;
   std::uint64_t position_ = 0;  // unsigned: what overflows after 2^63 counts goes round
   Reading last_{};
+  LatchTime last_at_{};
 };
 
 }  // namespace absenc::host

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Speed from positions, with a delay that is known.
+// Speed from positions, with its uncertainty and with a delay that is known.
 #pragma once
 
 #include <array>
@@ -7,56 +7,141 @@
 #include <cstdint>
 
 #include "absenc/core/time.hpp"
+#include "absenc/host/latch_time.hpp"
 
 namespace absenc::host {
 
-/// The mean speed between the newest position and the oldest one of a window: at constant acceleration exactly the
-/// speed in the middle of that time, so the delay is half of it. One count of noise is one count divided by that time.
+/// The mean speed between two positions: the newest one and an older one. At constant acceleration this is the speed in
+/// the middle of that time, so the delay is half of it.
+///
+/// The true mean speed between the two instants of latching is never farther from `counts_per_second` than
+/// `uncertainty`: as far as the latch times and one count of each position leave it open. The noise and the errors of
+/// the encoder itself are not in it.
+///
+/// The time between the two positions is `window` where that is enough. It is longer, up to `longest_windows` of it,
+/// until the latch times leave a twentieth of the speed open to either side and the way is twenty counts. With the
+/// longest time any number of counts will do, and a fourth of the speed may be open. Otherwise no speed is valid.
 class Velocity {
  public:
-  static constexpr std::size_t most_positions = 32;  // at high rates the window is as long as these
+  static constexpr std::size_t most_positions = 48;
+  static constexpr int longest_windows = 20;
 
-  /// At low rates the window is one step from reading to reading.
+  /// Where readings are farther apart than `window`, the time is one step from reading to reading.
   explicit constexpr Velocity(Time window = std::chrono::milliseconds(50)) : window_(window) {}
 
-  /// `position` as of `Unwrapper`, latched at `at`, which must lie after the one before; otherwise it is not taken.
-  constexpr void add(std::int64_t position, Time at) {
-    if (size_ != 0 && at <= from_newest(0).at) return;
-    newest_ = (newest_ + 1) % most_positions;
-    positions_[newest_] = {position, at};
-    if (size_ < most_positions) ++size_;
-    while (size_ > 2 && at - from_newest(size_ - 1).at > window_) --size_;
+  /// `position` as of `Unwrapper`. A position whose latch time does not lie behind the one before is not taken.
+  constexpr void add(std::int64_t position, const LatchTime& at) {
+    start_ = none;
+    if (size_ != 0 && at.middle() <= newest().at.middle()) return;
+    if (size_ == most_positions) thin_out();
+    positions_[size_++] = {position, at};
+    forget_old();
+    choose_start();
   }
+  /// The time is known exactly.
+  constexpr void add(std::int64_t position, Time at) { add(position, {at, at}); }
 
   /// After a jump of the position, or a pause.
-  constexpr void restart() { size_ = 0; }
+  constexpr void restart() {
+    size_ = 0;
+    start_ = none;
+  }
 
-  [[nodiscard]] constexpr bool valid() const { return size_ >= 2; }
+  /// Whether the last position has a speed.
+  [[nodiscard]] constexpr bool valid() const { return start_ != none; }
   /// 0 while not valid.
   [[nodiscard]] constexpr double counts_per_second() const {
     if (!valid()) return 0;
-    const auto counts = static_cast<std::int64_t>(static_cast<std::uint64_t>(from_newest(0).position) -
-                                                  static_cast<std::uint64_t>(from_newest(size_ - 1).position));
-    return static_cast<double>(counts) * 1e9 / static_cast<double>(span().count());
+    const double middle = (fastest() + slowest()) / 2;
+    return moved() < 0 ? -middle : middle;
   }
-  /// How long before the newest position the shaft had this speed. 0 while not valid.
-  [[nodiscard]] constexpr Time delay() const { return valid() ? span() / 2 : Time{}; }
+  /// How far the true mean speed is from `counts_per_second` at most, in counts a second. 0 while not valid.
+  [[nodiscard]] constexpr double uncertainty() const { return valid() ? (fastest() - slowest()) / 2 : 0; }
+  /// When the older position was latched, from which on this is the mean. Only while valid.
+  [[nodiscard]] constexpr const LatchTime& since() const { return positions_[start_].at; }
+  /// How long before the newest position (the middle of its latch time) the shaft had this speed. 0 while not valid.
+  [[nodiscard]] constexpr Time delay() const { return valid() ? span(start_) / 2 : Time{}; }
 
  private:
   struct Sample {
     std::int64_t position;
-    Time at;
+    LatchTime at;
   };
+  static constexpr std::size_t none = ~std::size_t{0};
+  static constexpr int enough = 20;  // times an uncertainty, to report a speed at once
+  static constexpr int least = 4;    // the same with the longest window
 
-  [[nodiscard]] constexpr const Sample& from_newest(std::size_t age) const {
-    return positions_[(newest_ + most_positions - age) % most_positions];
+  [[nodiscard]] constexpr const Sample& newest() const { return positions_[size_ - 1]; }
+  [[nodiscard]] constexpr Time span(std::size_t start) const {
+    return newest().at.middle() - positions_[start].at.middle();
   }
-  [[nodiscard]] constexpr Time span() const { return from_newest(0).at - from_newest(size_ - 1).at; }
+  [[nodiscard]] constexpr std::uint64_t moved_from(std::size_t start) const {
+    const std::uint64_t way =
+        static_cast<std::uint64_t>(newest().position) - static_cast<std::uint64_t>(positions_[start].position);
+    return static_cast<std::int64_t>(way) < 0 ? 0 - way : way;
+  }
+  [[nodiscard]] constexpr std::int64_t moved() const { return newest().position - positions_[start_].position; }
+
+  [[nodiscard]] static constexpr double per_second(double counts, Time time) {
+    return counts * 1e9 / static_cast<double>(time.count());
+  }
+  // Of the magnitude: a position is known to one count, so a way to one count more or less.
+  [[nodiscard]] constexpr double fastest() const {
+    return per_second(static_cast<double>(moved_from(start_)) + 1, newest().at.earliest - positions_[start_].at.latest);
+  }
+  [[nodiscard]] constexpr double slowest() const {
+    const std::uint64_t way = moved_from(start_);
+    if (way == 0) return -fastest();
+    return per_second(static_cast<double>(way) - 1, newest().at.latest - positions_[start_].at.earliest);
+  }
+
+  // Keeps one position that is as old as the longest window, or older.
+  constexpr void forget_old() {
+    std::size_t old = 0;
+    while (old + 2 < size_ && span(old + 1) >= longest_windows * window_) ++old;
+    if (old != 0) remove(0, old);
+  }
+
+  // At high rates old positions may be farther apart than new ones.
+  constexpr void thin_out() {
+    std::size_t closest = 1;
+    for (std::size_t i = 2; i + 1 < size_; ++i) {
+      if (gap(i) * age(closest) < gap(closest) * age(i)) closest = i;
+    }
+    const bool drops_first = positions_[closest].at.width() > positions_[closest + 1].at.width();
+    remove(drops_first || closest + 2 == size_ ? closest : closest + 1, 1);
+  }
+  // In units of about a microsecond, so that a product fits.
+  [[nodiscard]] constexpr std::int64_t gap(std::size_t i) const {
+    return (positions_[i + 1].at.middle() - positions_[i].at.middle()).count() >> 10;
+  }
+  [[nodiscard]] constexpr std::int64_t age(std::size_t i) const { return span(i).count() >> 10; }
+
+  constexpr void remove(std::size_t first, std::size_t count) {
+    for (std::size_t i = first + count; i < size_; ++i) positions_[i - count] = positions_[i];
+    size_ -= count;
+  }
+
+  // The shortest window that is good enough.
+  constexpr void choose_start() {
+    for (std::size_t i = size_ - 1; i-- > 0;) {
+      const bool fills_window = span(i) >= window_ || (i > 0 && span(i - 1) > window_);
+      if (!fills_window && i > 0) continue;
+      const std::uint64_t way = moved_from(i);
+      const bool is_resolved = way == 0 ? fills_window : way >= enough;
+      const Time open = (newest().at.width() + positions_[i].at.width()) / 2;  // to either side
+      const bool is_longest = span(i) >= longest_windows * window_;
+      if ((is_resolved && enough * open <= span(i)) || (is_longest && least * open <= span(i))) {
+        start_ = i;
+        return;
+      }
+    }
+  }
 
   Time window_;
-  std::array<Sample, most_positions> positions_{};
-  std::size_t newest_ = most_positions - 1;
+  std::array<Sample, most_positions> positions_{};  // the oldest first
   std::size_t size_ = 0;
+  std::size_t start_ = none;  // of the window that was chosen
 };
 
 }  // namespace absenc::host

@@ -3,6 +3,12 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <map>
+#include <random>
+
 namespace absenc::host {
 namespace {
 
@@ -14,11 +20,14 @@ TEST(Velocity, NeedsTwoPositions) {
   velocity.add(100, 1ms);
   EXPECT_FALSE(velocity.valid());
   EXPECT_EQ(velocity.counts_per_second(), 0);
+  EXPECT_EQ(velocity.uncertainty(), 0);
   EXPECT_EQ(velocity.delay(), 0ms);
-  velocity.add(90, 2ms);
+  velocity.add(0, 2ms);
   EXPECT_TRUE(velocity.valid());
-  EXPECT_EQ(velocity.counts_per_second(), -10'000);
+  EXPECT_NEAR(velocity.counts_per_second(), -100'000, 1e-6);
+  EXPECT_NEAR(velocity.uncertainty(), 1000, 1e-6);
   EXPECT_EQ(velocity.delay(), 500us);
+  EXPECT_EQ(velocity.since().earliest, 1ms);
   velocity.restart();
   EXPECT_FALSE(velocity.valid());
 }
@@ -26,8 +35,9 @@ TEST(Velocity, NeedsTwoPositions) {
 TEST(Velocity, IsTheMeanOverItsWindow) {
   Velocity velocity(10ms);
   for (int i = 0; i <= 100; ++i) velocity.add(i < 50 ? 0 : (i - 50) * 7, i * 1ms);
-  EXPECT_EQ(velocity.counts_per_second(), 7000);
-  EXPECT_EQ(velocity.delay(), 5ms);
+  EXPECT_NEAR(velocity.counts_per_second(), 7000, 1e-6);
+  EXPECT_GE(velocity.delay(), 5ms);
+  EXPECT_LE(velocity.delay(), 7ms);
 }
 
 TEST(Velocity, IsAStepWhereReadingsAreRare) {
@@ -35,23 +45,141 @@ TEST(Velocity, IsAStepWhereReadingsAreRare) {
   velocity.add(0, 0s);
   velocity.add(5, 1s);
   velocity.add(25, 2s);
-  EXPECT_EQ(velocity.counts_per_second(), 20);
+  EXPECT_NEAR(velocity.counts_per_second(), 20, 1e-6);
   EXPECT_EQ(velocity.delay(), 500ms);
 }
 
-TEST(Velocity, KeepsAsManyPositionsAsItHasRoomFor) {
-  Velocity velocity(1s);
-  for (int i = 0; i < 1000; ++i) velocity.add(i * i, i * 1us);
-  EXPECT_EQ(velocity.delay(), (Velocity::most_positions - 1) * 1000ns / 2);
+TEST(Velocity, KeepsItsWindowAtAnyRate) {
+  for (const Time period : {10us, 100us, 1000us, 7000us}) {
+    Velocity velocity;
+    for (int i = 0; i < 20'000; ++i) {
+      velocity.add(i * 1000LL, i * period);
+      if (!velocity.valid() || i * period < 100ms) continue;
+      ASSERT_GE(velocity.delay(), 18ms) << period.count();
+      ASSERT_LE(velocity.delay(), 40ms) << period.count();
+    }
+  }
 }
 
 TEST(Velocity, DoesNotTakeWhatIsNotLater) {
   Velocity velocity;
   velocity.add(0, 1ms);
-  velocity.add(10, 2ms);
-  velocity.add(500, 2ms);
-  velocity.add(600, 1ms);
-  EXPECT_EQ(velocity.counts_per_second(), 10'000);
+  velocity.add(100, 2ms);
+  velocity.add(5000, 2ms);
+  EXPECT_FALSE(velocity.valid()) << "a position without a speed";
+  velocity.add(6000, 1ms);
+  EXPECT_FALSE(velocity.valid());
+  velocity.add(200, 3ms);
+  EXPECT_NEAR(velocity.counts_per_second(), 100'000, 1e-6);
+}
+
+TEST(Velocity, IsToldAtOnceOfAShaftThatStands) {
+  Velocity velocity;
+  for (int i = 0; i < 50; ++i) {
+    velocity.add(7, i * 1ms);
+    ASSERT_FALSE(velocity.valid()) << i << ": one count is a large speed in so short a time";
+  }
+  velocity.add(7, 50ms);
+  ASSERT_TRUE(velocity.valid());
+  EXPECT_EQ(velocity.counts_per_second(), 0);
+  EXPECT_NEAR(velocity.uncertainty(), 20, 1e-6);
+}
+
+TEST(Velocity, WaitsForTwentyCountsUpToTwentyWindows) {
+  Velocity velocity(10ms);
+  for (int i = 0; i < 200; ++i) {
+    velocity.add(i / 50, i * 1ms);  // 20 counts a second
+    if (velocity.valid()) {
+      ASSERT_EQ(velocity.counts_per_second(), 0) << i;
+    }
+  }
+  velocity.add(4, 200ms);
+  ASSERT_TRUE(velocity.valid());
+  EXPECT_NEAR(velocity.counts_per_second(), 20, 1e-6);
+  EXPECT_NEAR(velocity.uncertainty(), 5, 1e-6);
+}
+
+TEST(Velocity, WaitsUntilItsWindowOutweighsTheTimes) {
+  Velocity velocity;
+  const auto add = [&](int i, Time width) { velocity.add(i * 1000, {i * 1ms, i * 1ms + width}); };
+  for (int i = 0; i < 80; ++i) {
+    add(i, 4ms);
+    ASSERT_FALSE(velocity.valid()) << i;
+  }
+  add(80, 4ms);
+  ASSERT_TRUE(velocity.valid());
+  EXPECT_NEAR(velocity.counts_per_second(), 1e6, 5e3);
+  EXPECT_LE(velocity.uncertainty(), 0.06e6);
+  EXPECT_GE(velocity.uncertainty(), 0.05e6);
+  add(81, 20ms);
+  EXPECT_FALSE(velocity.valid()) << "nobody knows when the last was latched";
+}
+
+TEST(Velocity, HasNoneWhenEvenTheLongestWindowDoesNotOutweighThem) {
+  Velocity good;
+  Velocity bad;
+  for (int i = 0; i <= 1100; ++i) {
+    good.add(i * 1000, {i * 1ms, i * 1ms + 240ms});
+    bad.add(i * 1000, {i * 1ms, i * 1ms + 280ms});
+    EXPECT_FALSE(bad.valid());
+  }
+  ASSERT_TRUE(good.valid());
+  EXPECT_LE(good.uncertainty(), 0.26e6);
+}
+
+// Motions in counts by seconds.
+using Motion = std::function<double(double)>;
+
+// What the window is is `since`: the true latch times are known here.
+void expect_bounds(const Motion& motion, Time period, Time longest_jitter, unsigned seed, std::size_t least_valid) {
+  std::mt19937_64 random(seed);
+  const auto within = [&](Time most) {
+    return Time(std::uniform_int_distribution<Time::rep>(0, most.count())(random));
+  };
+  Velocity velocity;
+  std::map<Time, Time> truths;  // by the earliest time of a position
+  const auto place = [&](Time at) { return motion(std::chrono::duration<double>(at).count()); };
+  std::size_t valid = 0;
+  for (int i = 0; i < 3000; ++i) {
+    const Time truth = i * period + within(period / 2);
+    const bool is_late = random() % 4 == 0;
+    const LatchTime at{truth - within(is_late ? longest_jitter : longest_jitter / 50),
+                       truth + within(is_late ? longest_jitter : longest_jitter / 50)};
+    truths[at.earliest] = truth;
+    velocity.add(static_cast<std::int64_t>(std::floor(place(truth))), at);
+    if (!velocity.valid()) continue;
+    ++valid;
+    const Time since = truths.at(velocity.since().earliest);
+    const double mean = (place(truth) - place(since)) * 1e9 / static_cast<double>((truth - since).count());
+    ASSERT_LE(std::abs(velocity.counts_per_second() - mean), velocity.uncertainty() * (1 + 1e-9) + 1e-6)
+        << "reading " << i << ", seed " << seed;
+  }
+  EXPECT_GE(valid, least_valid);
+}
+
+TEST(Velocity, IsNeverFartherOffThanItsUncertainty) {
+  constexpr double turn = 131'072;
+  const auto steady = [](double rpm) { return [=](double seconds) { return rpm / 60 * turn * seconds; }; };
+  const auto sine = [](double hertz) {
+    return [=](double seconds) { return 5 * turn * std::sin(2 * M_PI * hertz * seconds); };
+  };
+  for (unsigned seed = 1; seed <= 5; ++seed) {
+    for (const double rpm : {0.0, 0.01, 1.0, -12.0, 60.0, -3000.0, 60'000.0}) {
+      for (const Time jitter : {0us, 60us, 500us, 9'000us, 60'000us}) {
+        SCOPED_TRACE(rpm);
+        for (const Time period : {100us, 1'000us, 20'000us, 300'000us}) {
+          expect_bounds(steady(rpm), period, jitter, seed, jitter <= 500us && period >= 1ms && std::abs(rpm) != 0.01 ? 1000 : 0);
+        }
+      }
+    }
+    for (const double hertz : {0.1, 1.0, 10.0, 100.0}) {
+      SCOPED_TRACE(hertz);
+      for (const Time jitter : {0us, 60us, 500us, 9'000us}) {
+        expect_bounds(sine(hertz), 1'000us, jitter, seed, 0);
+        expect_bounds(sine(hertz), 100us, jitter, seed, 0);
+      }
+    }
+  }
 }
 
 }  // namespace

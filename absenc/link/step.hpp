@@ -79,7 +79,8 @@ struct Event {
                                   // sent on an SPI link: the period of the clock; 0: not known
   Time lead{};                    // sent, device side of an SPI link: from chip select to the first clock
   Time late{};                    // received: `items` may have come so much earlier, because the carrier was kept from
-                                  // looking; 0: not, or not known
+                                  // looking; sent: the transfer may have ended so much earlier, because the carrier
+                                  // was kept from noting it; 0: not, or not known
 };
 
 /// After each `feed`, call `next` until it returns `wait` or `done`. Both in one context: interrupts queue events.

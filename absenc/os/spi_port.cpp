@@ -124,7 +124,9 @@ void SpiPort::begin(const ByteStep& step) {
 
 ByteEvent SpiPort::wait(const ByteStep& step) {
   waiting_.begin(step);
-  if (std::exchange(sent_pending_, false)) return waiting_.tell({.kind = ByteEvent::Kind::sent, .at = sent_at_});
+  if (std::exchange(sent_pending_, false)) {
+    return waiting_.tell({.kind = ByteEvent::Kind::sent, .at = sent_at_, .late = sent_late_});
+  }
   if (std::exchange(heard_pending_, false)) {
     return waiting_.tell({.kind = ByteEvent::Kind::received, .at = sent_at_, .items = in_, .idle_low = idle_low_});
   }
@@ -138,8 +140,10 @@ void SpiPort::transfer(const ByteStep& step) {
   in_.assign(clocked ? (clocks + 7) / 8 : std::max(step.out.size(), step.expect), 0);
   out_.assign(step.out.begin(), step.out.end());
   out_.resize(in_.size(), 0);
+  const Time before = os::now();
   if (!in_.empty()) send_message(!clocked);
   sent_at_ = os::now();
+  sent_late_ = sent_at_ - before;
   if (clocked) keep_bits(step.bits);
   sent_pending_ = true;
   heard_pending_ = !in_.empty();

@@ -78,6 +78,7 @@ class SpiPort final : public Port<std::uint8_t> {
   std::vector<std::uint8_t> in_;
   Waiting<std::uint8_t> waiting_;
   Time sent_at_{};              // end of the last transfer
+  Time sent_late_{};            // how long the call took that made it
   bool sent_pending_ = false;   // `sent` is to be reported,
   bool heard_pending_ = false;  // and then `received`
   bool idle_low_ = false;       // the data line, before the first bit of a clocked transfer

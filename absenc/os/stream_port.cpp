@@ -42,16 +42,19 @@ void StreamPort::begin(const ByteStep& step) {
 void StreamPort::transfer(const ByteStep& step) {
   // The first comparison spares most transfers a look at the clock.
   if (step.at > waiting_.told() + send_slack_ && step.at > os::now() + send_slack_) reach(step.at);
-  const Time before = read_at_once_ ? os::now() : Time{};
+  const Time before = os::now();
   if (!step.out.empty()) write_all(step.out);
   const Time written = read_at_once_ ? before : os::now();
-  mark_sent(std::max(written, sent_at_) + character_time_ * static_cast<std::int64_t>(step.out.size()));
+  const Time begun = std::max(written, sent_at_);
+  mark_sent(begun + character_time_ * static_cast<std::int64_t>(step.out.size()), begun - std::max(before, sent_at_));
 }
 
 ByteEvent StreamPort::wait(const ByteStep& step) {
   const bool is_idle = waiting_.silence.has_heard() && step.expect == 0;
   waiting_.begin(step, is_idle ? std::min(latency_, idle_latency_) : latency_);
-  if (std::exchange(sent_pending_, false)) return waiting_.tell({.kind = ByteEvent::Kind::sent, .at = sent_at_});
+  if (std::exchange(sent_pending_, false)) {
+    return waiting_.tell({.kind = ByteEvent::Kind::sent, .at = sent_at_, .late = sent_late_});
+  }
   for (;;) {
     const std::span<const int> ready = poller_.wait(std::min(waiting_.due(), end_));
     const Time time = os::now();
@@ -76,6 +79,7 @@ void StreamPort::reach(Time time) {
 }
 
 void StreamPort::pulse(const ByteStep& step) {
+  const Time before = os::now();
   drive(step.wire, true);
   try {
     reach(os::now() + pulse_width(step.wire, step.width));
@@ -84,11 +88,13 @@ void StreamPort::pulse(const ByteStep& step) {
     throw;
   }
   drive(step.wire, false);
-  mark_sent(os::now());
+  const Time after = os::now();
+  mark_sent(after, after - before);
 }
 
-void StreamPort::mark_sent(Time at) {
+void StreamPort::mark_sent(Time at, Time late) {
   sent_at_ = at;
+  sent_late_ = late;
   sent_pending_ = true;
   waiting_.silence.sent(at);
 }

@@ -43,6 +43,9 @@ class StreamPort : public Port<std::uint8_t> {
   /// From `end` on the port throws Ended. `never` at first.
   void set_end(Time end) { end_ = end; }
 
+  /// The time of a character on the line; 0: not known, or there is no line, as behind a pseudo-terminal.
+  [[nodiscard]] Time character_time() const { return character_time_; }
+
  protected:
   StreamPort();
 
@@ -72,7 +75,7 @@ class StreamPort : public Port<std::uint8_t> {
  private:
   void reach(Time time);
   void pulse(const Step<std::uint8_t>& step);
-  void mark_sent(Time at);
+  void mark_sent(Time at, Time late);
   void transfer(const Step<std::uint8_t>& step);
 
   Poller poller_;
@@ -85,6 +88,7 @@ class StreamPort : public Port<std::uint8_t> {
 
   Waiting<std::uint8_t> waiting_;
   Time sent_at_{};             // end of the last transfer
+  Time sent_late_{};           // it may have ended so much earlier
   bool sent_pending_ = false;  // `sent` is to be reported
   std::array<std::uint8_t, 4096> buffer_;
 };

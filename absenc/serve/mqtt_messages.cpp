@@ -70,11 +70,13 @@ std::string readings_text(const std::string& id, const Watch& watch, std::uint64
     fmt::format_to(std::back_inserter(text), "[{},", one.at_us);
     append(text, one.place);
     text += ',';
-    append(text, one.speed);
+    append(text, one.speed ? std::optional(one.speed->value) : std::nullopt);
     text += ',';
     append(text, one.counts);
     text += ',';
     append(text, one.turns);
+    text += ',';
+    append(text, one.speed ? std::optional(one.speed->uncertainty) : std::nullopt);
     text += ']';
   }
   return text + "]}";

@@ -8,13 +8,15 @@
 #include <optional>
 #include <vector>
 
+#include "absenc/client/estimate.hpp"
+
 namespace absenc::serve {
 
 /// One good reading. What does not hold is not there.
 struct Passing {
-  std::int64_t at_us = 0;         // calendar, of when it was latched
-  std::optional<double> place{};  // past the end of a turn: degrees, of linear encoders mm
-  std::optional<double> speed{};  // rpm, of linear encoders mm/s
+  std::int64_t at_us = 0;                   // calendar, of when it was latched
+  std::optional<double> place{};            // past the end of a turn: degrees, of linear encoders mm
+  std::optional<client::Estimate> speed{};  // rpm, of linear encoders mm/s
   std::optional<std::uint64_t> counts{};
   std::optional<std::int64_t> turns{};
 };

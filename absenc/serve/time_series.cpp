@@ -32,13 +32,14 @@ void TimeSeries::count_errors(std::int64_t at_ms, std::uint64_t errors) {
   slot.count += errors;
 }
 
-void TimeSeries::count_reading(std::int64_t at_ms, std::optional<double> place, std::optional<double> speed) {
+void TimeSeries::count_reading(std::int64_t at_ms, std::optional<double> place,
+                               const std::optional<client::Estimate>& speed) {
   begin_second(at_ms / 1000);
   ++second_.readings;
   if (!place) return;
   second_.place.add(*place);
   second_.last_place = place;
-  if (speed) second_.speed.add(*speed);
+  if (speed) second_.speed.add(speed->value);
   add_point({at_ms, *place, speed});
 }
 

@@ -8,13 +8,15 @@
 #include <optional>
 #include <vector>
 
+#include "absenc/client/estimate.hpp"
+
 namespace absenc::serve {
 
 /// Position, continued past the end of a turn, and speed: in degrees and rpm, of linear encoders mm and mm/s.
 struct Point {
   std::int64_t at_ms = 0;  // calendar
   double place = 0;
-  std::optional<double> speed{};
+  std::optional<client::Estimate> speed{};
 };
 
 /// Least, greatest and mean of the values of a second.
@@ -33,7 +35,7 @@ struct Second {
   std::uint64_t readings = 0;
   std::uint64_t errors = 0;
   Spread place{};
-  Spread speed{};
+  Spread speed{};                      // of the speeds that were reported, without their uncertainties
   std::optional<double> last_place{};  // a mean says nothing where a turn begins anew
 };
 
@@ -42,7 +44,7 @@ class TimeSeries {
  public:
   void count_errors(std::int64_t at_ms, std::uint64_t errors);
   /// A good reading. `place`: where the position held; `speed`: where it is known.
-  void count_reading(std::int64_t at_ms, std::optional<double> place, std::optional<double> speed);
+  void count_reading(std::int64_t at_ms, std::optional<double> place, const std::optional<client::Estimate>& speed);
 
   /// From now on points are kept until they are taken, the newest 4096 of them.
   void trace(bool on);

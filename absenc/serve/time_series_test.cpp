@@ -26,7 +26,7 @@ TEST(TimeSeries, TheLastMinuteHasTheSecondsThatTheHistoryHasTaken) {
 
 TEST(TimeSeries, ASecondThatIsNotOverIsNotTaken) {
   TimeSeries series;
-  series.count_reading(begin_ms, 1, 60);
+  series.count_reading(begin_ms, 1, client::Estimate{60, 0.5});
   series.count_reading(begin_ms + 10, 3, {});
   series.count_errors(begin_ms + 20, 2);
   EXPECT_TRUE(series.take_seconds(begin_s).empty());

@@ -15,7 +15,7 @@ constexpr auto between_sendings = std::chrono::milliseconds(20);
 Json datagram(const std::string& encoder, const Passing& reading) {
   Json values = Json::object();
   if (reading.place) values.set("position", *reading.place);
-  if (reading.speed) values.set("speed", *reading.speed);
+  if (reading.speed) values.set("speed", reading.speed->value).set("speed_uncertainty", reading.speed->uncertainty);
   if (reading.counts) values.set("counts", *reading.counts);
   if (reading.turns) values.set("turns", *reading.turns);
   return Json::object().set("timestamp", static_cast<double>(reading.at_us) / 1e6).set(encoder, values);

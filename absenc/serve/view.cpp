@@ -210,6 +210,7 @@ Json overview(const Watch& watch, const Snapshot& snapshot) {
   set_place(json, last.reading, live);
   json.set("continued_position", live && last.position_valid && snapshot.place ? Json(*snapshot.place) : Json());
   json.set("speed", live && last.speed_valid ? Json(last.speed) : Json());
+  json.set("speed_uncertainty", live && last.speed_valid ? Json(last.speed_uncertainty) : Json());
   json.set("speed_unit", is_linear(watch) ? "mm/s" : "rpm");
   json.set("alarms", live ? alarms_json(unit, last.reading, &snapshot.raised) : Json());
   json.set("status", live ? status_json(unit, last.reading) : Json());
@@ -248,7 +249,9 @@ Json last_minute(const Fleet::Watches& watches) {
 
 Json points(const Watch& watch, std::span<const Point> taken) {
   const Json list = Json::list(taken, [](const Point& point) {
-    return Json::array().append(point.at_ms).append(point.place).append(point.speed ? Json(*point.speed) : Json());
+    Json json = Json::array().append(point.at_ms).append(point.place);
+    json.append(point.speed ? Json(point.speed->value) : Json());
+    return json.append(point.speed ? Json(point.speed->uncertainty) : Json());
   });
   return Json::object().set("encoder", watch.name()).set("points", list);
 }

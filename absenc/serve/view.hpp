@@ -14,8 +14,8 @@ namespace absenc::serve {
 
 [[nodiscard]] inline double seconds_of(Time time) { return std::chrono::duration<double>(time).count(); }
 
-/// At a glance: state, age_s, position, turns, speed, alarms in words, errors of the last minute. Values are null
-/// unless the encoder is live and they hold.
+/// At a glance: state, age_s, position, turns, speed with its uncertainty, alarms in words, errors of the last minute.
+/// Values are null unless the encoder is live and they hold.
 [[nodiscard]] client::Json overview(const Watch& watch, const Snapshot& snapshot);
 
 /// What of it holds until it is told otherwise: state, why it is not live, alarms in words, status; no value.
@@ -28,7 +28,8 @@ namespace absenc::serve {
 /// has with their arguments.
 [[nodiscard]] client::Json details(const Watch& watch);
 
-/// {"encoder":name,"points":[[at_ms,position,speed],...]}; a speed that is not known is null.
+/// {"encoder":name,"points":[[at_ms,position,speed,speed_uncertainty],...]}; a speed that is not known is
+/// null.
 [[nodiscard]] client::Json points(const Watch& watch, std::span<const Point> taken);
 
 /// {"encoders":[{"encoder":name,"seconds":[[at_s,position,speed],...]},...]}: last position and mean speed of the last

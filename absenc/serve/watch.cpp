@@ -287,7 +287,7 @@ void Watch::summarize(const Encoder& live, const Sample& sample) {
   series_.count_errors(at_ms, errors);
   if (sample.kind == Sample::Kind::reading) {
     series_.count_reading(at_ms, sample.position_valid ? std::optional(place_of(sample)) : std::nullopt,
-                          sample.speed_valid ? std::optional(sample.speed) : std::nullopt);
+                          sample.measured_speed());
   }
   pass_on(sample);
   if (errors != 0) details_.bad = live.bad_exchanges();
@@ -315,7 +315,7 @@ void Watch::pass_on(const Sample& sample) {
   Passing passing;
   passing.at_us = calendar_us() - std::chrono::duration_cast<std::chrono::microseconds>(os::now() - sample.at).count();
   if (sample.position_valid) passing.place = place_of(sample);
-  if (sample.speed_valid) passing.speed = sample.speed;
+  passing.speed = sample.measured_speed();
   if (reading.ready && reading.singleturn_valid()) passing.counts = reading.singleturn;
   if (reading.multiturn_bits != 0 && reading.multiturn_valid) passing.turns = reading.turns();
   for (Outbox& outbox : outboxes_) {

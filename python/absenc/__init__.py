@@ -6,7 +6,7 @@
     with absenc.open("tformat:/dev/ttyUSB0") as encoder:
         print(encoder.read().angle_deg)
         for sample in encoder.samples(rate=100, count=1000):
-            print(sample.time_s, sample.position, sample.speed)
+            print(sample.time_s, sample.position, sample.speed_rpm)
         encoder.record("log.h5", seconds=60)   # also .csv and .jsonl
 
     with absenc.emulate("tformat", motion="rpm=60") as virtual:

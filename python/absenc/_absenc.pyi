@@ -65,7 +65,20 @@ class Sample:
         """Counts, continued past the end of the counter."""
     @property
     def speed(self) -> Optional[float]:
-        """rpm, of linear encoders mm/s, as it was `speed_delay_s` before `time_s`."""
+        """rpm, of linear encoders mm/s: `speed_rpm` or `speed_mm_s`."""
+    @property
+    def speed_rpm(self) -> Optional[float]:
+        """The mean speed over a short window, as it was `speed_delay_s` before `time_s`; None: it is not known yet, or
+        the encoder is linear."""
+    @property
+    def speed_uncertainty_rpm(self) -> Optional[float]:
+        """How far the true mean is from `speed_rpm` at most."""
+    @property
+    def speed_mm_s(self) -> Optional[float]:
+        """The same of a linear encoder; None of a rotary one."""
+    @property
+    def speed_uncertainty_mm_s(self) -> Optional[float]:
+        """How far the true mean is from `speed_mm_s` at most."""
     @property
     def speed_delay_s(self) -> Optional[float]: ...
     @property

@@ -10,7 +10,9 @@ with absenc.emulate("tformat", motion="rpm=60") as virtual, absenc.open(virtual.
         if sample.reading is None or sample.reading.angle_deg is None:
             print(sample.text)
             continue
-        print(f"{sample.time_s:.3f} s: {sample.reading.angle_deg:.3f} degrees, {sample.speed or 0:.1f} rpm")
+        print(f"{sample.time_s:.3f} s: {sample.reading.angle_deg:.3f} degrees")
+        if sample.speed_rpm is not None:
+            print(f"    {sample.speed_rpm:.1f} ± {sample.speed_uncertainty_rpm:.1f} rpm")
     with tempfile.TemporaryDirectory() as folder:
         path = os.path.join(folder, "log.h5")
         recorded = encoder.record(path, rate=100, seconds=0.5)

@@ -42,6 +42,14 @@ py::tuple state_of(const PyReading& one) {
   return py::tuple(state);
 }
 
+std::optional<double> value_of(const std::optional<client::Estimate>& measured) {
+  return measured ? std::optional(measured->value) : std::nullopt;
+}
+
+std::optional<double> uncertainty_of(const std::optional<client::Estimate>& measured) {
+  return measured ? std::optional(measured->uncertainty) : std::nullopt;
+}
+
 PyReading reading_of(const py::tuple& state) {
   PyReading one{&client::require_unit(py::cast<std::string>(state[0])), {}};
   std::size_t next = 1;
@@ -100,7 +108,21 @@ void bind_sample(py::module_& module) {
           "Counts, continued past the end of the counter.")
       .def_property_readonly(
           "speed", [](const PySample& one) { return one.when(one.sample.speed_valid, one.sample.speed); },
-          "rpm, of linear encoders mm/s, as it was `speed_delay_s` before `time_s`.")
+          "rpm, of linear encoders mm/s: `speed_rpm` or `speed_mm_s`.")
+      .def_property_readonly(
+          "speed_rpm", [](const PySample& one) { return value_of(one.sample.speed_rpm()); },
+          "The mean speed over a short window, as it was `speed_delay_s` before `time_s`; None: it is not known yet, "
+          "or "
+          "the encoder is linear.")
+      .def_property_readonly(
+          "speed_uncertainty_rpm", [](const PySample& one) { return uncertainty_of(one.sample.speed_rpm()); },
+          "How far the true mean is from `speed_rpm` at most.")
+      .def_property_readonly(
+          "speed_mm_s", [](const PySample& one) { return value_of(one.sample.speed_mm_s()); },
+          "The same of a linear encoder; None of a rotary one.")
+      .def_property_readonly(
+          "speed_uncertainty_mm_s", [](const PySample& one) { return uncertainty_of(one.sample.speed_mm_s()); },
+          "How far the true mean is from `speed_mm_s` at most.")
       .def_property_readonly(
           "speed_delay_s",
           [](const PySample& one) { return one.when(one.sample.speed_valid, seconds(one.sample.speed_delay)); },

@@ -12,6 +12,7 @@
 #include "absenc/client/text/wire_text.hpp"
 #include "absenc/client/way/change_record.hpp"
 #include "absenc/client/way/diagnosis.hpp"
+#include "absenc/client/way/latch_times.hpp"
 #include "absenc/client/way/runner.hpp"
 #include "absenc/client/way/shared_link.hpp"
 
@@ -79,6 +80,7 @@ class ConnectionOn final : public Connection {
   ConnectionOn(const EncoderAddress& uri, OpenLink open)
       : Connection(uri),
         is_journaled_(!open && uri.place != Place::sim),
+        is_exact_(!open && uri.place == Place::sim),
         open_(open ? std::move(open) : open_link),
         runner_(uri, attempts) {
     session_.set_speed_limit(speed_limit(uri));
@@ -95,6 +97,7 @@ class ConnectionOn final : public Connection {
     session_.share(link_->guard<Item>());
     session_.doubt();
     life_counters_.clear();
+    arrivals_.restart();
   }
 
   void disconnect() override { link_.reset(); }
@@ -150,6 +153,7 @@ class ConnectionOn final : public Connection {
     if (const Reading* reading = last_->reading()) sink.put_reading(*reading);
   }
   void report_left(FieldSink& sink) const override { session_.report_left(sink); }
+  host::LatchTime latch_time() const override { return latch_time_; }
   bool confirmed() const override { return session_.confirmed(); }
   const host::Counters& counters() const override { return session_.counters(); }
   const host::Latencies& latencies() const override { return statistics_.latencies(); }
@@ -207,12 +211,26 @@ class ConnectionOn final : public Connection {
     return trouble;
   }
 
+  // The clock of a virtual encoder is that of its line, on which nothing keeps its request waiting.
+  void keep_latch_time(const Reading& reading, bool was_asked) {
+    if (!was_asked) {
+      arrivals_.add(reading.received, port_.nothing_until);
+      latch_time_ = arrivals_.latch_time();
+    } else if (is_exact_) {
+      latch_time_ = {reading.latched, reading.latched};
+    } else {
+      latch_time_ = asked_latch_time(port_.last, reading.latched, link_->link().character);
+    }
+  }
+
   Outcome read_once(const Command& command, host::Take take) {
+    const std::uint64_t requests = port_.requests;
     const Outcome ended = outcome(command, link_->take_turn([&] {
       return runner_.converse([&](host::Session<Item>& session) { return session.read(command, take); });
     }));
     life_counters_.begin();
     if (ended.error == Error::none && !ended.aborted) last_->report(life_counters_);
+    if (ended.reading != nullptr) keep_latch_time(*ended.reading, port_.requests != requests);
     return ended;
   }
 
@@ -345,6 +363,7 @@ class ConnectionOn final : public Connection {
   static constexpr unsigned attempts = 3;
 
   bool is_journaled_;
+  bool is_exact_;  // the times of its line
   OpenLink open_;
   std::shared_ptr<SharedLink> link_;
   Runner<Item> runner_;
@@ -354,6 +373,8 @@ class ConnectionOn final : public Connection {
   host::Statistics<Item> statistics_;
   const Conversation<Item>* last_ = nullptr;
   LifeCounters life_counters_;
+  ArrivalSpread arrivals_;
+  host::LatchTime latch_time_{};  // of the last position
   Change change_{};
   std::uint64_t requests_before_ = 0;  // the last command that changes the encoder
 };

@@ -12,6 +12,7 @@
 
 #include "absenc/client/trouble.hpp"
 #include "absenc/client/way/link.hpp"
+#include "absenc/host/latch_time.hpp"
 #include "absenc/host/session.hpp"
 
 namespace absenc::client {
@@ -60,6 +61,8 @@ class Connection {
   virtual void report_left(FieldSink& sink) const = 0;
   /// Of the last outcome.
   [[nodiscard]] virtual Trouble trouble(const Outcome& outcome) const = 0;
+  /// Between which times of its clock the last position was latched.
+  [[nodiscard]] virtual host::LatchTime latch_time() const = 0;
   /// Whether the last position was compared with another, and agreed as well as the fastest shaft allows.
   [[nodiscard]] virtual bool confirmed() const = 0;
   [[nodiscard]] virtual const host::Counters& counters() const = 0;

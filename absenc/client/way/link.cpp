@@ -58,6 +58,7 @@ Link open_serial(const EncoderAddress& uri) {
   const auto port = std::make_shared<os::SerialPort>(uri.path, line, uri.rs485, uri.wires);
   link.place = fmt::format("{} at {} baud", uri.path, line.rate);
   link.notes = port->notes();
+  link.character = port->character_time();
   take(link, port, uri);
   return link;
 }

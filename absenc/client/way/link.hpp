@@ -18,6 +18,7 @@ struct Link {
   Port<std::uint8_t>* bytes = nullptr;  // exactly one is set
   Port<CanFrame>* frames = nullptr;
   Time latency{};                  // of the way to the line
+  Time character{};                // of a character on the line; 0: not known, or it takes no time
   std::string place;               // "/dev/ttyUSB0 at 2500000 baud"
   std::vector<std::string> notes;  // what could be better about it
 };

@@ -25,6 +25,7 @@ struct LineExchange {
   std::size_t clocks = 0;        // of a clocked link, which sends nothing else
   Time answer{};                 // how long the protocol waits for the beginning of a reply; 0: it does not wait
   Time sent_at{};                // end of the request
+  Time sent_late{};              // which may have been so much earlier
   Time received_at{};            // end of the last item
   /// When how many items of `received` were there.
   struct Mark {
@@ -49,7 +50,7 @@ struct LineExchange {
     received.clear();
     marks.clear();
     echo = clocks = 0;
-    answer = sent_at = received_at = {};
+    answer = sent_at = sent_late = received_at = {};
   }
 };
 
@@ -90,7 +91,12 @@ class WatchedPort final : public Port<Item> {
     const Event<Item> event = wait_or_abort(step);
     looked_at_ = event.at;
     if (event.at >= deadline) throw OutOfTime{};
-    if (event.kind == Event<Item>::Kind::sent) last.sent_at = event.at;
+    if (event.kind == Event<Item>::Kind::sent) {
+      last.sent_at = event.at;
+      last.sent_late = event.late;
+    }
+    const bool nothing_came = event.kind == Event<Item>::Kind::timer || event.kind == Event<Item>::Kind::silence;
+    if (nothing_came) nothing_until = event.at;
     if (event.kind == Event<Item>::Kind::line_error) ++line_errors;
     if (event.kind == Event<Item>::Kind::received) {
       last.received_at = event.at;
@@ -110,6 +116,7 @@ class WatchedPort final : public Port<Item> {
   std::function<bool()> abort;  // asks the conversation to end early; returns whether it ends by itself
   Time deadline = never;        // by the port's clock: a wait that reaches it throws OutOfTime
   LineExchange<Item> last;
+  Time nothing_until{};  // when a wait ended last with nothing on the line
   std::uint64_t requests = 0;
   std::uint64_t items_sent = 0;
   std::uint64_t items_received = 0;

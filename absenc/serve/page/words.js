@@ -54,6 +54,15 @@ export function figure(one) {
   return {text: one.singleturn_valid === null ? "unknown" : "INVALID", unit: "", width};
 }
 
+/** Returns "12.0 ± 0.3": as many digits as the uncertainty leaves, and the uncertainty rounded up. */
+export function measuredText(value, uncertainty) {
+  const decimals = uncertainty > 0 ? Math.min(4, Math.max(0, -Math.floor(Math.log10(uncertainty)))) : 4;
+  const scale = 10 ** decimals;
+  const rounded = Math.round(value * scale) / scale;
+  const most = Math.ceil((uncertainty + Math.abs(rounded - value)) * scale - 1e-6) / scale;
+  return `${numberText(rounded, decimals)} ± ${numberText(most, decimals)}`;
+}
+
 export function lastText(last) {
   if (last.angle_deg !== null) return `${last.angle_deg.toFixed(3)}°`;
   return last.position_mm !== null ? `${numberText(last.position_mm, 4)} mm` : "";
@@ -70,7 +79,7 @@ export function belowFigure(one, now) {
   if (one.turns !== null) parts.push(`${numberText(one.turns)} ${Math.abs(one.turns) === 1 ? "turn" : "turns"}`);
   else if (one.has_turns) parts.push(one.multiturn_valid === false ? "turns INVALID" : "turns unknown");
   else if (!one.linear) parts.push("single-turn");
-  if (one.speed !== null) parts.push(`${numberText(one.speed, 1)} ${one.speed_unit}`);
+  if (one.speed !== null) parts.push(`${measuredText(one.speed, one.speed_uncertainty)} ${one.speed_unit}`);
   return parts;
 }
 

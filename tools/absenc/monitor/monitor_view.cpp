@@ -76,8 +76,16 @@ std::string turns_text(const Snapshot& snapshot) {
 
 std::string speed_text(const Snapshot& snapshot) {
   if (!is_live(snapshot) || !snapshot.last.speed_valid) return "-";
-  const double speed = std::abs(snapshot.last.speed) < 0.05 ? 0 : snapshot.last.speed;  // no "-0.0"
-  return short_text(speed, 1);
+  const std::string text = value_text(*snapshot.last.measured_speed());
+  return text.size() <= 9 ? text : short_text(snapshot.last.speed, 1);
+}
+
+// `sign` between the two. The screen draws bytes, so there it is "+/-".
+std::string measured_speed_text(const Snapshot& snapshot, std::string_view sign) {
+  const Sample& last = snapshot.last;
+  const std::string value =
+      is_live(snapshot) && last.speed_valid ? to_text(*last.measured_speed(), sign) : std::string("-");
+  return fmt::format("{} {}", value, speed_unit(last.reading));
 }
 
 // An alarm, or a flag of the status about which something must be done, where not all alarms are reported.
@@ -215,8 +223,8 @@ std::string speed_line(const Snapshot& snapshot) {
                                        : ", started again: it jumped, or the turns before are not known (max_rpm)");
   }
   if (!snapshot.last.speed_valid) return text;
-  return fmt::format("speed {} {}, {} ago; {}", speed_text(snapshot), speed_unit(reading),
-                     to_text(snapshot.last.speed_delay), text);
+  return fmt::format("speed {}, {} ago; {}", measured_speed_text(snapshot, "+/-"), to_text(snapshot.last.speed_delay),
+                     text);
 }
 
 std::string statistics_line(const Snapshot& snapshot) {
@@ -331,10 +339,12 @@ void draw_help(Screen& screen, int row, int end) {
       "h, ?          this help; again: away with it",
   };
   for (const std::string_view key : keys) screen.put(row++, 4, key);
-  draw_words(screen, row + 1, end,
-             "\"failed\" counts every attempt, repeated ones too. The speed is the mean over a short window, and as "
-             "old as it says. What is not live is never shown as a present value.",
-             Style::plain);
+  draw_words(
+      screen, row + 1, end,
+      "\"failed\" counts every attempt, repeated ones too. The speed is the mean over a short window, as old as it "
+      "says and no farther from the true mean than +/-; \"-\" while the times of the readings leave too much of "
+      "it open. What is not live is never shown as a present value.",
+      Style::plain);
 }
 
 // Of whom: never cut off.
@@ -377,9 +387,9 @@ std::string to_line(const Shown& shown) {
   const Snapshot& snapshot = shown.snapshot;
   std::string text = fmt::format("{}: ", shown.watch->name());
   if (is_live(snapshot)) {
-    text += fmt::format("{}   {} {}{}",
-                        reading_text(*shown.watch->uri().unit, snapshot.last.reading, doubt_of(snapshot.last)),
-                        speed_text(snapshot), speed_unit(snapshot.last.reading), age(snapshot));
+    text +=
+        fmt::format("{}   {}{}", reading_text(*shown.watch->uri().unit, snapshot.last.reading, doubt_of(snapshot.last)),
+                    measured_speed_text(snapshot, "±"), age(snapshot));
   } else {
     text += fmt::format("{}, no reading for {}", name_of(snapshot.state), to_text(snapshot.age));
   }

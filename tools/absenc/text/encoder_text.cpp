@@ -68,12 +68,14 @@ std::string exchanges_text(const host::Counters& counters, std::uint64_t reading
 
 void set_motion(Json& json, const Sample& sample, double unit_um) {
   const Json speed = sample.speed_valid ? Json(sample.speed) : Json();
+  const Json uncertainty = sample.speed_valid ? Json(sample.speed_uncertainty) : Json();
   json.set("position", sample.position_valid ? Json(sample.position) : Json());
   if (unit_um > 0) {
     const double mm = micrometres(sample.position, unit_um) / 1000;
     json.set("unwrapped_mm", sample.position_valid ? Json(mm) : Json()).set("speed_mm_s", speed);
+    json.set("speed_uncertainty_mm_s", uncertainty);
   } else {
-    json.set("speed_rpm", speed);
+    json.set("speed_rpm", speed).set("speed_uncertainty_rpm", uncertainty);
   }
 }
 

@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: Apache-2.0
+// When a position was latched, as far as host and line can tell.
+#pragma once
+
+#include "absenc/core/angle.hpp"
+#include "absenc/core/time.hpp"
+
+namespace absenc::host {
+
+/// The interval in which a position was latched. Between request and reply nobody knows it better.
+struct LatchTime {
+  Time earliest{};
+  Time latest{};
+
+  [[nodiscard]] constexpr Time middle() const { return earliest + (latest - earliest) / 2; }
+  [[nodiscard]] constexpr Time width() const { return latest - earliest; }
+};
+
+/// From the times of the reading alone: the reply came behind the latching.
+[[nodiscard]] constexpr LatchTime latch_time(const Reading& reading) {
+  return {reading.latched, reading.received > reading.latched ? reading.received : reading.latched};
+}
+
+}  // namespace absenc::host
