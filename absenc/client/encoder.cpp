@@ -82,6 +82,7 @@ void Encoder::resume() { cancelled_->store(false); }
 
 const Unit& Encoder::unit() const { return connection_->unit(); }
 const Options& Encoder::options() const { return connection_->uri().options; }
+const Joint& Encoder::joint() const { return connection_->uri().joint; }
 const std::vector<std::string>& Encoder::notes() const { return connection_->notes(); }
 const host::Counters& Encoder::counters() const { return connection_->counters(); }
 const host::Latencies& Encoder::latencies() const { return connection_->latencies(); }
@@ -257,7 +258,30 @@ Sample Encoder::take(Reading reading) {
   sample.speed = speed_of(reading, velocity_.counts_per_second());
   sample.speed_uncertainty = std::abs(speed_of(reading, velocity_.uncertainty()));
   if (sample.speed_valid) sample.speed_delay = velocity_.delay() - (latched.middle() - reading.latched);
+  sample.angles = angles_of(sample);
   return sample;
+}
+
+// Of a sample whose position is valid.
+JointAngles Encoder::angles_of(const Sample& sample) const {
+  const Joint& one = joint();
+  const Reading& reading = sample.reading;
+  const bool is_linear = reading.unit_um > 0;
+  JointAngles angles;
+  if (one.has_motor()) {
+    angles.electrical_deg = electrical_degrees(one, is_linear ? micrometres(reading.singleturn, reading.unit_um) / 1000
+                                                              : degrees(reading.singleturn, reading.singleturn_bits));
+  }
+  if (!one.is_set) return angles;
+  std::optional<Estimate>& speed = is_linear ? angles.joint_speed_mm_s : angles.joint_speed_rpm;
+  if (sample.speed_valid) speed = joint_speed(one, *sample.measured_speed());
+  if (is_linear) {
+    angles.joint_mm = joint_millimetres(one, micrometres(sample.position, reading.unit_um) / 1000);
+  } else if (unwrapper_.counts_turns() || one.gear == 1) {
+    const double turns = std::ldexp(static_cast<double>(sample.position), -static_cast<int>(reading.singleturn_bits));
+    angles.joint_deg = joint_degrees(one, 360 * turns);
+  }
+  return angles;
 }
 
 void Encoder::note_restart(Sample& sample, bool jumped, Time pause) {

@@ -14,8 +14,9 @@
 #include <string_view>
 #include <vector>
 
-#include "absenc/client/input_range.hpp"
 #include "absenc/client/estimate.hpp"
+#include "absenc/client/input_range.hpp"
+#include "absenc/client/joint.hpp"
 #include "absenc/client/memory.hpp"
 #include "absenc/client/row.hpp"
 #include "absenc/client/settings.hpp"
@@ -64,6 +65,7 @@ struct Sample {
                                  // which the two were latched. From the times of requests and replies and from one
                                  // count of each position; errors and noise of the encoder are not in it
   Time speed_delay{};
+  JointAngles angles{};   // of joint and motor, where the address says how the encoder sits in its drive
   Trouble trouble{};      // failed
   std::string message{};  // lost, absent, back, restarted
 
@@ -150,6 +152,8 @@ class Encoder {
 
   [[nodiscard]] const Unit& unit() const;
   [[nodiscard]] const Options& options() const;
+  /// How it sits in its drive, as its address says.
+  [[nodiscard]] const Joint& joint() const;
   /// What could be better about the port, a sentence each.
   [[nodiscard]] const std::vector<std::string>& notes() const;
   /// Of all exchanges: good ones, errors by kind, repetitions.
@@ -183,6 +187,7 @@ class Encoder {
   Sample search();
   Reading read_now();
   Sample take(Reading reading);
+  [[nodiscard]] JointAngles angles_of(const Sample& sample) const;
   void note_restart(Sample& sample, bool jumped, Time pause);
 
   std::unique_ptr<std::atomic<bool>> cancelled_;

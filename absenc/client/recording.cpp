@@ -39,7 +39,7 @@ Recording::Recording(const RecordingSettings& settings, Encoder& encoder)
     : settings_(settings),
       encoder_(encoder),
       start_(os::now()),
-      rows_(encoder.unit(), encoder.options(), start_, SampleRows::With::motion),
+      rows_(encoder.unit(), encoder.options(), start_, SampleRows::With::motion, encoder.joint()),
       started_(date_and_time()) {
   static_cast<void>(record_form(settings.path));  // before the folder is looked at
   if (settings_.part_bytes || settings_.part_time) refuse_parts_of_another_recording();

@@ -15,8 +15,13 @@ double seconds(Time time) { return std::chrono::duration<double>(time).count(); 
 
 }  // namespace
 
-SampleRows::SampleRows(const Unit& unit, const Options& options, Time start, With with)
-    : unit_(&unit), unit_um_(unit.resolution(options).unit_um), start_(start), reading_(unit, options) {
+SampleRows::SampleRows(const Unit& unit, const Options& options, Time start, With with, const Joint& joint)
+    : unit_(&unit),
+      unit_um_(unit.resolution(options).unit_um),
+      start_(start),
+      with_(with),
+      joint_(joint),
+      reading_(unit, options) {
   add({"time_s", "s", Type::real, "seconds after `started`", {.format = "{:.6f}"}});
   protocol_ = add({"protocol", "", Type::text, "", detail});
   reading_at_ = columns_.size();
@@ -24,6 +29,7 @@ SampleRows::SampleRows(const Unit& unit, const Options& options, Time start, Wit
   confirmed_ = add({"confirmed", "", Type::boolean, "two readings in a row agreed", detail});
   ok_ = add({"ok", "", Type::boolean, "whether it is a reading", detail});
   if (with == With::motion) add_motion();
+  if (joint.is_set || joint.has_motor()) add_angles();
   event_ = add(
       {"event", "", Type::text,
        "empty for a reading; restarted: it jumped, or came so long after the one before that the way between them is "
@@ -52,6 +58,28 @@ void SampleRows::add_motion() {
   missed_ = add({"missed", "", Type::uint64, "of a gap: how many readings were due and were not taken"});
 }
 
+void SampleRows::add_angles() {
+  const bool is_linear = unit_um_ > 0;
+  angles_ = columns_.size();
+  if (joint_.is_set) {
+    add(is_linear ? Column{"joint_mm", "mm", Type::real, "direction * (unwrapped_mm - offset_mm)"}
+                  : Column{"joint_deg", "deg", Type::real,
+                           "direction * (degrees past the end of a turn - offset_deg) / gear; empty where the turns "
+                           "are not known"});
+  }
+  if (joint_.is_set && with_ == With::motion) {
+    const Column::Look rounded{.format = "{:.6g}"};
+    const Column::Look short_look{.format = "{:.3g}"};
+    const std::string_view speed = "the speed at the joint";
+    const std::string_view most = "how far the true mean is from it at most";
+    add(is_linear ? Column{"joint_speed_mm_s", "mm/s", Type::real, speed, rounded}
+                  : Column{"joint_speed_rpm", "rpm", Type::real, speed, rounded});
+    add(is_linear ? Column{"joint_speed_uncertainty_mm_s", "mm/s", Type::real, most, short_look}
+                  : Column{"joint_speed_uncertainty_rpm", "rpm", Type::real, most, short_look});
+  }
+  if (joint_.has_motor()) add({"electrical_deg", "deg", Type::real, "of the motor, 0 to below 360"});
+}
+
 std::size_t SampleRows::add(const Column& column) {
   columns_.push_back(column);
   return columns_.size() - 1;
@@ -73,6 +101,7 @@ const Row& SampleRows::of(const Sample& sample) {
     reading_.fill(sample.reading, std::span(values).subspan(reading_at_, reading_.columns().size()));
     values[confirmed_] = sample.confirmed;
     if (motion_ != 0) fill_motion(sample);
+    if (angles_ != 0) fill_angles(sample);
     return row_;
   }
   const bool is_failed = sample.kind == Sample::Kind::failed;
@@ -93,6 +122,21 @@ void SampleRows::fill_motion(const Sample& sample) {
   put(sample.speed_valid, sample.speed);
   put(sample.speed_valid, sample.speed_uncertainty);
   put(sample.speed_valid, seconds(sample.speed_delay));
+}
+
+void SampleRows::fill_angles(const Sample& sample) {
+  std::size_t at = angles_;
+  const auto put = [&](const std::optional<double>& value) {
+    row_.values[at++] = value ? Value(*value) : Value(Invalid{});
+  };
+  const JointAngles& angles = sample.angles;
+  if (joint_.is_set) put(unit_um_ > 0 ? angles.joint_mm : angles.joint_deg);
+  if (joint_.is_set && with_ == With::motion) {
+    const std::optional<Estimate>& speed = unit_um_ > 0 ? angles.joint_speed_mm_s : angles.joint_speed_rpm;
+    put(speed ? std::optional(speed->value) : std::nullopt);
+    put(speed ? std::optional(speed->uncertainty) : std::nullopt);
+  }
+  if (joint_.has_motor()) put(angles.electrical_deg);
 }
 
 const Row& SampleRows::of_gap(Time at, std::uint64_t missed) {

@@ -22,7 +22,9 @@ class SampleRows {
   enum class With : std::uint8_t { reading, motion };
 
   /// Times count from `start`, which is one of os::now.
-  SampleRows(const Unit& unit, const Options& options, Time start, With with);
+  /// With `joint` there are columns of its angles: `joint_deg` or `joint_mm`, with motion `joint_speed_...` and its
+  /// uncertainty, `electrical_deg`.
+  SampleRows(const Unit& unit, const Options& options, Time start, With with, const Joint& joint = {});
 
   [[nodiscard]] std::span<const Column> columns() const { return columns_; }
   /// Valid until the next.
@@ -33,18 +35,23 @@ class SampleRows {
  private:
   std::size_t add(const Column& column);
   void add_motion();
+  void add_angles();
   void begin(Time at, bool is_good, std::string_view event);
   void fill_motion(const Sample& sample);
+  void fill_angles(const Sample& sample);
 
   const Unit* unit_;
   double unit_um_;  // 0: rotary
   Time start_;
+  With with_;
+  Joint joint_;
   ReadingColumns reading_;
   std::vector<Column> columns_;
   // Where they are.
   std::size_t protocol_, reading_at_, confirmed_, ok_;
   std::size_t motion_ = 0;  // the first of it; 0: there is none
   std::size_t missed_ = 0;
+  std::size_t angles_ = 0;  // the first of them; 0: there are none
   std::size_t event_, message_, sent_, received_;
   Row row_;
 };

@@ -32,6 +32,7 @@ class Unwrapper {
     if (!has_position(reading)) return Joined::ignored;
     const bool first = !started_;
     const bool joins = !first && is_near(reading) && are_surely_near(reading, at);
+    if (!joins) counts_turns_ = turn_bits(reading) != 0;
     position_ = joins ? position_ + static_cast<std::uint64_t>(way(reading)) : absolute(reading);
     apart_.add(reading.latched);
     last_ = reading;
@@ -54,6 +55,9 @@ class Unwrapper {
 
   /// Counts of the single-turn resolution; at the start the encoder's own turns and counts.
   [[nodiscard]] constexpr std::int64_t position() const { return static_cast<std::int64_t>(position_); }
+
+  /// Whether `position` began with turns that the encoder counts. If not, it began within a turn that nobody knows.
+  [[nodiscard]] constexpr bool counts_turns() const { return counts_turns_; }
 
  private:
   [[nodiscard]] static constexpr bool has_position(const Reading& reading) {
@@ -102,6 +106,7 @@ class Unwrapper {
   Times times_;
   Apart apart_;
   bool started_ = false;
+  bool counts_turns_ = false;
   std::uint64_t position_ = 0;  // unsigned: what overflows after 2^63 counts goes round
   Reading last_{};
   LatchTime last_at_{};

@@ -185,5 +185,29 @@ TEST(LongestGap, IsNearlyHalfOfTheRangeAtFullSpeed) {
   EXPECT_EQ(longest_gap({.multiturn_bits = 64}, {.rpm = 1}), never);
 }
 
+TEST(Unwrapper, DoesNotJoinPositionsThatMayHaveBeenLatchedTooFarApart) {
+  // At 10000 rpm half a turn takes 3 ms. The requests were 1 ms apart, but the second reply came late: the encoder may
+  // have latched late, too.
+  Unwrapper unwrapper;
+  unwrapper.add(singleturn(0, 0ms), {0ms, 1ms});
+  EXPECT_EQ(unwrapper.add(singleturn(300, 1ms), {1ms, 2ms}), Joined::continued);
+  EXPECT_EQ(unwrapper.add(singleturn(600, 2ms), {2ms, 5ms}), Joined::restarted);
+  EXPECT_EQ(unwrapper.position(), 600);
+  Reading late = singleturn(700, 6ms);
+  late.received = 9ms;
+  EXPECT_EQ(unwrapper.add(late), Joined::restarted) << "the times of the reading say the same";
+}
+
+TEST(Unwrapper, SaysWhetherItsTurnsAreThoseOfTheEncoder) {
+  Unwrapper single;
+  single.add(singleturn(5, 0ms));
+  EXPECT_FALSE(single.counts_turns());
+  Unwrapper multi;
+  multi.add(multiturn(3, 5, 0ms));
+  EXPECT_TRUE(multi.counts_turns());
+  multi.add(singleturn(6, 1ms));
+  EXPECT_TRUE(multi.counts_turns()) << "it went on from there";
+}
+
 }  // namespace
 }  // namespace absenc::host

@@ -32,6 +32,17 @@ void append(std::string& text, const std::optional<Number>& value) {
   text += value ? fmt::format_int(*value).c_str() : "null";
 }
 
+void append_angles(std::string& text, const Passing& one) {
+  text += ',';
+  append(text, one.joint);
+  text += ',';
+  append(text, one.joint_speed ? std::optional(one.joint_speed->value) : std::nullopt);
+  text += ',';
+  append(text, one.joint_speed ? std::optional(one.joint_speed->uncertainty) : std::nullopt);
+  text += ',';
+  append(text, one.electrical_deg);
+}
+
 }  // namespace
 
 std::string topic_level(std::string_view name) {
@@ -63,6 +74,8 @@ std::string readings_text(const std::string& id, const Watch& watch, std::uint64
                          .set("speed_unit", speed_unit(watch))
                          .set("first", first)
                          .line();
+  const Joint& joint = watch.address().joint;
+  const bool has_angles = joint.is_set || joint.has_motor();
   text.back() = ',';
   text += "\"readings\":[";
   for (const Passing& one : readings) {
@@ -77,6 +90,7 @@ std::string readings_text(const std::string& id, const Watch& watch, std::uint64
     append(text, one.turns);
     text += ',';
     append(text, one.speed ? std::optional(one.speed->uncertainty) : std::nullopt);
+    if (has_angles) append_angles(text, one);
     text += ']';
   }
   return text + "]}";

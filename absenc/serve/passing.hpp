@@ -14,9 +14,12 @@ namespace absenc::serve {
 
 /// One good reading. What does not hold is not there.
 struct Passing {
-  std::int64_t at_us = 0;                   // calendar, of when it was latched
-  std::optional<double> place{};            // past the end of a turn: degrees, of linear encoders mm
-  std::optional<client::Estimate> speed{};  // rpm, of linear encoders mm/s
+  std::int64_t at_us = 0;                         // calendar, of when it was latched
+  std::optional<double> place{};                  // past the end of a turn: degrees, of linear encoders mm
+  std::optional<client::Estimate> speed{};        // rpm, of linear encoders mm/s
+  std::optional<double> joint{};                  // degrees, of linear encoders mm; where the settings say how it sits
+  std::optional<client::Estimate> joint_speed{};  // rpm, of linear encoders mm/s
+  std::optional<double> electrical_deg{};
   std::optional<std::uint64_t> counts{};
   std::optional<std::int64_t> turns{};
 };

@@ -16,6 +16,12 @@ Json datagram(const std::string& encoder, const Passing& reading) {
   Json values = Json::object();
   if (reading.place) values.set("position", *reading.place);
   if (reading.speed) values.set("speed", reading.speed->value).set("speed_uncertainty", reading.speed->uncertainty);
+  if (reading.joint) values.set("joint", *reading.joint);
+  if (reading.joint_speed) {
+    values.set("joint_speed", reading.joint_speed->value);
+    values.set("joint_speed_uncertainty", reading.joint_speed->uncertainty);
+  }
+  if (reading.electrical_deg) values.set("electrical_deg", *reading.electrical_deg);
   if (reading.counts) values.set("counts", *reading.counts);
   if (reading.turns) values.set("turns", *reading.turns);
   return Json::object().set("timestamp", static_cast<double>(reading.at_us) / 1e6).set(encoder, values);

@@ -198,6 +198,21 @@ Json condition_json(const Watch& watch, const Snapshot& snapshot) {
   return json.set("status", live ? status_json(unit, snapshot.last.reading) : Json());
 }
 
+namespace {
+
+// Null is what was not set, does not hold or is not known.
+void set_angles(Json& json, const Watch& watch, const JointAngles& angles) {
+  const auto value = [](const std::optional<double>& one) { return one ? Json(*one) : Json(); };
+  const std::optional<Estimate>& speed = angles.joint_speed_mm_s ? angles.joint_speed_mm_s : angles.joint_speed_rpm;
+  json.set("has_joint", watch.address().joint.is_set).set("has_motor", watch.address().joint.has_motor());
+  json.set("joint_deg", value(angles.joint_deg)).set("joint_mm", value(angles.joint_mm));
+  json.set("joint_speed", speed ? Json(speed->value) : Json());
+  json.set("joint_speed_uncertainty", speed ? Json(speed->uncertainty) : Json());
+  json.set("electrical_deg", value(angles.electrical_deg));
+}
+
+}  // namespace
+
 Json overview(const Watch& watch, const Snapshot& snapshot) {
   const bool live = snapshot.state == State::live;
   const Unit& unit = *watch.address().unit;
@@ -212,6 +227,7 @@ Json overview(const Watch& watch, const Snapshot& snapshot) {
   json.set("speed", live && last.speed_valid ? Json(last.speed) : Json());
   json.set("speed_uncertainty", live && last.speed_valid ? Json(last.speed_uncertainty) : Json());
   json.set("speed_unit", is_linear(watch) ? "mm/s" : "rpm");
+  set_angles(json, watch, live ? last.angles : JointAngles{});
   json.set("alarms", live ? alarms_json(unit, last.reading, &snapshot.raised) : Json());
   json.set("status", live ? status_json(unit, last.reading) : Json());
   json.set("errors_last_minute", snapshot.errors_last_minute).set("rate_hz", snapshot.rate);

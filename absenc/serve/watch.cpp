@@ -316,6 +316,10 @@ void Watch::pass_on(const Sample& sample) {
   passing.at_us = calendar_us() - std::chrono::duration_cast<std::chrono::microseconds>(os::now() - sample.at).count();
   if (sample.position_valid) passing.place = place_of(sample);
   passing.speed = sample.measured_speed();
+  const client::JointAngles& angles = sample.angles;
+  passing.joint = angles.joint_mm ? angles.joint_mm : angles.joint_deg;
+  passing.joint_speed = angles.joint_speed_mm_s ? angles.joint_speed_mm_s : angles.joint_speed_rpm;
+  passing.electrical_deg = angles.electrical_deg;
   if (reading.ready && reading.singleturn_valid()) passing.counts = reading.singleturn;
   if (reading.multiturn_bits != 0 && reading.multiturn_valid) passing.turns = reading.turns();
   for (Outbox& outbox : outboxes_) {

@@ -82,6 +82,28 @@ class Sample:
     @property
     def speed_delay_s(self) -> Optional[float]: ...
     @property
+    def joint_deg(self) -> Optional[float]:
+        """Angle of the joint: direction * (degrees past the end of a turn - offset_deg) / gear; None: its address sets
+        none of them, it does not hold, or the turns are not known."""
+    @property
+    def joint_mm(self) -> Optional[float]:
+        """Of linear encoders: direction * (position - offset_mm)."""
+    @property
+    def joint_speed_rpm(self) -> Optional[float]:
+        """The speed at the joint."""
+    @property
+    def joint_speed_uncertainty_rpm(self) -> Optional[float]:
+        """How far the true mean is from it at most."""
+    @property
+    def joint_speed_mm_s(self) -> Optional[float]:
+        """The same of a linear encoder."""
+    @property
+    def joint_speed_uncertainty_mm_s(self) -> Optional[float]:
+        """How far the true mean is from it at most."""
+    @property
+    def electrical_deg(self) -> Optional[float]:
+        """Electrical angle of the motor, 0 to below 360; None: no pole_pairs or pole_pair_mm, or it does not hold."""
+    @property
     def confirmed(self) -> bool:
         """Two readings in a row agreed."""
     @property

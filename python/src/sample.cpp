@@ -128,6 +128,31 @@ void bind_sample(py::module_& module) {
           [](const PySample& one) { return one.when(one.sample.speed_valid, seconds(one.sample.speed_delay)); },
           "Seconds.")
       .def_property_readonly(
+          "joint_deg", [](const PySample& one) { return one.sample.angles.joint_deg; },
+          "Angle of the joint: direction * (degrees past the end of a turn - offset_deg) / gear; None: its address "
+          "sets "
+          "none of them, it does not hold, or the turns are not known.")
+      .def_property_readonly(
+          "joint_mm", [](const PySample& one) { return one.sample.angles.joint_mm; },
+          "Of linear encoders: direction * (position - offset_mm).")
+      .def_property_readonly(
+          "joint_speed_rpm", [](const PySample& one) { return value_of(one.sample.angles.joint_speed_rpm); },
+          "The speed at the joint.")
+      .def_property_readonly(
+          "joint_speed_uncertainty_rpm",
+          [](const PySample& one) { return uncertainty_of(one.sample.angles.joint_speed_rpm); },
+          "How far the true mean is from it at most.")
+      .def_property_readonly(
+          "joint_speed_mm_s", [](const PySample& one) { return value_of(one.sample.angles.joint_speed_mm_s); },
+          "The same of a linear encoder.")
+      .def_property_readonly(
+          "joint_speed_uncertainty_mm_s",
+          [](const PySample& one) { return uncertainty_of(one.sample.angles.joint_speed_mm_s); },
+          "How far the true mean is from it at most.")
+      .def_property_readonly(
+          "electrical_deg", [](const PySample& one) { return one.sample.angles.electrical_deg; },
+          "Electrical angle of the motor, 0 to below 360; None: no pole_pairs or pole_pair_mm, or it does not hold.")
+      .def_property_readonly(
           "confirmed", [](const PySample& one) { return one.sample.confirmed; },
           "It was compared with another reading, and they agree within the speed limit.")
       .def_property_readonly(

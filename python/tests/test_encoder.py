@@ -307,3 +307,23 @@ def test_changes_are_kept(absenc_emulate, monkeypatch, tmp_path) -> None:
     entries = [line.split("\t")[2:6] for line in journal.read_text().splitlines()]
     assert entries == [["memory write 0x05", "0x00", "0x42", "confirmed"],
                        ["config set overheat-threshold", "90", "80", "confirmed"]]
+
+
+def test_speed_and_angles_of_a_drive_have_their_units_in_their_names():
+    settings = "&gear=50/3&direction=-1&offset_deg=10&pole_pairs=7"
+    with absenc.open("sim:tformat?multiturn=3&motion=rpm=60" + settings) as encoder:
+        last = list(encoder.samples(rate=100, count=20))[-1]
+        turned = 360 * last.position / 2**17
+        assert last.joint_deg == pytest.approx(-(turned - 10) * 3 / 50)
+        assert last.electrical_deg == pytest.approx(-(turned - 10) * 7 % 360)
+        assert abs(last.speed_rpm - 60) <= last.speed_uncertainty_rpm < 1
+        assert last.joint_speed_rpm == pytest.approx(-last.speed_rpm * 3 / 50)
+        assert last.joint_speed_uncertainty_rpm == pytest.approx(last.speed_uncertainty_rpm * 3 / 50)
+        assert last.speed_mm_s is None and last.joint_mm is None
+    with absenc.open("sim:biss?model=linear-26-1um&singleturn=30000&offset_mm=10&pole_pair_mm=24") as encoder:
+        last = list(encoder.samples(rate=100, count=20))[-1]
+        assert (last.joint_mm, last.speed_mm_s, last.speed_rpm, last.joint_deg) == (20, 0, None, None)
+        assert last.electrical_deg == pytest.approx(300)
+    with absenc.open("sim:tformat") as encoder:
+        plain = next(encoder.samples(count=1))
+        assert (plain.joint_deg, plain.electrical_deg, plain.speed_rpm) == (None, None, None)

@@ -11,6 +11,7 @@
 #include <string_view>
 
 #include "absenc/client/emulation/virtual_device.hpp"
+#include "absenc/client/joint.hpp"
 #include "absenc/host/echo.hpp"
 #include "absenc/host/speed_limit.hpp"
 #include "absenc/os/serial.hpp"
@@ -34,7 +35,7 @@ struct LinkParameter {
   bool repeatable = false;
 };
 
-inline constexpr std::array<LinkParameter, 24> link_parameters{{
+inline constexpr std::array<LinkParameter, 30> link_parameters{{
     {rate_setting, "RATE", "bits a second, instead of the protocol's own; slcan: of the adapter's port, 115200",
      "serial, slcan"},
     {"parity", "none|odd|even", "of each character, instead of the protocol's own", "serial, sim"},
@@ -56,6 +57,15 @@ inline constexpr std::array<LinkParameter, 24> link_parameters{{
      "too long a pause",
      "serial, tcp, spi, can, slcan, sim"},
     {"max_mm_s", "MM/S", "the same of a linear encoder", "serial, tcp, spi, can, slcan, sim"},
+    {"direction", "1|-1", "-1: the joint turns against the encoder; shown as joint angle beside the encoder's own",
+     "serial, tcp, spi, can, slcan, sim"},
+    {"offset_deg", "DEG", "degrees at the encoder where the joint is at 0", "serial, tcp, spi, can, slcan, sim"},
+    {"offset_mm", "MM", "the same of a linear encoder", "serial, tcp, spi, can, slcan, sim"},
+    {"gear", "RATIO", "turns of the encoder for one of the joint: 100, 50/3", "serial, tcp, spi, can, slcan, sim"},
+    {"pole_pairs", "N", "of the motor on the encoder's shaft, for its electrical angle",
+     "serial, tcp, spi, can, slcan, sim"},
+    {"pole_pair_mm", "MM", "length of a pole pair of a linear motor, for its electrical angle",
+     "serial, tcp, spi, can, slcan, sim"},
     {"command", "NAME", "what is read, instead of the position with all alarms: a command that yields positions",
      "serial, tcp, spi, can, slcan, sim"},
     {"motion", "MOTION", "still, rpm=R, sine=DEGREES,HZ or file=CSV", "sim"},
@@ -96,6 +106,7 @@ struct EncoderAddress {
   host::EchoMode echo = host::EchoMode::off;
   std::uint32_t maximum_rpm = 0;   // 0: as the model says, or as is usual
   std::uint32_t maximum_mm_s = 0;  // of linear encoders; 0: as is usual
+  Joint joint;                     // how the encoder sits in its drive
   const Command* reads = nullptr;  // what is read again and again; null: the first command with Verb::read
   DeviceSettings device;
   std::string written;  // as the user wrote it, with all settings: "elbow?baud=57600"

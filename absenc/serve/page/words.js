@@ -80,6 +80,13 @@ export function belowFigure(one, now) {
   else if (one.has_turns) parts.push(one.multiturn_valid === false ? "turns INVALID" : "turns unknown");
   else if (!one.linear) parts.push("single-turn");
   if (one.speed !== null) parts.push(`${measuredText(one.speed, one.speed_uncertainty)} ${one.speed_unit}`);
+  if (one.has_joint) {
+    if (one.joint_deg !== null) parts.push(`joint ${numberText(one.joint_deg, 3)}°`);
+    else if (one.joint_mm !== null) parts.push(`joint ${numberText(one.joint_mm, 4)} mm`);
+    else parts.push("joint unknown");
+    if (one.joint_speed !== null) parts.push(`joint ${measuredText(one.joint_speed, one.joint_speed_uncertainty)} ${one.speed_unit}`);
+  }
+  if (one.has_motor) parts.push(one.electrical_deg === null ? "electrical unknown" : `electrical ${numberText(one.electrical_deg, 1)}°`);
   return parts;
 }
 

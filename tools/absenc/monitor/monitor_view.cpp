@@ -312,6 +312,8 @@ void draw_encoder(Screen& screen, int row, int end, const Shown& shown, bool err
   draw_position(screen, row++, shown);
   draw_bar(screen, row++, shown);
   screen.put(row++, 2, speed_line(snapshot));
+  const std::string angles = is_live(snapshot) ? angles_text(shown.watch->uri().joint, snapshot.last) : "";
+  if (!angles.empty()) screen.put(row++, 2, std::string_view(angles).substr(angles.find_first_not_of(' ')));
   screen.put(row++, 2, statistics_line(snapshot));
   const bool flawless = failures(snapshot) == 0 && snapshot.losses == 0;
   row = draw_words(screen, row, end,
@@ -387,9 +389,9 @@ std::string to_line(const Shown& shown) {
   const Snapshot& snapshot = shown.snapshot;
   std::string text = fmt::format("{}: ", shown.watch->name());
   if (is_live(snapshot)) {
-    text +=
-        fmt::format("{}   {}{}", reading_text(*shown.watch->uri().unit, snapshot.last.reading, doubt_of(snapshot.last)),
-                    measured_speed_text(snapshot, "±"), age(snapshot));
+    text += fmt::format(
+        "{}   {}{}", reading_text(*shown.watch->uri().unit, snapshot.last.reading, doubt_of(snapshot.last)),
+        measured_speed_text(snapshot, "±") + angles_text(shown.watch->uri().joint, snapshot.last), age(snapshot));
   } else {
     text += fmt::format("{}, no reading for {}", name_of(snapshot.state), to_text(snapshot.age));
   }
@@ -401,9 +403,10 @@ Json to_json(const Shown& shown) {
   const EncoderAddress& uri = shown.watch->uri();
   Json json = Json::object().set("encoder", shown.watch->name()).set("state", name_of(snapshot.state));
   json.set("age_s", std::chrono::duration<double>(snapshot.age).count());
-  SampleRows rows(*uri.unit, uri.options, shown.watch->start(), SampleRows::With::reading);
+  SampleRows rows(*uri.unit, uri.options, shown.watch->start(), SampleRows::With::reading, uri.joint);
   json.set("reading", is_live(snapshot) ? to_json(rows.of(snapshot.last)) : Json());
   set_motion(json, is_live(snapshot) ? snapshot.last : Sample{}, unit_um(shown));
+  set_joint_speed(json, is_live(snapshot) ? snapshot.last : Sample{}, uri.joint, unit_um(shown));
   const auto microseconds = [](Time time) { return static_cast<double>(time.count()) / 1e3; };
   json.set("rate_hz", snapshot.rate).set("readings", snapshot.readings);
   json.set("latency_us", Json::object()

@@ -79,4 +79,26 @@ void set_motion(Json& json, const Sample& sample, double unit_um) {
   }
 }
 
+void set_joint_speed(Json& json, const Sample& sample, const Joint& joint, double unit_um) {
+  if (!joint.is_set) return;
+  const std::string unit = unit_um > 0 ? "mm_s" : "rpm";
+  const std::optional<Estimate>& speed = unit_um > 0 ? sample.angles.joint_speed_mm_s : sample.angles.joint_speed_rpm;
+  json.set("joint_speed_" + unit, speed ? Json(speed->value) : Json());
+  json.set("joint_speed_uncertainty_" + unit, speed ? Json(speed->uncertainty) : Json());
+}
+
+std::string angles_text(const Joint& joint, const Sample& sample) {
+  const JointAngles& angles = sample.angles;
+  const bool is_linear = sample.reading.unit_um > 0;
+  const auto text = [](std::string_view what, const std::optional<double>& value, int decimals, std::string_view unit) {
+    if (!value) return fmt::format("   {} unknown", what);
+    return fmt::format("   {} {:.{}f} {}", what, *value, decimals, unit);
+  };
+  std::string line;
+  if (joint.is_set)
+    line += is_linear ? text("joint", angles.joint_mm, 4, "mm") : text("joint", angles.joint_deg, 4, "deg");
+  if (joint.has_motor()) line += text("electrical", angles.electrical_deg, 2, "deg");
+  return line;
+}
+
 }  // namespace absenc::tool

@@ -39,5 +39,9 @@ void set_change(Json& json, const Change& change);
 /// Sets the position in counts and the speed, of linear encoders (`unit_um` is not 0) both in millimetres; what is not
 /// valid is null.
 void set_motion(Json& json, const Sample& sample, double unit_um);
+/// Sets the speed at the joint with its uncertainty, where the address says how the encoder sits in its drive.
+void set_joint_speed(Json& json, const Sample& sample, const Joint& joint, double unit_um);
+/// "   joint 12.345 deg   electrical 90.00 deg"; "" where the address does not say how the encoder sits in its drive.
+[[nodiscard]] std::string angles_text(const Joint& joint, const Sample& sample);
 
 }  // namespace absenc::tool

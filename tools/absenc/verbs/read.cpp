@@ -41,7 +41,7 @@ class Display {
       : live_(&live),
         format_(format),
         speeds_(speeds),
-        rows_(live.unit(), live.options(), os::now(), SampleRows::With::reading) {
+        rows_(live.unit(), live.options(), os::now(), SampleRows::With::reading, live.joint()) {
     if (format == Format::csv) print_line(csv_header(rows_.columns()));
   }
 
@@ -80,7 +80,8 @@ class Display {
     }
     told_doubt_ = sample.doubtful;
     if (format_ != Format::human) return show_row(sample);
-    print_line(reading_text(unit, reading, doubt_of(sample)) + (speeds_ ? speed_text(sample) : ""));
+    print_line(reading_text(unit, reading, doubt_of(sample)) + (speeds_ ? speed_text(sample) : "") +
+               angles_text(live_->joint(), sample));
     // What was raised is so until the encoder reports that it is not.
     const std::uint32_t alarms = reading.alarms | (alarms_ & ~reading.alarms_reported);
     if (alarms == alarms_) return;
