@@ -37,6 +37,10 @@ class Table:
     def __len__(self) -> int:
         return len(self.rows)
 
+    def keys(self) -> list[str]:
+        """The names of the columns: `dict(recording)` has each with its values."""
+        return list(self.columns)
+
     def __getitem__(self, column: str) -> Masked:
         if column not in self.columns:
             raise KeyError(f"{column}: there are {', '.join(self.columns)}")

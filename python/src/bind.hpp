@@ -59,5 +59,6 @@ void bind_emulation(py::module_& module);
 void bind_decode(py::module_& module);
 void bind_protocol(py::module_& module);
 void bind_identify(py::module_& module);
+void bind_verdicts(py::module_& module);
 
 }  // namespace absenc::python

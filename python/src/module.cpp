@@ -9,6 +9,7 @@ PYBIND11_MODULE(_absenc, module) {
   bind_encoder(module);
   bind_emulation(module);
   bind_identify(module);
+  bind_verdicts(module);
   bind_protocol(module);
   bind_decode(module);
   module.attr("__version__") = ABSENC_VERSION;

@@ -55,6 +55,13 @@ def test_both_formats_are_the_same(both):
         name: value for name, value in of_json.header.items() if name != "started"}
 
 
+def test_as_a_dict(both):
+    for recording in both:
+        columns = dict(recording)
+        assert list(columns) == list(recording.columns)
+        assert np.ma.allequal(columns["time_s"], recording["time_s"])
+
+
 def test_hdf5_has_the_same_columns(tmp_path):
     of_csv, of_hdf5 = (absenc.load(record(tmp_path / name, FAULTY)) for name in ("run.csv", "run.h5"))
     assert of_hdf5.columns == of_csv.columns

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // What was found, as text: for people and for the programs that count tests.
+#include "absenc/client/conform/conform_text.hpp"
+
 #include <fmt/format.h>
 
 #include <algorithm>
-
-#include "absenc/client/conform.hpp"
 
 namespace absenc::client {
 
@@ -89,6 +89,27 @@ std::string Conformance::report() const {
   text += fmt::format("{} kept, {} broken, {} untested\n", count(Verdict::kept), count(Verdict::broken),
                       count(Verdict::untested));
   return verdict() == Verdict::untested ? text + fmt::format("{}\n", nothing_judged) : text;
+}
+
+Json to_json(const Conformance& conformance) {
+  const Json clauses = Json::list(conformance.clauses, [](const ClauseResult& one) {
+    return Json::object()
+        .set("id", one.id)
+        .set("document", one.document)
+        .set("paragraph", one.paragraph)
+        .set("words", one.words)
+        .set("verdict", name_of(one.verdict))
+        .set("evidence", one.evidence);
+  });
+  return Json::object()
+      .set("ok", conformance.verdict() == Verdict::kept)
+      .set("protocol", conformance.protocol)
+      .set("verdict", name_of(conformance.verdict()))
+      .set("kept", conformance.count(Verdict::kept))
+      .set("broken", conformance.count(Verdict::broken))
+      .set("untested", conformance.count(Verdict::untested))
+      .set("clauses", clauses)
+      .set("left", Json::list(conformance.left));
 }
 
 }  // namespace absenc::client

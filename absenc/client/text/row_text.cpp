@@ -104,4 +104,11 @@ Json to_json(const Row& row) {
   return json;
 }
 
+Json to_json(const Option& option, std::int64_t value) {
+  if (option.decimals != 0) return real_value(option, value);
+  if (option.choices.empty()) return value;
+  if (option.choices.data() == boolean_choices.data()) return value != 0;
+  return option.choices[static_cast<std::size_t>(value)];
+}
+
 }  // namespace absenc::client

@@ -8,19 +8,12 @@
 
 namespace absenc::tool {
 
-Json to_json(const Option& option, std::int64_t value) {
-  if (option.decimals != 0) return real_value(option, value);
-  if (option.choices.empty()) return value;
-  if (option.choices.data() == boolean_choices.data()) return value != 0;
-  return option.choices[static_cast<std::size_t>(value)];
-}
-
 Json options_to_json(const Unit& unit, const Options& options) {
   Json json = Json::object();
   if (options.has_word()) json.set(word_option_name, to_text(options.word));
   for (std::size_t i = 0; i < unit.options.size(); ++i) {
     if (options.has_word() && unit.options[i].describes_word) continue;
-    json.set(unit.options[i].name, to_json(unit.options[i], options[i]));
+    json.set(unit.options[i].name, client::to_json(unit.options[i], options[i]));
   }
   return json;
 }

@@ -15,7 +15,6 @@ namespace absenc::tool {
 
 using namespace client;
 
-[[nodiscard]] Json to_json(const Option& option, std::int64_t value);
 /// {"singleturn_bits":17,...}
 [[nodiscard]] Json options_to_json(const Unit& unit, const Options& options);
 

@@ -6,10 +6,10 @@
 #include <array>
 #include <fstream>
 
+#include "absenc/client/conform/conform_text.hpp"
 #include "absenc/client/conform/host_stage.hpp"
 #include "absenc/client/conform_host.hpp"
 #include "absenc/client/emulation/request_watch.hpp"
-#include "absenc/client/text/json.hpp"
 #include "absenc/client/text/unit_text.hpp"
 #include "absenc/os/cuse/spidev_node.hpp"
 #include "absenc/os/signals.hpp"
@@ -22,27 +22,6 @@
 namespace absenc::tool {
 
 namespace {
-
-Json conformance_json(const Conformance& conformance) {
-  const Json clauses = Json::list(conformance.clauses, [](const ClauseResult& one) {
-    return Json::object()
-        .set("id", one.id)
-        .set("document", one.document)
-        .set("paragraph", one.paragraph)
-        .set("words", one.words)
-        .set("verdict", name_of(one.verdict))
-        .set("evidence", one.evidence);
-  });
-  return Json::object()
-      .set("ok", conformance.verdict() == Verdict::kept)
-      .set("protocol", conformance.protocol)
-      .set("verdict", name_of(conformance.verdict()))
-      .set("kept", conformance.count(Verdict::kept))
-      .set("broken", conformance.count(Verdict::broken))
-      .set("untested", conformance.count(Verdict::untested))
-      .set("clauses", clauses)
-      .set("left", Json::list(conformance.left));
-}
 
 std::string without_end(std::string text) {
   if (!text.empty() && text.back() == '\n') text.pop_back();
@@ -59,7 +38,7 @@ int tell_verdict(const Invocation& invocation, const Conformance& conformance) {
       throw UsageError(fmt::format("{} cannot be written: choose a folder that is there and may be written", path));
   }
   if (invocation.has("--json")) {
-    print_line(conformance_json(conformance).line());
+    print_line(to_json(conformance).line());
   } else {
     print_line(without_end(invocation.has("--tap") ? conformance.tap() : conformance.report()));
   }

@@ -191,7 +191,7 @@ Json models_json(const Unit& unit) {
     Json options = Json::object();
     for (const OptionValue& value : model.values) {
       const Option& option = unit.options[value.option];
-      options.set(option.name, to_json(option, value.value));
+      options.set(option.name, client::to_json(option, value.value));
     }
     return Json::object()
         .set("name", model.name)
@@ -210,15 +210,15 @@ Json with_role(Json json, Role role) {
 Json options_json(const Unit& unit) {
   return Json::list(unit.options, [](const Option& option) {
     Json json = Json::object().set("name", option.name).set("meaning", option.meaning);
-    json.set("default", to_json(option, option.default_value));
+    json.set("default", client::to_json(option, option.default_value));
     json = with_role(std::move(json), option.role);
     if (option.choices.empty()) {
       if (option.or_zero) json.set("or_zero", true);
-      return json.set("minimum", to_json(option, option.minimum)).set("maximum", to_json(option, option.maximum));
+      return json.set("minimum", client::to_json(option, option.minimum)).set("maximum", client::to_json(option, option.maximum));
     }
     Json choices = Json::array();
     for (std::size_t i = 0; i < option.choices.size(); ++i) {
-      choices.append(to_json(option, static_cast<std::int64_t>(i)));
+      choices.append(client::to_json(option, static_cast<std::int64_t>(i)));
     }
     return json.set("choices", choices);
   });

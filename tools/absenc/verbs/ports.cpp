@@ -3,14 +3,11 @@
 
 #include <array>
 #include <string>
-#include <vector>
 
-#include "absenc/client/text/json.hpp"
 #include "absenc/client/text/unit_text.hpp"
+#include "absenc/client/way/ports.hpp"
 #include "absenc/os/port_facts.hpp"
 #include "absenc/os/serial_ports.hpp"
-#include "absenc/os/socketcan.hpp"
-#include "absenc/os/spi_port.hpp"
 #include "tools/absenc/error.hpp"
 #include "tools/absenc/parameters.hpp"
 #include "tools/absenc/subcommand.hpp"
@@ -41,55 +38,26 @@ std::string way_text(const ListedPort& port) {
   return text;
 }
 
-std::string text_of(const ListedPort& port) {
+std::string text_of_serial(const client::Port& listed) {
+  const ListedPort& port = listed.serial;
   std::string text = fmt::format("{}: {}\n  {}\n", port.path, adapter_text(port), way_text(port));
   if (!port.lasting_path.empty()) text += fmt::format("  lasting name: {}\n", port.lasting_path);
   if (os::is_modem_driver(port.driver)) return text + "  a mobile modem: no encoder is behind it\n";
   if (!port.refusal.empty()) return text + fmt::format("  {}\n", port.refusal);
   if (!port.holder.empty()) return text + fmt::format("  in use by {}\n", port.holder);
-  return text + fmt::format("  free; next: absenc identify {}\n", port.path);
+  return text + fmt::format("  free; next: {}\n", listed.next_command());
 }
 
-Json json_of(const ListedPort& port) {
-  const auto known = [](const std::string& text) { return text.empty() ? Json() : Json(text); };
-  const os::UsbAdapter usb = port.usb.value_or(os::UsbAdapter{});
-  const os::AdapterChip* chip = os::chip_of(usb);
-  return Json::object()
-      .set("port", port.path)
-      .set("kind", "serial")
-      .set("lasting_name", known(port.lasting_path))
-      .set("maker", known(usb.maker))
-      .set("adapter", known(usb.name))
-      .set("serial_number", known(usb.serial_number))
-      .set("chip", chip != nullptr ? Json(chip->name) : Json())
-      .set("driver", known(port.driver))
-      .set("latency_timer_ms", port.latency_timer ? Json(*port.latency_timer) : Json())
-      .set("highest_rate", port.highest_rate ? Json(*port.highest_rate) : Json())
-      .set("may_open", port.refusal.empty())
-      .set("refusal", known(port.refusal))
-      .set("in_use_by", known(port.holder));
-}
-
-Json json_of(std::string_view kind, const std::string& name) {
-  return Json::object().set("port", name).set("kind", kind);
+std::string text_of(const client::Port& port) {
+  if (port.kind == "serial") return text_of_serial(port);
+  const std::string_view words = port.kind == "can" ? "a CAN interface" : "an SPI controller";
+  return fmt::format("{}: {}\n  next: {}\n", port.path, words, port.next_command());
 }
 
 int run_ports(const Invocation& invocation) {
   const bool json = invocation.has("--json");
   std::string text;
-  for (const std::string& path : os::serial_ports()) {
-    const ListedPort port = os::look_at(path);
-    text += json ? json_of(port).line() + '\n' : text_of(port);
-  }
-  const auto add = [&](std::string_view kind, std::string_view words, std::string_view place,
-                       const std::vector<std::string>& names) {
-    for (const std::string& name : names) {
-      text += json ? json_of(kind, name).line() + '\n'
-                   : fmt::format("{0}: {1}\n  next: absenc identify {2}{0}\n", name, words, place);
-    }
-  };
-  add("can", "a CAN interface", "", os::can_interfaces());
-  add("spi", "an SPI controller", "spi:", os::spi_devices());
+  for (const client::Port& port : client::ports()) text += json ? to_json(port).line() + '\n' : text_of(port);
   if (!text.empty()) {
     print_line(text);
   } else if (!json) {

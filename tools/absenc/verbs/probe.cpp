@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "absenc/client/captures/probe.hpp"
+
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
@@ -7,7 +9,6 @@
 #include <vector>
 
 #include "absenc/client/text/unit_text.hpp"
-#include "absenc/client/text/wire_text.hpp"
 #include "tools/absenc/error.hpp"
 #include "tools/absenc/parameters.hpp"
 #include "tools/absenc/subcommand.hpp"
@@ -17,55 +18,6 @@
 namespace absenc::tool {
 
 namespace {
-
-struct Evidence final : EvidenceSink {
-  void put(const OptionEvidence& evidence) override { all.push_back(evidence); }
-  std::vector<OptionEvidence> all;
-};
-
-/// Frames from the command line, requests and replies by their order.
-class Captures {
- public:
-  Captures(const Unit& unit, std::span<const std::string> requests, std::span<const std::string> replies) {
-    if (replies.empty()) throw UsageError("there is nothing to probe: give captured replies with --hex");
-    if (!requests.empty() && requests.size() != replies.size()) {
-      throw UsageError(
-          fmt::format("{} --request for {} --hex: give one for each in the same order, or none; \"\" "
-                      "where it is not known",
-                      requests.size(), replies.size()));
-    }
-    for (std::size_t i = 0; i < replies.size(); ++i) {
-      frames_.push_back(frame(unit, "--request", i < requests.size() ? requests[i] : ""));
-      frames_.push_back(frame(unit, "--hex", replies[i]));
-      if (frames_[2 * i].bytes.empty() && frames_[2 * i + 1].bytes.empty()) {
-        throw UsageError(fmt::format("frame {} has neither request nor reply", i + 1));
-      }
-    }
-    for (std::size_t i = 0; i < frames_.size(); i += 2) all.push_back({frames_[i].bytes, frames_[i + 1].bytes});
-  }
-
-  std::vector<Capture> all;
-
- private:
-  static WireFrame frame(const Unit& unit, std::string_view what, std::string_view text) {
-    return text.empty() ? WireFrame{} : parse_wire_text(unit.link, what, text);
-  }
-
-  std::vector<WireFrame> frames_;
-};
-
-// What must be said to go on: values that the frames have settled, and those that are not the default.
-std::vector<std::string> settled(const Unit& unit, const Options& options, std::span<const OptionEvidence> evidence) {
-  std::vector<std::string> settings;
-  for (std::size_t i = 0; i < unit.options.size(); ++i) {
-    const Option& option = unit.options[i];
-    const auto possible = std::count_if(evidence.begin(), evidence.end(),
-                                        [i](const OptionEvidence& one) { return one.option == i && one.possible; });
-    if (possible == 0 || (possible > 1 && options[i] == option.default_value)) continue;
-    settings.push_back(fmt::format("{}={}", option.name, to_text(option, options[i])));
-  }
-  return settings;
-}
 
 std::string sentence(const OptionEvidence& evidence) {
   return evidence.possible ? std::string(evidence.why)
@@ -91,37 +43,19 @@ bool same_reason(std::span<const OptionEvidence> evidence) {
   });
 }
 
-Json evidence_json(const Unit& unit, std::span<const OptionEvidence> evidence) {
-  return Json::list(evidence, [&](const OptionEvidence& one) {
-    const Option& option = unit.options[one.option];
-    Json json = Json::object().set("option", option.name).set("value", to_json(option, one.value));
-    json.set("possible", one.possible).set("why", one.why);
-    return one.possible ? json : json.set("frame", one.capture + 1);
-  });
-}
-
 int run_probe(const Invocation& invocation) {
-  const Unit& unit = require_unit(invocation.text("protocol"));
-  if (unit.probe == nullptr) {
-    throw UsageError(fmt::format("captured frames of {} leave nothing open: `absenc decode {}` says what they mean",
-                                 unit.id, unit.id));
-  }
-  Options options = require_options(unit, invocation.text("--model"), invocation.texts("--option"));
-  const Captures captures(unit, invocation.texts("--request"), invocation.texts("--hex"));
-  Evidence evidence;
-  const bool explained = unit.probe(options, captures.all, evidence);
-  const std::vector<std::string> settings =
-      explained ? settled(unit, options, evidence.all) : std::vector<std::string>();
+  const Probed probed = probe(invocation.text("protocol"), invocation.text("--model"), invocation.texts("--option"),
+                              invocation.texts("--hex"), invocation.texts("--request"));
+  const auto& [unit, explained, evidence, settings] = probed;
   if (invocation.has("--json")) {
-    Json json = Json::object().set("protocol", unit.id).set("ok", explained);
-    print_line(json.set("evidence", evidence_json(unit, evidence.all)).set("settled", Json::list(settings)).line());
+    print_line(to_json(probed).line());
   } else {
-    if (explained || !same_reason(evidence.all)) show(unit, evidence.all);
+    if (explained || !same_reason(evidence)) show(*unit, evidence);
     if (explained && settings.empty()) print_line("\nthe defaults explain all frames; nothing else is excluded");
     if (!settings.empty()) print_line(fmt::format("\ngo on with: --option {}", fmt::join(settings, " --option ")));
     if (!explained) {
-      print_message(same_reason(evidence.all)
-                        ? fmt::format("whatever the options, {}", sentence(evidence.all.front()))
+      print_message(same_reason(evidence)
+                        ? fmt::format("whatever the options, {}", sentence(evidence.front()))
                         : "no options explain all frames: is one of them damaged, or of another encoder?");
     }
   }

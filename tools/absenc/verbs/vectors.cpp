@@ -77,7 +77,7 @@ Json vector_json(const Unit& unit, const Vector& vector) {
     const auto option = std::find_if(unit.options.begin(), unit.options.end(),
                                      [&](const Option& one) { return one.name == setting.name; });
     const auto index = static_cast<std::size_t>(option - unit.options.begin());
-    settings.set(setting.name, to_json(*option, options[index]));
+    settings.set(setting.name, client::to_json(*option, options[index]));
   }
   Json json = Json::object();
   json.set("id", vector.id).set("protocol", unit.id).set("description", vector.meaning);
