@@ -170,16 +170,30 @@ class Named(EncoderCase):
         with BabblingLine(period=0.002, pieces=(b"\x55\x12",)) as line:
             self.assert_found(f"tformat:{line.path}", "never_silent")
 
-    def test_another_rate(self):
+    def test_a_pseudo_terminal_has_no_rate_that_could_be_wrong(self):
         for said, rate in ((2_000_000, 2_500_000), (2_500_000, 9_600)):
             with self.subTest(rate=rate), TurnedRate(rate, GOOD_REPLY) as line:
-                found = self.assert_found(f"tformat:{line.path}?baud={said}&{PATIENT}", "wrong_baud")
-                self.assertEqual(found["findings"][0]["action"], f"set baud={rate}")
+                _, found = doctor(f"tformat:{line.path}?baud={said}&{PATIENT}")
+                self.assertNotIn("wrong_baud", ids(found))
+                self.assertNotIn("good:", found["verdict"])
 
     def test_another_model(self):
         emulator = self.emulator("--model", "23-bit", "--motion", "rpm=60")
         found = self.assert_found(f"tformat:{emulator.path}?{PATIENT}", "wrong_settings")
         self.assertEqual(found["findings"][0]["action"], "set model=23-bit")
+        with Emulator(self.directory, "--motion", "rpm=60", name="usual") as usual:
+            found = self.assert_found(f"tformat:{usual.path}?model=23-bit&{PATIENT}", "wrong_settings")
+            self.assertEqual(found["findings"][0]["action"], "set model=TS5700N8500")
+
+    def test_another_address(self):
+        with Emulator(self.directory, "--option", "address=3", protocol="esl", name="third") as third:
+            found = self.assert_found(f"esl:{third.path}?latency=50", "wrong_address")
+            self.assertEqual(found["findings"][0]["action"], "set address=3")
+
+    def test_another_protocol(self):
+        emulator = self.emulator("--motion", "rpm=60")
+        found = self.assert_found(f"esl:{emulator.path}?latency=50", "other_protocol")
+        self.assertIn(f"absenc read \"tformat:{emulator.path}", found["findings"][0]["action"])
 
     def test_two_encoders_with_one_address(self):
         with Emulator(self.directory, "--option", "address=3", "--also", "address=3&singleturn=1234567",

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -39,11 +40,20 @@ enum class Ailment : std::uint8_t {
   clock_too_fast,
   miso_stuck,
   wrong_echo,
+  wrong_address,
+  other_protocol,
   only_echo,
   modem_answers,
   no_answer,
   baud_pattern,
-  // The frames
+  // The frames: what an adapter or its driver does to bytes, then what the line does
+  byte_before,
+  byte_after,
+  flow_control,
+  newline_translated,
+  telnet_doubled,
+  seven_bits,
+  nul_lost,
   two_answer,
   extra_bytes,
   bytes_missing,
@@ -109,7 +119,10 @@ struct Measured {
   double failures = 1;  // the share of failures is below it, at 95 % confidence (Wilson)
   Time quickest{};      // from the end of a request to the end of its reply; 0: not known
   Time slowest{};       // of good ones
-  bool turned = false;  // the position was looked at while the shaft was turned
+  double rate = 0;      // good readings a second; 0: not known
+  std::string echo{};   // of the adapter: "echo seen", "no echo", "echo=off" as it was said; "": a line that has none
+  std::optional<Time> latency{};  // of the way, as the latency timer or latency= says; nothing: not known
+  bool turned = false;            // the position was looked at while the shaft was turned
 };
 
 struct Examination {

@@ -38,7 +38,8 @@ PortFacts port_facts(const std::string& path, const std::filesystem::path& sys) 
   if (error) return facts;
   facts.driver = driver_of(terminal, sys);
   facts.latency_timer = latency_timer(terminal, sys);
-  if (is_pseudo_terminal(path)) return facts;
+  facts.pseudo_terminal = is_pseudo_terminal(path);
+  if (facts.pseudo_terminal) return facts;
   const Descriptor descriptor(::open(path.c_str(), O_RDONLY | O_NOCTTY | O_NONBLOCK | O_CLOEXEC));
   if (descriptor) ask_terminal(descriptor.get(), facts);
   return facts;

@@ -28,6 +28,7 @@ struct PortFacts {
   std::optional<unsigned> latency_timer{};  // milliseconds
   std::optional<bool> kernel_direction{};   // whether the kernel switches an RS-485 transceiver
   std::optional<LineCounts> counts{};
+  bool pseudo_terminal = false;  // it has no line, and so no rate
 };
 
 /// Of the port at `path`, which nobody should have open: what its driver tells is left out else. `sys` is a parameter

@@ -3,6 +3,8 @@
 #pragma once
 
 #include <algorithm>
+#include <optional>
+#include <string>
 #include <vector>
 
 #include "absenc/client/doctor/judges.hpp"
@@ -32,5 +34,23 @@ template <class Is>
 /// How many of the replies become good when one of their bits is flipped; 0 when these are no more than of random
 /// replies of the same length, for a short checksum lets many pass by chance.
 [[nodiscard]] std::size_t mended_by_one_bit(const Case& one, const All& all);
+
+/// What an adapter, a driver or a device server did to the bytes of nearly all these damaged replies, or beside the
+/// good ones: undone, they are good, and by far more of them than chance makes so. Links of characters only.
+[[nodiscard]] std::optional<Finding> damage_by_adapter(const Case& one, const All& all);
+
+/// Text of a modem, a console or a GPS receiver. Nothing where the unit's own replies are text that looks so.
+[[nodiscard]] std::optional<Finding> text_of_others(const Case& one, Bytes bytes);
+
+/// Another model or other options of the unit, with which these damaged replies are good.
+[[nodiscard]] std::optional<Finding> other_settings(const Case& one, const All& all);
+
+/// Returns the settings ("model=23-bit") that make `wanted` of the options `now`; none where both are the same.
+[[nodiscard]] std::vector<std::string> settings_to_set(const Unit& unit, const Options& wanted, const Options& now);
+/// Returns these options in words: "model=23-bit", or "the usual settings".
+[[nodiscard]] std::string said_settings(const Unit& unit, const Options& options);
+
+/// Another checksum than the unit's, which is good in all these damaged replies.
+[[nodiscard]] std::optional<Finding> other_checksum(const Case& one, const All& all);
 
 }  // namespace absenc::client

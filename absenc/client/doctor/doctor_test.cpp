@@ -6,6 +6,7 @@
 #include <random>
 #include <set>
 
+#include "absenc/client/doctor/adapter_faults_test.hpp"
 #include "absenc/client/doctor/examine.hpp"
 #include "absenc/client/doctor/lines_test.hpp"
 #include "absenc/client/doctor/observed_test.hpp"
@@ -58,11 +59,6 @@ Link refused(os::Failure::Kind kind, os::Failure::Bus bus = os::Failure::Bus::un
 }
 
 // ---- Each fault, and how it comes about
-
-struct Fault {
-  std::string id;
-  std::function<Examination()> examine;
-};
 
 std::vector<Fault> port_faults() {
   using Kind = os::Failure::Kind;
@@ -169,13 +165,13 @@ std::vector<Fault> line_faults() {
   return faults;
 }
 
-/// Of a moving encoder whose checksum is inverted in part.
+/// Of a moving encoder that has a CRC in place of the sum.
 ByteList with_other_checksum(unsigned number) {
   ByteList reply = good_reply();
   for (std::size_t i = 2; i < 5; ++i) reply[i] = static_cast<std::uint8_t>(number * (37 + 11 * i) + number * number);
   reply[4] &= 0x01;
   reply.pop_back();
-  constexpr CrcParameters crc{.width = 8, .poly = 0x01, .init = 0, .refin = false, .refout = false, .xorout = 0x5A};
+  constexpr CrcParameters crc{.width = 8, .poly = 0x07, .init = 0, .refin = false, .refout = false, .xorout = 0x5A};
   reply.push_back(static_cast<std::uint8_t>(crc_bitwise(crc, reply)));
   return reply;
 }
@@ -260,9 +256,9 @@ std::vector<Fault> other_faults() {
 std::vector<Fault> partial_faults() {
   std::vector<Fault> faults;
   faults.push_back({"extra_bytes", [] {
-                      return examine_line([](const ByteList&) {
+                      return examine_line([number = 0u](const ByteList&) mutable {
                         ByteList reply = good_reply();
-                        reply.insert(reply.begin(), 0x55);
+                        reply.insert(reply.begin(), 3 + number++ % 3, 0x55);
                         return reply;
                       });
                     }});
@@ -317,7 +313,8 @@ std::vector<Fault> partial_faults() {
 
 std::vector<Fault> all_faults() {
   std::vector<Fault> faults;
-  for (const auto& some : {port_faults(), line_faults(), frame_faults(), partial_faults(), other_faults()}) {
+  for (const auto& some :
+       {port_faults(), line_faults(), frame_faults(), partial_faults(), other_faults(), adapter_faults()}) {
     faults.insert(faults.end(), some.begin(), some.end());
   }
   return faults;
@@ -346,7 +343,7 @@ TEST(Doctor, EachFaultIsNamedRightAndFirst) {
 
 TEST(Doctor, FindingsSayWhatHelps) {
   EXPECT_EQ(examine_rate(serial, 9'600).findings.at(0).action, "set baud=9600");
-  EXPECT_THAT(examine_rate(serial, 9'600).findings.at(0).evidence, HasSubstr("5 of 5 with baud=9600"));
+  EXPECT_THAT(examine_rate(serial, 9'600).findings.at(0).evidence, HasSubstr("10 of 10 with baud=9600"));
   const Examination other = examine_with(serial, [](const EncoderAddress&) {
     return virtual_link(parse_address("sim:tformat?model=23-bit&motion=rpm=600"));
   });

@@ -2,6 +2,7 @@
 #include "absenc/client/doctor/examine.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <array>
@@ -9,8 +10,11 @@
 #include <optional>
 #include <set>
 
+#include "absenc/client/doctor/damage.hpp"
 #include "absenc/client/doctor/examiner.hpp"
+#include "absenc/client/doctor/trials.hpp"
 #include "absenc/client/error.hpp"
+#include "absenc/client/identify/line.hpp"
 #include "absenc/client/text/unit_text.hpp"
 #include "absenc/os/signals.hpp"
 #include "absenc/os/wakeup_watch.hpp"
@@ -19,15 +23,27 @@ namespace absenc::client {
 
 namespace {
 
-constexpr std::size_t trial_readings = 5;
-constexpr std::size_t trial_good = 4;  // of them: then it helps
+constexpr std::size_t first_readings = 2;  // with another setting: one that is not answered at all is asked no more
+constexpr std::size_t trial_readings = 5;  // each time it is its turn
+constexpr unsigned trial_turns = 2;
 constexpr Time trial_limit = std::chrono::milliseconds(500);
-constexpr std::array<std::uint32_t, 16> usual_rates{2400,      4800,      9600,      19'200,   38'400,  57'600,
-                                                    115'200,   128'000,   230'400,   460'800,  500'000, 921'600,
-                                                    1'000'000, 2'000'000, 2'500'000, 5'000'000};
+constexpr Time models_limit = std::chrono::seconds(3);  // of all of them
+constexpr Time addresses_limit = std::chrono::seconds(4);
+constexpr Time identify_limit = std::chrono::seconds(10);
 
 bool is_serial(const EncoderAddress& address) {
   return address.place == Place::serial || address.place == Place::slcan;
+}
+
+// Where `identify` can look for others.
+bool may_be_another(const EncoderAddress& address) {
+  const bool characters = address.unit->link == LinkKind::half_duplex || address.unit->link == LinkKind::full_duplex;
+  return characters && (address.place == Place::serial || address.place == Place::tcp);
+}
+
+std::size_t count_good(const std::vector<Attempted>& attempts) {
+  return static_cast<std::size_t>(
+      std::ranges::count_if(attempts, [](const Attempted& one) { return one.error == Error::none; }));
 }
 
 bool streams(const EncoderAddress& address) {
@@ -44,99 +60,6 @@ struct Clashes final : FieldSink {
   std::set<std::int64_t> all;
 };
 
-// ---- What could be set instead
-
-struct Other {
-  Ailment ailment;
-  std::string said;
-  std::string setting;
-  EncoderAddress address;
-};
-
-// Nothing where the unit has no such rate.
-std::optional<EncoderAddress> with_rate(const EncoderAddress& address, std::uint32_t rate) {
-  EncoderAddress other = address;
-  const Option* option = find_role(address.unit->options, Role::rate);
-  if (option == nullptr) {
-    other.line.rate = rate;
-    return other;
-  }
-  const auto index = static_cast<std::size_t>(option - address.unit->options.data());
-  std::int64_t value = rate;
-  if (!option->choices.empty()) {
-    const auto choice = std::find(option->choices.begin(), option->choices.end(), std::to_string(rate));
-    if (choice == option->choices.end()) return std::nullopt;
-    value = choice - option->choices.begin();
-  } else if (value < option->minimum || value > option->maximum) {
-    return std::nullopt;
-  }
-  other.options.values[index] = value;
-  other.line = line_settings(*address.unit, other.options);
-  return other;
-}
-
-// Those of the protocol and its models first, then those that are common.
-std::vector<std::uint32_t> rates_of(const Unit& unit) {
-  std::vector<std::uint32_t> rates;
-  const auto add = [&](std::uint32_t rate) {
-    if (rate != 0 && std::find(rates.begin(), rates.end(), rate) == rates.end()) rates.push_back(rate);
-  };
-  add(unit.line.rate);
-  for (const Model& model : unit.models) {
-    Options options;
-    const bool known = resolve_options(unit, model.name, {}, options).kind == OptionError::Kind::none;
-    if (known) add(line_settings(unit, options).rate);
-  }
-  if (const Option* option = find_role(unit.options, Role::rate)) {
-    for (const std::string_view choice : option->choices) {
-      if (const auto rate = parse_number(choice)) add(static_cast<std::uint32_t>(*rate));
-    }
-  }
-  for (const std::uint32_t rate : usual_rates) add(rate);
-  return rates;
-}
-
-void add_rates(const EncoderAddress& address, std::vector<Other>& others) {
-  const Option* option = find_role(address.unit->options, Role::rate);
-  const std::string_view name = option != nullptr ? option->name : rate_setting;
-  const auto text = [&](std::uint32_t rate) { return fmt::format("{}={}", name, rate); };
-  for (const std::uint32_t rate : rates_of(*address.unit)) {
-    if (rate == address.line.rate) continue;
-    if (auto other = with_rate(address, rate)) {
-      others.push_back({Ailment::wrong_baud, text(address.line.rate), text(rate), std::move(*other)});
-    }
-  }
-}
-
-void add_spi(const EncoderAddress& address, std::vector<Other>& others) {
-  const std::uint8_t mode = address.spi.mode.value_or(address.line.spi_mode);
-  const std::uint32_t speed = address.spi.speed.value_or(address.line.rate);
-  const auto add = [&](Ailment ailment, std::string_view name, std::uint32_t said, std::uint32_t set) -> Other& {
-    return others.emplace_back(
-        Other{ailment, fmt::format("{}={}", name, said), fmt::format("{}={}", name, set), address});
-  };
-  for (std::uint8_t other = 0; other < 4; ++other) {
-    if (other != mode) add(Ailment::wrong_spi_mode, "spi_mode", mode, other).address.spi.mode = other;
-  }
-  for (const std::uint32_t divisor : {2u, 4u, 8u, 16u}) {
-    if (speed / divisor == 0) break;
-    add(Ailment::clock_too_fast, "speed", speed, speed / divisor).address.spi.speed = speed / divisor;
-  }
-}
-
-std::vector<Other> others_of(const EncoderAddress& address) {
-  std::vector<Other> others;
-  if (address.place == Place::spi) add_spi(address, others);
-  const bool characters = address.unit->link == LinkKind::half_duplex || address.unit->link == LinkKind::full_duplex;
-  if (characters && address.echo != host::EchoMode::automatic) {
-    const bool on = address.echo == host::EchoMode::on;
-    others.push_back({Ailment::wrong_echo, on ? "echo=on" : "echo=off", on ? "echo=off" : "echo=on", address});
-    others.back().address.echo = on ? host::EchoMode::off : host::EchoMode::on;
-  }
-  if (is_serial(address)) add_rates(address, others);
-  return others;
-}
-
 // ---- One after the other
 
 class Doctor {
@@ -150,6 +73,9 @@ class Doctor {
       throw UsageError(fmt::format("{} has no command that reads the position", address.unit->id));
     }
     seen_.limit = speed_limit(address);
+    seen_.place = address.place;
+    seen_.echo = seen_.echo_said = address.echo;
+    seen_.latency = address.latency;
   }
 
   Examination run() {
@@ -216,9 +142,15 @@ class Doctor {
     }
     // Another bit rate would destroy what others say on a bus: only where nobody does.
     const bool disturbs = std::is_same_v<Item, CanFrame> && any_heard();
-    if (!any_good() && !seen_.never_silent && seen_.lateness == Time{} && !disturbs) try_others<Item>();
+    if (none_good() && !seen_.never_silent && seen_.lateness == Time{} && !disturbs) try_others<Item>();
+    if constexpr (std::is_same_v<Item, std::uint8_t>) {
+      if (may_be_another(address_) && seen_.trials.empty() && is_unexplained()) identify_others();
+      if (address_.place != Place::sim && seen_.trials.empty() && !any_heard() && !seen_.refusal) ask_once_more();
+    }
   }
 
+  // But for what a short checksum lets pass by chance.
+  [[nodiscard]] bool none_good() const { return count_good(seen_.readings) * 20 < seen_.readings.size() + 1; }
   [[nodiscard]] bool any_good() const {
     return std::any_of(seen_.readings.begin(), seen_.readings.end(),
                        [](const Attempted& one) { return one.error == Error::none; });
@@ -242,25 +174,117 @@ class Doctor {
 
   template <class Item>
   void try_others() {
-    for (const Other& other : others_of(address_)) {
+    // A pseudo-terminal has none; the bit rate behind a CAN adapter is that of the bus.
+    const bool has_rate =
+        address_.place == Place::slcan || (address_.place == Place::serial && !seen_.facts.pseudo_terminal);
+    if (try_each<Item>(other_models(address_), models_limit)) return;
+    if (try_each<Item>(other_lines(address_, has_rate), never)) return;
+    try_each<Item>(other_addresses(address_), addresses_limit);
+  }
+
+  // Ends with the first that helps, and when the user's own setting is answered now. Returns whether it is over.
+  template <class Item>
+  bool try_each(const std::vector<Other>& others, Time limit) {
+    Time spent{};
+    for (const Other& other : others) {
+      if (spent >= limit) return false;
       tell(other.setting);
+      std::vector<Attempted> attempts;
+      spent += ask<Item>(other.address, first_readings, attempts);
+      if (count_good(attempts) == 0) continue;
       Trial trial{other.ailment, other.said, other.setting};
-      try {
-        Examiner<Item> examiner(other.address, surroundings_.open(other.address), choices_.over);
-        std::vector<Attempted> attempts;
-        const auto good = [](const Attempted& one) { return one.error == Error::none; };
-        // One that is not answered at all is asked no more.
-        examiner.read(*read_, 2, trial_limit, attempts);
-        if (std::any_of(attempts.begin(), attempts.end(), good)) {
-          examiner.read(*read_, trial_readings - 2, trial_limit, attempts);
-        }
-        trial.tried = attempts.size();
-        trial.good = static_cast<std::size_t>(std::count_if(attempts.begin(), attempts.end(), good));
-      } catch (const os::Failure&) {  // a rate that this port has not
-        continue;
-      }
-      if (trial.good < trial_good) continue;
+      if (compare<Item>(other.address, trial)) return true;
+    }
+    return false;
+  }
+
+  // Both in turns: an encoder that was silent for a while would else speak for whatever is tried then. Returns whether
+  // the search is over.
+  template <class Item>
+  bool compare(const EncoderAddress& other, Trial& trial) {
+    std::vector<Attempted> theirs;
+    std::vector<Attempted> ours;
+    for (unsigned turn = 0; turn < trial_turns; ++turn) {
+      ask<Item>(other, trial_readings, theirs);
+      ask<Item>(address_, trial_readings, ours);
+    }
+    trial.tried = theirs.size();
+    trial.good = count_good(theirs);
+    trial.tried_as_said = ours.size();
+    trial.good_as_said = count_good(ours);
+    if (is_far_better(trial.good, trial.tried, trial.good_as_said, trial.tried_as_said)) {
       seen_.trials.push_back(std::move(trial));
+      return true;
+    }
+    if (trial.good_as_said * 10 < trial.tried_as_said * 8) return false;
+    read_again<Item>();
+    return true;
+  }
+
+  // It may have been switched on meanwhile.
+  void ask_once_more() {
+    std::vector<Attempted> attempts;
+    ask<std::uint8_t>(address_, first_readings, attempts);
+    if (count_good(attempts) == first_readings) read_again<std::uint8_t>();
+  }
+
+  // The encoder is answering now.
+  template <class Item>
+  void read_again() {
+    tell("reading");
+    Examiner<Item> examiner(address_, surroundings_.open(address_), choices_.over);
+    examiner.read(*read_, choices_.readings, choices_.limit, seen_.readings);
+    examiner.conclude(seen_);
+  }
+
+  // Returns how long it took. A port that does not open so gives no attempts.
+  template <class Item>
+  Time ask(const EncoderAddress& address, std::size_t count, std::vector<Attempted>& attempts) {
+    const Command* read = find_command(*address.unit, Verb::read);
+    if (read == nullptr || read->changes_encoder) return {};
+    try {
+      Examiner<Item> examiner(address, surroundings_.open(address), choices_.over);
+      const Time begin = examiner.now();
+      examiner.read(*read, count, trial_limit, attempts);
+      return examiner.now() - begin;
+    } catch (const os::Failure&) {  // a rate that this port has not
+    } catch (const UsageError&) {   // options that need a wire which is not connected
+    }
+    return {};
+  }
+
+  // Whether all that was seen may be another protocol.
+  [[nodiscard]] bool is_unexplained() const {
+    if (any_good() || seen_.never_silent || seen_.lateness != Time{}) return false;
+    const Examination so_far = judge(*address_.unit, address_.options, seen_);
+    const Finding* first = so_far.first();
+    if (first == nullptr) return true;
+    constexpr std::array unsure{Ailment::no_answer,     Ailment::only_echo,      Ailment::baud_pattern,
+                                Ailment::extra_bytes,   Ailment::bytes_missing,  Ailment::other_checksum,
+                                Ailment::contradictory, Ailment::always_damaged, Ailment::direction_unswitched};
+    return std::ranges::find(unsure, first->ailment) != unsure.end();
+  }
+
+  void identify_others() {
+    LineSearch search = search_of(address_);
+    search.limit = identify_limit;
+    search.open = surroundings_.open;
+    search.over = choices_.over;
+    search.progress = [this](const std::string& what) { tell(fmt::format("which protocol: {}", what)); };
+    const LineFindings findings = search_line(search);
+    if (findings.interrupted) throw os::Interrupted{};
+    for (const Candidate& candidate : findings.candidates) {
+      if (candidate.unasked || !is_found(candidate)) continue;
+      const std::string command = address_of(candidate, search.place);
+      const EncoderAddress other = parse_address(command);
+      const bool is_ours = candidate.unit == address_.unit;
+      Trial trial{
+          is_ours ? Ailment::wrong_settings : Ailment::other_protocol,
+          is_ours ? said_settings(*address_.unit, address_.options) : std::string(address_.unit->id),
+          is_ours ? fmt::format("{}", fmt::join(all_settings(candidate), ", ")) : std::string(candidate.unit->id)};
+      trial.command = command;
+      tell(fmt::format("{} and {} in turns", address_.unit->id, candidate.unit->id));
+      compare<std::uint8_t>(other, trial);
       return;
     }
   }
@@ -302,6 +326,9 @@ Json to_json(const Examination& examination) {
   json.set("readings", examination.tried).set("good", examination.good).set("complete", examination.complete);
   const Measured& measured = examination.measured;
   json.set("seconds", in_seconds(measured.time)).set("failures_below", measured.failures);
+  if (measured.rate > 0) json.set("readings_per_second", measured.rate);
+  if (!measured.echo.empty()) json.set("echo", measured.echo);
+  if (measured.latency) json.set("latency_ms", in_seconds(*measured.latency) * 1e3);
   if (measured.slowest > Time{}) {
     json.set("quickest_reply_ms", in_seconds(measured.quickest) * 1e3);
     json.set("slowest_reply_ms", in_seconds(measured.slowest) * 1e3);

@@ -24,7 +24,7 @@ struct Surroundings {
                                   const Surroundings& surroundings = {.on_the_clock = true});
 
 /// {"ok","findings":[{"id","severity","evidence","cause","action"}],"readings","good","complete","seconds",
-/// "failures_below","verdict"}; with the times of replies, where there are some,
+/// "failures_below","verdict"}; where they are known, "readings_per_second", "echo", "latency_ms",
 /// "quickest_reply_ms","slowest_reply_ms".
 [[nodiscard]] Json to_json(const Examination& examination);
 

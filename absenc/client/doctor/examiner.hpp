@@ -67,12 +67,17 @@ class Examiner {
     if (conversation != nullptr && conversation->error() == Error::none) conversation->report(sink);
   }
 
+  /// Time on the port's clock.
+  [[nodiscard]] Time now() { return runner_.port().now(); }
+
   void conclude(Observations& seen) const {
     seen.line_errors += runner_.port().line_errors;
     seen.late = std::max(seen.late, runner_.late());
     seen.lateness = std::max(seen.lateness, runner_.lateness());
     seen.overfull = runner_.overfull();
+    seen.most_behind = runner_.most_behind();
     if constexpr (!std::is_same_v<Item, CanFrame>) {
+      seen.echo = runner_.session().echo().mode();
       seen.overfull_example.assign(runner_.overfull_example().begin(), runner_.overfull_example().end());
     }
   }

@@ -43,6 +43,18 @@ Ailment ailment_of(const Refusal& refusal) {
   return Ailment::port_failed;
 }
 
+// Of a port in use: what lets go of it, as far as the sentence names who has it.
+std::string_view action_for_holder(std::string_view sentence) {
+  if (sentence.find("by absenc serve") != std::string_view::npos) {
+    return "look at what the server reads, on its page or by its API, or let it examine the encoder";
+  }
+  if (sentence.find("by absenc") != std::string_view::npos) return "wait until that command is over, or end it";
+  if (sentence.find("ModemManager") != std::string_view::npos) {
+    return "let ModemManager go of it: `sudo systemctl stop ModemManager`";
+  }
+  return "end that program, or use another port";
+}
+
 std::size_t count(const std::vector<Attempted>& readings, bool (*is)(const Attempted&)) {
   return static_cast<std::size_t>(std::count_if(readings.begin(), readings.end(), is));
 }
@@ -70,7 +82,9 @@ std::string inversion(const Case& one) {
   std::size_t zeros = 0;
   for (const Attempted& attempt : seen.readings) {
     const auto& reply = attempt.exchange.reply.bytes;
-    if (!reply.empty() && all_are(reply, 0) && !is_cut(one, attempt)) ++zeros;
+    // So many are no frame that was cut behind its first bytes.
+    constexpr std::size_t many = 8;
+    if (!reply.empty() && all_are(reply, 0) && (reply.size() >= many || !is_cut(one, attempt))) ++zeros;
   }
   const std::size_t heard = count(seen.readings, was_heard);
   if (heard > 0 && zeros == heard) return fmt::format("{} replies came, all of them nothing but 00", zeros);
@@ -81,7 +95,9 @@ std::string inversion(const Case& one) {
 void judge_silence(const Case& one, std::vector<Finding>& findings) {
   const Observations& seen = one.seen;
   if (seen.readings.empty() || count(seen.readings, was_heard) != 0 || seen.never_silent) return;
-  if (seen.late > 0 || seen.line_errors > 0 || !seen.trials.empty() || os::is_modem_driver(seen.facts.driver)) return;
+  if (seen.late > 0 || (seen.line_errors > 0 && one.unit.link == LinkKind::can) || !seen.trials.empty() ||
+      os::is_modem_driver(seen.facts.driver))
+    return;
   const bool unswitched = one.unit.link == LinkKind::half_duplex && os::is_bare_uart(seen.facts.driver) &&
                           !seen.facts.kernel_direction.value_or(false);
   if (unswitched) {
@@ -139,7 +155,10 @@ void judge_port(const Case& one, std::vector<Finding>& findings) {
   if (os::is_modem_driver(seen.facts.driver)) {
     findings.push_back(finding(Ailment::port_is_modem, {seen.port, seen.facts.driver}));
   }
-  if (seen.refusal) findings.push_back(finding(ailment_of(*seen.refusal), {seen.refusal->sentence}));
+  if (seen.refusal) {
+    const std::string& sentence = seen.refusal->sentence;
+    findings.push_back(finding(ailment_of(*seen.refusal), {sentence, std::string(action_for_holder(sentence))}));
+  }
   if (const auto timer = seen.facts.latency_timer; timer && *timer > 1) {
     const std::string terminal = std::filesystem::path(seen.port).filename();
     findings.push_back(finding(Ailment::latency_timer, {terminal, fmt::format("{}", *timer)}));
@@ -148,16 +167,27 @@ void judge_port(const Case& one, std::vector<Finding>& findings) {
 
 void judge_line(const Case& one, std::vector<Finding>& findings) {
   const Observations& seen = one.seen;
-  if (seen.line_errors > 0) {
+  if (seen.line_errors > 0 && one.unit.link == LinkKind::can) {
     findings.push_back(finding(
         Ailment::can_errors,
         {fmt::format("{}", seen.line_errors), fmt::format("{}", seen.readings.size()), fmt::format("{}", one.good)}));
   }
   for (const Trial& trial : seen.trials) {
-    findings.push_back(finding(
-        trial.ailment, {trial.said, trial.setting, fmt::format("{}", trial.good), fmt::format("{}", trial.tried)}));
+    const std::string as_said = trial.good_as_said == 0
+                                    ? "no good reply"
+                                    : fmt::format("{} of {} replies good", trial.good_as_said, trial.tried_as_said);
+    findings.push_back(finding(trial.ailment, {trial.said, trial.setting, fmt::format("{}", trial.good),
+                                               fmt::format("{}", trial.tried), as_said, trial.command}));
   }
   const bool characters = one.unit.link == LinkKind::half_duplex || one.unit.link == LinkKind::full_duplex;
+  if (characters && one.good == 0 && seen.trials.empty()) {
+    std::vector<std::uint8_t> bytes = seen.unasked;
+    for (const Attempted& attempt : seen.readings) bytes.insert(bytes.end(), attempt.raw.begin(), attempt.raw.end());
+    if (std::optional<Finding> text = text_of_others(one, bytes)) {
+      findings.push_back(std::move(*text));
+      return;
+    }
+  }
   const bool in_doubt = one.good == 0 && seen.trials.empty() && characters;
   const std::string inverted = in_doubt ? inversion(one) : "";
   if (!inverted.empty()) {
@@ -169,125 +199,6 @@ void judge_line(const Case& one, std::vector<Finding>& findings) {
   if (findings.empty() || findings.back().ailment != Ailment::line_inverted) judge_silence(one, findings);
   judge_lateness(one, findings);
   judge_slowness(one, findings);
-}
-
-namespace {
-
-// A flag that some reading reported as raised.
-struct RaisedFlag {
-  const FlagInfo* flag = nullptr;
-  bool is_alarm = false;
-  std::set<std::string_view> channels{};  // the fields that report it
-  const Reading* last = nullptr;          // the last of the readings
-  std::size_t readings = 0;
-  std::size_t invalid = 0;  // of them, with a position or turns that do not hold
-};
-
-bool is_invalid(const Reading& reading) {
-  return reading.singleturn_validity() == Validity::invalid || reading.multiturn_validity() == Validity::invalid;
-}
-
-// The raised alarms of both channels, by the bits of the first.
-std::uint32_t alarms_of_either(const Unit& unit, const Reading& reading) {
-  std::uint32_t bits = 0;
-  for (const Flags& flags : alarms_of(unit, reading)) bits |= flags.bits;
-  return bits;
-}
-
-void count_flags(const std::vector<Flags>& all, bool is_alarm, const Reading& reading, std::uint32_t alarms,
-                 std::vector<RaisedFlag>& counts) {
-  for (const Flags& flags : all) {
-    for (const FlagInfo* flag : raised(*flags.field, flags.bits)) {
-      if (!is_alarm && (flag->action.empty() || (flag->sums & alarms) != 0)) continue;
-      // Channels have fields of their own with the same words.
-      auto count = std::ranges::find_if(counts, [&](const RaisedFlag& known) {
-        return known.is_alarm == is_alarm && known.flag->name == flag->name;
-      });
-      if (count == counts.end()) count = counts.insert(counts.end(), {.flag = flag, .is_alarm = is_alarm});
-      // A reading in which both channels report it counts once.
-      const bool is_known = std::exchange(count->last, &reading) == &reading;
-      count->channels.insert(flags.field->name);
-      if (is_known) continue;
-      ++count->readings;
-      count->invalid += is_invalid(reading) ? 1 : 0;
-    }
-  }
-}
-
-std::string share(std::size_t some, std::size_t all) {
-  return some == all ? fmt::format("all {}", all) : fmt::format("{} of {}", some, all);
-}
-
-// Judges positions and turns that are invalid without an alarm that says why. `is_damage`: so few of them
-// are damage that the checksum did not see.
-template <class IsDamage>
-void judge_validity(const std::vector<const Reading*>& readings, const IsDamage& is_damage,
-                    std::vector<Finding>& findings) {
-  std::size_t position = 0;
-  std::size_t turns = 0;
-  std::size_t usable_bits = 0;
-  for (const Reading* reading : readings) {
-    if (reading->singleturn_validity() == Validity::invalid) {
-      ++position;
-      usable_bits = std::max<std::size_t>(usable_bits, reading->singleturn_valid_bits);
-    }
-    turns += reading->multiturn_validity() == Validity::invalid ? 1 : 0;
-  }
-  if (std::max(position, turns) == 0 || is_damage(std::max(position, turns))) return;
-  const std::string upper = usable_bits != 0 ? fmt::format(", but for its upper {} bits", usable_bits) : "";
-  findings.push_back(finding(Ailment::position_invalid,
-                             {fmt::format("{}", std::max(position, turns)), fmt::format("{}", readings.size()),
-                              position > 0 ? "position" : "number of turns", position > 0 ? upper : ""}));
-}
-
-}  // namespace
-
-void judge_state(const Case& one, std::vector<Finding>& findings) {
-  std::vector<const Reading*> readings;
-  std::vector<const Reading*> ready;  // of one that starts nothing else counts
-  for (const Attempted& attempt : one.seen.readings) {
-    if (!attempt.reading) continue;
-    readings.push_back(&*attempt.reading);
-    if (attempt.reading->ready) ready.push_back(&*attempt.reading);
-  }
-  if (readings.empty()) return;
-  if (ready.size() < readings.size()) {
-    findings.push_back(finding(Ailment::starting,
-                               {fmt::format("{}", readings.size() - ready.size()), fmt::format("{}", readings.size()),
-                                readings.back()->ready ? ", and at the end no more" : ""}));
-  }
-  std::vector<RaisedFlag> flags;
-  for (const Reading* reading : ready) {
-    const std::uint32_t alarms = alarms_of_either(one.unit, *reading);
-    count_flags(alarms_of(one.unit, *reading), true, *reading, alarms, flags);
-    count_flags(status_of(one.unit, *reading), false, *reading, alarms, flags);
-  }
-  std::stable_sort(flags.begin(), flags.end(), [](const RaisedFlag& before, const RaisedFlag& after) {
-    return (before.invalid > 0) > (after.invalid > 0);  // what makes the position invalid is mended first
-  });
-  // A checksum of 6 bits passes one of 64 damaged replies, by chance a few more: the encoder may not have raised these
-  // flags.
-  const std::size_t failed = one.seen.readings.size() - one.good;
-  const auto is_damage = [failed](std::size_t count) { return count * 10 < failed; };
-  std::erase_if(flags, [&](const RaisedFlag& rare) { return is_damage(rare.readings); });
-  for (RaisedFlag& flag : flags) flag.invalid = is_damage(flag.invalid) ? 0 : flag.invalid;
-  bool is_explained = false;
-  for (const RaisedFlag& raised : flags) {
-    const std::string_view action =
-        raised.flag->action.empty() ? "what the encoder's document says of it" : raised.flag->action;
-    const bool in_one =
-        raised.channels.size() == 1 && (raised.is_alarm ? one.unit.second_alarms : one.unit.second_status) != nullptr;
-    const std::string channel = in_one ? fmt::format(" in {} alone,", *raised.channels.begin()) : "";
-    std::string evidence =
-        fmt::format("{}{} in {} readings", raised.flag->name, channel, share(raised.readings, ready.size()));
-    if (raised.invalid > 0)
-      evidence += fmt::format(", whose position is invalid in {}", share(raised.invalid, raised.readings));
-    findings.push_back(finding(raised.is_alarm ? Ailment::alarm : Ailment::status,
-                               {evidence, std::string(raised.flag->meaning), std::string(action)}));
-    if (raised.invalid > 0) findings.back().severity = Severity::fault;
-    is_explained = is_explained || raised.invalid > 0;
-  }
-  if (!is_explained) judge_validity(ready, is_damage, findings);
 }
 
 namespace {
@@ -318,10 +229,25 @@ std::set<std::string_view> alarm_names(const Unit& unit, std::uint32_t mask) {
   return names;
 }
 
-Measured measured_of(const Observations& seen, std::size_t good) {
+std::string echo_text(const Observations& seen) {
+  using host::EchoMode;
+  if (seen.echo_said == EchoMode::off) return "echo=off";
+  if (seen.echo_said == EchoMode::on) return "echo=on";
+  return seen.echo == EchoMode::on ? "echo seen" : seen.echo == EchoMode::off ? "no echo" : "echo not known";
+}
+
+Measured measured_of(const Unit& unit, const Observations& seen, std::size_t good) {
   Measured measured;
   if (seen.readings.empty()) return measured;
+  const bool characters = unit.link == LinkKind::half_duplex || unit.link == LinkKind::full_duplex;
+  if (characters && good > 0) measured.echo = echo_text(seen);
+  measured.latency = seen.latency;
+  if (!seen.latency && seen.facts.latency_timer)
+    measured.latency = std::chrono::milliseconds(*seen.facts.latency_timer);
   measured.time = seen.readings.back().began - seen.readings.front().began;
+  if (measured.time > Time{}) {
+    measured.rate = static_cast<double>(good) / std::chrono::duration<double>(measured.time).count();
+  }
   measured.failures = Share{seen.readings.size() - good, seen.readings.size()}.high();
   measured.turned = !seen.turned.empty();
   for (const Attempted& one : seen.readings) {
@@ -354,7 +280,7 @@ Reported reported_by(const Unit& unit, const Observations& seen) {
 Examination judge(const Unit& unit, const Options& options, const Observations& seen) {
   Examination result{.tried = seen.readings.size(), .complete = seen.complete};
   result.good = count(seen.readings, [](const Attempted& one) { return one.error == Error::none; });
-  result.measured = measured_of(seen, result.good);
+  result.measured = measured_of(unit, seen, result.good);
   const Case one{unit, options, seen, result.good};
   judge_port(one, result.findings);
   judge_line(one, result.findings);
@@ -366,7 +292,11 @@ Examination judge(const Unit& unit, const Options& options, const Observations& 
   if (result.good * 20 < result.tried || result.good == 0) {
     if (!explained) judge_bad_frames(one, result.findings);
   } else {
-    if (!explained) judge_mixed_frames(one, result.findings);
+    if (std::optional<Finding> start = judge_start(one)) {
+      result.findings.push_back(std::move(*start));
+    } else if (!explained) {
+      judge_mixed_frames(one, result.findings);
+    }
     judge_state(one, result.findings);
     judge_counter(one, result.findings);
     result.reported = reported_by(unit, seen);
@@ -387,6 +317,7 @@ Examination judge(const Unit& unit, const Options& options, const Observations& 
                                           : finding(Ailment::sometimes_silent, {fmt::format("{}", failed), all}));
     }
   }
+  for (Finding& found : result.findings) suit(found, seen.place);
   std::stable_sort(result.findings.begin(), result.findings.end(),
                    [](const Finding& before, const Finding& after) { return before.ailment < after.ailment; });
   return result;

@@ -6,19 +6,15 @@
 #include <algorithm>
 #include <array>
 #include <bit>
-#include <cctype>
 #include <map>
 #include <optional>
 
-#include "absenc/capture/search/hypotheses.hpp"
 #include "absenc/client/doctor/damage.hpp"
 #include "absenc/client/doctor/judges.hpp"
 #include "absenc/client/doctor/words.hpp"
-#include "absenc/client/error.hpp"
-#include "absenc/client/find_crc.hpp"
-#include "absenc/client/identify/candidate.hpp"
 #include "absenc/client/text/unit_text.hpp"
 #include "absenc/client/text/wire_text.hpp"
+#include "absenc/client/way/diagnosis.hpp"
 
 namespace absenc::client {
 
@@ -84,17 +80,6 @@ std::optional<Finding> own_echo(const Case& one, const All& all) {
   };
   if (!most(all, echoes)) return {};
   return finding(Ailment::only_echo, {fmt::format("{}", all.size()), to_hex(all.front()->exchange.request.bytes)});
-}
-
-std::optional<Finding> modem(const Case&, const All& all) {
-  std::string text;
-  for (const Attempted* one : all) text.append(one->raw.begin(), one->raw.end());
-  for (const std::string_view word : {"ERROR\r\n", "NO CARRIER", "OK\r\n", "login:"}) {
-    const std::size_t at = text.find(word);
-    if (at == std::string::npos) continue;
-    return finding(Ailment::modem_answers, {fmt::format("\"{}\"", word.substr(0, word.find('\r')))});
-  }
-  return {};
 }
 
 std::optional<Finding> two_frames(const Case& one, const All& all) {
@@ -183,48 +168,6 @@ std::optional<Finding> refusal(const Case&, const All& all) {
   const ErrorText& text = text_of(last.error);
   return finding(Ailment::refused, {last.detail.empty() ? std::string(text.description) : last.detail,
                                     last.advice.empty() ? std::string(text.advice) : last.advice});
-}
-
-// The machinery of `identify`, held to this unit and to this encoder of it.
-std::optional<Finding> other_settings(const Case& one, const All& all) {
-  constexpr std::size_t enough = 4;  // frames: fewer prove little
-  if (all.size() < enough) return {};
-  std::vector<capture::HeardExchange> exchanges;
-  for (const Attempted* attempt : all) exchanges.push_back(attempt->exchange);
-  constexpr std::size_t most_tried = 32;  // each is decoded with many sets of options
-  exchanges.resize(std::min(exchanges.size(), most_tried));
-  const std::vector<capture::Hypothesis> found = capture::find_hypotheses(one.unit, {}, exchanges);
-  if (found.empty()) return {};
-  const capture::Hypothesis& best = found.front();
-  const bool mostly = best.evidence.explained * 10 >= best.evidence.tried * 9;
-  if (!mostly || best.evidence.frames > capture::frames_say_enough) return {};
-  const std::vector<std::string> settings = settings_for(one.unit, best.options);
-  if (settings.empty()) return {};
-  return finding(Ailment::wrong_settings,
-                 {fmt::format("{}", exchanges.size()), fmt::format("{}", best.evidence.explained),
-                  fmt::format("{}", fmt::join(settings, ", "))});
-}
-
-std::optional<Finding> other_checksum(const Case&, const All& all) {
-  if (!most(all, [](const Attempted& attempt) { return attempt.error == Error::bad_checksum; })) return {};
-  std::vector<CheckedFrame> frames;
-  for (const Attempted* attempt : all) {
-    const auto& reply = attempt->exchange.reply;
-    if (!reply.bytes.empty()) frames.push_back({reply.bytes, reply.bits});
-  }
-  CheckFindings checks;
-  try {
-    checks = find_crc(frames);
-  } catch (const UsageError&) {  // too few, or of kinds in which no check is looked for
-    return {};
-  }
-  if (checks.checks.empty() || checks.checks.front().chance > 1e-4) return {};
-  const FoundCheck& check = checks.checks.front();
-  const std::string name = check.name != "crc"
-                               ? std::string(check.name)
-                               : fmt::format("a CRC of {} bits with polynomial {:#x} and init {:#x}",
-                                             check.parameters.width, check.parameters.poly, check.parameters.init);
-  return finding(Ailment::other_checksum, {fmt::format("{}", frames.size()), name});
 }
 
 // Bits of a sender that is several times slower than the receiver come out as long runs: no byte changes its level
@@ -327,9 +270,9 @@ Finding some_damage(const Case& one, const All& all) {
 void judge_bad_frames(const Case& one, std::vector<Finding>& findings) {
   const All all = damaged(one);
   if (all.empty()) return;
-  constexpr std::array looks{stuck_data,   own_echo,       modem,    two_frames,     extra_bytes,
-                             single_bits,  bytes_missing,  refusal,  other_settings, contradictory,
-                             same_address, other_checksum, stretched};
+  constexpr std::array looks{stuck_data,     own_echo,       damage_by_adapter, two_frames, extra_bytes,
+                             other_settings, single_bits,    bytes_missing,     refusal,    contradictory,
+                             same_address,   other_checksum, stretched};
   for (const auto& look : looks) {
     if (std::optional<Finding> found = look(one, all)) {
       findings.push_back(std::move(*found));
@@ -341,24 +284,40 @@ void judge_bad_frames(const Case& one, std::vector<Finding>& findings) {
                              {fmt::format("{}", all.size()), errors_of(one.seen.readings), shown(*all.front())}));
 }
 
-Finding finding_of(const Unit& unit, const Options& options, const Attempted& last, bool usually_good, bool late) {
-  if (late && last.error == Error::timeout) return finding(Ailment::reply_late, {"", "", "", ""});
+Finding finding_of(const Unit& unit, const Options& options, Place place, const Attempted& last, bool usually_good,
+                   bool late) {
+  const auto suited = [place](Finding found) {
+    suit(found, place);
+    return found;
+  };
+  if (late && last.error == Error::timeout) return suited(finding(Ailment::reply_late, {"", "", "", ""}));
   if (usually_good) {
-    return last.heard ? finding(Ailment::sometimes_damaged, {"", "", ""})
-                      : finding(Ailment::sometimes_silent, {"", ""});
+    return suited(last.heard ? finding(Ailment::sometimes_damaged, {"", "", ""})
+                             : finding(Ailment::sometimes_silent, {"", ""}));
+  }
+  // One frame tells of another model what many tell doctor.
+  const auto& [request, reply] = last.exchange;
+  if (last.error != Error::none && !reply.frame().empty()) {
+    const std::string setting = diagnose(unit, options, request.frame(), reply.frame()).setting;
+    if (!setting.empty()) return finding(Ailment::wrong_settings, {"", setting, "", "", "", ""});
   }
   Observations seen;
+  seen.place = place;
   seen.readings.push_back(last);
   const Examination one = judge(unit, options, seen);
   return one.findings.empty() ? finding(Ailment::always_damaged, {"", "", ""}) : one.findings.front();
 }
 
 void judge_mixed_frames(const Case& one, std::vector<Finding>& findings) {
+  All all = damaged(one);
+  if (std::optional<Finding> adapter = damage_by_adapter(one, all)) {
+    findings.push_back(std::move(*adapter));
+    return;
+  }
   if (std::optional<Finding> bursts = coming_and_going(one)) {
     findings.push_back(std::move(*bursts));
     return;
   }
-  All all = damaged(one);
   const auto take = [&all](const auto& is) {
     All taken;
     std::erase_if(all, [&](const Attempted* attempt) {

@@ -99,8 +99,8 @@ double reach(const Walk& walk, Time pause, const host::SpeedLimit& limit) {
   return 1.25 * counts * seconds + static_cast<double>(quiet(walk));
 }
 
-// `damaged`: so many readings were seen to be. A checksum of 8 bits passes one of 256 that are, and each goes there and
-// back: few jumps beside many damaged readings are damage, too.
+// `damaged`: so many readings were seen to be. A sum of 8 bits passes one of 20 in which three bits are damaged, and
+// each goes there and back: no more jumps than damaged readings are damage, too.
 void judge_jumps(const Walk& walk, const host::SpeedLimit& limit, std::size_t damaged, std::vector<Finding>& findings) {
   std::size_t jumps = 0;
   std::int64_t furthest = 0;
@@ -110,7 +110,7 @@ void judge_jumps(const Walk& walk, const host::SpeedLimit& limit, std::size_t da
     ++jumps;
     furthest = std::max(furthest, way);
   }
-  if (jumps * 5 <= damaged) return;
+  if (jumps <= damaged) return;
   findings.push_back(finding(Ailment::position_jumps, {fmt::format("{}", jumps), fmt::format("{}", furthest)}));
 }
 

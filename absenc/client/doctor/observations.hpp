@@ -9,6 +9,7 @@
 
 #include "absenc/client/doctor.hpp"
 #include "absenc/client/way/runner.hpp"
+#include "absenc/host/echo.hpp"
 #include "absenc/host/speed_limit.hpp"
 #include "absenc/os/error.hpp"
 #include "absenc/os/port_facts.hpp"
@@ -23,6 +24,9 @@ struct Trial {
   std::string setting{};  // "baud=9600"
   std::size_t good = 0;
   std::size_t tried = 0;
+  std::size_t good_as_said = 0;  // meanwhile, with the setting of the user
+  std::size_t tried_as_said = 0;
+  std::string command{};  // other_protocol: the address to read it by
 };
 
 /// Why the port did not open, or went away.
@@ -33,6 +37,7 @@ struct Refusal {
 };
 
 struct Observations {
+  Place place = Place::serial;
   std::string port{};  // its path, where it is a serial one
   os::PortFacts facts{};
   std::optional<os::LineCounts> damage{};  // that the UART counted meanwhile
@@ -47,10 +52,14 @@ struct Observations {
   Time lateness{};                  // of the latest
   std::uint64_t overfull = 0;       // good replies behind which more came
   std::vector<std::uint8_t> overfull_example{};
+  std::size_t most_behind = 0;  // items behind one of them
   std::vector<Trial> trials{};
-  Time woken_late{};         // how late this computer woke who waited meanwhile, at most
-  host::SpeedLimit limit{};  // how fast it may move
-  std::string clash{};       // "address 3": whatever answers there is damaged every time
+  host::EchoMode echo_said{};     // by the user
+  host::EchoMode echo{};          // as it was found
+  std::optional<Time> latency{};  // as the user said
+  Time woken_late{};              // how late this computer woke who waited meanwhile, at most
+  host::SpeedLimit limit{};       // how fast it may move
+  std::string clash{};            // "address 3": whatever answers there is damaged every time
   bool complete = true;
 };
 
@@ -59,7 +68,7 @@ struct Observations {
 
 /// Of one reading that failed, at once: what is most likely behind it. `usually_good`: others mostly do not fail;
 /// `late`: replies came after their limit. Its evidence may be incomplete.
-[[nodiscard]] Finding finding_of(const Unit& unit, const Options& options, const Attempted& last, bool usually_good,
-                                 bool late);
+[[nodiscard]] Finding finding_of(const Unit& unit, const Options& options, Place place, const Attempted& last,
+                                 bool usually_good, bool late);
 
 }  // namespace absenc::client

@@ -33,8 +33,7 @@ constexpr auto table = std::to_array<Words>({
     {Ailment::port_forbidden, "port_forbidden", fault, "{0}", "the user is not in the group that owns the port",
      "join the group of the port, as in `sudo usermod -aG dialout $USER`, and log in again"},
     {Ailment::port_in_use, "port_in_use", fault, "{0}",
-     "another program has it open, and both would take each other's bytes",
-     "end that program; ModemManager lets go of a port with `sudo systemctl stop ModemManager`"},
+     "another program has it open, and both would take each other's bytes", "{1}"},
     {Ailment::port_unsuitable, "port_unsuitable", fault, "{0}", "it is not what this encoder is connected to",
      "name the port of the adapter; `ls /dev/serial/by-id` shows those that there are"},
     {Ailment::port_is_modem, "port_is_modem", fault, "the driver of {0} is {1}, which is that of a mobile modem",
@@ -69,22 +68,27 @@ constexpr auto table = std::to_array<Words>({
     {Ailment::line_inverted, "line_inverted", fault, "the idle line is low: {0}",
      "A and B (or the two wires of a pair) are exchanged, so that every level is inverted",
      "exchange A and B at one end: makers disagree on the names"},
-    {Ailment::wrong_baud, "wrong_baud", fault, "no good reply with {0}, but {2} of {3} with {1}",
+    {Ailment::wrong_baud, "wrong_baud", fault, "{4} with {0}, but {2} of {3} with {1}",
      "the encoder has another rate than was said", "set {1}"},
-    {Ailment::wrong_spi_mode, "wrong_spi_mode", fault, "no good reply with {0}, but {2} of {3} with {1}",
+    {Ailment::wrong_spi_mode, "wrong_spi_mode", fault, "{4} with {0}, but {2} of {3} with {1}",
      "bits are taken at the wrong edge of the clock", "set {1}"},
-    {Ailment::clock_too_fast, "clock_too_fast", fault, "no good reply with {0}, but {2} of {3} with {1}",
+    {Ailment::clock_too_fast, "clock_too_fast", fault, "{4} with {0}, but {2} of {3} with {1}",
      "the cable or the encoder is too slow for this clock", "set {1}, or shorten the cable"},
     {Ailment::miso_stuck, "miso_stuck", fault, "in {0} transfers every bit from the encoder was {1}",
      "nobody drives the data line: no supply, not selected, a wire that is broken or shorted",
      "check the supply, MISO (of clocked encoders DATA), the chip select and which wires are a pair"},
-    {Ailment::wrong_echo, "wrong_echo", fault, "no good reply with {0}, but {2} of {3} with {1}",
+    {Ailment::wrong_echo, "wrong_echo", fault, "{4} with {0}, but {2} of {3} with {1}",
      "the adapter sends back what is sent otherwise than was said", "set {1}"},
+    {Ailment::wrong_address, "wrong_address", fault, "{4} with {0}, but {2} of {3} with {1}",
+     "the encoder has another address than was said", "set {1}"},
+    {Ailment::other_protocol, "other_protocol", fault, "{4} of {0}, but {2} of {3} of {1}",
+     "the encoder speaks another protocol", "`absenc read \"{5}\"`"},
     {Ailment::only_echo, "only_echo", fault, "{0} times only the request itself came back: {1}",
      "the adapter hears itself, but no encoder answers",
      "check the encoder's supply and ground, exchange A and B, and check address and baud rate"},
-    {Ailment::modem_answers, "modem_answers", fault, "what came back is text of a modem: {0}",
-     "a modem or a console is behind this port, no encoder", "name the port of the adapter: `ls /dev/serial/by-id`"},
+    {Ailment::modem_answers, "modem_answers", fault, "what came is text: {0}",
+     "a modem, a console, a GPS receiver or another device that speaks text is behind this port, no encoder",
+     "name the port of the adapter: `ls /dev/serial/by-id`"},
     {Ailment::no_answer, "no_answer", fault, "nothing came back to {0} requests{1}",
      "no supply, exchanged wires, another address or rate, or an adapter that does not send",
      "check the encoder's supply and ground, A and B (or TX and RX), the address and the rate; `absenc identify` asks "
@@ -93,6 +97,34 @@ constexpr auto table = std::to_array<Words>({
     {Ailment::baud_pattern, "baud_pattern", fault, "what came looks like bits at another rate: {0}",
      "the sender is many times slower or faster than the port is set", "set the rate of the encoder with baud=RATE"},
 
+    {Ailment::byte_before, "byte_before", fault,
+     "{0} of {1} replies are good without the {2} before each of them, such as {3}",
+     "the adapter switches its direction too late, or receives while it still sends",
+     "use an adapter that switches its direction by itself, or rs485=on; bias the idle line"},
+    {Ailment::byte_after, "byte_after", fault,
+     "{0} of {1} replies are good ones with {2} behind each of them, such as {3}",
+     "the encoder's driver or the adapter switches off too late, and the idle line is not biased",
+     "bias the idle line, 120 ohms at both ends, and use an adapter that switches its direction by itself"},
+    {Ailment::flow_control, "flow_control", fault,
+     "no reply has a byte 11 or 13, and {0} of {1} are good with {2} put back, such as {3}",
+     "software flow control (XON/XOFF) on the way takes these bytes out of the replies",
+     "switch it off in the adapter, the device server or its driver"},
+    {Ailment::newline_translated, "newline_translated", fault,
+     "before each byte 0A stands a 0D, and {0} of {1} replies are good without these, such as {3}",
+     "something on the way takes bytes for text and turns LF into CR LF",
+     "switch the way to raw bytes: a device server's text or console mode, socat's crnl, a terminal's onlcr"},
+    {Ailment::telnet_doubled, "telnet_doubled", fault,
+     "each byte FF comes twice, and {0} of {1} replies are good with one of each two, such as {3}",
+     "the device server speaks telnet, which doubles FF",
+     "set the server's port to raw TCP instead of telnet or RFC 2217"},
+    {Ailment::seven_bits, "seven_bits", fault,
+     "no reply has a byte above 7F, and {0} of {1} are good with the 8th bit of {2} set, such as {3}",
+     "the port, the device server or something behind it is set to 7 data bits, or strips the 8th",
+     "set 8 data bits wherever the line passes"},
+    {Ailment::nul_lost, "nul_lost", fault,
+     "no reply has a byte 00, and {0} of {1} are good with {2} put back, such as {3}",
+     "something on the way throws away bytes that are 00, as a driver or program for text does",
+     "switch the way to raw bytes, or use another adapter or driver"},
     {Ailment::two_answer, "two_answer", fault, "{0} of {1} replies held more than one frame, such as {2}",
      "two encoders answer one after the other", "give each an address of its own, or disconnect one"},
     {Ailment::extra_bytes, "extra_bytes", warning,
@@ -107,8 +139,8 @@ constexpr auto table = std::to_array<Words>({
      "every reply is damaged, and a scan finds that what answers at {0} is so each time",
      "two encoders have one address and speak at the same time",
      "disconnect one and give the other an address of its own"},
-    {Ailment::wrong_settings, "wrong_settings", fault, "none of {0} replies is good as it was said, but {1} with {2}",
-     "the encoder is another model, or set up otherwise", "set {2}"},
+    {Ailment::wrong_settings, "wrong_settings", fault, "{4} with {0}, but {2} of {3} with {1}",
+     "the encoder is another model, or set up otherwise", "set {1}"},
     {Ailment::other_checksum, "other_checksum", fault, "the checksum of {0} replies is wrong, but {1} explains all",
      "it speaks a variant of the protocol", "look for the document of this variant; `absenc crc find` tells more"},
     {Ailment::contradictory, "contradictory", fault,
@@ -154,8 +186,8 @@ constexpr auto table = std::to_array<Words>({
      "the way to the line holds them up: a network, a hub, the latency timer of an adapter",
      "for more readings a second connect the adapter without what is between"},
 
-    {Ailment::starting, "starting", warning, "the encoder said in {0} of {1} readings that it is still starting{2}",
-     "it was switched on just now, or its supply is too weak to come up", "wait, then look again; measure the supply"},
+    {Ailment::starting, "starting", warning, "{0}", "it was switched on just now, or its supply is too weak to come up",
+     "wait, then look again; measure the supply"},
     // The words of the encoder's document
     {Ailment::alarm, "alarm", warning, "the encoder reports {0}", "{1}", "{2}"},
     {Ailment::status, "status", warning, "the status of the encoder has {0}", "{1}", "{2}"},
@@ -181,6 +213,70 @@ constexpr auto table = std::to_array<Words>({
      "look at battery and alarms; `absenc run` with the protocol's command that resets the turns"},
     {Ailment::stuck_bits, "stuck_bits", fault, "of the position {0} never changed while it went {1} counts",
      "the resolution is another one, or codes are missing", "check the resolution of the model; replace the encoder"},
+});
+
+/// What is said instead where the encoder is not behind a serial port; "": the same.
+struct Elsewhere {
+  Ailment ailment;
+  Place place;
+  std::string_view cause;
+  std::string_view action;
+};
+constexpr auto elsewhere = std::to_array<Elsewhere>({
+    {Ailment::port_missing, Place::tcp, "the device server is off, or its host or port is another one",
+     "check the server's supply and cable, host and port"},
+    {Ailment::port_missing, Place::can, "the interface is not there, or its name is another one",
+     "correct the name; `ip link` shows the interfaces that there are"},
+    {Ailment::port_missing, Place::spi, "the kernel has no such SPI device, or its name is another one",
+     "correct the name; `ls /dev/spidev*` shows the devices that there are"},
+    {Ailment::port_unsuitable, Place::tcp, "", "name host and port of the device server's serial side"},
+    {Ailment::port_unsuitable, Place::can, "", "name a CAN interface; `ip link` shows those that there are"},
+    {Ailment::port_unsuitable, Place::spi, "", "name an SPI device; `ls /dev/spidev*` shows those that there are"},
+    {Ailment::port_forbidden, Place::spi, "the user is not in the group that owns the device",
+     "join the group that `ls -l /dev/spidev*` shows, and log in again"},
+    {Ailment::port_lost, Place::tcp, "the network or the device server ended the connection",
+     "check cable and supply of the server, and whether another client took its port"},
+    {Ailment::port_lost, Place::can, "the interface was taken down, or its adapter was unplugged",
+     "bring it up again: `ip link` shows its state"},
+    {Ailment::modem_answers, Place::tcp, "", "name host and port of the device server's serial side"},
+    {Ailment::no_answer, Place::tcp,
+     "no supply, exchanged wires, another address, or another rate of the device server",
+     "check the encoder's supply and ground, A and B, its address, and the rate of the device server's serial side; "
+     "`absenc identify` asks in every protocol"},
+    {Ailment::no_answer, Place::can, "no supply, exchanged wires, another number of the node or another bit rate",
+     "check the encoder's supply, CANH and CANL, 120 ohms at both ends, the number of the node and the bit rate"},
+    {Ailment::no_answer, Place::slcan, "no supply, exchanged wires, another number of the node or another bit rate",
+     "check the encoder's supply, CANH and CANL, 120 ohms at both ends, the number of the node and the bit rate"},
+    {Ailment::no_answer, Place::sim, "a fault of the virtual encoder is set so", "leave the fault out"},
+    {Ailment::baud_pattern, Place::tcp, "the device server's serial side has another rate than the encoder",
+     "set the rate of the device server's serial side"},
+    {Ailment::byte_before, Place::tcp, "the device server switches its direction too late",
+     "use a device server that switches its direction in time; bias the idle line"},
+    {Ailment::reply_late, Place::tcp,
+     "the network holds replies up, or the device server, which waits for more bytes before it sends them", ""},
+    {Ailment::reply_late, Place::can, "a busy bus, the adapter or a busy computer holds replies up", ""},
+    {Ailment::reply_late, Place::sim, "a fault of the virtual encoder is set so, or this computer is busy",
+     "leave the fault out, or let the computer do less meanwhile"},
+    {Ailment::sometimes_late, Place::tcp, "the network, the device server or a busy computer holds up single replies",
+     ""},
+    {Ailment::sometimes_late, Place::sim, "a fault of the virtual encoder is set so, or this computer is busy",
+     "leave the fault out, or let the computer do less meanwhile"},
+    {Ailment::reply_slow, Place::tcp,
+     "the network holds them up, or the device server, which waits for more bytes before it sends them",
+     "for more readings a second shorten the time for which the server waits, or use a serial port of the computer"},
+    {Ailment::reply_slow, Place::can, "the bus, the adapter or the computer is busy", "see what else is on the bus"},
+    {Ailment::reply_slow, Place::sim, "a fault of the virtual encoder is set so, or this computer is busy",
+     "leave the fault out, or let the computer do less meanwhile"},
+    {Ailment::reply_late, Place::spi, "this computer is busy", "let the computer do less meanwhile"},
+    {Ailment::sometimes_late, Place::spi, "this computer is busy", "let the computer do less meanwhile"},
+    {Ailment::sometimes_late, Place::can, "a busy bus, the adapter or a busy computer holds up single replies", ""},
+    {Ailment::reply_slow, Place::spi, "this computer is busy", "let the computer do less meanwhile"},
+    {Ailment::modem_answers, Place::spi, "something else than an encoder is behind this controller",
+     "name the SPI device of the encoder; `ls /dev/spidev*` shows those that there are"},
+    {Ailment::modem_answers, Place::can, "something else than an encoder is on this bus", "name another interface"},
+    {Ailment::sometimes_silent, Place::spi, "", "check plugs, supply and wires"},
+    {Ailment::sometimes_silent, Place::sim, "a fault of the virtual encoder is set so, or this computer is busy",
+     "leave the fault out, or let the computer do less meanwhile"},
 });
 
 constexpr bool is_in_order() {
@@ -219,6 +315,14 @@ Finding finding(Ailment ailment, const std::vector<std::string>& values) {
           filled(words.action, values)};
 }
 
+void suit(Finding& finding, Place place) {
+  for (const Elsewhere& one : elsewhere) {
+    if (one.ailment != finding.ailment || one.place != place) continue;
+    if (!one.cause.empty()) finding.cause = one.cause;
+    if (!one.action.empty()) finding.action = one.action;
+  }
+}
+
 std::string Finding::sentence() const {
   return fmt::format("{}: {}. Likely: {}. Try: {}", id, evidence, cause, action);
 }
@@ -237,6 +341,7 @@ std::string Examination::verdict() const {
   if (!complete) return "interrupted: nothing was found until then";
   std::string evidence = fmt::format("good: {} of {} readings in {:.3g} s", good, tried,
                                      std::chrono::duration<double>(measured.time).count());
+  if (measured.rate > 0) evidence += fmt::format(", {:.4g} a second", measured.rate);
   if (good < tried) evidence += fmt::format(" ({} failed)", tried - good);
   evidence += fmt::format(" (95 %: less than {:.2g} % fail)", 100 * measured.failures);
   evidence += reported.valid == good ? ", each with a valid position"
@@ -248,6 +353,8 @@ std::string Examination::verdict() const {
     const auto ms = [](Time time) { return std::chrono::duration<double, std::milli>(time).count(); };
     evidence += fmt::format("; replies took {:.3f} to {:.3f} ms", ms(measured.quickest), ms(measured.slowest));
   }
+  if (!measured.echo.empty()) evidence += fmt::format("; {}", measured.echo);
+  if (measured.latency) evidence += fmt::format("; the way adds up to {}", to_text(*measured.latency));
   if (!measured.turned) evidence += "; not looked at: a turning shaft (--turn)";
   return evidence;
 }

@@ -6,10 +6,14 @@
 #include <vector>
 
 #include "absenc/client/doctor.hpp"
+#include "absenc/client/way/address.hpp"
 
 namespace absenc::client {
 
 /// `values` stand for {0}, {1} ... in the texts of the table.
 [[nodiscard]] Finding finding(Ailment ailment, const std::vector<std::string>& values = {});
+
+/// Replaces a cause or an action that does not fit such a place: nothing about USB is said of a network.
+void suit(Finding& finding, Place place);
 
 }  // namespace absenc::client

@@ -79,6 +79,7 @@ class Attempt {
         runner_(address_) {
     if constexpr (!is_can) harmful_ = harmful_to_others(unit, address_.line.rate, search);
     runner_.port().deadline = deadline;
+    runner_.port().over = search.over;
     runner_.on_event = [this](const Event<Item>& event) {
       if (talk_ != nullptr) talk_->patience.see(event);
     };

@@ -23,6 +23,7 @@ struct LineSearch {
   std::function<void(const std::string&)> progress{};
   OpenLink open = open_link;
   std::function<Time()> now = os::now;  // the clock of the ports
+  std::function<bool()> over{};         // true: it ends with os::Ended. Empty: never
 };
 
 struct LineFindings {

@@ -270,6 +270,8 @@ class Runner {
 
   /// How many good replies more came behind, though nobody had asked; not on a CAN bus.
   [[nodiscard]] std::uint64_t overfull() const { return overfull_; }
+  /// The most items that came behind one of them.
+  [[nodiscard]] std::size_t most_behind() const { return most_behind_; }
   /// All that came in the last such exchange.
   [[nodiscard]] std::span<const Item> overfull_example() const { return overfull_example_; }
 
@@ -347,6 +349,7 @@ class Runner {
     const std::size_t answered = std::exchange(answered_, 0);
     if (!is_can && answered != 0 && last().received.size() > answered) {
       ++overfull_;
+      most_behind_ = std::max(most_behind_, last().received.size() - answered);
       overfull_example_ = last().received;
     }
     close_exchange();
@@ -387,6 +390,7 @@ class Runner {
   Time lateness_{};
   std::size_t answered_ = 0;  // items when the last exchange ended well
   std::uint64_t overfull_ = 0;
+  std::size_t most_behind_ = 0;
   std::vector<Item> overfull_example_;
 };
 

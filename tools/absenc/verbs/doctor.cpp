@@ -101,9 +101,10 @@ const Subcommand doctor_subcommand{
     "say what is wrong with an encoder, or with the way to it, and what to do",
     "A port without a protocol is identified first. Then looks from the port up: whether it is there, may be\n"
     "opened and is nobody else's; whether the line is silent until it is asked; whether anything answers, and if\n"
-    "not, at another rate, SPI mode or clock; what damaged replies look like; what the encoder reports; whether the\n"
-    "position is quiet and goes no faster than a shaft can. Each finding has what was seen, what is likely behind it\n"
-    "and what to do. The last line says good, or the first thing to mend. Nothing is ever written to the encoder.\n"
+    "not, as another model, at another rate, SPI mode, clock or address, or in another protocol; what damaged replies\n"
+    "look like, and what adapters do to bytes; what the encoder reports; whether the position is quiet and goes no\n"
+    "faster than a shaft can. Each finding has what was seen, what is likely behind it and what to do. The last line\n"
+    "says good, or the first thing to mend. Nothing is ever written to the encoder.\n"
     "Exit status 1 when something is to be mended.",
     doctor_parameters,
     doctor_examples,

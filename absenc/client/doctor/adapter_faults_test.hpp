@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: Apache-2.0
+// For tests of doctor: faults with the finding that each is, those of adapters and of other encoders among them.
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "absenc/client/doctor/ways_faults_test.hpp"
+
+namespace absenc::client {
+
+/// A fault, and how it comes about.
+struct Fault {
+  std::string id;
+  std::function<Examination()> examine;
+};
+
+/// Each of the first unit that can have it.
+inline std::vector<Fault> adapter_faults() {
+  std::vector<Fault> faults;
+  std::vector<ways::WayFault> all = ways::faults_of_bytes();
+  for (const ways::WayFault& one : ways::faults_of_others()) {
+    if (one.name == "another protocol" || one.name == "another address") all.push_back(one);
+  }
+  for (const ways::WayFault& one : all) {
+    for (const Unit* unit : ways::character_units()) {
+      const std::optional<ways::Outcome> outcome =
+          one.examine(*unit, ways::asked_mode(*unit), ways::rates_of(*unit).front());
+      if (!outcome) continue;
+      const bool is_named = outcome->causes.contains(one.name);
+      faults.push_back(
+          {is_named ? one.name : *outcome->causes.begin(), [seen = outcome->seen.examination] { return seen; }});
+      break;
+    }
+  }
+  return faults;
+}
+
+}  // namespace absenc::client

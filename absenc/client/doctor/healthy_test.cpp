@@ -1,0 +1,97 @@
+// SPDX-License-Identifier: Apache-2.0
+// No healthy encoder is called ill: each unit and model in each of its modes, examined again and again at random
+// places, speeds and pauses between the readings.
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "absenc/client/doctor/examine.hpp"
+#include "absenc/client/virtual_link_test.hpp"
+#include "absenc/protocol/all.hpp"
+#include "absenc/sim/random.hpp"
+
+namespace absenc::client {
+namespace {
+
+using namespace std::chrono_literals;
+
+constexpr unsigned examinations = 200;  // of each model and mode
+constexpr std::size_t readings = 40;
+
+class HealthyEncoder : public ::testing::TestWithParam<const Unit*> {};
+
+/// The usual options, each model, and each choice of an option.
+std::vector<std::string> modes_of(const Unit& unit) {
+  std::vector<std::string> modes{""};
+  for (const Model& model : unit.models) modes.push_back(fmt::format("model={}", model.name));
+  for (const Option& option : unit.options) {
+    if (option.role == Role::rate) continue;  // simulated lines have none that could be wrong
+    for (const std::string_view choice : option.choices) modes.push_back(fmt::format("{}={}", option.name, choice));
+  }
+  return modes;
+}
+
+Examination examined(const EncoderAddress& address, std::uint64_t seed) {
+  const Surroundings surroundings{
+      [&](const EncoderAddress& to) { return virtual_link(to, {.pauses = seed, .seed = seed}); },
+      [](const std::string&) { return os::PortFacts{}; }};
+  return examine(address, {.readings = readings, .limit = 60s}, surroundings);
+}
+
+std::string random_motion(const EncoderAddress& address, sim::Random& random) {
+  const host::SpeedLimit limit = speed_limit(address);
+  const auto rpm = static_cast<std::int64_t>(random.below(std::min<std::uint64_t>(limit.rpm, 6000)));
+  switch (random.below(4)) {
+    case 0:
+      return "still";
+    case 1:
+      return fmt::format("rpm={}", rpm);
+    case 2:
+      return fmt::format("rpm=-{}", rpm);
+    default:
+      return fmt::format("rpm={}", 1 + random.below(60));
+  }
+}
+
+TEST_P(HealthyEncoder, IsNeverCalledIll) {
+  const Unit& unit = *GetParam();
+  std::size_t modes = 0;
+  for (const std::string& mode : modes_of(unit)) {
+    std::optional<EncoderAddress> usual;
+    try {
+      usual = parse_address(fmt::format("sim:{}{}{}", unit.id, mode.empty() ? "" : "?", mode));
+      if (examined(*usual, 1).good == 0) continue;  // the virtual encoder cannot be read so
+    } catch (const std::exception&) {               // options that exclude each other
+      continue;
+    }
+    ++modes;
+    sim::Random random(modes);
+    const unsigned bits = std::min(unit.resolution(usual->options).singleturn_bits, 62u);
+    unsigned ill = 0;
+    for (unsigned i = 0; i < examinations && ill < 3; ++i) {
+      const std::string state =
+          fmt::format("singleturn={}&motion={}", random.below(std::uint64_t{1} << bits), random_motion(*usual, random));
+      const std::string text = fmt::format("sim:{}?{}{}{}", unit.id, mode, mode.empty() ? "" : "&", state);
+      const Examination one = examined(parse_address(text), random.next());
+      ill += one.healthy() ? 0 : 1;
+      EXPECT_TRUE(one.healthy()) << text << "\n" << (one.first() != nullptr ? one.first()->sentence() : one.verdict());
+    }
+  }
+  EXPECT_GT(modes, 0u);
+}
+
+std::string name_of_test(const ::testing::TestParamInfo<const Unit*>& one) {
+  std::string name(one.param->id);
+  std::replace(name.begin(), name.end(), '-', '_');
+  return name;
+}
+
+INSTANTIATE_TEST_SUITE_P(Units, HealthyEncoder, ::testing::ValuesIn(all_units().begin(), all_units().end()),
+                         name_of_test);
+
+}  // namespace
+}  // namespace absenc::client

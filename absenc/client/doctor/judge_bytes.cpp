@@ -1,0 +1,362 @@
+// SPDX-License-Identifier: Apache-2.0
+// What adapters, drivers and device servers do to bytes: undone, the replies are good.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cstdint>
+#include <optional>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "absenc/client/doctor/damage.hpp"
+#include "absenc/client/doctor/judges.hpp"
+#include "absenc/client/doctor/words.hpp"
+#include "absenc/client/text/wire_text.hpp"
+#include "absenc/sim/random.hpp"
+
+namespace absenc::client {
+
+namespace {
+
+using ByteList = std::vector<std::uint8_t>;
+
+constexpr std::uint8_t xon = 0x11;
+constexpr std::uint8_t xoff = 0x13;
+constexpr std::uint8_t lf = 0x0A;
+constexpr std::uint8_t cr = 0x0D;
+
+/// Looks for what makes one reply good again.
+class Mender {
+ public:
+  /// `random`: undoes something else in its place, which shows how often chance does as well; null: the thing itself.
+  Mender(const Case& one, const Attempted& attempt, sim::Random* random)
+      : one_(one), request_(attempt.exchange.request.frame()), raw_(attempt.raw), random_(random) {}
+
+  [[nodiscard]] const ByteList& raw() const { return raw_; }
+  [[nodiscard]] sim::Random* random() const { return random_; }
+  [[nodiscard]] bool is_good(Bytes bytes) const { return decodes(one_, request_, {.bytes = bytes}); }
+
+  /// Whether it is good without the bytes at these places, in ascending order; by chance: without as many others.
+  [[nodiscard]] bool without(const std::vector<std::size_t>& places) const {
+    if (places.empty() || places.size() >= raw_.size()) return false;
+    std::vector<bool> removed(raw_.size(), false);
+    for (const std::size_t place : places) removed[place] = true;
+    if (random_ != nullptr) {
+      if (places.size() * 2 > raw_.size()) return false;
+      std::vector<bool> others(raw_.size(), false);
+      for (std::size_t count = 0; count < places.size();) {
+        const std::size_t place = random_->below(raw_.size());
+        if (others[place] || removed[place]) continue;
+        others[place] = true;
+        ++count;
+      }
+      removed = others;
+    }
+    ByteList rest;
+    for (std::size_t i = 0; i < raw_.size(); ++i) {
+      if (!removed[i]) rest.push_back(raw_[i]);
+    }
+    return is_good(rest);
+  }
+
+  /// Whether it is good with up to `most` of these values put in anywhere; by chance: with others in their place. Keeps
+  /// how many.
+  [[nodiscard]] bool with(Bytes values, std::size_t most, std::size_t& put) const {
+    ByteList used(values.begin(), values.end());
+    if (random_ != nullptr) {
+      for (std::uint8_t& value : used) value = static_cast<std::uint8_t>(0x20 + random_->below(0xE0));
+    }
+    std::size_t tries = most_tries;
+    // As many at least as the frame lacks.
+    const FrameEnd end = one_.unit.frame_end(one_.options, Direction::reply, raw_);
+    const bool is_cut = end.kind == FrameEnd::Kind::incomplete && end.size > raw_.size();
+    for (put = is_cut ? std::min(end.size - raw_.size(), most) : 1; put <= most && tries > 0; ++put) {
+      ByteList bytes = raw_;
+      if (insert(bytes, used, 0, put, tries)) return true;
+    }
+    return false;
+  }
+
+  /// Whether it is good with the 8th bit of some bytes set; by chance: of the same with two other bits changed.
+  [[nodiscard]] bool with_eighth_bits(std::size_t& set) const {
+    constexpr std::size_t most_bytes = 12;  // all combinations of so many are tried
+    ByteList bytes = raw_;
+    if (random_ != nullptr && bytes.size() > 2) {
+      for (int i = 0; i < 2; ++i)
+        bytes[random_->below(bytes.size())] ^= static_cast<std::uint8_t>(1u << random_->below(7));
+    }
+    if (bytes.size() > most_bytes) {  // of longer ones only whether they are whole
+      const FrameEnd end = one_.unit.frame_end(one_.options, Direction::reply, bytes);
+      set = bytes.size();
+      return end.kind == FrameEnd::Kind::complete && end.size == bytes.size();
+    }
+    const std::size_t count = bytes.size();
+    for (unsigned mask = 1; mask < 1u << count; ++mask) {
+      for (std::size_t i = 0; i < count; ++i) {
+        const auto bit = static_cast<std::uint8_t>((mask >> i & 1u) << 7);
+        bytes[i] = static_cast<std::uint8_t>((bytes[i] & 0x7F) | bit);
+      }
+      if (!is_good(bytes)) continue;
+      set = static_cast<std::size_t>(std::popcount(mask));
+      return true;
+    }
+    return false;
+  }
+
+ private:
+  static constexpr std::size_t most_tries = 5000;  // decodings of one reply
+
+  // In all places from `from` on.
+  [[nodiscard]] bool insert(ByteList& bytes, const ByteList& values, std::size_t from, std::size_t count,
+                            std::size_t& tries) const {
+    if (count == 0) {
+      if (tries == 0) return false;
+      --tries;
+      return is_good(bytes);
+    }
+    for (std::size_t place = from; place <= bytes.size(); ++place) {
+      for (const std::uint8_t value : values) {
+        // In front of the same value it is the same as behind it.
+        if (place < bytes.size() && bytes[place] == value) continue;
+        bytes.insert(bytes.begin() + static_cast<std::ptrdiff_t>(place), value);
+        const bool good = insert(bytes, values, place + 1, count - 1, tries);
+        bytes.erase(bytes.begin() + static_cast<std::ptrdiff_t>(place));
+        if (good) return true;
+        if (tries == 0) return false;
+      }
+    }
+    return false;
+  }
+
+  const Case& one_;
+  Frame request_;
+  const ByteList& raw_;
+  sim::Random* random_;
+};
+
+bool contains(const ByteList& bytes, std::uint8_t value) {
+  return std::find(bytes.begin(), bytes.end(), value) != bytes.end();
+}
+
+/// Something that is done to the bytes of every reply.
+struct Suspicion {
+  Ailment ailment;
+  bool (*fits)(const ByteList& raw);  // false: this reply, good or not, shows that it is not done
+  /// Whether the reply is good when it is undone; `count`: how many bytes are concerned.
+  bool (*undo)(const Mender& mender, std::size_t& count);
+};
+
+// ---- Each of them
+
+bool fits_any(const ByteList&) { return true; }
+
+bool undo_byte_before(const Mender& mender, std::size_t& count) {
+  for (count = 1; count <= 2; ++count) {
+    std::vector<std::size_t> places;
+    for (std::size_t i = 0; i < count; ++i) places.push_back(i);
+    if (mender.without(places)) return true;
+  }
+  return false;
+}
+
+bool undo_byte_after(const Mender& mender, std::size_t& count) {
+  const std::size_t size = mender.raw().size();
+  for (count = 1; count <= 2 && count < size; ++count) {
+    std::vector<std::size_t> places;
+    for (std::size_t i = size - count; i < size; ++i) places.push_back(i);
+    if (mender.without(places)) return true;
+  }
+  return false;
+}
+
+bool fits_newline(const ByteList& raw) {
+  for (std::size_t i = 0; i < raw.size(); ++i) {
+    if (raw[i] == lf && (i == 0 || raw[i - 1] != cr)) return false;
+  }
+  return true;
+}
+bool undo_newline(const Mender& mender, std::size_t& count) {
+  std::vector<std::size_t> places;
+  for (std::size_t i = 1; i < mender.raw().size(); ++i) {
+    if (mender.raw()[i] == lf) places.push_back(i - 1);
+  }
+  count = places.size();
+  return mender.without(places);
+}
+
+// The second of each two FF.
+std::vector<std::size_t> doubled(const ByteList& raw) {
+  std::vector<std::size_t> places;
+  for (std::size_t i = 0; i + 1 < raw.size(); ++i) {
+    if (raw[i] == 0xFF && raw[i + 1] == 0xFF) places.push_back(++i);
+  }
+  return places;
+}
+bool fits_telnet(const ByteList& raw) {
+  return static_cast<std::size_t>(std::count(raw.begin(), raw.end(), 0xFF)) == 2 * doubled(raw).size();
+}
+bool undo_telnet(const Mender& mender, std::size_t& count) {
+  const std::vector<std::size_t> places = doubled(mender.raw());
+  count = places.size();
+  return mender.without(places);
+}
+
+bool fits_flow_control(const ByteList& raw) { return !contains(raw, xon) && !contains(raw, xoff); }
+bool undo_flow_control(const Mender& mender, std::size_t& count) {
+  constexpr std::array<std::uint8_t, 2> taken{xon, xoff};
+  return mender.with(taken, 3, count);
+}
+
+bool fits_nul_lost(const ByteList& raw) { return !contains(raw, 0); }
+bool undo_nul_lost(const Mender& mender, std::size_t& count) {
+  constexpr std::array<std::uint8_t, 1> taken{0};
+  return mender.with(taken, 16, count);
+}
+
+bool fits_seven_bits(const ByteList& raw) {
+  return std::all_of(raw.begin(), raw.end(), [](std::uint8_t byte) { return byte < 0x80; });
+}
+bool undo_seven_bits(const Mender& mender, std::size_t& count) { return mender.with_eighth_bits(count); }
+
+// What shows in all places before what shows at one end.
+constexpr auto suspicions = std::to_array<Suspicion>({
+    {Ailment::telnet_doubled, fits_telnet, undo_telnet},
+    {Ailment::newline_translated, fits_newline, undo_newline},
+    {Ailment::byte_before, fits_any, undo_byte_before},
+    {Ailment::byte_after, fits_any, undo_byte_after},
+    {Ailment::flow_control, fits_flow_control, undo_flow_control},
+    {Ailment::nul_lost, fits_nul_lost, undo_nul_lost},
+    {Ailment::seven_bits, fits_seven_bits, undo_seven_bits},
+});
+
+std::string bytes_of(std::size_t count) { return count == 1 ? "a byte" : fmt::format("{} bytes", count); }
+
+// How many values were seen beyond one in each place: that none of them has a certain bit is as unlikely.
+std::size_t variety(const All& all) {
+  std::vector<std::set<std::uint8_t>> values;
+  for (const Attempted* attempt : all) {
+    if (values.size() < attempt->raw.size()) values.resize(attempt->raw.size());
+    for (std::size_t i = 0; i < attempt->raw.size(); ++i) values[i].insert(attempt->raw[i]);
+  }
+  std::size_t sum = 0;
+  for (const std::set<std::uint8_t>& one : values) sum += one.empty() ? 0 : one.size() - 1;
+  return sum;
+}
+
+// Of so many readings nearly all.
+std::optional<Finding> suspected(const Case& one, const All& all, const Suspicion& suspicion) {
+  constexpr std::size_t enough = 4;
+  constexpr std::size_t most_tried = 10;
+  const bool fits = std::all_of(one.seen.readings.begin(), one.seen.readings.end(),
+                                [&](const Attempted& attempt) { return suspicion.fits(attempt.raw); });
+  if (!fits) return {};
+  sim::Random random(1);
+  std::size_t tried = 0;
+  std::size_t mended = 0;
+  std::size_t by_chance = 0;
+  std::size_t concerned = 0;
+  const Attempted* example = nullptr;
+  for (const Attempted* attempt : all) {
+    if (attempt->raw.empty()) continue;
+    if (++tried > most_tried) break;
+    std::size_t count = 0;
+    std::size_t ignored = 0;
+    if (suspicion.undo(Mender(one, *attempt, nullptr), count)) {
+      ++mended;
+      concerned = std::max(concerned, count);
+      example = attempt;
+    }
+    by_chance += suspicion.undo(Mender(one, *attempt, &random), ignored) ? 1 : 0;
+    // What mends none of the first will not mend nearly all.
+    if (tried >= enough && mended == 0) return {};
+  }
+  tried = std::min(tried, most_tried);
+  if (tried < enough || mended * 10 < tried * 8) return {};
+  constexpr std::size_t varied = 24;
+  const bool is_seen = suspicion.ailment == Ailment::seven_bits && variety(all) >= varied;
+  if (!is_seen && mended < by_chance + tried / 2) return {};
+  return finding(suspicion.ailment,
+                 {fmt::format("{}", mended), fmt::format("{}", tried), bytes_of(concerned),
+                  to_hex(Bytes(example->raw).first(std::min<std::size_t>(example->raw.size(), 24)))});
+}
+
+// A sum by XOR is good without the 8th bits, too: a byte of the position then goes from 7F to 00, again and again.
+std::optional<Finding> seven_bits_of_good(const Case& one) {
+  constexpr std::size_t enough = 40;
+  constexpr std::size_t least_wraps = 2;
+  constexpr std::uint8_t high = 0x60;
+  constexpr std::uint8_t low = 0x20;
+  std::vector<std::size_t> wraps;
+  const Attempted* before = nullptr;
+  std::size_t good = 0;
+  for (const Attempted& attempt : one.seen.readings) {
+    if (!fits_seven_bits(attempt.raw)) return {};
+    if (attempt.error != Error::none) continue;
+    ++good;
+    const bool is_alike = before != nullptr && before->raw.size() == attempt.raw.size();
+    wraps.resize(std::max(wraps.size(), attempt.raw.size()));
+    for (std::size_t i = 0; is_alike && i < attempt.raw.size(); ++i) {
+      const auto [least, most] = std::minmax(before->raw[i], attempt.raw[i]);
+      wraps[i] += least < low && most >= high ? 1 : 0;
+    }
+    before = &attempt;
+  }
+  const bool is_seen = std::ranges::any_of(wraps, [](std::size_t count) { return count >= least_wraps; });
+  if (good < enough || !is_seen) return {};
+  return finding(Ailment::seven_bits,
+                 {fmt::format("{}", good), fmt::format("{}", one.seen.readings.size()), "any bytes",
+                  to_hex(Bytes(before->raw).first(std::min<std::size_t>(before->raw.size(), 24)))});
+}
+
+// A byte before each reply to a request of one byte is taken for its echo.
+std::optional<Finding> false_echo(const Case& one) {
+  std::size_t good = 0;
+  std::size_t wrong = 0;
+  std::size_t longest = 0;
+  const Attempted* example = nullptr;
+  for (const Attempted& attempt : one.seen.readings) {
+    const ByteList& request = attempt.exchange.request.bytes;
+    const ByteList& reply = attempt.exchange.reply.bytes;
+    if (attempt.error != Error::none || request.empty()) continue;
+    ++good;
+    if (attempt.raw.size() <= reply.size()) continue;
+    const Bytes before = Bytes(attempt.raw).first(attempt.raw.size() - reply.size());
+    if (before.size() != request.size() || std::equal(before.begin(), before.end(), request.begin())) continue;
+    ++wrong;
+    longest = std::max(longest, before.size());
+    example = &attempt;
+  }
+  if (good < 4 || wrong * 10 < good * 8) return {};
+  return finding(Ailment::byte_before,
+                 {fmt::format("{}", wrong), fmt::format("{}", good), bytes_of(longest),
+                  to_hex(Bytes(example->raw).first(std::min<std::size_t>(example->raw.size(), 24)))});
+}
+
+// Behind a good reply: as few bytes as no second reply has.
+std::optional<Finding> byte_behind_good(const Case& one) {
+  const Observations& seen = one.seen;
+  if (seen.overfull * 10 < one.good * 8 || one.good < 4 || seen.most_behind == 0 || seen.most_behind > 2) return {};
+  const ByteList& example = seen.overfull_example;
+  if (example.size() < 3 * seen.most_behind) return {};
+  return finding(Ailment::byte_after,
+                 {fmt::format("{}", seen.overfull), fmt::format("{}", seen.readings.size()), bytes_of(seen.most_behind),
+                  to_hex(Bytes(example).first(std::min<std::size_t>(example.size(), 24)))});
+}
+
+}  // namespace
+
+std::optional<Finding> damage_by_adapter(const Case& one, const All& all) {
+  if (one.unit.link != LinkKind::half_duplex && one.unit.link != LinkKind::full_duplex) return {};
+  if (std::optional<Finding> found = false_echo(one)) return found;
+  if (std::optional<Finding> found = byte_behind_good(one)) return found;
+  if (std::optional<Finding> found = seven_bits_of_good(one)) return found;
+  for (const Suspicion& suspicion : suspicions) {
+    if (std::optional<Finding> found = suspected(one, all, suspicion)) return found;
+  }
+  return {};
+}
+
+}  // namespace absenc::client

@@ -1,0 +1,151 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the encoder reports of itself: that it is starting, alarms, status, and whether its position holds.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <optional>
+#include <set>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "absenc/client/doctor/judges.hpp"
+#include "absenc/client/doctor/words.hpp"
+#include "absenc/client/reading.hpp"
+#include "absenc/client/text/unit_text.hpp"
+
+namespace absenc::client {
+
+namespace {
+
+// A flag that some reading reported as raised.
+struct RaisedFlag {
+  const FlagInfo* flag = nullptr;
+  bool is_alarm = false;
+  std::set<std::string_view> channels{};  // the fields that report it
+  const Reading* last = nullptr;          // the last of the readings
+  std::size_t readings = 0;
+  std::size_t invalid = 0;  // of them, with a position or turns that do not hold
+};
+
+bool is_invalid(const Reading& reading) {
+  return reading.singleturn_validity() == Validity::invalid || reading.multiturn_validity() == Validity::invalid;
+}
+
+// The raised alarms of both channels, by the bits of the first.
+std::uint32_t alarms_of_either(const Unit& unit, const Reading& reading) {
+  std::uint32_t bits = 0;
+  for (const Flags& flags : alarms_of(unit, reading)) bits |= flags.bits;
+  return bits;
+}
+
+void count_flags(const std::vector<Flags>& all, bool is_alarm, const Reading& reading, std::uint32_t alarms,
+                 std::vector<RaisedFlag>& counts) {
+  for (const Flags& flags : all) {
+    for (const FlagInfo* flag : raised(*flags.field, flags.bits)) {
+      if (!is_alarm && (flag->action.empty() || (flag->sums & alarms) != 0)) continue;
+      // Channels have fields of their own with the same words.
+      auto count = std::ranges::find_if(counts, [&](const RaisedFlag& known) {
+        return known.is_alarm == is_alarm && known.flag->name == flag->name;
+      });
+      if (count == counts.end()) count = counts.insert(counts.end(), {.flag = flag, .is_alarm = is_alarm});
+      // A reading in which both channels report it counts once.
+      const bool is_known = std::exchange(count->last, &reading) == &reading;
+      count->channels.insert(flags.field->name);
+      if (is_known) continue;
+      ++count->readings;
+      count->invalid += is_invalid(reading) ? 1 : 0;
+    }
+  }
+}
+
+std::string share(std::size_t some, std::size_t all) {
+  return some == all ? fmt::format("all {}", all) : fmt::format("{} of {}", some, all);
+}
+
+// Judges positions and turns that are invalid without an alarm that says why. `is_damage`: so few of them
+// are damage that the checksum did not see.
+template <class IsDamage>
+void judge_validity(const std::vector<const Reading*>& readings, const IsDamage& is_damage,
+                    std::vector<Finding>& findings) {
+  std::size_t position = 0;
+  std::size_t turns = 0;
+  std::size_t usable_bits = 0;
+  for (const Reading* reading : readings) {
+    if (reading->singleturn_validity() == Validity::invalid) {
+      ++position;
+      usable_bits = std::max<std::size_t>(usable_bits, reading->singleturn_valid_bits);
+    }
+    turns += reading->multiturn_validity() == Validity::invalid ? 1 : 0;
+  }
+  if (std::max(position, turns) == 0 || is_damage(std::max(position, turns))) return;
+  const std::string upper = usable_bits != 0 ? fmt::format(", but for its upper {} bits", usable_bits) : "";
+  findings.push_back(finding(Ailment::position_invalid,
+                             {fmt::format("{}", std::max(position, turns)), fmt::format("{}", readings.size()),
+                              position > 0 ? "position" : "number of turns", position > 0 ? upper : ""}));
+}
+
+}  // namespace
+
+void judge_state(const Case& one, std::vector<Finding>& findings) {
+  std::vector<const Reading*> readings;
+  std::vector<const Reading*> ready;  // of one that starts nothing else counts
+  for (const Attempted& attempt : one.seen.readings) {
+    if (!attempt.reading) continue;
+    readings.push_back(&*attempt.reading);
+    if (attempt.reading->ready) ready.push_back(&*attempt.reading);
+  }
+  if (readings.empty()) return;
+  if (ready.size() < readings.size()) {
+    findings.push_back(
+        finding(Ailment::starting, {fmt::format("the encoder said in {} of {} readings that it is still starting{}",
+                                                readings.size() - ready.size(), readings.size(),
+                                                readings.back()->ready ? ", and at the end no more" : "")}));
+  }
+  std::vector<RaisedFlag> flags;
+  for (const Reading* reading : ready) {
+    const std::uint32_t alarms = alarms_of_either(one.unit, *reading);
+    count_flags(alarms_of(one.unit, *reading), true, *reading, alarms, flags);
+    count_flags(status_of(one.unit, *reading), false, *reading, alarms, flags);
+  }
+  std::stable_sort(flags.begin(), flags.end(), [](const RaisedFlag& before, const RaisedFlag& after) {
+    return (before.invalid > 0) > (after.invalid > 0);  // what makes the position invalid is mended first
+  });
+  // A checksum of 6 bits passes one of 64 damaged replies, by chance a few more: the encoder may not have raised these
+  // flags.
+  const std::size_t failed = one.seen.readings.size() - one.good;
+  const auto is_damage = [failed](std::size_t count) { return count * 10 < failed; };
+  std::erase_if(flags, [&](const RaisedFlag& rare) { return is_damage(rare.readings); });
+  for (RaisedFlag& flag : flags) flag.invalid = is_damage(flag.invalid) ? 0 : flag.invalid;
+  bool is_explained = false;
+  for (const RaisedFlag& raised : flags) {
+    const std::string_view action =
+        raised.flag->action.empty() ? "what the encoder's document says of it" : raised.flag->action;
+    const bool in_one =
+        raised.channels.size() == 1 && (raised.is_alarm ? one.unit.second_alarms : one.unit.second_status) != nullptr;
+    const std::string channel = in_one ? fmt::format(" in {} alone,", *raised.channels.begin()) : "";
+    std::string evidence =
+        fmt::format("{}{} in {} readings", raised.flag->name, channel, share(raised.readings, ready.size()));
+    if (raised.invalid > 0)
+      evidence += fmt::format(", whose position is invalid in {}", share(raised.invalid, raised.readings));
+    findings.push_back(finding(raised.is_alarm ? Ailment::alarm : Ailment::status,
+                               {evidence, std::string(raised.flag->meaning), std::string(action)}));
+    if (raised.invalid > 0) findings.back().severity = Severity::fault;
+    is_explained = is_explained || raised.invalid > 0;
+  }
+  if (!is_explained) judge_validity(ready, is_damage, findings);
+}
+
+std::optional<Finding> judge_start(const Case& one) {
+  constexpr std::size_t enough = 20;  // good ones
+  const std::vector<Attempted>& readings = one.seen.readings;
+  const auto first =
+      std::ranges::find_if(readings, [](const Attempted& attempt) { return attempt.error == Error::none; });
+  const auto silent = static_cast<std::size_t>(first - readings.begin());
+  const bool was_silent = std::all_of(readings.begin(), first, [](const Attempted& attempt) { return !attempt.heard; });
+  if (silent < 4 || !was_silent || one.good < enough || silent + one.good != readings.size()) return {};
+  return finding(Ailment::starting, {fmt::format("nothing came for the first {}, and then all {} readings were good",
+                                                 to_text(first->began - readings.front().began), one.good)});
+}
+
+}  // namespace absenc::client

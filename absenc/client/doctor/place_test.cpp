@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: Apache-2.0
+// What doctor advises fits the place: a network has no USB adapter, and a port that absenc holds no ModemManager.
+#include <gmock/gmock-more-matchers.h>
+#include <gtest/gtest.h>
+
+#include <set>
+
+#include "absenc/client/doctor/observed_test.hpp"
+#include "absenc/client/doctor/words.hpp"
+
+namespace absenc::client {
+namespace {
+
+using testing::HasSubstr;
+using testing::Not;
+
+/// Findings that only the facts of a serial port give.
+const std::set<std::string_view> of_serial_ports{"port_is_modem", "latency_timer", "direction_unswitched"};
+
+std::string advice_of(Ailment ailment, Place place) {
+  Finding one = finding(ailment, {"", "", "", "", "", ""});
+  suit(one, place);
+  return one.cause + " " + one.action;
+}
+
+TEST(DoctorAdvice, NamesNothingThatThePlaceHasNot) {
+  for (const Place place : {Place::tcp, Place::spi, Place::can, Place::sim}) {
+    for (std::size_t i = 0; i <= static_cast<std::size_t>(Ailment::stuck_bits); ++i) {
+      const auto ailment = static_cast<Ailment>(i);
+      const std::string_view id = id_of(ailment);
+      if (of_serial_ports.contains(id)) continue;
+      if (place == Place::sim && (id.starts_with("port_") || id == "modem_answers")) continue;  // it always opens
+      const std::string advice = advice_of(ailment, place);
+      for (const char* word : {"USB", "latency timer", "ModemManager", "/dev/serial"}) {
+        EXPECT_THAT(advice, Not(HasSubstr(word))) << id << " at " << place_names[static_cast<std::size_t>(place)];
+      }
+    }
+  }
+}
+
+/// `latency` is no setting of a virtual encoder, and of SPI.
+TEST(DoctorAdvice, ProposesALatencyOnlyWhereItCanBeSet) {
+  for (const Ailment ailment : {Ailment::reply_late, Ailment::sometimes_late, Ailment::sometimes_silent}) {
+    EXPECT_THAT(advice_of(ailment, Place::serial), HasSubstr("latency="));
+    EXPECT_THAT(advice_of(ailment, Place::tcp), HasSubstr("latency="));
+    EXPECT_THAT(advice_of(ailment, Place::sim), Not(HasSubstr("latency=")));
+    EXPECT_THAT(advice_of(ailment, Place::spi), Not(HasSubstr("latency=")));
+  }
+}
+
+TEST(DoctorAdvice, OfAPortInUseFitsWhoHasIt) {
+  const auto action = [](const std::string& sentence) {
+    Observations seen;
+    seen.refusal = Refusal{os::Failure::Kind::in_use, sentence};
+    return judged(seen).findings.at(0).action;
+  };
+  EXPECT_THAT(action("the port X is in use by ModemManager (process 12)"), HasSubstr("systemctl stop ModemManager"));
+  const std::string server = action("the port X is in use by absenc serve (process 12): its page shows it");
+  EXPECT_THAT(server, Not(HasSubstr("ModemManager")));
+  EXPECT_THAT(server, Not(HasSubstr("end")));
+  EXPECT_THAT(action("the port X is in use by absenc read (process 12)"), Not(HasSubstr("ModemManager")));
+  EXPECT_THAT(action("the port X is in use by minicom (process 12)"), Not(HasSubstr("ModemManager")));
+}
+
+}  // namespace
+}  // namespace absenc::client

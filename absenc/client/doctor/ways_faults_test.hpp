@@ -1,0 +1,300 @@
+// SPDX-License-Identifier: Apache-2.0
+// For tests of doctor: each fault of an adapter and of what else may be at the other end, and which finding it is.
+#pragma once
+
+#include <set>
+
+#include "absenc/capture/search/evidence.hpp"
+#include "absenc/client/doctor/ways_test.hpp"
+#include "absenc/sim/random.hpp"
+
+namespace absenc::client::ways {
+
+using Ids = std::set<std::string>;
+
+/// The outcome of one fault; nothing: this unit cannot have it.
+struct Outcome {
+  Seen seen{};
+  Ids causes{};  // the first finding is one of these
+};
+
+struct WayFault {
+  std::string name;
+  std::function<std::optional<Outcome>(const Unit& unit, const std::string& mode, const std::string& rate)> examine;
+};
+
+// ---- What adapters do to bytes
+
+inline ByteList without(const ByteList& bytes, std::initializer_list<std::uint8_t> values) {
+  ByteList rest;
+  for (const std::uint8_t byte : bytes) {
+    if (std::find(values.begin(), values.end(), byte) == values.end()) rest.push_back(byte);
+  }
+  return rest;
+}
+
+inline ByteList with_before(const ByteList& bytes, std::uint8_t value, std::uint8_t before) {
+  ByteList all;
+  for (const std::uint8_t byte : bytes) {
+    if (byte == value) all.push_back(before);
+    all.push_back(byte);
+  }
+  return all;
+}
+
+/// Positions in whose replies one of these bytes stands, however the frame places them.
+inline std::vector<std::string> positions_with(const Unit& unit, const Options& options,
+                                               const std::vector<std::uint64_t>& values) {
+  std::vector<std::string> all;
+  const unsigned bits = unit.resolution(options).singleturn_bits;
+  for (const std::uint64_t value : values) {
+    for (unsigned shift = bits > 8 ? bits - 8 : 0; shift >= 1; --shift) {
+      all.push_back(fmt::format("singleturn={}", value << shift | std::uint64_t{1} << (shift - 1)));
+    }
+  }
+  return all;
+}
+
+/// A check of so few bits passes many a damaged reply: what was done to them cannot be told.
+inline bool has_weak_check(const Unit& unit, const Options& options) {
+  for (const Vector& vector : unit.vectors) {
+    if (vector.error != Error::none || vector.reply.empty()) continue;
+    capture::HeardExchange good;
+    good.request.bytes.assign(vector.request.begin(), vector.request.end());
+    good.reply.bytes.assign(vector.reply.begin(), vector.reply.end());
+    if (!capture::explains(unit, options, good)) continue;
+    if (capture::acceptance(unit, options, good, 1u << 10) > 0.05) return true;
+  }
+  return false;
+}
+
+/// The shaft swings a little about a place at which most replies are changed; nothing where there is no such place.
+inline WayFault of_bytes(const std::string& name, const std::vector<std::uint64_t>& values, const Change& change,
+                         Ids causes = {}) {
+  causes.insert(name);
+  return {name, [=](const Unit& unit, const std::string& mode, const std::string& rate) {
+            constexpr std::size_t probed = 20;
+            std::optional<Outcome> outcome;
+            const Pair usual = pair_of(unit, mode, rate);
+            if (has_weak_check(unit, usual.far.encoder.options)) return outcome;
+            for (const std::string& place : positions_with(unit, usual.far.encoder.options, values)) {
+              Pair pair = pair_of(unit, mode, rate, {place, "motion=sine=0.2,20"});
+              pair.far.change = change;
+              Opener opener(pair.far);
+              const EncoderAddress asked = parse_address(pair.asked);
+              for (std::size_t i = 0; i < probed; ++i) static_cast<void>(read_once(asked, opener));
+              if (opener.changed() * 2 < probed) continue;
+              outcome = Outcome{examined(pair.asked, pair.far), causes};
+              break;
+            }
+            return outcome;
+          }};
+}
+
+inline std::vector<WayFault> faults_of_bytes() {
+  std::vector<WayFault> faults;
+  faults.push_back(of_bytes("byte_before", {0x67}, [](const ByteList&, ByteList reply) {
+    reply.insert(reply.begin(), 0x00);
+    return reply;
+  }));
+  faults.push_back(of_bytes("byte_after", {0x67}, [](const ByteList&, ByteList reply) {
+    reply.push_back(0xFE);
+    return reply;
+  }));
+  faults.push_back(of_bytes("flow_control", {0x11, 0x13}, [](const ByteList&, const ByteList& reply) {
+    return without(reply, {0x11, 0x13});
+  }));
+  faults.push_back(of_bytes("newline_translated", {0x0A},
+                            [](const ByteList&, const ByteList& reply) { return with_before(reply, 0x0A, 0x0D); }));
+  faults.push_back({"seven_bits", [](const Unit& unit, const std::string& mode, const std::string& rate) {
+                      std::optional<Outcome> outcome;
+                      Pair pair = pair_of(unit, mode, rate, {"motion=rpm=60"});
+                      if (has_weak_check(unit, pair.far.encoder.options)) return outcome;
+                      pair.far.change = [](const ByteList&, ByteList reply) {
+                        for (std::uint8_t& byte : reply) byte &= 0x7F;
+                        return reply;
+                      };
+                      Outcome one{examined(pair.asked, pair.far), {"seven_bits"}};
+                      if (one.seen.changed != 0) outcome = one;
+                      return outcome;
+                    }});
+  // Of a frame that is mostly 00 too little is left.
+  faults.push_back(of_bytes("nul_lost", {0x00},
+                            [](const ByteList&, const ByteList& reply) { return without(reply, {0x00}); },
+                            {"bytes_missing"}));
+  faults.push_back(of_bytes("telnet_doubled", {0xFF},
+                            [](const ByteList&, const ByteList& reply) { return with_before(reply, 0xFF, 0xFF); }));
+  return faults;
+}
+
+// ---- Faults of the virtual encoder and of its line
+
+inline WayFault of_encoder_fault(const std::string& name, const std::string& fault, const Ids& causes) {
+  return {name, [=](const Unit& unit, const std::string& mode, const std::string& rate) {
+            std::optional<Outcome> outcome;
+            Pair pair = pair_of(unit, mode, rate, {"singleturn=1383", fault});
+            if (fault.starts_with("fault=delay")) {
+              const Pair usual = pair_of(unit, mode, rate);
+              Opener opener(usual.far);
+              const Time limit = read_once(parse_address(usual.asked), opener).limit;
+              if (limit == Time{}) return outcome;
+              pair.far.encoder.device.delay = limit * 5 / 4;
+            }
+            Outcome one{examined(pair.asked, pair.far, {.readings = 400, .limit = 60s}), causes};
+            // Where the unit asks again by itself, no reading fails.
+            const bool is_spared =
+                one.seen.first() == "good" && one.seen.examination.good == one.seen.examination.tried;
+            if (!is_spared) outcome = one;
+            return outcome;
+          }};
+}
+
+inline WayFault of_talker(const std::string& name, const std::string& text, Time period, bool answers, Ids causes) {
+  return {name, [=](const Unit& unit, const std::string& mode, const std::string& rate) {
+            Pair pair = pair_of(unit, mode, rate);
+            // One that takes the first bytes of a text for its reply.
+            if (has_weak_check(unit, pair.far.encoder.options)) return std::optional<Outcome>();
+
+            pair.far.other = [=] {
+              return std::make_unique<Talker>(ByteList(text.begin(), text.end()), period, answers);
+            };
+            return std::optional(Outcome{examined(pair.asked, pair.far), causes});
+          }};
+}
+
+inline std::vector<WayFault> faults_of_line() {
+  std::vector<WayFault> faults;
+  const Ids damage{"damaged_bits", "damaged_bursts", "sometimes_damaged"};
+  faults.push_back(of_encoder_fault("dead", "fault=silence=1", {"no_answer"}));
+  faults.push_back(of_encoder_fault("lost 10 %", "fault=silence=0.1", {"sometimes_silent"}));
+  faults.push_back(of_encoder_fault("corrupt 2 %", "fault=corrupt=0.02", damage));
+  faults.push_back(of_encoder_fault("always late", "fault=delay=1", {"reply_late"}));
+  faults.push_back(of_encoder_fault("randomly late", "fault=delay=0.2", {"reply_late", "sometimes_late"}));
+  faults.push_back({"line low", [](const Unit& unit, const std::string& mode, const std::string& rate) {
+                      Pair pair = pair_of(unit, mode, rate);
+                      pair.far.change = [](const ByteList&, ByteList reply) { return ByteList(reply.size(), 0); };
+                      return std::optional(Outcome{examined(pair.asked, pair.far), {"line_inverted"}});
+                    }});
+  faults.push_back(of_talker("chatter", "\x12\xC5\x33\x9A\xE1\x07", 1ms, false, {"never_silent"}));
+  faults.push_back(of_talker("login console", "\r\nDebian GNU/Linux 12 cell ttyS0\r\n\r\ncell login: ", 1ms, true,
+                             {"modem_answers"}));
+  faults.push_back(of_talker("NMEA", "$GPGGA,120000.00,4807.0,N,01131.0,E,1,08,0.9,545.4,M,46.9,M,,*47\r\n", 50ms,
+                             false, {"modem_answers"}));
+  return faults;
+}
+
+// ---- Other encoders than the one that was said
+
+/// Options of models that make a difference on the wire; "" for the usual ones.
+inline std::vector<std::string> models_of(const Unit& unit) {
+  std::vector<std::string> models{""};
+  for (const Model& model : unit.models) models.push_back(fmt::format("model={}", model.name));
+  return models;
+}
+
+inline std::vector<WayFault> faults_of_others() {
+  std::vector<WayFault> faults;
+  faults.push_back({"another protocol", [](const Unit& unit, const std::string& mode, const std::string& rate) {
+                      std::optional<Outcome> last;
+                      // The first whose encoder is found at all, and which is no variant of this one.
+                      for (const Unit* other : character_units()) {
+                        if (other == &unit || other->line.rate == 0) continue;
+                        Pair pair = pair_of(unit, mode, rate);
+                        pair.far = pair_of(*other, asked_mode(*other),
+                                           fmt::format("{}={}", rate_setting, other->line.rate), {"motion=rpm=20"})
+                                       .far;
+                        last = Outcome{examined(pair.asked, pair.far), {"other_protocol"}};
+                        break;
+                      }
+                      return last;
+                    }});
+  faults.push_back({"another address", [](const Unit& unit, const std::string& mode, const std::string& rate) {
+                      std::optional<Outcome> none;
+                      const Option* option = find_role(unit.options, Role::encoder);
+                      if (option == nullptr) return none;
+                      const std::int64_t there = option->default_value == option->minimum + 3 * option->step
+                                                     ? option->minimum + 2 * option->step
+                                                     : option->minimum + 3 * option->step;
+                      Pair pair = pair_of(unit, mode, rate, {fmt::format("{}={}", option->name, there)});
+                      return std::optional(Outcome{examined(pair.asked, pair.far), {"wrong_address"}});
+                    }});
+  faults.push_back({"two of one address", [](const Unit& unit, const std::string& mode, const std::string& rate) {
+                      std::optional<Outcome> none;
+                      if (unit.link != LinkKind::half_duplex) return none;
+                      Pair pair = pair_of(unit, mode, rate, {"singleturn=1383"});
+                      pair.far.second = pair_of(unit, mode, rate, {"singleturn=700"}).far.encoder;
+                      return std::optional(
+                          Outcome{examined(pair.asked, pair.far), {"same_address", "always_damaged", "two_answer"}});
+                    }});
+  return faults;
+}
+
+// ---- States of an encoder that answers well
+
+inline std::vector<WayFault> faults_of_state() {
+  std::vector<WayFault> faults;
+  faults.push_back({"frozen", [](const Unit& unit, const std::string& mode, const std::string& rate) {
+                      const Pair pair = pair_of(unit, mode, rate, {"singleturn=1383"});
+                      const Time turning = pair.far.rate >= 1'000'000 ? 100ms : 5s;
+                      return std::optional(Outcome{examined(pair.asked, pair.far, {.readings = 40, .turning = turning}),
+                                                   {"position_frozen"}});
+                    }});
+  faults.push_back({"loose contact", [](const Unit& unit, const std::string& mode, const std::string& rate) {
+                      Pair pair = pair_of(unit, mode, rate, {"singleturn=1383"});
+                      Opener opener(pair.far);
+                      const Attempted usual = read_once(parse_address(pair.asked), opener);
+                      // So long that many readings are good, and a host waits for replies in vain many times.
+                      const Time period = std::max({300 * usual.after, 60 * usual.limit, Time(50ms)});
+                      pair.far.is_cut = [period](Time now) { return now % period > period * 7 / 10; };
+                      const Choices choices{.readings = 100'000, .limit = 5 * period};
+                      return std::optional(Outcome{examined(pair.asked, pair.far, choices), {"comes_and_goes"}});
+                    }});
+  faults.push_back({"starting", [](const Unit& unit, const std::string& mode, const std::string& rate) {
+                      Pair pair = pair_of(unit, mode, rate, {"singleturn=1383"});
+                      pair.far.goes_on = true;
+                      pair.far.is_cut = [](Time now) { return now < 900ms; };
+                      return std::optional(Outcome{examined(pair.asked, pair.far), {"starting"}});
+                    }});
+  faults.push_back({"battery empty", [](const Unit& unit, const std::string& mode, const std::string& rate) {
+                      std::optional<Outcome> none;
+                      for (const Condition& condition : unit.conditions) {
+                        if (condition.name != "battery") continue;
+                        const Pair pair = pair_of(unit, mode, rate, {"condition=battery=0"});
+                        Outcome outcome{examined(pair.asked, pair.far), {"alarm", "status", "position_invalid"}};
+                        // Some have a battery of which their replies say nothing.
+                        if (unit.alarms == nullptr) return none;
+                        return std::optional(outcome);
+                      }
+                      return none;
+                    }});
+  return faults;
+}
+
+inline std::vector<WayFault> way_faults() {
+  std::vector<WayFault> all = faults_of_bytes();
+  for (const auto& more : {faults_of_line(), faults_of_others(), faults_of_state()}) {
+    all.insert(all.end(), more.begin(), more.end());
+  }
+  return all;
+}
+
+/// A row a unit, a column a fault: the first finding; "-" where the unit cannot have it.
+inline std::string way_table() {
+  const std::vector<WayFault> faults = way_faults();
+  std::string table = "| protocol |";
+  for (const WayFault& fault : faults) table += fmt::format(" {} |", fault.name);
+  table += "\n|---|";
+  for (std::size_t i = 0; i < faults.size(); ++i) table += "---|";
+  table += "\n";
+  for (const Unit* unit : character_units()) {
+    table += fmt::format("| {} |", unit->id);
+    for (const WayFault& fault : faults) {
+      const std::optional<Outcome> outcome = fault.examine(*unit, asked_mode(*unit), rates_of(*unit).front());
+      table += fmt::format(" {} |", outcome ? outcome->seen.first() : "-");
+    }
+    table += "\n";
+  }
+  return table;
+}
+
+}  // namespace absenc::client::ways

@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: Apache-2.0
+// Each fault of an adapter, and each other device at the other end, is the first finding, for every unit at every rate.
+#include <gtest/gtest.h>
+
+#include "absenc/client/doctor/ways_faults_test.hpp"
+#include "absenc/client/error.hpp"
+
+namespace absenc::client::ways {
+namespace {
+
+class DoctorWays : public ::testing::TestWithParam<const Unit*> {
+ protected:
+  static std::string sentences(const Examination& examination) {
+    std::string text = examination.verdict();
+    for (const Finding& one : examination.findings) text += "\n" + one.sentence();
+    return text;
+  }
+
+  /// Each of these faults at each rate.
+  void examine_each(const std::vector<WayFault>& faults) const {
+    const Unit& unit = *GetParam();
+    const std::string mode = asked_mode(unit);
+    for (const std::string& rate : rates_of(unit)) {
+      for (const WayFault& fault : faults) {
+        SCOPED_TRACE(fmt::format("{} {} {}: {}", unit.id, mode, rate, fault.name));
+        const std::optional<Outcome> outcome = fault.examine(unit, mode, rate);
+        if (!outcome) continue;
+        EXPECT_TRUE(outcome->causes.contains(outcome->seen.first())) << outcome->seen.changed << " replies changed\n"
+                                                                     << sentences(outcome->seen.examination);
+      }
+    }
+  }
+};
+
+TEST_P(DoctorWays, FaultOfBytesIsNamed) { examine_each(faults_of_bytes()); }
+TEST_P(DoctorWays, FaultOfLineIsNamed) { examine_each(faults_of_line()); }
+TEST_P(DoctorWays, OtherEncoderIsNamed) { examine_each(faults_of_others()); }
+TEST_P(DoctorWays, StateIsNamed) { examine_each(faults_of_state()); }
+
+/// Whatever model is said and whatever model is there.
+TEST_P(DoctorWays, OtherModelIsNamedInBothDirections) {
+  const Unit& unit = *GetParam();
+  const std::string mode = asked_mode(unit);
+  if (has_weak_check(unit, pair_of(unit, mode, "").far.encoder.options)) GTEST_SKIP() << "its check tells too little";
+  for (const std::string& said : models_of(unit)) {
+    for (const std::string& there : models_of(unit)) {
+      if (said == there) continue;
+      SCOPED_TRACE(fmt::format("{}: {} read as {}", unit.id, there, said));
+      Pair pair = pair_of(unit, said, mode, {});
+      pair.far = pair_of(unit, there, mode, {"motion=rpm=20"}).far;
+      const Seen seen = examined(pair.asked, pair.far);
+      // Where the frames are the same, nothing is wrong with them.
+      const bool is_same = seen.examination.good == seen.examination.tried;
+      if (is_same) continue;
+      EXPECT_EQ(seen.first(), "wrong_settings") << sentences(seen.examination);
+    }
+  }
+}
+
+/// What `read` says of a single reading is what doctor finds, or leaves it open.
+TEST_P(DoctorWays, ReadSaysTheSameOrLeavesItOpen) {
+  static const Ids open{"no_answer", "always_damaged", "extra_bytes", "bytes_missing", "sometimes_damaged"};
+  const Unit& unit = *GetParam();
+  for (const WayFault& fault : way_faults()) {
+    const std::optional<Outcome> outcome = fault.examine(unit, asked_mode(unit), rates_of(unit).front());
+    if (!outcome || outcome->seen.read_alone.empty()) continue;
+    SCOPED_TRACE(fmt::format("{}: {}", unit.id, fault.name));
+    EXPECT_TRUE(open.contains(outcome->seen.read_alone) || outcome->seen.read_alone == outcome->seen.first())
+        << "read: " << outcome->seen.read_alone << ", doctor: " << outcome->seen.first();
+  }
+}
+
+std::string name_of_test(const ::testing::TestParamInfo<const Unit*>& one) {
+  std::string name(one.param->id);
+  std::replace(name.begin(), name.end(), '-', '_');
+  return name;
+}
+
+INSTANTIATE_TEST_SUITE_P(Units, DoctorWays, ::testing::ValuesIn(character_units()), name_of_test);
+
+}  // namespace
+}  // namespace absenc::client::ways
