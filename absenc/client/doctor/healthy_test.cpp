@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <optional>
 #include <string>
 #include <vector>
@@ -44,16 +45,22 @@ Examination examined(const EncoderAddress& address, std::uint64_t seed) {
 
 std::string random_motion(const EncoderAddress& address, sim::Random& random) {
   const host::SpeedLimit limit = speed_limit(address);
-  const auto rpm = static_cast<std::int64_t>(random.below(std::min<std::uint64_t>(limit.rpm, 6000)));
+  const Resolution resolution = address.unit->resolution(address.options);
+  double fastest = std::min(limit.rpm, 6000u);
+  if (resolution.unit_um > 0) {
+    const double turn_mm = std::ldexp(resolution.unit_um, static_cast<int>(resolution.singleturn_bits)) / 1000;
+    fastest = std::min(fastest, limit.mm_s * 60 / turn_mm);
+  }
+  const double rpm = fastest * static_cast<double>(random.below(1000)) / 1000;
   switch (random.below(4)) {
     case 0:
       return "still";
     case 1:
-      return fmt::format("rpm={}", rpm);
+      return fmt::format("rpm={:.3f}", rpm);
     case 2:
-      return fmt::format("rpm=-{}", rpm);
+      return fmt::format("rpm={:.3f}", -rpm);
     default:
-      return fmt::format("rpm={}", 1 + random.below(60));
+      return fmt::format("rpm={:.3f}", std::min(rpm, 1.0 + static_cast<double>(random.below(60))));
   }
 }
 
@@ -73,8 +80,10 @@ TEST_P(HealthyEncoder, IsNeverCalledIll) {
     const unsigned bits = std::min(unit.resolution(usual->options).singleturn_bits, 62u);
     unsigned ill = 0;
     for (unsigned i = 0; i < examinations && ill < 3; ++i) {
-      const std::string state =
-          fmt::format("singleturn={}&motion={}", random.below(std::uint64_t{1} << bits), random_motion(*usual, random));
+      // Backwards from there no counter of turns ends.
+      const std::string turns = unit.resolution(usual->options).multiturn_bits >= 8 ? "&multiturn=100" : "";
+      const std::string state = fmt::format("singleturn={}{}&motion={}", random.below(std::uint64_t{1} << bits), turns,
+                                            random_motion(*usual, random));
       const std::string text = fmt::format("sim:{}?{}{}{}", unit.id, mode, mode.empty() ? "" : "&", state);
       const Examination one = examined(parse_address(text), random.next());
       ill += one.healthy() ? 0 : 1;

@@ -39,6 +39,12 @@ class Mender {
   [[nodiscard]] sim::Random* random() const { return random_; }
   [[nodiscard]] bool is_good(Bytes bytes) const { return decodes(one_, request_, {.bytes = bytes}); }
 
+  /// Whether its first `size` bytes are the whole request.
+  [[nodiscard]] bool begins_with_request(std::size_t size) const {
+    const Bytes sent = request_.bytes;
+    return sent.size() == size && raw_.size() >= size && std::equal(sent.begin(), sent.end(), raw_.begin());
+  }
+
   /// Whether it is good without the bytes at these places, in ascending order; by chance: without as many others.
   [[nodiscard]] bool without(const std::vector<std::size_t>& places) const {
     if (places.empty() || places.size() >= raw_.size()) return false;
@@ -147,29 +153,30 @@ struct Suspicion {
   bool (*fits)(const ByteList& raw);  // false: this reply, good or not, shows that it is not done
   /// Whether the reply is good when it is undone; `count`: how many bytes are concerned.
   bool (*undo)(const Mender& mender, std::size_t& count);
+  std::size_t most_tried;      // replies
+  bool of_each_reply = false;  // whatever its bytes are
 };
 
 // ---- Each of them
 
 bool fits_any(const ByteList&) { return true; }
 
-bool undo_byte_before(const Mender& mender, std::size_t& count) {
-  for (count = 1; count <= 2; ++count) {
-    std::vector<std::size_t> places;
-    for (std::size_t i = 0; i < count; ++i) places.push_back(i);
-    if (mender.without(places)) return true;
-  }
-  return false;
+// In front of each reply; what is sent back of the request is an echo.
+template <std::size_t size>
+bool undo_bytes_before(const Mender& mender, std::size_t& count) {
+  count = size;
+  std::vector<std::size_t> places;
+  for (std::size_t i = 0; i < size; ++i) places.push_back(i);
+  return !mender.begins_with_request(size) && mender.without(places);
 }
 
-bool undo_byte_after(const Mender& mender, std::size_t& count) {
-  const std::size_t size = mender.raw().size();
-  for (count = 1; count <= 2 && count < size; ++count) {
-    std::vector<std::size_t> places;
-    for (std::size_t i = size - count; i < size; ++i) places.push_back(i);
-    if (mender.without(places)) return true;
-  }
-  return false;
+template <std::size_t size>
+bool undo_bytes_after(const Mender& mender, std::size_t& count) {
+  count = size;
+  if (mender.raw().size() <= size) return false;
+  std::vector<std::size_t> places;
+  for (std::size_t i = mender.raw().size() - size; i < mender.raw().size(); ++i) places.push_back(i);
+  return mender.without(places);
 }
 
 bool fits_newline(const ByteList& raw) {
@@ -221,15 +228,20 @@ bool fits_seven_bits(const ByteList& raw) {
 }
 bool undo_seven_bits(const Mender& mender, std::size_t& count) { return mender.with_eighth_bits(count); }
 
+constexpr std::size_t cheap = 24;  // replies that are looked at
+constexpr std::size_t dear = 10;   // where each is decoded thousands of times
+
 // What shows in all places before what shows at one end.
 constexpr auto suspicions = std::to_array<Suspicion>({
-    {Ailment::telnet_doubled, fits_telnet, undo_telnet},
-    {Ailment::newline_translated, fits_newline, undo_newline},
-    {Ailment::byte_before, fits_any, undo_byte_before},
-    {Ailment::byte_after, fits_any, undo_byte_after},
-    {Ailment::flow_control, fits_flow_control, undo_flow_control},
-    {Ailment::nul_lost, fits_nul_lost, undo_nul_lost},
-    {Ailment::seven_bits, fits_seven_bits, undo_seven_bits},
+    {Ailment::telnet_doubled, fits_telnet, undo_telnet, cheap},
+    {Ailment::newline_translated, fits_newline, undo_newline, cheap},
+    {Ailment::byte_before, fits_any, undo_bytes_before<1>, cheap, true},
+    {Ailment::byte_before, fits_any, undo_bytes_before<2>, cheap, true},
+    {Ailment::byte_after, fits_any, undo_bytes_after<1>, cheap, true},
+    {Ailment::byte_after, fits_any, undo_bytes_after<2>, cheap, true},
+    {Ailment::flow_control, fits_flow_control, undo_flow_control, dear},
+    {Ailment::nul_lost, fits_nul_lost, undo_nul_lost, dear},
+    {Ailment::seven_bits, fits_seven_bits, undo_seven_bits, dear},
 });
 
 std::string bytes_of(std::size_t count) { return count == 1 ? "a byte" : fmt::format("{} bytes", count); }
@@ -249,7 +261,7 @@ std::size_t variety(const All& all) {
 // Of so many readings nearly all.
 std::optional<Finding> suspected(const Case& one, const All& all, const Suspicion& suspicion) {
   constexpr std::size_t enough = 4;
-  constexpr std::size_t most_tried = 10;
+  if (suspicion.of_each_reply && all.size() * 10 < one.seen.readings.size() * 8) return {};
   const bool fits = std::all_of(one.seen.readings.begin(), one.seen.readings.end(),
                                 [&](const Attempted& attempt) { return suspicion.fits(attempt.raw); });
   if (!fits) return {};
@@ -261,7 +273,7 @@ std::optional<Finding> suspected(const Case& one, const All& all, const Suspicio
   const Attempted* example = nullptr;
   for (const Attempted* attempt : all) {
     if (attempt->raw.empty()) continue;
-    if (++tried > most_tried) break;
+    if (++tried > suspicion.most_tried) break;
     std::size_t count = 0;
     std::size_t ignored = 0;
     if (suspicion.undo(Mender(one, *attempt, nullptr), count)) {
@@ -273,7 +285,7 @@ std::optional<Finding> suspected(const Case& one, const All& all, const Suspicio
     // What mends none of the first will not mend nearly all.
     if (tried >= enough && mended == 0) return {};
   }
-  tried = std::min(tried, most_tried);
+  tried = std::min(tried, suspicion.most_tried);
   if (tried < enough || mended * 10 < tried * 8) return {};
   constexpr std::size_t varied = 24;
   const bool is_seen = suspicion.ailment == Ailment::seven_bits && variety(all) >= varied;

@@ -7,6 +7,7 @@
 #include <array>
 #include <cctype>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -88,6 +89,7 @@ bool is_of_unit(const FoundCheck& check, const Unit& unit) {
 }  // namespace
 
 std::vector<std::string> settings_to_set(const Unit& unit, const Options& wanted, const Options& now) {
+  if (wanted.values == now.values) return {};
   std::vector<std::string> settings = settings_for(unit, wanted);
   std::erase_if(settings, [&](const std::string& setting) {
     const std::vector<std::string> said = option_texts(unit, now);
@@ -115,7 +117,10 @@ std::optional<Finding> text_of_others(const Case& one, Bytes bytes) {
     const std::size_t at = text.find(word);
     if (at != std::string::npos) return finding(Ailment::modem_answers, {quoted(bytes, at)});
   }
-  if (bytes.size() < enough || printed(bytes) * 20 < bytes.size() * 19 || speaks_text(one.unit)) return {};
+  constexpr std::size_t enough_kinds = 6;  // of characters: a frame that comes again and again may have letters, too
+  const bool has_lines = text.find_first_of("\r\n") != std::string::npos;
+  if (bytes.size() < enough || !has_lines || std::set(text.begin(), text.end()).size() < enough_kinds) return {};
+  if (printed(bytes) * 20 < bytes.size() * 19 || speaks_text(one.unit)) return {};
   const auto begin =
       std::find_if(bytes.begin(), bytes.end(), [](std::uint8_t byte) { return std::isgraph(byte) != 0; });
   return finding(Ailment::modem_answers, {quoted(bytes, static_cast<std::size_t>(begin - bytes.begin()))});

@@ -22,7 +22,7 @@ constexpr std::array<std::uint32_t, 16> usual_rates{2400,      4800,      9600, 
                                                     115'200,   128'000,   230'400,   460'800,  500'000, 921'600,
                                                     1'000'000, 2'000'000, 2'500'000, 5'000'000};
 
-bool has_characters(const Unit& unit) {
+bool carries_characters(const Unit& unit) {
   return unit.link == LinkKind::half_duplex || unit.link == LinkKind::full_duplex;
 }
 
@@ -106,7 +106,7 @@ class Safety {
  public:
   explicit Safety(const EncoderAddress& address)
       : unit_(*address.unit), read_(find_command(*address.unit, Verb::read)) {
-    if (!has_characters(unit_) || address.place == Place::sim) return;
+    if (!carries_characters(unit_) || address.place == Place::sim) return;
     harmful_ = harmful_to_others(unit_, address.line.rate, search_of(address));
     said_ = is_harmful(address.options);
   }
@@ -164,7 +164,7 @@ LineSearch search_of(const EncoderAddress& address) {
 std::vector<Other> other_lines(const EncoderAddress& address, bool has_rate) {
   std::vector<Other> others;
   if (address.place == Place::spi) add_spi(address, others);
-  if (has_characters(*address.unit) && address.echo != host::EchoMode::automatic) {
+  if (carries_characters(*address.unit) && address.echo != host::EchoMode::automatic) {
     const bool on = address.echo == host::EchoMode::on;
     others.push_back({Ailment::wrong_echo, on ? "echo=on" : "echo=off", on ? "echo=off" : "echo=on", address});
     others.back().address.echo = on ? host::EchoMode::off : host::EchoMode::on;
@@ -199,7 +199,7 @@ std::vector<Other> other_models(const EncoderAddress& address) {
     Options options;
     if (resolve_options(unit, model.name, {}, options).kind == OptionError::Kind::none) add(options);
   }
-  if (!has_characters(unit)) return others;
+  if (!carries_characters(unit)) return others;
   for (std::size_t i = 0; i < unit.options.size(); ++i) {
     const Option& option = unit.options[i];
     if (option.role == Role::rate || option.role == Role::encoder) continue;

@@ -341,7 +341,7 @@ std::string Examination::verdict() const {
   if (!complete) return "interrupted: nothing was found until then";
   std::string evidence = fmt::format("good: {} of {} readings in {:.3g} s", good, tried,
                                      std::chrono::duration<double>(measured.time).count());
-  if (measured.rate > 0) evidence += fmt::format(", {:.4g} a second", measured.rate);
+  if (measured.rate > 0) evidence += fmt::format(", {:.{}f} a second", measured.rate, measured.rate < 100 ? 1 : 0);
   if (good < tried) evidence += fmt::format(" ({} failed)", tried - good);
   evidence += fmt::format(" (95 %: less than {:.2g} % fail)", 100 * measured.failures);
   evidence += reported.valid == good ? ", each with a valid position"
