@@ -81,7 +81,8 @@ TEST_P(HealthyEncoder, IsNeverCalledIll) {
     unsigned ill = 0;
     for (unsigned i = 0; i < examinations && ill < 3; ++i) {
       // Backwards from there no counter of turns ends.
-      const std::string turns = unit.resolution(usual->options).multiturn_bits >= 8 ? "&multiturn=100" : "";
+      const Options defaults = parse_address(fmt::format("sim:{}", unit.id)).options;
+      const std::string turns = unit.resolution(defaults).multiturn_bits >= 8 ? "&multiturn=100" : "";
       const std::string state = fmt::format("singleturn={}{}&motion={}", random.below(std::uint64_t{1} << bits), turns,
                                             random_motion(*usual, random));
       const std::string text = fmt::format("sim:{}?{}{}{}", unit.id, mode, mode.empty() ? "" : "&", state);
