@@ -45,6 +45,7 @@ Annotator::Annotator(const Unit& unit, const Options& options, const Settings& s
       options_(options) {
   is_first_ = !settings_.begins_silent;
   for (std::size_t i = 0; i < settings_.channel_count; ++i) channels_[i].carries = settings_.channels[i];
+  if (settings_.by_arrival) channels_[0].synchronised = channels_[0].in_step = settings_.begins_silent;
 }
 
 void Annotator::put(const Character& character) {
@@ -98,6 +99,10 @@ Tick Annotator::pause_of(const Channel& channel) const {
 
 void Annotator::take(const Character& character) {
   Channel& channel = channels_[character.channel];
+  if (settings_.by_arrival) {
+    if (channel.run.full()) parse(channel, false, false);
+    return channel.run.push(character);
+  }
   const auto paused = [&](const Channel& one) {
     return !one.run.empty() && character.begin >= one.run.end() + pause_of(one);
   };
@@ -131,7 +136,7 @@ void Annotator::parse(Channel& channel, bool whole, bool cut) {
   whole_ = whole;
   cut_ = cut;
   // Where the capture began within these, nobody knows what they are; but when they do not end, they must tell.
-  if (whole && !channel.synchronised) {
+  if (whole && !channel.synchronised && !settings_.by_arrival) {
     const Run& run = channel.run;
     const Piece all{run.bytes(), run.begin(0), run.end()};
     return exchanges_.alone(Annotation::Kind::noise, all, Error::none, Remark::cut);

@@ -34,6 +34,10 @@ enum class Carries : std::uint8_t {
 /// frame or not even characters: they are told as cut. On a line that never pauses, what is believed to be a frame has
 /// a good one next to it: a weak checksum finds frames everywhere. On a line of both directions a frame is a request or
 /// a reply by what was said before, never by its bytes alone: some replies equal their requests.
+///
+/// Where times are those of arrival (`by_arrival`), a pause may lie within a frame and none between two. Then frames
+/// are told apart by length and content alone, and pauses only judge bytes that are no good frame: see
+/// annotate_arrival.cpp.
 class Annotator {
  public:
   struct Settings {
@@ -42,6 +46,8 @@ class Annotator {
     LineTicks ticks{};
     Tick begin = 0;              // of the capture
     bool begins_silent = false;  // nothing was on the line before it
+    bool by_arrival = false;     // characters have the time at which a program received them; of one channel only
+    Tick gap = 1;                // by arrival: a pause that the way from line to program does not make by itself
   };
 
   /// `unit` and `sink` must outlive it.
@@ -53,6 +59,10 @@ class Annotator {
   void put(const Character& character);
   /// The capture ends here.
   void finish(Tick end);
+  /// By arrival: hands out what is whole and good so far, without waiting for what follows.
+  void hand_out();
+  /// By arrival: nothing has come for so long that no frame goes on, and no reply comes any more.
+  void fall_silent();
   /// What each channel carries; `one` while it is not known.
   [[nodiscard]] Carries carries(std::size_t channel) const { return channels_[channel].carries; }
 
@@ -78,6 +88,7 @@ class Annotator {
 
   // Frames of the run from `at_` on; each returns how many characters it took, 0: none.
   std::size_t next_frame();
+  std::size_t whole_frame();
   std::size_t answer_here();
   [[nodiscard]] bool goes_on(std::size_t size);
   [[nodiscard]] std::optional<std::size_t> asked_before(Tick begin) const;
@@ -96,6 +107,8 @@ class Annotator {
   [[nodiscard]] std::size_t request_at(std::size_t from);
   [[nodiscard]] bool good_from(std::size_t from);
   [[nodiscard]] bool may_turn(std::size_t at) const;
+  [[nodiscard]] bool has_gap(std::size_t before) const;
+  [[nodiscard]] bool stands_alone(std::size_t size) const;
   [[nodiscard]] std::size_t bad_size();
 
   Judge judge_;

@@ -31,6 +31,8 @@ std::size_t Annotator::reply_at(Bytes request, std::size_t from, std::size_t usu
   if (bytes.empty()) return 0;
   if (whole_ && bytes.size() <= lookahead && is_good(bytes.size())) return bytes.size();
   if (usual != 0 && usual <= bytes.size() && is_good(usual)) return usual;
+  // The rest of it may still come.
+  if (settings_.by_arrival && !whole_ && usual > bytes.size()) return 0;
   const std::size_t size = judge_.frame_size(Direction::reply, bytes);
   return size != 0 && size <= bytes.size() && is_good(size) ? size : 0;
 }
@@ -74,7 +76,7 @@ bool Annotator::may_turn(std::size_t at) const {
 // ---- Taking
 
 std::size_t Annotator::next_frame() {
-  if (!whole_ && channel_->run.size() - at_ <= lookahead) return 0;
+  if (!whole_ && channel_->run.size() - at_ <= lookahead) return settings_.by_arrival ? whole_frame() : 0;
   std::size_t taken = 0;
   if (channel_->carries != Carries::requests) {
     taken = answer_here();
@@ -119,7 +121,9 @@ std::size_t Annotator::answer_here() {
     const bool may_be_accident = size == 0 || size > asked.bytes().size();
     // Later than an encoder answers, it is the host that asks again.
     const bool is_late = settings_.ticks.turnaround != 0 && begin > asked.end + 2 * settings_.ticks.turnaround;
-    const std::size_t echoed = may_be_accident && !is_late ? echoed_answer_size(asked.bytes(), at_) : 0;
+    // Between host and encoder there is no echo: the host asks again.
+    const bool may_be_echo = !is_late && !settings_.by_arrival;
+    const std::size_t echoed = may_be_accident && may_be_echo ? echoed_answer_size(asked.bytes(), at_) : 0;
     if (echoed != 0 && (size == 0 || echoed == rest(at_).size())) return echoed_answer_here(*which, echoed);
     if (size == 0) return 0;
   }
@@ -128,6 +132,10 @@ std::size_t Annotator::answer_here() {
   if (leaves_rest && usual != 0 && size != usual && !goes_on(size)) return 0;
   last_reply_at_ = at_;
   last_reply_size_ = usual = size;
+  if (settings_.by_arrival) {
+    channel_->in_step = true;
+    channel_->last_size = 0;  // someone asks
+  }
   // What was looked at meanwhile says something else.
   if (leaves_rest || overdue) {
     static_cast<void>(judge_.decode({.bytes = asked.bytes()}, {.bytes = rest(at_).first(size)}));
@@ -197,6 +205,10 @@ bool Annotator::is_request(std::size_t size) {
     const Tick silence = channel.run.begin(at_) - std::min(channel.run.begin(at_), waiting.back().end);
     return settings_.ticks.turnaround == 0 || silence > 2 * settings_.ticks.turnaround;
   }
+  // Behind an exchange the host speaks, whatever else the frame could be.
+  const bool is_turn_of_host = settings_.by_arrival && channel.in_step && channel.last_size == 0 &&
+                               exchanges_.has_asked() && exchanges_.waiting().empty() && !judge_.streams();
+  if (is_turn_of_host) return true;
   const bool turns = may_turn(at_ + size);
   const Bytes request = rest(at_).first(size);
   const bool answered = turns && (reply_at(request, at_ + size) != 0 ||
@@ -204,6 +216,7 @@ bool Annotator::is_request(std::size_t size) {
   const std::size_t as_reply = reply_at({}, at_);
   if (as_reply != 0 && (!answered || channel.last_size != 0)) return false;
   if (answered) return true;
+  if (settings_.by_arrival && channel.in_step && stands_alone(size)) return true;
   const auto waiting = exchanges_.waiting();
   const bool expects_reply = !waiting.empty() && judge_.is_answered({.bytes = waiting.back().bytes()});
   return turns && channel.in_step && exchanges_.has_asked() && !expects_reply && !judge_.streams();
@@ -259,9 +272,16 @@ std::size_t Annotator::bad_size() {
     const std::size_t size = judge_.frame_size(Direction::reply, rest(at_));
     if (ends_before_request(size)) return size;
   }
+  // Damaged, but of its length.
+  if (const auto asked = asked_before(channel_->run.begin(at_)); settings_.by_arrival && asked) {
+    const std::size_t usual = reply_sizes_[exchanges_.waiting()[*asked].storage[0]];
+    for (const std::size_t size : {usual, judge_.frame_size(Direction::reply, rest(at_))}) {
+      if (size != 0 && size < left && has_gap(at_ + size)) return size;
+    }
+  }
   const std::size_t most = whole_ ? left : left - lookahead / 2;
   for (std::size_t i = 1; i < most; ++i) {
-    if (good_from(at_ + i)) return i;
+    if (has_gap(at_ + i) || good_from(at_ + i)) return i;
   }
   return most;
 }

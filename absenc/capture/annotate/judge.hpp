@@ -38,6 +38,10 @@ class Judge {
     const FrameEnd end = unit_->frame_end(options_, direction, bytes);
     return end.kind == FrameEnd::Kind::complete && end.size <= bytes.size() ? end.size : 0;
   }
+  /// Whether more bytes are needed to make a frame of these.
+  [[nodiscard]] bool is_incomplete(Direction direction, Bytes bytes) const {
+    return unit_->frame_end(options_, direction, bytes).kind == FrameEnd::Kind::incomplete;
+  }
   /// The size of the good request that the first byte begins, or 0.
   [[nodiscard]] std::size_t request_size(Bytes bytes) {
     const std::size_t size = frame_size(Direction::request, bytes);

@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: Apache-2.0
+// Characters with the time at which a program received them. Adapters, the kernel and other programs hand on several
+// frames at once, and parts of one with pauses between them. So a good frame is one by its length and content; where
+// bytes are none, what follows decides, or a silence that no frame has in it, and then a pause is where they are cut.
+#include <algorithm>
+
+#include "absenc/capture/annotate/annotate.hpp"
+
+namespace absenc::capture {
+
+void Annotator::hand_out() {
+  Channel& channel = channels_[0];
+  if (!channel.run.empty()) parse(channel, false, false);
+}
+
+void Annotator::fall_silent() {
+  Channel& channel = channels_[0];
+  close(channel, false);
+  is_first_ = false;
+  exchanges_.give_up(exchanges_.waiting().size());
+}
+
+bool Annotator::has_gap(std::size_t before) const {
+  if (!settings_.by_arrival) return false;
+  const Run& run = channel_->run;
+  return before == 0 || (before < run.size() && run.begin(before) - run.begin(before - 1) >= settings_.gap);
+}
+
+// Whether pauses are on both sides of these bytes at `at_`.
+bool Annotator::stands_alone(std::size_t size) const {
+  const bool is_end = whole_ && size == rest(at_).size();
+  return has_gap(at_) && (is_end || has_gap(at_ + size));
+}
+
+// The frame at `at_` that is whole and good whatever follows, or 0: the next characters may be part of it.
+std::size_t Annotator::whole_frame() {
+  if (!channel_->in_step) return 0;
+  const auto answered = [&](std::size_t size) {
+    const Bytes request = rest(at_).first(size);
+    return reply_at(request, at_ + size, reply_sizes_[request[0]]) != 0;
+  };
+  const std::size_t size = request_at(at_);
+  // The host has given a request up and asks once more, and again.
+  const auto repeats = [&] {
+    if (size == 0 || !stands_alone(size) || rest(at_ + size).size() < size) return false;
+    const Bytes behind = rest(at_ + size);
+    return std::equal(behind.begin(), behind.begin() + static_cast<std::ptrdiff_t>(size), rest(at_).begin());
+  };
+  const std::optional<std::size_t> which = asked_before(channel_->run.begin(at_));
+  if (which) {
+    const Exchanges::Asked& asked = exchanges_.waiting()[*which];
+    if (asked.error != Error::none || reply_at(asked.bytes(), at_, reply_sizes_[asked.storage[0]]) != 0) {
+      return answer_here();
+    }
+    if (!repeats() && judge_.is_incomplete(Direction::reply, rest(at_))) return 0;
+  }
+  if (repeats()) return request_here();
+  const bool needs_no_reply = size != 0 && !judge_.is_answered({.bytes = rest(at_).first(size)});
+  if (size != 0 && (needs_no_reply || answered(size))) return request_here();
+  const bool sends_by_itself = judge_.streams() || (!exchanges_.has_asked() && channel_->last_size != 0);
+  return size == 0 && sends_by_itself ? unasked_here() : 0;
+}
+
+}  // namespace absenc::capture

@@ -1,0 +1,287 @@
+// SPDX-License-Identifier: Apache-2.0
+// Characters as programs receive them: frames in parts and several at once, from anywhere on, damaged, unanswered.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "absenc/capture/annotate/annotate.hpp"
+#include "absenc/capture/annotate/conversation_test.hpp"
+#include "absenc/protocol/all.hpp"
+#include "absenc/sim/random.hpp"
+
+namespace absenc::capture {
+namespace {
+
+using testing::Said;
+using testing::Talker;
+using Kind = Annotation::Kind;
+using Wire = std::vector<std::uint8_t>;
+
+constexpr Tick gap = 20;
+
+struct Found {
+  Kind kind;
+  Remark remark;
+  Error error;
+  Wire request;
+  Wire reply;
+
+  [[nodiscard]] bool is_good_exchange() const { return kind == Kind::exchange && error == Error::none; }
+};
+
+struct Finder final : AnnotationSink {
+  void put(const Annotation& one) override {
+    found.push_back({one.kind,
+                     one.remark,
+                     one.error,
+                     {one.request.bytes.begin(), one.request.bytes.end()},
+                     {one.reply.bytes.begin(), one.reply.bytes.end()}});
+  }
+  std::vector<Found> found;
+};
+
+/// A request with its reply; a request that no encoder answers has none.
+struct Spoken {
+  Wire request;
+  Wire reply;
+  friend bool operator==(const Spoken&, const Spoken&) = default;
+};
+
+std::string hex(const Wire& wire) {
+  constexpr std::string_view digits = "0123456789ABCDEF";
+  std::string text;
+  for (const std::uint8_t byte : wire) text += {digits[byte >> 4], digits[byte & 15]};
+  return text;
+}
+
+// The first difference: hundreds of exchanges would be printed else.
+std::string difference(const std::vector<Spoken>& found, const std::vector<Spoken>& spoken) {
+  const auto text = [](const std::vector<Spoken>& all, std::size_t i) {
+    return i < all.size() ? hex(all[i].request) + " > " + hex(all[i].reply) : std::string("nothing");
+  };
+  for (std::size_t i = 0; i < std::max(found.size(), spoken.size()); ++i) {
+    if (i >= found.size() || i >= spoken.size() || !(found[i] == spoken[i])) {
+      return std::to_string(i) + ": " + text(found, i) + " instead of " + text(spoken, i);
+    }
+  }
+  return {};
+}
+
+class Arrival : public ::testing::TestWithParam<const Unit*> {
+ protected:
+  void listen(bool begins_silent) {
+    Annotator::Settings settings;
+    settings.begins_silent = begins_silent;
+    settings.by_arrival = true;
+    settings.gap = gap;
+    settings.ticks.limit = LineTicks::never;
+    annotator = std::make_unique<Annotator>(unit, options, settings, finder);
+  }
+
+  // All that host and encoder say in exchanges of a request and one reply; none where the encoder sends by itself.
+  std::vector<Spoken> talk(std::size_t count, std::uint64_t seed) {
+    Talker talker(unit, options, {}, seed);
+    std::vector<Spoken> spoken;
+    for (std::size_t talks = 0; spoken.size() < count && talks < spoken.size() + 20; ++talks) {
+      for (const Said& said : talker.talk().said) {
+        if (said.by == sim::Role::host) {
+          spoken.push_back({said.bytes, {}});
+        } else if (!spoken.empty()) {
+          Wire& reply = spoken.back().reply;
+          reply.insert(reply.end(), said.bytes.begin(), said.bytes.end());
+        }
+      }
+    }
+    std::erase_if(spoken, [&](const Spoken& one) {
+      return one.reply.empty() || unit.check(options, {.bytes = one.request}, {.bytes = one.reply}) != Error::none;
+    });
+    return spoken;
+  }
+
+  void receive(const Wire& bytes) {
+    for (const std::uint8_t byte : bytes) annotator->put({.begin = now, .end = now, .value = byte});
+    annotator->hand_out();
+  }
+
+  [[nodiscard]] std::vector<Spoken> good() const {
+    std::vector<Spoken> all;
+    for (const Found& one : finder.found) {
+      if (one.is_good_exchange()) all.push_back({one.request, one.reply});
+    }
+    return all;
+  }
+  [[nodiscard]] std::size_t others() const { return finder.found.size() - good().size(); }
+
+  const Unit& unit = *GetParam();
+  Options options = testing::options_of(unit);
+  Finder finder;
+  std::unique_ptr<Annotator> annotator;
+  Tick now = 1000;
+};
+
+std::vector<const Unit*> units_of_characters() {
+  std::vector<const Unit*> units;
+  for (const Unit* unit : all_units()) {
+    if (unit->link == LinkKind::half_duplex || unit->link == LinkKind::full_duplex) units.push_back(unit);
+  }
+  return units;
+}
+
+Wire joined(const std::vector<Spoken>& spoken) {
+  Wire all;
+  for (const Spoken& one : spoken) {
+    all.insert(all.end(), one.request.begin(), one.request.end());
+    all.insert(all.end(), one.reply.begin(), one.reply.end());
+  }
+  return all;
+}
+
+TEST_P(Arrival, ExchangesInPartsAndSeveralAtOnce) {
+  const std::vector<Spoken> spoken = talk(1000, 1);
+  if (spoken.empty()) return;
+  listen(true);
+  const Wire all = joined(spoken);
+  sim::Random random(2);
+  for (std::size_t at = 0; at < all.size();) {
+    const std::size_t size = std::min<std::size_t>(all.size() - at, 1 + random.below(random.below(4) == 0 ? 60 : 6));
+    receive({all.begin() + static_cast<std::ptrdiff_t>(at), all.begin() + static_cast<std::ptrdiff_t>(at + size)});
+    at += size;
+    now += random.below(10) == 0 ? 5 * gap : 1;  // pauses within frames, too
+  }
+  annotator->fall_silent();
+  EXPECT_EQ(difference(good(), spoken), "");
+  EXPECT_EQ(others(), 0u);
+}
+
+TEST_P(Arrival, AnExchangeIsHandedOutWhenItIsWhole) {
+  const std::vector<Spoken> spoken = talk(300, 3);
+  if (spoken.empty()) return;
+  listen(true);
+  std::size_t late = 0;
+  for (std::size_t i = 0; i < spoken.size(); ++i) {
+    receive(spoken[i].request);
+    now += gap / 2;
+    receive(spoken[i].reply);
+    now += gap / 2;
+    late += good().size() <= i ? 1u : 0u;
+  }
+  EXPECT_EQ(difference(good(), spoken), "");
+  EXPECT_LE(late, spoken.size() / 20);  // the first of a length that differs from that before
+}
+
+TEST_P(Arrival, FromTheMiddleOfAnExchange) {
+  const std::vector<Spoken> spoken = talk(80, 4);
+  if (spoken.empty()) return;
+  const Wire all = joined(spoken);
+  const std::size_t first = spoken[0].request.size() + spoken[0].reply.size();
+  for (std::size_t from = 1; from < first; ++from) {
+    finder.found.clear();
+    now += 1000;
+    listen(false);
+    receive({all.begin() + static_cast<std::ptrdiff_t>(from), all.end()});
+    annotator->fall_silent();
+    const std::vector<Spoken> found = good();
+    ASSERT_GE(found.size() + 3, spoken.size()) << from << " " << hex(finder.found[0].reply) << " " << hex(all);
+    // None that was not said, and the last ones in their order.
+    for (std::size_t i = 1; i <= found.size(); ++i) {
+      ASSERT_EQ(found[found.size() - i], spoken[spoken.size() - i]) << from;
+    }
+    for (const Found& one : finder.found) {
+      EXPECT_TRUE(one.error == Error::none) << from << ": cut, not bad: " << text_of(one.error).name;
+    }
+  }
+}
+
+// On a line of one pair, as a tap receives it.
+TEST_P(Arrival, ADamagedReplyCostsNoOtherExchange) {
+  if (unit.link != LinkKind::half_duplex) return;
+  const std::vector<Spoken> spoken = talk(400, 5);
+  if (spoken.empty()) return;
+  listen(true);
+  sim::Random random(6);
+  std::vector<Spoken> whole;
+  std::size_t damaged = 0;
+  for (std::size_t i = 0; i < spoken.size(); ++i) {
+    Wire reply = spoken[i].reply;
+    if (i % 16 == 8) {
+      std::uint8_t& byte = reply[random.below(reply.size())];
+      byte = static_cast<std::uint8_t>(byte ^ 1u << random.below(8));
+      if (unit.check(options, {.bytes = spoken[i].request}, {.bytes = reply}) == Error::none) continue;
+      ++damaged;
+    } else {
+      whole.push_back(spoken[i]);
+    }
+    receive(spoken[i].request);
+    receive(reply);
+    now += 2 * gap;
+  }
+  annotator->fall_silent();
+  EXPECT_EQ(difference(good(), whole), "");
+  std::size_t bad = 0;
+  for (const Found& one : finder.found) bad += one.error != Error::none ? 1u : 0u;
+  EXPECT_GE(bad, damaged);
+}
+
+TEST_P(Arrival, RequestsThatNobodyAnswers) {
+  const std::vector<Spoken> spoken = talk(20, 7);
+  if (spoken.empty()) return;
+  listen(true);
+  receive(spoken[0].request);
+  receive(spoken[0].reply);
+  constexpr std::size_t count = 50;
+  for (std::size_t i = 0; i < count; ++i) {
+    now += 2 * gap;
+    receive(spoken[0].request);
+  }
+  EXPECT_GE(finder.found.size() + 3, count) << "they are handed out while it goes on";
+  annotator->fall_silent();
+  EXPECT_EQ(good().size(), 1u);
+  EXPECT_EQ(finder.found.size(), 1 + count);
+  for (std::size_t i = 1; i < finder.found.size(); ++i) {
+    EXPECT_EQ(finder.found[i].request, spoken[0].request);
+    EXPECT_EQ(finder.found[i].remark, Remark::unanswered);
+  }
+  // And the encoder is there again.
+  for (const Spoken& one : spoken) {
+    receive(one.request);
+    receive(one.reply);
+  }
+  EXPECT_EQ(good().size(), 1 + spoken.size());
+}
+
+std::string name_of(const ::testing::TestParamInfo<const Unit*>& info) {
+  std::string name(info.param->id);
+  std::replace(name.begin(), name.end(), '-', '_');
+  return name;
+}
+
+TEST_P(Arrival, AnEncoderThatSendsByItself) {
+  if (unit.streams == nullptr || !unit.streams(options)) return;
+  Talker talker(unit, options, {}, 8);
+  std::vector<Wire> frames;
+  while (frames.size() < 300) {
+    for (const Said& said : talker.talk().said) {
+      if (unit.check(options, {}, {.bytes = said.bytes}) == Error::none) frames.push_back(said.bytes);
+    }
+  }
+  listen(true);
+  for (const Wire& frame : frames) {
+    receive({frame.begin(), frame.begin() + 2});
+    now += 5 * gap;
+    receive({frame.begin() + 2, frame.end()});
+  }
+  annotator->fall_silent();
+  ASSERT_EQ(finder.found.size(), frames.size());
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    EXPECT_EQ(finder.found[i].error, Error::none);
+    EXPECT_EQ(hex(finder.found[i].reply), hex(frames[i]));
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(All, Arrival, ::testing::ValuesIn(units_of_characters()), name_of);
+
+}  // namespace
+}  // namespace absenc::capture
