@@ -10,7 +10,7 @@ from command_support import ABSENC, Case, absenc, json_lines
 
 VERBS = ["list", "read", "monitor", "record", "info", "alarms", "temperature", "zero", "reset-multiturn", "clear-alarms",
          "memory read", "memory write", "memory dump", "memory load", "memory verify", "config get", "config set", "run",
-         "scan", "emulate", "decode", "encode", "wave", "probe", "identify", "doctor", "conform",
+         "scan", "emulate", "tap", "decode", "encode", "wave", "probe", "identify", "doctor", "conform",
          "conform-host", "crc find", "vectors",
          "campaign", "bench"]
 GOOD_REPLY = "1A 00 45 23 01 11 34 12 00 00 4A"

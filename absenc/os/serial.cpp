@@ -21,8 +21,9 @@ using namespace std::chrono_literals;
 
 namespace {
 
-Descriptor open_terminal(const std::string& path) {
-  Descriptor descriptor(::open(path.c_str(), O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC));
+Descriptor open_terminal(const std::string& path, SerialUse use) {
+  const int access = use == SerialUse::receive ? O_RDONLY : O_RDWR;
+  Descriptor descriptor(::open(path.c_str(), access | O_NOCTTY | O_NONBLOCK | O_CLOEXEC));
   if (!descriptor) throw open_failure(path, errno);
   // Before anything waits for it: epoll refuses plain files.
   if (!terminal_state(descriptor.get())) throw open_failure(path, errno);
@@ -67,8 +68,10 @@ bool is_pseudo_terminal(const std::string& path) {
 }
 
 SerialPort::SerialPort(const std::string& path, const LineSettings& settings, Rs485 rs485, const PulseWires& wires,
-                       WireKernel& kernel)
-    : DescriptorPort(open_terminal(path), "the port " + path), path_(path), pseudo_(is_pseudo_terminal(descriptor())) {
+                       WireKernel& kernel, SerialUse use)
+    : DescriptorPort(open_terminal(path, use), "the port " + path),
+      path_(path),
+      pseudo_(is_pseudo_terminal(descriptor())) {
   const auto before = terminal_state(descriptor());
   if (!before) throw open_failure(path, errno);
   before_ = *before;
@@ -80,8 +83,13 @@ SerialPort::SerialPort(const std::string& path, const LineSettings& settings, Rs
       throw Failure(Failure::Kind::unsupported,
                     "RTS cannot switch the direction of RS-485 and carry pulses: use DTR or a GPIO line for them");
     }
-    set_direction(uses_rts(wires) ? Rs485::off : rs485);
-    take_wires(wires, kernel);
+    if (use == SerialUse::receive) {
+      const int rts = TIOCM_RTS;  // the kernel raised it when the port was opened
+      ::ioctl(descriptor(), TIOCMBIC, &rts);
+    } else {
+      set_direction(uses_rts(wires) ? Rs485::off : rs485);
+      take_wires(wires, kernel);
+    }
   } catch (...) {
     restore_terminal(descriptor(), before_);
     throw;

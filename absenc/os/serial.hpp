@@ -22,6 +22,12 @@ enum class Rs485 : std::uint8_t {
   off,        // not the kernel; for full-duplex lines
 };
 
+/// Whether a port is to send at all.
+enum class SerialUse : std::uint8_t {
+  both,
+  receive,  // it is opened without writing, so that nothing can be sent; RTS, by which some adapters send, is released
+};
+
 /// Whether characters take no time there, and any rate does.
 [[nodiscard]] bool is_pseudo_terminal(const std::string& path);
 
@@ -31,7 +37,7 @@ class SerialPort final : public DescriptorPort {
   /// What came before is discarded. Throws Failure of every kind but `lost`; `bad_rate` when the port's nearest rate
   /// is more than 1 % away. A pulse without its wire in `wires` is `unsupported`. `kernel` must outlive the port.
   SerialPort(const std::string& path, const LineSettings& settings, Rs485 rs485 = Rs485::automatic,
-             const PulseWires& wires = {}, WireKernel& kernel = system_wires());
+             const PulseWires& wires = {}, WireKernel& kernel = system_wires(), SerialUse use = SerialUse::both);
   ~SerialPort() override;
 
   /// What could be better about this port, one sentence each, with the remedy.

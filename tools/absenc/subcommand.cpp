@@ -38,6 +38,7 @@ std::span<const Subcommand* const> all_subcommands() {
       &run_subcommand,
       &scan_subcommand,
       &emulate_subcommand,
+      &tap_subcommand,
       &decode_subcommand,
       &encode_subcommand,
       &wave_subcommand,

@@ -87,6 +87,7 @@ extern const Subcommand run_subcommand;
 extern const Subcommand scan_subcommand;
 extern const Subcommand emulate_subcommand;
 extern const Subcommand decode_subcommand;
+extern const Subcommand tap_subcommand;
 extern const Subcommand encode_subcommand;
 extern const Subcommand wave_subcommand;
 extern const Subcommand probe_subcommand;

@@ -120,6 +120,7 @@ void read_all(capture::Reader& reader, Take&& take) {
 std::unique_ptr<capture::Reader> open_capture(const CaptureChoices& choices) {
   const capture::OpenChoices how{.channels = choices.how.raw_channels,
                                  .samples_per_second = choices.how.samples_per_second};
+  if (choices.received != nullptr) return std::make_unique<ReceivedReader>(choices.received);
   try {
     if (choices.path != "-") return capture::open_capture(choices.path, how);
     auto source = std::make_unique<StdinSource>();
@@ -257,7 +258,9 @@ CaptureOutcome CaptureRun::run_bytes(capture::AnnotationSink& sink, const std::f
   capture::Annotator::Settings settings;
   settings.channel_count = std::max<std::size_t>(1, channels.size());
   if (settings.channel_count == 2) settings.channels = {Carries::requests, Carries::replies};
-  settings.begins_silent = true;  // whoever wrote the bytes down had them whole
+  settings.gap = reader_->layout().arrival_gap;
+  settings.by_arrival = settings.gap != 0;
+  settings.begins_silent = !settings.by_arrival;  // whoever wrote the bytes down had them whole
   CaptureOutcome outcome;
   std::unique_ptr<capture::Annotator> annotator;
   read_all(*reader_, [&](const capture::Block& block) {

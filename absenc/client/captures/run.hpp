@@ -15,6 +15,7 @@
 #include "absenc/capture/annotate/annotation.hpp"
 #include "absenc/capture/lines/pipeline.hpp"
 #include "absenc/capture/signal.hpp"
+#include "absenc/client/captures/received_characters.hpp"
 #include "absenc/client/decode.hpp"
 #include "absenc/protocol/unit.hpp"
 
@@ -24,6 +25,7 @@ namespace absenc::client {
 struct CaptureChoices {
   std::string path;     // "-": standard input
   DecodeChoices how{};  // its model and options are not looked at: they are given as Options
+  std::shared_ptr<const ReceivedCharacters> received{};  // in place of a file
 };
 
 struct CaptureOutcome {

@@ -76,6 +76,17 @@ Link open_tcp(const EncoderAddress& uri) {
   return link;
 }
 
+Link open_serial_receiving(const EncoderAddress& uri) {
+  Link link;
+  const LineSettings line = line_of_serial(uri);
+  const auto port = std::make_shared<os::SerialPort>(uri.path, line, os::Rs485::off, os::PulseWires{},
+                                                     os::system_wires(), os::SerialUse::receive);
+  link.place = fmt::format("{} at {} baud", uri.path, line.rate);
+  link.notes = port->notes();
+  take(link, port, uri);
+  return link;
+}
+
 Link open_spi(const EncoderAddress& uri) {
   Link link;
   const auto port = std::make_shared<os::SpiPort>(uri.path, uri.unit->link, uri.line, uri.spi);
@@ -165,6 +176,26 @@ Link open_link(const EncoderAddress& uri) {
   Link link = open();
   if (!uri.log.empty()) keep_log(link, uri);
   return link;
+}
+
+Link open_receiving(const EncoderAddress& uri) {
+  switch (uri.place) {
+    case Place::serial:
+      return open_serial_receiving(uri);
+    case Place::tcp:
+      return open_tcp(uri);
+    case Place::can:
+      throw UsageError(fmt::format("frames of a CAN interface come from candump: candump -L {0} | absenc decode {1} -",
+                                   uri.path, uri.unit->id));
+    case Place::slcan:
+      throw UsageError(
+          "an slcan adapter has to be asked to receive: make an interface of it with slcand, and use candump");
+    case Place::spi:
+      throw UsageError("a clocked line is received by a logic analyser: see `absenc decode --help`");
+    case Place::sim:
+      break;
+  }
+  throw UsageError("a virtual encoder inside this command has no line: `absenc emulate` makes one");
 }
 
 }  // namespace absenc::client

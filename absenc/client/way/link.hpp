@@ -25,6 +25,9 @@ struct Link {
 
 /// Throws os::Failure, UsageError.
 [[nodiscard]] Link open_link(const EncoderAddress& uri);
+/// Opens a serial port without writing, or a TCP connection to which nothing is written: exactly `bytes` is set. Throws
+/// os::Failure, UsageError.
+[[nodiscard]] Link open_receiving(const EncoderAddress& uri);
 /// In its place, a test has its own.
 using OpenLink = std::function<Link(const EncoderAddress&)>;
 

@@ -50,13 +50,19 @@ enum Behind : std::size_t { at_fields, at_error, at_message, behind_all };
 
 }  // namespace
 
+bool raises_alarm(const Annotation& annotation) {
+  const Reading* const reading = annotation.contents.reading;
+  return reading != nullptr && (reading->alarms & reading->alarms_reported) != 0;
+}
+
 AnnotationPrinter::AnnotationPrinter(const Unit& unit, const Options& options, const TickClock& clock,
-                                     AnnotationFormat format, ShowBits bits)
+                                     AnnotationFormat format, ShowBits bits, MarkAlarms marks)
     : unit_(unit),
       options_(options),
       clock_(clock),
       format_(format),
       bits_(bits),
+      marks_(marks),
       time_format_(clock.format()),
       reading_(unit, options) {
   if (format != AnnotationFormat::csv) return;
@@ -89,6 +95,7 @@ void AnnotationPrinter::flush() {
 
 std::string AnnotationPrinter::text(const Annotation& annotation) const {
   std::string line = fmt::format("{:>14}  ", clock_.text(annotation.begin));
+  if (marks_ == MarkAlarms::yes) line += annotation.error != Error::none || raises_alarm(annotation) ? "! " : "  ";
   if (annotation.kind != Kind::noise && unit_.link != LinkKind::clocked) {
     if (!annotation.request.empty()) line += to_wire_text(unit_.link, annotation.request) + ' ';
     line += annotation.kind == Kind::request ? ">" : "> ";

@@ -18,11 +18,16 @@ using namespace client;
 enum class AnnotationFormat : std::uint8_t { text, json, csv };
 enum class ShowBits : std::uint8_t { no, yes };  // where in the reply its fields stand
 
+enum class MarkAlarms : std::uint8_t { no, yes };  // an error, or an alarm that is raised, by ! before the time
+
+/// Whether its reply reports an alarm that is raised.
+[[nodiscard]] bool raises_alarm(const capture::Annotation& annotation);
+
 /// Prints each annotation as it comes; many at a time where nobody waits for them.
 class AnnotationPrinter final : public capture::AnnotationSink {
  public:
   AnnotationPrinter(const Unit& unit, const Options& options, const TickClock& clock, AnnotationFormat format,
-                    ShowBits bits = ShowBits::no);
+                    ShowBits bits = ShowBits::no, MarkAlarms marks = MarkAlarms::no);
 
   void put(const capture::Annotation& annotation) override;
   /// Prints what is still kept. Throws OutputClosed, Failure.
@@ -38,6 +43,7 @@ class AnnotationPrinter final : public capture::AnnotationSink {
   TickClock clock_;
   AnnotationFormat format_;
   ShowBits bits_;
+  MarkAlarms marks_;
   // Of CSV.
   std::string time_format_;
   ReadingColumns reading_;

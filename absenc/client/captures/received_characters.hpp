@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: Apache-2.0
+// Characters that were received just now, as a capture.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <utility>
+#include <vector>
+
+#include "absenc/capture/files/parsed_reader.hpp"
+#include "absenc/capture/signal.hpp"
+#include "absenc/core/time.hpp"
+
+namespace absenc::client {
+
+/// Finer than any time of arrival is.
+inline constexpr std::uint64_t arrival_ticks_per_second = 1'000'000;
+
+[[nodiscard]] constexpr capture::Tick arrival_tick(Time time) {
+  return static_cast<capture::Tick>(time.count() / 1000);
+}
+
+struct ReceivedCharacters {
+  std::vector<capture::Character> characters{};  // times are arrival_tick
+  capture::Tick gap = 1;                         // as Annotator::Settings::gap
+};
+
+class ReceivedReader final : public capture::ParsedReader {
+ public:
+  explicit ReceivedReader(std::shared_ptr<const ReceivedCharacters> received) : received_(std::move(received)) {
+    layout_.content = capture::Content::bytes;
+    layout_.ticks_per_second = arrival_ticks_per_second;
+    layout_.arrival_gap = received_->gap;
+  }
+
+  [[nodiscard]] bool claim(capture::Block& block) override {
+    if (std::exchange(done_, true)) return false;
+    capture::begin_block(block, 0, 0);
+    block.bytes = received_->characters;
+    block.end = block.bytes.empty() ? 0 : block.bytes.back().end;
+    return true;
+  }
+
+ private:
+  std::shared_ptr<const ReceivedCharacters> received_;
+  bool done_ = false;
+};
+
+}  // namespace absenc::client

@@ -1,0 +1,101 @@
+// SPDX-License-Identifier: Apache-2.0
+// How often a host sends each kind of request, by times of arrival.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "absenc/capture/annotate/annotation.hpp"
+#include "absenc/client/captures/received_characters.hpp"
+#include "absenc/protocol/unit.hpp"
+
+namespace absenc::client {
+
+class RequestRates final : public capture::AnnotationSink {
+ public:
+  struct Kind {
+    std::string name{};                 // of the command of the protocol; "": none of its commands sends that
+    std::vector<std::uint8_t> first{};  // the first request of this kind
+    std::uint64_t count = 0;
+    std::uint64_t errors = 0;  // of them: not answered, or badly
+    capture::Tick begin = 0;   // of the first
+    capture::Tick last = 0;    // begin of the last
+
+    /// Requests a second; 0: fewer than two.
+    [[nodiscard]] double per_second() const {
+      return count > 1 && last > begin
+                 ? static_cast<double>(count - 1) * static_cast<double>(arrival_ticks_per_second) /
+                       static_cast<double>(last - begin)
+                 : 0;
+    }
+  };
+
+  RequestRates(const Unit& unit, const Options& options) {
+    for (const Command& command : unit.commands) {
+      std::vector<std::int64_t> arguments;
+      for (const Argument& argument : command.arguments) arguments.push_back(argument.default_value);
+      std::array<std::uint8_t, 64> bytes{};
+      const Result<std::size_t> size = unit.encode(options, command, arguments, bytes);
+      if (!size || *size == 0) continue;
+      samples_.push_back(
+          {command.name, {bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(*size)}, !arguments.empty()});
+    }
+  }
+
+  void put(const capture::Annotation& annotation) override {
+    using AnnotationKind = capture::Annotation::Kind;
+    const bool asks = annotation.kind == AnnotationKind::exchange || annotation.kind == AnnotationKind::request;
+    if (!asks || annotation.composed) return;
+    Kind& kind = kind_of(annotation.request.bytes);
+    if (kind.count++ == 0) kind.begin = annotation.begin;
+    kind.last = annotation.begin;
+    kind.errors += annotation.error != Error::none ? 1 : 0;
+  }
+
+  /// The most frequent first. A damaged request is a kind of its own, as far as there is room.
+  [[nodiscard]] std::vector<Kind> kinds() const {
+    std::vector<Kind> all = kinds_;
+    std::stable_sort(all.begin(), all.end(),
+                     [](const Kind& one, const Kind& other) { return one.count > other.count; });
+    return all;
+  }
+
+ private:
+  static constexpr std::size_t most_kinds = 64;  // those behind share the last
+
+  struct Sample {
+    std::string_view command;
+    std::vector<std::uint8_t> bytes;
+    bool varies;  // it has arguments
+  };
+
+  // Requests of a command with arguments begin alike and are as long.
+  [[nodiscard]] std::string_view command_of(Bytes request) const {
+    for (const Sample& one : samples_) {
+      if (std::equal(one.bytes.begin(), one.bytes.end(), request.begin(), request.end())) return one.command;
+    }
+    for (const Sample& one : samples_) {
+      if (one.varies && one.bytes.size() == request.size() && one.bytes[0] == request[0]) return one.command;
+    }
+    return {};
+  }
+
+  Kind& kind_of(Bytes request) {
+    const std::string_view name = command_of(request);
+    for (Kind& kind : kinds_) {
+      const bool same = std::equal(kind.first.begin(), kind.first.end(), request.begin(), request.end());
+      if (name.empty() ? kind.name.empty() && same : kind.name == name) return kind;
+    }
+    if (kinds_.size() == most_kinds) return kinds_.back();
+    return kinds_.emplace_back(Kind{std::string(name), {request.begin(), request.end()}});
+  }
+
+  std::vector<Sample> samples_;
+  std::vector<Kind> kinds_;
+};
+
+}  // namespace absenc::client

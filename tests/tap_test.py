@@ -1,0 +1,357 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""tap on a line between a host and an emulator: a relay copies both directions onto a third pseudo-terminal.
+`--all`: ten thousand exchanges of each."""
+import collections
+import json
+import os
+import re
+import select
+import signal
+import subprocess
+import sys
+import threading
+import time
+import tty
+import unittest
+import unittest.mock
+
+from command_support import ABSENC, PATIENCE, Case, Emulator, absenc, end, json_lines, read_line
+
+ALL = "--all" in sys.argv
+COUNT = 10_000 if ALL else 150
+
+
+class Relay:
+    """Passes bytes between `host_path`, a pseudo-terminal for the host, and the encoder's, and copies each byte onto a third
+    one, `tap_path`, before it goes on. Nobody's bytes are lost: it waits where a pseudo-terminal takes no more. `change`
+    turns what comes (from the host: True) into what goes on; only the copy counts the damage."""
+
+    def __init__(self, encoder_path, change=lambda data, from_host: data):
+        self.change = change
+        self.copied = bytearray()
+        self.pairs = [os.openpty(), os.openpty()]
+        for _, slave in self.pairs:
+            tty.setraw(slave)
+        self.host_path, self.tap_path = (os.ttyname(slave) for _, slave in self.pairs)
+        self.host, self.tap = self.pairs[0][0], self.pairs[1][0]
+        for master in (self.host, self.tap):
+            os.set_blocking(master, False)
+        self.encoder = os.open(encoder_path, os.O_RDWR | os.O_NOCTTY)
+        tty.setraw(self.encoder)
+        self.from_tap = bytearray()  # what tap sent: must stay empty
+        self.wake, self.waker = os.pipe()
+        self.thread = threading.Thread(target=self.run)
+
+    def run(self):
+        while True:
+            ready = select.select([self.host, self.encoder, self.tap, self.wake], [], [])[0]
+            if self.wake in ready:
+                return
+            if self.tap in ready:
+                self.from_tap += os.read(self.tap, 4096)
+            # What the host has sent since comes behind the reply that it waited for.
+            for here, there in ((self.encoder, self.host), (self.host, self.encoder)):
+                if here in ready:
+                    data = self.change(os.read(here, 4096), here == self.host)
+                    self.write(self.tap, data)
+                    self.copied += data
+                    self.write(there, data)
+
+    def write(self, descriptor, data):
+        while data:
+            ready = select.select([self.wake], [descriptor], [])
+            if ready[0]:
+                return
+            data = data[os.write(descriptor, data):]
+
+    def __enter__(self):
+        self.thread.start()
+        return self
+
+    def __exit__(self, *_):
+        os.write(self.waker, b"x")
+        self.thread.join(PATIENCE)
+        for descriptor in (*self.pairs[0], *self.pairs[1], self.encoder, self.wake, self.waker):
+            os.close(descriptor)
+
+
+class TapCase(Case):
+    def emulator(self, protocol, *arguments, name="encoder"):
+        emulator = Emulator(self.directory, *arguments, protocol=protocol, name=name)
+        self.addCleanup(emulator.end)
+        return emulator
+
+    def relay(self, emulator, **settings):
+        relay = Relay(emulator.path, **settings)
+        relay.__enter__()
+        self.addCleanup(relay.__exit__)
+        return relay
+
+    def tap(self, *arguments, stdin=subprocess.DEVNULL):
+        """Runs `tap`, which writes into files: nobody has to read along. Returns when it listens."""
+        out, messages = open(self.file("out"), "w+b"), subprocess.PIPE
+        self.addCleanup(out.close)
+        process = subprocess.Popen([ABSENC, "tap", *arguments], stdin=stdin, stdout=out, stderr=messages, bufsize=0)
+        self.addCleanup(lambda: end(process, signal.SIGKILL) if process.poll() is None else None)
+        process.out, process.messages = out, ""
+        while "frames are told apart" not in process.messages:
+            line = read_line(process.stderr, time.monotonic() + PATIENCE)
+            self.assertIsNotNone(line, process.messages)
+            process.messages += line
+        return process
+
+    def finish(self, process, number=signal.SIGINT):
+        """Ends `tap` when it has taken what there is, and returns status, output and messages."""
+        if process.poll() is None:
+            process.send_signal(number)
+        _, messages = process.communicate(timeout=PATIENCE)
+        process.out.seek(0)
+        return process.returncode, process.out.read().decode(), process.messages + messages.decode()
+
+    def wait_for(self, process, found):
+        """Until what was printed so far satisfies `found`."""
+        deadline = time.monotonic() + PATIENCE
+        while time.monotonic() < deadline:
+            with open(process.out.name, encoding="utf-8") as file:
+                text = file.read()
+            if found(text):
+                return text
+            select.select([], [], [], 0.02)
+        self.fail(f"in vain waited: {text[-1000:]}")
+
+    def lines(self, text):
+        lines = json_lines(text)
+        return [line for line in lines if "summary" not in line], lines[-1].get("summary")
+
+
+def joined(lines):
+    return "".join(line.get("request", "") + line.get("reply", "") for line in lines).lower()
+
+
+# How each serial unit is emulated and read, so that the host asks; whose replies only silence ends, how long a reading
+# takes: as long as the way may hold them back, so that fewer are read.
+UNITS = {
+    "tformat": ([], "latency=1000", COUNT), "esl": ([], "latency=1000", COUNT), "e201": ([], "latency=1000", COUNT),
+    "raa38": (["--option", "mode=bus"], "latency=1000&mode=bus", COUNT),
+    "raa38-modbus": ([], "latency=1000", COUNT),
+    "encolink": ([], "latency=400", max(COUNT // 20, 10)), "amt21": ([], "latency=400", max(COUNT // 20, 10)),
+}
+
+
+class EveryExchange(TapCase):
+    def test_of_our_host(self):
+        for protocol, (emulated, read, count) in UNITS.items():
+            with self.subTest(protocol):
+                emulator = self.emulator(protocol, "--motion", "rpm=60", *emulated, name=f"e-{protocol}")
+                with Relay(emulator.path) as relay:
+                    self.compare(protocol, relay, emulated, read, count)
+                emulator.end()
+
+    def compare(self, protocol, relay, emulated, read, count):
+        record = self.file(f"{protocol}.txt")
+        tap = self.tap(relay.tap_path, protocol, *emulated, "--json", "--record", record)
+        host = absenc("read", f"{protocol}:{relay.host_path}?{read}", "--json", "--rate", "0", "--count",
+                      str(count), timeout=600)
+        self.assert_good(host)
+        readings = json_lines(host.stdout)
+        self.assertEqual(len(readings), count)
+        self.wait_for(tap, lambda text: text.count('"exchange"') >= count)
+        status, text, messages = self.finish(tap)
+        lines, summary = self.lines(text)
+        # A busy machine may hold a reply back for longer than the host waits: then it does ask again.
+        repeated = [line for line in lines if line["kind"] == "request" and line.get("error") == "timeout"]
+        exchanges = [line for line in lines if line["kind"] == "exchange"]
+        self.assertEqual([line for line in lines if line not in repeated and not (line in exchanges and line["ok"])], [],
+                         messages)
+        if count == COUNT:
+            self.assertEqual(repeated, [], messages)
+            self.assertEqual(status, 0, messages)
+        # Each byte of the line is in one exchange, in order, and nothing else is.
+        self.assertEqual(joined(lines), relay.copied.hex())
+        self.assertEqual(bytes(relay.from_tap), b"")
+        self.assertEqual(summary["exchanges"], len(exchanges))
+        self.assertEqual(summary["bytes"], len(relay.copied))
+        self.assertEqual(sum(kind["count"] for kind in summary["per_request"]), len(lines))
+        # Each position that the host read was said, in that order; of some encoders it asks twice.
+        key = "singleturn" if "singleturn" in readings[0] else "position"
+        said = [line["fields"][key] for line in lines if key in line.get("fields", {})]
+        wanted = [reading.get(key, reading.get("fields", {}).get(key)) for reading in readings]
+        rest = iter(said)
+        self.assertEqual([position for position in wanted if position not in rest], [], "in this order")
+        decoded = absenc("decode", protocol, *emulated, record, "--json")
+        again = [line for line in json_lines(decoded.stdout) if line["kind"] == "exchange"]
+        keys = ("request", "reply", "ok")
+        self.assertEqual([[line[key] for key in keys] for line in again], [[line[key] for key in keys] for line in exchanges])
+
+    def test_of_mbpoll(self):
+        emulator = self.emulator("raa38-modbus", "--singleturn", "383")
+        relay = self.relay(emulator)
+        tap = self.tap(relay.tap_path, "raa38-modbus", "--json")
+        count = 20
+        for _ in range(count):
+            polled = subprocess.run(["mbpoll", "-m", "rtu", "-b", "19200", "-P", "none", "-0", "-1", "-o", "5", "-a", "1",
+                                     "-t", "4", "-r", "0", "-c", "1", relay.host_path], capture_output=True, text=True,
+                                    timeout=PATIENCE, stdin=subprocess.DEVNULL)
+            self.assertEqual(re.findall(r"^\[0\]:\s+(\d+)", polled.stdout, re.MULTILINE), ["383"], polled.stderr)
+        self.wait_for(tap, lambda text: text.count('"exchange"') >= count)
+        status, text, messages = self.finish(tap)
+        lines, _ = self.lines(text)
+        self.assertEqual([(line["ok"], line["fields"]["singleturn"]) for line in lines], [(True, 383)] * count)
+        self.assertEqual(joined(lines), relay.copied.hex())
+        self.assertEqual(status, 0, messages)
+
+
+class Damage(TapCase):
+    def test_damaged_bytes(self):
+        """The exchanges that are whole are shown, those that are not are bad, and none is invented."""
+        emulator = self.emulator("tformat", "--motion", "rpm=60")
+        replies = collections.Counter()
+
+        def change(data, from_host):
+            if not from_host and len(data) == 11:
+                replies["all"] += 1
+                if replies["all"] % 20 == 10:
+                    replies["damaged"] += 1
+                    return data[:5] + bytes([data[5] ^ 0x10]) + data[6:]
+            return data
+
+        relay = self.relay(emulator, change=change)
+        tap = self.tap(relay.tap_path, "tformat", "--json")
+        absenc("read", f"tformat:{relay.host_path}?latency=1000", "--json", "--rate", "0", "--count", str(COUNT),
+               timeout=600)
+        self.wait_for(tap, lambda text: text.count('"ok": true') + text.count('"ok":true') >=
+                      replies["all"] - replies["damaged"])
+        status, text, messages = self.finish(tap)
+        lines, summary = self.lines(text)
+        good = [line for line in lines if line["ok"] and line["kind"] == "exchange"]
+        self.assertEqual(len(good), replies["all"] - replies["damaged"], messages)
+        self.assertEqual(summary["bad"], replies["damaged"])
+        self.assertEqual(joined(lines), relay.copied.hex())
+        self.assertEqual(status, 1)
+
+    def test_from_the_middle_of_a_frame(self):
+        data = bytes.fromhex("1a1a204523011134120010" + "7a")
+        process = subprocess.run([ABSENC, "tap", "-", "tformat", "--json"], input=data[7:] + data * 30, timeout=PATIENCE,
+                                 capture_output=True)
+        lines, _ = self.lines(process.stdout.decode())
+        self.assertEqual([line["kind"] for line in lines if line["kind"] != "exchange"], ["noise"], lines[:3])
+        self.assertEqual(sum(line["ok"] and line["kind"] == "exchange" for line in lines), 30)
+
+    def test_nobody_answers(self):
+        nobody, slave = os.openpty()
+        for descriptor in (nobody, slave):
+            self.addCleanup(os.close, descriptor)
+        emulator = unittest.mock.Mock(path=os.ttyname(slave))
+        relay = self.relay(emulator)
+        tap = self.tap(relay.tap_path, "tformat", "--json")
+        self.assertEqual(absenc("read", f"tformat:{relay.host_path}?latency=1200").returncode, 1)
+        self.wait_for(tap, lambda text: text.count("unanswered") + text.count("nobody answered") >= 2)
+        status, text, messages = self.finish(tap)
+        lines, _ = self.lines(text)
+        self.assertIn("request", {line["kind"] for line in lines})
+        self.assertFalse(any(line["ok"] and line["kind"] == "exchange" for line in lines), lines)
+        self.assertIn("only requests came", messages)
+        self.assertEqual(status, 1)
+
+
+class WhoseFramesTheyAre(TapCase):
+    def test_is_found_out(self):
+        for protocol in ("tformat", "esl", "raa38-modbus"):
+            with self.subTest(protocol):
+                emulator = self.emulator(protocol, "--motion", "rpm=60", name=f"e-{protocol}")
+                with Relay(emulator.path) as relay:
+                    tap = self.tap(relay.tap_path, "--json")
+                    self.assert_good(absenc("read", f"{protocol}:{relay.host_path}?latency=1000", "--rate", "0", "--count",
+                                            "60", timeout=600))
+                    self.wait_for(tap, lambda text: text.count('"exchange"') >= 60)
+                    status, text, messages = self.finish(tap)
+                    lines, _ = self.lines(text)
+                    self.assertEqual({line["protocol"] for line in lines}, {protocol}, messages)
+                    self.assertEqual(joined(lines), relay.copied.hex())
+                    self.assertEqual(bytes(relay.from_tap), b"")
+                    self.assertEqual(status, 0, messages)
+                    self.assertIn(f"{protocol} explains what is said", messages)
+                emulator.end()
+
+    def test_nothing_explains_it(self):
+        process = subprocess.run([ABSENC, "tap", "-"], input=bytes(range(256)) * 4, timeout=PATIENCE, capture_output=True)
+        self.assertEqual((process.returncode, process.stdout), (1, b""))
+        self.assertIn("1024 bytes came, but no protocol explains them", process.stderr.decode())
+
+
+class Output(TapCase):
+    EXCHANGE = bytes.fromhex("1a1a204523011134120010" + "7a")
+
+    def run_tap(self, *arguments, data=EXCHANGE):
+        return subprocess.run([ABSENC, "tap", "-", "tformat", *arguments], input=data, timeout=PATIENCE, capture_output=True,
+                              check=False)
+
+    def test_words_marks_and_rates(self):
+        result = self.run_tap(data=self.EXCHANGE * 5)
+        text = result.stdout.decode()
+        self.assertRegex(text, r"(?m)^ +0\.\d{6}  ! 1A > 1A 20 45 23 01 11 34 12 00 10 7A .*alarms: ")
+        self.assertRegex(text, r"(?m)^exchanges +5$")
+        self.assertRegex(text, r"(?m)^position\S* +1A +5 ")
+        self.assertNotIn("turn-around", text)
+        self.assertEqual(result.returncode, 0, result.stderr)
+
+    def test_an_exchange_is_shown_at_once(self):
+        """Not when the next ones come."""
+        with subprocess.Popen([ABSENC, "tap", "-", "tformat", "--json"], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+                              stderr=subprocess.DEVNULL, bufsize=0) as process:
+            for _ in range(20):
+                process.stdin.write(self.EXCHANGE)
+            shown = 0
+            while shown < 20:
+                self.assertIsNotNone(read_line(process.stdout, time.monotonic() + PATIENCE), shown)
+                shown += 1
+            process.stdin.close()
+            process.wait(PATIENCE)
+
+    def test_csv_has_the_columns_of_decode(self):
+        record = self.file("a.txt")
+        tapped = self.run_tap("--csv", "--record", record).stdout.decode().splitlines()
+        decoded = absenc("decode", "tformat", record, "--csv").stdout.splitlines()
+        self.assertEqual(tapped[0], decoded[0])
+        self.assertEqual(len(tapped), 2)
+
+    def test_a_record_is_never_overwritten(self):
+        path = self.file("there.txt", "mine\n")
+        result = self.run_tap("--record", path)
+        self.assertEqual(result.returncode, 1)
+        self.assertIn("there.txt", result.stderr.decode())
+        with open(path, encoding="utf-8") as file:
+            self.assertEqual(file.read(), "mine\n")
+        self.assertEqual(self.run_tap("--record", path, "--overwrite").returncode, 0)
+        self.assert_good(absenc("decode", "tformat", path))
+
+    def test_wrong_usage(self):
+        for arguments, words in ((["can-that-is-not-there", "raa38-can"], "candump"), (["-", "ssi"], "decode"),
+                                 (["-", "tformat", "--json", "--csv"], "together"), (["-", "--model", "23-bit"], "protocol"),
+                                 (["sim:tformat"], "virtual")):
+            with self.subTest(arguments):
+                self.assert_wrong_usage(absenc("tap", *arguments), words)
+
+    def test_ends_with_the_time(self):
+        emulator = self.emulator("tformat")
+        result = absenc("tap", emulator.path, "tformat", "--for", "0.2")
+        self.assert_failed_with(result, "nothing came")
+
+    def assert_failed_with(self, result, words):
+        self.assertEqual(result.returncode, 1)
+        self.assertIn(words, result.stderr)
+
+
+class OneSide(TapCase):
+    def test_replies_alone(self):
+        reply = Output.EXCHANGE[1:]
+        result = subprocess.run([ABSENC, "tap", "-", "tformat", "--json"], input=reply * 40, timeout=PATIENCE,
+                                capture_output=True)
+        lines, _ = self.lines(result.stdout.decode())
+        self.assertEqual({line["kind"] for line in lines}, {"reply"})
+        self.assertIn("only replies came", result.stderr.decode())
+
+
+if __name__ == "__main__":
+    unittest.main(argv=[argument for argument in sys.argv if argument != "--all"])
