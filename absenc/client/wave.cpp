@@ -143,7 +143,8 @@ capture::ScratchFile scratch_file(const std::string& path) {
   return capture::ScratchFile(::fdopen(file.release(), "w+"));
 }
 
-void write(const WaveChoices& choices, const std::string& path, capture::Drawing& drawing, const LineSettings& line) {
+void write_drawing(const WaveChoices& choices, const std::string& path, capture::Drawing& drawing,
+                   const LineSettings& line) {
   const FileFormat format = format_of(path);
   if (format == FileFormat::sigrok) {  // which takes the place of the old one by itself
     const std::uint64_t usual = std::min<std::uint64_t>(fastest, std::uint64_t{16} * line.rate);
@@ -181,7 +182,8 @@ Waved draw_wave(std::string_view text, std::span<const std::string> settings, co
   }
   if (choices.count == 0 || !(choices.rate > 0)) throw UsageError("results, and how many a second, are more than 0");
   if (std::filesystem::exists(path) && !choices.replaces) {
-    throw UsageError(fmt::format("{} exists: give another name, or --force (in Python replaces=True) to replace it", file));
+    throw UsageError(
+        fmt::format("{} exists: give another name, or --force (in Python replaces=True) to replace it", file));
   }
   const EncoderAddress uri = virtual_encoder(text, settings);
   require_replaceable(path);
@@ -199,7 +201,7 @@ Waved draw_wave(std::string_view text, std::span<const std::string> settings, co
   };
   tell();
   drawing.watch(tell);
-  write(choices, path, drawing, uri.line);
+  write_drawing(choices, path, drawing, uri.line);
   Waved waved{.results = conversations.results, .failures = conversations.failures, .time = waveform.end()};
   for (const capture::Drawing::Wire& wire : drawing.wires()) waved.wires.push_back(wire.name);
   return waved;

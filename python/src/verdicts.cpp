@@ -15,7 +15,7 @@ namespace {
 
 using Settings = std::vector<std::string>;
 
-Time time_of(double seconds) { return std::chrono::duration_cast<Time>(std::chrono::duration<double>(seconds)); }
+Time duration_of(double seconds) { return std::chrono::duration_cast<Time>(std::chrono::duration<double>(seconds)); }
 
 /// Runs `work` without the GIL; it is given a question whether a handler of Python wants to end it.
 template <class Work>
@@ -39,7 +39,7 @@ std::string doctor(const std::string& text, const Settings& settings, double sec
                    double turning_s) {
   return watched([&](const std::function<bool()>& over) {
     const client::DoctorChoices choices{
-        .readings = readings, .limit = time_of(seconds), .turning = time_of(turning_s), .over = over};
+        .readings = readings, .limit = duration_of(seconds), .turning = duration_of(turning_s), .over = over};
     return client::to_json(client::examine(text, settings, choices)).line();
   });
 }

@@ -31,6 +31,8 @@ constexpr std::uint8_t cr = 0x0D;
 /// Looks for what makes one reply good again.
 class Mender {
  public:
+  static constexpr std::size_t most_bytes = 12;  // in which all combinations of 8th bits are tried
+
   /// `random`: undoes something else in its place, which shows how often chance does as well; null: the thing itself.
   Mender(const Case& one, const Attempted& attempt, sim::Random* random)
       : one_(one), request_(attempt.exchange.request.frame()), raw_(attempt.raw), random_(random) {}
@@ -88,7 +90,6 @@ class Mender {
 
   /// Whether it is good with the 8th bit of some bytes set; by chance: of the same with two other bits changed.
   [[nodiscard]] bool with_eighth_bits(std::size_t& set) const {
-    constexpr std::size_t most_bytes = 12;  // all combinations of so many are tried
     ByteList bytes = raw_;
     if (random_ != nullptr && bytes.size() > 2) {
       for (int i = 0; i < 2; ++i)
@@ -261,7 +262,11 @@ std::size_t variety(const All& all) {
 // Of so many readings nearly all.
 std::optional<Finding> suspected(const Case& one, const All& all, const Suspicion& suspicion) {
   constexpr std::size_t enough = 4;
-  if (suspicion.of_each_reply && all.size() * 10 < one.seen.readings.size() * 8) return {};
+  const bool of_nearly_all = all.size() * 10 >= one.seen.readings.size() * 8;
+  if (suspicion.of_each_reply && !of_nearly_all) return {};
+  // Hardly a reply of more bytes is good without their 8th bits: those of text are, whose damage has another cause.
+  const auto is_long = [](const Attempted* attempt) { return attempt->raw.size() > Mender::most_bytes; };
+  if (suspicion.ailment == Ailment::seven_bits && !of_nearly_all && std::ranges::any_of(all, is_long)) return {};
   const bool fits = std::all_of(one.seen.readings.begin(), one.seen.readings.end(),
                                 [&](const Attempted& attempt) { return suspicion.fits(attempt.raw); });
   if (!fits) return {};

@@ -214,7 +214,9 @@ Json options_json(const Unit& unit) {
     json = with_role(std::move(json), option.role);
     if (option.choices.empty()) {
       if (option.or_zero) json.set("or_zero", true);
-      return json.set("minimum", client::to_json(option, option.minimum)).set("maximum", client::to_json(option, option.maximum));
+      json.set("minimum", client::to_json(option, option.minimum))
+          .set("maximum", client::to_json(option, option.maximum));
+      return option.step == 1 ? json : json.set("step", client::to_json(option, option.step));
     }
     Json choices = Json::array();
     for (std::size_t i = 0; i < option.choices.size(); ++i) {

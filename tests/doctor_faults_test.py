@@ -1,0 +1,200 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The first line of `absenc doctor` is the cause: faults between the command and an encoder, in real time, on a
+pseudo-terminal. Each fault once, with one unit after the other; with --all each with every unit that can have it."""
+import concurrent.futures
+import contextlib
+import json
+import os
+import socket
+import sys
+import threading
+import unittest
+
+import fault_proxy as faults
+from command_support import Case, Emulator, absenc, json_lines
+
+ALL = "--all" in sys.argv
+PATIENT = "latency=40"  # milliseconds that a busy machine may add to a reply
+
+# Name, fault, findings of which one must be the first. "good": nothing is wrong with it.
+PROXIED = [
+    ("healthy", faults.Fault, "good"),
+    ("split in packets", faults.Split, "good"),
+    ("own echo", faults.Echo, "good wrong_echo"),  # wrong_echo: of four wires, where nobody expects an echo
+    ("dead", faults.Dead, "no_answer"),
+    ("line low", faults.LineLow, "line_inverted"),
+    ("only the echo", faults.OnlyEcho, "only_echo"),
+    ("login console", faults.Console, "modem_answers"),
+    ("modem", faults.Modem, "modem_answers"),
+    ("NMEA", faults.Nmea, "modem_answers never_silent"),
+    ("chatter", faults.Chatter, "never_silent"),
+    ("always late", faults.AlwaysLate, "reply_late"),
+    ("randomly late", faults.SometimesLate, "sometimes_late reply_late"),
+    ("loose contact", faults.LooseContact, "comes_and_goes sometimes_silent"),
+    ("starting", faults.Starting, "good starting"),
+    ("lost 10 %", faults.Lost, "sometimes_silent"),
+    ("requests lost 10 %", faults.LostRequests, "sometimes_silent"),
+    ("corrupt 2 %", faults.Corrupt, "damaged_bits sometimes_damaged"),
+    ("bursts 10 %", faults.Bursts, "damaged_bursts sometimes_damaged"),
+    ("bytes lost 10 %", faults.BytesLost, "bytes_missing damaged_bursts sometimes_damaged"),
+    ("end cut off", faults.Cut, "bytes_missing"),
+    ("reply twice", faults.Twice, "two_answer extra_bytes"),
+    ("byte before", faults.ByteBefore, "byte_before"),
+    ("byte after", faults.ByteAfter, "byte_after"),
+    ("seven bits", faults.SevenBits, "seven_bits"),
+    ("XON stripped", faults.FlowControl, "flow_control"),
+    ("LF to CR LF", lambda: faults.Translated(b"\n", b"\r\n"), "newline_translated"),
+    ("NUL lost", lambda: faults.Translated(b"\0", b""), "nul_lost"),
+    ("telnet", faults.ParityMarks, "telnet_doubled"),
+]
+
+SECONDS = {"loose contact": "3"}  # of more than one period
+OF_REQUESTS = {"line low", "only the echo", "login console", "modem", "requests lost 10 %",
+               "starting", "always late", "randomly late", "own echo"}
+
+
+def units():
+    """Serial units that are asked, by name: on a line that carries characters, and which do not send by themselves."""
+    return {unit["protocol"]: unit for unit in json_lines(absenc("list", "--json").stdout)
+            if unit["link"] in ("half_duplex", "full_duplex")}
+
+
+def first_of(found):
+    """The id of the finding that the verdict names, or "good"."""
+    verdict = found["verdict"]
+    return verdict.split(":")[1].strip() if verdict.startswith("first:") else verdict.split(":")[0]
+
+
+class DoctorFaults(Case):
+    def examine(self, address, *more):
+        result = absenc("doctor", address, "--json", *(more or ["--for", "1"]))
+        self.assertTrue(result.stdout, f"{address}: {result.stderr}")
+        return json.loads(result.stdout)
+
+    def assert_first(self, found, wanted, what):
+        self.assertIn(first_of(found), wanted.split(),
+                      "\n".join([what, found["verdict"]] + [f"  {one['id']}: {one['evidence']}"
+                                                            for one in found["findings"]]))
+
+    def rotated(self, number, names):
+        return names if ALL else [names[number % len(names)]]
+
+    def side_by_side(self, examine, cases):
+        """Examines all cases, four at a time: most of it is waiting for replies that do not come."""
+        def one(case):
+            try:
+                print(examine(*case), flush=True)
+                return None
+            except AssertionError as failure:
+                return str(failure)
+
+        with concurrent.futures.ThreadPoolExecutor(4) as pool:
+            failures = [failure for failure in pool.map(one, cases) if failure]
+        self.assertEqual(failures, [], "\n\n".join(failures))
+
+    def is_asked(self, unit):
+        """Whether it answers, and does not send by itself."""
+        with Emulator(self.directory, "--motion", "rpm=20", protocol=unit, name=f"asked-{unit}") as emulator, \
+             faults.FaultProxy(faults.Fault(), emulator.path) as proxy:
+            self.assert_good(absenc("read", f"{unit}:{proxy.path}?{PATIENT}", "--count", "3"))
+            return proxy.requests > 0
+
+    def test_faults_of_the_line(self):
+        names = list(units())
+        asked = [unit for unit in names if self.is_asked(unit)]
+        self.assertGreater(len(asked), 4)
+        self.side_by_side(self.examine_fault,
+                          [(unit, *fault) for number, fault in enumerate(PROXIED)
+                           for unit in self.rotated(number, asked if fault[0] in OF_REQUESTS else names)])
+
+    def examine_fault(self, unit, what, make, wanted):
+        name = f"{unit}-{what.replace(' ', '-').replace('%', '')}"
+        with Emulator(self.directory, "--motion", "rpm=20", protocol=unit, name=name) as emulator, \
+             faults.FaultProxy(make(), emulator.path) as proxy:
+            found = self.examine(f"{unit}:{proxy.path}?{PATIENT}", "--for", SECONDS.get(what, "1"))
+            # A fault that changed no byte, because no reply had one that it changes, is not to be found; of a few replies
+            # nobody can say more than that they are damaged.
+            also = "good" if proxy.changed == 0 else "sometimes_damaged" if proxy.changed < 10 else ""
+            self.assert_first(found, f"{wanted} {also}", f"{unit}: {what}")
+            return f"{unit:14} {what:24} {first_of(found)} ({proxy.changed} changed)"
+
+    def test_another_model(self):
+        """Read as another model than it is, both ways: wrong_settings names one that fits, or nothing tells them apart."""
+        cases = []
+        for unit, about in units().items():
+            models = [model["name"] for model in about["models"]]
+            both = [(unit, None, model) for model in models] + [(unit, model, None) for model in models]
+            cases += dict.fromkeys(both if ALL else both[1:2] + both[-1:])
+        self.side_by_side(self.examine_model, cases)
+
+    def examine_model(self, unit, actual, said):
+        with Emulator(self.directory, *(["--model", actual] if actual else []), "--motion", "rpm=20", protocol=unit,
+                      name=f"{unit}-{actual}-{said}") as emulator:
+            found = self.examine(f"{unit}:{emulator.path}?{PATIENT}" + (f"&model={said}" if said else ""))
+            self.assert_first(found, "wrong_settings good", f"{unit}: {actual} read as {said}")
+            return f"{unit:14} {actual or 'usual'} read as {said or 'usual'}: {found['verdict'][:100]}"
+
+    def test_another_address(self):
+        addresses = [(unit, option["minimum"] + 3 * option.get("step", 1)) for unit, about in units().items()
+                     for option in about["options"] if option["name"] == "address"]
+        self.assertGreater(len(addresses), 1)
+        self.side_by_side(self.examine_address, addresses)
+
+    def examine_address(self, unit, address):
+        with Emulator(self.directory, "--option", f"address={address}", protocol=unit, name=f"{unit}-3") as emulator:
+            found = self.examine(f"{unit}:{emulator.path}?{PATIENT}")
+            self.assert_first(found, "wrong_address", unit)
+            self.assertIn(f"address={address}", found["verdict"])
+            return f"{unit:14} at address={address}: {found['verdict'][:100]}"
+
+    def test_another_protocol(self):
+        """One that is asked, read as another that is asked."""
+        names = [unit for unit in units() if self.is_asked(unit)]
+        self.side_by_side(self.examine_protocol,
+                          [(unit, other) for number, unit in enumerate(names)
+                           for other in self.rotated(number, [name for name in names if name != unit])])
+
+    def examine_protocol(self, unit, other):
+        with Emulator(self.directory, "--motion", "rpm=20", protocol=unit, name=f"{unit}-as-{other}") as emulator:
+            found = self.examine(f"{other}:{emulator.path}?{PATIENT}")
+            # A check of two bits proves too little in the time that the search for others may take.
+            self.assert_first(found, "no_answer" if unit == "amt21" else "other_protocol", f"{unit} read as {other}")
+            self.assertIn("absenc identify" if unit == "amt21" else f"{unit}:", found["verdict"])
+            return f"{unit:14} read as {other}: {found['verdict'][:100]}"
+
+    def test_tcp(self):
+        with socket.create_server(("127.0.0.1", 0)) as server:
+            port = server.getsockname()[1]
+            # Somebody listens, and says nothing.
+            self.assert_first(self.examine(f"tformat:tcp:127.0.0.1:{port}"), "no_answer", "a silent server")
+        self.assert_first(self.examine(f"tformat:tcp:127.0.0.1:{port}"), "port_missing", "nobody listens")
+        with socket.create_server(("127.0.0.1", 0)) as server:
+            def hang_up():
+                with contextlib.suppress(OSError):
+                    while True:
+                        connection, _ = server.accept()
+                        connection.recv(1)
+                        connection.close()
+
+            thread = threading.Thread(target=hang_up)
+            thread.start()
+            try:
+                found = self.examine(f"tformat:tcp:127.0.0.1:{server.getsockname()[1]}")
+                self.assert_first(found, "port_lost", "a server that hangs up")
+                self.assertNotIn("USB", json.dumps(found))
+            finally:
+                server.shutdown(socket.SHUT_RDWR)
+                thread.join()
+
+    def test_no_port(self):
+        self.assert_first(self.examine(f"esl:{self.directory}"), "port_unsuitable", "a directory")
+        self.assert_first(self.examine("esl:/dev/null"), "port_unsuitable", "no terminal")
+        loop = self.file("loop")
+        os.symlink(loop, loop)
+        self.assert_first(self.examine(f"esl:{loop}"), "port_missing port_failed", "a link to itself")
+
+
+if __name__ == "__main__":
+    if ALL:
+        sys.argv.remove("--all")
+    unittest.main()
