@@ -19,15 +19,15 @@ class Fault:
     chatter = None  # (period, bytes) of somebody who sends unasked
 
     def request(self, data, now):  # pylint: disable=unused-argument
-        """What of the host's bytes goes on to the encoder."""
+        """Returns the bytes that go on to the encoder."""
         return data
 
     def returned(self, data, now):  # pylint: disable=unused-argument
-        """What the host gets back at once, before any reply."""
+        """Returns the bytes that the host gets back at once, before any reply."""
         return b""
 
     def reply(self, data, now):  # pylint: disable=unused-argument
-        """What the host gets of the encoder's bytes: (delay, bytes), any number of them."""
+        """Yields what the host gets in place of the encoder's bytes: (delay, bytes), any number of them."""
         yield 0, data
 
 

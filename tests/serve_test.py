@@ -380,7 +380,7 @@ class HeldPort(ServeCase):
             self.assertEqual(json.loads(printed)["encoders"][0]["encoder"], f"tformat:{emulator.path}")
             folder = os.path.join(self.directory, "absenc")
             (notice,) = os.listdir(folder)
-            # What another process wrote, which is there no more, says nothing of who has the port.
+            # A file that another process left behind says nothing of who has the port.
             with open(os.path.join(folder, notice), "w", encoding="utf-8") as file:
                 file.write("1 http://127.0.0.1:1/\n")
             refused = absenc("read", f"tformat:{emulator.path}").stderr

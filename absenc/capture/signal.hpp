@@ -28,7 +28,7 @@ struct Layout {
   std::vector<std::string> channels;   // by index; of bytes and frames: the directions or lines they were seen on
   std::uint64_t ticks_per_second = 0;  // 0: the file has no times
   std::uint64_t ticks = 0;             // 0: not known before the end
-  // Of bytes whose times are those of arrival at a program: Annotator::Settings::gap. 0: they are those of the line.
+  // Bytes whose times are those of arrival at a program: Annotator::Settings::gap. 0: the times are those of the line.
   Tick arrival_gap = 0;
 };
 

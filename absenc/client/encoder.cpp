@@ -262,7 +262,7 @@ Sample Encoder::take(Reading reading) {
   return sample;
 }
 
-// Of a sample whose position is valid.
+// For a sample whose position is valid.
 JointAngles Encoder::angles_of(const Sample& sample) const {
   const Joint& one = joint();
   const Reading& reading = sample.reading;

@@ -30,7 +30,7 @@ struct Joint {
   [[nodiscard]] bool has_motor() const { return pole_pairs != 0 || pole_pair_mm > 0; }
 };
 
-/// What follows from one reading. Empty is what was not set, does not hold or is not known.
+/// Angles of joint and motor from one reading. A member is empty if it was not set, does not hold or is not known.
 struct JointAngles {
   /// Empty too where the encoder has not reported in which turn it is, unless `gear` is 1: then the angle is right up
   /// to whole turns.

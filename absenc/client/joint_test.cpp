@@ -47,7 +47,7 @@ TEST(Joint, ElectricalAngleIsFrom0ToBelow360) {
   EXPECT_DOUBLE_EQ(electrical_degrees(linear, 5 + 24 * 1000), 0);
 }
 
-/// What the encoder's own position, which goes on past the end of a turn, says the angles are.
+/// Returns the angles that follow from the encoder's own position, which goes on past the end of a turn.
 void expect_angles(const std::string& address, double direction, double offset, double gear, double pole_pairs) {
   Encoder encoder = open(address);
   double first = 0;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What two others say to each other on a line, while they say it: nothing is sent.
+// Listens to a line on which two others speak, and sends nothing.
 #pragma once
 
 #include <memory>

@@ -130,7 +130,7 @@ TEST(Velocity, HasNoneWhenEvenTheLongestWindowDoesNotOutweighThem) {
 // Motions in counts by seconds.
 using Motion = std::function<double(double)>;
 
-// What the window is is `since`: the true latch times are known here.
+// `since` gives the window: the true latch times are known here.
 void expect_bounds(const Motion& motion, Time period, Time longest_jitter, unsigned seed, std::size_t least_valid) {
   std::mt19937_64 random(seed);
   const auto within = [&](Time most) {

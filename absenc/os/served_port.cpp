@@ -63,7 +63,7 @@ std::string page_of_server(const std::string& port, const std::string& holder) {
     std::ifstream file(folder / file_name(port));
     std::string process;
     std::string url;
-    // What a server left behind that was killed says nothing of who has the port now.
+    // A server that was killed leaves its file behind, which says nothing of who has the port now.
     if (file >> process >> url && process == holder) return url;
   }
   return {};

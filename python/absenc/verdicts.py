@@ -14,7 +14,7 @@ from .errors import UsageError
 
 
 class Finding(NamedTuple):
-    """What is wrong, or good to know."""
+    """A defect, or a fact that is good to know."""
 
     id: str  #: "reply_late", as docs/doctor.md lists them
     severity: str  #: "note", "warning": it works, but not for long; "fault": it does not work
@@ -24,7 +24,7 @@ class Finding(NamedTuple):
 
 
 class Examination(NamedTuple):
-    """What `absenc doctor --json` prints."""
+    """The verdict of `absenc doctor --json`."""
 
     ok: bool  #: nothing is to be mended
     findings: list[Finding]  #: in the order in which they are to be mended
@@ -53,7 +53,7 @@ class Clause(NamedTuple):
 
 
 class Conformance(NamedTuple):
-    """What `absenc conform --json` prints."""
+    """The verdict of `absenc conform --json`."""
 
     ok: bool  #: the verdict is "kept"
     protocol: str
@@ -66,7 +66,7 @@ class Conformance(NamedTuple):
 
 
 class OptionEvidence(NamedTuple):
-    """What frames tell of a value of an option that the document leaves open."""
+    """Whether frames allow a value of an option that the document leaves open."""
 
     option: str
     value: Union[bool, int, str]
@@ -76,7 +76,7 @@ class OptionEvidence(NamedTuple):
 
 
 class Probed(NamedTuple):
-    """What `absenc probe --json` prints."""
+    """The result of `absenc probe --json`."""
 
     protocol: str
     ok: bool  #: some options explain all frames
@@ -85,7 +85,7 @@ class Probed(NamedTuple):
 
 
 class Waved(NamedTuple):
-    """What was drawn."""
+    """A waveform that was drawn."""
 
     results: int
     failures: int  #: of them
@@ -141,7 +141,7 @@ def conform(
 def probe(
     protocol: str, replies: Sequence[str], requests: Sequence[str] = (), *, model: str = "", **options: Value
 ) -> Probed:
-    """What captured frames tell of the options that the document of the protocol leaves open. `replies` and `requests` are
+    """Finds the options that the document of the protocol leaves open from captured frames. `replies` and `requests` are
     hexadecimal, in the same order; "" where one did not come or is not known. Raises UsageError."""
     found = json.loads(_absenc.probe(protocol, model, texts(options), list(replies), list(requests)))
     found["evidence"] = [OptionEvidence(**one) for one in found["evidence"]]

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What absenc concludes of an encoder or of frames, and the ports of this computer: as JSON, so that the words are the
-// command's. And waveforms.
+// Verdicts of doctor, conform and probe, and the ports of this computer, as JSON, so that the words are the command's;
+// and waveforms.
 #include "absenc/client/captures/probe.hpp"
 #include "absenc/client/conform/conform_text.hpp"
 #include "absenc/client/doctor/examine.hpp"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the package concludes is what the command prints, word for word."""
+"""The package gives the verdicts of the command, word for word."""
 from __future__ import annotations
 
 import json

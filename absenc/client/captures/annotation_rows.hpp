@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What was said on a line, as rows.
+// Annotations as rows.
 #pragma once
 
 #include <cstddef>

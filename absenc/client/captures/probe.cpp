@@ -50,7 +50,7 @@ class Captures {
   std::vector<WireFrame> frames_;
 };
 
-// What must be said to go on: values that the frames have settled, and those that are not the default.
+// Returns the settings to go on with: values that the frames have settled, and those that are not the default.
 std::vector<std::string> settled(const Unit& unit, const Options& options, std::span<const OptionEvidence> evidence) {
   std::vector<std::string> settings;
   for (std::size_t i = 0; i < unit.options.size(); ++i) {

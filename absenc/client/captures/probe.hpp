@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What captured frames tell of the options that the document of a protocol leaves open.
+// Finds the options that the document of a protocol leaves open from captured frames.
 #pragma once
 
 #include <span>

@@ -20,7 +20,7 @@
 
 namespace absenc::client {
 
-/// What came at one time, or that nothing came.
+/// Bytes that came at one time, or the fact that none came.
 struct Received {
   Time at{};
   std::vector<std::uint8_t> bytes{};  // none: nothing has come for `Receiver::quiet`

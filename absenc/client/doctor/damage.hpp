@@ -35,8 +35,8 @@ template <class Is>
 /// replies of the same length, for a short checksum lets many pass by chance.
 [[nodiscard]] std::size_t mended_by_one_bit(const Case& one, const All& all);
 
-/// What an adapter, a driver or a device server did to the bytes of nearly all these damaged replies, or beside the
-/// good ones: undone, they are good, and by far more of them than chance makes so. Links of characters only.
+/// Returns what an adapter, a driver or a device server did to the bytes of nearly all these damaged replies, or beside
+/// the good ones: undone, they are good, and by far more of them than chance makes so. Links of characters only.
 [[nodiscard]] std::optional<Finding> damage_by_adapter(const Case& one, const All& all);
 
 /// Text of a modem, a console or a GPS receiver. Nothing where the unit's own replies are text that looks so.

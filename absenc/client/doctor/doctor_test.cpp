@@ -165,7 +165,7 @@ std::vector<Fault> line_faults() {
   return faults;
 }
 
-/// Of a moving encoder that has a CRC in place of the sum.
+/// Replies of a moving encoder that has a CRC in place of the sum.
 ByteList with_other_checksum(unsigned number) {
   ByteList reply = good_reply();
   for (std::size_t i = 2; i < 5; ++i) reply[i] = static_cast<std::uint8_t>(number * (37 + 11 * i) + number * number);

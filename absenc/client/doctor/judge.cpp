@@ -43,7 +43,7 @@ Ailment ailment_of(const Refusal& refusal) {
   return Ailment::port_failed;
 }
 
-// Of a port in use: what lets go of it, as far as the sentence names who has it.
+// Returns how a port in use becomes free, as far as the sentence names who has it.
 std::string_view action_for_holder(std::string_view sentence) {
   if (sentence.find("by absenc serve") != std::string_view::npos) {
     return "look at what the server reads, on its page or by its API, or let it examine the encoder";

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What adapters, drivers and device servers do to bytes: undone, the replies are good.
+// Finds what adapters, drivers and device servers do to bytes: when it is undone, the replies are good.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -232,7 +232,7 @@ bool undo_seven_bits(const Mender& mender, std::size_t& count) { return mender.w
 constexpr std::size_t cheap = 24;  // replies that are looked at
 constexpr std::size_t dear = 10;   // where each is decoded thousands of times
 
-// What shows in all places before what shows at one end.
+// Changes at any place come before changes at one end.
 constexpr auto suspicions = std::to_array<Suspicion>({
     {Ailment::telnet_doubled, fits_telnet, undo_telnet, cheap},
     {Ailment::newline_translated, fits_newline, undo_newline, cheap},
@@ -259,7 +259,7 @@ std::size_t variety(const All& all) {
   return sum;
 }
 
-// Of so many readings nearly all.
+// Nearly all damaged replies must become good.
 std::optional<Finding> suspected(const Case& one, const All& all, const Suspicion& suspicion) {
   constexpr std::size_t enough = 4;
   const bool of_nearly_all = all.size() * 10 >= one.seen.readings.size() * 8;
@@ -287,7 +287,7 @@ std::optional<Finding> suspected(const Case& one, const All& all, const Suspicio
       example = attempt;
     }
     by_chance += suspicion.undo(Mender(one, *attempt, &random), ignored) ? 1 : 0;
-    // What mends none of the first will not mend nearly all.
+    // A change that explains none of the first replies does not explain nearly all.
     if (tried >= enough && mended == 0) return {};
   }
   tried = std::min(tried, suspicion.most_tried);

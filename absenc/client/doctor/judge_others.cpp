@@ -61,7 +61,7 @@ std::string quoted(Bytes bytes, std::size_t at) {
   return text + "\"";
 }
 
-// What these frames' own checks are.
+// Returns the checks that explain these frames.
 CheckFindings checks_of(const std::vector<CheckedFrame>& frames) {
   try {
     return find_crc(frames);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the encoder reports of itself: that it is starting, alarms, status, and whether its position holds.
+// Judges what the encoder reports of itself: that it is starting, alarms, status, and whether its position holds.
 #include <fmt/format.h>
 
 #include <algorithm>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What doctor advises fits the place: a network has no USB adapter, and a port that absenc holds no ModemManager.
+// The doctor's advice fits the place: a network has no USB adapter, and a port that absenc holds no ModemManager.
 #include <gmock/gmock-more-matchers.h>
 #include <gtest/gtest.h>
 

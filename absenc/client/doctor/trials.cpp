@@ -110,7 +110,7 @@ class Safety {
     harmful_ = harmful_to_others(unit_, address.line.rate, search_of(address));
     said_ = is_harmful(address.options);
   }
-  /// What the user asks himself, he may.
+  /// The request that the user asks for is always allowed.
   [[nodiscard]] bool allows(const Options& options) const { return said_ || !is_harmful(options); }
 
  private:
@@ -137,7 +137,7 @@ EncoderAddress with_options(const EncoderAddress& address, const Options& option
   return other;
 }
 
-// What a choice makes of options is only tried where the unit takes them.
+// A choice is only tried where the unit accepts the options that follow from it.
 bool is_possible(const Unit& unit, const Options& options) {
   std::vector<std::string> texts = option_texts(unit, options);
   std::vector<OptionText> settings;

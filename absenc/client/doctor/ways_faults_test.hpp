@@ -113,7 +113,7 @@ inline std::vector<WayFault> faults_of_bytes() {
                       if (one.seen.changed != 0) outcome = one;
                       return outcome;
                     }});
-  // Of a frame that is mostly 00 too little is left.
+  // Too little is left of a frame that is mostly 00.
   faults.push_back(of_bytes("nul_lost", {0x00},
                             [](const ByteList&, const ByteList& reply) { return without(reply, {0x00}); },
                             {"bytes_missing"}));

@@ -57,7 +57,7 @@ TEST_P(DoctorWays, OtherModelIsNamedInBothDirections) {
   }
 }
 
-/// What `read` says of a single reading is what doctor finds, or leaves it open.
+/// `read` names for a single reading the finding of doctor, or none.
 TEST_P(DoctorWays, ReadSaysTheSameOrLeavesItOpen) {
   static const Ids open{"no_answer", "always_damaged", "extra_bytes", "bytes_missing", "sometimes_damaged"};
   const Unit& unit = *GetParam();

@@ -98,7 +98,7 @@ class Talker final : public Machine<std::uint8_t> {
   Time at_{};
 };
 
-/// What is at the other end of the port.
+/// The other end of the port.
 struct Far {
   EncoderAddress encoder;                  // "sim:tformat?model=23-bit"
   std::uint32_t rate = 0;                  // of its line

@@ -215,7 +215,7 @@ constexpr auto table = std::to_array<Words>({
      "the resolution is another one, or codes are missing", "check the resolution of the model; replace the encoder"},
 });
 
-/// What is said instead where the encoder is not behind a serial port; "": the same.
+/// Words to use instead where the encoder is not behind a serial port; "": the same.
 struct Elsewhere {
   Ailment ailment;
   Place place;

@@ -190,7 +190,7 @@ void check_speed_limit(const EncoderAddress& uri) {
   }
 }
 
-// What would be ignored is refused.
+// A setting that would be ignored is refused.
 void check_joint(const EncoderAddress& uri, std::span<const OptionText> settings) {
   const bool linear = uri.unit->resolution(uri.options).unit_um > 0;
   struct Alternative {

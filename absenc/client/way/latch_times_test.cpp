@@ -108,7 +108,7 @@ std::vector<Case> cases() {
   return all;
 }
 
-// Of a linear encoder all that it counts is the revolution, which is metres.
+// The revolution of a linear encoder is its whole range, which is metres.
 double revolutions_a_second(const Case& one) {
   const EncoderAddress address = parse_address(one.address);
   return address.unit->resolution(address.options).unit_um > 0 ? 0.05 : 0.5;
@@ -242,7 +242,7 @@ TEST_P(LatchTimes, MakeNoSpeedThatIsFartherOffThanItSays) {
   }
 }
 
-// What is measured is the mean between the two instants, be the shaft steady or not.
+// The speed is the mean between the two instants, whether the shaft is steady or not.
 TEST_P(LatchTimes, MakeTheMeanSpeedOfAShaftThatSwings) {
   const double swing = revolutions_a_second(GetParam()) / 5;
   for (const Time most : most_late) {

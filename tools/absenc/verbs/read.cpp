@@ -27,7 +27,7 @@ namespace {
 
 enum class Format : std::uint8_t { human, json, csv };
 
-// Of a shaft that surely turns: "   12.0 ± 0.3 rpm".
+// For a shaft that surely turns: "   12.0 ± 0.3 rpm".
 std::string speed_text(const Sample& sample) {
   if (!sample.speed_valid || std::abs(sample.speed) <= sample.speed_uncertainty) return {};
   return fmt::format("   {} {}", to_text(*sample.measured_speed()), speed_unit(sample.reading));
