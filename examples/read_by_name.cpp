@@ -11,7 +11,7 @@ using namespace absenc;
 int main(int argc, char** argv) try {
   // [readme]
   client::Encoder encoder = client::open(argc > 1 ? argv[1] : "sim:tformat?motion=rpm=60");
-  for (const client::Sample& sample : encoder.samples({.rate_hz = 100, .count = 5})) {
+  for (const client::Sample& sample : encoder.samples({.rate_hz = 100, .count = 200})) {
     if (sample.kind != client::Sample::Kind::reading) {
       std::printf("%s\n", sample.text().c_str());
       continue;

@@ -18,7 +18,7 @@ BUILD = Path(os.environ["ABSENC"]).parent.parent
 VERSION = re.search(r"^project\(absenc VERSION ([\d.]+)", (SOURCE / "CMakeLists.txt").read_text(), re.MULTILINE)[1]
 
 BY_NAME = SOURCE / "examples/read_by_name.cpp"
-BY_NAME_SAYS = "0.0000 degrees, 0.0 rpm\n" * 5
+BY_NAME_SAYS = r"^(0\.0000 degrees\n)+0\.0 rpm, within \d"  # the speed as soon as its window is long enough
 # As firmware would use it: a conversation with a virtual encoder that stands at 7 turns and a quarter.
 FIRMWARE = """
 #include <cstdint>
@@ -243,7 +243,7 @@ class Installed(Case):
         (project / "firmware.cpp").write_text(FIRMWARE)
         run("cmake", "-G", "Ninja", "-S", project, "-B", project / "build", f"-DCMAKE_PREFIX_PATH={self.root}")
         run("cmake", "--build", project / "build")
-        self.assertEqual(run(project / "build/by_name", "sim:tformat"), BY_NAME_SAYS)
+        self.assertRegex(run(project / "build/by_name", "sim:tformat"), BY_NAME_SAYS)
         self.assertEqual(run(project / "build/firmware"), FIRMWARE_SAYS)
 
     def program(self, name, source, library):
@@ -255,7 +255,7 @@ class Installed(Case):
     def test_programs_with_pkg_config(self):
         firmware = self.folder / "firmware.cpp"
         firmware.write_text(FIRMWARE)
-        self.assertEqual(run(self.program("by_name", BY_NAME, "absenc-client"), "sim:tformat"), BY_NAME_SAYS)
+        self.assertRegex(run(self.program("by_name", BY_NAME, "absenc-client"), "sim:tformat"), BY_NAME_SAYS)
         self.assertEqual(run(self.program("firmware", firmware, "absenc")), FIRMWARE_SAYS)
         endings = self.folder / "endings.cpp"
         endings.write_text(ENDINGS)
