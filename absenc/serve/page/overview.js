@@ -85,7 +85,7 @@ class Card {
       this.scale.node, this.words, this.trace, element("p", {class: "foot faint"}, this.rate, this.errors));
   }
 
-  show(one, at_ms) {
+  show(one, at_ms, isSmall) {
     this.one = one;
     this.condition = condition(one);
     setClass(this.node, `card ${this.condition.kind}`);
@@ -99,7 +99,7 @@ class Card {
     if (one.linear && one.length_mm !== null) {
       this.scale.move(one.position_mm === null ? null : one.position_mm / one.length_mm, `${numberText(one.length_mm)} mm`);
     }
-    showParts(this.below, belowFigure(one, at_ms));
+    showParts(this.below, belowFigure(one, at_ms, isSmall));
     this.showWords(wrongs(one));
     const live = one.state === "live";
     setText(this.rate, live ? `${numberText(one.rate_hz, one.rate_hz < 10 ? 1 : 0)} readings/s` : "0 readings/s");
@@ -213,7 +213,7 @@ export class Overview {
       this.cards = new Map(this.given.map((name) => [name, this.cards.get(name) ?? new Card(name)]));
       for (const card of this.cards.values()) this.seedCard(card);
     }
-    for (const one of state.encoders) this.cards.get(one.encoder).show(one, state.at_ms);
+    for (const one of state.encoders) this.cards.get(one.encoder).show(one, state.at_ms, this.given.length > MANY);
     this.none.toggleAttribute("hidden", this.given.length > 0);
     this.list.classList.toggle("many", this.given.length > MANY);
     this.list.classList.toggle("few", this.given.length <= FEW);

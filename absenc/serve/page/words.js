@@ -68,8 +68,9 @@ export function lastText(last) {
   return last.position_mm !== null ? `${numberText(last.position_mm, 4)} mm` : "";
 }
 
-/** Returns the line below the large figure, in parts that are not broken. */
-export function belowFigure(one, now) {
+/** Returns the line below the large figure, in parts that are not broken. `isSmall`: a card that has room for turns and
+ *  speed alone; the page of the encoder shows the rest. */
+export function belowFigure(one, now, isSmall = false) {
   if (one.state !== "live") {
     if (one.last_reading === null) return ["no reading yet"];
     const last = lastText(one.last_reading);
@@ -79,6 +80,10 @@ export function belowFigure(one, now) {
   if (one.turns !== null) parts.push(`${numberText(one.turns)} ${Math.abs(one.turns) === 1 ? "turn" : "turns"}`);
   else if (one.has_turns) parts.push(one.multiturn_valid === false ? "turns INVALID" : "turns unknown");
   else if (!one.linear) parts.push("single-turn");
+  if (isSmall) {
+    if (one.speed !== null) parts.push(`${numberText(one.speed, 1)} ${one.speed_unit}`);
+    return parts;
+  }
   if (one.speed !== null) parts.push(`${measuredText(one.speed, one.speed_uncertainty)} ${one.speed_unit}`);
   if (one.has_joint) {
     if (one.joint_deg !== null) parts.push(`joint ${numberText(one.joint_deg, 3)}°`);
