@@ -43,7 +43,7 @@ Examination examined(const EncoderAddress& address, std::uint64_t seed) {
   return examine(address, {.readings = readings, .limit = 60s}, surroundings);
 }
 
-std::string random_motion(const EncoderAddress& address, sim::Random& random) {
+std::string random_motion(const EncoderAddress& address, bool may_go_back, sim::Random& random) {
   const host::SpeedLimit limit = speed_limit(address);
   const Resolution resolution = address.unit->resolution(address.options);
   double fastest = std::min(limit.rpm, 6000u);
@@ -58,7 +58,7 @@ std::string random_motion(const EncoderAddress& address, sim::Random& random) {
     case 1:
       return fmt::format("rpm={:.3f}", rpm);
     case 2:
-      return fmt::format("rpm={:.3f}", -rpm);
+      return fmt::format("rpm={:.3f}", may_go_back ? -rpm : rpm);
     default:
       return fmt::format("rpm={:.3f}", std::min(rpm, 1.0 + static_cast<double>(random.below(60))));
   }
@@ -80,11 +80,12 @@ TEST_P(HealthyEncoder, IsNeverCalledIll) {
     const unsigned bits = std::min(unit.resolution(usual->options).singleturn_bits, 62u);
     unsigned ill = 0;
     for (unsigned i = 0; i < examinations && ill < 3; ++i) {
-      // Backwards from there no counter of turns ends.
-      const Options defaults = parse_address(fmt::format("sim:{}", unit.id)).options;
-      const std::string turns = unit.resolution(defaults).multiturn_bits >= 8 ? "&multiturn=100" : "";
+      // Backwards from there no counter of turns ends. Modes may lose the turns when they are switched on, and begin at
+      // 0.
+      const bool has_turns = unit.resolution(usual->options).multiturn_bits >= 8;
+      const std::string turns = has_turns ? "&multiturn=100" : "";
       const std::string state = fmt::format("singleturn={}{}&motion={}", random.below(std::uint64_t{1} << bits), turns,
-                                            random_motion(*usual, random));
+                                            random_motion(*usual, !has_turns || mode.empty(), random));
       const std::string text = fmt::format("sim:{}?{}{}{}", unit.id, mode, mode.empty() ? "" : "&", state);
       const Examination one = examined(parse_address(text), random.next());
       ill += one.healthy() ? 0 : 1;
