@@ -67,6 +67,8 @@ std::string random_motion(const EncoderAddress& address, bool may_go_back, sim::
 TEST_P(HealthyEncoder, IsNeverCalledIll) {
   const Unit& unit = *GetParam();
   std::size_t modes = 0;
+  const Options defaults = parse_address(fmt::format("sim:{}", unit.id)).options;
+  const bool counts_turns = unit.resolution(defaults).multiturn_bits >= 8;
   for (const std::string& mode : modes_of(unit)) {
     std::optional<EncoderAddress> usual;
     try {
@@ -85,7 +87,7 @@ TEST_P(HealthyEncoder, IsNeverCalledIll) {
       const bool has_turns = unit.resolution(usual->options).multiturn_bits >= 8;
       const std::string turns = has_turns ? "&multiturn=100" : "";
       const std::string state = fmt::format("singleturn={}{}&motion={}", random.below(std::uint64_t{1} << bits), turns,
-                                            random_motion(*usual, !has_turns || mode.empty(), random));
+                                            random_motion(*usual, mode.empty() || !counts_turns, random));
       const std::string text = fmt::format("sim:{}?{}{}{}", unit.id, mode, mode.empty() ? "" : "&", state);
       const Examination one = examined(parse_address(text), random.next());
       ill += one.healthy() ? 0 : 1;
