@@ -48,7 +48,7 @@ class Verbs(Case):
         self.assertEqual(info["options"]["word"], WORD)
         self.assertNotIn("bits", info["options"])
         self.assertEqual(info["model"], None)
-        self.assertEqual(info["resolution"], {"singleturn_bits": 24, "multiturn_bits": 12})
+        self.assertEqual(info["resolution"], {"singleturn_bits": 24, "multiturn_bits": 12, "multiturn_signed": False})
         self.assertRegex(absenc("info", "sim:ssi", *OPTION, "--all").stdout, f"options +word={WORD}\n +after_word")
 
     def test_run_decode_and_encode(self):
