@@ -137,6 +137,9 @@ if(ABSENC_COMMAND)
       COST 100  # they mostly wait: first, beside what computes
       TIMEOUT 400)  # and some minutes on a machine that does something else
   endforeach()
+  # These compute, beside few others: browsers that draw, and tests that keep the machine busy on purpose.
+  set_tests_properties(serve_browser.py serve_look.py doctor_faults.py PROPERTIES PROCESSORS 4)
+  set_tests_properties(speed.py PROPERTIES RUN_SERIAL ON)
 endif()
 
 # What the tests in the virtual machine run beside the command.

@@ -50,7 +50,7 @@ class Relay:
                 return
             if self.tap in ready:
                 self.from_tap += os.read(self.tap, 4096)
-            # What the host has sent since comes behind the reply that it waited for.
+            # Bytes that the host has sent since then come behind the reply that it waited for.
             for here, there in ((self.encoder, self.host), (self.host, self.encoder)):
                 if here in ready:
                     data = self.change(os.read(here, 4096), here == self.host)
@@ -162,17 +162,20 @@ class EveryExchange(TapCase):
         # A busy machine may hold a reply back for longer than the host waits: then it does ask again.
         repeated = [line for line in lines if line["kind"] == "request" and line.get("error") == "timeout"]
         exchanges = [line for line in lines if line["kind"] == "exchange"]
-        self.assertEqual([line for line in lines if line not in repeated and not (line in exchanges and line["ok"])], [],
-                         messages)
+        # After half a second tap has given a request up: a reply that comes then is shown alone (docs/tap.md).
+        late = [line for before, line in zip(lines, lines[1:])
+                if line["kind"] == "reply" and before in repeated and line["time_s"] - before["time_s"] >= 0.5]
+        self.assertEqual([line for line in lines
+                          if line not in repeated + late and not (line in exchanges and line["ok"])], [], messages)
         if count == COUNT:
-            self.assertEqual(repeated, [], messages)
+            self.assertEqual(repeated + late, [], messages)
             self.assertEqual(status, 0, messages)
         # Each byte of the line is in one exchange, in order, and nothing else is.
         self.assertEqual(joined(lines), relay.copied.hex())
         self.assertEqual(bytes(relay.from_tap), b"")
         self.assertEqual(summary["exchanges"], len(exchanges))
         self.assertEqual(summary["bytes"], len(relay.copied))
-        self.assertEqual(sum(kind["count"] for kind in summary["per_request"]), len(lines))
+        self.assertEqual(sum(kind["count"] for kind in summary["per_request"]), len(lines) - len(late))
         # Each position that the host read was said, in that order; of some encoders it asks twice.
         key = "singleturn" if "singleturn" in readings[0] else "position"
         said = [line["fields"][key] for line in lines if key in line.get("fields", {})]
@@ -323,7 +326,7 @@ class Output(TapCase):
         self.assertIn("there.txt", result.stderr.decode())
         with open(path, encoding="utf-8") as file:
             self.assertEqual(file.read(), "mine\n")
-        self.assertEqual(self.run_tap("--record", path, "--overwrite").returncode, 0)
+        self.assertEqual(self.run_tap("--record", path, "--force").returncode, 0)
         self.assert_good(absenc("decode", "tformat", path))
 
     def test_wrong_usage(self):

@@ -20,7 +20,7 @@ struct TapChoices {
   std::vector<std::string> options{};  // "name=value"
   Time duration{};                     // 0: until `cancel`, or the end of the input
   std::string record{};                // file to write all frames to, which `decode` reads; "": none
-  bool overwrites = false;             // `record` may be there already
+  bool replaces = false;               // the file of `record` may be there already
 };
 
 /// An input range of rows, as `Decoded` has them, in the order in which they ended, each as soon as it is whole. What

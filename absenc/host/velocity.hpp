@@ -85,7 +85,7 @@ class Velocity {
   [[nodiscard]] static constexpr double per_second(double counts, Time time) {
     return counts * 1e9 / static_cast<double>(time.count());
   }
-  // Of the absolute value: a position is known to one count, so a distance to one count more or less.
+  // Bounds of the absolute speed: a position is known to one count, and a distance to one count more or less.
   [[nodiscard]] constexpr double fastest() const {
     return per_second(static_cast<double>(moved_from(start_)) + 1, newest().at.earliest - positions_[start_].at.latest);
   }

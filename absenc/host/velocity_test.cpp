@@ -168,7 +168,8 @@ TEST(Velocity, IsNeverFartherOffThanItsUncertainty) {
       for (const Time jitter : {0us, 60us, 500us, 9'000us, 60'000us}) {
         SCOPED_TRACE(rpm);
         for (const Time period : {100us, 1'000us, 20'000us, 300'000us}) {
-          expect_bounds(steady(rpm), period, jitter, seed, jitter <= 500us && period >= 1ms && std::abs(rpm) != 0.01 ? 1000 : 0);
+          expect_bounds(steady(rpm), period, jitter, seed,
+                        jitter <= 500us && period >= 1ms && std::abs(rpm) != 0.01 ? 1000 : 0);
         }
       }
     }

@@ -26,14 +26,22 @@ class Failure : public std::runtime_error {
   /// What of a CAN bus is behind it, where that is known.
   enum class Bus : std::uint8_t { unknown, off, not_acknowledged };
 
+  /// Who has a port that is in use.
+  enum class Holder : std::uint8_t { unknown, program, absenc, server, modem_manager };
+
   Failure(Kind kind, const std::string& sentence, Bus bus = Bus::unknown)
       : std::runtime_error(sentence), kind_(kind), bus_(bus) {}
+  /// A port that is in use.
+  Failure(const std::string& sentence, Holder holder)
+      : std::runtime_error(sentence), kind_(Kind::in_use), holder_(holder) {}
   [[nodiscard]] Kind kind() const { return kind_; }
   [[nodiscard]] Bus bus() const { return bus_; }
+  [[nodiscard]] Holder holder() const { return holder_; }
 
  private:
   Kind kind_;
-  Bus bus_;
+  Bus bus_ = Bus::unknown;
+  Holder holder_ = Holder::unknown;
 };
 
 /// "<what> failed: <text of error>"; `error` is a value of errno.

@@ -77,19 +77,24 @@ std::string opener(const fs::path& file) {
 }
 
 Failure in_use(const std::string& path) {
-  std::string holder = holder_of(path);
-  // A server reads for many: who ended it would take the encoder from all of them.
+  using Holder = Failure::Holder;
+  const std::string holder = holder_of(path);
+  const std::string what = "the port " + path + " is in use by ";
+  if (holder.empty()) return {what + "another program: end it, or use another port", Holder::unknown};
   constexpr std::string_view server = "absenc serve (process ";
-  if (holder.starts_with(server)) {
-    const std::string process = holder.substr(server.size(), holder.size() - server.size() - 1);
-    const std::string page = page_of_server(path, process);
-    const std::string where =
-        page.empty() ? "its page and its API (/api/encoders) show what it reads"
-                     : "`curl --silent " + page + "api/encoders` prints what it reads, and " + page + " shows it";
-    return {Failure::Kind::in_use, "the port " + path + " is in use by " + holder + ": " + where};
+  if (!holder.starts_with(server)) {
+    const Holder who = holder.starts_with("absenc ")         ? Holder::absenc
+                       : holder.starts_with("ModemManager ") ? Holder::modem_manager
+                                                             : Holder::program;
+    return {what + holder + ": end it, or use another port", who};
   }
-  if (holder.empty()) holder = "another program";
-  return {Failure::Kind::in_use, "the port " + path + " is in use by " + holder + ": end it, or use another port"};
+  // A server reads for many: who ended it would take the encoder from all of them.
+  const std::string process = holder.substr(server.size(), holder.size() - server.size() - 1);
+  const std::string page = page_of_server(path, process);
+  const std::string where =
+      page.empty() ? "its page and its API (/api/encoders) show what it reads"
+                   : "`curl --silent " + page + "api/encoders` prints what it reads, and " + page + " shows it";
+  return {what + holder + ": " + where, Holder::server};
 }
 
 Failure no_permission(const std::string& path) {

@@ -3,10 +3,13 @@
 
 #include <fcntl.h>
 #include <gtest/gtest.h>
+#include <sys/file.h>
+#include <sys/prctl.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <array>
+#include <cerrno>
 #include <csignal>
 #include <filesystem>
 #include <fstream>
@@ -120,6 +123,28 @@ TEST_F(ListedPorts, AProgramThatHasItOpenIsNamed) {
   ::kill(holder, SIGKILL);
   ::waitpid(holder, nullptr, 0);
   EXPECT_EQ(look().holder, "");
+}
+
+TEST_F(ListedPorts, APortInUseSaysWhoHasIt) {
+  plug_in("0403", "6001", "0600");
+  const std::string path = root() / "dev/ttyUSB0";
+  const int port = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
+  ASSERT_EQ(::flock(port, LOCK_EX | LOCK_NB), 0);
+  std::array<char, 16> name{};
+  ::prctl(PR_GET_NAME, name.data());
+  using Holder = Failure::Holder;
+  const auto found = [&](const char* program) {
+    ::prctl(PR_SET_NAME, program);
+    const Failure failure = open_failure(path, EWOULDBLOCK);
+    EXPECT_EQ(failure.kind(), Failure::Kind::in_use);
+    EXPECT_NE(std::string_view(failure.what()).find(program), std::string_view::npos) << failure.what();
+    return failure.holder();
+  };
+  EXPECT_EQ(found("ModemManager"), Holder::modem_manager);
+  EXPECT_EQ(found("minicom"), Holder::program);
+  EXPECT_EQ(found("absenc"), Holder::absenc);
+  ::prctl(PR_SET_NAME, name.data());
+  ::close(port);
 }
 
 TEST_F(ListedPorts, APortThatCannotBeOpenedSaysWhy) {

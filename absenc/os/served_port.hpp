@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Where a server says that it reads a port for others, so that who finds the port in use is led to the server.
+// Files in which a server says that it reads a port, so that a program which finds the port in use can name the server.
 #pragma once
 
 #include <string>
@@ -8,8 +8,8 @@
 namespace absenc::os {
 
 /// A file for each port, in $RUNTIME_DIRECTORY, which systemd gives to a service, or else in $XDG_RUNTIME_DIR/absenc,
-/// from the constructor to the destructor. Without these folders, or where they cannot be written, there is none: who
-/// opens the port is then told which process holds it, and no more.
+/// from the constructor to the destructor. Without these folders, or where they cannot be written, there is none:
+/// a program that opens the port then learns which process holds it, and no more.
 class ServedPorts {
  public:
   /// `url`: of the server's page, as "http://127.0.0.1:8420/".

@@ -64,7 +64,7 @@ struct Server::Parts {
     sending.change_to({});
   }
 
-  // Who finds one of the ports in use is led here.
+  // Leads a program that finds one of the ports in use to this server.
   void tell_ports() {
     std::vector<std::string> ports;
     for (const std::shared_ptr<Watch>& watch : fleet.all()) {

@@ -4,10 +4,9 @@
 #include <fmt/format.h>
 
 #include <array>
-#include <cerrno>
-#include <cmath>
-#include <cstdlib>
+#include <optional>
 
+#include "absenc/client/text/real_number.hpp"
 #include "absenc/protocol/options.hpp"
 #include "tools/absenc/error.hpp"
 
@@ -98,14 +97,9 @@ std::int64_t Invocation::number(std::string_view name, std::int64_t fallback, st
 
 double Invocation::real(std::string_view name, double fallback, double minimum, double maximum) const {
   if (!has(name)) return fallback;
-  const std::string written(text(name));
-  char* end = nullptr;
-  errno = 0;
-  const double value = std::strtod(written.c_str(), &end);
-  const bool whole = !written.empty() && end == written.c_str() + written.size() && std::isfinite(value) &&
-                     errno != ERANGE;  // 1e-400 is not 0
-  if (whole && value >= minimum && value <= maximum) return value;
-  throw UsageError(fmt::format("{} is \"{}\", but must be a number from {} to {}", name, written, minimum, maximum));
+  const std::optional<double> value = parse_real(text(name));
+  if (value && *value >= minimum && *value <= maximum) return *value;
+  throw UsageError(fmt::format("{} is \"{}\", but must be a number from {} to {}", name, text(name), minimum, maximum));
 }
 
 }  // namespace absenc::tool

@@ -7,6 +7,7 @@
 #include <array>
 #include <ctime>
 #include <deque>
+#include <optional>
 #include <type_traits>
 
 #include "absenc/client/campaign/check_code.hpp"
@@ -14,6 +15,7 @@
 #include "absenc/client/campaign/rough_setup.hpp"
 #include "absenc/client/error.hpp"
 #include "absenc/client/text/nearest.hpp"
+#include "absenc/client/text/real_number.hpp"
 #include "absenc/client/text/unit_text.hpp"
 #include "absenc/sim/place.hpp"
 
@@ -41,10 +43,8 @@ constexpr std::array<LineFault, 14> all_faults{{
 }};
 
 double require_rate(std::string_view text, std::string_view written) {
-  const std::string number(written);
-  char* end = nullptr;
-  const double rate = std::strtod(number.c_str(), &end);
-  if (!number.empty() && *end == 0 && rate >= 0 && rate <= 1) return rate;
+  const std::optional<double> rate = parse_real(written);
+  if (rate && *rate >= 0 && *rate <= 1) return *rate;
   throw UsageError(fmt::format("fault \"{}\": the rate must be a number from 0 to 1", text));
 }
 

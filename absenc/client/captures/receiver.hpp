@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Receives what comes to a port, in a thread of its own: whoever looks at it may be slow. Nothing is ever sent.
+// Receives the bytes of a port in a thread of its own, because its reader may be slow. Nothing is ever sent.
 #pragma once
 
 #include <condition_variable>

@@ -28,7 +28,7 @@ using namespace std::chrono_literals;
 namespace {
 
 constexpr std::size_t first_search = 64;     // bytes; the next are at twice as many each
-constexpr std::size_t last_search = 8192;    // more would say no more
+constexpr std::size_t last_search = 8192;    // more do not help
 constexpr std::size_t most_at_other = 2048;  // bytes at a rate that may be another
 constexpr Time patience_at_rate = 2s;        // until something comes, where there are more rates to try
 constexpr std::size_t enough_to_settle = 600;
@@ -97,7 +97,7 @@ TapRun::TapRun(std::string_view place, TapChoices choices) : choices_(std::move(
   open(lines_.front());
   if (choices_.record.empty()) return;
   std::error_code error;
-  if (choices_.overwrites && std::filesystem::is_regular_file(choices_.record, error)) {
+  if (choices_.replaces && std::filesystem::is_regular_file(choices_.record, error)) {
     std::filesystem::remove(choices_.record, error);
   }
   record_ =

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Listens on a line: receives, finds out whose frames they are where nobody said, and hands out exchanges while they
-// come.
+// Listens on a line: receives bytes, finds the protocol where none was given, and hands out exchanges as they come.
 #pragma once
 
 #include <cstdint>
@@ -46,7 +45,7 @@ class TapRun {
   bool advance();
   /// Behind the end.
   [[nodiscard]] TapOutcome outcome() const;
-  /// From any thread: `settle` and `advance` end.
+  /// From any thread, behind `settle`: `advance` ends.
   void cancel();
 
   [[nodiscard]] bool is_protocol_given() const { return !choices_.protocol.empty(); }

@@ -39,10 +39,10 @@ template <class Is>
 /// the good ones: undone, they are good, and by far more of them than chance makes so. Links of characters only.
 [[nodiscard]] std::optional<Finding> damage_by_adapter(const Case& one, const All& all);
 
-/// Text of a modem, a console or a GPS receiver. Nothing where the unit's own replies are text that looks so.
+/// Finds text of a modem, a console or a GPS receiver. Nothing where the unit's own replies are text that looks so.
 [[nodiscard]] std::optional<Finding> text_of_others(const Case& one, Bytes bytes);
 
-/// Another model or other options of the unit, with which these damaged replies are good.
+/// Finds another model or other options of the unit, with which these damaged replies are good.
 [[nodiscard]] std::optional<Finding> other_settings(const Case& one, const All& all);
 
 /// Returns the settings ("model=23-bit") that make `wanted` of the options `now`; none where both are the same.
@@ -50,7 +50,7 @@ template <class Is>
 /// Returns these options in words: "model=23-bit", or "the usual settings".
 [[nodiscard]] std::string said_settings(const Unit& unit, const Options& options);
 
-/// Another checksum than the unit's, which is good in all these damaged replies.
+/// Finds another checksum than the unit's, which is good in all these damaged replies.
 [[nodiscard]] std::optional<Finding> other_checksum(const Case& one, const All& all);
 
 }  // namespace absenc::client

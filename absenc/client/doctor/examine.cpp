@@ -82,7 +82,7 @@ class Doctor {
     try {
       look();
     } catch (const os::Failure& failure) {
-      seen_.refusal = Refusal{failure.kind(), failure.what(), failure.bus()};
+      seen_.refusal = Refusal{failure.kind(), failure.what(), failure.bus(), failure.holder()};
     } catch (const os::Interrupted&) {
       seen_.complete = false;
     }
@@ -149,7 +149,7 @@ class Doctor {
     }
   }
 
-  // But for what a short checksum lets pass by chance.
+  // A short checksum lets some damaged replies pass.
   [[nodiscard]] bool none_good() const { return count_good(seen_.readings) * 20 < seen_.readings.size() + 1; }
   [[nodiscard]] bool any_good() const {
     return std::any_of(seen_.readings.begin(), seen_.readings.end(),
@@ -237,7 +237,7 @@ class Doctor {
     examiner.conclude(seen_);
   }
 
-  // Returns how long it took. A port that does not open so gives no attempts.
+  // Returns how long it took. A port that does not open gives no attempts.
   template <class Item>
   Time ask(const EncoderAddress& address, std::size_t count, std::vector<Attempted>& attempts) {
     const Command* read = find_command(*address.unit, Verb::read);
@@ -253,7 +253,7 @@ class Doctor {
     return {};
   }
 
-  // Whether all that was seen may be another protocol.
+  // Whether another protocol may explain what was seen.
   [[nodiscard]] bool is_unexplained() const {
     if (any_good() || seen_.never_silent || seen_.lateness != Time{}) return false;
     const Examination so_far = judge(*address_.unit, address_.options, seen_);

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "absenc/client/doctor/examine.hpp"
+#include "absenc/client/doctor/modes_test.hpp"
 #include "absenc/client/virtual_link_test.hpp"
 #include "absenc/protocol/all.hpp"
 #include "absenc/sim/random.hpp"
@@ -24,17 +25,6 @@ constexpr unsigned examinations = 200;  // of each model and mode
 constexpr std::size_t readings = 40;
 
 class HealthyEncoder : public ::testing::TestWithParam<const Unit*> {};
-
-/// The usual options, each model, and each choice of an option.
-std::vector<std::string> modes_of(const Unit& unit) {
-  std::vector<std::string> modes{""};
-  for (const Model& model : unit.models) modes.push_back(fmt::format("model={}", model.name));
-  for (const Option& option : unit.options) {
-    if (option.role == Role::rate) continue;  // simulated lines have none that could be wrong
-    for (const std::string_view choice : option.choices) modes.push_back(fmt::format("{}={}", option.name, choice));
-  }
-  return modes;
-}
 
 Examination examined(const EncoderAddress& address, std::uint64_t seed) {
   const Surroundings surroundings{

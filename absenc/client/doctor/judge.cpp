@@ -43,14 +43,19 @@ Ailment ailment_of(const Refusal& refusal) {
   return Ailment::port_failed;
 }
 
-// Returns how a port in use becomes free, as far as the sentence names who has it.
-std::string_view action_for_holder(std::string_view sentence) {
-  if (sentence.find("by absenc serve") != std::string_view::npos) {
-    return "look at what the server reads, on its page or by its API, or let it examine the encoder";
-  }
-  if (sentence.find("by absenc") != std::string_view::npos) return "wait until that command is over, or end it";
-  if (sentence.find("ModemManager") != std::string_view::npos) {
-    return "let ModemManager go of it: `sudo systemctl stop ModemManager`";
+// Returns how a port that is in use becomes free.
+std::string_view action_for(os::Failure::Holder holder) {
+  using Holder = os::Failure::Holder;
+  switch (holder) {
+    case Holder::server:
+      return "look at what the server reads, on its page or by its API, or let it examine the encoder";
+    case Holder::absenc:
+      return "wait until that command is over, or end it";
+    case Holder::modem_manager:
+      return "let ModemManager go of it: `sudo systemctl stop ModemManager`";
+    case Holder::unknown:
+    case Holder::program:
+      break;
   }
   return "end that program, or use another port";
 }
@@ -82,7 +87,7 @@ std::string inversion(const Case& one) {
   std::size_t zeros = 0;
   for (const Attempted& attempt : seen.readings) {
     const auto& reply = attempt.exchange.reply.bytes;
-    // So many are no frame that was cut behind its first bytes.
+    // A frame that was cut behind its first bytes has fewer zeros.
     constexpr std::size_t many = 8;
     if (!reply.empty() && all_are(reply, 0) && (reply.size() >= many || !is_cut(one, attempt))) ++zeros;
   }
@@ -156,8 +161,8 @@ void judge_port(const Case& one, std::vector<Finding>& findings) {
     findings.push_back(finding(Ailment::port_is_modem, {seen.port, seen.facts.driver}));
   }
   if (seen.refusal) {
-    const std::string& sentence = seen.refusal->sentence;
-    findings.push_back(finding(ailment_of(*seen.refusal), {sentence, std::string(action_for_holder(sentence))}));
+    findings.push_back(
+        finding(ailment_of(*seen.refusal), {seen.refusal->sentence, std::string(action_for(seen.refusal->holder))}));
   }
   if (const auto timer = seen.facts.latency_timer; timer && *timer > 1) {
     const std::string terminal = std::filesystem::path(seen.port).filename();

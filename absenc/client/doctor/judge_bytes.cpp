@@ -162,7 +162,7 @@ struct Suspicion {
 
 bool fits_any(const ByteList&) { return true; }
 
-// In front of each reply; what is sent back of the request is an echo.
+// Bytes in front of each reply. The request itself there is an echo.
 template <std::size_t size>
 bool undo_bytes_before(const Mender& mender, std::size_t& count) {
   count = size;
@@ -247,7 +247,8 @@ constexpr auto suspicions = std::to_array<Suspicion>({
 
 std::string bytes_of(std::size_t count) { return count == 1 ? "a byte" : fmt::format("{} bytes", count); }
 
-// How many values were seen beyond one in each place: that none of them has a certain bit is as unlikely.
+// Returns how many values were seen in each place beyond the first, summed: the more there are, the less likely is it
+// that none of them has a certain bit by chance.
 std::size_t variety(const All& all) {
   std::vector<std::set<std::uint8_t>> values;
   for (const Attempted* attempt : all) {
@@ -328,7 +329,7 @@ std::optional<Finding> seven_bits_of_good(const Case& one) {
                   to_hex(Bytes(before->raw).first(std::min<std::size_t>(before->raw.size(), 24)))});
 }
 
-// A byte before each reply to a request of one byte is taken for its echo.
+// Finds a byte before each reply to a request of one byte, which the port took for its echo.
 std::optional<Finding> false_echo(const Case& one) {
   std::size_t good = 0;
   std::size_t wrong = 0;
@@ -352,7 +353,7 @@ std::optional<Finding> false_echo(const Case& one) {
                   to_hex(Bytes(example->raw).first(std::min<std::size_t>(example->raw.size(), 24)))});
 }
 
-// Behind a good reply: as few bytes as no second reply has.
+// Finds bytes behind good replies that are too few for a second reply.
 std::optional<Finding> byte_behind_good(const Case& one) {
   const Observations& seen = one.seen;
   if (seen.overfull * 10 < one.good * 8 || one.good < 4 || seen.most_behind == 0 || seen.most_behind > 2) return {};

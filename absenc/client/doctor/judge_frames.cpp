@@ -295,7 +295,7 @@ Finding finding_of(const Unit& unit, const Options& options, Place place, const 
     return suited(last.heard ? finding(Ailment::sometimes_damaged, {"", "", ""})
                              : finding(Ailment::sometimes_silent, {"", ""}));
   }
-  // One frame tells of another model what many tell doctor.
+  // A single frame can show another model, as many frames do for the doctor.
   const auto& [request, reply] = last.exchange;
   if (last.error != Error::none && !reply.frame().empty()) {
     const std::string setting = diagnose(unit, options, request.frame(), reply.frame()).setting;

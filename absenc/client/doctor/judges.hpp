@@ -32,7 +32,7 @@ void judge_bad_frames(const Case& one, std::vector<Finding>& findings);
 [[nodiscard]] std::optional<Finding> coming_and_going(const Case& one);
 /// Of replies of which some are.
 void judge_mixed_frames(const Case& one, std::vector<Finding>& findings);
-/// An encoder that was switched on meanwhile: nothing came at first, and from then on every reading was good.
+/// Finds an encoder that was switched on meanwhile: nothing came at first, and from then on every reading was good.
 [[nodiscard]] std::optional<Finding> judge_start(const Case& one);
 void judge_state(const Case& one, std::vector<Finding>& findings);
 void judge_position(const Case& one, const std::vector<Attempted>& readings, bool by_hand,

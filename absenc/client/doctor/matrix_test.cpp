@@ -16,6 +16,7 @@
 
 #include "absenc/client/doctor/examine.hpp"
 #include "absenc/client/doctor/lines_test.hpp"
+#include "absenc/client/doctor/modes_test.hpp"
 #include "absenc/client/doctor/ways_faults_test.hpp"
 #include "absenc/client/reading.hpp"
 #include "absenc/client/text/unit_text.hpp"
@@ -28,18 +29,6 @@ namespace {
 using Ids = std::set<std::string_view>;
 
 constexpr std::size_t readings = 200;
-
-/// Settings of a unit that change how it is read: its usual options, each model, each value of each option
-/// that has names or is a yes or no.
-std::vector<std::string> modes_of(const Unit& unit) {
-  std::vector<std::string> modes{""};
-  for (const Model& model : unit.models) modes.push_back(fmt::format("model={}", model.name));
-  for (const Option& option : unit.options) {
-    if (option.role == Role::rate) continue;  // simulated lines have none that could be wrong
-    for (const std::string_view choice : option.choices) modes.push_back(fmt::format("{}={}", option.name, choice));
-  }
-  return modes;
-}
 
 /// A position of which no byte is 0: of such a frame what is left of it may be a good one.
 constexpr std::string_view at_no_zero = "singleturn=1383&";

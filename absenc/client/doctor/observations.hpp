@@ -34,6 +34,7 @@ struct Refusal {
   os::Failure::Kind kind{};
   std::string sentence{};
   os::Failure::Bus bus = os::Failure::Bus::unknown;
+  os::Failure::Holder holder = os::Failure::Holder::unknown;
 };
 
 struct Observations {

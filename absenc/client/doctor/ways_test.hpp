@@ -271,7 +271,7 @@ inline std::string joined(const std::vector<std::string>& settings) {
   return text;
 }
 
-/// Which settings of a line are options of the virtual encoder as well.
+/// Returns the setting if it is also one of the virtual encoder, and "" if it is one of the line alone.
 inline std::string of_encoder(const Unit& unit, const std::string& setting) {
   if (setting.empty()) return "";
   const std::string_view name = split_setting(setting).name;

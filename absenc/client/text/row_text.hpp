@@ -26,7 +26,7 @@ void append_csv(std::string& text, const Row& row);
 /// What is not told is left out; what does not hold is null.
 [[nodiscard]] Json to_json(const Row& row);
 
-/// The value of an option: a number, the name of a choice, or true and false.
+/// Returns the value of an option: a number, the name of a choice, or true and false.
 [[nodiscard]] Json to_json(const Option& option, std::int64_t value);
 
 }  // namespace absenc::client

@@ -2,17 +2,15 @@
 #include "absenc/client/way/address.hpp"
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include <algorithm>
-#include <cctype>
-#include <cmath>
-#include <cstdlib>
 #include <vector>
 
 #include "absenc/client/error.hpp"
 #include "absenc/client/text/unit_text.hpp"
+#include "absenc/client/way/joint_settings.hpp"
 #include "absenc/client/way/named_encoder.hpp"
+#include "absenc/client/way/setting_value.hpp"
 #include "absenc/client/way/settings_file.hpp"
 #include "absenc/os/serial_ports.hpp"
 #include "absenc/os/socketcan.hpp"
@@ -21,42 +19,6 @@
 namespace absenc::client {
 
 namespace {
-
-std::int64_t number_of(const OptionText& setting, std::int64_t minimum, std::int64_t maximum) {
-  const Result<std::int64_t> number = parse_number(setting.value);
-  if (number && *number >= minimum && *number <= maximum) return *number;
-  throw UsageError(fmt::format("{} is \"{}\", but must be a whole number from {} to {}", setting.name, setting.value,
-                               minimum, maximum));
-}
-
-// Above 0 where `above_zero`.
-double real_of(const OptionText& setting, std::string_view text, double most, bool above_zero) {
-  const std::string copy(text);
-  char* end = nullptr;
-  const double value = std::strtod(copy.c_str(), &end);
-  const bool whole = !copy.empty() && end == copy.c_str() + copy.size() && std::isspace(copy.front()) == 0;
-  if (whole && std::abs(value) <= most && (!above_zero || value > 0)) return value;
-  throw UsageError(fmt::format("{} is \"{}\", but must be a number {} up to {}", setting.name, setting.value,
-                               above_zero ? "above 0" : fmt::format("from {}", -most), most));
-}
-
-// "100", "12.5" or "50/3".
-double ratio_of(const OptionText& setting) {
-  constexpr double most = 1e6;
-  const std::size_t slash = setting.value.find('/');
-  const double above = real_of(setting, setting.value.substr(0, slash), most, true);
-  if (slash == std::string_view::npos) return above;
-  return above / real_of(setting, setting.value.substr(slash + 1), most, true);
-}
-
-// The index of one of `words`.
-std::size_t choice_of(const OptionText& setting, std::initializer_list<std::string_view> words) {
-  const auto* const found = std::find(words.begin(), words.end(), setting.value);
-  if (found != words.end()) return static_cast<std::size_t>(found - words.begin());
-  const std::span<const std::string_view> all(words.begin(), words.size());
-  throw UsageError(fmt::format("{} is \"{}\", but must be {} or {}", setting.name, setting.value,
-                               fmt::join(all.first(all.size() - 1), ", "), all.back()));
-}
 
 // What stands behind the name of the line: "", "_us" or "_active".
 void set_pulse_wire(os::PulseWire& wire, std::string_view what, const OptionText& setting) {
@@ -87,26 +49,6 @@ const Command& reading_command(const Unit& unit, std::string_view name) {
                     name, command.changes_encoder ? "changes the encoder" : "takes arguments"));
   }
   return command;
-}
-
-// Whether it was one of these.
-bool set_joint(Joint& joint, const OptionText& setting) {
-  if (setting.name == "direction") {
-    joint.direction = choice_of(setting, {"1", "-1"}) == 0 ? 1 : -1;
-  } else if (setting.name == "offset_deg" || setting.name == "offset_mm") {
-    joint.offset = real_of(setting, setting.value, 1e9, false);
-  } else if (setting.name == "gear") {
-    joint.gear = ratio_of(setting);
-  } else if (setting.name == "pole_pairs") {
-    joint.pole_pairs = static_cast<int>(number_of(setting, 1, 10'000));
-    return true;
-  } else if (setting.name == "pole_pair_mm") {
-    joint.pole_pair_mm = real_of(setting, setting.value, 1e6, true);
-    return true;
-  } else {
-    return false;
-  }
-  return joint.is_set = true;
 }
 
 void set_link_parameter(EncoderAddress& uri, const OptionText& setting) {
@@ -190,28 +132,6 @@ void check_speed_limit(const EncoderAddress& uri) {
   }
 }
 
-// A setting that would be ignored is refused.
-void check_joint(const EncoderAddress& uri, std::span<const OptionText> settings) {
-  const bool linear = uri.unit->resolution(uri.options).unit_um > 0;
-  struct Alternative {
-    std::string_view name;
-    bool of_linear;
-    std::string_view instead;
-  };
-  constexpr std::array<Alternative, 5> all{{{"offset_deg", false, "set offset_mm=MM"},
-                                            {"gear", false, "it has no gear ratio"},
-                                            {"pole_pairs", false, "set pole_pair_mm=MM"},
-                                            {"offset_mm", true, "set offset_deg=DEG"},
-                                            {"pole_pair_mm", true, "set pole_pairs=N"}}};
-  for (const OptionText& setting : settings) {
-    for (const Alternative& one : all) {
-      if (setting.name != one.name || one.of_linear == linear) continue;
-      throw UsageError(fmt::format("{} cannot be set here, because the encoder {}: {}", one.name,
-                                   linear ? "is a linear one" : "turns", one.instead));
-    }
-  }
-}
-
 // Takes what is a link parameter; the rest are options of the unit, also its rate where its conversations depend on it.
 void take_settings(EncoderAddress& uri, std::span<const OptionText> settings) {
   std::vector<OptionText> options;
@@ -235,7 +155,7 @@ void take_settings(EncoderAddress& uri, std::span<const OptionText> settings) {
   uri.line = line_settings(*uri.unit, uri.options);
   for (const OptionText& setting : of_link) set_link_parameter(uri, setting);
   check_speed_limit(uri);
-  check_joint(uri, of_link);
+  check_joint(of_link, uri.unit->resolution(uri.options).unit_um > 0);
   const bool any_rate_does =
       uri.place == Place::sim || (uri.place == Place::serial && os::is_pseudo_terminal(uri.path));
   if (any_rate_does) uri.line = uri.line.with_some_rate();

@@ -296,7 +296,8 @@ class ConnectionOn final : public Connection {
     runner_.keep_exchange(last);
     const host::Counters& counters = session_.counters();
     const bool usually_good = counters.good > counters.bad();
-    const Finding found = finding_of(unit(), uri().options, uri().place, last, usually_good, session_.lateness() != Time{});
+    const Finding found =
+        finding_of(unit(), uri().options, uri().place, last, usually_good, session_.lateness() != Time{});
     return fmt::format("{}: {}", found.id, found.cause);
   }
 

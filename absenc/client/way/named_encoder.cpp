@@ -5,9 +5,10 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <cstdlib>
+#include <optional>
 
 #include "absenc/client/text/nearest.hpp"
+#include "absenc/client/text/real_number.hpp"
 #include "absenc/client/text/unit_text.hpp"
 #include "absenc/client/way/address.hpp"
 #include "absenc/protocol/all.hpp"
@@ -119,13 +120,11 @@ double rate_of(const FileSection& encoder) {
   const FileSetting* rate = encoder.find(rate_name);
   if (rate == nullptr) return 0;
   const std::string& text = rate->values[0];
-  char* end = nullptr;
-  const double value = std::strtod(text.c_str(), &end);
-  const bool whole = !text.empty() && end == text.c_str() + text.size();
-  if (!whole || !(value >= 0.001 && value <= 1e6)) {
+  const std::optional<double> value = parse_real(text);
+  if (!value || *value < 0.001 || *value > 1e6) {
     refuse(rate->place, fmt::format("{} is \"{}\", but must be a number from 0.001 to 1000000", rate_name, text));
   }
-  return value;
+  return *value;
 }
 
 }  // namespace

@@ -79,7 +79,7 @@ TapChoices choices_of(const Invocation& invocation) {
   choices.model = invocation.text("--model");
   choices.options.assign(invocation.texts("--option").begin(), invocation.texts("--option").end());
   choices.record = invocation.text("--record");
-  choices.overwrites = invocation.has("--overwrite");
+  choices.replaces = invocation.has("--force");
   if (invocation.has("--for")) {
     choices.duration = Time(static_cast<std::int64_t>(1e9 * invocation.real("--for", 0, 0.001, 1e9)));
   }
@@ -95,7 +95,7 @@ void introduce_tap(const TapRun& run) {
       run.receiver().place(), tool::to_text(run.receiver().latency())));
 }
 
-// Says which protocol it is. False: nobody knows.
+// Says which protocol it is. Returns whether one was found.
 bool settle_tap(TapRun& run, bool is_given) {
   Progress progress;
   const bool settled = run.settle([&](const std::string& text) { progress.show(text); });
@@ -148,8 +148,8 @@ int run_tap(const Invocation& invocation) {
   const bool json = invocation.has("--json");
   if (json && invocation.has("--csv")) throw UsageError("--json and --csv cannot be given together");
   if (statistics_only && invocation.has("--csv")) throw UsageError("--stats is text or, with --json, an object");
-  if (invocation.has("--overwrite") && !invocation.has("--record")) {
-    throw UsageError("--overwrite is about the file of --record");
+  if (invocation.has("--force") && !invocation.has("--record")) {
+    throw UsageError("--force is about the file of --record");
   }
   const AnnotationFormat format = json                      ? AnnotationFormat::json
                                   : invocation.has("--csv") ? AnnotationFormat::csv
@@ -194,7 +194,7 @@ constexpr std::array<Parameter, 10> tap_parameters{{
     {"protocol", "", "see `absenc list`; without it, found out from what is said"},
     {"--for", "SECONDS", "end after this time", "until Ctrl-C, or the end of the input"},
     {"--record", "FILE", "also write each frame to it, with its time, for `absenc decode`; it must not exist yet"},
-    {"--overwrite", "", "the file of --record may be there: it is written anew"},
+    {"--force", "", "replace the file of --record if it exists"},
     {"--stats", "", "only the summary"},
     {"--csv", "", "a line for each exchange"},
     parameter::model,
