@@ -135,7 +135,7 @@ if(ABSENC_COMMAND)
     set_tests_properties(${name}.py PROPERTIES
       ENVIRONMENT "ABSENC=${absenc_bin_dir}/absenc;ABSENC_SOURCE_DIR=${PROJECT_SOURCE_DIR}"
       COST 100  # they mostly wait: first, beside what computes
-      TIMEOUT 400)  # and some minutes on a machine that does something else
+      TIMEOUT 900)  # and some minutes on a machine that does something else
   endforeach()
   # These compute, beside few others: browsers that draw, and tests that keep the machine busy on purpose.
   set_tests_properties(serve_browser.py serve_look.py doctor_faults.py PROPERTIES PROCESSORS 4)
