@@ -26,6 +26,9 @@ class Reading:
     @property
     def singleturn_bits(self) -> int: ...
     @property
+    def singleturn_valid_bits(self) -> int:
+        """How many of the highest bits hold; some encoders give fewer while they turn fast."""
+    @property
     def multiturn_bits(self) -> int: ...
     @property
     def ready(self) -> bool:

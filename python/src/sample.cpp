@@ -75,6 +75,9 @@ void bind_sample(py::module_& module) {
           "singleturn_bits", [](const PyReading& one) { return one.reading.singleturn_bits; },
           "0: the reply carries no position")
       .def_property_readonly(
+          "singleturn_valid_bits", [](const PyReading& one) { return one.reading.singleturn_valid_bits; },
+          "How many of the highest bits hold; some encoders give fewer while they turn fast.")
+      .def_property_readonly(
           "multiturn_bits", [](const PyReading& one) { return one.reading.multiturn_bits; },
           "0: the reply carries no revolutions")
       .def_property_readonly(
