@@ -9,6 +9,7 @@ import select
 import shutil
 import signal
 import subprocess
+import sys
 import tempfile
 import threading
 import time
@@ -59,6 +60,21 @@ def wait_for_handler(process):
         if caught >> (signal.SIGINT - 1) & 1:
             return
     raise AssertionError(f"in vain waited until process {process.pid} catches SIGINT")
+
+
+class Busy:
+    """Processes that use all the time that they get."""
+
+    def __init__(self, count):
+        self.processes = [subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range(count)]
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        for process in self.processes:
+            process.kill()
+            process.wait()
 
 
 class Emulator:

@@ -4,11 +4,10 @@
 import json
 import os
 import subprocess
-import sys
 import unittest
 from concurrent.futures import ThreadPoolExecutor
 
-from command_support import ABSENC, Emulator, EncoderCase, absenc
+from command_support import ABSENC, Busy, Emulator, EncoderCase, absenc
 
 SPEEDS = (1, 12, 60, 3000)  # rpm
 # Where a unit is not read with its default options, or also with others: encoders that send by themselves.
@@ -19,21 +18,6 @@ def serial_units():
     """Names of the units whose emulator is on a pseudo-terminal."""
     units = [json.loads(line) for line in absenc("list", "--json").stdout.splitlines()]
     return [unit["protocol"] for unit in units if unit["link"] not in ("exchange", "clocked")]
-
-
-class Busy:
-    """Processes that use all the time that they get."""
-
-    def __init__(self, count):
-        self.processes = [subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range(count)]
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, *_):
-        for process in self.processes:
-            process.kill()
-            process.wait()
 
 
 class Speed(EncoderCase):

@@ -13,7 +13,8 @@ import termios
 import threading
 import tty
 
-from command_support import Emulator, EncoderCase, absenc, end
+from command_support import Emulator, EncoderCase, absenc, end, json_lines
+from tap_support import Relay, TapCase, joined
 
 PORT, OTHER = "/dev/ttyS1", "/dev/ttyS2"
 REGISTERS = 0x2F8  # of PORT
@@ -217,3 +218,30 @@ class Uart(EncoderCase):
                 os._exit(error.errno)
             os._exit(0)
         return os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+
+
+class TapOfAUart(TapCase):
+    COUNT = 300
+    BAUD = 57600  # which both protocols have
+
+    def test_every_exchange(self):
+        """Of two protocols, as a receiver on the pair hears them; what was on the line is known."""
+        for protocol in ("tformat", "raa38-modbus"):
+            with self.subTest(protocol):
+                emulator = self.emulator(protocol, "--motion", "rpm=60", name=f"e-{protocol}")
+                subprocess.run(["stty", "-F", OTHER, str(self.BAUD), "raw", "-echo"], check=True)
+                with Relay(emulator.path, copy_to=OTHER) as relay:
+                    tap = self.tap(f"{PORT}?baud={self.BAUD}", protocol, "--json")
+                    host = absenc("read", f"{protocol}:{relay.host_path}?latency=2000", "--json", "--rate", "0",
+                                  "--count", str(self.COUNT), timeout=3600)
+                    self.assert_good(host)
+                    self.wait_for(tap, lambda text: text.count('"exchange"') >= self.COUNT)
+                    status, text, messages = self.finish(tap)
+                    lines, summary = self.lines(text)
+                    self.assertEqual([line for line in lines if line["kind"] != "exchange" or not line["ok"]], [], messages)
+                    self.assertEqual(joined(lines), relay.copied.hex())
+                    self.assertEqual((status, summary["bytes"]), (0, len(relay.copied)), messages)
+                    said = [line["fields"]["singleturn"] for line in lines if "singleturn" in line["fields"]]
+                    for reading in json_lines(host.stdout):
+                        self.assertIn(reading["singleturn"], said)
+                emulator.end()

@@ -1,0 +1,127 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What the tests of `tap` share: a line between a host and an emulator that is copied, and `tap` as a process."""
+import os
+import select
+import signal
+import subprocess
+import threading
+import time
+import tty
+
+from command_support import ABSENC, PATIENCE, Case, Emulator, end, json_lines, read_line
+
+
+class Relay:
+    """Passes bytes between `host_path`, a pseudo-terminal for the host, and the encoder's, and copies each byte onto a third
+    one, `tap_path`, before it goes on, or into `copy_to`, a serial port that stands at its rate. Nobody's bytes are lost: it
+    waits where a line takes no more. `change` turns what comes (from the host: True) into what goes on; only the copy
+    counts the damage."""
+
+    def __init__(self, encoder_path, change=lambda data, from_host: data, copy_to=None):
+        self.change = change
+        self.copied = bytearray()
+        self.opened = []
+        self.host, self.host_path = self.pseudo_terminal()
+        if copy_to is None:
+            self.tap, self.tap_path = self.pseudo_terminal()
+        else:
+            self.tap, self.tap_path = os.open(copy_to, os.O_RDWR | os.O_NOCTTY), None
+            self.opened.append(self.tap)
+        for master in (self.host, self.tap):
+            os.set_blocking(master, False)
+        self.encoder = os.open(encoder_path, os.O_RDWR | os.O_NOCTTY)
+        tty.setraw(self.encoder)
+        self.from_tap = bytearray()  # what tap sent: must stay empty
+        self.wake, self.waker = os.pipe()
+        self.thread = threading.Thread(target=self.run)
+
+    def pseudo_terminal(self):
+        master, slave = os.openpty()
+        tty.setraw(slave)
+        self.opened += master, slave
+        return master, os.ttyname(slave)
+
+    def run(self):
+        while True:
+            ready = select.select([self.host, self.encoder, self.tap, self.wake], [], [])[0]
+            if self.wake in ready:
+                return
+            if self.tap in ready:
+                self.from_tap += os.read(self.tap, 4096)
+            # Bytes that the host has sent since then come behind the reply that it waited for.
+            for here, there in ((self.encoder, self.host), (self.host, self.encoder)):
+                if here in ready:
+                    data = self.change(os.read(here, 4096), here == self.host)
+                    self.write(self.tap, data)
+                    self.copied += data
+                    self.write(there, data)
+
+    def write(self, descriptor, data):
+        while data:
+            ready = select.select([self.wake], [descriptor], [])
+            if ready[0]:
+                return
+            data = data[os.write(descriptor, data):]
+
+    def __enter__(self):
+        self.thread.start()
+        return self
+
+    def __exit__(self, *_):
+        os.write(self.waker, b"x")
+        self.thread.join(PATIENCE)
+        for descriptor in (*self.opened, self.encoder, self.wake, self.waker):
+            os.close(descriptor)
+
+
+class TapCase(Case):
+    def emulator(self, protocol, *arguments, name="encoder"):
+        emulator = Emulator(self.directory, *arguments, protocol=protocol, name=name)
+        self.addCleanup(emulator.end)
+        return emulator
+
+    def relay(self, emulator, **settings):
+        relay = Relay(emulator.path, **settings)
+        relay.__enter__()
+        self.addCleanup(relay.__exit__)
+        return relay
+
+    def tap(self, *arguments, stdin=subprocess.DEVNULL):
+        """Runs `tap`, which writes into files: nobody has to read along. Returns when it listens."""
+        out, messages = open(self.file("out"), "w+b"), subprocess.PIPE
+        self.addCleanup(out.close)
+        process = subprocess.Popen([ABSENC, "tap", *arguments], stdin=stdin, stdout=out, stderr=messages, bufsize=0)
+        self.addCleanup(lambda: end(process, signal.SIGKILL) if process.poll() is None else None)
+        process.out, process.messages = out, ""
+        while "frames are told apart" not in process.messages:
+            line = read_line(process.stderr, time.monotonic() + PATIENCE)
+            self.assertIsNotNone(line, process.messages)
+            process.messages += line
+        return process
+
+    def finish(self, process, number=signal.SIGINT):
+        """Ends `tap` when it has taken what there is, and returns status, output and messages."""
+        if process.poll() is None:
+            process.send_signal(number)
+        _, messages = process.communicate(timeout=PATIENCE)
+        process.out.seek(0)
+        return process.returncode, process.out.read().decode(), process.messages + messages.decode()
+
+    def wait_for(self, process, found):
+        """Until what was printed so far satisfies `found`."""
+        deadline = time.monotonic() + PATIENCE
+        while time.monotonic() < deadline:
+            with open(process.out.name, encoding="utf-8") as file:
+                text = file.read()
+            if found(text):
+                return text
+            select.select([], [], [], 0.02)
+        self.fail(f"in vain waited: {text[-1000:]}")
+
+    def lines(self, text):
+        lines = json_lines(text)
+        return [line for line in lines if "summary" not in line], lines[-1].get("summary")
+
+
+def joined(lines):
+    return "".join(line.get("request", "") + line.get("reply", "") for line in lines).lower()
