@@ -10,7 +10,7 @@ import time
 import unittest
 
 from command_support import PATIENCE
-from mqtt_fake import (CONNACK, CONNECT, DISCONNECT, PINGRESP, PUBACK, PUBLISH, Closed, FakeBroker, packet)
+from mqtt_fake import (CONNACK, CONNECT, DISCONNECT, PINGRESP, PUBACK, PUBLISH, Closed, FakeBroker, packet, published)
 from mqtt_support import numbers
 from serve_support import BUSY, ServeCase
 
@@ -73,6 +73,8 @@ class Conversation:
         self.good_packets = self.random.choice((0, 0, 0, 1, 2, 3, 5, 8))
         self.seen = 0
         self.ends = None
+        # Of packets that came, and one of none: who acknowledges what it has not received loses it, and nobody can tell.
+        self.numbers = [60_000]
 
 
 class Packets(ServeCase):
@@ -82,7 +84,7 @@ class Packets(ServeCase):
         self.broker = FakeBroker(self.answer)
         self.addCleanup(self.broker.end)
 
-    def answer(self, _broker, connection, kind, _flags, body_, usual):
+    def answer(self, _broker, connection, kind, flags, body_, usual):
         if self.good and not hasattr(connection, "conversation"):
             return usual
         if not hasattr(connection, "conversation"):
@@ -93,13 +95,15 @@ class Packets(ServeCase):
             if time.monotonic() > talk.ends:
                 raise Closed
             return b"" if talk.random.random() < 0.5 else usual
+        if kind == PUBLISH and (number := published(flags, body_)[1]) is not None:
+            talk.numbers.append(number)
         talk.seen += 1
         if talk.seen <= talk.good_packets:
             return usual
         talk.ends = time.monotonic() + 0.3
         expected = {CONNECT: CONNACK, PUBLISH: PUBACK}.get(kind, PINGRESP)
         wrong = expected if talk.random.random() < 0.5 else talk.random.choice(KINDS)
-        bad = b"".join(bad_packet(talk.random, wrong, talk.random.randrange(1, 9))
+        bad = b"".join(bad_packet(talk.random, wrong, talk.random.choice(talk.numbers))
                        for _ in range(talk.random.choice((1, 1, 1, 2, 5))))
         return talk.random.choice((bad, usual + bad))
 

@@ -104,10 +104,11 @@ Progress progress_of(const Profile& profile, std::span<const Capture> captures) 
 }
 
 // By the index of the option and of its value: how far the best profile with this value comes.
-using Reached = std::array<std::array<Progress, 3>, open_options>;
+using ReachedByValue = std::array<Progress, most_choices>;
+using Reached = std::array<ReachedByValue, open_options>;
 
 // Each step of the counter against what `best` makes of the replies.
-void judge_sequence(Profile& best, std::span<const Capture> captures, std::array<Progress, 3>& values) {
+void judge_sequence(Profile& best, std::span<const Capture> captures, ReachedByValue& values) {
   values.fill({});
   bool known = false;
   std::uint8_t last = 0;
@@ -194,7 +195,7 @@ bool parity_is_it(const Profile& profile, const Capture& capture) {
 
 // Each value of each option that changes replies.
 constexpr auto changes = [] {
-  Buffer<OptionValue, 3 * open_options> all;
+  Buffer<OptionValue, most_choices * open_options> all;
   for (std::size_t option = 0; option < open_options; ++option) {
     if (option == option_sequence_step || option == option_parity_scope || option == options.find("request_crc"))
       continue;

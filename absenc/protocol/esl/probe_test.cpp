@@ -121,6 +121,12 @@ TEST(EslProbe, AReportedParityErrorTellsTheScope) {
   EXPECT_EQ(result.best.parity_scope, ParityScope::command);
 }
 
+TEST(EslProbe, OpenOptionsStandFirst) {
+  EXPECT_EQ(open_options, 10u);  // of PROTOCOLS.md, "what the document leaves open"
+  for (const Option& option : std::span(options.infos).subspan(open_options))
+    EXPECT_FALSE(option.probeable) << option.name;
+}
+
 TEST(EslProbe, SilenceAndNoiseProveNothing) {
   Probed silence({{Wire{0x08, 0x75}, {}}});
   EXPECT_TRUE(silence.any);

@@ -3,6 +3,7 @@
 // an option. README.md says how hardware tells each alternative; probe.hpp finds them in captured frames.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <string_view>
@@ -78,7 +79,7 @@ constexpr auto open_option(std::string_view name, std::string_view meaning, cons
 }
 }  // namespace detail
 
-/// First those that the document leaves open.
+/// Those that the document leaves open stand first; a test sees to it.
 inline constexpr auto options = author::OptionsOf{
     detail::open_option<&Profile::crc_bit_order>(
         "crc_bit_order", "which bit of a byte enters the CRC first; word: 16-bit words, MSB first",
@@ -122,6 +123,17 @@ inline constexpr auto options = author::OptionsOf{
         "bad_request", "what the virtual encoder does with a request whose parity or stop bit is wrong",
         choices::bad_request),
 };
-inline constexpr std::size_t open_options = options.find("address");
+/// How many the document leaves open.
+inline constexpr std::size_t open_options = [] {
+  std::size_t count = 0;
+  while (options.infos[count].probeable) ++count;
+  return count;
+}();
+/// The most values that one of these has.
+inline constexpr std::size_t most_choices = [] {
+  std::size_t most = 0;
+  for (std::size_t i = 0; i < open_options; ++i) most = std::max(most, options.infos[i].choices.size());
+  return most;
+}();
 
 }  // namespace absenc::esl

@@ -223,12 +223,6 @@ constexpr Check check_memory(const Request& request, const Reply& reply) {
   return reply.id == DataId::write_memory && reply.value != request.value ? Check::other_value : Check::passed;
 }
 
-/// The redundant position in the 9 bits of IDs 1, 2, B, C.
-constexpr unsigned redundant_9(const Profile& profile, const Reply& reply) {
-  const bool wide = reply.id == DataId::calibration && profile.id6_rs == Id6Redundant::bits_16;
-  return wide ? reply.redundant >> 7 : reply.redundant;
-}
-
 constexpr Check check_content(const Profile& profile, const Layout& layout, const Reply& reply) {
   const unsigned both = reply.one.status | reply.two.status;
   if ((both & status::parity_error) != 0) return Check::parity_reported;

@@ -21,8 +21,7 @@ inline constexpr std::size_t shortest_frame = 4;    // address, function, CRC
 inline constexpr std::size_t crc_size = 2;
 using FrameBytes = ByteBuffer<frame_capacity>;
 
-inline constexpr std::uint8_t broadcast_address = 0;  // never answered
-inline constexpr std::uint8_t first_address = 1;
+inline constexpr std::uint8_t first_address = 1;  // 0 is broadcast and never answered
 inline constexpr std::uint8_t last_address = 247;  // S 2.2
 
 inline constexpr std::uint8_t read_holding_registers = 0x03;
