@@ -8,6 +8,7 @@ import unittest
 import urllib.parse
 
 from page_scenes import Browser  # first: it looks for selenium
+from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
 from selenium.webdriver.support.ui import Select
@@ -225,10 +226,10 @@ class Page(ServeCase):
         self.open()
         self.wait_for("good", ".pill")
         for _ in range(20):
-            self.browser.switch_to.active_element.send_keys(Keys.TAB)
+            ActionChains(self.browser).send_keys(Keys.TAB).perform()
             if "esl" in self.browser.switch_to.active_element.text:
                 break
-        self.browser.switch_to.active_element.send_keys(Keys.ENTER)
+        ActionChains(self.browser).send_keys(Keys.ENTER).perform()
         self.wait_for("What is wrong")
         self.wait_for("good", ".state")
         wait_until(lambda: self.canvas_has(".plot", [0x0b, 0x5c, 0xad]), "the trace is drawn")
