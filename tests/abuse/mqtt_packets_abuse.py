@@ -18,6 +18,8 @@ ONE = "sim:tformat?motion=rpm=60"
 SEED = int(os.environ.get("ABSENC_ABUSE_SEED", "1"))
 CONVERSATIONS = often(150, 10_000)
 SERVERS = often(20, 60)  # each pauses for up to 5 s between two conversations
+PUBREC, PUBCOMP = 5, 7
+NOBODYS = 60_000  # the number of no message: they are counted from 1 in each conversation
 KNOWN = [bytes.fromhex(one) for one in ("20050000027f00", "4006000100027f00", "e00487027f00", "30050001615859")]
 KINDS = (CONNACK, PUBACK, 9, PUBLISH, DISCONNECT, PINGRESP, 15)  # 9: SUBACK, 15: AUTH
 
@@ -66,6 +68,26 @@ def bad_packet(random_, kind, number):
     return bytes(mutated)
 
 
+def acknowledged(stream):
+    """The numbers that a client finds acknowledged in what came, and the bytes of a packet that is not whole yet."""
+    found = []
+    while True:
+        size, shift, begin = 0, 0, 1
+        while begin < len(stream) and begin < 5:
+            size |= (stream[begin] & 127) << shift
+            shift += 7
+            begin += 1
+            if stream[begin - 1] < 128:
+                break
+        else:
+            return found, b"" if begin == 5 else stream  # a size of five bytes ends the conversation
+        if len(stream) < begin + size:
+            return found, stream
+        if stream[0] >> 4 in (PUBACK, PUBREC, PUBCOMP):
+            found.append(int.from_bytes(stream[begin:begin + 2], "big"))
+        stream = stream[begin + size:]
+
+
 class Conversation:
     def __init__(self, seed):
         self.random = random.Random(seed)
@@ -73,8 +95,18 @@ class Conversation:
         self.good_packets = self.random.choice((0, 0, 0, 1, 2, 3, 5, 8))
         self.seen = 0
         self.ends = None
-        # Of packets that came, and one of none: who acknowledges what it has not received loses it, and nobody can tell.
-        self.numbers = [60_000]
+        self.received = set()  # numbers of messages
+        self.rest = b""        # of what was sent: a packet that is not whole
+
+    def numbers(self):
+        return [*sorted(self.received), NOBODYS]
+
+    def truthful(self, data):
+        """`data`, but a broker that acknowledges what it has not received loses it, and nobody can tell: it hangs up."""
+        found, self.rest = acknowledged(self.rest + data)
+        if any(number != NOBODYS and number not in self.received for number in found):
+            raise Closed
+        return data
 
 
 class Packets(ServeCase):
@@ -91,19 +123,22 @@ class Packets(ServeCase):
             connection.conversation = Conversation(SEED + connection.index)
             connection.socket.settimeout(1)  # a client that has nothing to say ends it
         talk = connection.conversation
+        if kind == PUBLISH and (number := published(flags, body_)[1]) is not None:
+            talk.received.add(number)
+        return talk.truthful(self.said(talk, kind, usual))
+
+    def said(self, talk, kind, usual):
         if talk.ends is not None:
             if time.monotonic() > talk.ends:
                 raise Closed
             return b"" if talk.random.random() < 0.5 else usual
-        if kind == PUBLISH and (number := published(flags, body_)[1]) is not None:
-            talk.numbers.append(number)
         talk.seen += 1
         if talk.seen <= talk.good_packets:
             return usual
         talk.ends = time.monotonic() + 0.3
         expected = {CONNECT: CONNACK, PUBLISH: PUBACK}.get(kind, PINGRESP)
         wrong = expected if talk.random.random() < 0.5 else talk.random.choice(KINDS)
-        bad = b"".join(bad_packet(talk.random, wrong, talk.random.choice(talk.numbers))
+        bad = b"".join(bad_packet(talk.random, wrong, talk.random.choice(talk.numbers()))
                        for _ in range(talk.random.choice((1, 1, 1, 2, 5))))
         return talk.random.choice((bad, usual + bad))
 
