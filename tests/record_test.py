@@ -98,15 +98,15 @@ class Files(RecordCase):
 
     def test_json_lines(self):
         self.assert_good(absenc("record", self.encoder("--singleturn", "5"), "--output", self.output("log.jsonl"),
-                                "--count", "3", "--rate", "10"))
+                                "--count", "12", "--rate", "10"))
         header, rows = read_json_lines(self.output("log.jsonl"))
         rows = [row for row in rows if row.get("event") != "gap"]  # of a busy machine
         self.assertEqual((header["absenc_record"], header["protocol"], header["model"]), (1, "tformat", "TS5700N8500"))
         self.assertIn("speed_rpm", header["units"])
-        self.assertEqual([row["singleturn"] for row in rows], [5, 5, 5])
+        self.assertEqual([row["singleturn"] for row in rows], [5] * 12)
         self.assertEqual(rows[0]["position"], 5)
         self.assertEqual(rows[0]["speed_rpm"], None)
-        self.assertEqual(rows[2]["speed_rpm"], 0)
+        self.assertEqual({row["speed_rpm"] for row in rows[1:]} - {None}, {0})  # of a busy machine not all
 
     def test_speed_and_position_past_the_wrap(self):
         result = absenc("record", "sim:tformat?motion=rpm=-90", "--output", self.output(), "--for", "1.2")
