@@ -137,7 +137,7 @@ class DoctorFaults(Case):
         with Emulator(self.directory, *(["--model", name] if name else []), "--motion", motion, protocol=unit,
                       name=f"healthy-{unit}-{name}-{number}") as emulator:
             # The emulator, too, waits for its turn beside the busy processes.
-            found = self.examine(f"{unit}:{emulator.path}?latency=300" + (f"&model={name}" if name else ""))
+            found = self.examine(f"{unit}:{emulator.path}?latency=300" + (f"&model={name}" if name else ""), "--for", "3")
             self.assert_first(found, "good", f"{unit}, {name or 'usual'}, beside busy processes")
             return f"{unit:14} {name or 'usual'}: {found['verdict'][:100]}"
 

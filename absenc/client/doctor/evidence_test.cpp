@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <random>
+#include <utility>
 
 #include "absenc/client/doctor/observed_test.hpp"
 
@@ -51,6 +52,13 @@ TEST(Doctor, ALatenessOfThisComputerIsNotTheEncoders) {
   EXPECT_THAT(ids(judged(seen)), Contains("sometimes_late"));
   seen.woken_late = 13ms;
   EXPECT_THAT(ids(judged(seen)), IsEmpty());
+  // One of few is a tenth of all, but no more than one.
+  seen.readings.resize(9);
+  EXPECT_THAT(ids(judged(seen)), Contains("reply_late"));
+  seen.late = 1;
+  EXPECT_THAT(ids(judged(seen)), IsEmpty());
+  seen.woken_late = 11ms;
+  EXPECT_THAT(ids(judged(seen)), Contains("reply_late"));
 }
 
 /// On a computer that was busy meanwhile less than 0.1 % tell nothing; on another one they do.
@@ -76,6 +84,46 @@ TEST(Doctor, FewOfThousandsMayBeABusyComputer) {
                 is_told ? std::vector<std::string>{"sometimes_silent"} : std::vector<std::string>{});
     }
   }
+}
+
+/// Of 200 readings on a computer that was busy; on another one it is told, and of three readings it always is.
+TEST(Doctor, OneOfManyMayBeABusyComputer) {
+  const auto with_one = [](std::size_t count, const Attempted& failed) {
+    Observations seen = positions([](std::size_t) { return 5; });
+    seen.readings.resize(count);
+    seen.readings[count / 2] = failed;
+    return seen;
+  };
+  Attempted late_and_next{.error = Error::wrong_length, .heard = true, .answered = true};
+  late_and_next.exchange.request.bytes = {0x1A};
+  late_and_next.exchange.reply.bytes = good_reply();
+  late_and_next.exchange.reply.bytes.insert(late_and_next.exchange.reply.bytes.end(), good_reply().begin(),
+                                            good_reply().end());
+  late_and_next.raw = late_and_next.exchange.reply.bytes;
+  for (const auto& [failed, id] : {std::pair<Attempted, std::string>{{.error = Error::timeout}, "sometimes_silent"},
+                                   {late_and_next, "extra_bytes"}}) {
+    Observations few = with_one(3, failed);
+    few.woken_late = 2ms;
+    EXPECT_THAT(ids(judged(few)), Not(IsEmpty()));
+    Observations many = with_one(200, failed);
+    EXPECT_THAT(ids(judged(many)), Contains(id));
+    many.woken_late = 2ms;
+    EXPECT_THAT(ids(judged(many)), IsEmpty());
+  }
+}
+
+/// A stream whose frames wait in this computer comes all at once: how fast the shaft was then is not known.
+TEST(Doctor, APositionThatThisComputerTookLateIsNoJump) {
+  Observations seen = positions([](std::size_t i) { return i * 20; });
+  for (std::size_t i = 100; i < 150; ++i) seen.readings[i].reading->latched += 49ms;  // read together with the 150th
+  for (std::size_t i = 101; i < 150; ++i) {
+    seen.readings[i].reading->latched = seen.readings[100].reading->latched + static_cast<std::int64_t>(i) * 1us;
+  }
+  for (std::size_t i = 150; i < 200; ++i) seen.readings[i].reading->latched += 50ms;
+  for (std::size_t i = 101; i < 150; ++i) seen.readings[i].reading->singleturn = i * 400;
+  EXPECT_THAT(ids(judged(seen)), Contains("position_jumps"));
+  seen.woken_late = 50ms;
+  EXPECT_THAT(ids(judged(seen)), Not(Contains("position_jumps")));
 }
 
 TEST(Doctor, GoodSaysHowMuchWasLookedAt) {

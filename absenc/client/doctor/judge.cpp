@@ -126,7 +126,8 @@ void judge_lateness(const Case& one, std::vector<Finding>& findings) {
   Time limit{};
   for (const Attempted& attempt : seen.readings) limit = std::max(limit, attempt.limit);
   const bool is_ours = seen.woken_late > Time{} && seen.lateness - limit <= seen.woken_late;
-  if (!often && is_ours) return;  // no later than this computer itself
+  const bool is_one_of_few = seen.late < 2 && !nothing_else;
+  if ((!often || is_one_of_few) && is_ours) return;  // no later than this computer itself
   const auto allowance = std::chrono::ceil<std::chrono::milliseconds>(seen.lateness * 3 / 2).count();
   findings.push_back(finding(often ? Ailment::reply_late : Ailment::sometimes_late,
                              {fmt::format("{}", std::min<std::size_t>(seen.late, tried)), fmt::format("{}", tried),

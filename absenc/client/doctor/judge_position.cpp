@@ -100,13 +100,16 @@ double reach(const Walk& walk, Time pause, const host::SpeedLimit& limit) {
 }
 
 // `damaged`: so many readings were seen to be. A sum of 8 bits passes one of 20 in which three bits are damaged, and
-// each goes there and back: no more jumps than damaged readings are damage, too.
-void judge_jumps(const Walk& walk, const host::SpeedLimit& limit, std::size_t damaged, std::vector<Finding>& findings) {
+// each goes there and back: no more jumps than damaged readings are damage, too. `woken_late`: a pause may have been
+// longer by so much, because this computer took the first of the two positions late.
+void judge_jumps(const Walk& walk, const host::SpeedLimit& limit, Time woken_late, std::size_t damaged,
+                 std::vector<Finding>& findings) {
   std::size_t jumps = 0;
   std::int64_t furthest = 0;
   for (std::size_t i = 0; i < walk.steps.size(); ++i) {
     const auto way = std::abs(walk.steps[i]);
-    if (walk.pauses[i] <= Time{} || static_cast<double>(way) <= reach(walk, walk.pauses[i], limit)) continue;
+    if (walk.pauses[i] <= Time{} || static_cast<double>(way) <= reach(walk, walk.pauses[i] + woken_late, limit))
+      continue;
     ++jumps;
     furthest = std::max(furthest, way);
   }
@@ -161,7 +164,8 @@ void judge_position(const Case& one, const std::vector<Attempted>& readings, boo
     judge_noise(walk, findings);
   }
   const auto is_damaged = [](const Attempted& reading) { return reading.error != Error::none && reading.heard; };
-  judge_jumps(walk, limit, static_cast<std::size_t>(std::ranges::count_if(readings, is_damaged)), findings);
+  const auto damaged = static_cast<std::size_t>(std::ranges::count_if(readings, is_damaged));
+  judge_jumps(walk, limit, one.seen.woken_late, damaged, findings);
   judge_bits(walk, findings);
 }
 
