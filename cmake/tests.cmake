@@ -140,7 +140,7 @@ if(ABSENC_COMMAND)
   endforeach()
   # These compute, beside few others: browsers that draw, and tests that keep the machine busy on purpose.
   set_tests_properties(serve_browser.py serve_look.py doctor_faults.py PROPERTIES PROCESSORS 4)
-  set_tests_properties(speed.py PROPERTIES RUN_SERIAL ON)
+  set_tests_properties(speed.py doctor_healthy.py PROPERTIES RUN_SERIAL ON)
 endif()
 
 # What the tests in the virtual machine run beside the command.

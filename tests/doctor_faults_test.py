@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The first line of `absenc doctor` is the cause: faults between the command and an encoder, in real time, on a
-pseudo-terminal. Each fault once, with one unit after the other; with --all each with every unit that can have it. And no
-healthy encoder is called ill beside busy processes: each model once, with --all twenty times."""
+pseudo-terminal. Each fault once, with one unit after the other; with --all each with every unit that can have it."""
 import concurrent.futures
 import contextlib
 import json
@@ -12,7 +11,7 @@ import threading
 import unittest
 
 import fault_proxy as faults
-from command_support import Busy, Case, Emulator, absenc, json_lines
+from command_support import Case, Emulator, absenc, json_lines
 
 ALL = "--all" in sys.argv
 PATIENT = "latency=40"  # milliseconds that a busy machine may add to a reply
@@ -80,10 +79,9 @@ class DoctorFaults(Case):
     def rotated(self, number, names):
         return names if ALL else [names[number % len(names)]]
 
-    def side_by_side(self, examine, cases, again=True):
+    def side_by_side(self, examine, cases):
         """Examines all cases, four at a time: most of it is waiting for replies that do not come. A busy machine holds up
-        the proxy and the emulator, too, which is a fault of its own: `again`, what has failed is examined once more,
-        alone."""
+        the proxy and the emulator, too, which is a fault of its own: what has failed is examined once more, alone."""
         def one(case):
             try:
                 print(examine(*case), flush=True)
@@ -93,9 +91,8 @@ class DoctorFaults(Case):
 
         with concurrent.futures.ThreadPoolExecutor(4) as pool:
             failures = [failure for failure in pool.map(one, cases) if failure]
-        if again:
-            print("".join(f"again, alone: {text}\n" for _, text in failures), flush=True)
-            failures = [failure for case, _ in failures if (failure := one(case))]
+        print("".join(f"again, alone: {text}\n" for _, text in failures), flush=True)
+        failures = [failure for case, _ in failures if (failure := one(case))]
         self.assertEqual(failures, [], "\n\n".join(text for _, text in failures))
 
     def is_asked(self, unit):
@@ -123,23 +120,6 @@ class DoctorFaults(Case):
             also = "good" if proxy.changed == 0 else "sometimes_damaged" if proxy.changed < 10 else ""
             self.assert_first(found, f"{wanted} {also}", f"{unit}: {what}")
             return f"{unit:14} {what:24} {first_of(found)} ({proxy.changed} changed)"
-
-    def test_healthy_encoders_beside_busy_processes(self):
-        usual = {"name": "", "maximum_rpm": None}
-        with Busy(4):
-            self.side_by_side(self.examine_healthy, [(unit, model, number) for unit, about in units().items()
-                                                     for model in [usual, *about["models"]]
-                                                     for number in range(20 if ALL else 1)], again=False)
-
-    def examine_healthy(self, unit, model, number):
-        name = model["name"]
-        motion = "still" if model["maximum_rpm"] == 0 else "rpm=20"  # linear encoders have no turns
-        with Emulator(self.directory, *(["--model", name] if name else []), "--motion", motion, protocol=unit,
-                      name=f"healthy-{unit}-{name}-{number}") as emulator:
-            # The emulator, too, waits for its turn beside the busy processes.
-            found = self.examine(f"{unit}:{emulator.path}?latency=300" + (f"&model={name}" if name else ""), "--for", "3")
-            self.assert_first(found, "good", f"{unit}, {name or 'usual'}, beside busy processes")
-            return f"{unit:14} {name or 'usual'}: {found['verdict'][:100]}"
 
     def test_another_model(self):
         """Read as another model than it is, both ways: wrong_settings names one that fits, or nothing tells them apart."""

@@ -1,0 +1,44 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""`absenc doctor` calls no healthy encoder ill, in real time beside four busy processes: each model of each serial unit once,
+with --all twenty times. In virtual time: absenc/client/doctor/healthy_test.cpp."""
+import concurrent.futures
+import json
+import sys
+import unittest
+
+from command_support import Busy, Case, Emulator, absenc, json_lines
+
+ALL = "--all" in sys.argv
+RUNS = 20 if ALL else 1
+USUAL = {"name": "", "maximum_rpm": None}
+# The emulator waits for its turn, too, as no encoder does.
+PATIENT = "latency=300"
+
+
+class Healthy(Case):
+    def test_beside_busy_processes(self):
+        units = [unit for unit in json_lines(absenc("list", "--json").stdout) if unit["link"] in ("half_duplex", "full_duplex")]
+        cases = [(unit["protocol"], model, number) for unit in units for model in [USUAL, *unit["models"]]
+                 for number in range(RUNS)]
+        self.assertGreater(len(cases), 20)
+        with Busy(4), concurrent.futures.ThreadPoolExecutor(2) as pool:
+            ill = [text for text in pool.map(lambda case: self.examine(*case), cases) if text]
+        self.assertEqual(ill, [], "\n".join(ill))
+
+    def examine(self, unit, model, number):
+        """What is said to be wrong with it, or ""."""
+        name = model["name"]
+        motion = "still" if model["maximum_rpm"] == 0 else "rpm=20"  # linear encoders have no turns
+        with Emulator(self.directory, *(["--model", name] if name else []), "--motion", motion, protocol=unit,
+                      name=f"{unit}-{name}-{number}") as emulator:
+            address = f"{unit}:{emulator.path}?{PATIENT}" + (f"&model={name}" if name else "")
+            found = json.loads(absenc("doctor", address, "--json", "--for", "3").stdout)
+        print(f"{unit:14} {name or 'usual'}: {found['verdict'][:100]}", flush=True)
+        return "" if found["verdict"].startswith("good") else f"{unit} {name or 'usual'}: {found['verdict']}: {found['findings']}"
+
+
+if __name__ == "__main__":
+    if ALL:
+        sys.argv.remove("--all")
+    unittest.main()
