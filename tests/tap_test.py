@@ -3,7 +3,6 @@
 """tap on a line between a host and an emulator: a relay copies both directions onto a third pseudo-terminal.
 `--all`: ten thousand exchanges of each."""
 import collections
-import json
 import os
 import re
 import subprocess
