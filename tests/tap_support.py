@@ -118,6 +118,10 @@ class TapCase(Case):
             select.select([], [], [], 0.02)
         self.fail(f"in vain waited: {text[-1000:]}")
 
+    def wait_for_all(self, process, relay):
+        """Until each byte that was on the line stands in a line of `--json`."""
+        self.wait_for(process, lambda text: joined(json_lines(text[:text.rfind("\n") + 1])) == relay.copied.hex())
+
     def lines(self, text):
         lines = json_lines(text)
         return [line for line in lines if "summary" not in line], lines[-1].get("summary")

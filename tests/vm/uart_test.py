@@ -235,7 +235,7 @@ class TapOfAUart(TapCase):
                     host = absenc("read", f"{protocol}:{relay.host_path}?latency=2000", "--json", "--rate", "0",
                                   "--count", str(self.COUNT), timeout=3600)
                     self.assert_good(host)
-                    self.wait_for(tap, lambda text: text.count('"exchange"') >= self.COUNT)
+                    self.wait_for_all(tap, relay)
                     status, text, messages = self.finish(tap)
                     lines, summary = self.lines(text)
                     self.assertEqual([line for line in lines if line["kind"] != "exchange" or not line["ok"]], [], messages)
