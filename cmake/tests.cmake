@@ -133,12 +133,12 @@ if(ABSENC_COMMAND)
     string(REGEX REPLACE "_test$" "" name "${stem}")
     add_test(NAME ${name}.py COMMAND "${Python3_EXECUTABLE}" -B "${source}")
     set_tests_properties(${name}.py PROPERTIES
-      # Beside others "at once" takes longer.
-      ENVIRONMENT "ABSENC=${absenc_bin_dir}/absenc;ABSENC_SOURCE_DIR=${PROJECT_SOURCE_DIR};ABSENC_BUSY_SECONDS=5"
+      # What happens at once takes longer while other tests run.
+      ENVIRONMENT "ABSENC=${absenc_bin_dir}/absenc;ABSENC_SOURCE_DIR=${PROJECT_SOURCE_DIR};ABSENC_BUSY_SECONDS=2"
       COST 100  # they mostly wait: first, beside what computes
       TIMEOUT 900)  # and some minutes on a machine that does something else
   endforeach()
-  # These compute, beside few others: browsers that draw, and tests that keep the machine busy on purpose.
+  # Browsers that draw, and tests that keep the machine busy on purpose, leave little time for other tests.
   set_tests_properties(serve_browser.py serve_look.py doctor_faults.py PROPERTIES PROCESSORS 4)
   set_tests_properties(speed.py doctor_healthy.py PROPERTIES RUN_SERIAL ON)
 endif()

@@ -62,6 +62,12 @@ def wait_for_handler(process):
     raise AssertionError(f"in vain waited until process {process.pid} catches SIGINT")
 
 
+def character_units():
+    """What `absenc list --json` says of each unit whose line carries characters, by name."""
+    return {unit["protocol"]: unit for unit in json_lines(absenc("list", "--json").stdout)
+            if unit["link"] in ("half_duplex", "full_duplex")}
+
+
 class Busy:
     """Processes that use all the time that they get."""
 

@@ -11,7 +11,7 @@ import threading
 import unittest
 
 import fault_proxy as faults
-from command_support import Case, Emulator, absenc, json_lines
+from command_support import Case, Emulator, absenc, character_units
 
 ALL = "--all" in sys.argv
 PATIENT = "latency=40"  # milliseconds that a busy machine may add to a reply
@@ -51,12 +51,6 @@ PROXIED = [
 SECONDS = {"loose contact": "3"}  # of more than one period
 OF_REQUESTS = {"line low", "only the echo", "login console", "modem", "requests lost 10 %",
                "starting", "always late", "randomly late", "own echo"}
-
-
-def units():
-    """Serial units that are asked, by name: on a line that carries characters, and which do not send by themselves."""
-    return {unit["protocol"]: unit for unit in json_lines(absenc("list", "--json").stdout)
-            if unit["link"] in ("half_duplex", "full_duplex")}
 
 
 def first_of(found):
@@ -103,7 +97,7 @@ class DoctorFaults(Case):
             return proxy.requests > 0
 
     def test_faults_of_the_line(self):
-        names = list(units())
+        names = list(character_units())
         asked = [unit for unit in names if self.is_asked(unit)]
         self.assertGreater(len(asked), 4)
         self.side_by_side(self.examine_fault,
@@ -124,7 +118,7 @@ class DoctorFaults(Case):
     def test_another_model(self):
         """Read as another model than it is, both ways: wrong_settings names one that fits, or nothing tells them apart."""
         cases = []
-        for unit, about in units().items():
+        for unit, about in character_units().items():
             models = [model["name"] for model in about["models"]]
             both = [(unit, None, model) for model in models] + [(unit, model, None) for model in models]
             cases += dict.fromkeys(both if ALL else both[1:2] + both[-1:])
@@ -138,7 +132,7 @@ class DoctorFaults(Case):
             return f"{unit:14} {actual or 'usual'} read as {said or 'usual'}: {found['verdict'][:100]}"
 
     def test_another_address(self):
-        addresses = [(unit, option["minimum"] + 3 * option.get("step", 1)) for unit, about in units().items()
+        addresses = [(unit, option["minimum"] + 3 * option.get("step", 1)) for unit, about in character_units().items()
                      for option in about["options"] if option["name"] == "address"]
         self.assertGreater(len(addresses), 1)
         self.side_by_side(self.examine_address, addresses)
@@ -152,7 +146,7 @@ class DoctorFaults(Case):
 
     def test_another_protocol(self):
         """One that is asked, read as another that is asked."""
-        names = [unit for unit in units() if self.is_asked(unit)]
+        names = [unit for unit in character_units() if self.is_asked(unit)]
         self.side_by_side(self.examine_protocol,
                           [(unit, other) for number, unit in enumerate(names)
                            for other in self.rotated(number, [name for name in names if name != unit])])

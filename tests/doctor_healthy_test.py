@@ -1,28 +1,27 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""`absenc doctor` calls no healthy encoder ill, in real time beside four busy processes: each model of each serial unit once,
-with --all twenty times. In virtual time: absenc/client/doctor/healthy_test.cpp."""
+"""`absenc doctor` calls no healthy encoder ill, in real time: each model of each serial unit once, with --all twenty times
+beside four busy processes. In virtual time: absenc/client/doctor/healthy_test.cpp."""
 import concurrent.futures
 import json
 import sys
 import unittest
 
-from command_support import Busy, Case, Emulator, absenc, json_lines
+from command_support import Busy, Case, Emulator, absenc, character_units
 
 ALL = "--all" in sys.argv
-RUNS = 20 if ALL else 1
+RUNS, BUSY = (20, 4) if ALL else (1, 0)
 USUAL = {"name": "", "maximum_rpm": None}
 # The emulator waits for its turn, too, as no encoder does.
 PATIENT = "latency=300"
 
 
 class Healthy(Case):
-    def test_beside_busy_processes(self):
-        units = [unit for unit in json_lines(absenc("list", "--json").stdout) if unit["link"] in ("half_duplex", "full_duplex")]
-        cases = [(unit["protocol"], model, number) for unit in units for model in [USUAL, *unit["models"]]
-                 for number in range(RUNS)]
+    def test_each_model_of_each_serial_unit(self):
+        cases = [(unit, model, number) for unit, about in character_units().items()
+                 for model in [USUAL, *about["models"]] for number in range(RUNS)]
         self.assertGreater(len(cases), 20)
-        with Busy(4), concurrent.futures.ThreadPoolExecutor(2) as pool:
+        with Busy(BUSY), concurrent.futures.ThreadPoolExecutor(2) as pool:
             ill = [text for text in pool.map(lambda case: self.examine(*case), cases) if text]
         self.assertEqual(ill, [], "\n".join(ill))
 
@@ -35,7 +34,9 @@ class Healthy(Case):
             address = f"{unit}:{emulator.path}?{PATIENT}" + (f"&model={name}" if name else "")
             found = json.loads(absenc("doctor", address, "--json", "--for", "3").stdout)
         print(f"{unit:14} {name or 'usual'}: {found['verdict'][:100]}", flush=True)
-        return "" if found["verdict"].startswith("good") else f"{unit} {name or 'usual'}: {found['verdict']}: {found['findings']}"
+        if found["verdict"].startswith("good"):
+            return ""
+        return f"{unit} {name or 'usual'}: {found['verdict']}: {found['findings']}"
 
 
 if __name__ == "__main__":

@@ -10,7 +10,8 @@ import time
 import unittest
 
 from command_support import PATIENCE
-from mqtt_fake import (CONNACK, CONNECT, DISCONNECT, PINGRESP, PUBACK, PUBLISH, Closed, FakeBroker, packet, published)
+from mqtt_fake import (CONNACK, CONNECT, DISCONNECT, PINGRESP, PUBACK, PUBCOMP, PUBLISH, PUBREC, Closed, FakeBroker, packet,
+                       published)
 from mqtt_support import numbers
 from serve_support import BUSY, ServeCase
 
@@ -18,8 +19,7 @@ ONE = "sim:tformat?motion=rpm=60"
 SEED = int(os.environ.get("ABSENC_ABUSE_SEED", "1"))
 CONVERSATIONS = often(150, 10_000)
 SERVERS = often(20, 60)  # each pauses for up to 5 s between two conversations
-PUBREC, PUBCOMP = 5, 7
-NOBODYS = 60_000  # the number of no message: they are counted from 1 in each conversation
+NOBODYS = 60_000  # no message has this number: they count from 1 in each conversation
 KNOWN = [bytes.fromhex(one) for one in ("20050000027f00", "4006000100027f00", "e00487027f00", "30050001615859")]
 KINDS = (CONNACK, PUBACK, 9, PUBLISH, DISCONNECT, PINGRESP, 15)  # 9: SUBACK, 15: AUTH
 
@@ -69,23 +69,19 @@ def bad_packet(random_, kind, number):
 
 
 def acknowledged(stream):
-    """The numbers that a client finds acknowledged in what came, and the bytes of a packet that is not whole yet."""
+    """Returns the numbers of messages that `stream` acknowledges to a client, and the beginning of a packet at its end."""
     found = []
     while True:
-        size, shift, begin = 0, 0, 1
-        while begin < len(stream) and begin < 5:
-            size |= (stream[begin] & 127) << shift
-            shift += 7
-            begin += 1
-            if stream[begin - 1] < 128:
-                break
-        else:
-            return found, b"" if begin == 5 else stream  # a size of five bytes ends the conversation
-        if len(stream) < begin + size:
+        sizes = next((stream[1:end] for end in range(2, 6) if end <= len(stream) and stream[end - 1] < 128), None)
+        if sizes is None:  # no client accepts a size of five bytes
+            return found, stream if len(stream) < 5 else b""
+        body_at = 1 + len(sizes)
+        end = body_at + sum((byte & 127) << 7 * place for place, byte in enumerate(sizes))
+        if len(stream) < end:
             return found, stream
         if stream[0] >> 4 in (PUBACK, PUBREC, PUBCOMP):
-            found.append(int.from_bytes(stream[begin:begin + 2], "big"))
-        stream = stream[begin + size:]
+            found.append(int.from_bytes(stream[body_at:body_at + 2], "big"))
+        stream = stream[end:]
 
 
 class Conversation:
@@ -102,7 +98,7 @@ class Conversation:
         return [*sorted(self.received), NOBODYS]
 
     def truthful(self, data):
-        """`data`, but a broker that acknowledges what it has not received loses it, and nobody can tell: it hangs up."""
+        """Returns `data`. Hangs up instead of acknowledging a message that did not come: no client could know of its loss."""
         found, self.rest = acknowledged(self.rest + data)
         if any(number != NOBODYS and number not in self.received for number in found):
             raise Closed

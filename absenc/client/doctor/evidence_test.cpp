@@ -86,7 +86,8 @@ TEST(Doctor, FewOfThousandsMayBeABusyComputer) {
   }
 }
 
-/// Of 200 readings on a computer that was busy; on another one it is told, and of three readings it always is.
+/// One failure among 200 readings is no finding where the computer was busy. It is one where the computer was not, and
+/// among three readings.
 TEST(Doctor, OneOfManyMayBeABusyComputer) {
   const auto with_one = [](std::size_t count, const Attempted& failed) {
     Observations seen = positions([](std::size_t) { return 5; });
@@ -110,6 +111,31 @@ TEST(Doctor, OneOfManyMayBeABusyComputer) {
     many.woken_late = 2ms;
     EXPECT_THAT(ids(judged(many)), IsEmpty());
   }
+  // A byte behind a reply is no reply that was late.
+  Attempted noise = late_and_next;
+  noise.exchange.reply.bytes.resize(good_reply().size() + 1);
+  noise.raw = noise.exchange.reply.bytes;
+  Observations busy = with_one(200, noise);
+  busy.woken_late = 2ms;
+  EXPECT_THAT(ids(judged(busy)), Contains("extra_bytes"));
+}
+
+/// Two of 300 readings whose replies may take 300 ms.
+TEST(Doctor, AComputerThatStoodStillExplainsSilence) {
+  Observations seen = positions([](std::size_t) { return 5; });
+  const std::vector<Attempted> some = seen.readings;
+  seen.readings.insert(seen.readings.end(), some.begin(), some.begin() + 100);
+  for (std::size_t i = 0; i < seen.readings.size(); ++i) {
+    seen.readings[i].reading->latched = static_cast<std::int64_t>(i) * 1ms;
+    seen.readings[i].limit = 300ms;
+  }
+  for (const std::size_t place : {100, 101}) seen.readings[place] = {.error = Error::timeout, .limit = 300ms};
+  seen.woken_late = 299ms;
+  EXPECT_THAT(ids(judged(seen)), Contains("sometimes_silent"));
+  seen.woken_late = 300ms;
+  EXPECT_THAT(ids(judged(seen)), IsEmpty());
+  seen.readings[102] = seen.readings[100];
+  EXPECT_THAT(ids(judged(seen)), Contains("sometimes_silent"));
 }
 
 /// A stream whose frames wait in this computer comes all at once: how fast the shaft was then is not known.

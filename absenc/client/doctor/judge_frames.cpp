@@ -82,21 +82,21 @@ std::optional<Finding> own_echo(const Case& one, const All& all) {
   return finding(Ailment::only_echo, {fmt::format("{}", all.size()), to_hex(all.front()->exchange.request.bytes)});
 }
 
+bool holds_two(const Case& one, const Attempted& attempt) {
+  const Frame request = attempt.exchange.request.frame();
+  const Bytes bytes = attempt.exchange.reply.bytes;
+  for (std::size_t size = 2; size + 1 < bytes.size(); ++size) {
+    if (is_good(one, request, bytes.first(size)) && is_good(one, request, bytes.subspan(size))) return true;
+  }
+  return false;
+}
+
 std::optional<Finding> two_frames(const Case& one, const All& all) {
   if (one.unit.link != LinkKind::half_duplex && one.unit.link != LinkKind::full_duplex) return {};
-  const auto holds_two = [&](const Attempted& attempt) {
-    const Frame request = attempt.exchange.request.frame();
-    const Bytes bytes = attempt.exchange.reply.bytes;
-    for (std::size_t size = 2; size + 1 < bytes.size(); ++size) {
-      if (is_good(one, request, bytes.first(size)) && is_good(one, request, bytes.subspan(size))) return true;
-    }
-    return false;
-  };
-  const auto two = static_cast<std::size_t>(
-      std::count_if(all.begin(), all.end(), [&](const Attempted* attempt) { return holds_two(*attempt); }));
+  const auto is_double = [&](const Attempted* attempt) { return holds_two(one, *attempt); };
+  const auto two = static_cast<std::size_t>(std::count_if(all.begin(), all.end(), is_double));
   if (two * 2 < all.size() || two == 0) return {};
-  const auto first =
-      std::find_if(all.begin(), all.end(), [&](const Attempted* attempt) { return holds_two(*attempt); });
+  const auto first = std::find_if(all.begin(), all.end(), is_double);
   return finding(Ailment::two_answer, {fmt::format("{}", two), fmt::format("{}", all.size()), shown(**first)});
 }
 
@@ -351,8 +351,9 @@ void judge_mixed_frames(const Case& one, std::vector<Finding>& findings) {
         finding(Ailment::two_answer, {fmt::format("{}", one.seen.overfull), fmt::format("{}", one.seen.readings.size()),
                                       to_hex(example.first(std::min(example.size(), most_shown)))}));
   } else if (std::optional<Finding> extra = extra_bytes(one, all)) {
-    // A reply so late that the next one stands behind it looks the same.
-    if (!may_be_the_computer(one.seen, all.size())) findings.push_back(std::move(*extra));
+    // A whole reply behind a reply may be the next one, where the first was late.
+    const bool may_be_late = std::ranges::all_of(all, [&](const Attempted* one_of) { return holds_two(one, *one_of); });
+    if (!may_be_late || !may_be_the_computer(one.seen, all.size())) findings.push_back(std::move(*extra));
   } else if (!all.empty()) {
     findings.push_back(some_damage(one, all));
   }

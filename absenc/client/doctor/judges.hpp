@@ -2,6 +2,7 @@
 // The parts of the judgement: each adds what it finds.
 #pragma once
 
+#include <algorithm>
 #include <optional>
 #include <vector>
 
@@ -18,13 +19,17 @@ struct Case {
 };
 
 /// Whether so many replies that were late or did not come may be due to this computer, which was busy: the encoder may
-/// be a program on it, or an adapter whose driver waits, too. One of few readings proves nothing either way, so that it
-/// is none of many only.
+/// be a program on it, or an adapter whose driver waits, too. A single one may be where there are many readings, and
+/// one of a hundred where the computer stood still for as long as a reply may take.
 [[nodiscard]] inline bool may_be_the_computer(const Observations& seen, std::size_t some) {
   constexpr Time busy = std::chrono::milliseconds(1);
   constexpr std::size_t many = 20;
   const std::size_t readings = seen.readings.size();
-  return seen.woken_late >= busy && (some * 1000 < readings || (some < 2 && readings >= many));
+  Time limit{};
+  for (const Attempted& one : seen.readings) limit = std::max(limit, one.limit);
+  const bool stood_still = limit > Time{} && seen.woken_late >= limit;
+  return seen.woken_late >= busy &&
+         (some * 1000 < readings || (some < 2 && readings >= many) || (stood_still && some * 100 < readings));
 }
 
 void judge_port(const Case& one, std::vector<Finding>& findings);

@@ -122,7 +122,7 @@ TEST(EslProbe, AReportedParityErrorTellsTheScope) {
 }
 
 TEST(EslProbe, OpenOptionsStandFirst) {
-  EXPECT_EQ(open_options, 10u);  // of PROTOCOLS.md, "what the document leaves open"
+  EXPECT_EQ(open_options, 10u);  // README.md names each
   for (const Option& option : std::span(options.infos).subspan(open_options))
     EXPECT_FALSE(option.probeable) << option.name;
 }
