@@ -1,8 +1,10 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
 """Include lines follow the layers: core <- link <- protocol <- {host, sim, capture} <- client <- serve <- tools; os needs
-core, link. A public header, which is installed, needs public ones only."""
+core, link. A public header, which is installed, needs public ones only. Folders of client do not include each other in a
+circle."""
 
+import graphlib
 import os
 import re
 import tempfile
@@ -98,8 +100,27 @@ def system_fault(path, header):
     return "belongs into absenc/os" if OS_HEADER.search(header) and not at_os else None
 
 
+def client_circles(root):
+    """Folders of client that include each other, directly or through others: "captures -> identify -> captures"."""
+    client = Path("absenc/client")
+    included = {}
+    for file in sorted((root / client).rglob("*.[ch]pp")):
+        folder = file.relative_to(root).parent
+        if is_test(file) or folder == client:
+            continue
+        for bracket, name in INCLUDE.findall(file.read_text(encoding="utf-8")):
+            other = Path(name).parent
+            if bracket == '"' and client in other.parents and other != folder:
+                included.setdefault(folder.name, set()).add(other.name)
+    try:
+        tuple(graphlib.TopologicalSorter(included).static_order())
+    except graphlib.CycleError as error:
+        return [" -> ".join(reversed(error.args[1])) + ": folders of client that include each other"]
+    return []
+
+
 def faults(root):
-    found = []
+    found = client_circles(root)
     heavy = {}
     for top in ("absenc", "tools", "tests", "bench", "examples"):
         for file in sorted((root / top).rglob("*.[ch]pp")):
@@ -145,8 +166,10 @@ class TheCheckItself(unittest.TestCase):
         "absenc/capture/open.hpp": "",
         "absenc/client/encoder.hpp": '#include "absenc/client/row.hpp"\n#include "absenc/sim/line.hpp"\n',
         "absenc/client/row.hpp": '#include "absenc/os/error.hpp"\n',
-        "absenc/client/row.cpp": '#include <fmt/core.h>\n#include "absenc/client/text/rows.hpp"\n',
+        "absenc/client/text/row.cpp": '#include <fmt/core.h>\n#include "absenc/client/text/rows.hpp"\n',
         "absenc/client/text/rows.hpp": '#include "absenc/capture/open.hpp"\n#include "absenc/os/serial.hpp"\n',
+        "absenc/client/captures/run.hpp": '#include "absenc/client/text/rows.hpp"\n',
+        "absenc/client/tap/run.hpp": '#include "absenc/client/captures/run.hpp"\n',
         "absenc/serve/http.hpp": '#include "absenc/client/text/rows.hpp"\n',
         "absenc/serve/http.cpp": "#include <microhttpd.h>\n",
         "absenc/os/serial.cpp": '#include <sys/ioctl.h>\n#include "absenc/link/step.hpp"\n',
@@ -192,8 +215,10 @@ class TheCheckItself(unittest.TestCase):
             ("absenc/client/encoder.hpp", '#include "absenc/os/serial.hpp"'),
             ("absenc/client/encoder.hpp", "#include <fmt/core.h>"),
             ("absenc/client/encoder.hpp", "#include <poll.h>"),
-            ("absenc/client/row.cpp", '#include "absenc/protocol/one/unit.hpp"'),
-            ("absenc/client/row.cpp", '#include "absenc/serve/http.hpp"'),
+            ("absenc/client/text/row.cpp", '#include "absenc/protocol/one/unit.hpp"'),
+            ("absenc/client/text/row.cpp", '#include "absenc/serve/http.hpp"'),
+            ("absenc/client/captures/run.hpp", '#include "absenc/client/tap/run.hpp"'),
+            ("absenc/client/text/rows.hpp", '#include "absenc/client/tap/run.hpp"'),
             ("absenc/serve/http.hpp", '#include "absenc/capture/open.hpp"'),
             ("absenc/serve/http.hpp", "#include <microhttpd.h>"),
             ("tools/absenc/main.cpp", '#include "absenc/protocol/one/unit.hpp"'),

@@ -12,10 +12,10 @@
 #include <string>
 #include <vector>
 
+#include "absenc/client/encoder/connection.hpp"
+#include "absenc/client/port/virtual_link_test.hpp"
 #include "absenc/client/settings.hpp"
 #include "absenc/client/text/unit_text.hpp"
-#include "absenc/client/virtual_link_test.hpp"
-#include "absenc/client/way/connection.hpp"
 #include "absenc/protocol/all.hpp"
 #include "tests/cases.hpp"
 

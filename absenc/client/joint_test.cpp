@@ -9,8 +9,8 @@
 
 #include "absenc/client/encoder.hpp"
 #include "absenc/client/error.hpp"
+#include "absenc/client/port/address.hpp"
 #include "absenc/client/sample_rows.hpp"
-#include "absenc/client/way/address.hpp"
 
 namespace absenc::client {
 namespace {

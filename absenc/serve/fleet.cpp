@@ -9,8 +9,8 @@
 #include <utility>
 
 #include "absenc/client/error.hpp"
-#include "absenc/client/way/named_encoder.hpp"
-#include "absenc/client/way/shared_link.hpp"
+#include "absenc/client/port/named_encoder.hpp"
+#include "absenc/client/port/shared_link.hpp"
 #include "absenc/os/error.hpp"
 #include "absenc/os/signals.hpp"
 

@@ -9,9 +9,9 @@
 #include <span>
 
 #include "absenc/client/error.hpp"
+#include "absenc/client/port/named_encoder.hpp"
+#include "absenc/client/port/settings_file.hpp"
 #include "absenc/client/text/nearest.hpp"
-#include "absenc/client/way/named_encoder.hpp"
-#include "absenc/client/way/settings_file.hpp"
 #include "absenc/os/network.hpp"
 #include "absenc/protocol/options.hpp"
 #include "absenc/serve/state_file.hpp"

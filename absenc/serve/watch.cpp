@@ -8,11 +8,11 @@
 #include <utility>
 
 #include "absenc/client/doctor/examine.hpp"
+#include "absenc/client/encoder/connection.hpp"
+#include "absenc/client/encoder/pace.hpp"
 #include "absenc/client/text/nearest.hpp"
 #include "absenc/client/text/row_text.hpp"
 #include "absenc/client/text/unit_text.hpp"
-#include "absenc/client/way/connection.hpp"
-#include "absenc/client/way/pace.hpp"
 #include "absenc/os/error.hpp"
 #include "absenc/os/signals.hpp"
 

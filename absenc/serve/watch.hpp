@@ -14,8 +14,8 @@
 #include <vector>
 
 #include "absenc/client/encoder.hpp"
+#include "absenc/client/port/address.hpp"
 #include "absenc/client/text/json.hpp"
-#include "absenc/client/way/address.hpp"
 #include "absenc/serve/happening.hpp"
 #include "absenc/serve/order.hpp"
 #include "absenc/serve/passing.hpp"

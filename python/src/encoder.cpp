@@ -6,11 +6,11 @@
 #include <mutex>
 #include <utility>
 
+#include "absenc/client/encoder/connection.hpp"
 #include "absenc/client/error.hpp"
+#include "absenc/client/port/address.hpp"
 #include "absenc/client/recording.hpp"
 #include "absenc/client/text/unit_text.hpp"
-#include "absenc/client/way/address.hpp"
-#include "absenc/client/way/connection.hpp"
 #include "python/src/bind.hpp"
 #include "python/src/sample.hpp"
 

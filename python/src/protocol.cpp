@@ -6,9 +6,9 @@
 #include <array>
 
 #include "absenc/client/error.hpp"
+#include "absenc/client/port/diagnosis.hpp"
 #include "absenc/client/text/unit_text.hpp"
 #include "absenc/client/text/wire_text.hpp"
-#include "absenc/client/way/diagnosis.hpp"
 #include "absenc/core/crc.hpp"
 #include "absenc/protocol/all.hpp"
 #include "python/src/bind.hpp"
@@ -65,7 +65,8 @@ py::object encode(const std::string& name, const std::string& command_name, cons
                              ". Try: " + std::string(text_of(size.error()).advice));
   }
   const Bytes encoded = Bytes(bytes).first(*size);
-  if (unit.link == LinkKind::can || unit.link == LinkKind::clocked) return py::str(std::string(encoded.begin(), encoded.end()));
+  if (unit.link == LinkKind::can || unit.link == LinkKind::clocked)
+    return py::str(std::string(encoded.begin(), encoded.end()));
   return to_bytes(encoded);
 }
 

@@ -4,8 +4,8 @@
 #include "absenc/client/captures/probe.hpp"
 #include "absenc/client/conform/conform_text.hpp"
 #include "absenc/client/doctor/examine.hpp"
+#include "absenc/client/port/ports.hpp"
 #include "absenc/client/wave.hpp"
-#include "absenc/client/way/ports.hpp"
 #include "absenc/os/error.hpp"
 #include "python/src/bind.hpp"
 

@@ -4,7 +4,7 @@
 
 #include <string_view>
 
-#include "absenc/client/way/address.hpp"
+#include "absenc/client/port/address.hpp"
 #include "tools/absenc/subcommand.hpp"
 
 namespace absenc::tool {

@@ -6,7 +6,7 @@
 #include <string_view>
 #include <vector>
 
-#include "absenc/client/emulation/virtual_device.hpp"
+#include "absenc/client/port/virtual_device.hpp"
 #include "absenc/link/step.hpp"
 #include "absenc/os/input_lines.hpp"
 

@@ -11,8 +11,8 @@
 #include <utility>
 #include <vector>
 
+#include "absenc/client/port/address.hpp"
 #include "absenc/client/text/nearest.hpp"
-#include "absenc/client/way/address.hpp"
 #include "absenc/os/error.hpp"
 #include "absenc/os/process.hpp"
 #include "absenc/os/signals.hpp"

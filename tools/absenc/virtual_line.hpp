@@ -6,7 +6,7 @@
 #include <type_traits>
 #include <vector>
 
-#include "absenc/client/way/address.hpp"
+#include "absenc/client/port/address.hpp"
 #include "absenc/sim/bus.hpp"
 #include "absenc/sim/frame_bus.hpp"
 #include "tools/absenc/subcommand.hpp"

@@ -3,7 +3,7 @@
 
 #include <fmt/format.h>
 
-#include "absenc/client/way/address.hpp"
+#include "absenc/client/port/address.hpp"
 #include "tools/absenc/help.hpp"
 
 namespace absenc::tool {

@@ -13,10 +13,10 @@
 #include <vector>
 
 #include "absenc/capture/annotate/drawing.hpp"
-#include "absenc/client/emulation/virtual_device.hpp"
+#include "absenc/client/port/address.hpp"
+#include "absenc/client/port/virtual_device.hpp"
 #include "absenc/client/row.hpp"
 #include "absenc/client/text/unit_text.hpp"
-#include "absenc/client/way/address.hpp"
 #include "absenc/host/session.hpp"
 #include "absenc/sim/sim_port.hpp"
 #include "absenc/sim/waveform.hpp"

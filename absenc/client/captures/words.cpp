@@ -7,7 +7,7 @@
 #include <cmath>
 
 #include "absenc/capture/lines/can_line.hpp"
-#include "absenc/client/way/diagnosis.hpp"
+#include "absenc/client/port/diagnosis.hpp"
 
 namespace absenc::client {
 

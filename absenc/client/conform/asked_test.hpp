@@ -10,8 +10,8 @@
 
 #include "absenc/client/conform.hpp"
 #include "absenc/client/error.hpp"
+#include "absenc/client/port/address.hpp"
 #include "absenc/client/text/unit_text.hpp"
-#include "absenc/client/way/address.hpp"
 
 namespace absenc::client {
 

@@ -3,7 +3,7 @@
 #pragma once
 
 #include "absenc/client/conform.hpp"
-#include "absenc/client/way/link.hpp"
+#include "absenc/client/port/link.hpp"
 
 namespace absenc::client {
 

@@ -11,7 +11,7 @@
 
 #include "absenc/capture/search/evidence.hpp"
 #include "absenc/client/conform.hpp"
-#include "absenc/client/way/runner.hpp"
+#include "absenc/client/port/runner.hpp"
 #include "absenc/protocol/clause.hpp"
 
 namespace absenc::client {

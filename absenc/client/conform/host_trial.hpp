@@ -10,7 +10,7 @@
 
 #include "absenc/client/conform.hpp"
 #include "absenc/client/emulate.hpp"
-#include "absenc/client/emulation/virtual_device.hpp"
+#include "absenc/client/port/virtual_device.hpp"
 #include "absenc/protocol/clause.hpp"
 
 namespace absenc::client {

@@ -14,8 +14,8 @@
 
 #include "absenc/client/conform/asked_test.hpp"
 #include "absenc/client/conform/conform_link.hpp"
+#include "absenc/client/port/virtual_link_test.hpp"
 #include "absenc/client/text/unit_text.hpp"
-#include "absenc/client/virtual_link_test.hpp"
 #include "absenc/protocol/clause.hpp"
 
 namespace absenc::client {

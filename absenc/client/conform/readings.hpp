@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "absenc/client/conform.hpp"
-#include "absenc/client/way/runner.hpp"
+#include "absenc/client/port/runner.hpp"
 #include "absenc/protocol/clause.hpp"
 
 namespace absenc::client {

@@ -17,9 +17,9 @@
 #include "absenc/client/conform/evidence.hpp"
 #include "absenc/client/conform/readings.hpp"
 #include "absenc/client/error.hpp"
+#include "absenc/client/port/runner.hpp"
 #include "absenc/client/text/unit_text.hpp"
 #include "absenc/client/text/wire_text.hpp"
-#include "absenc/client/way/runner.hpp"
 #include "absenc/os/error.hpp"
 #include "absenc/protocol/clause.hpp"
 

@@ -6,8 +6,8 @@
 #include <string>
 
 #include "absenc/client/doctor/observations.hpp"
+#include "absenc/client/port/link.hpp"
 #include "absenc/client/text/json.hpp"
-#include "absenc/client/way/link.hpp"
 
 namespace absenc::client {
 

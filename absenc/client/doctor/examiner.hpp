@@ -7,8 +7,8 @@
 #include <utility>
 
 #include "absenc/client/doctor/observations.hpp"
-#include "absenc/client/way/link.hpp"
-#include "absenc/client/way/runner.hpp"
+#include "absenc/client/port/link.hpp"
+#include "absenc/client/port/runner.hpp"
 
 namespace absenc::client {
 

@@ -12,7 +12,7 @@
 
 #include "absenc/client/doctor/examine.hpp"
 #include "absenc/client/doctor/modes_test.hpp"
-#include "absenc/client/virtual_link_test.hpp"
+#include "absenc/client/port/virtual_link_test.hpp"
 #include "absenc/protocol/all.hpp"
 #include "absenc/sim/random.hpp"
 

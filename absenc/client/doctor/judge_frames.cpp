@@ -12,9 +12,9 @@
 #include "absenc/client/doctor/damage.hpp"
 #include "absenc/client/doctor/judges.hpp"
 #include "absenc/client/doctor/words.hpp"
+#include "absenc/client/port/diagnosis.hpp"
 #include "absenc/client/text/unit_text.hpp"
 #include "absenc/client/text/wire_text.hpp"
-#include "absenc/client/way/diagnosis.hpp"
 
 namespace absenc::client {
 

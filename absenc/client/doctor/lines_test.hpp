@@ -10,7 +10,7 @@
 #include <utility>
 #include <vector>
 
-#include "absenc/client/virtual_link_test.hpp"
+#include "absenc/client/port/virtual_link_test.hpp"
 
 namespace absenc::client {
 

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "absenc/client/doctor.hpp"
-#include "absenc/client/way/runner.hpp"
+#include "absenc/client/port/runner.hpp"
 #include "absenc/host/echo.hpp"
 #include "absenc/host/speed_limit.hpp"
 #include "absenc/os/error.hpp"

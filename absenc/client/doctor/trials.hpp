@@ -9,7 +9,7 @@
 
 #include "absenc/client/doctor.hpp"
 #include "absenc/client/identify/line.hpp"
-#include "absenc/client/way/address.hpp"
+#include "absenc/client/port/address.hpp"
 
 namespace absenc::client {
 

@@ -15,8 +15,8 @@
 
 #include "absenc/client/doctor/examine.hpp"
 #include "absenc/client/identify/ways.hpp"
+#include "absenc/client/port/link.hpp"
 #include "absenc/client/text/unit_text.hpp"
-#include "absenc/client/way/link.hpp"
 #include "absenc/protocol/all.hpp"
 #include "absenc/sim/sim_port.hpp"
 

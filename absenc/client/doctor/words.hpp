@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "absenc/client/doctor.hpp"
-#include "absenc/client/way/address.hpp"
+#include "absenc/client/port/address.hpp"
 
 namespace absenc::client {
 

@@ -12,8 +12,8 @@
 #include <vector>
 
 #include "absenc/client/emulate.hpp"
+#include "absenc/client/port/address.hpp"
 #include "absenc/client/text/wire_text.hpp"
-#include "absenc/client/way/address.hpp"
 #include "absenc/link/step.hpp"
 #include "absenc/protocol/unit.hpp"
 
@@ -127,9 +127,7 @@ class RequestWatch final : public Machine<Item> {
     pending_.clear();
   }
 
-  [[nodiscard]] Error error_of(const Frame& request) const {
-    return unit_.check(options_, request, {});
-  }
+  [[nodiscard]] Error error_of(const Frame& request) const { return unit_.check(options_, request, {}); }
 
   // A port that is opened may bring a few bytes before the host has said anything.
   void note_good() {

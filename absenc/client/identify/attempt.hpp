@@ -13,9 +13,9 @@
 #include "absenc/client/identify/line.hpp"
 #include "absenc/client/identify/patience.hpp"
 #include "absenc/client/identify/ways.hpp"
+#include "absenc/client/port/link.hpp"
+#include "absenc/client/port/runner.hpp"
 #include "absenc/client/text/unit_text.hpp"
-#include "absenc/client/way/link.hpp"
-#include "absenc/client/way/runner.hpp"
 #include "absenc/os/error.hpp"
 #include "absenc/os/signals.hpp"
 

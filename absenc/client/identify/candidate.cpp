@@ -6,8 +6,8 @@
 
 #include <algorithm>
 
+#include "absenc/client/port/address.hpp"
 #include "absenc/client/text/unit_text.hpp"
-#include "absenc/client/way/address.hpp"
 
 namespace absenc::client {
 

@@ -4,7 +4,7 @@
 
 #include "absenc/client/identify/attempt.hpp"
 #include "absenc/client/identify/line.hpp"
-#include "absenc/client/virtual_link_test.hpp"
+#include "absenc/client/port/virtual_link_test.hpp"
 #include "absenc/protocol/all.hpp"
 
 namespace absenc::client {

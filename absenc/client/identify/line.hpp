@@ -10,8 +10,8 @@
 #include <vector>
 
 #include "absenc/client/identify/candidate.hpp"
-#include "absenc/client/way/address.hpp"
-#include "absenc/client/way/link.hpp"
+#include "absenc/client/port/address.hpp"
+#include "absenc/client/port/link.hpp"
 #include "absenc/os/signals.hpp"
 
 namespace absenc::client {

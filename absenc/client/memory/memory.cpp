@@ -5,9 +5,9 @@
 
 #include <algorithm>
 
+#include "absenc/client/encoder/connection.hpp"
 #include "absenc/client/error.hpp"
 #include "absenc/client/text/unit_text.hpp"
-#include "absenc/client/way/connection.hpp"
 
 namespace absenc::client {
 

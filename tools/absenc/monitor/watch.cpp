@@ -8,8 +8,8 @@
 #include <chrono>
 #include <utility>
 
+#include "absenc/client/encoder/pace.hpp"
 #include "absenc/client/text/unit_text.hpp"
-#include "absenc/client/way/pace.hpp"
 #include "absenc/os/error.hpp"
 #include "absenc/os/signals.hpp"
 #include "tools/absenc/text/encoder_text.hpp"

@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "absenc/client/encoder.hpp"
-#include "absenc/client/way/connection.hpp"
+#include "absenc/client/encoder/connection.hpp"
 
 namespace absenc::tool {
 

@@ -7,10 +7,10 @@
 #include <span>
 
 #include "absenc/capture/lines/can_line.hpp"
+#include "absenc/client/port/diagnosis.hpp"
 #include "absenc/client/text/row_text.hpp"
 #include "absenc/client/text/unit_text.hpp"
 #include "absenc/client/text/wire_text.hpp"
-#include "absenc/client/way/diagnosis.hpp"
 #include "tools/absenc/text/bit_text.hpp"
 #include "tools/absenc/text/field_text.hpp"
 #include "tools/absenc/text/output.hpp"

@@ -6,8 +6,8 @@
 #include <string>
 
 #include "absenc/client/encoder.hpp"
+#include "absenc/client/encoder/connection.hpp"
 #include "absenc/client/text/json.hpp"
-#include "absenc/client/way/connection.hpp"
 
 namespace absenc::tool {
 

@@ -6,10 +6,10 @@
 #include <array>
 #include <vector>
 
+#include "absenc/client/encoder/connection.hpp"
 #include "absenc/client/row.hpp"
 #include "absenc/client/text/row_text.hpp"
 #include "absenc/client/text/unit_text.hpp"
-#include "absenc/client/way/connection.hpp"
 #include "absenc/os/signals.hpp"
 #include "tools/absenc/error.hpp"
 #include "tools/absenc/parameters.hpp"

@@ -5,8 +5,8 @@
 #include <array>
 #include <vector>
 
+#include "absenc/client/port/journal.hpp"
 #include "absenc/client/text/json.hpp"
-#include "absenc/client/way/journal.hpp"
 #include "tools/absenc/error.hpp"
 #include "tools/absenc/parameters.hpp"
 #include "tools/absenc/text/output.hpp"

@@ -7,12 +7,12 @@
 #include <iterator>
 #include <utility>
 
+#include "absenc/client/encoder/connection.hpp"
 #include "absenc/client/identify/candidate.hpp"
 #include "absenc/client/reading_columns.hpp"
 #include "absenc/client/settings.hpp"
 #include "absenc/client/text/row_text.hpp"
 #include "absenc/client/text/unit_text.hpp"
-#include "absenc/client/way/connection.hpp"
 #include "absenc/os/signals.hpp"
 #include "tools/absenc/error.hpp"
 #include "tools/absenc/parameters.hpp"

@@ -4,10 +4,10 @@
 
 #include <array>
 
+#include "absenc/client/port/address.hpp"
+#include "absenc/client/port/named_encoder.hpp"
 #include "absenc/client/text/known_name.hpp"
 #include "absenc/client/text/unit_text.hpp"
-#include "absenc/client/way/address.hpp"
-#include "absenc/client/way/named_encoder.hpp"
 #include "absenc/protocol/all.hpp"
 #include "tools/absenc/error.hpp"
 #include "tools/absenc/subcommand.hpp"

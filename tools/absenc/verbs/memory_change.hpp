@@ -3,8 +3,8 @@
 #pragma once
 
 #include "absenc/client/memory.hpp"
+#include "absenc/client/port/address.hpp"
 #include "absenc/client/text/json.hpp"
-#include "absenc/client/way/address.hpp"
 #include "tools/absenc/subcommand.hpp"
 
 namespace absenc::tool {

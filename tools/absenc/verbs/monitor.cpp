@@ -6,8 +6,8 @@
 #include <map>
 #include <memory>
 
+#include "absenc/client/port/shared_link.hpp"
 #include "absenc/client/text/unit_text.hpp"
-#include "absenc/client/way/shared_link.hpp"
 #include "absenc/os/error.hpp"
 #include "absenc/os/process.hpp"
 #include "absenc/os/signals.hpp"

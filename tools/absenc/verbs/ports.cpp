@@ -4,8 +4,8 @@
 #include <array>
 #include <string>
 
+#include "absenc/client/port/ports.hpp"
 #include "absenc/client/text/unit_text.hpp"
-#include "absenc/client/way/ports.hpp"
 #include "absenc/os/port_facts.hpp"
 #include "absenc/os/serial_ports.hpp"
 #include "tools/absenc/error.hpp"

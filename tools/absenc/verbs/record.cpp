@@ -4,10 +4,10 @@
 #include <array>
 
 #include "absenc/client/encoder.hpp"
+#include "absenc/client/encoder/connection.hpp"
+#include "absenc/client/encoder/pace.hpp"
 #include "absenc/client/recording.hpp"
 #include "absenc/client/text/unit_text.hpp"
-#include "absenc/client/way/connection.hpp"
-#include "absenc/client/way/pace.hpp"
 #include "absenc/os/error.hpp"
 #include "absenc/os/signals.hpp"
 #include "tools/absenc/error.hpp"

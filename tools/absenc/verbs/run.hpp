@@ -2,7 +2,7 @@
 // What every verb that runs commands of a protocol does: ask, run, show the result or the failure.
 #pragma once
 
-#include "absenc/client/way/connection.hpp"
+#include "absenc/client/encoder/connection.hpp"
 #include "tools/absenc/subcommand.hpp"
 
 namespace absenc::tool {

@@ -7,7 +7,7 @@
 #include <string>
 #include <string_view>
 
-#include "absenc/client/way/address.hpp"
+#include "absenc/client/port/address.hpp"
 #include "absenc/core/time.hpp"
 #include "absenc/link/step.hpp"
 

@@ -5,9 +5,9 @@
 #include <array>
 #include <utility>
 
+#include "absenc/client/encoder/connection.hpp"
 #include "absenc/client/settings.hpp"
 #include "absenc/client/text/unit_text.hpp"
-#include "absenc/client/way/connection.hpp"
 #include "absenc/os/error.hpp"
 #include "absenc/os/signals.hpp"
 #include "tools/absenc/consent.hpp"

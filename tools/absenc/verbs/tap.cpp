@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <array>
 
-#include "absenc/client/captures/request_rates.hpp"
-#include "absenc/client/captures/tap_run.hpp"
+#include "absenc/client/tap/request_rates.hpp"
+#include "absenc/client/tap/tap_run.hpp"
 #include "absenc/client/text/unit_text.hpp"
 #include "absenc/client/text/wire_text.hpp"
 #include "absenc/os/signals.hpp"

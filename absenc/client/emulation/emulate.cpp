@@ -1,0 +1,259 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "absenc/client/emulate.hpp"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <condition_variable>
+#include <exception>
+#include <functional>
+#include <mutex>
+#include <thread>
+#include <utility>
+
+#include "absenc/client/emulation/attended.hpp"
+#include "absenc/client/emulation/request_watch.hpp"
+#include "absenc/client/emulation/rule_counter.hpp"
+#include "absenc/client/emulation/serve_forever.hpp"
+#include "absenc/client/error.hpp"
+#include "absenc/client/port/address.hpp"
+#include "absenc/client/text/unit_text.hpp"
+#include "absenc/host/drive.hpp"
+#include "absenc/os/emulator_port.hpp"
+#include "absenc/os/signals.hpp"
+#include "absenc/os/slcan_port.hpp"
+#include "absenc/os/socketcan.hpp"
+
+namespace absenc::client {
+
+namespace {
+
+constexpr Time between_tries_to_look = std::chrono::milliseconds(20);  // while the interface is away
+
+EncoderAddress virtual_address(std::string_view text) {
+  EncoderAddress address = parse_address("sim:" + std::string(text));
+  const LinkKind link = address.unit->link;
+  if (link != LinkKind::spi && link != LinkKind::clocked) return address;
+  throw UsageError(fmt::format("{} ({}) does not go over a pseudo-terminal: open it as sim:{}", address.unit->id,
+                               line_of(*address.unit), address.unit->id));
+}
+
+void require_can_alone(const Unit& unit, const EmulateChoices& choices) {
+  if (unit.link != LinkKind::can) {
+    throw UsageError(fmt::format("{} ({}) does not go over a CAN bus", unit.id, line_of(unit)));
+  }
+  if (!choices.link.empty() || choices.tcp) {
+    throw UsageError(fmt::format("the interface {} is a line of its own: not with a link or TCP", choices.can));
+  }
+}
+
+DeviceSettings with_faults_to_come(DeviceSettings settings) {
+  settings.faults_may_come = true;
+  return settings;
+}
+
+}  // namespace
+
+struct Emulation::Service {
+  Service(std::string_view text, const EmulateChoices& choices)
+      : address(virtual_address(text)),
+        device(*address.unit, address.options, with_faults_to_come(address.device)),
+        interface(choices.can) {
+    if (interface.empty()) {
+      port = std::make_shared<os::EmulatorPort>(choices.link, choices.tcp);
+      port->set_send_slack(send_slack);
+    } else {
+      require_can_alone(*address.unit, choices);
+      can = open_can();
+    }
+    device.watch_rules(&rules);
+    device.power_on(os::now());
+    thread = std::jthread([this] { serve(); });
+  }
+
+  ~Service() {
+    const std::lock_guard lock(mutex);
+    stopped = true;
+  }
+
+  void serve() {
+    try {
+      if (!interface.empty()) {
+        serve_on_can();
+      } else if (device.frames() != nullptr) {
+        os::SlcanAdapter adapter(port, address.line);
+        serve_on(*device.frames(), adapter);
+      } else {
+        serve_on(*device.bytes(), *port);
+      }
+    } catch (const Cancelled&) {
+    } catch (...) {
+      thrown = std::current_exception();
+    }
+    const std::lock_guard lock(mutex);
+    stopped = true;
+    changed.notify_all();
+  }
+
+  template <class Item>
+  void serve_on(Machine<Item>& machine, Port<Item>& on) {
+    RequestWatch<Item> watch(machine, address);
+    count_requests = [&watch] { return watch.counts(); };
+    Attended<Item> attended(watch, [this](Time now) { return look(now); });
+    host::drive(attended, on, [] { return true; });
+  }
+
+  [[nodiscard]] std::unique_ptr<os::SocketCan> open_can() const {
+    return std::make_unique<os::SocketCan>(interface, address.line);
+  }
+
+  [[noreturn]] void serve_on_can() {
+    RequestWatch<CanFrame> watch(*device.frames(), address);
+    count_requests = [&watch] { return watch.counts(); };
+    Attended<CanFrame> attended(watch, [this](Time now) { return look(now); });
+    const auto open = [this] { return can != nullptr ? std::move(can) : open_can(); };
+    const auto wait = [this](Time time) {
+      for (Time now = os::now(); now < time; now = os::now()) {
+        look(now);
+        os::sleep_until(std::min(time, now + between_tries_to_look));
+      }
+    };
+    serve_forever(attended, open, wait, [](Served, std::string_view) {});
+  }
+
+  // Between two steps of the encoder.
+  bool look(Time now) {
+    const std::lock_guard lock(mutex);
+    if (stopped) throw Cancelled{};
+    if (!wish) return true;
+    wish(now);
+    wish = nullptr;
+    changed.notify_all();
+    return true;
+  }
+
+  /// Does the work there, and returns when it is done.
+  void carry_out(const std::function<void(Time)>& work) {
+    const std::lock_guard turn(wishes);
+    std::unique_lock lock(mutex);
+    wish = work;
+    changed.wait(lock, [&] { return !wish || stopped; });
+    if (!wish) return;
+    if (thrown) std::rethrow_exception(thrown);
+    throw Cancelled{};
+  }
+
+  template <class Ask>
+  auto ask(const Ask& question) {
+    decltype(question(*device.device().bytes)) answer{};
+    carry_out([&](Time) {
+      answer = device.device().bytes != nullptr ? question(*device.device().bytes) : question(*device.device().frames);
+    });
+    return answer;
+  }
+
+  EncoderAddress address;
+  RuleCounter rules;
+  VirtualDevice device;
+  std::string interface;  // or else
+  std::shared_ptr<os::EmulatorPort> port;
+  std::unique_ptr<os::SocketCan> can;  // not served yet
+
+  std::mutex wishes;  // one at a time
+  std::mutex mutex;   // guards what follows
+  std::condition_variable changed;
+  std::function<void(Time)> wish;
+  bool stopped = false;
+  std::exception_ptr thrown;
+  std::function<RequestCounts()> count_requests;  // as long as it serves, in its thread
+
+  std::jthread thread;  // last: it uses all of the others
+};
+
+Emulation::Emulation(std::string_view text, const EmulateChoices& choices)
+    : service_(std::make_unique<Service>(text, choices)) {}
+Emulation::Emulation(Emulation&&) noexcept = default;
+Emulation& Emulation::operator=(Emulation&&) noexcept = default;
+Emulation::~Emulation() = default;
+
+const std::string& Emulation::path() const {
+  return service_->port != nullptr ? service_->port->path() : service_->interface;
+}
+std::uint16_t Emulation::tcp_port() const { return service_->port != nullptr ? service_->port->tcp_port() : 0; }
+const Unit& Emulation::unit() const { return *service_->address.unit; }
+const Options& Emulation::options() const { return service_->address.options; }
+
+std::string Emulation::address() const {
+  return fmt::format("{}:{}{}", unit().id, unit().link == LinkKind::can && service_->interface.empty() ? "slcan:" : "",
+                     path());
+}
+
+void Emulation::power_off() {
+  service_->carry_out([this](Time now) { service_->device.switch_off(now); });
+}
+
+void Emulation::power_on(bool real) {
+  service_->carry_out([this, real](Time now) { service_->device.switch_on(now, real); });
+}
+
+void Emulation::raise_alarm(std::string_view name) {
+  const std::uint32_t bits = require_alarms(unit(), service_->device.options(), std::array{std::string(name)});
+  service_->carry_out([this, bits](Time) { service_->device.raise_alarms(bits); });
+}
+
+void Emulation::lower_alarm(std::string_view name) {
+  const std::uint32_t bits = require_alarms(unit(), std::array{std::string(name)});
+  service_->carry_out([this, bits](Time) { service_->device.lower_alarms(bits); });
+}
+
+void Emulation::set_condition(std::string_view name, std::int64_t value) {
+  const Condition& condition = require_condition(unit(), name);
+  static_cast<void>(require_value(condition, fmt::format("{}", value)));
+  const auto index = static_cast<std::size_t>(&condition - unit().conditions.data());
+  service_->carry_out([this, index, value](Time now) { service_->device.set_condition(index, value, now); });
+}
+
+void Emulation::set_fault(std::string_view kind, double rate) {
+  const sim::FaultRate fault = require_fault(fmt::format("{}={}", kind, rate));
+  service_->carry_out([this, fault](Time) {
+    sim::FaultRates rates = service_->device.fault_rates();
+    rates[fault.kind] = fault.rate;
+    service_->device.set_faults(rates);
+  });
+}
+
+void Emulation::clear_faults() {
+  service_->carry_out([this](Time) { service_->device.set_faults({.delay = service_->device.fault_rates().delay}); });
+}
+
+std::uint64_t Emulation::fault_count(std::string_view kind) const {
+  const sim::FaultKind wanted = require_fault(fmt::format("{}=0", kind)).kind;
+  return service_->ask([this, wanted](const auto&) -> std::uint64_t {
+    const sim::FaultCounts* const counts = service_->device.faults();
+    return counts != nullptr ? (*counts)[static_cast<std::size_t>(wanted)] : 0;
+  });
+}
+
+std::uint64_t Emulation::answer_count() const {
+  return service_->ask([](const auto& device) { return device.answer_count(); });
+}
+
+std::uint32_t Emulation::violations() const {
+  return service_->ask([](const auto& device) { return device.violation_count(); });
+}
+
+std::string Emulation::first_violation() const {
+  return service_->ask([](const auto& device) {
+    return std::string(device.violations().empty() ? std::string_view{} : device.violations()[0].rule);
+  });
+}
+
+std::vector<RuleCount> Emulation::rule_counts() const {
+  return service_->ask([this](const auto&) { return service_->rules.counts(); });
+}
+
+RequestCounts Emulation::request_counts() const {
+  return service_->ask([this](const auto&) { return service_->count_requests(); });
+}
+
+}  // namespace absenc::client

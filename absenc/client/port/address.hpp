@@ -1,0 +1,133 @@
+// SPDX-License-Identifier: Apache-2.0
+// An encoder as the user writes it: tformat:/dev/ttyUSB0?model=23-bit&echo=on, tformat:tcp:host:4001,
+// ssi:spi:/dev/spidev0.0, raa38-can:can0, raa38-can:slcan:/dev/ttyACM0, sim:tformat, or a name of absenc.toml.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+
+#include "absenc/client/joint.hpp"
+#include "absenc/client/port/virtual_device.hpp"
+#include "absenc/host/echo.hpp"
+#include "absenc/host/speed_limit.hpp"
+#include "absenc/os/serial.hpp"
+#include "absenc/os/spi_port.hpp"
+#include "absenc/protocol/unit.hpp"
+
+namespace absenc::client {
+
+enum class Place : std::uint8_t { serial, tcp, spi, can, slcan, sim };
+inline constexpr std::array<std::string_view, 6> place_names{"serial", "tcp", "spi", "can", "slcan", "sim"};
+
+/// The setting that is the rate of an asynchronous line.
+inline constexpr std::string_view rate_setting = "baud";
+
+/// A setting of the way to the encoder, beside the options of its protocol.
+struct LinkParameter {
+  std::string_view name;
+  std::string_view value;
+  std::string_view meaning;
+  std::string_view places;  // where it may be given, by the names of `place_names`
+  bool repeatable = false;
+};
+
+inline constexpr std::array<LinkParameter, 30> link_parameters{{
+    {rate_setting, "RATE", "bits a second, instead of the protocol's own; slcan: of the adapter's port, 115200",
+     "serial, slcan"},
+    {"parity", "none|odd|even", "of each character, instead of the protocol's own", "serial, sim"},
+    {"trigger", "rts|dtr|gpio:NAME", "the wire whose pulse asks for a frame", "serial"},
+    {"trigger_us", "US", "how long that pulse lasts, instead of the protocol's own", "serial"},
+    {"trigger_active", "low|high", "its level at the UART's pin or the GPIO line, low if not said", "serial"},
+    {"clear", "rts|dtr|gpio:NAME", "the wire whose pulse sets the zero", "serial"},
+    {"clear_us", "US", "how long that pulse lasts, instead of the protocol's own", "serial"},
+    {"clear_active", "low|high", "its level at the UART's pin or the GPIO line, low if not said", "serial"},
+    {"rs485", "auto|on|off", "whether the kernel switches the direction of the transceiver", "serial"},
+    {"latency", "MS", "what the way adds to the encoder's answer time", "serial, tcp, can, slcan"},
+    {"log", "FILE", "write every CAN frame sent and received to it, as candump -l does; it must not exist yet",
+     "can, slcan, sim"},
+    {"speed", "HZ", "clock of the controller, instead of the protocol's own", "spi"},
+    {"spi_mode", "0..3", "2 x CPOL + CPHA, instead of the protocol's own", "spi"},
+    {"echo", "auto|on|off", "whether the adapter sends back what is sent", "serial, tcp, sim"},
+    {"max_rpm", "RPM",
+     "the fastest that the shaft turns: farther than it gets no position is believed, nor turns after "
+     "too long a pause",
+     "serial, tcp, spi, can, slcan, sim"},
+    {"max_mm_s", "MM/S", "the same of a linear encoder", "serial, tcp, spi, can, slcan, sim"},
+    {"direction", "1|-1", "-1: the joint turns against the encoder; shown as joint angle beside the encoder's own",
+     "serial, tcp, spi, can, slcan, sim"},
+    {"offset_deg", "DEG", "degrees at the encoder where the joint is at 0", "serial, tcp, spi, can, slcan, sim"},
+    {"offset_mm", "MM", "the same of a linear encoder", "serial, tcp, spi, can, slcan, sim"},
+    {"gear", "RATIO", "turns of the encoder for one of the joint: 100, 50/3", "serial, tcp, spi, can, slcan, sim"},
+    {"pole_pairs", "N", "of the motor on the encoder's shaft, for its electrical angle",
+     "serial, tcp, spi, can, slcan, sim"},
+    {"pole_pair_mm", "MM", "length of a pole pair of a linear motor, for its electrical angle",
+     "serial, tcp, spi, can, slcan, sim"},
+    {"command", "NAME", "what is read, instead of the position with all alarms: a command that yields positions",
+     "serial, tcp, spi, can, slcan, sim"},
+    {"motion", "MOTION", "still, rpm=R, sine=DEGREES,HZ or file=CSV", "sim"},
+    {"singleturn", "COUNTS", "position within the turn at the start", "sim"},
+    {"multiturn", "TURNS", "turns at the start", "sim"},
+    {"condition", "NAME=VALUE",
+     "a condition of the virtual encoder: temperature, battery ...; may be given more than once", "sim", true},
+    {"alarm", "NAME", "an alarm to raise; may be given more than once", "sim", true},
+    {"fault", "KIND=RATE",
+     "a fault to inject, with its probability for each reply (request_corrupt: for each byte heard); may be given more "
+     "than once",
+     "sim", true},
+    {"seed", "N", "another series of faults", "sim"},
+}};
+
+/// The option that a setting of this name sets; null: none. Where the rate is an option, because silences are measured
+/// in characters, `rate_setting` sets it, whatever the unit calls it.
+[[nodiscard]] const Option* find_option(const Unit& unit, std::string_view name);
+
+/// Null when there is none with this name.
+[[nodiscard]] const LinkParameter* find_link_parameter(std::string_view name);
+
+struct EncoderAddress {
+  const Unit* unit = nullptr;
+  Options options;
+  Place place = Place::serial;
+  std::string path;  // serial, spi, slcan; can: the interface
+  std::string host;  // tcp
+  std::uint16_t port = 0;
+
+  LineSettings line;
+  os::Rs485 rs485 = os::Rs485::automatic;
+  os::PulseWires wires;
+  std::optional<Time> latency;
+  os::SpiChoice spi;
+  std::uint32_t adapter_rate = 115'200;  // slcan: of the serial port, not of the bus
+  std::string log;                       // "": none
+  host::EchoMode echo = host::EchoMode::off;
+  std::uint32_t maximum_rpm = 0;   // 0: as the model says, or as is usual
+  std::uint32_t maximum_mm_s = 0;  // of linear encoders; 0: as is usual
+  Joint joint;                     // how the encoder sits in its drive
+  const Command* reads = nullptr;  // what is read again and again; null: the first command with Verb::read
+  DeviceSettings device;
+  std::string written;  // as the user wrote it, with all settings: "elbow?baud=57600"
+};
+
+/// How fast the encoder may be taken to move: what the user says, or else as host::speed_limit.
+[[nodiscard]] host::SpeedLimit speed_limit(const EncoderAddress& uri);
+
+/// Where the text names a port of this computer, or one on the network, and no protocol: that port with what stands
+/// behind ?, as `absenc identify` takes it. Empty for all others.
+[[nodiscard]] std::optional<std::string> bare_port(std::string_view text);
+
+/// `settings` ("name=value") count as if they stood behind the text; both override what absenc.toml says of a name.
+/// Throws UsageError, which names what is wrong and the nearest name that would be right.
+[[nodiscard]] EncoderAddress parse_address(std::string_view text, std::span<const std::string> settings = {});
+
+class NamedEncoders;
+/// The same of a name of absenc.toml that was read already.
+[[nodiscard]] EncoderAddress parse_address(std::string_view name, const NamedEncoders& names);
+
+/// Without its settings: "tformat:/dev/ttyUSB0"
+[[nodiscard]] std::string address_of(const EncoderAddress& uri);
+
+}  // namespace absenc::client

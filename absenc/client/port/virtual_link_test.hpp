@@ -1,0 +1,101 @@
+// SPDX-License-Identifier: Apache-2.0
+// For tests of whoever converses over a Link: any unit's virtual encoder, or any machine in its place, in virtual time.
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <random>
+#include <utility>
+
+#include "absenc/client/port/link.hpp"
+#include "absenc/sim/rough_line.hpp"
+#include "absenc/sim/sim_port.hpp"
+
+namespace absenc::client {
+
+/// One clock for ports that are opened one after the other, as `identify` does. It stands still while nobody waits.
+struct VirtualClock {
+  [[nodiscard]] sim::RealTime real_time() {
+    return {.now = [this] { return time; }, .sleep_until = [this](Time until) { time = std::max(time, until); }};
+  }
+  Time time{};
+};
+
+/// What is between a virtual encoder and who converses with it.
+struct VirtualWay {
+  bool echo = false;                       // the adapter echoes
+  std::optional<std::uint64_t> pauses{};   // each request begins a random while later: the seed
+  std::optional<sim::RoughRates> rough{};  // a line of whole frames, which is faster and can be bad; without echo
+  std::uint64_t seed = 1;                  // of the bad line
+  VirtualClock* clock = nullptr;           // null: time begins with the link, and jumps from event to event
+  std::uint32_t rate = 0;                  // of the host's end; 0: that of the encoder
+};
+
+/// Begins each request a random while later.
+template <class Item>
+class UnevenPort final : public Port<Item> {
+ public:
+  UnevenPort(std::unique_ptr<sim::SimPort<Item>> port, std::uint64_t seed) : port_(std::move(port)), random_(seed) {}
+  Time now() override { return port_->now(); }
+  void begin(const Step<Item>& step) override {
+    Step<Item> later = step;
+    // On SPI and clocked links pauses have a meaning; so they have within a procedure.
+    if (step.kind == Step<Item>::Kind::transfer && step.at <= port_->now()) {
+      later.at = port_->now() + Time(std::uniform_int_distribution<std::int64_t>(0, 400'000)(random_));
+    }
+    port_->begin(later);
+  }
+  Event<Item> wait(const Step<Item>& step) override { return port_->wait(step); }
+
+ private:
+  std::unique_ptr<sim::SimPort<Item>> port_;
+  std::mt19937_64 random_;
+};
+
+template <class Item, class AnyPort>
+void take_port(Link& link, std::shared_ptr<AnyPort> port) {
+  if constexpr (std::is_same_v<Item, CanFrame>) {
+    link.frames = port.get();
+  } else {
+    link.bytes = port.get();
+  }
+  link.owner = std::move(port);
+}
+
+/// `device` stands where the encoder of this address would, and must outlive the link.
+template <class Item>
+void put_on_line(Link& link, const EncoderAddress& encoder, Machine<Item>& device, const VirtualWay& way = {}) {
+  const LinkKind kind = encoder.unit->link;
+  const LineSettings settings = encoder.line.with_some_rate();
+  link.place = "here";
+  if (way.rough) {
+    auto line = std::make_shared<sim::RoughLine<Item>>(kind, settings, device, way.seed);
+    line->set_rates(*way.rough);
+    return take_port<Item>(link, std::move(line));
+  }
+  const sim::RealTime real_time = way.clock != nullptr ? way.clock->real_time() : sim::RealTime{};
+  auto line = std::make_unique<sim::SimPort<Item>>(kind, settings, device, real_time);
+  if (way.echo) line->set_echo(true);
+  if (way.rate != 0 && way.rate != settings.rate) {
+    line->begin({.kind = Step<Item>::Kind::configure, .rate = way.rate});
+  }
+  if (way.pauses) return take_port<Item>(link, std::make_shared<UnevenPort<Item>>(std::move(line), *way.pauses));
+  take_port<Item>(link, std::shared_ptr<sim::SimPort<Item>>(std::move(line)));
+}
+
+/// A virtual encoder as its address describes it, with options, motion, conditions, alarms and faults.
+inline Link virtual_link(const EncoderAddress& encoder, const VirtualWay& way = {}) {
+  Link link;
+  link.device = std::make_unique<VirtualDevice>(*encoder.unit, encoder.options, encoder.device);
+  link.device->power_on(Time{});
+  if (link.device->bytes() != nullptr) {
+    put_on_line(link, encoder, *link.device->bytes(), way);
+  } else {
+    put_on_line(link, encoder, *link.device->frames(), way);
+  }
+  return link;
+}
+
+}  // namespace absenc::client

@@ -1,0 +1,184 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "absenc/client/recording.hpp"
+
+#include <fmt/chrono.h>
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cctype>
+#include <chrono>
+#include <filesystem>
+#include <utility>
+#include <vector>
+
+#include "absenc/client/encoder/connection.hpp"
+#include "absenc/client/encoder/end_at.hpp"
+#include "absenc/client/encoder/pace.hpp"
+#include "absenc/client/error.hpp"
+#include "absenc/client/recording/record_file.hpp"
+#include "absenc/client/text/unit_text.hpp"
+#include "absenc/os/signals.hpp"
+
+namespace absenc::client {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string date_and_time() {
+  const auto now = std::chrono::time_point_cast<std::chrono::milliseconds>(std::chrono::system_clock::now());
+  const auto milliseconds = now.time_since_epoch().count() % 1000;
+  return fmt::format("{:%Y-%m-%dT%H:%M:%S}.{:03}Z", fmt::gmtime(std::chrono::system_clock::to_time_t(now)),
+                     milliseconds);
+}
+
+}  // namespace
+
+Recording::Recording(const RecordingSettings& settings, Encoder& encoder)
+    : settings_(settings),
+      encoder_(encoder),
+      start_(os::now()),
+      rows_(encoder.unit(), encoder.options(), start_, SampleRows::With::motion, encoder.joint()),
+      started_(date_and_time()) {
+  static_cast<void>(record_form(settings.path));  // before the folder is looked at
+  if (settings_.part_bytes || settings_.part_time) refuse_parts_of_another_recording();
+  open_part();
+}
+
+Recording::~Recording() = default;
+
+std::uint64_t Recording::bytes() const { return finished_bytes_ + file_->size(); }
+
+RecordCounts Recording::counts() const {
+  RecordCounts all = finished_;
+  return all += file_->counts();
+}
+
+bool Recording::run(const std::function<void(const Sample&)>& heard) {
+  const Time end = settings_.duration ? start_ + *settings_.duration : never;
+  const EndAt end_at(encoder_, end);
+  Pace pace(settings_.rate_hz);
+  encoder_.period_ = pace.period();
+  pace.start_at(start_);
+  Sample sample;
+  const auto tell_missed = [&] {
+    const std::uint64_t missed = pace.take_missed();
+    // While the port is away, that it was lost says so.
+    const bool was_there = sample.kind == Sample::Kind::reading || sample.kind == Sample::Kind::failed;
+    if (was_there) miss(missed);
+  };
+  bool has_all = false;
+  try {
+    while (os::now() < end && !os::interrupted()) {
+      sample = encoder_.next();
+      take(sample);
+      if (heard) heard(sample);
+      has_all = settings_.count != 0 && taken_ >= settings_.count;
+      if (has_all) break;
+      pace.wait(end, [this](Time time) { encoder_.wait_until(time); });
+      tell_missed();
+    }
+  } catch (const os::Interrupted&) {
+  } catch (const Cancelled&) {
+  }
+  if (!has_all) pace.leave_out(end);  // the end may have come while a reading was taken
+  tell_missed();
+  write_gap();
+  file_->finish();
+  return sample.kind == Sample::Kind::reading;
+}
+
+std::string Recording::part_path(unsigned part) const {
+  if (!settings_.part_bytes && !settings_.part_time) return settings_.path;
+  const fs::path path(settings_.path);
+  const std::string name = fmt::format("{}-{:04}{}", path.stem().string(), part, path.extension().string());
+  return path.parent_path() / name;
+}
+
+// Later parts of an older recording would stand in the way in the middle of this one.
+void Recording::refuse_parts_of_another_recording() const {
+  const fs::path path(settings_.path);
+  const std::string begin = path.stem().string() + "-";
+  const std::string ending = path.extension();
+  std::error_code error;  // a folder that cannot be read will be told when the file is made
+  for (const fs::directory_entry& entry :
+       fs::directory_iterator(path.has_parent_path() ? path.parent_path() : ".", error)) {
+    const std::string name = entry.path().filename();
+    if (!name.starts_with(begin) || !name.ends_with(ending) || name.size() < begin.size() + ending.size() + 4) continue;
+    const std::string number = name.substr(begin.size(), name.size() - begin.size() - ending.size());
+    if (!std::all_of(number.begin(), number.end(), [](unsigned char c) { return std::isdigit(c) != 0; })) continue;
+    throw UsageError(
+        fmt::format("there is already a part of another recording, {}: choose another name", entry.path().string()));
+  }
+}
+
+void Recording::open_part() {
+  if (file_) {
+    file_->finish();
+    finished_bytes_ += file_->size();
+    finished_ += file_->counts();
+  }
+  ++part_;
+  part_start_ = os::now();
+  file_ = make_record_file(part_path(part_), rows_.columns(), header());
+}
+
+RecordHeader Recording::header() const {
+  const Model* known = encoder_.options().model;
+  return {.encoder = settings_.encoder,
+          .protocol = std::string(encoder_.unit().id),
+          .model = std::string(known != nullptr ? known->name : "none"),
+          .options = fmt::format("{}", fmt::join(option_texts(encoder_.unit(), encoder_.options()), " ")),
+          .started = started_,
+          .rate_hz = settings_.rate_hz,
+          .every = settings_.every,
+          .part = part_};
+}
+
+// Of the readings every so manieth, but none with other alarms is left out; of what went wrong everything but waiting.
+bool Recording::wanted(const Sample& sample) {
+  if (sample.kind == Sample::Kind::absent) return false;
+  if (sample.kind != Sample::Kind::reading) return true;
+  const Reading& reading = sample.reading;
+  const bool other_alarms = reading.alarms != alarms_ || reading.alarms_reported != alarms_reported_;
+  alarms_ = reading.alarms;
+  alarms_reported_ = reading.alarms_reported;
+  return seen_++ % settings_.every == 0 || other_alarms;
+}
+
+void Recording::miss(std::uint64_t readings) {
+  if (readings == 0) return;
+  gap_ += readings;
+  gap_at_ = os::now();
+}
+
+void Recording::write_gap() {
+  if (gap_ == 0) return;
+  const std::uint64_t missed = std::exchange(gap_, 0);
+  file_->append(rows_.of_gap(gap_at_, missed), {.gaps = 1, .missed = missed});
+}
+
+void Recording::take(const Sample& sample) {
+  if (!wanted(sample)) return file_->require_there();
+  const bool full = settings_.part_bytes && file_->size() >= *settings_.part_bytes;
+  const bool over = settings_.part_time && os::now() - part_start_ >= *settings_.part_time;
+  if (full || over) open_part();
+  write_gap();
+  const std::uint64_t is_reading = sample.kind == Sample::Kind::reading ? 1 : 0;
+  const std::uint64_t is_failure = sample.kind == Sample::Kind::failed ? 1 : 0;
+  file_->append(rows_.of(sample), {.readings = is_reading, .failures = is_failure});
+  taken_ += is_reading;
+}
+
+std::vector<std::string> Recording::paths() const {
+  std::vector<std::string> paths;
+  for (unsigned part = 1; part <= part_; ++part) paths.push_back(part_path(part));
+  return paths;
+}
+
+std::string Recording::names() const {
+  return part_ == 1 ? part_path(1) : fmt::format("{} to {}", part_path(1), part_path(part_));
+}
+
+}  // namespace absenc::client

@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "absenc/client/tap.hpp"
+
+#include <atomic>
+#include <cstddef>
+#include <utility>
+
+#include "absenc/client/captures/annotation_rows.hpp"
+#include "absenc/client/error.hpp"
+#include "absenc/client/tap/tap_run.hpp"
+
+namespace absenc::client {
+
+struct Tap::Work final : capture::AnnotationSink {
+  Work(const std::string& place, const TapChoices& choices)
+      : run(place, choices), rows(settled(run), run.options(), clock) {}
+
+  static const Unit& settled(TapRun& run) {
+    if (run.settle([](const std::string&) {})) return run.unit();
+    if (run.outcome().end == Receiver::End::interrupted) throw os::Interrupted{};
+    if (!run.outcome().problem.empty()) throw Failure(run.outcome().problem);
+    throw Failure(run.received_bytes() == 0
+                      ? "nothing came: does the drive ask the encoder?"
+                      : "bytes came, but no protocol explains them: say which it is, or the baud rate");
+  }
+
+  void put(const capture::Annotation& annotation) override {
+    if (filled == ready.size()) ready.push_back({rows.columns(), {}});
+    rows.fill(annotation, run.options(), ready[filled++]);
+  }
+
+  const Row* take() {
+    while (++at >= filled) {
+      if (is_over) return end();
+      filled = at = 0;
+      is_over = !run.advance();
+      --at;  // the next is the first
+    }
+    return &ready[at];
+  }
+
+  const Row* end() {
+    if (is_cancelled) throw Cancelled{};
+    const TapOutcome outcome = run.outcome();
+    if (outcome.end == Receiver::End::interrupted) throw os::Interrupted{};
+    if (!outcome.problem.empty()) throw Failure(outcome.problem);
+    return nullptr;
+  }
+
+  TapRun run;
+  TickClock clock{arrival_ticks_per_second};
+  AnnotationRows rows;
+  std::vector<Row> ready;  // filled again and again
+  std::size_t filled = 0;
+  std::size_t at = 0;
+  bool is_over = false;
+  std::atomic<bool> is_cancelled = false;
+};
+
+Tap::Tap(const std::string& place, const TapChoices& choices) : work_(std::make_unique<Work>(place, choices)) {}
+Tap::Tap(Tap&&) noexcept = default;
+Tap& Tap::operator=(Tap&&) noexcept = default;
+Tap::~Tap() = default;
+
+Tap::Iterator Tap::begin() {
+  work_->run.begin(*work_);
+  --work_->at;
+  advance();
+  return Iterator(*this);
+}
+
+void Tap::advance() { row_ = work_->take(); }
+
+void Tap::cancel() {
+  work_->is_cancelled = true;
+  work_->run.cancel();
+}
+
+std::string_view Tap::protocol() const { return work_->run.unit().id; }
+std::vector<std::string> Tap::options() const { return settings_for(work_->run.unit(), work_->run.options()); }
+std::span<const Column> Tap::columns() const { return work_->rows.columns(); }
+
+}  // namespace absenc::client
