@@ -48,7 +48,7 @@ class Axis {
     }
   }
   void received(std::uint8_t byte, Time now) {
-    if (!carrier_.is_busy()) ++unasked_;
+    if (!carrier_.is_busy()) ++unsolicited_;
     carrier_.received({&byte, 1}, now);
   }
   void sent(Time now) { carrier_.sent(now); }
@@ -96,7 +96,7 @@ class Axis {
   }
   [[nodiscard]] std::uint32_t requests() const { return requests_; }
   [[nodiscard]] std::uint32_t silences() const { return carrier_.silences(); }
-  [[nodiscard]] std::uint32_t unasked() const { return unasked_; }
+  [[nodiscard]] std::uint32_t unsolicited() const { return unsolicited_; }
 
  private:
   host::Carrier<std::uint8_t, Axis> carrier_;
@@ -108,7 +108,7 @@ class Axis {
   std::size_t first_ = 0;
   std::size_t count_ = 0;
   std::uint32_t requests_ = 0;
-  std::uint32_t unasked_ = 0;
+  std::uint32_t unsolicited_ = 0;
   bool positions_wanted_ = false;
 };
 
@@ -215,7 +215,7 @@ bool run() {
   watch.tell();
   Watch::tell("requests", axis->requests());
   Watch::tell("silences", axis->silences());
-  Watch::tell("unasked", axis->unasked());
+  Watch::tell("unasked", axis->unsolicited());
   Watch::tell("cleared", cleared ? 1 : 0);
   Watch::tell("stored", stored ? 1 : 0);
   Watch::tell("stack", machine::stack_used());

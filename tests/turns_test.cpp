@@ -94,7 +94,7 @@ class Bench {
     const LineSettings line = line_settings(*one.unit, built);
     port_ = std::make_unique<sim::SimPort<Item>>(one.unit->link, line.with_some_rate(), *device_);
     session_ = std::make_unique<Session<Item>>(*one.unit, known_, *port_, host_storage_);
-    unwrapper_ = Unwrapper(speed_limit(known_), sends_unasked(*one.unit, known_) ? Times::arrived : Times::latched);
+    unwrapper_ = Unwrapper(speed_limit(known_), sends_unsolicited(*one.unit, known_) ? Times::arrived : Times::latched);
   }
 
   void pause(Time time) { port_->line().run_until(port_->line().now() + time); }

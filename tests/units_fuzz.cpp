@@ -107,7 +107,7 @@ void converse(const Unit& unit, const Options& options, const Command& command, 
   const bool clocks = unit.link == LinkKind::spi || unit.link == LinkKind::clocked;
   Time now{};
   std::span<const Item> left{};
-  bool unasked = true;
+  bool unsolicited = true;
   for (unsigned steps = 0; steps < 30'000; ++steps) {
     const Step<Item> step = conversation->next(now);
     require(conversation->error() == Error::none || conversation->reading() == nullptr);
@@ -125,8 +125,8 @@ void converse(const Unit& unit, const Options& options, const Command& command, 
       // Whoever is the clock gets as much as he asks for.
       if (clocks) items.resize(step.bits != 0 ? (step.bits + 7) / 8 : std::max(step.expect, step.out.size()));
       left = items;
-    } else if (!left.empty() || unasked) {
-      if (unasked) left = items;
+    } else if (!left.empty() || unsolicited) {
+      if (unsolicited) left = items;
       const auto part = left.first(clocks ? left.size() : std::min(piece, left.size()));
       left = left.subspan(part.size());
       if (!part.empty()) conversation->feed({.kind = Kind::received, .at = now, .items = part});
@@ -135,7 +135,7 @@ void converse(const Unit& unit, const Options& options, const Command& command, 
       if (step.at > now && step.at != never) now = step.at;
       conversation->feed({.kind = Kind::timer, .at = now});
     }
-    unasked = false;
+    unsolicited = false;
   }
   require(false);
 }

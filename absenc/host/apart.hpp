@@ -12,7 +12,7 @@ namespace absenc::host {
 enum class Times : std::uint8_t { latched, arrived };
 
 /// An encoder that transmits by itself has no time but that of its arrival.
-[[nodiscard]] constexpr bool sends_unasked(const Unit& unit, const Options& options) {
+[[nodiscard]] constexpr bool sends_unsolicited(const Unit& unit, const Options& options) {
   return unit.link == LinkKind::can || (unit.streams != nullptr && unit.streams(options));
 }
 

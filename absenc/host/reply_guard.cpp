@@ -287,7 +287,7 @@ void ReplyGuard<Item>::count_late(Owed* owed, Time at) {
   if (owed != nullptr) {
     sent_at = owed->sent_at.empty() ? owed->lost_last : owed->sent_at[0];
     // The first late reply of several that are owed may be to any of them: the next one tells. On CAN it may also have
-    // been sent unasked.
+    // been sent unsolicited.
     if (!is_can && lateness_ == Time{}) sent_at = owed->newest();
   }
   lateness_ = std::max(lateness_, std::min(at - sent_at, longest_way));
@@ -391,7 +391,7 @@ void ReplyGuard<Item>::end_late(Owed* owed, Time at) {
       return;
     }
   }
-  // On CAN it may also have been sent unasked.
+  // On CAN it may also have been sent unsolicited.
   if (!is_can) until_ = std::min(std::max(until_, at + quiet_time()), latest_);
 }
 

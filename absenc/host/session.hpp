@@ -184,7 +184,7 @@ class Session {
     apart_ = Apart(times());
   }
   [[nodiscard]] Reach reach() const { return Reach::of(limit_, unit_->resolution(options_)); }
-  [[nodiscard]] Times times() const { return sends_unasked(*unit_, options_) ? Times::arrived : Times::latched; }
+  [[nodiscard]] Times times() const { return sends_unsolicited(*unit_, options_) ? Times::arrived : Times::latched; }
 
   // Whether this and the one before cannot both be right.
   [[nodiscard]] bool refutes(const Reading& reading) const {

@@ -12,7 +12,7 @@
 
 namespace absenc::os {
 
-KeptFolder::KeptFolder(const std::string& path) : path_(path) {
+OwnedFolder::OwnedFolder(const std::string& path) : path_(path) {
   if (::mkdir(path.c_str(), 0777) < 0 && errno != EEXIST) {
     if (errno != ENOENT) throw system_failure("making the folder " + path, errno);
     throw Failure(Failure::Kind::not_found, "the folder " + path + " cannot be made: the one that it is in is missing");
@@ -24,7 +24,7 @@ KeptFolder::KeptFolder(const std::string& path) : path_(path) {
   throw Failure(Failure::Kind::in_use, "the folder " + path + " is locked: another process keeps it");
 }
 
-bool KeptFolder::is_there() const {
+bool OwnedFolder::is_there() const {
   struct stat ours {
   }, named{};
   return ::fstat(folder_.get(), &ours) == 0 && ::stat(path_.c_str(), &named) == 0 && ours.st_ino == named.st_ino &&

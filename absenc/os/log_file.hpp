@@ -12,11 +12,11 @@
 namespace absenc::os {
 
 /// A folder, locked (flock) for as long as this lives.
-class KeptFolder {
+class OwnedFolder {
  public:
   /// Makes it where there is none, but not its parent. Throws Failure: `in_use` when another process keeps it,
   /// `not_found` when its parent is missing.
-  explicit KeptFolder(const std::string& path);
+  explicit OwnedFolder(const std::string& path);
 
   /// Whether it still has its name: it may have been removed, moved or replaced.
   [[nodiscard]] bool is_there() const;

@@ -77,11 +77,11 @@ Response error_response(unsigned status, std::string_view sentence) {
   return {status, "application/json", Json::object().set("error", sentence).line() + "\n"};
 }
 
-Access::Access(const Choices& choices, Happenings& happenings)
+Access::Access(const Choices& choices, ServerEvents& server_events)
     : token_file_(choices.token_file),
       public_origin_(origin_of(choices.public_url)),
       on_loopback_(choices.on_loopback),
-      happenings_(&happenings) {
+      server_events_(&server_events) {
   if (token_file_.empty()) {
     if (on_loopback_) return;
     throw UsageError("whoever can reach this address could read the encoders: give --token-file too");
@@ -110,9 +110,9 @@ bool Access::may_guess_on(const std::string& peer) const {
   if (guesses_.size() >= most_addresses && !guesses_.contains(peer)) return false;
   Guesses& guesses = guesses_.try_emplace(peer, Guesses{now, 0}).first->second;
   ++guesses.count;
-  if (guesses.count == 1) happenings_->add({calendar_ms(), "", "access", "a wrong token came", peer});
+  if (guesses.count == 1) server_events_->add({calendar_ms(), "", "access", "a wrong token came", peer});
   if (guesses.count == most_guesses + 1) {
-    happenings_->add(
+    server_events_->add(
         {calendar_ms(), "", "access",
          fmt::format("more than {} wrong tokens came within a minute: the rest of it refuses them with 429",
                      most_guesses),

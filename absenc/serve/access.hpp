@@ -12,9 +12,9 @@
 #include <vector>
 
 #include "absenc/core/time.hpp"
-#include "absenc/serve/happening.hpp"
 #include "absenc/serve/http.hpp"
 #include "absenc/serve/secret_file.hpp"
+#include "absenc/serve/server_event.hpp"
 
 namespace absenc::serve {
 
@@ -33,8 +33,8 @@ class Access {
     bool on_loopback = false;  // nobody on another computer can reach the server itself
   };
   /// Throws Failure when the file cannot be read, others may read it, or a token is shorter than 16 characters;
-  /// UsageError. `happenings` outlives it.
-  Access(const Choices& choices, Happenings& happenings);
+  /// UsageError. `server_events` outlives it.
+  Access(const Choices& choices, ServerEvents& server_events);
 
   /// Reads the file again: tokens that are no longer in it end at once. Throws Failure as the constructor; then those
   /// of before count.
@@ -65,7 +65,7 @@ class Access {
   std::string token_file_;
   std::string public_origin_;  // "https://encoders.example:8443"; "": there is no proxy
   bool on_loopback_;
-  Happenings* happenings_;
+  ServerEvents* server_events_;
   mutable std::mutex mutex_;  // guards what follows
   std::vector<Secret> tokens_;
   mutable std::map<std::string, Guesses> guesses_;  // by address

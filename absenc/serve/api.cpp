@@ -127,13 +127,13 @@ Json state_json(const Fleet& fleet, const Chronicler* chronicler) {
   return Json::object().set("at_ms", calendar_ms()).set("encoders", encoders).set("history", history);
 }
 
-Api::Api(Fleet& fleet, const Access& access, Streams& streams, Worker& worker, const Happenings& happenings,
+Api::Api(Fleet& fleet, const Access& access, Streams& streams, Worker& worker, const ServerEvents& server_events,
          Chronicler* chronicler, const Sending& sending)
     : fleet_(&fleet),
       access_(&access),
       streams_(&streams),
       worker_(&worker),
-      happenings_(&happenings),
+      server_events_(&server_events),
       chronicler_(chronicler),
       sending_(&sending) {}
 
@@ -275,7 +275,7 @@ void Api::acknowledge(Watch& watch, const Request& request, const Reply& reply) 
     reply.send(json_response(Json::object().set("ok", true).set("alarm", alarm).set("who", token)));
   };
   if (chronicler_ == nullptr) return answer();
-  chronicler_->when_written(happenings_->added(), answer);
+  chronicler_->when_written(server_events_->added(), answer);
 }
 
 // It opens the port anew, with other settings too: others on the line would lose it.
@@ -299,9 +299,9 @@ void Api::give(Watch& watch, Order order, const Request& request, const Reply& r
   }
   // The history is the record of who changed what: it has the command before anybody is told that it was done.
   if (chronicler_ != nullptr && order.kind == Order::Kind::command) {
-    order.done = [chronicler = chronicler_, happenings = happenings_,
+    order.done = [chronicler = chronicler_, server_events = server_events_,
                   answer = std::move(order.done)](const Done& done) {
-      chronicler->when_written(happenings->added(), [answer, done] { answer(done); });
+      chronicler->when_written(server_events->added(), [answer, done] { answer(done); });
     };
   }
   const std::string_view refused = watch.give(std::move(order));
@@ -315,7 +315,7 @@ void Api::past(const std::string& encoder, bool events, const Request& request, 
   const auto job = [reader = &chronicler_->reader(), range, rows, encoder, events, reply] {
     try {
       reply.send(
-          json_response(events ? reader->happenings(encoder, range, rows) : reader->seconds(encoder, range, rows)));
+          json_response(events ? reader->server_events(encoder, range, rows) : reader->seconds(encoder, range, rows)));
     } catch (const std::exception& error) {
       reply.send(error_response(503, error.what()));
     }

@@ -23,7 +23,7 @@ namespace absenc::serve {
 class Api {
  public:
   /// All of them outlive it; `chronicler` null: there is no history.
-  Api(Fleet& fleet, const Access& access, Streams& streams, Worker& worker, const Happenings& happenings,
+  Api(Fleet& fleet, const Access& access, Streams& streams, Worker& worker, const ServerEvents& server_events,
       Chronicler* chronicler, const Sending& sending);
 
   void answer(Request request, const Reply& reply);
@@ -46,7 +46,7 @@ class Api {
   const Access* access_;
   Streams* streams_;
   Worker* worker_;
-  const Happenings* happenings_;
+  const ServerEvents* server_events_;
   Chronicler* chronicler_;
   const Sending* sending_;
 };

@@ -42,10 +42,11 @@ std::int64_t ClockWatch::look(std::int64_t calendar, Time now) {
   return std::abs(jump) < smallest_jump_ms ? 0 : jump;
 }
 
-Chronicler::Chronicler(const std::string& path, const HistoryLimits& limits, const Fleet& fleet, Happenings& happenings)
+Chronicler::Chronicler(const std::string& path, const HistoryLimits& limits, const Fleet& fleet,
+                       ServerEvents& server_events)
     : writer_(path, limits),
       fleet_(&fleet),
-      told_(&happenings),
+      told_(&server_events),
       health_{writer_.trouble(), 0},
       thread_([this](const std::stop_token& stop) { work(stop); }) {}
 
@@ -55,9 +56,9 @@ Chronicler::~Chronicler() {
   write();
 }
 
-void Chronicler::add(const std::vector<Happening>& happenings, std::uint64_t added) {
+void Chronicler::add(const std::vector<ServerEvent>& server_events, std::uint64_t added) {
   const std::lock_guard lock(mutex_);
-  happenings_.insert(happenings_.end(), happenings.begin(), happenings.end());
+  server_events_.insert(server_events_.end(), server_events.begin(), server_events.end());
   added_ = added;
   if (!waiting_.empty()) changed_.notify_all();
 }
@@ -106,14 +107,14 @@ void Chronicler::write() {
   for (const auto& watch : fleet_->all()) {
     for (const Second& second : watch->take_seconds()) seconds.push_back({watch->name(), second});
   }
-  std::vector<Happening> happenings;
+  std::vector<ServerEvent> server_events;
   std::uint64_t added = 0;
   {
     const std::lock_guard lock(mutex_);
-    happenings = std::exchange(happenings_, {});
+    server_events = std::exchange(server_events_, {});
     added = added_;
   }
-  writer_.write(seconds, happenings);
+  writer_.write(seconds, server_events);
   for (std::string& note : writer_.take_notes()) told_->add({calendar_ms(), "", "history", std::move(note)});
   std::vector<std::function<void()>> served;
   {

@@ -33,15 +33,15 @@ class ClockWatch {
 
 class Chronicler {
  public:
-  /// `fleet` and `happenings`, which is told what happens to the history, outlive it. Throws HistoryInUse.
-  Chronicler(const std::string& path, const HistoryLimits& limits, const Fleet& fleet, Happenings& happenings);
+  /// `fleet` and `server_events`, which is told what happens to the history, outlive it. Throws HistoryInUse.
+  Chronicler(const std::string& path, const HistoryLimits& limits, const Fleet& fleet, ServerEvents& server_events);
   /// Writes what there still is.
   ~Chronicler();
 
-  /// `added`: how many there have been with them (Happenings::added).
-  void add(const std::vector<Happening>& happenings, std::uint64_t added);
-  /// Calls `then` once the first `added` happenings are in the file, so that kill -9 does not lose them, or could not
-  /// be written; from the thread of the history.
+  /// `added`: how many there have been with them (ServerEvents::added).
+  void add(const std::vector<ServerEvent>& server_events, std::uint64_t added);
+  /// Calls `then` once the first `added` server_events are in the file, so that kill -9 does not lose them, or could
+  /// not be written; from the thread of the history.
   void when_written(std::uint64_t added, std::function<void()> then);
 
   struct Health {
@@ -59,12 +59,12 @@ class Chronicler {
 
   HistoryWriter writer_;
   const Fleet* fleet_;
-  Happenings* told_;
+  ServerEvents* told_;
   ClockWatch clock_;
   mutable std::mutex mutex_;  // guards what follows
   std::condition_variable_any changed_;
-  std::vector<Happening> happenings_;
-  std::uint64_t added_ = 0;  // with those of `happenings_`
+  std::vector<ServerEvent> server_events_;
+  std::uint64_t added_ = 0;  // with those of `server_events_`
   std::vector<std::pair<std::uint64_t, std::function<void()>>> waiting_;
   Health health_;
   std::jthread thread_;  // last: it uses all of the others

@@ -41,8 +41,8 @@ struct Fleet::Wanted {
   double rate;
 };
 
-Fleet::Fleet(std::vector<std::string> names, double rate, Happenings& happenings)
-    : names_(std::move(names)), rate_(rate), happenings_(&happenings) {
+Fleet::Fleet(std::vector<std::string> names, double rate, ServerEvents& server_events)
+    : names_(std::move(names)), rate_(rate), server_events_(&server_events) {
   reload();
 }
 
@@ -117,7 +117,8 @@ std::string Fleet::reload() {
     // Side by side and not all at once.
     const double share = now.rate > 0 ? static_cast<double>(i) / (now.rate * static_cast<double>(all.size())) : 0;
     const Time offset(static_cast<std::int64_t>(1e9 * share));
-    next.push_back({now.description, std::make_shared<Watch>(now.name, now.address, now.rate, offset, *happenings_)});
+    next.push_back(
+        {now.description, std::make_shared<Watch>(now.name, now.address, now.rate, offset, *server_events_)});
   }
   const std::lock_guard lock(mutex_);
   served_ = std::move(next);

@@ -17,8 +17,8 @@ class Fleet {
   using Watches = std::vector<std::shared_ptr<Watch>>;
 
   /// `names` as for `absenc read`; none: all of absenc.toml. `rate` in readings a second of those for which the file
-  /// has no `rate_hz`; 0: as fast as can be. `happenings` outlives it. Throws UsageError.
-  Fleet(std::vector<std::string> names, double rate, Happenings& happenings);
+  /// has no `rate_hz`; 0: as fast as can be. `server_events` outlives it. Throws UsageError.
+  Fleet(std::vector<std::string> names, double rate, ServerEvents& server_events);
   ~Fleet();
   Fleet(const Fleet&) = delete;
   Fleet& operator=(const Fleet&) = delete;
@@ -46,7 +46,7 @@ class Fleet {
 
   std::vector<std::string> names_;
   double rate_;
-  Happenings* happenings_;
+  ServerEvents* server_events_;
   mutable std::mutex mutex_;
   std::vector<Served> served_;
 };

@@ -118,15 +118,15 @@ void HistoryWriter::set_aside(std::string_view why) {
   file_.reset();
 }
 
-void HistoryWriter::write(const std::vector<Entry>& seconds, const std::vector<Happening>& happenings) {
+void HistoryWriter::write(const std::vector<Entry>& seconds, const std::vector<ServerEvent>& server_events) {
   try {
     require_file();
     try {
-      insert(seconds, happenings);
+      insert(seconds, server_events);
     } catch (const DamagedFile& damaged) {
       set_aside(fmt::format("is damaged ({})", damaged.what()));
       open();
-      insert(seconds, happenings);
+      insert(seconds, server_events);
     }
     if (lost_now_ != 0) {
       notes_.push_back(
@@ -135,13 +135,13 @@ void HistoryWriter::write(const std::vector<Entry>& seconds, const std::vector<H
     lost_now_ = 0;
     trouble_.clear();
   } catch (const Failure& failure) {
-    note_loss(seconds.size() + happenings.size(), failure.what());
+    note_loss(seconds.size() + server_events.size(), failure.what());
   } catch (const os::Failure& failure) {
-    note_loss(seconds.size() + happenings.size(), failure.what());
+    note_loss(seconds.size() + server_events.size(), failure.what());
   }
 }
 
-void HistoryWriter::insert(const std::vector<Entry>& seconds, const std::vector<Happening>& happenings) {
+void HistoryWriter::insert(const std::vector<Entry>& seconds, const std::vector<ServerEvent>& server_events) {
   Sqlite& sqlite = file_->sqlite();
   sqlite.run("BEGIN IMMEDIATE");
   {
@@ -155,9 +155,9 @@ void HistoryWriter::insert(const std::vector<Entry>& seconds, const std::vector<
       bind_spread(second, 7, entry.second.speed);
       second.bind(10, entry.encoder).run();
     }
-    Statement happening(sqlite, "INSERT INTO happening (at_ms, encoder, kind, text, who) VALUES (?, ?, ?, ?, ?)");
-    for (const Happening& one : happenings) {
-      happening.bind(1, one.at_ms).bind(2, one.encoder).bind(3, one.kind).bind(4, one.text).bind(5, one.who).run();
+    Statement server_event(sqlite, "INSERT INTO happening (at_ms, encoder, kind, text, who) VALUES (?, ?, ?, ?, ?)");
+    for (const ServerEvent& one : server_events) {
+      server_event.bind(1, one.at_ms).bind(2, one.encoder).bind(3, one.kind).bind(4, one.text).bind(5, one.who).run();
     }
   }
   sqlite.run("COMMIT");
@@ -280,7 +280,7 @@ Json HistoryReader::seconds(const std::string& encoder, Range range, std::int64_
   return Json::object().set("encoder", encoder).set("step_s", step).set("rows", list);
 }
 
-Json HistoryReader::happenings(const std::string& encoder, Range range, std::int64_t most) {
+Json HistoryReader::server_events(const std::string& encoder, Range range, std::int64_t most) {
   const std::lock_guard lock(mutex_);
   Statement rows(database(),
                  "SELECT at_ms, encoder, kind, text, who FROM happening WHERE at_ms BETWEEN ?1 AND ?2 AND (?3 = '' OR "
@@ -288,7 +288,7 @@ Json HistoryReader::happenings(const std::string& encoder, Range range, std::int
   rows.bind(1, range.from_s * 1000).bind(2, range.to_s * 1000 + 999).bind(3, encoder).bind(4, most);
   Json list = Json::array();
   while (rows.next()) {
-    list.append(Happening{rows.integer(0), rows.text(1), rows.text(2), rows.text(3), rows.text(4)}.json());
+    list.append(ServerEvent{rows.integer(0), rows.text(1), rows.text(2), rows.text(3), rows.text(4)}.json());
   }
   return Json::object().set("events", list);
 }

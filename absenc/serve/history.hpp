@@ -11,8 +11,8 @@
 #include <vector>
 
 #include "absenc/client/text/json.hpp"
-#include "absenc/serve/happening.hpp"
 #include "absenc/serve/history_file.hpp"
+#include "absenc/serve/server_event.hpp"
 #include "absenc/serve/watch.hpp"
 
 namespace absenc::serve {
@@ -41,7 +41,7 @@ class HistoryReader {
   /// greatest, readings, errors],...]
   [[nodiscard]] client::Json seconds(const std::string& encoder, Range range, std::int64_t most);
   /// The newest `most` of an encoder, "": of all.
-  [[nodiscard]] client::Json happenings(const std::string& encoder, Range range, std::int64_t most);
+  [[nodiscard]] client::Json server_events(const std::string& encoder, Range range, std::int64_t most);
   /// Up to `most` rows of CSV, with where the next begin: behind `range.to_s` when there are no more.
   [[nodiscard]] std::pair<std::string, std::int64_t> csv(const std::string& encoder, Range range, std::int64_t most);
   [[nodiscard]] static std::string_view csv_header();
@@ -76,7 +76,7 @@ class HistoryWriter {
   };
   /// All of it or, when the disk is full, nothing: what was lost is counted. Begins anew where the file was moved,
   /// removed, replaced, truncated or damaged; a damaged one is kept under another name.
-  void write(const std::vector<Entry>& seconds, const std::vector<Happening>& happenings);
+  void write(const std::vector<Entry>& seconds, const std::vector<ServerEvent>& server_events);
   /// Deletes what is beyond the limits; cheap when there is nothing. By its age only once a day was recorded since.
   void trim();
 
@@ -92,7 +92,7 @@ class HistoryWriter {
   void require_file();
   void leave(HistoryFile::State state);
   void set_aside(std::string_view why);
-  void insert(const std::vector<Entry>& seconds, const std::vector<Happening>& happenings);
+  void insert(const std::vector<Entry>& seconds, const std::vector<ServerEvent>& server_events);
   void note_loss(std::size_t rows, const std::string& why);
   void roll_back();
   [[nodiscard]] bool was_recorded_since(std::int64_t at_s);

@@ -32,9 +32,9 @@ CREATE INDEX IF NOT EXISTS happening_at ON happening (at_ms);
 std::string log_of(const std::string& path) { return path + "-wal"; }
 std::string index_of(const std::string& path) { return path + "-shm"; }
 
-std::unique_ptr<os::KeptFile> lock(const std::string& path) {
+std::unique_ptr<os::OwnedFile> lock(const std::string& path) {
   try {
-    return std::make_unique<os::KeptFile>(path);
+    return std::make_unique<os::OwnedFile>(path);
   } catch (const os::Failure& failure) {
     if (failure.kind() != os::Failure::Kind::in_use) throw Failure(fmt::format("the history: {}", failure.what()));
     throw HistoryInUse(fmt::format(

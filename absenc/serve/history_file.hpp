@@ -8,7 +8,7 @@
 #include <optional>
 #include <string>
 
-#include "absenc/os/kept_file.hpp"
+#include "absenc/os/owned_file.hpp"
 #include "absenc/serve/sqlite.hpp"
 
 namespace absenc::serve {
@@ -52,7 +52,7 @@ class HistoryFile {
   [[nodiscard]] bool is_sound() const;
 
   std::string path_;
-  std::unique_ptr<os::KeptFile> kept_;  // until the database is closed: closing it would undo SQLite's locks
+  std::unique_ptr<os::OwnedFile> kept_;  // until the database is closed: closing it would undo SQLite's locks
   std::optional<Sqlite> sqlite_;
   os::FileIdentity log_;  // the write-ahead log and its index
   os::FileIdentity index_;

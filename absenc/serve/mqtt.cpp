@@ -51,11 +51,11 @@ std::string MqttHealth::metrics() const {
 
 // In the order in which each needs those above it.
 struct Mqtt::Parts {
-  Parts(const MqttSettings& wanted, const Fleet& fleet, Happenings& happenings)
+  Parts(const MqttSettings& wanted, const Fleet& fleet, ServerEvents& server_events)
       : settings(wanted),
         spool(settings.spool, settings.spool_bytes),
-        sender(settings, spool, fleet, happenings),
-        collector(settings, spool, fleet, happenings) {}
+        sender(settings, spool, fleet, server_events),
+        collector(settings, spool, fleet, server_events) {}
 
   MqttSettings settings;
   Spool spool;
@@ -63,11 +63,11 @@ struct Mqtt::Parts {
   MqttCollector collector;
 };
 
-Mqtt::Mqtt(const MqttSettings& settings, const Fleet& fleet, Happenings& happenings)
-    : parts_(std::make_unique<Parts>(settings, fleet, happenings)) {}
+Mqtt::Mqtt(const MqttSettings& settings, const Fleet& fleet, ServerEvents& server_events)
+    : parts_(std::make_unique<Parts>(settings, fleet, server_events)) {}
 Mqtt::~Mqtt() = default;
 
-void Mqtt::add(const std::vector<Happening>& happenings) { parts_->collector.add(happenings); }
+void Mqtt::add(const std::vector<ServerEvent>& server_events) { parts_->collector.add(server_events); }
 
 MqttHealth Mqtt::health() const {
   const MqttCollector::Figures collected = parts_->collector.figures();

@@ -38,14 +38,14 @@ struct MqttHealth {
 
 class Mqtt {
  public:
-  /// `fleet` and `happenings` outlive it. Throws Failure: the spool or a file cannot be used.
-  Mqtt(const MqttSettings& settings, const Fleet& fleet, Happenings& happenings);
+  /// `fleet` and `server_events` outlive it. Throws Failure: the spool or a file cannot be used.
+  Mqtt(const MqttSettings& settings, const Fleet& fleet, ServerEvents& server_events);
   /// Spools what there still is; gives a broker that is there a second to take it.
   ~Mqtt();
   Mqtt(const Mqtt&) = delete;
   Mqtt& operator=(const Mqtt&) = delete;
 
-  void add(const std::vector<Happening>& happenings);
+  void add(const std::vector<ServerEvent>& server_events);
   [[nodiscard]] MqttHealth health() const;
 
  private:

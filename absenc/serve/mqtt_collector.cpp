@@ -23,11 +23,12 @@ constexpr Time time_drops_show = std::chrono::seconds(30);           // in the h
 
 }  // namespace
 
-MqttCollector::MqttCollector(const MqttSettings& settings, Spool& spool, const Fleet& fleet, Happenings& happenings)
+MqttCollector::MqttCollector(const MqttSettings& settings, Spool& spool, const Fleet& fleet,
+                             ServerEvents& server_events)
     : settings_(&settings),
       spool_(&spool),
       fleet_(&fleet),
-      happenings_(&happenings),
+      server_events_(&server_events),
       next_id_(spool.next_id()),
       next_numbers_(spool.next_numbers()),
       thread_([this](const std::stop_token& stop) { work(stop); }) {}
@@ -38,11 +39,11 @@ MqttCollector::~MqttCollector() {
   collect();
 }
 
-void MqttCollector::add(const std::vector<Happening>& happenings) {
+void MqttCollector::add(const std::vector<ServerEvent>& server_events) {
   const std::lock_guard lock(mutex_);
   // Who has seen an alarm is for the page: subscribers get the alarms themselves.
-  std::copy_if(happenings.begin(), happenings.end(), std::back_inserter(waiting_),
-               [](const Happening& one) { return one.kind != "acknowledged"; });
+  std::copy_if(server_events.begin(), server_events.end(), std::back_inserter(waiting_),
+               [](const ServerEvent& one) { return one.kind != "acknowledged"; });
 }
 
 MqttCollector::Figures MqttCollector::figures() const {
@@ -77,12 +78,12 @@ void MqttCollector::collect() {
     collect_readings(*watch, std::move(taken.readings), messages);
     changed[watch->name()] = next_numbers_[watch->name()];
   }
-  std::vector<Happening> happenings;
+  std::vector<ServerEvent> server_events;
   {
     const std::lock_guard lock(mutex_);
-    happenings = std::exchange(waiting_, {});
+    server_events = std::exchange(waiting_, {});
   }
-  for (const Happening& one : happenings) {
+  for (const ServerEvent& one : server_events) {
     const std::int64_t id = next_id_ + static_cast<std::int64_t>(messages.size());
     messages.push_back({id, topic_of(settings_->prefix, one.encoder, "event"), event_text(id_text(id), one), 0});
   }
@@ -90,17 +91,17 @@ void MqttCollector::collect() {
   if (untold_.messages + untold_.readings == 0 || os::now() < next_told_) return;
   next_told_ = os::now() + between_dropped_tellings;
   const Spool::Counts told = std::exchange(untold_, {});
-  happenings_->add({calendar_ms(), "", "mqtt",
-                    fmt::format("{} readings in {} messages were dropped, the oldest first: {}", told.readings,
-                                told.messages, untold_why_)});
+  server_events_->add({calendar_ms(), "", "mqtt",
+                       fmt::format("{} readings in {} messages were dropped, the oldest first: {}", told.readings,
+                                   told.messages, untold_why_)});
 }
 
-void MqttCollector::collect_readings(const Watch& watch, std::vector<Passing> readings,
+void MqttCollector::collect_readings(const Watch& watch, std::vector<OutgoingReading> readings,
                                      std::vector<Message>& messages) {
   const std::string topic = topic_of(settings_->prefix, watch.name(), "readings");
   std::uint64_t& next = next_numbers_.try_emplace(watch.name(), 1).first->second;
-  for (std::span<const Passing> rest(readings); !rest.empty();) {
-    const std::span<const Passing> piece = rest.first(std::min(rest.size(), most_in_a_message));
+  for (std::span<const OutgoingReading> rest(readings); !rest.empty();) {
+    const std::span<const OutgoingReading> piece = rest.first(std::min(rest.size(), most_in_a_message));
     const std::int64_t id = next_id_ + static_cast<std::int64_t>(messages.size());
     messages.push_back({id, topic, readings_text(id_text(id), watch, next, piece), piece.size()});
     next += piece.size();
@@ -111,7 +112,7 @@ void MqttCollector::collect_readings(const Watch& watch, std::vector<Passing> re
 void MqttCollector::spool(const std::vector<Message>& messages, const std::map<std::string, std::uint64_t>& changed) {
   spool_->add(messages, changed);
   next_id_ += static_cast<std::int64_t>(messages.size());
-  for (const std::string& note : spool_->take_notes()) happenings_->add({calendar_ms(), "", "mqtt", note});
+  for (const std::string& note : spool_->take_notes()) server_events_->add({calendar_ms(), "", "mqtt", note});
   const Spool::Dropped dropped = spool_->take_dropped();
   if (dropped.counts.messages != 0) note_dropped(dropped.counts, dropped.why);
   const Spool::Condition condition = spool_->condition();

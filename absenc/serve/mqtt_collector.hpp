@@ -19,11 +19,11 @@ namespace absenc::serve {
 class MqttCollector {
  public:
   /// All outlive it. Throws Failure.
-  MqttCollector(const MqttSettings& settings, Spool& spool, const Fleet& fleet, Happenings& happenings);
+  MqttCollector(const MqttSettings& settings, Spool& spool, const Fleet& fleet, ServerEvents& server_events);
   /// Spools what there still is.
   ~MqttCollector();
 
-  void add(const std::vector<Happening>& happenings);
+  void add(const std::vector<ServerEvent>& server_events);
 
   struct Figures {
     std::string trouble{};      // why the spool cannot be written
@@ -36,7 +36,7 @@ class MqttCollector {
  private:
   void work(const std::stop_token& stop);
   void collect();
-  void collect_readings(const Watch& watch, std::vector<Passing> readings, std::vector<Message>& messages);
+  void collect_readings(const Watch& watch, std::vector<OutgoingReading> readings, std::vector<Message>& messages);
   void spool(const std::vector<Message>& messages, const std::map<std::string, std::uint64_t>& changed);
   void note_dropped(const Spool::Counts& dropped, const std::string& why);
   [[nodiscard]] std::string id_text(std::int64_t id) const;
@@ -44,7 +44,7 @@ class MqttCollector {
   const MqttSettings* settings_;
   Spool* spool_;
   const Fleet* fleet_;
-  Happenings* happenings_;
+  ServerEvents* server_events_;
 
   // Of the thread alone.
   std::int64_t next_id_;
@@ -56,7 +56,7 @@ class MqttCollector {
 
   mutable std::mutex mutex_;  // guards what follows
   std::condition_variable_any changed_;
-  std::vector<Happening> waiting_;
+  std::vector<ServerEvent> waiting_;
   Figures figures_;
   Time last_dropped_{};
   std::jthread thread_;  // last: it uses all of the others

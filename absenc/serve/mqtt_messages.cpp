@@ -32,7 +32,7 @@ void append(std::string& text, const std::optional<Number>& value) {
   text += value ? fmt::format_int(*value).c_str() : "null";
 }
 
-void append_angles(std::string& text, const Passing& one) {
+void append_angles(std::string& text, const OutgoingReading& one) {
   text += ',';
   append(text, one.joint);
   text += ',';
@@ -65,7 +65,7 @@ std::string topic_of(const std::string& prefix, std::string_view encoder, std::s
 }
 
 std::string readings_text(const std::string& id, const Watch& watch, std::uint64_t first,
-                          std::span<const Passing> readings) {
+                          std::span<const OutgoingReading> readings) {
   std::string text = Json::object()
                          .set("id", id)
                          .set("encoder", watch.name())
@@ -78,7 +78,7 @@ std::string readings_text(const std::string& id, const Watch& watch, std::uint64
   const bool has_angles = joint.is_set || joint.has_motor();
   text.back() = ',';
   text += "\"readings\":[";
-  for (const Passing& one : readings) {
+  for (const OutgoingReading& one : readings) {
     if (&one != readings.data()) text += ',';
     fmt::format_to(std::back_inserter(text), "[{},", one.at_us);
     append(text, one.place);
@@ -96,8 +96,8 @@ std::string readings_text(const std::string& id, const Watch& watch, std::uint64
   return text + "]}";
 }
 
-std::string event_text(const std::string& id, const Happening& happening) {
-  return happening.json().set("id", id).line();
+std::string event_text(const std::string& id, const ServerEvent& server_event) {
+  return server_event.json().set("id", id).line();
 }
 
 std::string server_state_text(std::string_view state, std::string_view why) {

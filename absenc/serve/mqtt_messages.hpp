@@ -9,9 +9,9 @@
 #include <vector>
 
 #include "absenc/client/text/json.hpp"
-#include "absenc/serve/happening.hpp"
+#include "absenc/serve/outbox.hpp"
 #include "absenc/serve/outlets.hpp"
-#include "absenc/serve/passing.hpp"
+#include "absenc/serve/server_event.hpp"
 #include "absenc/serve/watch.hpp"
 
 namespace absenc::serve {
@@ -24,8 +24,8 @@ namespace absenc::serve {
 
 /// `first`: the number of the first of `readings`; they ascend by one.
 [[nodiscard]] std::string readings_text(const std::string& id, const Watch& watch, std::uint64_t first,
-                                        std::span<const Passing> readings);
-[[nodiscard]] std::string event_text(const std::string& id, const Happening& happening);
+                                        std::span<const OutgoingReading> readings);
+[[nodiscard]] std::string event_text(const std::string& id, const ServerEvent& server_event);
 
 /// Of the server: "online" or "offline".
 [[nodiscard]] std::string server_state_text(std::string_view state, std::string_view why);

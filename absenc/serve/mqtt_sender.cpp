@@ -36,8 +36,8 @@ constexpr Time between_connected_tellings = 60s;  // of a connection that comes 
 
 }  // namespace
 
-MqttSender::MqttSender(const MqttSettings& settings, Spool& spool, const Fleet& fleet, Happenings& happenings)
-    : settings_(&settings), spool_(&spool), fleet_(&fleet), happenings_(&happenings) {
+MqttSender::MqttSender(const MqttSettings& settings, Spool& spool, const Fleet& fleet, ServerEvents& server_events)
+    : settings_(&settings), spool_(&spool), fleet_(&fleet), server_events_(&server_events) {
   for (const auto& [name, next] : spool.next_numbers()) served_.insert(name);
   static_cast<void>(MqttClient(settings.broker, identity(), version_));  // whether its files are good
   thread_ = std::jthread([this](const std::stop_token& stop) { work(stop); });
@@ -313,6 +313,6 @@ void MqttSender::become_lost(const std::string& why) {
   tell(fmt::format("nothing reaches {}: {}; what it shall have waits on disk", settings_->broker.text(), why));
 }
 
-void MqttSender::tell(const std::string& text) { happenings_->add({calendar_ms(), "", "mqtt", text}); }
+void MqttSender::tell(const std::string& text) { server_events_->add({calendar_ms(), "", "mqtt", text}); }
 
 }  // namespace absenc::serve

@@ -24,7 +24,7 @@ namespace absenc::serve {
 class MqttSender {
  public:
   /// All outlive it. Throws Failure: a file for the connection cannot be used.
-  MqttSender(const MqttSettings& settings, Spool& spool, const Fleet& fleet, Happenings& happenings);
+  MqttSender(const MqttSettings& settings, Spool& spool, const Fleet& fleet, ServerEvents& server_events);
   /// A broker that is there has a second to take what there is.
   ~MqttSender();
 
@@ -68,7 +68,7 @@ class MqttSender {
   const MqttSettings* settings_;
   Spool* spool_;
   const Fleet* fleet_;
-  Happenings* happenings_;
+  ServerEvents* server_events_;
 
   // Of the thread alone.
   MqttVersion version_ = MqttVersion::v5;

@@ -18,7 +18,7 @@ std::string Sending::change_to(const Outlets& outlets) {
     old.reset();  // the next one may have its spool, which is locked
     now_.mqtt.reset();
     std::shared_ptr<Mqtt> next;
-    if (outlets.mqtt) next = std::make_shared<Mqtt>(*outlets.mqtt, *fleet_, *happenings_);
+    if (outlets.mqtt) next = std::make_shared<Mqtt>(*outlets.mqtt, *fleet_, *server_events_);
     now_.mqtt = outlets.mqtt;
     if (!outlets.mqtt) stop_passing(Watch::Outlet::mqtt);  // else they wait for the next one
     changed += fmt::format("; MQTT: {}", outlets.mqtt ? outlets.mqtt->broker.text() : "none");
@@ -45,8 +45,8 @@ std::shared_ptr<Mqtt> Sending::mqtt() const {
   return mqtt_;
 }
 
-void Sending::add(const std::vector<Happening>& happenings) {
-  if (const std::shared_ptr<Mqtt> to = mqtt()) to->add(happenings);
+void Sending::add(const std::vector<ServerEvent>& server_events) {
+  if (const std::shared_ptr<Mqtt> to = mqtt()) to->add(server_events);
 }
 
 MqttHealth Sending::mqtt_health() const {

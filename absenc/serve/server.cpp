@@ -41,13 +41,13 @@ struct Server::Parts {
       : listener(os::listen_at(choices.host, choices.port)),
         url(url_of(choices.host, listener.port)),
         served_ports(url),
-        access({choices.token_file, choices.public_url, listener.on_loopback}, happenings),
-        fleet(choices.encoders, choices.rate, happenings),
-        sending(fleet, happenings) {
+        access({choices.token_file, choices.public_url, listener.on_loopback}, server_events),
+        fleet(choices.encoders, choices.rate, server_events),
+        sending(fleet, server_events) {
     sending.change_to(read_outlets(choices.outlets));
-    if (!choices.history.empty()) chronicler.emplace(choices.history, choices.limits, fleet, happenings);
+    if (!choices.history.empty()) chronicler.emplace(choices.history, choices.limits, fleet, server_events);
     Chronicler* history = chronicler ? &*chronicler : nullptr;
-    api.emplace(fleet, access, streams, worker, happenings, history, sending);
+    api.emplace(fleet, access, streams, worker, server_events, history, sending);
     http.emplace(
         std::move(listener), [this](const Request& request, const Reply& reply) { api->answer(request, reply); },
         std::vector<std::string>{"/healthz", "/metrics"});
@@ -60,7 +60,7 @@ struct Server::Parts {
     teller.join();
     http.reset();  // before what it asks
     fleet.end();   // what a command tells at its end goes into the history
-    tell_happenings();
+    write_events();
     sending.change_to({});
   }
 
@@ -78,7 +78,7 @@ struct Server::Parts {
     Time next_second{};
     while (!stop.stop_requested()) {
       const Time now = os::now();
-      tell_happenings();
+      write_events();
       tell_points();
       if (now >= next_state) {
         next_state = now + (fleet.all().size() > large ? between_large_states : between_states);
@@ -94,13 +94,13 @@ struct Server::Parts {
     }
   }
 
-  void tell_happenings() {
+  void write_events() {
     std::uint64_t added = 0;
-    const std::vector<Happening> taken = happenings.take(added);
+    const std::vector<ServerEvent> taken = server_events.take(added);
     if (taken.empty()) return;
     if (chronicler) chronicler->add(taken, added);
     sending.add(taken);
-    for (const Happening& one : taken) streams.tell("happening", one.json());
+    for (const ServerEvent& one : taken) streams.tell("happening", one.json());
   }
 
   void tell_points() {
@@ -119,7 +119,7 @@ struct Server::Parts {
     }
   }
 
-  Happenings happenings;
+  ServerEvents server_events;
   os::Listener listener;
   std::string url;
   os::ServedPorts served_ports;
@@ -156,7 +156,7 @@ std::string Server::reload() {
   std::string changed = parts_->fleet.reload();
   parts_->tell_ports();
   changed += parts_->sending.change_to(outlets);
-  parts_->happenings.add({calendar_ms(), "", "change", "absenc.toml was read again: " + changed});
+  parts_->server_events.add({calendar_ms(), "", "change", "absenc.toml was read again: " + changed});
   return changed;
 }
 

@@ -120,7 +120,7 @@ class Spool {
   std::mutex mutex_;  // guards what follows
   SpoolFacts facts_;
   std::map<std::string, std::uint64_t> unwritten_numbers_;
-  std::optional<os::KeptFolder> folder_;
+  std::optional<os::OwnedFolder> folder_;
   std::deque<Part> parts_;             // the oldest first
   std::unique_ptr<SpoolFile> newest_;  // of the last part, which is appended to; null while there is none
   std::int64_t next_part_ = 1;

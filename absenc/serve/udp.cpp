@@ -12,7 +12,7 @@ namespace {
 constexpr auto between_sendings = std::chrono::milliseconds(20);
 
 // PlotJuggler takes the time from "timestamp" and makes a curve of every other number, by its path.
-Json datagram(const std::string& encoder, const Passing& reading) {
+Json datagram(const std::string& encoder, const OutgoingReading& reading) {
   Json values = Json::object();
   if (reading.place) values.set("position", *reading.place);
   if (reading.speed) values.set("speed", reading.speed->value).set("speed_uncertainty", reading.speed->uncertainty);
@@ -42,7 +42,7 @@ UdpSender::~UdpSender() {
 void UdpSender::work(const std::stop_token& stop) {
   while (!stop.stop_requested()) {
     for (const auto& watch : fleet_->all()) {
-      for (const Passing& one : watch->take_passing(Watch::Outlet::udp).readings) {
+      for (const OutgoingReading& one : watch->take_passing(Watch::Outlet::udp).readings) {
         static_cast<void>(socket_.send(datagram(watch->name(), one).line()));
       }
     }

@@ -52,12 +52,12 @@ std::string_view name_of(State state) {
   return names[static_cast<std::size_t>(state)];
 }
 
-Watch::Watch(std::string name, const EncoderAddress& address, double rate, Time offset, Happenings& happenings)
+Watch::Watch(std::string name, const EncoderAddress& address, double rate, Time offset, ServerEvents& server_events)
     : name_(std::move(name)),
       address_(address),
       rate_(rate),
       offset_(offset),
-      happenings_(&happenings),
+      server_events_(&server_events),
       known_at_(os::now()),
       thread_([this](const std::stop_token& stop) { work(stop); }) {}
 
@@ -175,7 +175,7 @@ void Watch::take_orders(bool on) {
 }
 
 void Watch::tell(std::string_view kind, std::string text, std::string who) {
-  happenings_->add({calendar_ms(), name_, std::string(kind), std::move(text), std::move(who)});
+  server_events_->add({calendar_ms(), name_, std::string(kind), std::move(text), std::move(who)});
 }
 
 void Watch::work(const std::stop_token& stop) {
@@ -312,7 +312,7 @@ void Watch::pass_on(const Sample& sample) {
   const auto is_wanted = [](const Outbox& one) { return one.wanted(); };
   if (sample.kind != Sample::Kind::reading || std::none_of(outboxes_.begin(), outboxes_.end(), is_wanted)) return;
   const Reading& reading = sample.reading;
-  Passing passing;
+  OutgoingReading passing;
   passing.at_us = calendar_us() - std::chrono::duration_cast<std::chrono::microseconds>(os::now() - sample.at).count();
   if (sample.position_valid) passing.place = place_of(sample);
   passing.speed = sample.measured_speed();

@@ -16,9 +16,9 @@
 #include "absenc/client/encoder.hpp"
 #include "absenc/client/port/address.hpp"
 #include "absenc/client/text/json.hpp"
-#include "absenc/serve/happening.hpp"
 #include "absenc/serve/order.hpp"
-#include "absenc/serve/passing.hpp"
+#include "absenc/serve/outbox.hpp"
+#include "absenc/serve/server_event.hpp"
 #include "absenc/serve/time_series.hpp"
 
 namespace absenc::serve {
@@ -91,8 +91,8 @@ struct Details {
 
 class Watch {
  public:
-  /// The first reading comes `offset` after the start. `happenings` outlives it.
-  Watch(std::string name, const client::EncoderAddress& address, double rate, Time offset, Happenings& happenings);
+  /// The first reading comes `offset` after the start. `server_events` outlives it.
+  Watch(std::string name, const client::EncoderAddress& address, double rate, Time offset, ServerEvents& server_events);
   ~Watch();
   Watch(const Watch&) = delete;
   Watch& operator=(const Watch&) = delete;
@@ -149,7 +149,7 @@ class Watch {
   client::EncoderAddress address_;
   double rate_;
   Time offset_;
-  Happenings* happenings_;
+  ServerEvents* server_events_;
 
   mutable std::mutex mutex_;  // guards what follows
   std::condition_variable_any changed_;

@@ -108,13 +108,13 @@ Time Line<Item>::settled() const {
 }
 
 template <class Item>
-void Line<Item>::schedule(typename Happening::Kind kind, Time at, Node node) {
+void Line<Item>::schedule(typename ScheduledEvent::Kind kind, Time at, Node node) {
   happenings_.push({kind, std::max(at, now_), order_++, node, nodes_[node]->begin_generation});
 }
 
 template <class Item>
 bool Line<Item>::step() {
-  using Kind = typename Happening::Kind;
+  using Kind = typename ScheduledEvent::Kind;
   const Time time = next_event();
   if (time == never) return false;
   now_ = time;
@@ -125,7 +125,7 @@ bool Line<Item>::step() {
     deadline(late);
     return true;
   }
-  const Happening happening = happenings_.top();
+  const ScheduledEvent happening = happenings_.top();
   happenings_.pop();
   const Node node = happening.node;
   const bool current = happening.generation == nodes_[node]->begin_generation;
@@ -230,7 +230,7 @@ void Line<Item>::take_up(Node node, const Step<Item>& step) {
   state.taken_up = now_;
   ++state.begin_generation;
   // Not at once: whoever else is asked or attached at this time comes first, in whatever order.
-  if (!driven) schedule(Happening::Kind::begin, step.at, node);
+  if (!driven) schedule(ScheduledEvent::Kind::begin, step.at, node);
 }
 
 template <class Item>

@@ -80,13 +80,13 @@ class Line {
 
  private:
   struct State;
-  struct Happening {
+  struct ScheduledEvent {
     enum class Kind : std::uint8_t { begin, character, frame, transferred, finished, arbitrate } kind;
     Time at;
     std::uint64_t order;  // the first scheduled comes first
     Node node;
     std::uint64_t generation;  // void when the node has moved on
-    bool operator>(const Happening& other) const {
+    bool operator>(const ScheduledEvent& other) const {
       if (at != other.at) return at > other.at;
       // Everybody who begins a CAN frame at that time takes part.
       if ((kind == Kind::arbitrate) != (other.kind == Kind::arbitrate)) return kind == Kind::arbitrate;
@@ -94,7 +94,7 @@ class Line {
     }
   };
 
-  void schedule(typename Happening::Kind kind, Time at, Node node);
+  void schedule(typename ScheduledEvent::Kind kind, Time at, Node node);
   void serve(Node node);
   void take_up(Node node, const Step<Item>& step);
   void feed(Node node, const Event<Item>& event);
@@ -120,7 +120,7 @@ class Line {
   Time now_{};
   std::uint64_t order_ = 0;
   std::vector<std::unique_ptr<State>> nodes_;
-  std::priority_queue<Happening, std::vector<Happening>, std::greater<>> happenings_;
+  std::priority_queue<ScheduledEvent, std::vector<ScheduledEvent>, std::greater<>> happenings_;
   Observer observer_;
   TransferObserver transfer_observer_;
   PulseObserver pulse_observer_;

@@ -37,7 +37,7 @@ void Line<Item>::begin(Node node) {
   state.start = now_;
   state.index = 0;
   if (state.doing == Step<Item>::Kind::pulse) {
-    schedule(Happening::Kind::finished, now_ + state.width, node);
+    schedule(ScheduledEvent::Kind::finished, now_ + state.width, node);
     if (pulse_observer_) pulse_observer_(state.pulse_wire, now_, now_ + state.width);
     for (Node other = 0; other < nodes_.size(); ++other) {
       if (other == node) continue;
@@ -46,9 +46,9 @@ void Line<Item>::begin(Node node) {
   } else if (kind_ == LinkKind::spi || kind_ == LinkKind::clocked) {
     begin_transfer(node);
   } else if (state.out.empty()) {
-    schedule(Happening::Kind::finished, now_, node);
+    schedule(ScheduledEvent::Kind::finished, now_, node);
   } else if (kind_ == LinkKind::can) {
-    schedule(Happening::Kind::arbitrate, now_, node);
+    schedule(ScheduledEvent::Kind::arbitrate, now_, node);
   } else {
     begin_characters(node);
   }
@@ -73,7 +73,7 @@ void Line<Item>::begin_characters(Node node) {
   State& state = *nodes_[node];
   state.each = state.settings.character();
   state.on_wire = state.out.size();
-  schedule(Happening::Kind::character, now_ + state.each, node);
+  schedule(ScheduledEvent::Kind::character, now_ + state.each, node);
   frame_character(node);
 }
 
@@ -101,9 +101,9 @@ void Line<Item>::end_character(Node node) {
   const std::uint64_t generation = sender.begin_generation;
   const bool last = ++sender.index == sender.out.size();
   if (last) {
-    schedule(Happening::Kind::finished, now_, node);
+    schedule(ScheduledEvent::Kind::finished, now_, node);
   } else {
-    schedule(Happening::Kind::character, now_ + sender.each, node);
+    schedule(ScheduledEvent::Kind::character, now_ + sender.each, node);
   }
   for (Node other = 0; other < nodes_.size(); ++other) {
     State& receiver = *nodes_[other];
@@ -145,7 +145,7 @@ void Line<Item>::begin_transfer(Node node) {
     feed(other, {.kind = Event<Item>::Kind::selected, .at = now_, .held_low = host.hold_low, .width = period});
   }
   if (kind_ == LinkKind::spi) host.lead = host.settings.select_lead;
-  schedule(Happening::Kind::transferred, now_ + host.lead + host.settings.bits(host.bits), node);
+  schedule(ScheduledEvent::Kind::transferred, now_ + host.lead + host.settings.bits(host.bits), node);
 }
 
 template <class Item>
@@ -203,7 +203,7 @@ void Line<Item>::arbitrate() {
     frame_on_bus_ = true;
     State& state = *nodes_[winner];
     state.start = now_;
-    schedule(Happening::Kind::frame, now_ + state.settings.bits(frame_bits(state.out[state.index])), winner);
+    schedule(ScheduledEvent::Kind::frame, now_ + state.settings.bits(frame_bits(state.out[state.index])), winner);
   }
 }
 
@@ -225,7 +225,7 @@ void Line<Item>::end_frame(Node node) {
       senders.push_back(other);
     }
     for (const Node other : senders) {
-      if (++nodes_[other]->index == nodes_[other]->out.size()) schedule(Happening::Kind::finished, now_, other);
+      if (++nodes_[other]->index == nodes_[other]->out.size()) schedule(ScheduledEvent::Kind::finished, now_, other);
     }
     for (Node other = 0; other < nodes_.size(); ++other) {
       const bool sent_it = std::find(senders.begin(), senders.end(), other) != senders.end();

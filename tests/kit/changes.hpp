@@ -62,7 +62,7 @@ void follow(World<Item>& world, const Unit& unit, const Command& setter, Argumen
   world.set_options(options);
 }
 
-/// Again after an error, as a session does: what an encoder sends unasked may come in between.
+/// Again after an error, as a session does: what an encoder sends unsolicited may come in between.
 template <class Item>
 Ended run_repeated(World<Item>& world, const Command& command, Arguments arguments) {
   Ended result = world.run(command, arguments);

@@ -96,9 +96,10 @@ class Campaign {
     if (unit.link == LinkKind::spi) rates = {};                        // there a reply is as long as what is clocked
     rates[FaultKind::corrupt] = unit.link == LinkKind::can ? 0 : 0.1;  // CAN's own checksum sees that
     if (wanted.requests_too) rates[FaultKind::request_corrupt] = 0.02;
-    // Late enough to be given up, every other time. Nobody can tell how old it is what comes unasked.
-    const bool unasked = unit.link == LinkKind::can || (unit.streams != nullptr && unit.streams(options));
-    if (wanted.seed % 2 == 1 && !wanted.requests_too && !unasked) rates.delay = unit.timing.turnaround_limit * 3 / 2;
+    // Late enough to be given up, every other time. Nobody can tell how old it is what comes unsolicited.
+    const bool unsolicited = unit.link == LinkKind::can || (unit.streams != nullptr && unit.streams(options));
+    if (wanted.seed % 2 == 1 && !wanted.requests_too && !unsolicited)
+      rates.delay = unit.timing.turnaround_limit * 3 / 2;
     return rates;
   }
 

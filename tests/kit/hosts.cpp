@@ -282,9 +282,9 @@ std::optional<Values> arguments_for(const Unit& unit, const Options& options, co
   const Result<Wire> request = encoded(unit, options, command, values);
   if (request && std::ranges::equal(*request, vector.request)) return values;
   // Nothing is sent for what comes by itself.
-  const bool unasked = !request && request.error() == Error::unsupported && vector.request.empty() &&
-                       command.verb == Verb::read && unit.streams != nullptr && unit.streams(options);
-  if (unasked) return values;
+  const bool unsolicited = !request && request.error() == Error::unsupported && vector.request.empty() &&
+                           command.verb == Verb::read && unit.streams != nullptr && unit.streams(options);
+  if (unsolicited) return values;
   return std::nullopt;
 }
 

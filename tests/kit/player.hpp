@@ -37,7 +37,7 @@ class Player {
            unsigned most_steps = 2000) {
     using Kind = typename Event<Item>::Kind;
     using Wanted = typename Step<Item>::Kind;
-    bool unasked = request.empty();
+    bool unsolicited = request.empty();
     for (unsigned steps = 0; steps < most_steps; ++steps) {
       const Step<Item> step = conversation.next(now_);
       if (step.kind == Wanted::done) return true;
@@ -45,7 +45,7 @@ class Player {
       if (step.kind == Wanted::emit || step.kind == Wanted::configure) continue;
       now_ += std::chrono::milliseconds(1);
       if (step.kind == Wanted::wait) {
-        if (std::exchange(unasked, false)) {
+        if (std::exchange(unsolicited, false)) {
           play(conversation, reply(step.expect));
         } else {
           conversation.feed({.kind = Kind::silence, .at = now_});
@@ -59,7 +59,7 @@ class Player {
       ++sent_;
       const bool tested = sent == request;
       if (tested) ++asked_;
-      unasked = false;
+      unsolicited = false;
       play(conversation, tested ? reply(clocks) : Pieces{ask_device(sent)});
     }
     return false;

@@ -70,11 +70,11 @@ class World {
   [[nodiscard]] const Options& options() const { return options_; }
   void set_rates(const sim::FaultRates& rates) { faulty_->set_rates(rates); }
   void pass(Time time) { line_->run_until(line_->now() + time); }
-  /// Puts the shaft there. What was sent unasked has said where it was before.
+  /// Puts the shaft there. What was sent unsolicited has said where it was before.
   void move(std::int64_t position) {
     shaft_.position = position;
-    const bool unasked = is_can || (unit_.streams != nullptr && unit_.streams(options_));
-    if (unasked) pass(std::chrono::milliseconds(5));
+    const bool unsolicited = is_can || (unit_.streams != nullptr && unit_.streams(options_));
+    if (unsolicited) pass(std::chrono::milliseconds(5));
   }
   [[nodiscard]] std::int64_t place() const { return shaft_.position; }
 

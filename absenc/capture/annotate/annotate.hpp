@@ -97,7 +97,7 @@ class Annotator {
   std::size_t repeated_here();
   std::size_t request_here();
   [[nodiscard]] bool is_request(std::size_t size);
-  std::size_t unasked_here();
+  std::size_t unsolicited_here();
   std::size_t bad_here();
   void tell_bad(std::size_t size);
 

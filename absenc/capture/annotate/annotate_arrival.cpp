@@ -58,7 +58,7 @@ std::size_t Annotator::whole_frame() {
   const bool needs_no_reply = size != 0 && !judge_.is_answered({.bytes = rest(at_).first(size)});
   if (size != 0 && (needs_no_reply || answered(size))) return request_here();
   const bool sends_by_itself = judge_.streams() || (!exchanges_.has_asked() && channel_->last_size != 0);
-  return size == 0 && sends_by_itself ? unasked_here() : 0;
+  return size == 0 && sends_by_itself ? unsolicited_here() : 0;
 }
 
 }  // namespace absenc::capture

@@ -83,7 +83,7 @@ class BurstAnnotator {
   ControlFrames control_;
 };
 
-/// CAN frames of any number of nodes, who answer in any order or speak unasked.
+/// CAN frames of any number of nodes, who answer in any order or speak unsolicited.
 class CanAnnotator {
  public:
   CanAnnotator(const Unit& unit, const Options& options, const LineTicks& ticks, AnnotationSink& sink)

@@ -73,7 +73,7 @@ class Truth {
   void add(const std::vector<Said>& said) {
     for (std::size_t i = 0; i < said.size(); ++i) {
       if (said[i].by == sim::Role::device) {
-        unasked(said[i]);
+        unsolicited(said[i]);
         continue;
       }
       if (i + 1 < said.size() && said[i + 1].by == sim::Role::device) {
@@ -148,7 +148,7 @@ class Truth {
     expected.push_back(one);
   }
 
-  void unasked(const Said& said) {
+  void unsolicited(const Said& said) {
     const std::size_t size = stream_size_;
     const Error error = judge_.decode({}, {.bytes = said.bytes});
     if (error == Error::none) stream_size_ = said.bytes.size();

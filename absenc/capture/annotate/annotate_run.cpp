@@ -87,7 +87,7 @@ std::size_t Annotator::next_frame() {
     exchanges_.give_up(1);
   }
   if (taken == 0 && channel_->carries != Carries::replies) taken = request_here();
-  if (taken == 0 && channel_->carries != Carries::requests) taken = unasked_here();
+  if (taken == 0 && channel_->carries != Carries::requests) taken = unsolicited_here();
   return taken != 0 ? taken : bad_here();
 }
 
@@ -222,7 +222,7 @@ bool Annotator::is_request(std::size_t size) {
   return turns && channel.in_step && exchanges_.has_asked() && !expects_reply && !judge_.streams();
 }
 
-std::size_t Annotator::unasked_here() {
+std::size_t Annotator::unsolicited_here() {
   const bool streams = judge_.streams();
   // A good reply, but to something else.
   if (!streams && asked_before(channel_->run.begin(at_))) return 0;
@@ -236,7 +236,7 @@ std::size_t Annotator::unasked_here() {
   const bool good = streams || !exchanges_.has_asked();
   static_cast<void>(judge_.decode({}, {.bytes = rest(at_).first(size)}));  // the look ahead has other contents
   exchanges_.alone(Annotation::Kind::reply, piece(size), good ? Error::none : Error::unexpected_reply,
-                   good ? Remark::none : Remark::unasked, good ? judge_.contents() : Contents{});
+                   good ? Remark::none : Remark::unsolicited, good ? judge_.contents() : Contents{});
   return size;
 }
 

@@ -262,7 +262,8 @@ TEST_P(OfUnit, NoiseBetweenExchanges) {
 
 INSTANTIATE_TEST_SUITE_P(Units, OfUnit, ::testing::ValuesIn(units_of_characters()), name_of);
 
-// ---- CAN: a toy whose node n is asked on 0x200 + n and answers, or speaks unasked, on 0x100 + n with the same data
+// ---- CAN: a toy whose node n is asked on 0x200 + n and answers, or speaks unsolicited, on 0x100 + n with the same
+// data
 
 Error decode_toy(const Options&, Frame request, Frame reply, FieldSink& sink) {
   if (reply.can == nullptr) return (request.can->id & 0x700) == 0x200 ? Error::none : Error::unexpected_reply;

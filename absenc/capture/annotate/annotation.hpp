@@ -19,7 +19,7 @@ namespace absenc::capture {
 enum class Remark : std::uint8_t {
   none,
   unanswered,    // nothing came behind the request
-  unasked,       // nothing was asked before the reply
+  unsolicited,   // nothing was asked before the reply
   repeated,      // the reply came once more
   echo,          // the request came back before the reply
   late,          // the reply came after every host has given up

@@ -11,7 +11,7 @@ std::string_view text_of(Remark remark) {
       break;
     case Remark::unanswered:
       return "nobody answered";
-    case Remark::unasked:
+    case Remark::unsolicited:
       return "a reply that nobody asked for";
     case Remark::repeated:
       return "the reply before came once more";

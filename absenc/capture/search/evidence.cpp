@@ -25,7 +25,7 @@ struct PositionSink final : FieldSink {
 };
 
 // How many bytes at its beginning a reply has in common with its request.
-std::size_t repeated(const HeardExchange& exchange) {
+std::size_t repeated(const ObservedExchange& exchange) {
   const auto& request = exchange.request.bytes;
   const auto& reply = exchange.reply.bytes;
   const std::size_t both = std::min(request.size(), reply.size());
@@ -64,8 +64,8 @@ class Distinct {
  public:
   Distinct(const Unit& unit, const Options& options) : unit_(unit), options_(options) {}
 
-  void add(const HeardExchange& exchange) {
-    const auto same = [&](const HeardExchange* one) { return *one == exchange; };
+  void add(const ObservedExchange& exchange) {
+    const auto same = [&](const ObservedExchange* one) { return *one == exchange; };
     if (std::any_of(all_.begin(), all_.end(), same)) return;
     all_.push_back(&exchange);
   }
@@ -74,19 +74,19 @@ class Distinct {
   [[nodiscard]] double each() {
     if (all_.empty()) return 1;
     double sum = 0;
-    for (const HeardExchange* one : all_) sum += std::log10(acceptance_like(*one));
+    for (const ObservedExchange* one : all_) sum += std::log10(acceptance_like(*one));
     return std::pow(10, sum / static_cast<double>(all_.size()));
   }
 
  private:
   struct Known {
-    const HeardExchange* exchange;
+    const ObservedExchange* exchange;
     double acceptance;
   };
 
-  double acceptance_like(const HeardExchange& exchange) {
+  double acceptance_like(const ObservedExchange& exchange) {
     for (const Known& known : known_) {
-      const HeardExchange& other = *known.exchange;
+      const ObservedExchange& other = *known.exchange;
       const bool alike = other.request == exchange.request && other.reply.bytes.size() == exchange.reply.bytes.size() &&
                          other.reply.bits == exchange.reply.bits && repeated(other) == repeated(exchange);
       if (alike) return known.acceptance;
@@ -98,7 +98,7 @@ class Distinct {
 
   const Unit& unit_;
   const Options& options_;
-  std::vector<const HeardExchange*> all_;
+  std::vector<const ObservedExchange*> all_;
   std::vector<Known> known_;
 };
 
@@ -106,9 +106,9 @@ class Distinct {
 
 double Evidence::chance() const { return motion && explains_all() ? frames + *motion : frames; }
 
-double acceptance(const Unit& unit, const Options& options, const HeardExchange& good, unsigned attempts) {
+double acceptance(const Unit& unit, const Options& options, const ObservedExchange& good, unsigned attempts) {
   std::mt19937_64 random(good.reply.bytes.size());  // the same answer each time
-  HeardExchange noise = good;
+  ObservedExchange noise = good;
   const std::size_t kept = repeated(good);
   unsigned accepted = 0;
   unsigned tried = 0;
@@ -131,16 +131,16 @@ double acceptance(const Unit& unit, const Options& options, const HeardExchange&
   return std::max(accepted, 1u) / static_cast<double>(tried);
 }
 
-bool explains(const Unit& unit, const Options& options, const HeardExchange& exchange) {
+bool explains(const Unit& unit, const Options& options, const ObservedExchange& exchange) {
   const Frame reply = exchange.reply.frame();
   return !reply.empty() && unit.check(options, exchange.request.frame(), reply) == Error::none;
 }
 
-Evidence weigh(const Unit& unit, const Options& options, std::span<const HeardExchange> exchanges) {
+Evidence weigh(const Unit& unit, const Options& options, std::span<const ObservedExchange> exchanges) {
   Evidence evidence{.tried = exchanges.size()};
   Distinct distinct(unit, options);
   std::vector<Reading> positions;
-  for (const HeardExchange& exchange : exchanges) {
+  for (const ObservedExchange& exchange : exchanges) {
     if (!explains(unit, options, exchange)) continue;
     ++evidence.explained;
     distinct.add(exchange);

@@ -13,22 +13,22 @@
 namespace absenc::capture {
 
 /// A frame that owns its bytes.
-struct HeardFrame {
+struct ObservedFrame {
   std::vector<std::uint8_t> bytes{};
   std::size_t bits = 0;  // clocked links
   std::optional<CanFrame> can{};
 
   /// Valid as long as this object.
   [[nodiscard]] Frame frame() const { return {bytes, bits, can ? &*can : nullptr}; }
-  friend bool operator==(const HeardFrame&, const HeardFrame&) = default;
+  friend bool operator==(const ObservedFrame&, const ObservedFrame&) = default;
 };
 
 /// A request and what came back; without a request, nobody had asked or it is not known what.
-struct HeardExchange {
-  HeardFrame request{};
-  HeardFrame reply{};
+struct ObservedExchange {
+  ObservedFrame request{};
+  ObservedFrame reply{};
 
-  friend bool operator==(const HeardExchange&, const HeardExchange&) = default;
+  friend bool operator==(const ObservedExchange&, const ObservedExchange&) = default;
 };
 
 /// What repeats of the request is no evidence, nor is a reply that comes again.
@@ -54,14 +54,14 @@ inline constexpr unsigned usual_attempts = 1u << 14;
 
 /// How often the unit takes random content for a good reply of this length to this request: at most 1, at least one in
 /// the number of attempts. What the reply repeats of the request from its beginning on stays as it is.
-[[nodiscard]] double acceptance(const Unit& unit, const Options& options, const HeardExchange& good,
+[[nodiscard]] double acceptance(const Unit& unit, const Options& options, const ObservedExchange& good,
                                 unsigned attempts = usual_attempts);
 
 /// Whether the unit takes this reply for a good one.
-[[nodiscard]] bool explains(const Unit& unit, const Options& options, const HeardExchange& exchange);
+[[nodiscard]] bool explains(const Unit& unit, const Options& options, const ObservedExchange& exchange);
 
 /// Exchanges in the order of time.
-[[nodiscard]] Evidence weigh(const Unit& unit, const Options& options, std::span<const HeardExchange> exchanges);
+[[nodiscard]] Evidence weigh(const Unit& unit, const Options& options, std::span<const ObservedExchange> exchanges);
 
 /// log10 of the probability that at least `good` of `all` come about when each does with the probability `each`.
 [[nodiscard]] double tail(std::size_t good, std::size_t all, double each);

@@ -46,7 +46,7 @@ struct Toy {
   }
 };
 
-HeardExchange heard(std::uint8_t value, std::uint8_t first = 7) {
+ObservedExchange heard(std::uint8_t value, std::uint8_t first = 7) {
   return {.request = {.bytes = {7}}, .reply = {.bytes = {first, value}}};
 }
 
@@ -60,14 +60,14 @@ TEST(Evidence, AcceptanceIsThatOfNoiseBehindWhatTheRequestFixes) {
   EXPECT_NEAR(acceptance(Toy::unit(), with_bits(4), heard(1)), 16.0 / 256, 0.01);
   EXPECT_DOUBLE_EQ(acceptance(Toy::unit(), with_bits(8), heard(1)), 1);
   // Nothing of the reply is fixed when nobody asked.
-  const HeardExchange unasked{.reply = {.bytes = {7, 1}}};
-  EXPECT_NEAR(acceptance(Toy::unit(), with_bits(4), unasked), 16.0 / 256, 0.01);
+  const ObservedExchange unsolicited{.reply = {.bytes = {7, 1}}};
+  EXPECT_NEAR(acceptance(Toy::unit(), with_bits(4), unsolicited), 16.0 / 256, 0.01);
 }
 
 TEST(Evidence, AcceptanceIsNeverNothing) {
   const Unit& real = *find_unit("tformat");
-  const HeardExchange good{.request = {.bytes = {0x1A}},
-                           .reply = {.bytes = {0x1A, 0, 0x45, 0x23, 1, 0x11, 0x34, 0x12, 0, 0, 0x4A}}};
+  const ObservedExchange good{.request = {.bytes = {0x1A}},
+                              .reply = {.bytes = {0x1A, 0, 0x45, 0x23, 1, 0x11, 0x34, 0x12, 0, 0, 0x4A}}};
   Options options;
   ASSERT_EQ(resolve_options(real, {}, {}, options).kind, OptionError::Kind::none);
   ASSERT_TRUE(explains(real, options, good));
@@ -77,18 +77,18 @@ TEST(Evidence, AcceptanceIsNeverNothing) {
 }
 
 TEST(Evidence, AFrameThatComesAgainProvesNothingMore) {
-  const std::vector<HeardExchange> same(5, heard(1));
+  const std::vector<ObservedExchange> same(5, heard(1));
   const Evidence once = weigh(Toy::unit(), with_bits(4), std::span(same).first(1));
   const Evidence often = weigh(Toy::unit(), with_bits(4), same);
   EXPECT_EQ(often.explained, 5u);
   EXPECT_EQ(often.distinct, 1u);
   EXPECT_DOUBLE_EQ(once.frames, often.frames);
-  const std::vector<HeardExchange> other{heard(1), heard(2), heard(3)};
+  const std::vector<ObservedExchange> other{heard(1), heard(2), heard(3)};
   EXPECT_NEAR(weigh(Toy::unit(), with_bits(4), other).frames, 3 * once.frames, 1e-9);
 }
 
 TEST(Evidence, WhatIsNotExplainedCountsAgainst) {
-  const std::vector<HeardExchange> mixed{heard(1), heard(200), heard(201), heard(202), heard(203)};
+  const std::vector<ObservedExchange> mixed{heard(1), heard(200), heard(201), heard(202), heard(203)};
   const Evidence evidence = weigh(Toy::unit(), with_bits(4), mixed);
   EXPECT_EQ(evidence.tried, 5u);
   EXPECT_EQ(evidence.explained, 1u);
@@ -106,7 +106,7 @@ TEST(Evidence, TailOfTheBinomialDistribution) {
 
 TEST(Evidence, OfFramesThatSayNothingTheMotionTells) {
   const auto motion_of = [](std::initializer_list<std::uint8_t> values) {
-    std::vector<HeardExchange> exchanges;
+    std::vector<ObservedExchange> exchanges;
     for (const std::uint8_t value : values) exchanges.push_back(heard(value));
     return weigh(Toy::unit(), with_bits(8), exchanges);
   };
@@ -142,7 +142,7 @@ TEST(Hypotheses, WhatMeansTheSameIsListedOnce) {
   static constexpr std::array<Option, 3> options{{Toy::options[0], Toy::options[1], {"name", "", 0, 0, 0, names}}};
   Unit unit = Toy::unit();
   unit.options = options;
-  const std::vector<HeardExchange> all{heard(254), heard(253), heard(250), heard(3, 8)};
+  const std::vector<ObservedExchange> all{heard(254), heard(253), heard(250), heard(3, 8)};
   const std::vector<Hypothesis> found = find_hypotheses(unit, {}, all);
   ASSERT_FALSE(found.empty());
   for (const Hypothesis& one : found) EXPECT_EQ(one.options[2], 0);
@@ -157,7 +157,7 @@ TEST(Hypotheses, FramesThatProveThemselvesGoFirst) {
 }
 
 TEST(Hypotheses, ModelsComeFirst) {
-  const std::vector<HeardExchange> small{heard(1), heard(2)};
+  const std::vector<ObservedExchange> small{heard(1), heard(2)};
   const std::vector<Hypothesis> found = find_hypotheses(Toy::unit(), {}, small);
   ASSERT_EQ(found.size(), 1u);
   ASSERT_NE(found[0].options.model, nullptr);
@@ -166,7 +166,7 @@ TEST(Hypotheses, ModelsComeFirst) {
 }
 
 TEST(Hypotheses, TheFewestBitsWhereNoModelFits) {
-  const std::vector<HeardExchange> large{heard(1), heard(40)};
+  const std::vector<ObservedExchange> large{heard(1), heard(40)};
   const std::vector<Hypothesis> found = find_hypotheses(Toy::unit(), {}, large);
   ASSERT_FALSE(found.empty());
   EXPECT_EQ(found[0].options.model, nullptr);
@@ -176,14 +176,14 @@ TEST(Hypotheses, TheFewestBitsWhereNoModelFits) {
 }
 
 TEST(Hypotheses, ASingleChoiceThatExplainsMore) {
-  const std::vector<HeardExchange> downwards{heard(254), heard(253), heard(250)};
+  const std::vector<ObservedExchange> downwards{heard(254), heard(253), heard(250)};
   const std::vector<Hypothesis> found = find_hypotheses(Toy::unit(), {}, downwards);
   ASSERT_FALSE(found.empty());
   EXPECT_EQ(found[0].options[1], 1);
 }
 
 TEST(Hypotheses, NothingWhereNothingIsExplained) {
-  const std::vector<HeardExchange> other{heard(1, 8)};
+  const std::vector<ObservedExchange> other{heard(1, 8)};
   EXPECT_TRUE(find_hypotheses(Toy::unit(), {}, other).empty());
 }
 
@@ -193,8 +193,8 @@ TEST(Hypotheses, EveryVectorOfEveryUnitIsFoundByItsUnit) {
     unsigned left = test_cases(static_cast<unsigned>(unit->vectors.size()));
     for (const Vector& vector : unit->vectors) {
       if (left == 0 || vector.error != Error::none || vector.reply.empty() || !vector.options.empty()) continue;
-      const HeardExchange one{.request = {.bytes = {vector.request.begin(), vector.request.end()}},
-                              .reply = {.bytes = {vector.reply.begin(), vector.reply.end()}}};
+      const ObservedExchange one{.request = {.bytes = {vector.request.begin(), vector.request.end()}},
+                                 .reply = {.bytes = {vector.reply.begin(), vector.reply.end()}}};
       EXPECT_FALSE(find_hypotheses(*unit, {}, {&one, 1}).empty()) << vector.id;
       --left;
     }

@@ -52,7 +52,8 @@ class Meaning final : public FieldSink {
 
 class HypothesisSearch {
  public:
-  HypothesisSearch(const Unit& unit, std::span<const HeardExchange> exchanges) : unit_(unit), exchanges_(exchanges) {}
+  HypothesisSearch(const Unit& unit, std::span<const ObservedExchange> exchanges)
+      : unit_(unit), exchanges_(exchanges) {}
 
   /// Weighs it, when it explains as much as the best so far.
   void add(const Options& options, bool at_least = false) {
@@ -77,7 +78,7 @@ class HypothesisSearch {
     if (unit_.probe == nullptr) return;
     NoEvidence nowhere;
     std::vector<Capture> captures;
-    for (const HeardExchange& one : exchanges_) captures.push_back({one.request.bytes, one.reply.bytes});
+    for (const ObservedExchange& one : exchanges_) captures.push_back({one.request.bytes, one.reply.bytes});
     if (!unit_.probe(options, captures, nowhere)) return;
     options.model = nullptr;
     add(options);
@@ -123,7 +124,7 @@ class HypothesisSearch {
  private:
   [[nodiscard]] std::uint64_t meaning_of(const Options& options) const {
     Meaning meaning;
-    for (const HeardExchange& one : exchanges_) {
+    for (const ObservedExchange& one : exchanges_) {
       meaning.add(explains(unit_, options, one) ? 1 : 0);
       static_cast<void>(unit_.decode(options, one.request.frame(), one.reply.frame(), meaning));
     }
@@ -181,7 +182,7 @@ class HypothesisSearch {
   }
 
   const Unit& unit_;
-  std::span<const HeardExchange> exchanges_;
+  std::span<const ObservedExchange> exchanges_;
   std::vector<Hypothesis> best_;
   std::vector<std::uint64_t> meanings_;  // of each of them
   std::size_t most_ = 0;
@@ -234,7 +235,7 @@ std::vector<Options> likely_options(const Unit& unit, std::span<const OptionText
 }
 
 std::vector<Hypothesis> find_hypotheses(const Unit& unit, std::span<const OptionText> settings,
-                                        std::span<const HeardExchange> exchanges) {
+                                        std::span<const ObservedExchange> exchanges) {
   if (exchanges.empty()) return {};
   HypothesisSearch search(unit, exchanges);
   const std::vector<Options> likely = likely_options(unit, settings);

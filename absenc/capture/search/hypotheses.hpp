@@ -37,7 +37,7 @@ inline constexpr double is_found = -3;
 /// All that explain as much as any, the likeliest first; none when nothing is explained. Models are tried before single
 /// options. `settings` hold for all, as the address of the encoder that was asked.
 [[nodiscard]] std::vector<Hypothesis> find_hypotheses(const Unit& unit, std::span<const OptionText> settings,
-                                                      std::span<const HeardExchange> exchanges);
+                                                      std::span<const ObservedExchange> exchanges);
 
 /// The options that change how many bits a position has, by index.
 [[nodiscard]] std::vector<std::size_t> resolution_options(const Unit& unit);

@@ -18,7 +18,8 @@ constexpr std::size_t least_frames = 3;  // good ones
 std::size_t reply_size(const Unit& unit, const Options& options, Bytes bytes) {
   const FrameEnd end = unit.frame_end(options, Direction::reply, bytes);
   if (end.kind != FrameEnd::Kind::complete || end.size == 0 || end.size > bytes.size()) return 0;
-  const HeardExchange reply{.reply = {.bytes = {bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(end.size)}}};
+  const ObservedExchange reply{
+      .reply = {.bytes = {bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(end.size)}}};
   return explains(unit, options, reply) ? end.size : 0;
 }
 
@@ -92,8 +93,8 @@ void set_streaming(const Unit& unit, Options& options, double frames_per_second)
 
 }  // namespace
 
-std::vector<HeardExchange> split_stream(const Unit& unit, const Options& options, Bytes bytes) {
-  std::vector<HeardExchange> replies;
+std::vector<ObservedExchange> split_stream(const Unit& unit, const Options& options, Bytes bytes) {
+  std::vector<ObservedExchange> replies;
   std::size_t longest = 0;        // good one
   std::size_t begin_of_good = 0;  // how many are before the first good one,
   std::size_t end_of_good = 0;    // and up to the last
@@ -119,11 +120,11 @@ std::vector<Hypothesis> find_stream_hypotheses(const Unit& unit, Bytes bytes, Ti
   if (bytes.empty()) return found;
   const std::vector<Options> all = stream_options(unit);
   for (const Options& options : all) {
-    const std::vector<HeardExchange> replies = split_stream(unit, options, bytes);
+    const std::vector<ObservedExchange> replies = split_stream(unit, options, bytes);
     Hypothesis one{.options = options, .evidence = weigh(unit, options, replies)};
     if (one.evidence.explained < least_frames) continue;
     // Where a frame begins was tried as well, from the first byte on.
-    for (const HeardExchange& reply : replies) one.tried = std::max(one.tried, reply.reply.bytes.size());
+    for (const ObservedExchange& reply : replies) one.tried = std::max(one.tried, reply.reply.bytes.size());
     one.tried *= all.size();
     found.push_back(std::move(one));
   }

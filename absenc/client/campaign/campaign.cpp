@@ -118,8 +118,8 @@ class Campaign {
     constexpr Time longest = 30s;  // nothing is later
     if (places_.size() > 1 && places_[1].since + longest < line_.now()) places_.pop_front();
     places_.push_back({line_.now(), shaft_.position});
-    // What is sent unasked has said where it was before; a chip is not selected again at once.
-    if (bench_.unasked) {
+    // What is sent unsolicited has said where it was before; a chip is not selected again at once.
+    if (bench_.unsolicited) {
       line_.rest(line_.now() + 5ms);
       line_.drop();
     }

@@ -62,7 +62,7 @@ struct RoughBench {
              rates.by_device ? static_cast<Machine<Item>&>(faulty) : device, seed + 2),
         session(unit, options, line, host_storage,
                 unit.link == LinkKind::half_duplex ? host::EchoMode::automatic : host::EchoMode::off),
-        unasked(host::sends_unasked(unit, options)) {
+        unsolicited(host::sends_unsolicited(unit, options)) {
     line.set_rates(rates.line);
   }
 
@@ -102,7 +102,7 @@ struct RoughBench {
     using namespace std::chrono_literals;
     if (rates.device[sim::FaultKind::request_corrupt] <= 0) return false;
     set_faults(false);
-    line.rest(line.now() + (unasked ? 11s : 20s));  // nothing is late any more
+    line.rest(line.now() + (unsolicited ? 11s : 20s));  // nothing is late any more
     line.drop();
     const Conversation<Item>* now = session.run(read);
     const bool changed = now->error() != Error::none || (now->reading() != nullptr && !is_right(*now->reading()));
@@ -114,7 +114,7 @@ struct RoughBench {
   // Who has given up tries again after a while, of 10 us to 10 s, each decade as often: a line that holds up a reply
   // holds up those behind it. What comes all the time holds up nobody so long.
   void pause() {
-    const double decades = (unasked ? 4 : 6) * static_cast<double>(random.next() >> 11) * 0x1p-53;
+    const double decades = (unsolicited ? 4 : 6) * static_cast<double>(random.next() >> 11) * 0x1p-53;
     line.rest(line.now() + Time(static_cast<std::int64_t>(1e4 * std::pow(10.0, decades))));
   }
 
@@ -131,7 +131,7 @@ struct RoughBench {
   Faulty faulty;
   sim::RoughLine<Item> line;
   host::Session<Item> session;
-  bool unasked;
+  bool unsolicited;
 };
 
 }  // namespace absenc::client

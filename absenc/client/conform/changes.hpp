@@ -30,8 +30,8 @@ struct Ran {
 
 /// A request that was sent by itself, and what came; both empty: nothing is asked with these options.
 struct Sent {
-  capture::HeardFrame request{};
-  capture::HeardFrame reply{};
+  capture::ObservedFrame request{};
+  capture::ObservedFrame reply{};
 };
 
 /// A reply of the memory, with its busy bit.

@@ -13,21 +13,21 @@ namespace absenc::client {
 
 namespace {
 
-using capture::HeardExchange;
-using capture::HeardFrame;
+using capture::ObservedExchange;
+using capture::ObservedFrame;
 
-std::size_t bits_of(const HeardFrame& frame) {
+std::size_t bits_of(const ObservedFrame& frame) {
   if (frame.can) return std::size_t{frame.can->size} * 8;
   return frame.bits != 0 ? frame.bits : frame.bytes.size() * 8;
 }
 
 // On clocked links the first bit is the highest of its byte.
-void flip(HeardFrame& frame, std::size_t bit) {
+void flip(ObservedFrame& frame, std::size_t bit) {
   std::uint8_t& byte = frame.can ? frame.can->data[bit / 8] : frame.bytes[bit / 8];
   byte = static_cast<std::uint8_t>(byte ^ (frame.bits != 0 ? 0x80U >> bit % 8 : 1U << bit % 8));
 }
 
-void resize(HeardFrame& frame, int by) {
+void resize(ObservedFrame& frame, int by) {
   if (frame.can) {
     frame.can->size = static_cast<std::uint8_t>(std::min(8, frame.can->size + by));
   } else {
@@ -36,7 +36,7 @@ void resize(HeardFrame& frame, int by) {
 }
 
 // Empty: there is none with these options.
-HeardFrame request_of(const Unit& unit, const Options& options, const Command& command) {
+ObservedFrame request_of(const Unit& unit, const Options& options, const Command& command) {
   std::array<std::uint8_t, longest_request> bytes{};
   std::vector<std::int64_t> arguments;
   for (const Argument& one : command.arguments) {
@@ -51,10 +51,10 @@ HeardFrame request_of(const Unit& unit, const Options& options, const Command& c
 }
 
 // The requests of all commands, and of all of another address.
-std::vector<HeardFrame> other_requests(const Unit& unit, const Options& options) {
-  std::vector<HeardFrame> requests;
+std::vector<ObservedFrame> other_requests(const Unit& unit, const Options& options) {
+  std::vector<ObservedFrame> requests;
   const auto add = [&](const Options& with, const Command& command) {
-    HeardFrame request = request_of(unit, with, command);
+    ObservedFrame request = request_of(unit, with, command);
     if (!request.frame().empty()) requests.push_back(std::move(request));
   };
   for (const Command& command : unit.commands) add(options, command);
@@ -91,33 +91,34 @@ std::string reason_against(const Unit& unit, const Options& options, const Claus
   return {};
 }
 
-Error reply_error(const Unit& unit, const Options& options, std::string_view command, const HeardExchange& exchange) {
+Error reply_error(const Unit& unit, const Options& options, std::string_view command,
+                  const ObservedExchange& exchange) {
   if (exchange.reply.frame().empty()) return Error::timeout;
-  const HeardFrame request =
+  const ObservedFrame request =
       command.empty() ? exchange.request : request_of(unit, options, *find_command(unit, command));
   return unit.check(options, request.frame(), exchange.reply.frame());
 }
 
-std::size_t changes_noticed(const Unit& unit, const Options& options, const HeardExchange& good, Errors errors) {
+std::size_t changes_noticed(const Unit& unit, const Options& options, const ObservedExchange& good, Errors errors) {
   std::size_t noticed = 0;
-  const auto try_one = [&](const HeardFrame& request, const HeardFrame& reply) {
+  const auto try_one = [&](const ObservedFrame& request, const ObservedFrame& reply) {
     noticed += (errors & any_of(unit.check(options, request.frame(), reply.frame()))) != 0 ? 1 : 0;
   };
   for (std::size_t bit = 0; bit < bits_of(good.reply); ++bit) {
-    HeardFrame changed = good.reply;
+    ObservedFrame changed = good.reply;
     flip(changed, bit);
     try_one(good.request, changed);
   }
   for (const int by : {-1, 1}) {
     if (good.reply.bytes.empty() && !good.reply.can) break;
-    HeardFrame changed = good.reply;
+    ObservedFrame changed = good.reply;
     resize(changed, by);
     try_one(good.request, changed);
   }
-  for (const HeardFrame& request : other_requests(unit, options)) try_one(request, good.reply);
+  for (const ObservedFrame& request : other_requests(unit, options)) try_one(request, good.reply);
   if (unit.link == LinkKind::clocked) return noticed;  // no check is the last byte there
   // A checksum hides what stands before it: wrong bits with a last byte that makes it right again.
-  HeardFrame changed = good.reply;
+  ObservedFrame changed = good.reply;
   for (std::size_t bit = 0; noticed == 0 && changed.bytes.size() > 2 && bit < bits_of(good.reply) - 8; ++bit) {
     flip(changed, bit);
     for (unsigned last = 0; last < 256 && noticed == 0; ++last) {

@@ -28,12 +28,12 @@ inline void conclude(ClauseResult& result, bool kept, std::string evidence) {
 
 /// In how many ways a good reply can be changed that then breaks it by one of these errors: a wrong bit, a missing or
 /// an additional byte, or that it answers another request. 0: these options have no such check.
-[[nodiscard]] std::size_t changes_noticed(const Unit& unit, const Options& options, const capture::HeardExchange& good,
-                                          Errors errors);
+[[nodiscard]] std::size_t changes_noticed(const Unit& unit, const Options& options,
+                                          const capture::ObservedExchange& good, Errors errors);
 
 /// Returns the error of the reply as one to the request of this command; "": to its own request.
 [[nodiscard]] Error reply_error(const Unit& unit, const Options& options, std::string_view command,
-                                const capture::HeardExchange& exchange);
+                                const capture::ObservedExchange& exchange);
 
 /// Whose request this is, as it says itself. Nothing: it is none, or names nobody.
 [[nodiscard]] std::optional<std::int64_t> encoder_of(const Unit& unit, const Options& options, const Frame& request);

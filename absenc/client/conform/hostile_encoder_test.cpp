@@ -21,8 +21,8 @@
 namespace absenc::client {
 namespace {
 
-using capture::HeardExchange;
-using capture::HeardFrame;
+using capture::ObservedExchange;
+using capture::ObservedFrame;
 
 /// Keeps all exchanges of the line: each request with all that came until the next.
 template <class Item>
@@ -155,8 +155,8 @@ std::vector<Item> zeros(const std::vector<Item>& like) {
 }
 
 template <class Item>
-HeardFrame frame_of(const std::vector<Item>& items, std::size_t bits = 0) {
-  HeardFrame frame;
+ObservedFrame frame_of(const std::vector<Item>& items, std::size_t bits = 0) {
+  ObservedFrame frame;
   if constexpr (std::is_same_v<Item, CanFrame>) {
     if (!items.empty()) frame.can = items.back();
   } else {
@@ -176,7 +176,7 @@ std::size_t good_replies(EncoderAddress address, const Clause& clause, const Tap
   std::size_t good = 0;
   for (const auto& one : tap.exchanges) {
     if (one.reply.empty() || is_flat(frame_of(one.reply, one.bits))) continue;
-    const HeardFrame request = frame_of(one.request);
+    const ObservedFrame request = frame_of(one.request);
     good += unit.check(address.options, request.frame(), frame_of(one.reply, one.bits).frame()) == Error::none;
     if (!one.request.empty() || unit.link == LinkKind::clocked) continue;
     if constexpr (std::is_same_v<Item, std::uint8_t>) {

@@ -34,7 +34,7 @@ std::size_t mixtures_noticed(const Unit& unit, const Options& options, const Rea
   for (const Attempted& other : readings.all) {
     const std::size_t bits = one->exchange.reply.bits;
     if (noticed != 0 || other.error != Error::none || other.exchange.reply.bits != bits) continue;
-    capture::HeardExchange mixed = other.exchange;
+    capture::ObservedExchange mixed = other.exchange;
     for (std::size_t bit = 0; bit < bits; ++bit) {
       const auto mask = static_cast<std::uint8_t>(0x80U >> bit % 8);
       std::uint8_t& byte = mixed.reply.bytes[bit / 8];
@@ -47,7 +47,7 @@ std::size_t mixtures_noticed(const Unit& unit, const Options& options, const Rea
 
 }  // namespace
 
-bool is_flat(const capture::HeardFrame& reply) {
+bool is_flat(const capture::ObservedFrame& reply) {
   const Frame frame = reply.frame();
   const std::size_t bits = frame.bits;
   for (std::size_t i = 1; i < bits; ++i) {

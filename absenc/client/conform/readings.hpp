@@ -12,7 +12,7 @@
 namespace absenc::client {
 
 /// Whether all bits of a clocked word are alike: a line that nobody drives shows the same.
-[[nodiscard]] bool is_flat(const capture::HeardFrame& reply);
+[[nodiscard]] bool is_flat(const capture::ObservedFrame& reply);
 
 /// Whether something came for the last request, and not only the level of a line that nobody drives.
 [[nodiscard]] inline bool was_answered(const Attempted& one) { return one.answered && one.error != Error::line_stuck; }

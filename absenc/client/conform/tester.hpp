@@ -322,11 +322,11 @@ class Tester {
     if constexpr (is_can) return one.error == Error::timeout;
     return !one.answered;
   }
-  [[nodiscard]] capture::HeardFrame own_request() const {
+  [[nodiscard]] capture::ObservedFrame own_request() const {
     const Attempted* const good = readings_.first_good();
-    return good != nullptr ? good->exchange.request : capture::HeardFrame{};
+    return good != nullptr ? good->exchange.request : capture::ObservedFrame{};
   }
-  [[nodiscard]] Error error_of(const capture::HeardFrame& request, const Attempted& one) const {
+  [[nodiscard]] Error error_of(const capture::ObservedFrame& request, const Attempted& one) const {
     return unit_.check(options_, request.frame(), one.exchange.reply.frame());
   }
 

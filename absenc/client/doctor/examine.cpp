@@ -132,7 +132,7 @@ class Doctor {
           tell("turn the shaft by hand now");
           examiner.read(*read_, most_turned, choices_.turning, seen_.turned);
         }
-        if (wired && !any_heard() && seen_.unasked.empty()) examiner.listen_for_late();
+        if (wired && !any_heard() && seen_.unsolicited.empty()) examiner.listen_for_late();
         if (!any_good() && any_heard()) scan(examiner);
       } catch (...) {
         examiner.conclude(seen_);
@@ -274,7 +274,7 @@ class Doctor {
     const LineFindings findings = search_line(search);
     if (findings.interrupted) throw os::Interrupted{};
     for (const Candidate& candidate : findings.candidates) {
-      if (candidate.unasked || !is_found(candidate)) continue;
+      if (candidate.unsolicited || !is_found(candidate)) continue;
       const std::string command = address_of(candidate, search.place);
       const EncoderAddress other = parse_address(command);
       const bool is_ours = candidate.unit == address_.unit;

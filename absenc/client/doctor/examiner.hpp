@@ -36,7 +36,8 @@ class Examiner {
         bool heard = false;
         runner_.listen(piece_time, [&](Bytes bytes) {
           heard = true;
-          if (seen.unasked.size() < most_heard) seen.unasked.insert(seen.unasked.end(), bytes.begin(), bytes.end());
+          if (seen.unsolicited.size() < most_heard)
+            seen.unsolicited.insert(seen.unsolicited.end(), bytes.begin(), bytes.end());
           return true;
         });
         busy += heard ? 1 : 0;

@@ -81,8 +81,8 @@ std::string inversion(const Case& one) {
     return fmt::format("the UART counted {} breaks, in which it was low for more than a character",
                        seen.damage->breaks);
   }
-  if (!seen.unasked.empty() && all_are(seen.unasked, 0)) {
-    return fmt::format("{} bytes came that nobody asked for, all of them 00", seen.unasked.size());
+  if (!seen.unsolicited.empty() && all_are(seen.unsolicited, 0)) {
+    return fmt::format("{} bytes came that nobody asked for, all of them 00", seen.unsolicited.size());
   }
   std::size_t zeros = 0;
   for (const Attempted& attempt : seen.readings) {
@@ -108,16 +108,16 @@ void judge_silence(const Case& one, std::vector<Finding>& findings) {
   if (unswitched) {
     findings.push_back(finding(Ailment::direction_unswitched, {seen.port, seen.facts.driver}));
   } else {
-    findings.push_back(finding(
-        Ailment::no_answer,
-        {fmt::format("{}", seen.readings.size()), seen.unasked.empty() ? "" : ", though something was heard before"}));
+    findings.push_back(
+        finding(Ailment::no_answer, {fmt::format("{}", seen.readings.size()),
+                                     seen.unsolicited.empty() ? "" : ", though something was heard before"}));
   }
 }
 
 void judge_lateness(const Case& one, std::vector<Finding>& findings) {
   const Observations& seen = one.seen;
   const std::size_t tried = seen.readings.size();
-  // On a CAN bus encoders send unasked: what comes behind a request that was not answered is no late answer to it.
+  // On a CAN bus encoders send unsolicited: what comes behind a request that was not answered is no late answer to it.
   if (seen.late == 0 || one.unit.link == LinkKind::can) return;
   // A single one may be this computer, which was busy. The verdict counts it all the same.
   const bool nothing_else = one.good == 0 && count(seen.readings, was_heard) * 10 < tried;
@@ -187,7 +187,7 @@ void judge_line(const Case& one, std::vector<Finding>& findings) {
   }
   const bool characters = one.unit.link == LinkKind::half_duplex || one.unit.link == LinkKind::full_duplex;
   if (characters && one.good == 0 && seen.trials.empty()) {
-    std::vector<std::uint8_t> bytes = seen.unasked;
+    std::vector<std::uint8_t> bytes = seen.unsolicited;
     for (const Attempted& attempt : seen.readings) bytes.insert(bytes.end(), attempt.raw.begin(), attempt.raw.end());
     if (std::optional<Finding> text = text_of_others(one, bytes)) {
       findings.push_back(std::move(*text));
@@ -199,8 +199,8 @@ void judge_line(const Case& one, std::vector<Finding>& findings) {
   if (!inverted.empty()) {
     findings.push_back(finding(Ailment::line_inverted, {inverted}));
   } else if (seen.never_silent && one.good * 10 < seen.readings.size() * 9 + 1) {
-    findings.push_back(finding(Ailment::never_silent,
-                               {fmt::format("{}", seen.unasked.size()), to_text(seen.listened), hex(seen.unasked, 8)}));
+    findings.push_back(finding(Ailment::never_silent, {fmt::format("{}", seen.unsolicited.size()),
+                                                       to_text(seen.listened), hex(seen.unsolicited, 8)}));
   }
   if (findings.empty() || findings.back().ailment != Ailment::line_inverted) judge_silence(one, findings);
   judge_lateness(one, findings);

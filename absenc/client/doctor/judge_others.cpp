@@ -130,7 +130,7 @@ std::optional<Finding> text_of_others(const Case& one, Bytes bytes) {
 std::optional<Finding> other_settings(const Case& one, const All& all) {
   constexpr std::size_t enough = 4;  // frames: fewer prove little
   if (all.size() < enough) return {};
-  std::vector<capture::HeardExchange> exchanges;
+  std::vector<capture::ObservedExchange> exchanges;
   for (const Attempted* attempt : all) exchanges.push_back(attempt->exchange);
   constexpr std::size_t most_tried = 32;  // each is decoded with many sets of options
   exchanges.resize(std::min(exchanges.size(), most_tried));

@@ -43,7 +43,7 @@ struct Observations {
   os::PortFacts facts{};
   std::optional<os::LineCounts> damage{};  // that the UART counted meanwhile
   std::optional<Refusal> refusal{};
-  std::vector<std::uint8_t> unasked{};  // before anything was sent
+  std::vector<std::uint8_t> unsolicited{};  // before anything was sent
   Time listened{};
   bool never_silent = false;  // meanwhile
   std::vector<Attempted> readings{};

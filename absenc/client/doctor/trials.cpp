@@ -11,7 +11,7 @@
 #include <optional>
 
 #include "absenc/client/doctor/damage.hpp"
-#include "absenc/client/identify/ways.hpp"
+#include "absenc/client/identify/probe_settings.hpp"
 #include "absenc/client/text/unit_text.hpp"
 
 namespace absenc::client {

@@ -14,7 +14,7 @@
 #include <vector>
 
 #include "absenc/client/doctor/examine.hpp"
-#include "absenc/client/identify/ways.hpp"
+#include "absenc/client/identify/probe_settings.hpp"
 #include "absenc/client/port/link.hpp"
 #include "absenc/client/text/unit_text.hpp"
 #include "absenc/protocol/all.hpp"

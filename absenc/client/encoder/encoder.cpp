@@ -27,8 +27,8 @@ constexpr Time time_between_tries = 250ms;
 constexpr Time between_looks = 20ms;  // whether it was cancelled
 
 host::Unwrapper make_unwrapper(const EncoderAddress& uri) {
-  const bool unasked = host::sends_unasked(*uri.unit, uri.options);
-  return host::Unwrapper(speed_limit(uri), unasked ? host::Times::arrived : host::Times::latched);
+  const bool unsolicited = host::sends_unsolicited(*uri.unit, uri.options);
+  return host::Unwrapper(speed_limit(uri), unsolicited ? host::Times::arrived : host::Times::latched);
 }
 
 std::string limit_text(const EncoderAddress& uri, const Reading& reading) {

@@ -124,13 +124,13 @@ class Busy {
         storage_(std::make_unique<std::byte[]>(address_.unit->device_storage)),
         connection_(
             Connection::make(address_, [&, most, seed](const EncoderAddress& to) { return link(to, most, seed); })),
-        unwrapper_({.rpm = 60, .mm_s = 20'000}, is_unasked() ? host::Times::arrived : host::Times::latched) {
+        unwrapper_({.rpm = 60, .mm_s = 20'000}, is_unsolicited() ? host::Times::arrived : host::Times::latched) {
     device_ = address_.unit->device(address_.options, shaft_, {storage_.get(), address_.unit->device_storage});
     each([](auto& device) { device.power_on(Time{}, std::decay_t<decltype(device)>::PowerOn::skip); });
     connection_->connect();
   }
 
-  [[nodiscard]] bool is_unasked() const { return host::sends_unasked(*address_.unit, address_.options); }
+  [[nodiscard]] bool is_unsolicited() const { return host::sends_unsolicited(*address_.unit, address_.options); }
 
   /// Reads so often, and calls `use(reading, bounds)` for good ones. Returns how many were.
   template <class Use>
@@ -208,7 +208,7 @@ TEST_P(LatchTimes, HoldTheTrueInstant) {
   for (const Time most : most_late) {
     Busy busy(
         GetParam(), [=](double seconds) { return rate * seconds; }, most, 1);
-    if (busy.is_unasked()) GTEST_SKIP() << "it sends by itself: only its arrival is known";
+    if (busy.is_unsolicited()) GTEST_SKIP() << "it sends by itself: only its arrival is known";
     const std::size_t good = busy.read(200, 1ms, [&](const Reading& reading, const host::LatchTime& at) {
       ASSERT_TRUE(true_instant(busy.shaft(), reading, at).has_value())
           << to_text(at.width()) << " from " << at.earliest.count() << ", late by up to " << to_text(most);
@@ -248,7 +248,7 @@ TEST_P(LatchTimes, MakeTheMeanSpeedOfAShaftThatSwings) {
   for (const Time most : most_late) {
     Busy busy(
         GetParam(), [=](double seconds) { return swing * std::sin(2 * M_PI * seconds); }, most, 1);
-    if (busy.is_unasked()) GTEST_SKIP() << "it sends by itself: only its arrival is known";
+    if (busy.is_unsolicited()) GTEST_SKIP() << "it sends by itself: only its arrival is known";
     std::map<Time, Time> truths;  // by the earliest time of a reading
     std::size_t compared = 0;
     busy.read(600, 3ms, [&](const Reading& reading, const host::LatchTime& at) {

@@ -12,7 +12,7 @@
 #include "absenc/client/error.hpp"
 #include "absenc/client/identify/line.hpp"
 #include "absenc/client/identify/patience.hpp"
-#include "absenc/client/identify/ways.hpp"
+#include "absenc/client/identify/probe_settings.hpp"
 #include "absenc/client/port/link.hpp"
 #include "absenc/client/port/runner.hpp"
 #include "absenc/client/text/unit_text.hpp"
@@ -22,8 +22,8 @@
 namespace absenc::client {
 
 using namespace std::chrono_literals;
-using capture::HeardExchange;
 using capture::Hypothesis;
+using capture::ObservedExchange;
 
 inline constexpr unsigned reads = 6;              // of each encoder that answers
 inline constexpr Time listening = 100ms;          // before anything is sent
@@ -119,7 +119,7 @@ class Attempt {
   void ask() {
     const Command* read = find_command(unit_, Verb::read);
     if (read == nullptr || read->changes_encoder) return;
-    for (const Settings& way : ways_to_ask(unit_, settings_, *read)) {
+    for (const Settings& way : settings_to_try(unit_, settings_, *read)) {
       Settings settings = settings_;
       settings.insert(settings.end(), way.begin(), way.end());
       const Options options = require_options(unit_, {}, option_settings(unit_, settings, true));
@@ -142,7 +142,7 @@ class Attempt {
       const bool needs_argument = std::any_of(command.arguments.begin(), command.arguments.end(),
                                               [](const Argument& argument) { return argument.required; });
       if (command.verb != Verb::info || command.changes_encoder || needs_argument) continue;
-      std::vector<HeardExchange> ignored;
+      std::vector<ObservedExchange> ignored;
       const Conversed one = converse(command, options, ignored, &identity);
       all.agrees = all.agrees || one.error == Error::none;
       const bool contradicts = one.error == Error::unexpected_reply || one.error == Error::out_of_range;
@@ -159,7 +159,7 @@ class Attempt {
   /// The conversation that is under way.
   struct Talk {
     const Options& options;
-    std::vector<HeardExchange> exchanges{};
+    std::vector<ObservedExchange> exchanges{};
     Patience<Item> patience;
     bool understood = false;  // a good reply came
   };
@@ -187,7 +187,7 @@ class Attempt {
     talk.exchanges.push_back(heard_exchange(line));
     talk.understood = talk.understood || is_good(talk.exchanges.back(), talk.options);
   }
-  [[nodiscard]] bool is_good(const HeardExchange& one, const Options& options) const {
+  [[nodiscard]] bool is_good(const ObservedExchange& one, const Options& options) const {
     return !one.reply.frame().empty() && capture::explains(unit_, options, one);
   }
 
@@ -199,7 +199,7 @@ class Attempt {
 
   // One conversation; its exchanges go to `exchanges`. Where a reply was late, all is asked once more, with more time
   // for each reply.
-  Conversed converse(const Command& command, const Options& options, std::vector<HeardExchange>& exchanges,
+  Conversed converse(const Command& command, const Options& options, std::vector<ObservedExchange>& exchanges,
                      FieldSink* sink = nullptr) {
     for (;;) {
       if (std::exchange(asked_, true)) runner_.settle(settled, longest_settling);
@@ -215,7 +215,7 @@ class Attempt {
     }
   }
 
-  Conversed converse_once(const Command& command, const Options& options, std::vector<HeardExchange>& exchanges,
+  Conversed converse_once(const Command& command, const Options& options, std::vector<ObservedExchange>& exchanges,
                           FieldSink* sink) {
     const bool scans = command.verb == Verb::scan;
     const Time quiet = (scans ? patience_ : 500ms) + 5 * (link_.latency + allowance_);
@@ -248,21 +248,21 @@ class Attempt {
       throw;
     }
     if constexpr (!is_can) findings_.only_echo = findings_.only_echo || runner_.session().echo().only_echo();
-    const auto alive = [this](const HeardExchange& exchange) { return is_alive(exchange); };
+    const auto alive = [this](const ObservedExchange& exchange) { return is_alive(exchange); };
     const bool answered = std::any_of(talk.exchanges.begin(), talk.exchanges.end(), alive);
     is_unanswered_ = !talk.exchanges.empty() && talk.exchanges.back().reply.frame().empty();
     one.heard = answered ? talk.patience.heard() : 0;
     take(talk, exchanges);
     return one;
   }
-  void take(Talk& talk, std::vector<HeardExchange>& exchanges) {
+  void take(Talk& talk, std::vector<ObservedExchange>& exchanges) {
     findings_.requests += talk.exchanges.size();
     findings_.heard += talk.patience.heard();
     exchanges.insert(exchanges.end(), talk.exchanges.begin(), talk.exchanges.end());
   }
 
   // Whether anybody sent it: what nobody drives is clocked in all the same.
-  [[nodiscard]] bool is_alive(const HeardExchange& exchange) const {
+  [[nodiscard]] bool is_alive(const ObservedExchange& exchange) const {
     if (unit_.link != LinkKind::clocked && unit_.link != LinkKind::spi) return true;
     const auto& bytes = exchange.reply.bytes;
     const auto same_as = [&](std::uint8_t value) {
@@ -281,7 +281,7 @@ class Attempt {
       return targets;
     }
     Addresses addresses;
-    std::vector<HeardExchange> ignored;
+    std::vector<ObservedExchange> ignored;
     converse(*command, options, ignored, &addresses);
     const Option* option = find_role(unit_.options, Role::encoder);
     for (const std::int64_t address : addresses.all) {
@@ -295,7 +295,7 @@ class Attempt {
   bool ask_one(const Command& read, const Settings& settings, const std::string& encoder) {
     const std::vector<OptionText> known = option_settings(unit_, settings, false);
     const Options options = require_options(unit_, {}, option_settings(unit_, settings, true));
-    std::vector<HeardExchange> exchanges;
+    std::vector<ObservedExchange> exchanges;
     if (converse(read, options, exchanges).heard == 0) {
       exchanges.clear();  // it may have been late, or have missed the first request
       if (converse(read, options, exchanges).heard == 0) return false;
@@ -307,7 +307,7 @@ class Attempt {
     // What explains more than what was asked with may also ask better.
     if (!found.empty() && !found.front().evidence.explains_all() &&
         request_of(unit_, found.front().options, read) != request_of(unit_, options, read)) {
-      std::vector<HeardExchange> again;
+      std::vector<ObservedExchange> again;
       read_all(read, found.front().options, again);
       ++findings_.searches;
       std::vector<Hypothesis> better = capture::find_hypotheses(unit_, known, again);
@@ -317,19 +317,20 @@ class Attempt {
     return true;
   }
 
-  void read_all(const Command& read, const Options& options, std::vector<HeardExchange>& exchanges) {
+  void read_all(const Command& read, const Options& options, std::vector<ObservedExchange>& exchanges) {
     unsigned unanswered = 0;
     for (unsigned i = 1; i < reads + unanswered; ++i) {
       if (os::interrupted()) throw os::Interrupted{};
       if (converse(read, options, exchanges).heard == 0 && ++unanswered == most_unanswered) break;
     }
     // On a busy machine an answer may come too late for one of them.
-    std::erase_if(exchanges,
-                  [&](const HeardExchange& one) { return one.reply.frame().empty() || is_of_another(one, options); });
+    std::erase_if(exchanges, [&](const ObservedExchange& one) {
+      return one.reply.frame().empty() || is_of_another(one, options);
+    });
   }
 
   // Whether it says that it is from another encoder than the one that was asked: one on a CAN bus sends by itself.
-  [[nodiscard]] bool is_of_another(const HeardExchange& exchange, const Options& options) const {
+  [[nodiscard]] bool is_of_another(const ObservedExchange& exchange, const Options& options) const {
     const Option* asked = find_role(unit_.options, Role::encoder);
     Addresses who;
     if (asked == nullptr || unit_.decode(options, {}, exchange.reply.frame(), who) != Error::none) return false;

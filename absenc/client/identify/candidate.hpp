@@ -16,7 +16,7 @@ struct Candidate {
   const Unit* unit = nullptr;
   capture::Hypothesis hypothesis{};
   std::vector<std::string> link_settings{};  // "baud=9600"; those of the user too
-  bool unasked = false;                      // the encoder sends by itself
+  bool unsolicited = false;                  // the encoder sends by itself
   std::string line{};                        // "RS-485 half duplex, 2.5 Mbit/s"
   std::string encoder{};                     // "address=3": which of those on the line; "": the only one
   Answer identity{};                         // what it says of itself: its type, its serial number; of a line

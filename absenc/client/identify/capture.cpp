@@ -16,8 +16,8 @@ namespace absenc::client {
 
 namespace {
 
-using capture::HeardExchange;
 using capture::Hypothesis;
+using capture::ObservedExchange;
 
 constexpr std::size_t enough = 300;         // replies, good or bad
 constexpr std::size_t enough_noise = 3000;  // bytes that are part of no frame
@@ -25,8 +25,8 @@ constexpr std::size_t enough_noise = 3000;  // bytes that are part of no frame
 /// Thrown when more of the capture would say no more.
 struct Enough {};
 
-capture::HeardFrame owned(const Frame& frame) {
-  capture::HeardFrame heard{.bytes = {frame.bytes.begin(), frame.bytes.end()}, .bits = frame.bits};
+capture::ObservedFrame owned(const Frame& frame) {
+  capture::ObservedFrame heard{.bytes = {frame.bytes.begin(), frame.bytes.end()}, .bits = frame.bits};
   if (frame.can != nullptr) heard.can = *frame.can;
   return heard;
 }
@@ -47,15 +47,15 @@ struct Collector final : capture::AnnotationSink {
     }
     if (replies >= enough || noise >= enough_noise) throw Enough{};
   }
-  std::vector<HeardExchange> exchanges;
+  std::vector<ObservedExchange> exchanges;
   std::size_t replies = 0;
   std::size_t noise = 0;
 };
 
 using Sentences = std::vector<std::string>;
 
-std::vector<HeardExchange> heard_as(const Unit& unit, const Options& options, const CaptureChoices& choices,
-                                    Sentences& damages) {
+std::vector<ObservedExchange> heard_as(const Unit& unit, const Options& options, const CaptureChoices& choices,
+                                       Sentences& damages) {
   CaptureRun run(unit, options, choices);
   Collector collector;
   try {

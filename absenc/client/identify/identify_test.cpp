@@ -12,7 +12,7 @@ namespace {
 
 /// A line with one encoder, which is switched on anew each time the line is opened.
 struct Place {
-  explicit Place(const std::string& text, std::vector<std::string> faults = {}, VirtualWay between = {})
+  explicit Place(const std::string& text, std::vector<std::string> faults = {}, VirtualPort between = {})
       : encoder(parse_address(text)), way(between) {
     encoder.device.faults = std::move(faults);
     way.clock = &clock;
@@ -26,13 +26,13 @@ struct Place {
   }
 
   EncoderAddress encoder;
-  VirtualWay way;
+  VirtualPort way;
   VirtualClock clock;
 };
 
 /// Returns the evidence for the unit when it alone is asked, and the number of requests.
 std::pair<capture::Evidence, std::size_t> asked(const std::string& text, const std::vector<std::string>& faults,
-                                                const VirtualWay& way = {}) {
+                                                const VirtualPort& way = {}) {
   Place place(text, faults, way);
   const LineSearch search = place.search();
   LineFindings findings;
@@ -49,7 +49,7 @@ struct Counted {
   std::size_t requests = 0;
 };
 Counted damaged_by_runner(const std::string& text, const std::vector<std::string>& faults, std::size_t count,
-                          const VirtualWay& way = {}) {
+                          const VirtualPort& way = {}) {
   Place place(text, faults, way);
   Link link = virtual_link(place.encoder, place.way);
   Runner<std::uint8_t> runner(place.encoder);
@@ -79,7 +79,7 @@ TEST_P(Damage, IsWhatTheRunnerSaysWithAndWithoutEcho) {
   const std::string text = fmt::format("sim:{}", unit.id);
   const EncoderAddress address = parse_address(text);
   const bool is_asked = unit.link == LinkKind::half_duplex && find_command(unit, Verb::read) != nullptr &&
-                        !host::sends_unasked(unit, address.options);
+                        !host::sends_unsolicited(unit, address.options);
   if (!is_asked) GTEST_SKIP() << "a reading is not one request with its reply";
   std::size_t damaged = 0;
   for (const char* const fault : {"corrupt=0.4", "garbage=0.4", "truncate=0.4"}) {
@@ -127,7 +127,7 @@ TEST_P(Found, TheFirstCandidateIsTheEncoderOfEachModelAndNumber) {
   if (unit.link == LinkKind::clocked || unit.link == LinkKind::spi) GTEST_SKIP() << "an SPI controller is needed";
   std::vector<std::string> settings{""};
   // Who sends by himself tells no number, and takes the search seconds.
-  if (!host::sends_unasked(unit, parse_address(fmt::format("sim:{}", unit.id)).options)) {
+  if (!host::sends_unsolicited(unit, parse_address(fmt::format("sim:{}", unit.id)).options)) {
     settings.push_back(at_last_number(unit));
     for (const Model& model : unit.models) settings.push_back(fmt::format("model={}", model.name));
   }
@@ -143,7 +143,7 @@ TEST_P(Found, TheFirstCandidateIsTheEncoderOfEachModelAndNumber) {
     const unsigned wanted = unit.resolution(place.encoder.options).singleturn_bits;
     EXPECT_TRUE(found == wanted || best.hypothesis.at_least) << found << " of " << wanted;
     const Option* number = find_role(unit.options, Role::encoder);
-    if (number == nullptr || best.unasked) continue;
+    if (number == nullptr || best.unsolicited) continue;
     const auto index = static_cast<std::size_t>(number - unit.options.data());
     EXPECT_EQ(best.hypothesis.options[index], place.encoder.options[index]);
   }

@@ -34,7 +34,7 @@ constexpr std::array<std::uint32_t, 10> common_rates{9600,    19'200,  38'400,  
 struct Sender {
   const Option* option = nullptr;  // that says which encoder is meant; null: there is none
   std::string number{};            // its value
-  std::vector<HeardExchange> exchanges{};
+  std::vector<ObservedExchange> exchanges{};
 
   [[nodiscard]] std::string name() const {
     return option != nullptr ? fmt::format("{}={}", option->name, number) : std::string();
@@ -110,7 +110,7 @@ class Search {
     std::vector<Candidate>& all = findings_.candidates;
     std::set<std::pair<const Unit*, std::string>> asked;
     for (std::size_t i = 0; i < all.size(); ++i) {
-      if (all[i].unit == nullptr || all[i].unasked || !is_found(all[i])) continue;
+      if (all[i].unit == nullptr || all[i].unsolicited || !is_found(all[i])) continue;
       if (!asked.emplace(all[i].unit, all[i].encoder).second) continue;
       const std::vector<std::size_t> alike = same_as(i);
       if (alike.size() == 1 && find_role(all[i].unit->fields, Role::identity) == nullptr) continue;
@@ -127,7 +127,7 @@ class Search {
     const std::vector<Candidate>& all = findings_.candidates;
     std::vector<std::size_t> alike;
     for (std::size_t i = first; i < all.size() && alike.size() < most_introduced; ++i) {
-      const bool same = all[i].unit == all[first].unit && all[i].encoder == all[first].encoder && !all[i].unasked;
+      const bool same = all[i].unit == all[first].unit && all[i].encoder == all[first].encoder && !all[i].unsolicited;
       if (same && is_as_likely(all[i], all[first])) alike.push_back(i);
     }
     return alike;
@@ -166,7 +166,7 @@ class Search {
   }
 
   void try_rates(const Unit& unit) {
-    if (has_setting(search_.settings, rate_setting) || way_of(search_) != Way::serial) return;
+    if (has_setting(search_.settings, rate_setting) || medium_of(search_) != Medium::serial) return;
     std::vector<std::string> rates;
     const Option* rate = find_role(unit.options, Role::rate);
     if (rate != nullptr) {
@@ -207,7 +207,7 @@ class Search {
     if (search_.now() >= deadline_) throw OutOfTime{};
     const Time patience = is_beyond_doubt() ? brief_patience : patience_;
     Attempt<Item> one(search_, unit, settings, patience, deadline_, findings_);
-    if (one.line().rate == 0 && way_of(search_) == Way::serial) return;  // the rates come later
+    if (one.line().rate == 0 && medium_of(search_) == Medium::serial) return;  // the rates come later
     const std::string line = line_of(unit.link, one.line());
     if (search_.progress) {
       search_.progress(fmt::format("{}, {}: {} found so far", unit.id, line, findings_.candidates.size()));
@@ -222,7 +222,7 @@ class Search {
       return;
     }
     findings_.lines.insert(line);
-    if (way_of(search_) == Way::spi || !listen(one, unit)) one.ask();
+    if (medium_of(search_) == Medium::spi || !listen(one, unit)) one.ask();
     if (one.cut() && settings == search_.settings) cut_.push_back(&unit);
   }
 
@@ -237,7 +237,7 @@ class Search {
     if (known != listened_.end()) return known->second;
     const std::size_t before = findings_.candidates.size();
     const std::vector<Item> items = attempt.listen();
-    findings_.unasked += items.size();
+    findings_.unsolicited += items.size();
     if constexpr (std::is_same_v<Item, CanFrame>) {
       explain_frames(items, line_of(unit.link, line));
     } else {
@@ -268,13 +268,13 @@ class Search {
 
   void explain_bytes(Bytes bytes, const LineSettings& line, LinkKind link) {
     for (const Unit* other : all_units()) {
-      const bool same_line = fits(*other, search_) && hears(*other, line.rate, search_) &&
+      const bool same_line = fits(*other, search_) && can_receive(*other, line.rate, search_) &&
                              other->line.parity == line.parity && other->line.stop_bits == line.stop_bits;
       if (!same_line || bytes.empty()) continue;
       ++findings_.searches;
       for (Hypothesis& one : capture::find_stream_hypotheses(*other, bytes, listening)) {
         Settings settings = search_.settings;
-        const bool needs_rate = other->line.rate != line.rate && way_of(search_) == Way::serial &&
+        const bool needs_rate = other->line.rate != line.rate && medium_of(search_) == Medium::serial &&
                                 !has_setting(settings, rate_setting) && !os::is_pseudo_terminal(search_.place);
         if (needs_rate) settings.push_back(fmt::format("{}={}", rate_setting, line.rate));
         findings_.candidates.push_back({other, std::move(one), settings, true, line_of(link, line)});
@@ -289,7 +289,7 @@ class Search {
       const bool repeated = std::any_of(kept.begin(), kept.end(), [&](const Candidate& other) {
         return other.unit == one.unit && other.hypothesis.options.values == one.hypothesis.options.values;
       });
-      if (!repeated && !(one.unasked && is_explained(*one.unit))) kept.push_back(one);
+      if (!repeated && !(one.unsolicited && is_explained(*one.unit))) kept.push_back(one);
     }
     findings_.candidates = std::move(kept);
   }
@@ -297,7 +297,7 @@ class Search {
   // Whether one of this unit answers, and all that it answers is explained.
   [[nodiscard]] bool is_explained(const Unit& unit) const {
     return std::any_of(findings_.candidates.begin(), findings_.candidates.end(), [&](const Candidate& one) {
-      return one.unit == &unit && !one.unasked && one.hypothesis.evidence.explains_all();
+      return one.unit == &unit && !one.unsolicited && one.hypothesis.evidence.explains_all();
     });
   }
 

@@ -30,7 +30,7 @@ struct LineFindings {
   std::vector<Candidate> candidates{};
   std::size_t requests = 0;        // sent
   std::size_t heard = 0;           // bytes that came, echo taken off
-  std::size_t unasked = 0;         // of them, before anything was sent
+  std::size_t unsolicited = 0;     // of them, before anything was sent
   std::size_t searches = 0;        // for what explains what came: protocols, settings, encoders
   bool only_echo = false;          // all that ever came back was what was sent
   std::set<std::string> lines{};   // that were tried

@@ -24,19 +24,19 @@ namespace absenc::client {
 /// A command that was run once: how it ended, and its last exchange.
 struct Attempted {
   Error error = Error::none;
-  std::string detail{};               // in the words of the unit
-  std::string advice{};               // of the unit; "": none
-  Time began{};                       // on the port's clock
-  capture::HeardExchange exchange{};  // the last one, without echo
-  std::vector<std::uint8_t> raw{};    // all bytes that came, echo included
-  bool heard = false;                 // something came, be it an echo
-  bool answered = false;              // something came that is no echo
-  std::uint64_t unanswered = 0;       // requests before the last, behind which nothing came
-  std::uint64_t discarded = 0;        // damaged frames of a stream since the one before; `error` may report one of them
-  Time answered_after{};              // from the end of the request to the beginning of the reply
-  Time limit{};                       // of that: what the protocol and the way allow; 0: none
-  Time after{};                       // from the end of the request to the end of the reply
-  Time allowed{};                     // that the protocol and the characters of the reply take at most
+  std::string detail{};                  // in the words of the unit
+  std::string advice{};                  // of the unit; "": none
+  Time began{};                          // on the port's clock
+  capture::ObservedExchange exchange{};  // the last one, without echo
+  std::vector<std::uint8_t> raw{};       // all bytes that came, echo included
+  bool heard = false;                    // something came, be it an echo
+  bool answered = false;                 // something came that is no echo
+  std::uint64_t unanswered = 0;          // requests before the last, behind which nothing came
+  std::uint64_t discarded = 0;  // damaged frames of a stream since the one before; `error` may report one of them
+  Time answered_after{};        // from the end of the request to the beginning of the reply
+  Time limit{};                 // of that: what the protocol and the way allow; 0: none
+  Time after{};                 // from the end of the request to the end of the reply
+  Time allowed{};               // that the protocol and the characters of the reply take at most
   std::optional<Reading> reading{};
   std::optional<std::int64_t> counter{};  // the first field that counts the replies
   const FieldInfo* counter_field = nullptr;
@@ -49,9 +49,9 @@ struct Attempted {
 /// A request and its reply, without echo. `clocks`: of a clocked link. Of several CAN frames the last one is the reply:
 /// what came before it was for others.
 template <class Item>
-[[nodiscard]] capture::HeardExchange heard_exchange(std::span<const Item> request, std::span<const Item> reply,
-                                                    std::size_t clocks) {
-  capture::HeardExchange exchange;
+[[nodiscard]] capture::ObservedExchange heard_exchange(std::span<const Item> request, std::span<const Item> reply,
+                                                       std::size_t clocks) {
+  capture::ObservedExchange exchange;
   if constexpr (std::is_same_v<Item, CanFrame>) {
     if (!request.empty()) exchange.request.can = request.front();
     if (!reply.empty()) exchange.reply.can = reply.back();
@@ -63,7 +63,7 @@ template <class Item>
   return exchange;
 }
 template <class Item>
-[[nodiscard]] capture::HeardExchange heard_exchange(const LineExchange<Item>& line) {
+[[nodiscard]] capture::ObservedExchange heard_exchange(const LineExchange<Item>& line) {
   return heard_exchange<Item>(line.request, line.reply(), line.clocks);
 }
 

@@ -28,9 +28,9 @@ EncoderAddress with_faults(EncoderAddress address, std::vector<std::string> faul
 
 /// An encoder of bytes behind a runner.
 struct Bench {
-  explicit Bench(const std::string& text, const VirtualWay& way = {}, unsigned attempts = 1)
+  explicit Bench(const std::string& text, const VirtualPort& way = {}, unsigned attempts = 1)
       : Bench(parse_address(text), way, attempts) {}
-  explicit Bench(const EncoderAddress& to, const VirtualWay& way = {}, unsigned attempts = 1)
+  explicit Bench(const EncoderAddress& to, const VirtualPort& way = {}, unsigned attempts = 1)
       : address(to), link(virtual_link(to, way)), runner(to, attempts) {
     runner.attach(*link.bytes, link.latency);
   }

@@ -24,7 +24,7 @@ struct VirtualClock {
 };
 
 /// What is between a virtual encoder and who converses with it.
-struct VirtualWay {
+struct VirtualPort {
   bool echo = false;                       // the adapter echoes
   std::optional<std::uint64_t> pauses{};   // each request begins a random while later: the seed
   std::optional<sim::RoughRates> rough{};  // a line of whole frames, which is faster and can be bad; without echo
@@ -66,7 +66,7 @@ void take_port(Link& link, std::shared_ptr<AnyPort> port) {
 
 /// `device` stands where the encoder of this address would, and must outlive the link.
 template <class Item>
-void put_on_line(Link& link, const EncoderAddress& encoder, Machine<Item>& device, const VirtualWay& way = {}) {
+void put_on_line(Link& link, const EncoderAddress& encoder, Machine<Item>& device, const VirtualPort& way = {}) {
   const LinkKind kind = encoder.unit->link;
   const LineSettings settings = encoder.line.with_some_rate();
   link.place = "here";
@@ -86,7 +86,7 @@ void put_on_line(Link& link, const EncoderAddress& encoder, Machine<Item>& devic
 }
 
 /// A virtual encoder as its address describes it, with options, motion, conditions, alarms and faults.
-inline Link virtual_link(const EncoderAddress& encoder, const VirtualWay& way = {}) {
+inline Link virtual_link(const EncoderAddress& encoder, const VirtualPort& way = {}) {
   Link link;
   link.device = std::make_unique<VirtualDevice>(*encoder.unit, encoder.options, encoder.device);
   link.device->power_on(Time{});

@@ -53,7 +53,7 @@ class CanEngine : public Conversation<CanFrame> {
   void overhear(bool yes = true) { overhears_ = yes; }
   /// Whether the frame that is being told is such a one.
   [[nodiscard]] bool came_early() const { return early_; }
-  /// Hears what is sent unasked.
+  /// Hears what is sent unsolicited.
   void listen(Time duration);
   /// Switches this end of the line, then hears for `duration`.
   void configure(std::uint32_t rate, Time duration);

@@ -120,8 +120,8 @@ Fate lost(Found& found, Error error, std::string_view detail = {}) {
 
 Part<Fate> try_to_execute(Dialog& dialog, Found& found) {
   found.data.clear();
-  const Error unasked = co_await send(dialog, found);
-  if (unasked != Error::none) co_return lost(found, unasked);
+  const Error unsolicited = co_await send(dialog, found);
+  if (unsolicited != Error::none) co_return lost(found, unsolicited);
   const Time asked = dialog.received_at();
   const std::uint8_t ready = found.writes ? channel3::write_ready : channel3::read_ready;
   unsigned idle = 0;

@@ -115,9 +115,9 @@ TEST(EslDevice, AWrongParityBitIsReportedOrNotAtEveryAddress) {
 
 // An encoder without a line: what happens to it by hand.
 struct Alone {
-  using Happening = Event<std::uint8_t>::Kind;
+  using LinkEvent = Event<std::uint8_t>::Kind;
   Alone() { encoder.power_on(Time{}, PowerOn::skip); }
-  Step<std::uint8_t> feed(Happening kind, Time at, const Wire& bytes = {}) {
+  Step<std::uint8_t> feed(LinkEvent kind, Time at, const Wire& bytes = {}) {
     encoder.feed({.kind = kind, .at = at, .items = bytes});
     return encoder.next(at);
   }
@@ -129,10 +129,10 @@ constexpr auto waits = Step<std::uint8_t>::Kind::wait;
 // A request of three characters, the second of them damaged: the answer waits for the end of the frame set.
 TEST(EslDevice, AWrongStopBitIsReportedWhenTheHostHasEnded) {
   Alone alone;
-  alone.feed(Alone::Happening::received, 1us, {control_field({}, 0, DataId::position)});
-  EXPECT_EQ(alone.feed(Alone::Happening::line_error, 2us).kind, waits);
-  EXPECT_EQ(alone.feed(Alone::Happening::received, 3us, {0x55}).kind, waits);
-  const Step<std::uint8_t> step = alone.feed(Alone::Happening::silence, 3us + 2 * line_settings.character());
+  alone.feed(Alone::LinkEvent::received, 1us, {control_field({}, 0, DataId::position)});
+  EXPECT_EQ(alone.feed(Alone::LinkEvent::line_error, 2us).kind, waits);
+  EXPECT_EQ(alone.feed(Alone::LinkEvent::received, 3us, {0x55}).kind, waits);
+  const Step<std::uint8_t> step = alone.feed(Alone::LinkEvent::silence, 3us + 2 * line_settings.character());
   ASSERT_EQ(step.kind, Step<std::uint8_t>::Kind::transfer);
   EXPECT_EQ(step.at, 3us + answer_time);
   EXPECT_EQ(step.out[1] & status::rejected, status::stop_error);
@@ -141,34 +141,34 @@ TEST(EslDevice, AWrongStopBitIsReportedWhenTheHostHasEnded) {
 
 TEST(EslDevice, AnyPauseEndsWhatAnAbsentEncoderWasAskedAndNothingIsSentWhenOff) {
   Alone alone;
-  const Step<std::uint8_t> step = alone.feed(Alone::Happening::received, 2us, wire_of({DataId::position, 3}));
+  const Step<std::uint8_t> step = alone.feed(Alone::LinkEvent::received, 2us, wire_of({DataId::position, 3}));
   EXPECT_EQ(step.expect, 0u);
   EXPECT_GT(step.gap, Time{});
-  alone.feed(Alone::Happening::silence, 5us);
+  alone.feed(Alone::LinkEvent::silence, 5us);
   const Wire own = wire_of({DataId::position});
-  alone.encoder.feed({.kind = Alone::Happening::received, .at = 9us, .items = own});
+  alone.encoder.feed({.kind = Alone::LinkEvent::received, .at = 9us, .items = own});
   alone.encoder.power_off(10us);
   EXPECT_EQ(alone.encoder.next(10us).kind, waits);
 }
 
 // So that the eighth reset after it is the first of eight.
 TEST(EslDevice, ABadRequestStartsTheCountAgain) {
-  for (const auto kind : {Alone::Happening::received, Alone::Happening::line_error}) {
+  for (const auto kind : {Alone::LinkEvent::received, Alone::LinkEvent::line_error}) {
     Alone alone;
     alone.shaft.put(0, 1'000'000);
     Time now{};
     const Wire zero = wire_of({DataId::zero});
     const auto ask = [&](int times) {
       for (; times > 0; --times) {
-        alone.feed(Alone::Happening::received, now += reset_interval, zero);
-        alone.feed(Alone::Happening::sent, now + 20us);
+        alone.feed(Alone::LinkEvent::received, now += reset_interval, zero);
+        alone.feed(Alone::LinkEvent::sent, now + 20us);
       }
     };
     ask(7);
-    alone.feed(Alone::Happening::received, now += reset_interval, {zero[0]});
+    alone.feed(Alone::LinkEvent::received, now += reset_interval, {zero[0]});
     alone.feed(kind, now + 1us, {0x55});
-    alone.feed(Alone::Happening::silence, now + 3us);
-    alone.feed(Alone::Happening::sent, now + 20us);
+    alone.feed(Alone::LinkEvent::silence, now + 3us);
+    alone.feed(Alone::LinkEvent::sent, now + 20us);
     ask(1);
     EXPECT_EQ(alone.encoder.reply_to(DataId::position, now).singleturn, 1'000'000u);
     ask(7);
@@ -273,10 +273,10 @@ TEST(EslDevice, ItsTimesBeginWhenARequestMayHaveCome) {
     Alone alone;
     const Wire one = wire_of(first);
     const Wire two = wire_of(second);
-    alone.encoder.feed({.kind = Alone::Happening::received, .at = 50ms, .items = one, .late = late});
+    alone.encoder.feed({.kind = Alone::LinkEvent::received, .at = 50ms, .items = one, .late = late});
     alone.encoder.next(50ms);
-    alone.feed(Alone::Happening::sent, 50ms);
-    alone.feed(Alone::Happening::received, 50ms + apart, two);
+    alone.feed(Alone::LinkEvent::sent, 50ms);
+    alone.feed(Alone::LinkEvent::received, 50ms + apart, two);
     return alone.encoder.violation_count();
   };
   const Request page = memory_write(page_select_address, 4);

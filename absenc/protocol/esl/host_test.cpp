@@ -224,15 +224,15 @@ TEST(EslHost, WhatIsWrongWithAReplyIsSaid) {
 
 // Of characters that were damaged nobody knows what they would have been.
 TEST(EslHost, OfADamagedReplyNoSentenceIsMade) {
-  using Happening = Event<std::uint8_t>;
+  using LinkEvent = Event<std::uint8_t>;
   const testing::Talk made(unit, testing::options_of({}), "position");
   Conversation<std::uint8_t>& host = *made;
   static_cast<void>(host.next({}));
-  host.feed({.kind = Happening::Kind::sent, .at = 2us});
+  host.feed({.kind = LinkEvent::Kind::sent, .at = 2us});
   const Wire channel_1 = wire({.one = {.status = status::ready}});
-  host.feed({.kind = Happening::Kind::received, .at = 15us, .items = Bytes(channel_1).first(11)});
-  host.feed({.kind = Happening::Kind::line_error, .at = 16us});
-  host.feed({.kind = Happening::Kind::silence, .at = 20us});
+  host.feed({.kind = LinkEvent::Kind::received, .at = 15us, .items = Bytes(channel_1).first(11)});
+  host.feed({.kind = LinkEvent::Kind::line_error, .at = 16us});
+  host.feed({.kind = LinkEvent::Kind::silence, .at = 20us});
   EXPECT_EQ(host.error(), Error::wrong_length);
   EXPECT_EQ(host.detail(), "");
 }

@@ -29,7 +29,7 @@ std::string chance_text(double log10) {
 
 std::string settings_text(const Candidate& candidate) {
   std::vector<std::string> settings = settings_for(*candidate.unit, candidate.hypothesis.options);
-  if (candidate.unasked) settings.emplace_back("sends by itself");
+  if (candidate.unsolicited) settings.emplace_back("sends by itself");
   return settings.empty() ? "the defaults" : fmt::format("{}", fmt::join(settings, ", "));
 }
 
@@ -41,7 +41,7 @@ Json to_json(const Candidate& candidate, const std::string& command) {
   json.set("options", options_to_json(*candidate.unit, candidate.hypothesis.options));
   json.set("encoder", candidate.encoder.empty() ? Json() : Json(candidate.encoder));
   json.set("identity", to_json(candidate.identity.row()));
-  json.set("line", candidate.line).set("unasked", candidate.unasked);
+  json.set("line", candidate.line).set("unasked", candidate.unsolicited);
   json.set("explained", evidence.explained).set("tried", evidence.tried).set("distinct", evidence.distinct);
   json.set("log10_chance", candidate.hypothesis.chance()).set("found", is_found(candidate));
   return json.set("more_bits_possible", candidate.hypothesis.at_least).set("command", command);
@@ -125,11 +125,11 @@ std::vector<std::string> advice(std::span<const Candidate> candidates) {
 }  // namespace
 
 std::string advice_for(const LineFindings& findings, const LineSearch& search) {
-  if (findings.heard == 0 && findings.unasked == 0 && findings.only_echo) {
+  if (findings.heard == 0 && findings.unsolicited == 0 && findings.only_echo) {
     return "only what was sent came back (the adapter's echo), and nothing from an encoder\n"
            "  Try: the encoder's supply and ground; A and B swapped; the wires between adapter and encoder";
   }
-  if (findings.heard == 0 && findings.unasked == 0) {
+  if (findings.heard == 0 && findings.unsolicited == 0) {
     return fmt::format(
         "{} requests were sent, and nothing came back\n"
         "  Try: the encoder's supply and ground; A and B (or TX and RX) swapped; termination; an adapter that can\n"
@@ -140,7 +140,7 @@ std::string advice_for(const LineFindings& findings, const LineSearch& search) {
       "{} bytes came, but no protocol explains them\n"
       "  Try: A and B swapped, which makes every byte wrong; the baud rate, as in {}?baud=9600; shielding and\n"
       "  termination; it may be an encoder that absenc does not know: `absenc crc find` looks into its frames",
-      findings.heard + findings.unasked, search.place);
+      findings.heard + findings.unsolicited, search.place);
 }
 
 std::string read_command(const Candidate& candidate, std::string_view place) {

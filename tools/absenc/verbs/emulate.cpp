@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "absenc/client/emulation/attended.hpp"
-#include "absenc/client/memory/keeper.hpp"
-#include "absenc/client/memory/kept.hpp"
+#include "absenc/client/memory/memory_file.hpp"
+#include "absenc/client/memory/memory_saver.hpp"
 #include "absenc/client/text/unit_text.hpp"
 #include "absenc/host/drive.hpp"
 #include "absenc/os/cuse/spidev_node.hpp"
@@ -158,7 +158,7 @@ struct Emulation {
       console.look(now);
       return !console.ended();
     });
-    MemoryKeeper<Item> keeper(attended, line.first(), file);
+    MemorySaver<Item> keeper(attended, line.first(), file);
     std::vector<std::string> notes;
     int status = exit_good;
     try {

@@ -25,21 +25,21 @@ namespace absenc::tool {
 
 namespace {
 
-using capture::HeardExchange;
-using capture::HeardFrame;
+using capture::ObservedExchange;
+using capture::ObservedFrame;
 
 // ---- Frames from the command line
 
-HeardFrame heard(LinkKind link, std::string_view what, std::string_view text) {
+ObservedFrame heard(LinkKind link, std::string_view what, std::string_view text) {
   if (text.empty()) return {};
   WireFrame frame = parse_wire_text(link, what, text);
   return {std::move(frame.bytes), frame.bits, frame.can};
 }
 
-std::vector<HeardExchange> frames_for(const Unit& unit, const Invocation& invocation) {
+std::vector<ObservedExchange> frames_for(const Unit& unit, const Invocation& invocation) {
   const std::span<const std::string> requests = invocation.texts("--request");
   const std::span<const std::string> replies = invocation.texts("--hex");
-  std::vector<HeardExchange> exchanges;
+  std::vector<ObservedExchange> exchanges;
   for (std::size_t i = 0; i < replies.size(); ++i) {
     const std::string_view request = i < requests.size() ? std::string_view(requests[i]) : std::string_view();
     exchanges.push_back({heard(unit.link, "--request", request), heard(unit.link, "--hex", replies[i])});
@@ -63,7 +63,7 @@ int identify_frames(const Invocation& invocation) {
   std::size_t searches = 0;
   for (const Unit* unit : all_units()) {
     try {
-      const std::vector<HeardExchange> exchanges = frames_for(*unit, invocation);
+      const std::vector<ObservedExchange> exchanges = frames_for(*unit, invocation);
       readable = true;
       ++searches;
       for (capture::Hypothesis& one : capture::find_hypotheses(*unit, {}, exchanges)) {

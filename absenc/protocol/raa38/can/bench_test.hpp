@@ -97,14 +97,14 @@ struct Scripted final : Machine<CanFrame> {
     if (queue.empty() && (!by_itself || now < due)) return {.at = by_itself ? due : never};
     if (by_itself) due = now + period + (wobble = -wobble);
     if (by_itself && left != nullptr) --*left;
-    out = by_itself ? unasked : queue.front();
+    out = by_itself ? unsolicited : queue.front();
     if (!by_itself) queue.erase(queue.begin());
     sending = true;
     return {.kind = Step<CanFrame>::Kind::transfer, .out = {&out, 1}};
   }
 
   Script script;
-  CanFrame unasked = encode_position(0x20, 49);
+  CanFrame unsolicited = encode_position(0x20, 49);
   Time period{};             // 0: it sends nothing by itself
   Time wobble{};             // each second one comes so much later
   unsigned* left = nullptr;  // how many frames it still sends by itself; null: it goes on

@@ -93,7 +93,7 @@ struct Format {
   bool listens = false;       // reads what the node sends by itself
   std::uint8_t positive = 0;  // what 22 carries to count up, and to count down: the document does not say
   std::uint8_t negative = 1;
-  std::uint8_t cyclic = 10;     // virtual: readings a second after power on, unasked; 0: none
+  std::uint8_t cyclic = 10;     // virtual: readings a second after power on, unsolicited; 0: none
   bool answers_on_7e4 = false;  // virtual: its answers to configurations, else on 7E5
 
   [[nodiscard]] constexpr std::uint32_t bit_rate() const { return rates[rate].bits_per_second; }

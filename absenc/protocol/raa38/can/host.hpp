@@ -92,17 +92,17 @@ author::Procedure look_for_node(Dialog& dialog, Values& found);
 
 /// What was heard of one number.
 struct Heard {
-  std::uint16_t unasked = 0;     // frames that it sent by itself
-  std::uint16_t per_second = 0;  // those of the first second
-  std::uint8_t answers = 0;      // to one request
-  std::uint8_t damaged = 0;      // requests at which frames were destroyed
-  bool readable = false;         // `counts` fits the format
-  std::uint32_t counts = 0;      // of the last frame
+  std::uint16_t unsolicited = 0;  // frames that it sent by itself
+  std::uint16_t per_second = 0;   // those of the first second
+  std::uint8_t answers = 0;       // to one request
+  std::uint8_t damaged = 0;       // requests at which frames were destroyed
+  bool readable = false;          // `counts` fits the format
+  std::uint32_t counts = 0;       // of the last frame
 
-  [[nodiscard]] constexpr bool is_there() const { return unasked != 0 || answers != 0 || damaged > 1; }
+  [[nodiscard]] constexpr bool is_there() const { return unsolicited != 0 || answers != 0 || damaged > 1; }
   /// Two answers to one request, or destroyed frames each time.
   [[nodiscard]] constexpr bool clash() const {
-    return (unasked == 0 && answers > 1) || (damaged > 1 && answers == 0 && unasked == 0);
+    return (unsolicited == 0 && answers > 1) || (damaged > 1 && answers == 0 && unsolicited == 0);
   }
 };
 
@@ -113,7 +113,7 @@ struct Nodes {
   [[nodiscard]] unsigned count() const;
 };
 
-/// Listens, because after power on nodes send unasked, then asks every number. Error: timeout when nobody is there.
+/// Listens, because after power on nodes send unsolicited, then asks every number. Error: timeout when nobody is there.
 author::Procedure scan(Dialog& dialog, Nodes& nodes);
 
 struct Surveyed : Values {

@@ -218,7 +218,7 @@ TEST(CanZero, ANodeThatNoLongerSendsIsTold) {
     left = 0;
     return Frames{};
   });
-  exhausted.unasked = encode_position(0x20, 0);
+  exhausted.unsolicited = encode_position(0x20, 0);
   exhausted.period = 100ms;
   exhausted.left = &left;
   EXPECT_TRUE(ended(with(exhausted, "zero"), Error::cross_check_failed, "no longer sends"));
@@ -235,7 +235,7 @@ TEST(CanZero, WhatItStillSentByItselfIsNoAnswer) {
       if (order == Order::zero) counts = 0;
       return order == Order::zero ? Frames{} : obedient(heard, counts);
     });
-    slow.unasked = encode_position(0x20, 32);
+    slow.unsolicited = encode_position(0x20, 32);
     slow.period = period;
     slow.left = &left;
     EXPECT_TRUE(with(slow, "zero").has("answered=0"));

@@ -273,7 +273,7 @@ Part<bool> hear_nodes(Dialog& dialog, Nodes& nodes, unsigned asked) {
     const unsigned early = dialog.came_early() && node.damaged == 0 ? 1 : 0;
     const bool was_asked = asked == everybody || (number + early <= asked && number + answering > asked);
     if (!was_asked) {
-      ++node.unasked;
+      ++node.unsolicited;
     } else if (node.answers < 255) {
       ++node.answers;
     }

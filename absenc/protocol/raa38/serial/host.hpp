@@ -78,9 +78,9 @@ using Dialog = author::DialogOf<Protocol>;
 /// half a second.
 author::Procedure set_zero(Dialog& dialog, Values& found);
 
-/// Listens whether somebody transmits unasked, then asks every number of a bus, whatever the mode. An answer that is
-/// damaged every time tells of two encoders with one number, or of a bad line. Errors: timeout when nobody answers,
-/// unexpected_reply when somebody transmits unasked.
+/// Listens whether somebody transmits unsolicited, then asks every number of a bus, whatever the mode. An answer that
+/// is damaged every time tells of two encoders with one number, or of a bad line. Errors: timeout when nobody answers,
+/// unexpected_reply when somebody transmits unsolicited.
 using Units = std::array<Values, unit_count>;
 author::Procedure scan(Dialog& dialog, Units& found);
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The memory of a virtual encoder in a file, for people to read and edit. kept.cpp describes the format.
+// The memory of a virtual encoder in a file, for people to read and edit. memory_file.cpp describes the format.
 #pragma once
 
 #include <optional>
@@ -7,7 +7,7 @@
 #include <string_view>
 
 #include "absenc/core/bytes.hpp"
-#include "absenc/os/kept_file.hpp"
+#include "absenc/os/owned_file.hpp"
 
 namespace absenc::client {
 
@@ -31,7 +31,7 @@ class MemoryFile {
   std::string path_;
   std::string protocol_;
   std::string model_;
-  std::optional<os::KeptFile> file_;
+  std::optional<os::OwnedFile> file_;
 };
 
 }  // namespace absenc::client

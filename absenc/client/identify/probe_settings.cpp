@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "absenc/client/identify/ways.hpp"
+#include "absenc/client/identify/probe_settings.hpp"
 
 #include <fmt/format.h>
 
@@ -12,25 +12,25 @@
 
 namespace absenc::client {
 
-Way way_of(const LineSearch& search) {
+Medium medium_of(const LineSearch& search) {
   const std::string& place = search.place;
-  if (place.starts_with("spi:")) return Way::spi;
-  if (place.starts_with("tcp:")) return Way::tcp;
+  if (place.starts_with("spi:")) return Medium::spi;
+  if (place.starts_with("tcp:")) return Medium::tcp;
   // A place that is no path can only be a network interface.
-  return place.starts_with("slcan:") || place.find('/') == std::string::npos ? Way::can : Way::serial;
+  return place.starts_with("slcan:") || place.find('/') == std::string::npos ? Medium::can : Medium::serial;
 }
 
 bool fits(const Unit& unit, const LineSearch& search) {
-  const Way way = way_of(search);
-  if (way == Way::can) return unit.link == LinkKind::can;
-  if (way == Way::spi) return unit.link == LinkKind::spi || unit.link == LinkKind::clocked;
+  const Medium way = medium_of(search);
+  if (way == Medium::can) return unit.link == LinkKind::can;
+  if (way == Medium::spi) return unit.link == LinkKind::spi || unit.link == LinkKind::clocked;
   return unit.link == LinkKind::half_duplex || unit.link == LinkKind::full_duplex;
 }
 
-bool hears(const Unit& unit, std::uint32_t rate, const LineSearch& search) {
+bool can_receive(const Unit& unit, std::uint32_t rate, const LineSearch& search) {
   const bool any_rate = unit.line.rate == 0 || find_role(unit.options, Role::rate) != nullptr;
   const bool users_rate = has_setting(search.settings, rate_setting);
-  return any_rate || users_rate || way_of(search) == Way::tcp || unit.line.rate == rate;
+  return any_rate || users_rate || medium_of(search) == Medium::tcp || unit.line.rate == rate;
 }
 
 bool has_setting(const Settings& settings, std::string_view name) {
@@ -60,7 +60,7 @@ std::vector<std::uint8_t> request_of(const Unit& unit, const Options& options, c
   return {bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(*size)};
 }
 
-std::vector<Settings> ways_to_ask(const Unit& unit, const Settings& settings, const Command& read) {
+std::vector<Settings> settings_to_try(const Unit& unit, const Settings& settings, const Command& read) {
   constexpr std::size_t most_ways = 8;
   std::vector<Settings> all;
   std::vector<std::vector<std::uint8_t>> requests;
@@ -93,7 +93,7 @@ std::vector<std::vector<std::uint8_t>> harmful_to_others(const Unit& unit, std::
                                                          const LineSearch& search) {
   std::vector<std::vector<std::uint8_t>> all;
   for (const Unit* other : all_units()) {
-    if (other == &unit || !fits(*other, search) || !hears(*other, rate, search)) continue;
+    if (other == &unit || !fits(*other, search) || !can_receive(*other, rate, search)) continue;
     Options defaults;
     for (std::size_t i = 0; i < other->options.size(); ++i) defaults.values[i] = other->options[i].default_value;
     for (const Command& command : other->commands) {

@@ -21,7 +21,7 @@ namespace absenc::serve {
 }
 [[nodiscard]] inline std::int64_t calendar_ms() { return calendar_us() / 1000; }
 
-struct Happening {
+struct ServerEvent {
   std::int64_t at_ms = 0;
   std::string encoder{};  // "": of the server itself
   // alarm, alarm_over, acknowledged, failing, silent, lost, back, restarted, ended, examined, command, change, history,
@@ -41,13 +41,13 @@ struct Happening {
 };
 
 /// From the threads that read to whoever tells: bounded, so that a flood of them costs the oldest and no memory.
-class Happenings {
+class ServerEvents {
  public:
   static constexpr std::size_t most = 10'000;
 
-  void add(Happening happening) {
+  void add(ServerEvent server_event) {
     const std::lock_guard lock(mutex_);
-    waiting_.push_back(std::move(happening));
+    waiting_.push_back(std::move(server_event));
     ++added_;
     if (waiting_.size() <= most) return;
     waiting_.pop_front();
@@ -61,10 +61,10 @@ class Happenings {
   }
 
   /// All that came since the last time, the oldest first; `added` says how many there have been with them.
-  [[nodiscard]] std::vector<Happening> take(std::uint64_t& added) {
+  [[nodiscard]] std::vector<ServerEvent> take(std::uint64_t& added) {
     const std::lock_guard lock(mutex_);
     added = added_;
-    std::vector<Happening> taken(std::make_move_iterator(waiting_.begin()), std::make_move_iterator(waiting_.end()));
+    std::vector<ServerEvent> taken(std::make_move_iterator(waiting_.begin()), std::make_move_iterator(waiting_.end()));
     waiting_.clear();
     if (dropped_ != 0) {
       taken.push_back({calendar_ms(), "", "history", std::to_string(dropped_) + " older events were dropped"});
@@ -75,7 +75,7 @@ class Happenings {
 
  private:
   mutable std::mutex mutex_;
-  std::deque<Happening> waiting_;
+  std::deque<ServerEvent> waiting_;
   std::uint64_t added_ = 0;
   std::size_t dropped_ = 0;
 };

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "absenc/os/kept_file.hpp"
+#include "absenc/os/owned_file.hpp"
 
 #include <fcntl.h>
 #include <sys/file.h>
@@ -30,7 +30,7 @@ FileIdentity identity_of(const std::string& path) {
   return ::stat(path.c_str(), &named) == 0 ? identity_of(named) : FileIdentity{};
 }
 
-KeptFile::KeptFile(const std::string& path) : path_(path) {
+OwnedFile::OwnedFile(const std::string& path) : path_(path) {
   constexpr int most_tries = 100;
   for (int tries = 0; tries < most_tries; ++tries) {
     // To open a device may already do something to it.
@@ -55,25 +55,25 @@ KeptFile::KeptFile(const std::string& path) : path_(path) {
   throw system_failure("opening " + path, ELOOP);  // a link to itself; or somebody replaces it all the time
 }
 
-void KeptFile::replace(std::string_view content, Durable durable) {
+void OwnedFile::replace(std::string_view content, Durable durable) {
   NewFile file(path_);
   if (::flock(file.descriptor(), LOCK_EX | LOCK_NB) < 0) throw system_failure("locking " + path_, errno);
   file.write(content);
   file_ = file.take_place(durable);
 }
 
-bool KeptFile::has_its_name() const {
+bool OwnedFile::has_its_name() const {
   struct stat opened {};
   return ::fstat(file_.get(), &opened) == 0 && identity_of(path_) == identity_of(opened);
 }
 
-KeptFile::State KeptFile::state() const {
+OwnedFile::State OwnedFile::state() const {
   struct stat opened {};
   if (::fstat(file_.get(), &opened) < 0) throw system_failure("reading " + path_, errno);
   return {opened.st_size, opened.st_mtim.tv_sec * std::int64_t{1'000'000'000} + opened.st_mtim.tv_nsec};
 }
 
-std::string KeptFile::beginning(std::size_t size) const {
+std::string OwnedFile::beginning(std::size_t size) const {
   std::string bytes(size, '\0');
   const ssize_t count = ::pread(file_.get(), bytes.data(), bytes.size(), 0);
   if (count < 0) throw system_failure("reading " + path_, errno);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "absenc/os/kept_file.hpp"
+#include "absenc/os/owned_file.hpp"
 
 #include <gtest/gtest.h>
 #include <sys/stat.h>
@@ -16,7 +16,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-struct KeptFileTest : ::testing::Test {
+struct OwnedFileTest : ::testing::Test {
   testing::TemporaryDirectory directory;
   std::string path = directory.path() / "kept";
 
@@ -29,7 +29,7 @@ struct KeptFileTest : ::testing::Test {
   }
   static Failure::Kind refusal(const std::string& name) {
     try {
-      const KeptFile file(name);
+      const OwnedFile file(name);
     } catch (const Failure& failure) {
       return failure.kind();
     }
@@ -38,9 +38,9 @@ struct KeptFileTest : ::testing::Test {
   }
 };
 
-TEST_F(KeptFileTest, IsMadeAndReplaced) {
+TEST_F(OwnedFileTest, IsMadeAndReplaced) {
   {
-    KeptFile file(path);
+    OwnedFile file(path);
     EXPECT_TRUE(file.made());
     for (const char* text : {"one", "another one", ""}) {
       file.replace(text, Durable::no);
@@ -49,22 +49,22 @@ TEST_F(KeptFileTest, IsMadeAndReplaced) {
     }
     file.replace("last", Durable::yes);
   }
-  const KeptFile again(path);
+  const OwnedFile again(path);
   EXPECT_FALSE(again.made());
   EXPECT_EQ(content(), "last");
 }
 
-TEST_F(KeptFileTest, HasOneKeeper) {
+TEST_F(OwnedFileTest, HasOneKeeper) {
   {
-    KeptFile file(path);
+    OwnedFile file(path);
     EXPECT_EQ(refusal(path), Failure::Kind::in_use);
     file.replace("new", Durable::no);
     EXPECT_EQ(refusal(path), Failure::Kind::in_use);
   }
-  EXPECT_FALSE(KeptFile(path).made());
+  EXPECT_FALSE(OwnedFile(path).made());
 }
 
-TEST_F(KeptFileTest, IsARegularFile) {
+TEST_F(OwnedFileTest, IsARegularFile) {
   ASSERT_EQ(::mkfifo(path.c_str(), 0600), 0);
   for (const std::string& name : {path, std::string("/dev/full"), directory.path().string()}) {
     EXPECT_EQ(refusal(name), Failure::Kind::unsupported) << name;
@@ -74,8 +74,8 @@ TEST_F(KeptFileTest, IsARegularFile) {
   EXPECT_EQ(refusal(directory.path() / "loop"), Failure::Kind::system);
 }
 
-TEST_F(KeptFileTest, WhatCannotBeWrittenLeavesTheOldOne) {
-  KeptFile file(path);
+TEST_F(OwnedFileTest, WhatCannotBeWrittenLeavesTheOldOne) {
+  OwnedFile file(path);
   file.replace("old", Durable::no);
   fs::rename(directory.path(), directory.path().string() + "-away");
   EXPECT_THROW(file.replace("new", Durable::no), Failure);
@@ -84,7 +84,7 @@ TEST_F(KeptFileTest, WhatCannotBeWrittenLeavesTheOldOne) {
   EXPECT_EQ(files(), 1u);
 }
 
-TEST_F(KeptFileTest, ANewFileThatIsNotWholeVanishes) {
+TEST_F(OwnedFileTest, ANewFileThatIsNotWholeVanishes) {
   {
     NewFile file(path);
     file.write("half");
@@ -97,7 +97,7 @@ TEST_F(KeptFileTest, ANewFileThatIsNotWholeVanishes) {
   EXPECT_EQ(files(), 1u);
 }
 
-TEST_F(KeptFileTest, AFileWithoutANameIsSeenByNobody) {
+TEST_F(OwnedFileTest, AFileWithoutANameIsSeenByNobody) {
   const Descriptor file = nameless_file(directory.path());
   EXPECT_EQ(files(), 0u);
   EXPECT_THROW(static_cast<void>(nameless_file(path)), Failure);

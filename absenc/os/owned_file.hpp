@@ -25,11 +25,11 @@ struct FileIdentity {
 /// Locked (flock) from the constructor to the end of the object, also while it is replaced: the lock is on the file
 /// itself, and on each new one before it takes the place. Whoever opened the old one looks whether it still has its
 /// name.
-class KeptFile {
+class OwnedFile {
  public:
   /// Makes an empty file where there is none. Throws Failure: `in_use` when another process keeps it, `unsupported`
   /// when it is no regular file.
-  explicit KeptFile(const std::string& path);
+  explicit OwnedFile(const std::string& path);
 
   /// Whether the constructor made it.
   [[nodiscard]] bool made() const { return made_; }

@@ -14,16 +14,16 @@ namespace absenc::client {
 
 using Settings = std::vector<std::string>;  // "address=3"
 
-enum class Way : std::uint8_t { serial, tcp, spi, can };
+enum class Medium : std::uint8_t { serial, tcp, spi, can };
 
 /// Returns the kind of port at the place that is searched.
-[[nodiscard]] Way way_of(const LineSearch& search);
+[[nodiscard]] Medium medium_of(const LineSearch& search);
 
 /// Whether an encoder of this unit can be at such a port.
 [[nodiscard]] bool fits(const Unit& unit, const LineSearch& search);
 
 /// Whether an encoder of this unit may receive what is sent at `rate`, bits a second.
-[[nodiscard]] bool hears(const Unit& unit, std::uint32_t rate, const LineSearch& search);
+[[nodiscard]] bool can_receive(const Unit& unit, std::uint32_t rate, const LineSearch& search);
 
 [[nodiscard]] bool has_setting(const Settings& settings, std::string_view name);
 
@@ -36,7 +36,7 @@ enum class Way : std::uint8_t { serial, tcp, spi, can };
 /// Returns the settings to add to `settings` in each way in which the unit may have to be asked, at most 8: none, each
 /// model, and single choices that change the request. On clocked links the request is the same for all models, which
 /// differ in their number of bits. Ways in which the encoder sends by itself are left out.
-[[nodiscard]] std::vector<Settings> ways_to_ask(const Unit& unit, const Settings& settings, const Command& read);
+[[nodiscard]] std::vector<Settings> settings_to_try(const Unit& unit, const Settings& settings, const Command& read);
 
 /// Returns the requests by which encoders of other units that may receive them would be changed.
 [[nodiscard]] std::vector<std::vector<std::uint8_t>> harmful_to_others(const Unit& unit, std::uint32_t rate,

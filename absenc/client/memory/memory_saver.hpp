@@ -2,7 +2,7 @@
 // Stands in front of a virtual encoder and saves its memory before anybody can know what it holds.
 #pragma once
 
-#include "absenc/client/memory/kept.hpp"
+#include "absenc/client/memory/memory_file.hpp"
 #include "absenc/protocol/conversation.hpp"
 
 namespace absenc::client {
@@ -10,10 +10,10 @@ namespace absenc::client {
 /// Whatever becomes of this process, what its host was told is in the file. Throws Failure out of `next`, and with
 /// that gives no reply, when it cannot be saved.
 template <class Item>
-class MemoryKeeper final : public Machine<Item> {
+class MemorySaver final : public Machine<Item> {
  public:
   /// `line` is the device, or what stands in front of it.
-  MemoryKeeper(Machine<Item>& line, Device<Item>& device, MemoryFile& file)
+  MemorySaver(Machine<Item>& line, Device<Item>& device, MemoryFile& file)
       : line_(&line), device_(&device), file_(&file), saved_(device.memory_version()), finished_(saved_) {}
 
   void feed(const Event<Item>& event) override { line_->feed(event); }

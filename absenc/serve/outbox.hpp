@@ -13,7 +13,7 @@
 namespace absenc::serve {
 
 /// One good reading. What does not hold is not there.
-struct Passing {
+struct OutgoingReading {
   std::int64_t at_us = 0;                         // calendar, of when it was latched
   std::optional<double> place{};                  // past the end of a turn: degrees, of linear encoders mm
   std::optional<client::Estimate> speed{};        // rpm, of linear encoders mm/s
@@ -30,13 +30,13 @@ class Outbox {
   static constexpr std::size_t most = 2048;
 
   struct Taken {
-    std::vector<Passing> readings{};  // the oldest first
-    std::uint64_t dropped = 0;        // before them
+    std::vector<OutgoingReading> readings{};  // the oldest first
+    std::uint64_t dropped = 0;                // before them
   };
 
   [[nodiscard]] bool wanted() const { return wanted_; }
 
-  void put(const Passing& reading) {
+  void put(const OutgoingReading& reading) {
     waiting_.push_back(reading);
     if (waiting_.size() <= most) return;
     waiting_.pop_front();
@@ -54,7 +54,7 @@ class Outbox {
   void close() { *this = {}; }
 
  private:
-  std::deque<Passing> waiting_;
+  std::deque<OutgoingReading> waiting_;
   std::uint64_t dropped_ = 0;
   bool wanted_ = false;
 };
