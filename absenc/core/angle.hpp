@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A position reading and the only place where counts become an angle or a way.
+// A position reading, and the only functions that convert counts to degrees or micrometres.
 #pragma once
 
 #include <cstdint>
@@ -9,40 +9,41 @@
 
 namespace absenc {
 
-/// What an encoder has reported about a part of its position.
+/// How far one part of a reading (single-turn position or turns) can be trusted.
 enum class Validity : std::uint8_t {
   absent,   // the reply does not carry this part
-  unknown,  // it carries it, but neither this reply nor an earlier one reports whether it holds: do not use it
-  invalid,  // an alarm or a state that was reported says that it does not hold
-  valid,    // everything that could make it invalid was reported, and clear
+  unknown,  // no reply so far reports whether this part is valid: do not use it
+  invalid,  // a reported alarm or state marks this part as invalid
+  valid,    // every alarm and state that could make this part invalid was reported, and is clear
 };
 
-/// The low `bits` of `value` as a number with a sign, two's complement. 1 to 64 bits.
+/// Returns the low `bits` (1 to 64) of `value` as a signed number in two's complement.
 [[nodiscard]] constexpr std::int64_t with_sign(std::uint64_t value, unsigned bits) {
   const std::uint64_t sign = std::uint64_t{1} << (bits - 1);
   return static_cast<std::int64_t>(((value & low_mask(bits)) ^ sign) - sign);
 }
 
-/// One position as an encoder reported it, with what of it may be trusted.
+/// One position as an encoder reported it, and which parts of it can be trusted.
 struct Reading {
   std::uint64_t singleturn = 0;        // counts, 0 .. 2^singleturn_bits - 1
-  std::uint64_t multiturn = 0;         // revolutions, 0 .. 2^multiturn_bits - 1; people are shown `turns()`
+  std::uint64_t multiturn = 0;         // revolutions, 0 .. 2^multiturn_bits - 1; users see `turns()`
   unsigned singleturn_bits = 0;        // 0: the reply carries no single-turn position
   unsigned multiturn_bits = 0;         // 0: the reply carries no revolutions
-  unsigned singleturn_valid_bits = 0;  // the top bits that hold; 0: do not use the position
+  unsigned singleturn_valid_bits = 0;  // number of valid bits, counted from the top; 0: do not use the position
   bool multiturn_valid = false;
-  bool singleturn_known = true;   // false: no reply so far reports whether the position holds; then it is not valid
-  bool multiturn_known = true;    // the same of the turns
-  bool multiturn_signed = false;  // the encoder counts them below zero: two's complement of `multiturn_bits`
-  double unit_um = 0;             // linear encoders: micrometres a count of `singleturn`; 0: a rotation
-  bool ready = true;              // false while the encoder says that it is starting
-  std::uint32_t status = 0;       // bits named by the unit's status field, then those of its second
-  std::uint32_t alarms = 0;       // bits named by the unit's alarms field, then those of its second
-  std::uint32_t status_reported =
-      0;  // the bits of `status` that were reported; a bit that was not is unknown, not clear
-  std::uint32_t alarms_reported = 0;  // the same of `alarms`
-  Time latched{};                     // when the encoder took the position
-  Time received{};                    // when the last byte of the reply was there
+  bool singleturn_known = true;   // false: no reply so far reports whether the position is valid; it then counts as not
+                                  // valid
+  bool multiturn_known = true;    // false: no reply so far reports whether the turns are valid
+  bool multiturn_signed = false;  // the encoder counts turns below zero: `multiturn` is two's complement of
+                                  // `multiturn_bits`
+  double unit_um = 0;             // linear encoders: micrometres per count of `singleturn`; 0: rotary encoder
+  bool ready = true;              // false while the encoder reports that it is starting
+  std::uint32_t status = 0;       // bits named by the unit's status field, then those of its second status field
+  std::uint32_t alarms = 0;       // bits named by the unit's alarms field, then those of its second alarms field
+  std::uint32_t status_reported = 0;  // bits of `status` that were reported; other bits are unknown, not clear
+  std::uint32_t alarms_reported = 0;  // bits of `alarms` that were reported; other bits are unknown
+  Time latched{};                     // time at which the encoder sampled the position
+  Time received{};                    // time at which the last byte of the reply arrived
 
   [[nodiscard]] constexpr bool singleturn_valid() const {
     return singleturn_bits != 0 && singleturn_valid_bits == singleturn_bits;
@@ -52,7 +53,7 @@ struct Reading {
     if (!singleturn_known) return Validity::unknown;
     return singleturn_valid() ? Validity::valid : Validity::invalid;
   }
-  /// Revolutions as the encoder counts them, below zero where its turns have a sign.
+  /// Returns the revolutions, below zero where the encoder counts them with a sign.
   [[nodiscard]] constexpr std::int64_t turns() const {
     if (multiturn_signed && multiturn_bits != 0) return with_sign(multiturn, multiturn_bits);
     return static_cast<std::int64_t>(multiturn);
@@ -64,13 +65,14 @@ struct Reading {
   }
 };
 
-/// Degrees, 0 to below 360. A revolution has 2^bits counts, not 2^bits - 1. 1 to 64 bits.
+/// Returns the angle in degrees, 0 to below 360, of a position of 1 to 64 bits. A revolution has 2^bits counts, not
+/// 2^bits - 1.
 [[nodiscard]] constexpr double degrees(std::uint64_t counts, unsigned bits) {
-  if (bits > 48) return degrees(counts >> (bits - 48), 48);  // more would be rounded up to 360
+  if (bits > 48) return degrees(counts >> (bits - 48), 48);  // more than 48 bits could be rounded up to 360
   return 180.0 * static_cast<double>(counts) / static_cast<double>(std::uint64_t{1} << (bits - 1));
 }
 
-/// The way of a linear encoder, or that in a second.
+/// Converts counts of a linear encoder to micrometres, or counts per second to micrometres per second.
 [[nodiscard]] constexpr double micrometres(double counts, double unit_um) { return counts * unit_um; }
 [[nodiscard]] constexpr double micrometres(std::uint64_t counts, double unit_um) {
   return micrometres(static_cast<double>(counts), unit_um);
@@ -79,7 +81,8 @@ struct Reading {
   return micrometres(static_cast<double>(counts), unit_um);
 }
 
-/// The shortest way from `from` to `to` on a circle of 2^bits counts: -2^(bits-1) .. 2^(bits-1) - 1. 1 to 63 bits.
+/// Returns the shortest signed distance from `from` to `to` on a circle of 2^bits counts, 1 to 63 bits. The result
+/// is from -2^(bits-1) to 2^(bits-1) - 1.
 [[nodiscard]] constexpr std::int64_t wrapped_difference(std::uint64_t to, std::uint64_t from, unsigned bits) {
   return with_sign(to - from, bits);
 }

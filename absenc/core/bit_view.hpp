@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Runs of bits as clocked links carry them: packed MSB first, the last byte left-aligned.
+// Bit sequences as clocked links carry them: packed MSB first, the last byte left-aligned.
 #pragma once
 
 #include <algorithm>
@@ -18,13 +18,14 @@ namespace absenc {
 
 struct BitView {
   Bytes bytes{};
-  std::size_t size = 0;  // bits; `bytes` holds at least so many
+  std::size_t size = 0;  // number of bits; `bytes` has room for them
 
   [[nodiscard]] constexpr bool operator[](std::size_t index) const {
     return ((bytes[index / 8] >> (7 - index % 8)) & 1) != 0;
   }
 
-  /// `count` bits (0 to 64) from `first` on, the first one the most significant. All of them must be there.
+  /// Returns `count` bits (0 to 64) that begin at index `first`, the first one as the most significant. All must lie
+  /// within the view.
   [[nodiscard]] constexpr std::uint64_t load(std::size_t first, unsigned count) const {
     if (count == 0) return 0;
     std::uint64_t value = 0;
@@ -34,7 +35,7 @@ struct BitView {
     return value << count | window(first) >> (register_bits - count);
   }
 
-  /// Where the run of equal bits that begins at `first` ends; `size` when it does not.
+  /// Returns the index behind the run of equal bits that begins at `first`; `size` if the run reaches the end.
   [[nodiscard]] constexpr std::size_t end_of_run(std::size_t first) const {
     const std::size_t ones = first < size && (*this)[first] ? 0 : ~std::size_t{0};
     for (std::size_t at = first; at < size; at += window_bits) {
@@ -48,24 +49,25 @@ struct BitView {
   static constexpr unsigned register_bits = sizeof(std::size_t) * 8;
   static constexpr unsigned window_bits = register_bits - 7;
 
-  // A register of the bits from `first` on, the first one at the top: `window_bits` at least, zeros behind the end.
+  // Returns one machine word whose top bit is bit `first`: at least `window_bits` bits are usable, zeros follow the
+  // end.
   [[nodiscard, gnu::always_inline]] constexpr std::size_t window(std::size_t first) const {
     if (bytes.size() < sizeof(std::size_t)) return short_window(first);
     const std::size_t at = std::min(first / 8, bytes.size() - sizeof(std::size_t));
-    if (std::is_constant_evaluated()) {  // clang 14 has not made the template yet
+    if (std::is_constant_evaluated()) {  // clang 14 has not instantiated the template yet
       std::size_t value = 0;
       for (std::size_t i = 0; i < sizeof(std::size_t); ++i) value = value << 8 | bytes[at + i];
       return value << (first - 8 * at);
     }
     return register_at(at, std::make_index_sequence<sizeof(std::size_t)>{}) << (first - 8 * at);
   }
-  // Written without a loop it becomes one load where the processor has one.
+  // Without a loop the compiler emits a single load where the processor has one.
   template <std::size_t... i>
   [[nodiscard]] constexpr std::size_t register_at(std::size_t at, std::index_sequence<i...>) const {
     const std::uint8_t* from = bytes.data() + at;
     return ((std::size_t{from[i]} << (register_bits - 8 - 8 * i)) | ...);
   }
-  // Where all bytes together are fewer than a register has.
+  // Does the same for views with fewer bytes than a machine word.
   [[nodiscard, gnu::noinline]] constexpr std::size_t short_window(std::size_t first) const {
     std::size_t value = 0;
     unsigned shift = register_bits;
@@ -74,7 +76,7 @@ struct BitView {
   }
 };
 
-/// The same of bits that are all in one number, the first one its most significant.
+/// A bit sequence of up to 64 bits in one number, the first bit as the most significant. Has `load` like BitView.
 struct BitNumber {
   std::uint64_t number;
   unsigned size;  // 1 to 64
@@ -87,7 +89,8 @@ struct BitNumber {
 template <std::size_t Capacity>
 class BitBuffer {
  public:
-  /// False, and nothing stored, when they do not all fit. `count`: 0 to 64, the most significant bit first.
+  /// Appends the low `count` (0 to 64) bits of `value`, most significant first. Returns false, and stores nothing, if
+  /// they do not all fit.
   constexpr bool append(std::uint64_t value, unsigned count) {
     if (count > Capacity - size_) return false;
     for (unsigned i = count; i-- > 0;) {
@@ -105,12 +108,12 @@ class BitBuffer {
   [[nodiscard]] constexpr BitView view() const { return {bytes_, size_}; }
 
  private:
-  std::array<std::uint8_t, (Capacity + 7) / 8> bytes_{};  // 0 behind the end
+  std::array<std::uint8_t, (Capacity + 7) / 8> bytes_{};  // bits behind `size_` are 0
   std::size_t size_ = 0;
 };
 
-/// The CRC of `count` bits from `first` on. Where their number is no multiple of 8 zeros are put before them, which
-/// change nothing as long as the remainder begins at 0.
+/// Returns the CRC of `count` bits that begin at `first`. If `count` is no multiple of 8, zeros are put before the
+/// bits; they change nothing because the remainder begins at 0.
 template <CrcParameters parameters, CrcTable table = CrcTable::byte, class Bits>
 [[nodiscard]] constexpr auto crc_of(const Bits& bits, std::size_t first, std::size_t count) {
   static_assert(parameters.init == 0 && !parameters.refin);

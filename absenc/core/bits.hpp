@@ -10,29 +10,30 @@
 
 namespace absenc {
 
-/// The low `bits` bits set; 0 to 64.
+/// Returns a mask with the low `bits` (0 to 64) bits set.
 [[nodiscard]] constexpr std::uint64_t low_mask(unsigned bits) {
   return bits >= 64 ? ~std::uint64_t{0} : (std::uint64_t{1} << bits) - 1;
 }
 
-/// True when an odd number of bits is set.
+/// Returns true when an odd number of bits is set.
 [[nodiscard]] constexpr bool odd_parity(std::uint64_t value) { return (std::popcount(value) & 1) != 0; }
 
-/// The low `bits` bits of `value` in reverse order; 1 to 32, which a small processor shifts at once.
+/// Returns the low `bits` bits of `value` in reverse order. 1 to 32 bits: a small processor shifts 32 bits in one
+/// instruction.
 [[nodiscard]] constexpr std::uint32_t reflect(std::uint32_t value, unsigned bits) {
   std::uint32_t reversed = 0;
   for (unsigned i = 0; i < bits; ++i) reversed |= ((value >> i) & 1) << (bits - 1 - i);
   return reversed;
 }
 
-/// Up to 8 bytes, least significant first.
+/// Returns the number in up to 8 bytes, least significant first.
 [[nodiscard]] constexpr std::uint64_t load_little_endian(Bytes bytes) {
   std::uint64_t value = 0;
   for (std::size_t i = bytes.size(); i-- > 0;) value = value << 8 | bytes[i];
   return value;
 }
 
-/// Up to 8 bytes, most significant first.
+/// Returns the number in up to 8 bytes, most significant first.
 [[nodiscard]] constexpr std::uint64_t load_big_endian(Bytes bytes) {
   std::uint64_t value = 0;
   for (const std::uint8_t byte : bytes) value = value << 8 | byte;

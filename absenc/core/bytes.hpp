@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Views of bytes and a fixed-capacity buffer: what every layer passes around without a heap.
+// Views of bytes and a buffer of fixed capacity, which all layers use instead of a heap.
 #pragma once
 
 #include <array>
@@ -12,23 +12,24 @@ namespace absenc {
 using Bytes = std::span<const std::uint8_t>;
 using MutableBytes = std::span<std::uint8_t>;
 
-/// At most Capacity items, stored inside the object. Appending to a full buffer is refused, never truncated.
+/// Up to Capacity items, stored inside the object. Appending to a full buffer is refused, never truncated.
 template <class Item, std::size_t Capacity>
 class Buffer {
  public:
   constexpr Buffer() = default;
 
-  /// False, and nothing stored, when the buffer is full.
+  /// Appends `item`. Returns false, and stores nothing, if the buffer is full.
   constexpr bool push_back(const Item& item) {
     if (size_ == Capacity) return false;
     items_[size_++] = item;
     return true;
   }
 
-  /// False, and nothing stored, when `items` do not all fit.
+  /// Appends `items`. Returns false, and stores nothing, if they do not all fit.
   constexpr bool append(std::span<const Item> items) {
     if (items.size() > Capacity - size_) return false;
-    std::size_t size = size_;  // a byte that is stored could be part of a member: it would be read anew for each
+    std::size_t size = size_;  // local copy: a stored byte might alias `size_`, which would then be loaded again for
+                               // each item
     for (const Item& item : items) items_[size++] = item;
     size_ = size;
     return true;

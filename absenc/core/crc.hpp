@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Cyclic redundancy checks of 3 to 16 bits, in the parameters of the Rocksoft model (width, poly, init, refin,
-// refout, xorout). `crc_bitwise` is the definition; `Crc` is the same thing with a table made at compile time.
+// Cyclic redundancy checks of 3 to 16 bits, in the parameters of the Rocksoft model (width, poly, init, refin, refout,
+// xorout). `crc_bitwise` is the definition; `Crc` computes the same with a table made at compile time.
 #pragma once
 
 #include <array>
@@ -13,7 +13,7 @@
 
 namespace absenc {
 
-/// `poly` in normal notation (the highest power left out): x8+x5+x3+x2+x+1 is 0x2F.
+/// Parameters of a CRC. `poly` is in normal notation (the highest power left out): x8+x5+x3+x2+x+1 is 0x2F.
 struct CrcParameters {
   unsigned width;  // 3 to 16
   std::uint16_t poly;
@@ -25,7 +25,7 @@ struct CrcParameters {
   friend constexpr bool operator==(const CrcParameters&, const CrcParameters&) = default;
 };
 
-/// One bit at a time, straight from the definition: the reference the fast engine is tested against.
+/// Computes the CRC bit by bit, straight from the definition. The tests compare the table-driven `Crc` with it.
 [[nodiscard]] constexpr std::uint16_t crc_bitwise(const CrcParameters& parameters, Bytes bytes) {
   const std::uint32_t top = std::uint32_t{1} << (parameters.width - 1);
   const auto mask = static_cast<std::uint32_t>(low_mask(parameters.width));
@@ -43,14 +43,14 @@ struct CrcParameters {
   return static_cast<std::uint16_t>((remainder ^ parameters.xorout) & mask);
 }
 
-/// How much constant memory the fast engine may take.
+/// Size of the constant table of `Crc`.
 enum class CrcTable {
-  byte,    // 256 entries, one look-up a byte: 256 bytes up to width 8, 512 above
-  nibble,  // 16 entries, two look-ups a byte: 16 or 32 bytes, for firmware
+  byte,    // 256 entries, one look-up per byte: 256 bytes up to width 8, 512 above
+  nibble,  // 16 entries, two look-ups per byte: 16 or 32 bytes, for firmware
 };
 
-/// Table-driven engine. The remainder is kept reflected when `refin` is set and left-aligned in `Word`
-/// otherwise, so that widths that are no multiple of 8 (3 to 7, 9 to 15) need no special case.
+/// Table-driven CRC. The remainder is stored reflected when `refin` is set, otherwise left-aligned in `Word`, so that
+/// widths that are no multiple of 8 (3 to 7, 9 to 15) need no special case.
 template <CrcParameters parameters, CrcTable table_kind = CrcTable::byte>
 class Crc {
   static_assert(parameters.width >= 3 && parameters.width <= 16, "widths from 3 to 16 bits");
@@ -59,7 +59,7 @@ class Crc {
   using Word = std::conditional_t<(parameters.width <= 8), std::uint8_t, std::uint16_t>;
 
   constexpr Crc() = default;
-  /// Starts from another value than `parameters.init`, with the same table.
+  /// Starts from `init` instead of `parameters.init`, with the same table.
   constexpr explicit Crc(std::uint16_t init) : remainder_(initial(init)) {}
 
   constexpr void update(std::uint8_t byte) {
@@ -92,18 +92,18 @@ class Crc {
     return crc.value();
   }
 
-  /// Constant memory of the table.
+  /// Size of the table in constant memory, in bytes.
   static constexpr std::size_t table_bytes = (std::size_t{1} << (table_kind == CrcTable::byte ? 8 : 4)) * sizeof(Word);
 
  private:
   static constexpr unsigned word_bits = sizeof(Word) * 8;
   static constexpr unsigned spare_bits = word_bits - parameters.width;
 
-  // The polynomial as the remainder is kept.
+  // The polynomial, aligned like the remainder (reflected or left-aligned).
   static constexpr std::uint32_t poly =
       parameters.refin ? reflect(parameters.poly, parameters.width) : std::uint32_t{parameters.poly} << spare_bits;
 
-  // What `bits` bits of input do to an otherwise empty remainder.
+  // Returns the remainder after `bits` bits of input when it was 0 before: one table entry.
   static constexpr Word advance(std::uint32_t input, unsigned bits) {
     std::uint32_t remainder = 0;
     if constexpr (parameters.refin) {
@@ -129,7 +129,7 @@ class Crc {
 
   template <unsigned bits>
   constexpr void step(std::uint32_t input) {
-    // A remainder narrower than the input shifts out completely: >> and << on 32 bits yield 0 then.
+    // A remainder narrower than the input is shifted out completely: >> and << on 32 bits then yield 0.
     const std::uint32_t remainder = remainder_;
     if constexpr (parameters.refin) {
       const std::uint32_t index = (remainder ^ input) & low_mask(bits);

@@ -8,7 +8,7 @@ namespace absenc {
 
 [[nodiscard]] constexpr std::uint64_t gray_encode(std::uint64_t binary) { return binary ^ (binary >> 1); }
 
-/// Any width up to 64 bits: the prefix XOR is folded over all of them (a loop of four shifts stops at 16 bits).
+/// Decodes Gray code of any width up to 64 bits: the prefix XOR needs six shifts (four would stop at 16 bits).
 [[nodiscard]] constexpr std::uint64_t gray_decode(std::uint64_t gray) {
   for (unsigned shift = 1; shift < 64; shift *= 2) gray ^= gray >> shift;
   return gray;

@@ -13,7 +13,7 @@
 
 namespace absenc {
 
-/// 0 to 15, or -1 for another character.
+/// Returns the value of a hexadecimal digit, 0 to 15, or -1 for another character.
 [[nodiscard]] constexpr int hex_digit(char c) {
   if (c >= '0' && c <= '9') return c - '0';
   if (c >= 'a' && c <= 'f') return c - 'a' + 10;
@@ -21,7 +21,7 @@ namespace absenc {
   return -1;
 }
 
-/// Pairs of digits, with spaces between bytes as wanted. Returns the number of bytes.
+/// Parses pairs of digits; spaces are allowed between bytes. Returns the number of bytes.
 /// Errors: invalid_argument (a character that is no digit, or half a byte), buffer_too_small.
 [[nodiscard]] constexpr Result<std::size_t> parse_hex(std::string_view text, MutableBytes bytes) {
   std::size_t count = 0;
@@ -61,11 +61,11 @@ consteval auto hex_bytes() {
 }
 }  // namespace detail
 
-/// Static bytes of at most 256.
+/// Static bytes from hexadecimal text, at most 256.
 template <HexLiteral literal>
 inline constexpr auto hex = detail::hex_bytes<literal>();
 
-/// Static bytes: the characters of a text, as vectors of ASCII protocols and of clocked links are written.
+/// Static bytes from the characters of a text, for test vectors of ASCII protocols and of clocked links.
 template <HexLiteral literal>
 inline constexpr auto ascii = [] {
   std::array<std::uint8_t, literal.view().size()> bytes{};

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What can go wrong between a host and an encoder, and a value-or-error with the member names of std::expected.
+// Errors between a host and an encoder, and a value-or-error type with the member names of std::expected.
 #pragma once
 
 #include <array>
@@ -10,39 +10,39 @@
 
 namespace absenc {
 
-/// Grouped by who must act. Alarms and warnings that an encoder reports in a good frame are data, not errors.
+/// Errors, grouped by their source. Alarms and warnings that an encoder reports in a good frame are data, not errors.
 enum class Error : std::uint8_t {
   none,
-  // the caller
+  // caused by the caller
   invalid_argument,
   unsupported,
   buffer_too_small,
-  // the line
+  // caused by the line
   timeout,
   line_stuck,
   bad_framing,
   truncated,
-  // the frame
+  // caused by the content of a frame
   wrong_length,
   unexpected_reply,
   bad_checksum,
   out_of_range,
   sequence_mismatch,
   cross_check_failed,
-  // the encoder refused
+  // refused by the encoder
   busy,
   request_rejected,
-  // the shaft
+  // caused by the shaft
   not_still,
 };
 
 struct ErrorText {
-  std::string_view name;         // as printed by the command and written in vectors
-  std::string_view description;  // what happened, true of every frame and link
-  std::string_view advice;       // what to try
+  std::string_view name;         // as printed by the command and written in test vectors
+  std::string_view description;  // what happened, valid for every frame and link
+  std::string_view advice;       // what the user can try
 };
 
-/// Indexed by the enumerator.
+/// Texts of all errors, indexed by the enumerator.
 inline constexpr std::array<ErrorText, 17> error_texts{{
     {"none", "no error", ""},
     {"invalid_argument", "this cannot be done as it was asked", "check the value against its range"},
@@ -66,16 +66,16 @@ inline constexpr std::array<ErrorText, 17> error_texts{{
     {"not_still", "the shaft is turning, and this needs it standing still", "stop the shaft, then try again"},
 }};
 
-/// Whether the bytes themselves are wrong. With any other error a whole frame with a right checksum came: what it says
-/// is not what was expected.
+/// Returns whether the bytes themselves are wrong. With any other error a whole frame with a right checksum arrived,
+/// but its content was not the expected one.
 [[nodiscard]] constexpr bool is_damage(Error error) {
   return (error >= Error::line_stuck && error <= Error::wrong_length) || error == Error::bad_checksum;
 }
 
 [[nodiscard]] constexpr const ErrorText& text_of(Error error) { return error_texts[static_cast<std::size_t>(error)]; }
 
-/// A value, at first that of T{}, or an Error other than `none`. Reading the value of a failed result is undefined, as
-/// in std::expected.
+/// A value (initially T{}) or an Error other than `none`. Reading the value of a failed result is undefined, as in
+/// std::expected.
 template <class T>
 class [[nodiscard]] Result {
  public:

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Where a shaft is and how it moves: what a virtual encoder measures.
+// Position and motion of a shaft, which a virtual encoder measures.
 #pragma once
 
 #include <cstdint>
@@ -9,12 +9,12 @@
 namespace absenc {
 
 struct ShaftState {
-  std::int64_t position = 0;        // 2^-32 revolution; the upper 32 bits count revolutions, negative below zero
-  std::int32_t speed_millirpm = 0;  // 1/1000 revolutions a minute, counter-clockwise positive
+  std::int64_t position = 0;        // unit 2^-32 revolution; the upper 32 bits count revolutions, negative below zero
+  std::int32_t speed_millirpm = 0;  // 1/1000 revolutions per minute, counter-clockwise positive
   std::int32_t acceleration = 0;    // rad/s^2
 };
 
-/// A motion as a function of time. Implementations answer for any time, in any order.
+/// A motion as a function of time. Implementations accept any times, in any order.
 struct Shaft {
   [[nodiscard]] virtual ShaftState at(Time time) const = 0;
 

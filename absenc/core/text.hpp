@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Cutting text where std::string_view would want memchr and an exception, which firmware does not have.
+// Text functions for firmware, which has neither memchr nor the exceptions that std::string_view functions need.
 #pragma once
 
 #include <cstddef>
@@ -7,19 +7,19 @@
 
 namespace absenc {
 
-/// The index of the first `c`, or the size of the text.
+/// Returns the index of the first `c`, or the size of the text if it has none.
 [[nodiscard]] constexpr std::size_t index_of(std::string_view text, char c) {
   std::size_t index = 0;
   while (index < text.size() && text[index] != c) ++index;
   return index;
 }
 
-/// The first `count` characters, or all when there are fewer.
+/// Returns the first `count` characters, or all if the text is shorter.
 [[nodiscard]] constexpr std::string_view first_of(std::string_view text, std::size_t count) {
   return {text.data(), count < text.size() ? count : text.size()};
 }
 
-/// What is behind the first `count` characters.
+/// Returns the text behind its first `count` characters; empty if the text is shorter.
 [[nodiscard]] constexpr std::string_view behind(std::string_view text, std::size_t count) {
   text.remove_prefix(count < text.size() ? count : text.size());
   return text;

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// The one clock type: nanoseconds since whatever start the caller chose. No layer below `os` reads a clock.
+// The only clock type: nanoseconds since a start that the caller chooses. No layer below `os` reads a clock.
 #pragma once
 
-// Of <chrono> durations alone, without calendars and time zones: half a second for everybody who includes this.
+// Includes only the durations of <chrono>, without calendars and time zones, which would cost half a second in every
+// file.
 #if __has_include(<bits/chrono.h>)
 #include <bits/chrono.h>  // libstdc++
 #else
@@ -15,7 +16,8 @@ using Time = std::chrono::nanoseconds;
 
 inline constexpr Time never = Time::max();
 
-// As two numbers: those of chrono come by way of <=>, which on a small core is a call, and three instructions without.
+// Compares the counts as numbers: the operators of chrono use <=>, which costs a call on a small core instead of three
+// instructions.
 [[nodiscard]] constexpr bool operator<(Time one, Time other) { return one.count() < other.count(); }
 [[nodiscard]] constexpr bool operator>(Time one, Time other) { return one.count() > other.count(); }
 [[nodiscard]] constexpr bool operator<=(Time one, Time other) { return one.count() <= other.count(); }

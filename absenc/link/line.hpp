@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a line is set to, and the extra wires beside the data: common to every kind of link.
+// Settings of a line, and the extra wires beside the data: common to every kind of link.
 #pragma once
 
 #include <cstdint>
@@ -8,35 +8,38 @@
 
 namespace absenc {
 
-/// How items travel. The kind decides what `Step::Kind::transfer` means (link/step.hpp).
+/// How items (bytes, bits or frames) travel. The kind decides what `Step::Kind::transfer` means (link/step.hpp).
 enum class LinkKind : std::uint8_t {
-  half_duplex,  // one pair for both directions (RS-485): never send while the other side does
+  half_duplex,  // one pair for both directions (RS-485): never send while the other side sends
   full_duplex,  // a pair for each direction (RS-422, RS-232, USB serial)
-  spi,          // every byte out brings one byte in
-  clocked,      // the host clocks bits out of the encoder (SSI, BiSS); packed MSB first, the last byte left-aligned;
+  spi,          // the host's clock moves one byte in each direction at once
+  clocked,      // the host clocks bits out of the encoder (SSI, BiSS); bits are packed MSB first, the last byte
+                // left-aligned; the clock idles high, its rising edge brings the next bit
                 // the clock idles high, its rising edge brings the next bit
   can,
 };
 
 enum class Parity : std::uint8_t { none, odd, even };
 
-/// Wires beside the data, each driven by the host.
+/// Wires beside the data; the host drives them.
 enum class ExtraWire : std::uint8_t { trigger, clear };
 
-/// The rate of virtual encoders whose protocol leaves it open.
+/// Default bit rate of virtual encoders whose protocol does not define one.
 inline constexpr std::uint32_t assumed_rate = 115'200;
 
-/// Of spi and clocked links the unit says here how a controller is set up; sim draws its waveforms by the same.
+/// Settings of a line. For SPI and clocked links they describe how to configure a controller; sim draws waveforms from
+/// them.
 struct LineSettings {
-  std::uint32_t rate = 0;  // bits a second: baud, SPI or shift clock, CAN bit rate
+  std::uint32_t rate = 0;  // bits per second: baud rate, SPI or shift clock, CAN bit rate
   Parity parity = Parity::none;
   std::uint8_t stop_bits = 1;
   std::uint8_t spi_mode = 0;       // spi, clocked: 2 * CPOL + CPHA
-  std::uint8_t idle_clocks = 0;    // clocked: clocks that show the idle line before the first bit
-  Time select_lead{};              // spi: from chip select to the first clock, at least
-  std::uint32_t highest_rate = 0;  // that the document allows, where a controller could be faster; 0: not told
+  std::uint8_t idle_clocks = 0;    // clocked: number of clocks before the first bit, during which the line stays idle
+  Time select_lead{};              // spi: minimum time from chip select to the first clock
+  std::uint32_t highest_rate = 0;  // highest rate that the document allows, if a controller could be faster; 0: not
+                                   // stated
 
-  /// The same; with `assumed_rate` where there is none.
+  /// Returns the settings, with `assumed_rate` if `rate` is 0.
   [[nodiscard]] constexpr LineSettings with_some_rate() const {
     LineSettings settings = *this;
     if (rate == 0) settings.rate = assumed_rate;
@@ -45,11 +48,11 @@ struct LineSettings {
 
   friend constexpr bool operator==(const LineSettings&, const LineSettings&) = default;
 
-  /// `count` bits, rounded to the nearest nanosecond. `rate` must not be 0.
+  /// Returns the duration of `count` bits, rounded to the nearest nanosecond. `rate` must not be 0.
   [[nodiscard]] constexpr Time bits(std::uint64_t count) const {
     return Time((count * 1'000'000'000 + rate / 2) / rate);
   }
-  /// Bits of one asynchronous character: start, 8 data, parity, stop.
+  /// Returns the number of bits of one asynchronous character: start, 8 data, parity, stop.
   [[nodiscard]] constexpr unsigned character_bits() const {
     return 9u + (parity == Parity::none ? 0u : 1u) + stop_bits;
   }

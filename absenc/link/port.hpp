@@ -1,24 +1,24 @@
 // SPDX-License-Identifier: Apache-2.0
-// One end of a real or simulated line, as a machine's carrier sees it.
+// The interface between a machine's driver loop and one end of a real or simulated line.
 #pragma once
 
 #include "absenc/link/step.hpp"
 
 namespace absenc {
 
-/// Carries out steps and reports events. Ports of the operating system throw on failure (os/error.hpp);
-/// a port on a microcontroller reports it as `line_error`. An interface here, so that the loop that drives a machine
-/// exists once (host/drive.hpp) and os needs nothing from host.
+/// Carries out steps and reports events. Ports of the operating system throw on failure (os/error.hpp); a port on a
+/// microcontroller reports a failure as `line_error`. The interface is defined in link so that only one loop drives
+/// machines (host/drive.hpp) and os does not depend on host.
 template <class Item>
 struct Port {
-  /// The port's own clock, which stamps every event; it never runs backwards.
+  /// Returns the time on the port's own clock, which also stamps every event and never runs backwards.
   [[nodiscard]] virtual Time now() = 0;
 
-  /// Begins a transfer, pulse or configure step. After a transfer or pulse, `sent` is the next event, unless something
-  /// was heard before its end (the echo of a half-duplex line, an encoder that talks out of turn).
+  /// Begins a transfer, pulse or configure step. After a transfer or pulse the next event is `sent`, unless bytes
+  /// arrive before its end (the echo of a half-duplex line, or an unsolicited reply).
   virtual void begin(const Step<Item>& step) = 0;
 
-  /// Blocks until the next event that a machine waiting with this step must see. Items stay valid until the next call.
+  /// Blocks until the next event that a machine waiting with `step` must see. Items stay valid until the next call.
   [[nodiscard]] virtual Event<Item> wait(const Step<Item>& step) = 0;
 
  protected:

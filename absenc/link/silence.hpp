@@ -1,43 +1,43 @@
 // SPDX-License-Identifier: Apache-2.0
-// When a machine is told that nothing came: the rule that all ports and simulated lines follow.
+// The rule for the `silence` event, which all ports and simulated lines follow.
 #pragma once
 
 #include "absenc/link/step.hpp"
 
 namespace absenc {
 
-/// The silence at one end of a line: it is told once for each transfer, and once for what came after it, when the line
-/// was quiet for as long as the machine's last step says.
+/// Silence timer at one end of a line. `silence` is reported at most once after each transfer and once after each
+/// received item, when the line was quiet for the limit in the machine's last step.
 class Silence {
  public:
   Silence() = default;
   explicit Silence(Time since) : since_(since) {}
 
-  /// A transfer or pulse of this end is over: its answer is waited for.
+  /// Records the end of a transfer or pulse of this end: the `answer` limit now applies.
   void sent(Time at) { *this = Silence(at); }
-  /// Something came: now the gap counts.
+  /// Records a received item: the `gap` limit now applies.
   void heard(Time at) {
     busy(at);
     heard_ = true;
     told_ = false;
   }
-  /// The line was not quiet, though nothing came that concerns this end.
+  /// Records activity on the line that did not reach this end as an item: the limit starts again.
   void busy(Time at) { since_ = at; }
   void told() { told_ = true; }
 
   [[nodiscard]] Time since() const { return since_; }
   [[nodiscard]] bool has_heard() const { return heard_; }
 
-  /// When `silence` is to be told to whoever waits with these limits (Step::answer and gap); `latency`: what the way to
-  /// the line adds to them. `never`: not before something is sent or comes.
+  /// Returns when `silence` is due for a step with these limits (Step::answer and gap); `latency` is the port's delay,
+  /// which is added. Returns `never` if `silence` was already reported or no limit applies.
   [[nodiscard]] Time due(Time answer, Time gap, Time latency = {}) const {
     const Time limit = heard_ ? gap : answer;
     return told_ || limit <= Time{} ? never : since_ + limit + latency;
   }
 
  private:
-  Time since_{};        // the end of the last transfer, or of what came last
-  bool heard_ = false;  // since the last transfer
+  Time since_{};        // end of the last transfer, or time of the last activity
+  bool heard_ = false;  // an item was received since the last transfer
   bool told_ = false;
 };
 

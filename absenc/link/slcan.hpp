@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The ASCII protocol of serial-line CAN adapters (Lawicel CAN232, slcand of can-utils): frames as text, a line each.
+// The ASCII protocol of serial-line CAN adapters (Lawicel CAN232, slcand of can-utils): each frame is one line of text.
 #pragma once
 
 #include <array>
@@ -14,19 +14,20 @@
 
 namespace absenc::slcan {
 
-inline constexpr std::uint8_t end_of_line = '\r';  // also the answer "accepted"
-inline constexpr std::uint8_t bell = 0x07;         // the answer "refused"
+inline constexpr std::uint8_t end_of_line = '\r';  // also the adapter's reply "accepted"
+inline constexpr std::uint8_t bell = 0x07;         // the adapter's reply "refused"
 
-/// T, 8 digits, length, 16 digits, 4 digits of time, CR.
+/// Longest line: T, 8 digits, length, 16 digits, 4 digits of time, CR.
 inline constexpr std::size_t line_capacity = 31;
 using LineText = ByteBuffer<line_capacity>;
 
-/// t and T: data, r and R: remote frames; capitals have 29-bit identifiers.
+/// Returns whether `byte` begins a frame: t and T for data frames, r and R for remote frames; capitals mean 29-bit
+/// identifiers.
 [[nodiscard]] constexpr bool begins_frame(std::uint8_t byte) {
   return byte == 't' || byte == 'T' || byte == 'r' || byte == 'R';
 }
 
-/// The code behind S that sets a bit rate; nothing for a rate that has none.
+/// Returns the digit after S that sets a bit rate; nothing if the protocol has no code for this rate.
 [[nodiscard]] constexpr std::optional<std::uint8_t> rate_code(std::uint32_t rate) {
   constexpr std::array<std::uint32_t, 9> rates{10'000,  20'000,  50'000,  100'000,  125'000,
                                                250'000, 500'000, 800'000, 1'000'000};
@@ -36,7 +37,7 @@ using LineText = ByteBuffer<line_capacity>;
   return std::nullopt;
 }
 
-/// The inverse; 0 for what is no code.
+/// Returns the bit rate of a digit after S, the inverse of `rate_code`; 0 if `code` is invalid.
 [[nodiscard]] constexpr std::uint32_t rate_of(std::uint8_t code) {
   for (const std::uint32_t rate :
        {10'000u, 20'000u, 50'000u, 100'000u, 125'000u, 250'000u, 500'000u, 800'000u, 1'000'000u}) {
@@ -51,7 +52,7 @@ constexpr void append_digits(LineText& text, std::uint32_t value, unsigned digit
     text.push_back(static_cast<std::uint8_t>("0123456789ABCDEF"[value >> 4 * i & 15]));
 }
 
-// -1 when a character is no digit.
+// Returns the number written in hexadecimal digits, or -1 when a character is no digit.
 constexpr std::int64_t digits_of(Bytes text) {
   std::int64_t value = 0;
   for (const std::uint8_t byte : text) {
@@ -63,7 +64,8 @@ constexpr std::int64_t digits_of(Bytes text) {
 }
 }  // namespace detail
 
-/// With CR; with a time of milliseconds (0 to 59999) where the other side asked for it by Z1.
+/// Encodes a frame as a line with CR. `time` is in milliseconds (0 to 59999) and is appended if the other side
+/// requested timestamps with Z1.
 [[nodiscard]] constexpr LineText encode(const CanFrame& frame, std::optional<std::uint16_t> time = {}) {
   LineText text;
   text.push_back(frame.remote ? (frame.extended ? 'R' : 'r') : (frame.extended ? 'T' : 't'));
@@ -77,8 +79,8 @@ constexpr std::int64_t digits_of(Bytes text) {
   return text;
 }
 
-/// A frame from its line without the CR; a time behind it is skipped. Errors: bad_framing (it is no frame, or has a
-/// character that is no digit), out_of_range (identifier, more than 8 bytes), wrong_length.
+/// Decodes a frame from its line without the CR; a timestamp at the end is skipped. Errors: bad_framing (not a frame,
+/// or a character that is no digit), out_of_range (identifier, more than 8 bytes), wrong_length.
 [[nodiscard]] constexpr Result<CanFrame> decode(Bytes line) {
   if (line.empty() || !begins_frame(line[0])) return Error::bad_framing;
   CanFrame frame;
@@ -104,15 +106,15 @@ constexpr std::int64_t digits_of(Bytes text) {
   return frame;
 }
 
-/// Cuts what comes into lines. After garbage, or when a CR was lost, it goes on with the next letter of a frame: none
-/// of the four stands within a frame or a command.
+/// Splits received bytes into lines. After garbage or a lost CR it resumes at the next letter that begins a frame: none
+/// of the four letters occurs within a frame or a command.
 class LineReader {
  public:
   enum class Found : std::uint8_t {
     nothing,
-    line,     // in `line`, until the next byte; may be empty
+    line,     // `line()` is complete and valid until the next byte; may be empty
     refused,  // BEL
-    garbage,  // what could not be a line was thrown away
+    garbage,  // bytes that cannot be a line were discarded
   };
 
   constexpr Found feed(std::uint8_t byte) {
@@ -131,7 +133,7 @@ class LineReader {
     return Found::nothing;
   }
 
-  /// Without the CR.
+  /// Returns the last complete line, without the CR.
   [[nodiscard]] constexpr Bytes line() const { return line_; }
 
  private:
@@ -143,7 +145,7 @@ class LineReader {
 
   LineText line_;
   bool complete_ = false;
-  bool lost_ = false;  // too long for a line: until something begins anew
+  bool lost_ = false;  // the current line is too long: bytes are discarded until a new line begins
 };
 
 }  // namespace absenc::slcan

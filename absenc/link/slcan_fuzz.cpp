@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Any bytes as what an adapter sends: every line that passes is the line that its frame makes.
+// Feeds arbitrary bytes as an adapter's output: each line that decodes to a frame must equal the line encoded from that
+// frame.
 #include "absenc/link/slcan.hpp"
 
 #include <cstddef>
@@ -14,7 +15,7 @@ void require(bool condition) {
   if (!condition) std::abort();
 }
 
-// Upper case, as frames are written; letters of commands are none of these.
+// Converts digits a to f to upper case, as `encode` writes them. The letters that begin commands are not among them.
 std::uint8_t upper(std::uint8_t byte) {
   return byte >= 'a' && byte <= 'f' ? static_cast<std::uint8_t>(byte - 'a' + 'A') : byte;
 }
@@ -24,7 +25,8 @@ void check(Bytes line) {
   if (!frame) return;
   require(frame->size <= 8 && frame->id <= (frame->extended ? 0x1FFFFFFFu : 0x7FFu));
   const slcan::LineText again = slcan::encode(*frame);
-  require(again.size() - 1 == line.size() || again.size() + 3 == line.size());  // a time behind it
+  // equal length, or 4 digits of time at the end
+  require(again.size() - 1 == line.size() || again.size() + 3 == line.size());
   for (std::size_t i = 0; i + 1 < again.size(); ++i) require(again[i] == upper(line[i]));
 }
 
@@ -38,7 +40,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     require(reader.line().size() <= slcan::line_capacity);
     check(reader.line());
   }
-  // Whatever came, a frame behind it is found.
+  // A frame behind arbitrary bytes is found.
   const CanFrame frame{.id = 0x120, .size = 1, .data = {0x47}};
   slcan::LineReader::Found found{};
   const slcan::LineText text = slcan::encode(frame);

@@ -74,7 +74,7 @@ TEST(Slcan, BitRates) {
   EXPECT_EQ(rate_of('9'), 0u);
 }
 
-// "line:", "refused", "garbage" for what was found.
+// Returns the lines of `stream`; "refused" and "garbage" mark the other events.
 std::vector<std::string> found(std::string_view stream) {
   LineReader reader;
   std::vector<std::string> all;
