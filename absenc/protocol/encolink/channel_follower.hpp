@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Channels 2 and 3 in a capture: the cycles that position frames carry a byte each, and the register accesses whose
-// requests ride in `ra` and whose answers ride in those cycles.
+// Finds channels 2 and 3 in a capture: cycles, of which each position frame carries one byte, and register accesses,
+// whose requests are in the `ra` bytes and whose answers are in these cycles.
 #pragma once
 
 #include <cstddef>
@@ -14,9 +14,9 @@
 
 namespace absenc::encolink {
 
-/// A cycle begins with the frame behind a reset of the channels (AA, BB). Where none was seen, as in a capture of an
-/// encoder that has long been running, one is found by its checksum and by the position, which is that of the frame
-/// with which it began.
+/// Combines frames to cycles of channel 2 and to register accesses. A cycle begins with the frame after a reset of the
+/// channels (AA, BB). If the capture has no reset, a cycle is found by its checksum and its position, which equals that
+/// of the cycle's first frame.
 class ChannelFollower final : public Follower {
  public:
   explicit ChannelFollower(const Format& format) : format_(format) {}
@@ -34,20 +34,20 @@ class ChannelFollower final : public Follower {
   void take_request(std::uint64_t number, std::uint8_t byte);
 
   Format format_;
-  // Channel 2. Its byte in each of the last frames, and the position of the oldest of them.
+  // Channel 2: the positions and channel 2 bytes of the latest frames.
   bool in_step_ = false;
   Buffer<Position, longest_cycle> frames_;
-  std::uint64_t first_ = 0;  // number of the oldest
+  std::uint64_t first_ = 0;  // exchange number of the oldest frame in `frames_`
   std::optional<Composed> cycle_;
   ByteBuffer<longest_cycle> cycle_bytes_;
   // Channel 3.
-  AccessBytes asking_;  // `ra` bytes so far
+  AccessBytes asking_;  // the `ra` bytes of an unfinished access
   std::uint64_t asking_from_ = 0;
-  AccessBytes asked_;  // the last whole access
+  AccessBytes asked_;  // the last complete access
   std::uint64_t asked_from_ = 0;
   bool awaits_answer_ = false;
   ByteBuffer<2 + access_capacity> answer_;
-  bool has_answer_ = false;  // it ended with the last exchange
+  bool has_answer_ = false;  // the answer was completed by the last exchange
 };
 
 }  // namespace absenc::encolink

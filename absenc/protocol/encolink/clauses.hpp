@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the document demands of the encoder, with the place that says so.
+// Requirements of the document on the encoder and on the host, each with its paragraph.
 #pragma once
 
 #include <array>
@@ -76,7 +76,7 @@ inline constexpr auto spi_clauses = std::array{
            .shown_with = "resolution=20&multiturn_bits=0"},
 };
 
-// ---- What hosts do that break a clause: one access, and the next before its answer has come
+// ---- Requests that break the clause `access`: a second register access before the first was answered
 
 namespace script {
 inline constexpr std::chrono::milliseconds pause{1};

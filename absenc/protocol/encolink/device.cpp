@@ -7,9 +7,9 @@ namespace absenc::encolink {
 
 namespace {
 
-constexpr std::string_view part_text = "MB080SLA20MENT00";  // 16 characters; [8..9] hold the resolution
+constexpr std::string_view part_text = "MB080SLA20MENT00";  // 16 characters; [8..9] are the resolution
 constexpr std::string_view access_rule = "register access before the last one was answered";
-constexpr Time access_time = 200us;  // until an access is executed; assumed
+constexpr Time access_time = 200us;  // time from the last byte of an access to its execution; assumed
 
 struct Text {
   std::size_t index;
@@ -18,9 +18,10 @@ struct Text {
 constexpr std::array<Text, 3> texts{
     {{serial_number, "AK2A0001"}, {serial_number_extended, "AK2A0001-0000001"}, {part_number, "MB080SLA20MENT00 SIM"}}};
 
-// Of each register that is a number, and of what follows them. 0: of what a calibration or the factory would have
-// found.
-constexpr std::size_t turns_taken = registers.size();  // off those of the shaft, by a preset
+// Values at shipping of the number registers and of `turns_taken`. Values that only a calibration or the factory could
+// know are 0.
+// Index of the turns that a preset subtracts from the shaft's turns.
+constexpr std::size_t turns_taken = registers.size();
 constexpr auto at_shipping = [] {
   std::array<std::uint32_t, turns_taken + 1> values{};
   values[firmware_major] = 1;
@@ -29,14 +30,14 @@ constexpr auto at_shipping = [] {
   return values;
 }();
 
-// What `save` keeps, one after the other.
+// Registers that `save` stores, in the order of the memory.
 constexpr std::array<std::size_t, 9> kept{position_offset, multiturn_preset,      write_lock,
                                           turns_taken,     position_filter,       position_filter_speed,
                                           velocity_filter, velocity_filter_speed, calibration_range};
 
 }  // namespace
 
-// It answers while it starts: with zeros.
+// The encoder answers while it starts, with zeros.
 VirtualEncoder::VirtualEncoder(const Format& format, const Shaft& shaft)
     : Responder({.character = uart_settings.character(), .answer_time = answer_time}), format_(format), shaft_(&shaft) {
   if (format_.resolution == 0) format_.resolution = virtual_format.resolution;
@@ -75,7 +76,8 @@ void VirtualEncoder::feed(const ByteEvent& event) {
 VirtualEncoder::Answer VirtualEncoder::respond(Bytes request, Time at, ByteBuffer<64>& reply) {
   const ReplyBytes frame = make_frame(at);
   reply.append(frame);
-  // Whoever asks with the vendor's library reads as many bytes as the identity may have, twice.
+  // A host with the vendor's library always reads as many bytes as the longest identity, for the identity and for the
+  // frame before it.
   const bool identifies = frame.size() == identity_bytes || request[0] == static_cast<std::uint8_t>(Config::identify);
   while (identifies && reply.size() < format_.identity_size && format_.identity_size > identity_bytes) {
     reply.push_back(0);
@@ -115,7 +117,7 @@ Identity VirtualEncoder::identity() const {
   return identity;
 }
 
-// The frame that goes out with this request was made before: what it asks for shows in the next one.
+// Executes a request. The frame of this exchange was made before: the effect shows in the next frame.
 void VirtualEncoder::handle(Bytes request, Time at) {
   if (at < zeros_until_) return;
   const auto config = static_cast<Config>(request[0]);
@@ -165,7 +167,7 @@ void VirtualEncoder::ra_received(std::uint8_t byte, Time at) {
 
 // ---- State
 
-// Of the shaft with the offset, as if the turn counter had no end: 2^-32 revolution.
+// Returns the shaft's position with the offset in 2^-32 revolution, as if the turn counter had no limit.
 std::int64_t VirtualEncoder::place(Time now) const {
   const auto fraction = static_cast<std::int32_t>(format_.offset_fraction(offset()));
   const std::int64_t position = shaft_->at(now).position;
@@ -183,7 +185,7 @@ Position VirtualEncoder::measure(Time now) const {
   return position;
 }
 
-// Brings everything that changes with time up to now.
+// Applies all changes that are due until `now`.
 void VirtualEncoder::update(Time now) {
   if (save_pending_ && now >= busy_until_) save();
   if (calibrating_ && now >= calibrated_at_) end_calibration(now);
@@ -223,12 +225,12 @@ void VirtualEncoder::execute(Time at) {
   answer_.clear();
   answered_bytes_ = 0;
   busy_until_ = std::max(busy_until_, at + access_time);
-  if (request.error() == Error::unsupported) return;  // no operation of this number: it stays idle
+  if (request.error() == Error::unsupported) return;  // an unknown operation is ignored: channel 3 stays idle
   AccessStatus status = writes ? AccessStatus::write_checksum : AccessStatus::read_checksum;
   if (request.error() == Error::wrong_length) status = AccessStatus::byte_count;
   std::size_t index = 0;
   if (request) {
-    // The registers of an AksIM-4 are others, which are not described.
+    // The registers of an AksIM-4 are not described, so none is found.
     const Register* found = format_.generation == Generation::aksim2 ? find_register(request->address) : nullptr;
     if (found != nullptr) index = static_cast<std::size_t>(found - registers.data());
     status = judge(*request, found);
@@ -239,7 +241,7 @@ void VirtualEncoder::execute(Time at) {
   if (!request || writes) return;
   if (status == AccessStatus::ok) {
     answer_.append(value_of(index, at));
-  } else {  // the vendor's host takes the bytes it asked for whatever the status says
+  } else {  // the vendor's host reads all requested bytes whatever the status is
     for (std::size_t i = 0; i < std::min<std::size_t>(request->length, access_capacity); ++i) answer_.push_back(0);
   }
 }
@@ -307,7 +309,7 @@ ByteBuffer<largest_register> VirtualEncoder::value_of(std::size_t index, Time at
   return bytes;
 }
 
-// ---- What survives without power
+// ---- Non-volatile memory
 
 constexpr std::size_t kept_size(std::size_t index) { return index == turns_taken ? 4 : registers[index].size; }
 
@@ -328,7 +330,7 @@ void VirtualEncoder::save() {
     bytes = bytes.subspan(kept_size(index));
   }
   change_memory();
-  lower_alarms(status::configuration_error);  // it is whole again
+  lower_alarms(status::configuration_error);  // the stored configuration is complete again
 }
 
 }  // namespace absenc::encolink

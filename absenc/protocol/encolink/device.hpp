@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A virtual AksIM-2 on UART or SPI: three channels, registers, lock, busy times, and the rules that its host breaks.
+// A virtual AksIM-2 on UART or SPI: three channels, registers, write lock, busy times, and checks of the host's timing.
 #pragma once
 
 #include <array>
@@ -23,8 +23,8 @@ enum ConditionIndex : std::size_t { condition_temperature, condition_busy, condi
 
 class VirtualEncoder final : public author::Responder {
  public:
-  /// Switched off until `power_on`. `shaft` must outlive the encoder. What is unknown of the format is
-  /// virtual_format's.
+  /// Creates an encoder that is off until `power_on`. `shaft` must outlive it. Unknown members of `format` are taken
+  /// from virtual_format.
   VirtualEncoder(const Format& format, const Shaft& shaft);
 
   void feed(const Event<std::uint8_t>& event) override;
@@ -32,11 +32,11 @@ class VirtualEncoder final : public author::Responder {
 
   void power_on(Time now, PowerOn kind) override;
   void set_condition(std::size_t index, std::int64_t value, Time) override { conditions_[index] = value; }
-  /// What `save` has stored: offset, preset, lock, turns, filters, range of calibration; 31 bytes.
+  /// Returns the 31 bytes that `save` stores: offset, preset, lock, turns, filters, calibration range.
   [[nodiscard]] MutableBytes memory() override { return memory_; }
 
   [[nodiscard]] const Format& format() const { return format_; }
-  /// What a frame would say now.
+  /// Returns the position that a frame would carry at `now`.
   [[nodiscard]] Position measure(Time now) const;
   [[nodiscard]] std::uint32_t offset() const { return values_[position_offset]; }
   [[nodiscard]] std::uint16_t alarms() const { return static_cast<std::uint16_t>(raised()); }
@@ -72,7 +72,8 @@ class VirtualEncoder final : public author::Responder {
   Format format_;
   const Shaft* shaft_;
   std::array<std::int64_t, conditions.size()> conditions_{};
-  std::array<std::uint32_t, registers.size() + 1> values_{};  // of the registers; and the turns taken off the shaft's
+  // Values of the registers, then the turns that a preset subtracts from the shaft's turns.
+  std::array<std::uint32_t, registers.size() + 1> values_{};
   std::array<std::uint8_t, 31> memory_{};
 
   Time zeros_until_{};
@@ -90,7 +91,7 @@ class VirtualEncoder final : public author::Responder {
   ByteBuffer<access_capacity + 2> answer_;
   std::size_t answered_bytes_ = 0;
 
-  Time next_frame_{};  // of those it sends by itself
+  Time next_frame_{};  // start of the next frame of an encoder that streams
   Time pause_since_{};
   bool was_selected_ = false;
 };

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Names, units and meanings of everything in EncoLink frames and registers, in words for the person at the machine.
+// Names, units and meanings of all fields of EncoLink frames and registers, in words for the user.
 #pragma once
 
 #include <algorithm>
@@ -22,7 +22,7 @@ inline constexpr std::array<FlagInfo, 2> general_flags{{
     {"warning", "the position is valid, but something is near its limit", read_the_alarms, false, status::warnings},
 }};
 
-/// What out_of_range means in a position.
+/// Explains out_of_range of a position.
 inline constexpr std::string_view wrong_resolution =
     "padding bits are set: the encoder has more bits than the options resolution and multiturn_bits say; `absenc info` "
     "asks it";
@@ -30,12 +30,12 @@ inline constexpr std::string_view wrong_resolution =
 inline constexpr std::string_view channels_disagree =
     "channel 2 has another position than channel 1: positions go on, but the detailed status cannot be trusted";
 
-/// Why the registers of an AksIM-4 are refused.
+/// Explains why register accesses to an AksIM-4 are refused.
 inline constexpr std::string_view not_described =
     "protocol version 4 (AksIM-4) has its registers at other addresses, which are not described here: its positions "
     "may be read";
 
-// What to do is ours: the vendor only names the bits.
+// The advice is not from the vendor, who only names the bits.
 inline constexpr std::array<FlagInfo, 16> alarm_flags{{
     {"acceleration_error", "the position changed faster than a shaft can", "check the fixing of ring and readhead"},
     {"magnetic_pattern_error", "the magnetic pattern of the ring is not what it should be",
@@ -67,7 +67,7 @@ inline constexpr std::array<FlagInfo, 4> calibration_flags{{
      "mount the ring again, then `absenc run ... self-calibrate` again"},
 }};
 
-/// What frames and accesses say. What is not there is not put.
+/// Values of frames and register accesses. Members without a value are not reported.
 struct Values {
   template <class T>
   using Maybe = std::optional<T>;
@@ -91,7 +91,7 @@ inline constexpr FieldInfo general_status_field{"general_status", FieldInfo::Kin
                                                 "the two low bits of a position frame, active low", general_flags};
 
 namespace detail {
-// A member of a part that may be there.
+// Returns a member of an optional part.
 template <auto part, auto member>
 constexpr auto of(const Values& values) {
   return values.*part ? std::optional((*(values.*part)).*member) : std::nullopt;
@@ -138,7 +138,7 @@ inline constexpr FieldInfo running_field{"running", FieldInfo::Kind::boolean, ""
                                          "whether the self-calibration still goes on"};
 inline constexpr FieldInfo not_described_field{"registers", FieldInfo::Kind::text, "", "why none of them is shown"};
 
-/// One for each of the table, in its order.
+/// Fields of the registers, in the order of the table `registers`.
 inline constexpr auto register_fields = [] {
   using enum FieldInfo::Kind;
   constexpr std::array<FieldInfo, 5> of_content{{
@@ -146,7 +146,7 @@ inline constexpr auto register_fields = [] {
       {"", real, "degC", "register: how warm the readhead is"},
       {"", real, "rpm", "register: how fast the ring turns"},
       {"", flags, "", "how the last self-calibration ended", calibration_flags},
-      {"", text, "", "register", {}, Role::identity},  // its numbers, all of them
+      {"", text, "", "register", {}, Role::identity},  // all registers with text are numbers that identify the encoder
   }};
   std::array<FieldInfo, registers.size()> made{};
   for (std::size_t i = 0; i < made.size(); ++i) {
@@ -156,7 +156,7 @@ inline constexpr auto register_fields = [] {
   return made;
 }();
 
-/// All of them.
+/// Fields of frames, registers and procedures.
 inline constexpr auto fields = [] {
   std::array<FieldInfo, 1 + frame_fields.infos.size() + register_fields.size() + 3> made{};
   made[0] = general_status_field;
@@ -168,7 +168,7 @@ inline constexpr auto fields = [] {
   return made;
 }();
 
-/// A position frame, with the detailed status where it is known; with a byte of channel 3 a cycle.
+/// Reports a position frame with its detailed status if known; with `channel3`, a cycle of channel 2.
 constexpr void put_position(FieldSink& sink, const Format& format, const Position& position,
                             std::optional<std::uint16_t> detailed = {}, std::optional<std::uint8_t> channel3 = {}) {
   Values values{.position = position, .status = detailed, .channel3 = channel3};
@@ -178,14 +178,14 @@ constexpr void put_position(FieldSink& sink, const Format& format, const Positio
   sink.put_reading(to_reading(format, position, detailed));
 }
 
-/// Two's complement of 1 to 8 bytes.
+/// Returns a two's complement number of 1 to 8 bytes.
 [[nodiscard]] constexpr std::int64_t signed_value(Bytes bytes) {
   const auto bits = static_cast<unsigned>(8 * bytes.size());
   return bits >= 64 ? static_cast<std::int64_t>(load_big_endian(bytes))
                     : wrapped_difference(load_big_endian(bytes), 0, bits);
 }
 
-/// What the bytes of a register of the table mean.
+/// Reports the value of register `index` of the table.
 constexpr void put_value(FieldSink& sink, std::size_t index, Bytes bytes) {
   FieldValue shown{.info = &register_fields[index], .bytes = bytes};
   switch (registers[index].content) {
@@ -204,7 +204,7 @@ constexpr void put_value(FieldSink& sink, std::size_t index, Bytes bytes) {
   if (index == calibration_status) sink.put({&calibrations_field, bytes[0] & calibration::count});
 }
 
-/// A register that was read or written.
+/// Reports a register that was read or written.
 constexpr void put_register(FieldSink& sink, std::uint32_t address, Bytes data,
                             std::optional<std::string_view> op = {}) {
   const Register* known = find_register(address);
@@ -216,7 +216,8 @@ constexpr void put_register(FieldSink& sink, std::uint32_t address, Bytes data,
   if (in_table) put_value(sink, static_cast<std::size_t>(known - registers.data()), data);
 }
 
-/// What a frame is decoded with where the encoder cannot be asked: all 22 bits, turns as the length tells.
+/// Returns the format that decodes a reply when the encoder's identity is unknown: 22 bits, and turns if the length of
+/// the reply includes them.
 [[nodiscard]] constexpr Format assumed(const Format& format, Bytes reply) {
   Format known = format;
   if (known.resolution == 0) known.resolution = maximum_resolution;
@@ -234,10 +235,10 @@ constexpr BitRanges identity_bits(const FieldInfo& field) {
   using author::bits_of;
   if (&field == frame_fields.of<of<&Values::identity, &Identity::protocol_version>>()) return bits_of(0, 0, 8);
   if (&field == frame_fields.of<of<&Values::identity, &Identity::frame_bytes>>()) return bits_of(1, 0, 8);
-  return {};  // the resolution is decimal
+  return {};  // the resolution is two decimal digits, so its bits are not reported
 }
 
-// Channel 1 is one number, whose lowest two bits are active low.
+// Channel 1 is one big-endian number; its lowest two bits are active low.
 constexpr BitRanges position_bits(const Format& format, const FieldInfo& field) {
   const std::size_t size = format.position_bytes();
   if (&field == frame_fields.of<of<&Values::position, &Position::singleturn>>()) {
@@ -255,7 +256,7 @@ constexpr BitRanges position_bits(const Format& format, const FieldInfo& field) 
 
 }  // namespace detail
 
-/// Where a good reply has a field.
+/// Returns the bits of a valid reply that hold `field`.
 [[nodiscard]] constexpr BitRanges bits_of(const Format& format, Bytes reply, const FieldInfo& field) {
   if (reply.size() == identity_bytes || reply.size() == padded_identity_bytes) return detail::identity_bits(field);
   const Format known = assumed(format, reply);
@@ -268,7 +269,7 @@ constexpr BitRanges position_bits(const Format& format, const FieldInfo& field) 
   return detail::position_bits(known, field);
 }
 
-/// The request alone: two bytes, or all the `ra` bytes of a register access.
+/// Decodes a request without a reply: two bytes, or all `ra` bytes of a register access.
 constexpr Error decode_request(Bytes request, FieldSink& sink) {
   if (request.size() == request_bytes) {
     if (!is_config(request[0])) return Error::unsupported;
@@ -285,7 +286,7 @@ constexpr Error decode_request(Bytes request, FieldSink& sink) {
   return Error::none;
 }
 
-/// The answer to a register access.
+/// Decodes the answer to a register access.
 constexpr Error decode_access_answer(Bytes request, Bytes reply, FieldSink& sink) {
   const Result<RegisterRequest> access = decode_access(request);
   if (!access) return access.error();
@@ -296,8 +297,8 @@ constexpr Error decode_access_answer(Bytes request, Bytes reply, FieldSink& sink
   return Error::none;
 }
 
-/// A register access answers all its `ra` bytes. Of others the length of a reply says what it is: a position frame, a
-/// channel 2 cycle or the identity.
+/// Decodes a reply. If the request is a register access (all its `ra` bytes), the reply is its answer. Otherwise the
+/// length of the reply selects: position frame, channel 2 cycle or identity.
 constexpr Error decode(const Format& format, Bytes request, Bytes reply, FieldSink& sink) {
   if (reply.empty()) return decode_request(request, sink);
   if (is_access(request)) return decode_access_answer(request, reply, sink);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// EncoLink frames of channel 1, cycles of channel 2 and the identity (RLS AksIM-2, UART and SPI): encode, decode and
-// every check they allow. README.md draws them; the bytes of channel 3 are in registers.hpp.
+// Encodes and decodes the EncoLink frames of RLS AksIM-2 encoders on UART and SPI: channel 1, cycles of channel 2 and
+// the identity. README.md draws them; the register access bytes of channel 3 are in registers.hpp.
 #pragma once
 
 #include <array>
@@ -20,37 +20,38 @@ namespace absenc::encolink {
 
 using namespace std::chrono_literals;
 
-// ---- Times, as the host keeps them and the virtual encoder demands them
+// ---- Times that the host keeps and the virtual encoder demands
 
-inline constexpr LineSettings uart_settings{.rate = 1'000'000};  // interface variant L
-inline constexpr Time spi_lead = 5us;                            // t_s: NCS low to the first edge of SCK
-// 4 MHz at most; CPOL 0, CPHA 1
+inline constexpr LineSettings uart_settings{.rate = 1'000'000};  // line of interface variant L
+inline constexpr Time spi_lead = 5us;  // t_s: shortest time from NCS low to the first edge of SCK
+// SPI mode 1 (CPOL 0, CPHA 1), at most 4 MHz.
 inline constexpr LineSettings spi_settings{
     .rate = 1'000'000, .spi_mode = 1, .select_lead = spi_lead, .highest_rate = 4'000'000};
 inline constexpr Time shortest_clock = 250ns;
-inline constexpr Time spi_pause = 5us;  // t_p
+inline constexpr Time spi_pause = 5us;  // t_p: shortest time that NCS stays high between two frames
 
-// Not in the document. The virtual encoder answers that long after a request; the host waits generously.
+// The document gives no reply times. The virtual encoder replies `answer_time` after a request; the host waits up to
+// `answer_limit`.
 inline constexpr Time answer_time = 5us;
 inline constexpr Time answer_limit = 500us;
 inline constexpr Time gap_limit = 30us;
 
-inline constexpr Time start_up = 100ms;  // of well-formed zeros; assumed
-inline constexpr Time save_time = 50ms;  // busy; assumed
+inline constexpr Time start_up = 100ms;  // the encoder sends well-formed zeros for this time after power on; assumed
+inline constexpr Time save_time = 50ms;  // the encoder is busy for this time after `save`; assumed
 inline constexpr Time busy_limit = 2s;
-inline constexpr Time calibration_time = 1s;    // of the virtual encoder's shaft
-inline constexpr Time calibration_limit = 15s;  // the vendor allows the shaft 10 s
+inline constexpr Time calibration_time = 1s;    // duration of the virtual encoder's self-calibration
+inline constexpr Time calibration_limit = 15s;  // timeout of a self-calibration; the vendor allows the shaft 10 s
 inline constexpr Time calibration_poll = 100ms;
-inline constexpr Time listen_limit = 500ms;  // without a good frame of an encoder that transmits by itself
+inline constexpr Time listen_limit = 500ms;  // longest time without a valid frame of a streaming encoder
 
 // ---- Frames
 
-/// "Inverted CRC, 0x97 polynom", in normal notation: x8 + x7 + x4 + x2 + x + 1.
+/// Checksum of all frames: "Inverted CRC, 0x97 polynom", in normal notation x8 + x7 + x4 + x2 + x + 1.
 inline constexpr CrcParameters crc_parameters{8, 0x97, 0, false, false, 0xFF};
 
 [[nodiscard]] constexpr std::uint8_t checksum(Bytes bytes) { return Crc<crc_parameters, CrcTable::nibble>::of(bytes); }
 
-/// Whether the last byte is the checksum of those before it.
+/// Returns whether the last byte is the checksum of the bytes before it.
 [[nodiscard]] constexpr bool is_sealed(Bytes bytes) {
   return !bytes.empty() && checksum(bytes.first(bytes.size() - 1)) == bytes.back();
 }
@@ -58,85 +59,87 @@ inline constexpr CrcParameters crc_parameters{8, 0x97, 0, false, false, 0xFF};
 /// First byte of a request.
 enum class Config : std::uint8_t {
   position = 0x00,
-  reset_channels = 0xAA,  // and the position
-  identify = 0xBB,        // the frame after this one carries the identity
+  reset_channels = 0xAA,  // position; channels 2 and 3 begin anew in the next frame
+  identify = 0xBB,        // position; the next frame carries the identity
 };
 [[nodiscard]] constexpr bool is_config(std::uint8_t byte) { return byte == 0x00 || byte == 0xAA || byte == 0xBB; }
 
-inline constexpr std::size_t request_bytes = 2;           // config, ra
-inline constexpr std::size_t identity_bytes = 19;         // with the checksum
-inline constexpr std::size_t padded_identity_bytes = 20;  // what the vendor's library reads: one byte more
+inline constexpr std::size_t request_bytes = 2;    // bytes of a request: config, ra
+inline constexpr std::size_t identity_bytes = 19;  // bytes of an identity, checksum included
+// Bytes of an identity as the vendor's library reads it: one more.
+inline constexpr std::size_t padded_identity_bytes = 20;
 inline constexpr std::size_t reply_capacity = 20;
 inline constexpr unsigned maximum_resolution = 22;
 inline constexpr unsigned maximum_multiturn_bits = 16;
 using ReplyBytes = ByteBuffer<reply_capacity>;
 
-/// A transfer on SPI brings the frame of the moment at which it begins; a UART answers afterwards.
+/// On SPI, a transfer carries the frame of the moment at which it begins. On a UART, the reply follows the request.
 enum class Interface : std::uint8_t { uart, spi };
-/// Whether the position offset is added to what the sensor measures or taken off. The register map does not say.
+/// Whether the position offset is added to the measured position or subtracted. The register map does not state it.
 enum class OffsetSign : std::uint8_t { add, subtract };
-/// What the position offset counts. The map does not say it either; the vendor's example shows FFFFFFFF refused.
+/// Unit of the position offset. The register map does not state it; in the vendor's example the value FFFFFFFF is
+/// refused.
 enum class OffsetUnit : std::uint8_t { counts, turn_fraction };
 enum class Generation : std::uint8_t { aksim2, aksim4 };
 
-/// What an encoder's frames carry. What is unknown is asked: the identity tells it.
+/// Layout of an encoder's frames. Unknown members are read from the encoder's identity.
 struct Format {
-  unsigned resolution = 0;  // bits of the turn, 1 to 22; 0: unknown
-  int multiturn_bits = -1;  // 0 to 16; -1: unknown
-  bool has_ch2 = true;      // false: frames as those of an AksIM-1, without the last byte
+  unsigned resolution = 0;  // bits of a turn, 1 to 22; 0: unknown
+  int multiturn_bits = -1;  // bits of the turn counter, 0 to 16; -1: unknown
+  bool has_ch2 = true;      // false: frames as of an AksIM-1, without the channel 2 byte
   Interface interface = Interface::uart;
   OffsetSign offset_sign = OffsetSign::add;
   OffsetUnit offset_unit = OffsetUnit::counts;
-  std::uint32_t stream_rate = 0;                // frames a second that it sends by itself; 0: it answers requests
-  Generation generation = Generation::aksim2;   // of the virtual encoder
-  std::uint8_t identity_size = identity_bytes;  // of the virtual encoder on a UART, or padded_identity_bytes
+  std::uint32_t stream_rate = 0;  // frames per second that the encoder sends without requests; 0: it answers requests
+  Generation generation = Generation::aksim2;   // generation of the virtual encoder
+  std::uint8_t identity_size = identity_bytes;  // identity bytes of the virtual encoder on a UART, 19 or 20
 
   [[nodiscard]] constexpr bool known() const { return resolution != 0 && multiturn_bits >= 0; }
   [[nodiscard]] constexpr std::size_t turns_bytes() const { return multiturn_bits > 0 ? 2 : 0; }
-  /// Zeros behind the turns.
+  /// Returns the number of padding bits below the turn counter.
   [[nodiscard]] constexpr unsigned spare_turns() const {
     return maximum_multiturn_bits - static_cast<unsigned>(multiturn_bits);
   }
-  /// Of channel 1; the checksum stands behind them.
+  /// Returns the bytes of channel 1 before its checksum.
   [[nodiscard]] constexpr std::size_t position_bytes() const { return turns_bytes() + 3; }
   [[nodiscard]] constexpr std::size_t frame_bytes() const { return position_bytes() + (has_ch2 ? 2 : 1); }
   [[nodiscard]] constexpr std::size_t cycle_bytes() const { return position_bytes() + 4; }
 
-  /// The largest position offset.
+  /// Returns the largest position offset that the register accepts.
   [[nodiscard]] constexpr std::uint32_t largest_offset() const {
     return static_cast<std::uint32_t>(low_mask(offset_unit == OffsetUnit::counts ? resolution : 32));
   }
-  /// The offset that takes `singleturn` off what the encoder shows with `offset`.
+  /// Returns the offset that makes the present position zero, if the encoder reports `singleturn` with `offset`.
   [[nodiscard]] constexpr std::uint32_t moved_offset(std::uint32_t offset, std::uint32_t singleturn) const {
     const std::uint32_t here = offset_unit == OffsetUnit::counts ? singleturn : singleturn << (32 - resolution);
     return (offset_sign == OffsetSign::add ? offset - here : offset + here) & largest_offset();
   }
-  /// Of a turn, in 2^-32.
+  /// Converts a position offset to 2^-32 of a turn.
   [[nodiscard]] constexpr std::uint32_t offset_fraction(std::uint32_t offset) const {
     return offset_unit == OffsetUnit::counts ? offset << (32 - resolution) : offset;
   }
 };
 
-/// What a virtual encoder that is asked for its own format has.
+/// Format of a virtual encoder whose options leave resolution and turns unknown.
 inline constexpr Format virtual_format{.resolution = 20, .multiturn_bits = 16};
 
-/// What channel 1 says. `channel2` is outside the checksum.
+/// Content of a channel 1 frame. The checksum does not cover `channel2`.
 struct Position {
   std::uint32_t singleturn = 0;
   std::uint16_t multiturn = 0;
-  bool error = false;    // the position is not valid
-  bool warning = false;  // valid, but near the limits
+  bool error = false;    // the position is invalid
+  bool warning = false;  // the position is valid, but near its limits
   std::uint8_t channel2 = 0;
 };
 
-/// One cycle of channel 2, a byte a frame; its position was taken with its first byte.
+/// A cycle of channel 2. Each frame carries one byte of it; its position is that of the frame with its first byte.
 struct Cycle {
-  Position position{};  // channel2: unused
+  Position position{};  // its member `channel2` is unused
   std::uint16_t status = 0;
   std::uint8_t channel3 = 0;
 };
 
-/// Bits of the detailed status.
+/// Bits of the detailed status in a channel 2 cycle.
 namespace status {
 inline constexpr std::uint16_t acceleration = 0x0001;
 inline constexpr std::uint16_t magnetic_pattern = 0x0002;
@@ -147,8 +150,9 @@ inline constexpr std::uint16_t signal_lost = 0x0020;
 inline constexpr std::uint16_t position_invalid = 0x0200;
 inline constexpr std::uint16_t configuration_error = 0x0400;
 inline constexpr std::uint16_t multiturn_mismatch = 0x8000;
-inline constexpr std::uint16_t warnings = 0x21D0;  // amplitude high and low, near limits, temperature
-inline constexpr std::uint16_t errors = 0xDE2F;    // all others
+// Bits that are warnings: amplitude high and low, near limits, temperature.
+inline constexpr std::uint16_t warnings = 0x21D0;
+inline constexpr std::uint16_t errors = 0xDE2F;  // bits that are errors: all but the warnings
 static_assert((warnings ^ errors) == 0xFFFF);
 }  // namespace status
 
@@ -158,7 +162,7 @@ inline constexpr std::uint32_t error = 1;
 inline constexpr std::uint32_t warning = 2;
 }  // namespace general
 
-/// Of the protocol. The frames of both are the same; the registers behind them are not.
+/// Protocol versions. Both have the same frames, but different registers.
 namespace version {
 inline constexpr std::uint8_t aksim2 = 2;
 inline constexpr std::uint8_t aksim4 = 4;
@@ -168,13 +172,13 @@ struct Identity {
   std::uint8_t protocol_version = version::aksim2;
   std::uint8_t frame_bytes = 5;
   unsigned resolution = 20;
-  std::array<std::uint8_t, 18> text{};  // the whole of it; text[2..17] is the part number
+  std::array<std::uint8_t, 18> text{};  // all identity bytes before the checksum; text[2..17] is the part number
   [[nodiscard]] constexpr Bytes part_number() const { return Bytes(text).subspan(2); }
 };
 
 namespace detail {
 
-// Channel 1 is one number: turns, position, error and warning. `format` must be known.
+// Returns channel 1 as one big-endian number of turns, position, error and warning. `format` must be known.
 constexpr ReplyBytes position_bytes(const Format& format, const Position& position) {
   std::uint64_t number = std::uint64_t{position.singleturn} << (24 - format.resolution);
   if (!position.error) number |= 2;
@@ -187,7 +191,7 @@ constexpr ReplyBytes position_bytes(const Format& format, const Position& positi
   return frame;
 }
 
-// Padding that is not zero means another resolution.
+// Decodes channel 1. Padding that is not zero means that the encoder has another resolution: out_of_range.
 constexpr Result<Position> load_position(const Format& format, Bytes bytes) {
   const std::uint64_t number = load_big_endian(bytes.first(format.position_bytes()));
   const auto word = static_cast<std::uint32_t>(number & low_mask(24));
@@ -209,7 +213,7 @@ constexpr Result<Position> load_position(const Format& format, Bytes bytes) {
   return frame;
 }
 
-/// Errors in this order: wrong_length, bad_checksum, out_of_range. `format` must be known.
+/// Decodes a position frame. Errors in this order: wrong_length, bad_checksum, out_of_range. `format` must be known.
 [[nodiscard]] constexpr Result<Position> decode_position(const Format& format, Bytes bytes) {
   if (bytes.size() != format.frame_bytes()) return Error::wrong_length;
   if (!is_sealed(bytes.first(format.position_bytes() + 1))) return Error::bad_checksum;
@@ -227,7 +231,7 @@ constexpr Result<Position> load_position(const Format& format, Bytes bytes) {
   return bytes;
 }
 
-/// Errors in this order: wrong_length, bad_checksum, out_of_range. `format` must be known.
+/// Decodes a channel 2 cycle. Errors in this order: wrong_length, bad_checksum, out_of_range. `format` must be known.
 [[nodiscard]] constexpr Result<Cycle> decode_cycle(const Format& format, Bytes bytes) {
   if (bytes.size() != format.cycle_bytes()) return Error::wrong_length;
   if (!is_sealed(bytes)) return Error::bad_checksum;
@@ -248,8 +252,8 @@ constexpr Result<Position> load_position(const Format& format, Bytes bytes) {
   return bytes;
 }
 
-/// With or without a byte behind it, which means nothing. Errors in this order: wrong_length, bad_checksum,
-/// unexpected_reply (another protocol version or frame length), out_of_range (the resolution is no number from 1 to
+/// Decodes an identity. One more byte may follow it and is ignored. Errors in this order: wrong_length, bad_checksum,
+/// unexpected_reply (another protocol version or frame length), out_of_range (the resolution is not a number from 1 to
 /// 22).
 [[nodiscard]] constexpr Result<Identity> decode_identity(Bytes bytes) {
   if (bytes.size() != identity_bytes && bytes.size() != padded_identity_bytes) return Error::wrong_length;
@@ -265,7 +269,8 @@ constexpr Result<Position> load_position(const Format& format, Bytes bytes) {
   return identity;
 }
 
-/// The format as the identity says it, which does not tell how many bits of turns there are.
+/// Returns `format` with the resolution of `identity`. An identity reports whether the encoder counts turns, but not
+/// with how many bits.
 [[nodiscard]] constexpr Format as_identified(const Format& format, const Identity& identity) {
   Format known = format;
   known.resolution = identity.resolution;
@@ -274,8 +279,8 @@ constexpr Result<Position> load_position(const Format& format, Bytes bytes) {
   return known;
 }
 
-/// The format with what was unknown taken from the identity. Error: unexpected_reply (it says otherwise than what was
-/// known: another resolution, or turns where none were expected, or the other way round).
+/// Returns `format` with its unknown members taken from `identity`. Error: unexpected_reply (a known member contradicts
+/// the identity: another resolution, or turns in only one of the two).
 [[nodiscard]] constexpr Result<Format> complete(const Format& format, const Identity& identity) {
   const Format known = as_identified(format, identity);
   const bool other_turns = format.multiturn_bits >= 0 && known.multiturn_bits != format.multiturn_bits;
@@ -283,24 +288,24 @@ constexpr Result<Position> load_position(const Format& format, Bytes bytes) {
   return known;
 }
 
-/// Whether two positions are the same; channel 2 repeats that of channel 1.
+/// Returns whether two positions are the same. Channel 2 repeats the position of channel 1.
 [[nodiscard]] constexpr bool same_place(const Position& a, const Position& b) {
   return a.singleturn == b.singleturn && a.multiturn == b.multiturn;
 }
 
-/// What may be a real position as well as what an encoder sends while it starts.
+/// Returns whether the position is zero: a real position, or the zeros that an encoder sends while it starts.
 [[nodiscard]] constexpr bool is_all_zero(const Position& position) {
   return position.singleturn == 0 && position.multiturn == 0;
 }
 
-/// Returns the alarms that the two bits of a frame report clear: all errors, all warnings. A bit that is set does not
-/// say which alarm it is for. Without channel 2 an encoder has no alarms by name.
+/// Returns the alarms that the error and warning bits of a frame report as clear: all errors, all warnings. A bit that
+/// is set does not report which alarm raised it. Without channel 2 an encoder has no named alarms.
 [[nodiscard]] constexpr std::uint32_t clear_by(const Format& format, const Position& position) {
   if (!format.has_ch2) return 0;
   return (position.error ? 0u : status::errors) | (position.warning ? 0u : status::warnings);
 }
 
-/// `detailed`: the status of a cycle, where there was one.
+/// Converts a position to a reading. `detailed`: the status of the latest cycle of channel 2, if one is known.
 [[nodiscard]] constexpr Reading to_reading(const Format& format, const Position& position,
                                            std::optional<std::uint16_t> detailed = {}) {
   const std::uint16_t alarms = detailed.value_or(0);
@@ -319,9 +324,9 @@ constexpr Result<Position> load_position(const Format& format, Bytes bytes) {
   return reading;
 }
 
-/// See Unit. The status of a cycle of channel 2 holds as long as the error and warning bits of position frames agree
-/// with it: which alarm has come or gone the next cycle tells. A bit that is set does not say which alarm it is for,
-/// and a bit that is clear says only that the alarms of its own kind are.
+/// Adds remembered alarms to a later reading; see Unit. The status of a channel 2 cycle stays valid as long as the
+/// error and warning bits of position frames agree with it. If they change, only the next cycle reports which alarm
+/// changed: a set bit does not name its alarm, and a clear bit clears only the alarms of its own kind.
 [[nodiscard]] constexpr Reading remembered(const Reading& before, Reading now) {
   const std::uint32_t unknown = before.alarms_reported & ~now.alarms_reported;
   if (unknown == 0 || now.singleturn_bits == 0) return now;

@@ -8,14 +8,14 @@ namespace absenc::encolink {
 // ---- Frames
 
 std::array<std::uint8_t, request_bytes> Frames::encode(const Format&, const Request& request) {
-  Config config = Config::position;  // also where the identity comes
+  Config config = Config::position;  // the request for the frame that carries the identity is a position request too
   if (request.ask == Ask::reset) config = Config::reset_channels;
   if (request.ask == Ask::identify) config = Config::identify;
   return {static_cast<std::uint8_t>(config), request.ra};
 }
 
-// 0: silence ends it. What comes before the identity has a length that may be unknown, and behind both there may be
-// more.
+// Returns 0 if only silence ends the reply: on a UART the frame before an identity may have an unknown length, and one
+// more byte may follow either.
 std::size_t Frames::expected(const Format& format, const Request& request, Bytes) {
   const bool identifies = request.ask == Ask::identify || request.ask == Ask::identity;
   if (!identifies) return format.frame_bytes();
@@ -37,7 +37,8 @@ void Channels::take(const author::HostOf<Frames>& host) {
   const Format& format = host.format();
   const Position& position = host.last();
   ended.reset();
-  if (host.request().ask == Ask::reset) {  // its byte of channel 2 is still one of before
+  // The channel 2 byte of this reply still belongs to the cycle before the reset.
+  if (host.request().ask == Ask::reset) {
     bytes_.clear();
     in_step = true;
   } else if (in_step) {
@@ -57,8 +58,8 @@ void Channels::take(const author::HostOf<Frames>& host) {
     }
   }
   reading = to_reading(format, position, status);
-  // On SPI the position is taken when NCS falls. The document does not say when it is on a UART: at the end of the
-  // request at the latest.
+  // On SPI the encoder takes the position when NCS falls. For a UART the document does not state when: at the latest at
+  // the end of the request.
   reading.latched = format.interface == Interface::spi ? host.begun_at() : host.sent_at();
   reading.received = host.received_at();
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Host side of EncoLink: frames, what one after the other says, and the position that a drive repeats. procedures.hpp
-// has all that takes more.
+// Host side of EncoLink: one frame, the channels that several frames make, and the position that a drive polls.
+// procedures.hpp has the commands that take more frames.
 #pragma once
 
 #include <array>
@@ -11,22 +11,22 @@
 
 namespace absenc::encolink {
 
-/// What a frame is asked for.
+/// Purpose of a request.
 enum class Ask : std::uint8_t {
   position,
-  reset,     // and channels 2 and 3 begin anew in the next frame
-  identify,  // the next frame is the identity
+  reset,     // position; channels 2 and 3 begin anew in the next frame
+  identify,  // position; the next frame is the identity
   identity,
 };
 
-/// author/dialog.hpp says what each of these is.
+/// EncoLink frames for the engine; author/dialog.hpp explains each member.
 struct Frames {
   using Format = encolink::Format;
   struct Request {
     Ask ask = Ask::position;
-    std::uint8_t ra = 0;  // a byte of a register access
+    std::uint8_t ra = 0;  // one byte of a register access
   };
-  using Reply = Position;  // of the identity nothing
+  using Reply = Position;  // empty for an identity
   static constexpr std::size_t longest_reply = identity_bytes;
 
   static constexpr author::HostTimes host_times(const Format& format) {
@@ -35,26 +35,27 @@ struct Frames {
   static constexpr author::Manner manner(const Format&, const Request&) { return {}; }
   static std::array<std::uint8_t, request_bytes> encode(const Format&, const Request& request);
   static std::size_t expected(const Format& format, const Request& request, Bytes);
-  /// Errors: timeout, line_stuck (SPI: all bits alike), those of decode_position or of decode_identity.
+  /// Decodes a reply. Errors: timeout, line_stuck (SPI: all bits alike), those of decode_position or of
+  /// decode_identity.
   static Result<Position> decode(const Format& format, const Request& request, Bytes reply);
-  /// SPI has brought all there is; on a UART more may be coming.
+  /// Returns true on SPI, where a transfer has a fixed length; on a UART more bytes may follow.
   static bool is_whole(const Format& format, Error) { return format.interface == Interface::spi; }
-  /// How long after a frame the next one may begin: also after one of a conversation before this.
+  /// Returns the shortest time between two frames; it also holds between conversations.
   static constexpr Time pause(const Format& format) { return format.interface == Interface::spi ? spi_pause : Time{}; }
 };
 
-/// What the frames of a conversation say together: the position, and cycles of channel 2, a byte a frame, from a reset
-/// of the channels until a frame is lost.
+/// The content of successive frames: the position, and cycles of channel 2. A cycle takes one byte of each frame, from
+/// a reset of the channels until a frame is lost.
 struct Channels {
-  Reading reading{};                      // of the last good frame; nothing before the first
-  std::optional<std::uint16_t> status{};  // of the last good cycle
-  std::optional<Error> ended{};           // the last frame ended a cycle: none, or what is wrong with it
-  std::uint8_t channel3 = 0;              // of the last good cycle
-  bool in_step = false;                   // the bytes of channel 2 are those of a cycle
-  bool silent = false;                    // all bytes of the last cycle were 0: there is no channel 2 yet
+  Reading reading{};                      // reading of the last valid frame; empty before the first
+  std::optional<std::uint16_t> status{};  // detailed status of the last valid cycle
+  std::optional<Error> ended{};           // set if the last frame completed a cycle: none, or the cycle's error
+  std::uint8_t channel3 = 0;              // channel 3 byte of the last valid cycle
+  bool in_step = false;                   // the channel 2 bytes are aligned to a cycle
+  bool silent = false;                    // all bytes of the last cycle were 0: the encoder is starting
 
-  /// A good frame. A cycle whose position is not that of the frame with which it began is cross_check_failed; one that
-  /// is not good ends the step.
+  /// Takes a valid frame. A cycle whose position is not that of its first frame ends with cross_check_failed. A cycle
+  /// with an error ends the alignment.
   void take(const author::HostOf<Frames>& host);
 
  private:
@@ -62,9 +63,9 @@ struct Channels {
   Position first_{};
 };
 
-/// One frame. When its position is not valid, near a limit, or all zero as while the encoder starts, a cycle of channel
-/// 2 follows: its alarms become those of the reading. Zeros in both channels are not `ready`; a channel 2 that is wrong
-/// otherwise leaves the alarms unknown. What of the format is unknown is asked first.
+/// Reads one frame. If its position is invalid, near a limit or all zero (as while the encoder starts), also reads a
+/// cycle of channel 2 and takes the alarms from it. If both channels are zero, the reading is not `ready`. If the cycle
+/// is otherwise wrong, the alarms stay unknown. If `format` has unknown members, reads the identity first.
 class ReadPosition : public author::HostOf<Frames> {
  public:
   explicit ReadPosition(const Format& format);

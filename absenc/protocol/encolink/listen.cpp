@@ -23,11 +23,12 @@ void Listen::end(Error error, std::string_view detail) {
 
 ByteStep Listen::next(Time now) {
   if (!done_ && find()) {
-    deadline_ = Time{};  // what happens meanwhile is not the encoder's doing
+    deadline_ = Time{};  // the time that the caller takes for the emitted frame does not count towards the timeout
     return {.kind = ByteStep::Kind::emit};
   }
   if (deadline_ == Time{}) deadline_ = now + listen_limit;
-  if (!done_ && now >= deadline_) {  // bytes that are no frames may come before every timer
+  // Bytes that are no frames do not extend the deadline, so it is checked even while they arrive.
+  if (!done_ && now >= deadline_) {
     frame_.clear();
     if (!heard_) {
       end(Error::timeout, "nothing comes: the encoder does not transmit by itself, or it was unplugged");
@@ -61,7 +62,7 @@ void Listen::feed(const ByteEvent& event) {
   counts_.discarded = discarded_.count();
 }
 
-// The next frame, or the loss of them.
+// Finds the next frame, or the loss of alignment. Returns whether one was found.
 bool Listen::find() {
   if (std::exchange(disturbed_, false)) {
     lose(Error::bad_framing, {});
@@ -73,7 +74,7 @@ bool Listen::find() {
     const Result<Position> position = decode_position(format_, first);
     const bool good = position && (in_step_ || decode_position(format_, waiting().subspan(size, size)));
     if (good) {
-      // Of the two that show where frames begin the older one is passed over: when it began is not known any more.
+      // Two valid frames establish alignment. The older one is dropped, because the time at which it began is unknown.
       if (!std::exchange(in_step_, true)) begin_ += size;
       discarded_.found();
       const Bytes frame = waiting().first(size);
@@ -100,7 +101,8 @@ void Listen::take(Bytes frame, const Position& position) {
   frame_.clear();
   frame_.append(frame);
   reading_ = to_reading(format_, position_);
-  // The document does not say when it was taken: before the frame began. What waits ended at `received_at_`.
+  // The document does not state when the position was taken; at the latest when the frame began. The unexamined bytes
+  // ended at `received_at_`.
   reading_.latched = received_at_ - uart_settings.character() * static_cast<std::int64_t>(waiting().size());
   reading_.received = received_at_;
 }

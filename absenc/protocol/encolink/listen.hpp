@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The conversation that only listens.
+// The conversation that only receives, for encoders that transmit without requests.
 #pragma once
 
 #include <array>
@@ -12,12 +12,13 @@
 
 namespace absenc::encolink {
 
-/// For encoders that transmit by themselves: sends nothing, finds the frames by their checksums and emits each, and
-/// each loss of the frames with its error. Where a frame begins is believed after two good ones in a row. Ends only
-/// when nothing good comes any more.
+/// Receives the frames of a streaming encoder and sends nothing. Finds frames by their checksums: frame alignment is
+/// accepted after two valid frames in a row. Emits each frame, and each loss of alignment with its error. Ends when no
+/// valid frame arrives for `listen_limit`.
 class Listen final : public Conversation<std::uint8_t> {
  public:
-  /// `format` must be known: nobody can be asked. Errors: invalid_argument, timeout, bad_checksum.
+  /// `format` must be known, because the encoder cannot be asked for its identity. Errors: invalid_argument, timeout,
+  /// bad_checksum.
   explicit Listen(const Format& format);
 
   void feed(const Event<std::uint8_t>& event) override;
@@ -32,7 +33,7 @@ class Listen final : public Conversation<std::uint8_t> {
   [[nodiscard]] Exchange<std::uint8_t> exchange() const override {
     return {{}, frame_.empty() ? waiting() : frame_.view(), received_at_, received_at_};
   }
-  /// Bytes that belong to no good frame.
+  /// Returns the number of received bytes that belong to no valid frame.
   [[nodiscard]] std::uint64_t skipped() const { return discarded_.skipped(); }
 
  private:
@@ -46,14 +47,14 @@ class Listen final : public Conversation<std::uint8_t> {
   DiscardedFrames discarded_;
   StreamCounts counts_{};
   bool in_step_ = false;
-  bool disturbed_ = false;  // a damaged character came while in step
-  bool heard_ = false;      // anything, since the last good frame
+  bool disturbed_ = false;  // a damaged character was received while in step
+  bool heard_ = false;      // bytes or damaged characters were received since the last valid frame
   bool done_ = false;
   Error last_bad_ = Error::wrong_length;
-  std::array<std::uint8_t, 1024> bytes_{};  // as many as a port hands out at once
-  std::size_t begin_ = 0;                   // of those that were not looked at
+  std::array<std::uint8_t, 1024> bytes_{};  // received bytes; the size is the most that a port delivers at once
+  std::size_t begin_ = 0;                   // index of the first byte that was not yet examined
   std::size_t end_ = 0;
-  ReplyBytes frame_;  // the last good or damaged one
+  ReplyBytes frame_;  // the last valid or damaged frame
   Position position_{};
   Reading reading_{};
   Time deadline_{};

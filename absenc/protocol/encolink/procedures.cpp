@@ -15,9 +15,9 @@ namespace {
 
 constexpr unsigned frame_attempts = 3;
 constexpr unsigned cycle_attempts = 3;
-constexpr unsigned access_attempts = 5;  // each is some hundred frames, all of which must be good
+constexpr unsigned access_attempts = 5;  // an access takes some hundred frames, and all of them must be valid
 constexpr unsigned write_attempts = 3;
-constexpr unsigned idle_cycles_allowed = 8;  // after the last byte of an access
+constexpr unsigned idle_cycles_allowed = 8;  // idle cycles allowed between the last byte of an access and its answer
 
 constexpr std::string_view channel2_damaged = "channel 2 is damaged: positions go on, but registers cannot be reached";
 constexpr std::string_view no_channel2 = "without channel 2 (has_ch2=false) there is neither status nor register";
@@ -27,7 +27,7 @@ constexpr std::string_view size_needed = "this address is not in the table of re
 
 // ---- Frames
 
-// One that is lost or damaged ends the step of channel 2.
+// Requests one frame. A lost or damaged frame ends the alignment of channel 2.
 Part<Error> ask_frame(Dialog& dialog, Found& found, Frames::Request request) {
   if (found.emits && found.is_new) dialog.emit();
   found.is_new = false;
@@ -52,8 +52,8 @@ Outcome stopped(const Found& found, Error error) {
   return {error, in_access ? "the encoder stopped answering during a register access" : std::string_view{}};
 }
 
-// With `trusted` it counts also against the options. Asking for it resets the channels. Ends the procedure when it does
-// not come.
+// Reads the identity, which also resets the channels. If `trusted`, the identity overrides the options; otherwise a
+// contradiction is an error. Stops the procedure if no identity arrives.
 Part<Identity> identify(Dialog& dialog, Found& found, bool trusted) {
   for (;;) {
     Error error = co_await ask_frame(dialog, found, {Ask::identify});
@@ -70,7 +70,7 @@ Part<Identity> identify(Dialog& dialog, Found& found, bool trusted) {
   co_return identity;
 }
 
-// The next good frame; out of step it is asked for by `ask`. Ends the procedure when none comes.
+// Reads the next valid frame; if channel 2 is not aligned, with request `ask`. Stops the procedure if none arrives.
 Part<bool> next_frame(Dialog& dialog, Found& found, Ask ask = Ask::position) {
   if (!dialog.format().known()) co_await identify(dialog, found, false);
   for (;;) {
@@ -82,12 +82,12 @@ Part<bool> next_frame(Dialog& dialog, Found& found, Ask ask = Ask::position) {
 
 // ---- Register accesses
 
-// What is wrong with the last frame, or the cycle that it ended.
+// Returns the error of the last frame, or of the cycle that it completed.
 Error damage(const Found& found, Error error) {
   return error == Error::none ? found.ended.value_or(Error::none) : error;
 }
 
-// The bytes of the request, one a frame.
+// Sends the `ra` bytes of the access, one per frame.
 Part<Error> send(Dialog& dialog, Found& found) {
   found.was_asked = false;
   for (std::size_t sent = 0; !found.was_asked;) {
@@ -101,7 +101,7 @@ Part<Error> send(Dialog& dialog, Found& found) {
   co_return Error::none;
 }
 
-// The next cycle: its byte of channel 3 is one of the answer.
+// Receives the next cycle; its channel 3 byte is part of the answer.
 Part<Error> receive(Dialog& dialog, Found& found) {
   do {
     const Error error = co_await ask_frame(dialog, found, {});
@@ -110,7 +110,7 @@ Part<Error> receive(Dialog& dialog, Found& found) {
   co_return Error::none;
 }
 
-// A write that may have been executed is not repeated blindly: whoever wants it reads back first.
+// Ends an access whose answer was lost. A write that may have been executed is not repeated before it was read back.
 Fate lost(Found& found, Error error, std::string_view detail = {}) {
   if (found.ended.value_or(Error::none) != Error::none) {
     detail = *found.ended == Error::cross_check_failed ? channels_disagree : channel2_damaged;
@@ -154,14 +154,15 @@ Part<Fate> try_to_execute(Dialog& dialog, Found& found) {
   co_return found.end(Fate::good, done);
 }
 
-// The identity is asked first: an encoder with other registers is left alone.
+// Reads the identity first: registers of an AksIM-4 must not be accessed.
 Part<Fate> execute(Dialog& dialog, Found& found) {
   if (!dialog.format().has_ch2) co_await dialog.stop({Error::unsupported, no_channel2});
   if (found.protocol_version == 0) co_await identify(dialog, found, false);
   if (found.protocol_version == version::aksim4) co_await dialog.stop({Error::unsupported, not_described});
   for (unsigned left = access_attempts - 1;; --left) {
     const Fate fate = co_await try_to_execute(dialog, found);
-    if (fate != Fate::good) found.in_step = false;  // more of the answer may be coming
+    // More bytes of the answer may follow, so the channels must be reset before the next access.
+    if (fate != Fate::good) found.in_step = false;
     if (is_gone(dialog, found)) co_return found.end(Fate::gone, stopped(found, found.why.error));
     if (!found.again || left == 0) co_return fate;
   }
@@ -181,7 +182,7 @@ Part<Fate> attempt_write(Dialog& dialog, Found& found, std::uint32_t address, st
 
 namespace {
 
-// The bytes of a register, as `data`. Ends the procedure when there are none.
+// Reads a register into `found.data`. Stops the procedure if that fails.
 Part<bool> read(Dialog& dialog, Found& found, std::uint32_t address, std::uint16_t size) {
   const Fate fate = co_await attempt_read(dialog, found, address, size);
   if (fate != Fate::good) co_await dialog.stop(found.why);
@@ -192,12 +193,13 @@ Part<bool> read(Dialog& dialog, Found& found, RegisterIndex index) {
   return read(dialog, found, registers[index].address, registers[index].size);
 }
 
-// A procedure may write twice: only a refusal of the first write leaves the encoder as it was.
+// Notes that the encoder refused a write. A procedure may write twice: only a refusal of the first write leaves the
+// encoder unchanged.
 void note_refusal(Dialog& dialog, const Found& found, Fate fate) {
   if (fate == Fate::refused && found.why.error == Error::request_rejected && !found.changed) dialog.refused();
 }
 
-// A write whose answer is lost is repeated only if reading back shows that it was not executed.
+// Writes a register and reads it back. A write with a lost answer is repeated only if reading back shows the old value.
 Part<bool> write(Dialog& dialog, Found& found, std::uint32_t address, std::uint16_t size, std::uint64_t value) {
   constexpr std::string_view in_the_middle =
       "the encoder stopped answering in the middle of a register write: read it to see whether it was written";
@@ -243,7 +245,7 @@ bool is_near(const Dialog& dialog, std::uint32_t singleturn,
   return author::is_near(dialog.last().singleturn, singleturn, dialog.format().resolution, millidegrees);
 }
 
-// Of a procedure that has had a frame, and a cycle of channel 2. Ends it where a zero must not be set.
+// Stops the procedure if a zero must not be set. A frame and a cycle of channel 2 must have been read before.
 Part<bool> may_set_zero(Dialog& dialog, Found& found) {
   const Reading first = to_reading(dialog.format(), dialog.last(), found.status);
   const Time looked = dialog.received_at();
@@ -255,7 +257,7 @@ Part<bool> may_set_zero(Dialog& dialog, Found& found) {
 
 }  // namespace
 
-// ---- What is read
+// ---- Reading commands
 
 Procedure read_alarms(Dialog& dialog, Found& found) {
   if (!dialog.format().has_ch2) co_return {Error::unsupported, no_channel2};
@@ -330,7 +332,7 @@ Procedure read_memory(Dialog& dialog, Found& found, Arguments arguments) {
   return read_at(dialog, found, address, size_of(address, arguments[1]));
 }
 
-// ---- What is written
+// ---- Writing commands
 
 Procedure write_register(Dialog& dialog, Found& found, std::size_t index, Arguments arguments) {
   return write_at(dialog, found, registers[index].address, registers[index].size, arguments[0]);
@@ -381,7 +383,7 @@ Procedure preset_multiturn(Dialog& dialog, Found& found, Arguments arguments) {
   co_return done;
 }
 
-// It has ended when its counter moved on, or it shows a failure that was not there before.
+// The self-calibration has ended when its counter has changed, or when it reports a failure that was not set before.
 Procedure self_calibrate(Dialog& dialog, Found& found) {
   co_await read(dialog, found, calibration_status);
   const std::uint8_t before = found.data[0];

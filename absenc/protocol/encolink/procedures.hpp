@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The procedures of EncoLink. Positions go on meanwhile; most hand each out.
+// The procedures of EncoLink. Positions continue during register accesses; most procedures emit each position.
 #pragma once
 
 #include <cstdint>
@@ -16,36 +16,37 @@ using Dialog = author::DialogOf<Frames>;
 
 /// How a register access ended.
 enum class Fate : std::uint8_t {
-  good,     // the encoder executed it
-  refused,  // it did not
-  lost,     // frames come, but not the answer: it may have been executed
-  gone,     // not even frames come; `was_asked` tells whether it may have been executed
+  good,     // the encoder executed the access
+  refused,  // the encoder did not execute the access
+  lost,     // frames arrive, but the answer does not: the access may have been executed
+  gone,     // no frames arrive; `was_sent` tells whether the access may have been executed
 };
 
-/// What a procedure knows of its encoder, and what it tells of it: the position, if nothing else.
+/// State of a procedure and its results. Without other results the position is reported.
 struct Found : Channels {
   struct Value {
-    std::size_t index;  // of the register
+    std::size_t index;  // index of the register in the table
     ByteBuffer<largest_register> bytes;
   };
-  std::optional<Identity> identity{};      // told in place of the position, with the values
-  std::optional<std::uint32_t> address{};  // told in place of the position: of the register whose bytes are `data`
-  Buffer<Value, 8> values{};               // of registers of the table
-  std::optional<bool> running{};           // a self-calibration
+  std::optional<Identity> identity{};  // reported instead of the position, together with `values`
+  // Address of the register whose bytes are `data`; reported instead of the position.
+  std::optional<std::uint32_t> address{};
+  Buffer<Value, 8> values{};      // values of registers of the table
+  std::optional<bool> running{};  // whether a self-calibration is running
   bool tells_status = false;
 
-  bool emits = false;                  // each position is handed out
-  bool is_new = false;                 // the position was not yet
-  std::uint8_t protocol_version = 0;   // 0: not asked yet
-  unsigned lost = 0;                   // frames in a row
-  AccessBytes access{};                // the register access under way
-  bool writes = false;                 // it does
-  bool was_asked = false;              // all of it went out: the encoder may have executed it
-  bool changed = false;                // a register was written, and read back
-  std::uint16_t length = 0;            // bytes it reads
-  ByteBuffer<access_capacity> data{};  // that it has read
-  author::Outcome why{};               // it did not go well
-  bool again = false;                  // asking once more can help, and does no harm
+  bool emits = false;                  // each position is emitted
+  bool is_new = false;                 // the latest position was not emitted yet
+  std::uint8_t protocol_version = 0;   // version in the identity; 0: the identity was not read yet
+  unsigned lost = 0;                   // number of lost frames in a row
+  AccessBytes access{};                // all `ra` bytes of the present register access
+  bool writes = false;                 // the present access is a write
+  bool was_asked = false;              // all `ra` bytes were sent: the encoder may have executed the access
+  bool changed = false;                // a register was written and read back
+  std::uint16_t length = 0;            // bytes that the access reads
+  ByteBuffer<access_capacity> data{};  // bytes that the access has read
+  author::Outcome why{};               // why the access failed
+  bool again = false;                  // a repetition of the access can help and does no harm
 
   void begin(const RegisterRequest& request) {
     access = encode_access(request);
@@ -63,42 +64,47 @@ struct Found : Channels {
   }
 };
 
-/// One access while positions go on. Ends the procedure where the encoder has no registers, or others.
+/// Executes one register access while positions continue. Stops the procedure if the encoder has no registers, or those
+/// of an AksIM-4.
 author::Part<Fate> attempt_read(Dialog& dialog, Found& found, std::uint32_t address, std::uint16_t size);
 author::Part<Fate> attempt_write(Dialog& dialog, Found& found, std::uint32_t address, std::uint16_t size,
                                  std::uint64_t value);
 
-/// A cycle of channel 2, checked against channel 1.
+/// Reads a cycle of channel 2 and compares it with channel 1.
 author::Procedure read_alarms(Dialog& dialog, Found& found);
 author::Procedure read_identity(Dialog& dialog, Found& found);
-/// The identity and every register of the table that is in_info. One that the encoder does not have is left out.
+/// Reads the identity and every register with `in_info`. Leaves out registers that the encoder rejects.
 author::Procedure read_info(Dialog& dialog, Found& found);
 
-/// Errors of these: request_rejected (the detail has the encoder's words), busy, timeout, cross_check_failed (channel 2
-/// disagrees with channel 1), unsupported (no channel 2, or other registers), or that of a frame.
+/// Reads register `index` of the table. Errors of this and the following procedures: request_rejected (the detail
+/// explains the encoder's status), busy, timeout, cross_check_failed (channel 2 disagrees with channel 1), unsupported
+/// (no channel 2, or other registers), or the error of a frame.
 author::Procedure read_register(Dialog& dialog, Found& found, std::size_t index);
-/// Arguments: address, length (0: as the table says). Error also: invalid_argument (a length is needed).
+/// Reads a register. Arguments: address, length (0: from the table). Error also: invalid_argument (a length is needed).
 author::Procedure read_memory(Dialog& dialog, Found& found, Arguments arguments);
 
-/// Errors of these also: cross_check_failed (another value is there now).
+/// Writes register `index` of the table. This and the following procedures also have the error cross_check_failed
+/// (reading back gave another value).
 author::Procedure write_register(Dialog& dialog, Found& found, std::size_t index, Arguments arguments);
-/// Arguments: address, value, size (0: as the table says). The command register cannot be read back: `save` and others
-/// write it.
+/// Writes a register. Arguments: address, value, size (0: from the table). Refuses the command register, which cannot
+/// be read back: `send_command` writes it.
 author::Procedure write_memory(Dialog& dialog, Found& found, Arguments arguments);
-/// Writes a command: only its status tells whether it was executed, so it is not repeated.
+/// Writes the command register. Only the status of the answer shows that the command was executed, so it is not
+/// repeated.
 author::Procedure send_command(Dialog& dialog, Found& found, std::uint8_t command);
 
-/// Makes this position the zero of the turn, by the position offset. Argument: 1: saved. Errors also: invalid_argument
-/// (the shaft turns, or the position is not valid), cross_check_failed (it is not zero afterwards; the old offset is
-/// back).
+/// Makes the present position the zero of the turn, by the position offset. Argument: 1 to save. Errors also:
+/// invalid_argument (the position is not valid), not_still (the shaft turns), cross_check_failed (the position is not
+/// zero afterwards; the old offset is restored).
 author::Procedure zero(Dialog& dialog, Found& found, Arguments arguments);
-/// Sets the turn counter. Arguments: turns, 1: saved. Error also: unsupported (the encoder has none).
+/// Sets the turn counter. Arguments: turns, 1 to save. Error also: unsupported (the encoder has no turn counter).
 author::Procedure preset_multiturn(Dialog& dialog, Found& found, Arguments arguments);
-/// Starts the self-calibration and watches it while the shaft is turned; emits whenever its status was read. Errors
-/// also: cross_check_failed (it failed; the detail says how), timeout (it does not end).
+/// Starts the self-calibration and polls its status while the shaft is turned; emits each status. Errors also:
+/// cross_check_failed (it failed; the detail states why), timeout (it does not end).
 author::Procedure self_calibrate(Dialog& dialog, Found& found);
 
-/// How many bytes an access has: `wanted`, or where that is 0 what the table says; 0: nobody knows.
+/// Returns the bytes of a register: `wanted`, or if that is 0 the size in the table; 0 if the table has no such
+/// register.
 [[nodiscard]] std::uint16_t size_of(std::uint32_t address, std::int64_t wanted);
 
 }  // namespace absenc::encolink

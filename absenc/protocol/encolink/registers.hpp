@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Channel 3: the registers of an AksIM-2 as one table, and the bytes that ask for them, one in each request.
+// Channel 3: the table of AksIM-2 registers, and the bytes that access them. Each request carries one of these bytes.
 #pragma once
 
 #include <algorithm>
@@ -16,28 +16,28 @@
 
 namespace absenc::encolink {
 
-/// What the encoder says in the channel 3 byte of a cycle.
+/// State of the encoder in the channel 3 byte of a cycle.
 namespace channel3 {
 inline constexpr std::uint8_t idle = 0x33;
 inline constexpr std::uint8_t busy = 0x66;
-inline constexpr std::uint8_t read_ready = 0x88;   // status and data follow, a byte a cycle
-inline constexpr std::uint8_t write_ready = 0x99;  // the status follows
+inline constexpr std::uint8_t read_ready = 0x88;   // status and data follow, one byte per cycle
+inline constexpr std::uint8_t write_ready = 0x99;  // the status follows in the next cycle
 }  // namespace channel3
 
-/// Answer of the encoder to a register access.
+/// Status byte in the encoder's answer to a register access.
 enum class AccessStatus : std::uint8_t {
   ok = 0x09,
   no_such_register = 0x26,
   out_of_range = 0x56,
   denied = 0x96,
   read_checksum = 0xE4,
-  read_checksum_too = 0xE6,  // in other code of the vendor
+  read_checksum_too = 0xE6,  // same meaning as read_checksum; used in other code of the vendor
   byte_count = 0xEE,
   locked = 0xF6,
   write_checksum = 0xF9,
 };
 
-/// The request arrived damaged: sending it again helps.
+/// Returns whether the encoder received a damaged request, so that a repetition helps.
 [[nodiscard]] constexpr bool is_damaged(AccessStatus status) {
   return status == AccessStatus::read_checksum || status == AccessStatus::read_checksum_too ||
          status == AccessStatus::write_checksum;
@@ -61,8 +61,8 @@ enum class AccessStatus : std::uint8_t {
 
 enum class Access : std::uint8_t { read_only, read_write, write_only };
 
-/// How the bytes of a register are to be understood; all are big endian.
-enum class Content : std::uint8_t { number, celsius, rpm, flags, text };  // celsius and rpm in tenths, signed
+/// How the bytes of a register are decoded; all are big endian.
+enum class Content : std::uint8_t { number, celsius, rpm, flags, text };  // celsius and rpm: signed, in tenths
 
 struct Register {
   std::string_view name;
@@ -70,7 +70,7 @@ struct Register {
   std::uint8_t size;
   Access access;
   Content content = Content::number;
-  bool in_info = false;  // part of what `info` shows
+  bool in_info = false;  // the command `info` reads it
 };
 
 enum RegisterIndex : std::size_t {
@@ -98,8 +98,8 @@ enum RegisterIndex : std::size_t {
   serial_number_extended,
 };
 
-// Addresses and sizes: rls-encolink 1.0.1, product_aksim2_map.h. Some overlap; each is accessed as a whole. Which can
-// be written it does not say: README.md has what is assumed.
+// Addresses and sizes are from rls-encolink 1.0.1, product_aksim2_map.h. Some registers overlap; each is accessed as a
+// whole. The vendor does not state which registers can be written: README.md lists the assumptions.
 inline constexpr auto registers = [] {
   using enum Access;
   using enum Content;
@@ -132,7 +132,7 @@ inline constexpr auto registers = [] {
       {"voltage_compensation_n", 0x1218, 4, read_only},
   });
 }();
-inline constexpr std::size_t largest_register = 20;  // bytes
+inline constexpr std::size_t largest_register = 20;  // bytes of the largest register
 
 /// Values of the command register.
 namespace commands {
@@ -143,12 +143,12 @@ inline constexpr std::uint8_t self_calibrate = 0x41;
 
 /// Bits of calibration_status.
 namespace calibration {
-inline constexpr std::uint8_t count = 0x03;  // of calibrations that ended, modulo 4
+inline constexpr std::uint8_t count = 0x03;  // number of finished calibrations, modulo 4
 inline constexpr std::uint8_t timed_out = 0x04;
 inline constexpr std::uint8_t out_of_range = 0x08;
 }  // namespace calibration
 
-/// Null when the table has none at this address.
+/// Returns the register at `address`, or null if the table has none there.
 [[nodiscard]] constexpr const Register* find_register(std::uint32_t address) {
   for (const Register& one : registers) {
     if (one.address == address) return &one;
@@ -156,24 +156,25 @@ inline constexpr std::uint8_t out_of_range = 0x08;
   return nullptr;
 }
 
-inline constexpr std::size_t access_capacity = 100;  // bytes of one access: what the vendor's library allows
+inline constexpr std::size_t access_capacity = 100;  // most data bytes of one access; limit of the vendor's library
 
 struct RegisterRequest {
   enum class Operation : std::uint8_t { write = 0x58, read = 0x59 } operation = Operation::read;
   std::uint32_t address = 0;
   std::uint16_t length = 0;
-  ByteBuffer<access_capacity> data{};  // write: `length` bytes
+  ByteBuffer<access_capacity> data{};  // written bytes, `length` of them; empty for a read
 };
 
 inline constexpr std::array<std::uint8_t, 5> access_keys{0x00, 0xCD, 0xEF, 0x89, 0xAB};
-inline constexpr std::size_t access_header = access_keys.size() + 1 + 2 + 4;  // keys, operation, length, address
+// Bytes of keys, operation, length and address.
+inline constexpr std::size_t access_header = access_keys.size() + 1 + 2 + 4;
 using AccessBytes = ByteBuffer<access_header + access_capacity + 1>;
 
 [[nodiscard]] constexpr RegisterRequest read_request(std::uint32_t address, std::uint16_t length) {
   return {RegisterRequest::Operation::read, address, length};
 }
 
-/// `size` bytes of `value`, 1 to 8.
+/// Returns the request that writes `value` as `size` bytes, 1 to 8.
 [[nodiscard]] constexpr RegisterRequest write_request(std::uint32_t address, std::uint16_t size, std::uint64_t value) {
   RegisterRequest request{RegisterRequest::Operation::write, address, size};
   std::array<std::uint8_t, 8> bytes{};
@@ -182,7 +183,7 @@ using AccessBytes = ByteBuffer<access_header + access_capacity + 1>;
   return request;
 }
 
-/// All the `ra` bytes of an access.
+/// Returns all `ra` bytes of an access.
 [[nodiscard]] constexpr AccessBytes encode_access(const RegisterRequest& request) {
   AccessBytes bytes;
   bytes.append(access_keys);
@@ -195,15 +196,16 @@ using AccessBytes = ByteBuffer<access_header + access_capacity + 1>;
   return bytes;
 }
 
-/// Whether `request` is all the `ra` bytes of a register access. SPI clocks zeros behind the two bytes of a request; an
-/// access is longer than these two, and its keys have no zeros there.
+/// Returns whether `request` is all `ra` bytes of a register access. On SPI, zeros are clocked behind the two bytes of
+/// a request; an access is longer than two bytes and its keys are not zeros.
 [[nodiscard]] constexpr bool is_access(Bytes request) {
   if (request.size() <= request_bytes) return false;
   const Bytes behind = request.subspan(request_bytes);
   return std::any_of(behind.begin(), behind.end(), [](std::uint8_t byte) { return byte != 0; });
 }
 
-/// Errors in this order: bad_framing (keys), unsupported (no such operation), wrong_length, bad_checksum.
+/// Decodes the `ra` bytes of an access. Errors in this order: bad_framing (wrong keys), unsupported (unknown
+/// operation), wrong_length, bad_checksum.
 [[nodiscard]] constexpr Result<RegisterRequest> decode_access(Bytes bytes) {
   for (std::size_t i = 0; i < access_keys.size(); ++i) {
     if (i == bytes.size()) return Error::wrong_length;
@@ -223,8 +225,9 @@ using AccessBytes = ByteBuffer<access_header + access_capacity + 1>;
   return request;
 }
 
-/// What the encoder says to an access, a byte a cycle, from `channel3::read_ready` or `write_ready` on: a status, and
-/// the data of a register that was read. Errors in this order: wrong_length, unexpected_reply, request_rejected.
+/// Decodes the encoder's answer to an access, one byte per cycle, beginning with `channel3::read_ready` or
+/// `write_ready`: the status, then the data of a register that was read. Errors in this order: wrong_length,
+/// unexpected_reply, request_rejected.
 [[nodiscard]] constexpr Result<Bytes> decode_answer(const RegisterRequest& request, Bytes answer) {
   if (answer.size() < 2) return Error::wrong_length;
   const bool reads = request.operation == RegisterRequest::Operation::read;

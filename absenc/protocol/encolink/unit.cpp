@@ -55,9 +55,9 @@ constexpr auto options = author::OptionsOf{
         identity_bytes, padded_identity_bytes),
 };
 
-// ---- What goes out
+// ---- Requests
 
-/// Two bytes, or the access whose bytes ride in the second one.
+/// A request: its two bytes, or a register access whose bytes are sent one by one as `ra`.
 struct Request {
   Config config = Config::position;
   std::optional<RegisterRequest> access{};
@@ -122,9 +122,9 @@ Result<Request> memory_writing(const Format&, Arguments arguments) {
   return writing(static_cast<std::uint32_t>(arguments[0]), arguments[2], arguments[1]);
 }
 
-constexpr MakeRequest not_known = nullptr;  // the value depends on the position, or nothing is sent
+constexpr MakeRequest not_known = nullptr;  // used where the value depends on the position, or where nothing is sent
 
-// ---- Where a frame ends: its checksum alone tells
+// ---- End of a frame: found by its checksum alone
 
 constexpr std::size_t reply_size(const Format& format, Bytes begin) {
   for (std::size_t size = 1; size <= identity_bytes; ++size) {
@@ -140,16 +140,17 @@ constexpr std::size_t reply_size(const Format& format, Bytes begin) {
   return 0;
 }
 
-// The byte of channel 2 stands behind the checksum of a position frame; one that means nothing may stand behind that of
-// the identity.
+// Returns whether a checksum covers `bit`. The channel 2 byte is outside the checksum of a position frame, and the byte
+// that may follow an identity is outside the identity's checksum.
 bool is_checked(const Options& values, Frame request, Frame reply, std::size_t bit) {
   const Format format = assumed(options.format(values), reply.bytes);
-  if (is_access(request.bytes)) return bit / 8 < 2;  // cycles of channel 2 have the checksums
+  // The checksums are in the cycles that carried the answer: only its first two bytes (ready, status) are checked here.
+  if (is_access(request.bytes)) return bit / 8 < 2;
   if (reply.bytes.size() == padded_identity_bytes) return bit / 8 < identity_bytes;
   return !format.has_ch2 || reply.bytes.size() != format.frame_bytes() || bit / 8 != format.frame_bytes() - 1;
 }
 
-// ---- What is shown
+// ---- Reported fields
 
 using Host = author::HostOf<Frames>;
 
@@ -197,7 +198,7 @@ Explanation explain_host(const Host& host) {
       return {};
   }
 }
-/// Of a frame, which captures have; of a register access all its bytes.
+/// Explains an error of a captured frame, or of a register access with all its bytes.
 constexpr Explanation explain(const Format&, Error error, Bytes request, Bytes reply) {
   if (is_access(request)) {
     if (error != Error::request_rejected || reply.size() < 2) return {};
@@ -305,17 +306,17 @@ constexpr auto commands_of_unit = std::array{
         {"listen", Verb::run, 0, "the last of some frames of an encoder that transmits by itself", listen_arguments}),
 };
 
-// ---- What captures tell of the format of an encoder that cannot be asked
+// ---- Format of a captured encoder, which cannot be asked
 
 constexpr std::size_t option_resolution = options.find("resolution");
 constexpr std::size_t option_multiturn_bits = options.find("multiturn_bits");
 
-// What speaks for a format: the identity, or without one the length that most frames have.
+// Evidence for a format: the identity, or without one the length that most frames have.
 struct Told {
   std::optional<Identity> identity{};
-  std::size_t identity_at = 0;         // index of its capture
-  std::array<std::size_t, 2> good{};   // position frames without turns, with turns
-  std::array<std::size_t, 2> first{};  // the first of them
+  std::size_t identity_at = 0;         // index of the capture with the identity
+  std::array<std::size_t, 2> good{};   // number of valid position frames without turns, and with turns
+  std::array<std::size_t, 2> first{};  // index of the first capture of each kind
 
   [[nodiscard]] bool tells() const { return identity || good[0] != good[1]; }
   [[nodiscard]] bool has_turns() const { return identity ? identity->frame_bytes == 7 : good[1] > good[0]; }
@@ -339,8 +340,8 @@ Told told_by(const Format& format, std::span<const Capture> captures) {
   return told;
 }
 
-// Without an identity whether there are turns is told by the length that most position frames have, because of one
-// frame with turns in 250 a shorter part has a good checksum too.
+// Finds the resolution and the turns that fit the captures. Without an identity, the length of most position frames
+// decides: in one of 250 frames with turns, a shorter part has a valid checksum too.
 bool probe(Options& values, std::span<const Capture> captures, EvidenceSink& sink) {
   const Told told = told_by(options.format(values), captures);
   constexpr std::string_view open = "these frames do not tell";
@@ -366,7 +367,7 @@ bool probe(Options& values, std::span<const Capture> captures, EvidenceSink& sin
   return is_resolution && (!told.tells() || (values[option_multiturn_bits] > 0) == told.has_turns());
 }
 
-// ---- What is declared
+// ---- Declaration
 
 constexpr std::array<RegisterInfo, registers.size()> register_infos = [] {
   std::array<RegisterInfo, registers.size()> infos{};
@@ -388,7 +389,7 @@ constexpr Format format_of(const Options& values) {
   made.interface = interface;
   return made;
 }
-// Those of the virtual encoder where they are asked from the real one.
+// Returns the resolution; unknown members are the virtual encoder's.
 constexpr Resolution resolution_of(const Format& format) {
   return {format.resolution != 0 ? format.resolution : virtual_format.resolution,
           static_cast<unsigned>(format.multiturn_bits >= 0 ? format.multiturn_bits : virtual_format.multiturn_bits)};
@@ -414,7 +415,7 @@ Follower* make_follower(const Options& values, std::span<std::byte> storage) {
 
 constexpr auto known_as = std::array<std::string_view, 2>{"RLS", "AksIM"};
 
-/// What the document says of both interfaces, and of each.
+/// The declaration of the protocol for `interface`.
 template <Interface interface>
 constexpr author::Declaration<Protocol, VirtualEncoder, Host> declaration{
     .id = interface == Interface::spi ? "encolink-spi" : "encolink",

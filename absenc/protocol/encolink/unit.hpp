@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// EncoLink as the neutral layers see it: one unit for each interface.
+// The EncoLink protocol as units, one for each interface.
 #pragma once
 
 #include "absenc/protocol/unit.hpp"

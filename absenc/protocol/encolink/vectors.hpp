@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// EncoLink frames with their source. The unit decodes each at compile time: a broken frame does not build.
+// EncoLink test frames with their source. The unit decodes each frame at compile time: a wrong frame breaks the build.
 #pragma once
 
 #include <array>
@@ -75,7 +75,7 @@ inline constexpr std::array uart{
                "bad_checksum"},
 };
 
-// The same frames go over SPI: one of each length.
+// SPI carries the same frames as the UART: one vector per frame length.
 inline constexpr std::array spi{
     VectorText{"encolink-spi-001", "ST res 19 pos 275096", derived, "resolution=19 multiturn_bits=0", ask, "8653036200",
                "singleturn=275096 error=0 warning=0 channel2=0"},
