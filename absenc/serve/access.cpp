@@ -17,19 +17,19 @@ using namespace client;
 namespace {
 
 constexpr std::size_t least_token = 16;
-constexpr unsigned most_guesses = 10;  // wrong tokens of one address within the time that follows
+constexpr unsigned most_guesses = 10;  // wrong tokens allowed for one address within `time_of_guesses`
 constexpr Time time_of_guesses = std::chrono::seconds(60);
 constexpr std::size_t most_addresses = 1000;
 constexpr std::string_view wrong_token = "the token is wrong: the server's token file has no such token";
 
-// As HTTP compares the names of hosts and of schemes: of ASCII, without the case.
+// Compares host names and URL schemes as HTTP does: ASCII, ignoring case.
 bool same_word(std::string_view one, std::string_view other) {
   const auto lower = [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; };
   return std::equal(one.begin(), one.end(), other.begin(), other.end(),
                     [&](char a, char b) { return lower(a) == lower(b); });
 }
 
-// How long it takes tells nothing about how much of it is right.
+// Takes the same time wherever the texts differ, so that the time does not reveal how much of a guess is right.
 bool same_secret(std::string_view one, std::string_view other) {
   if (one.size() != other.size()) return false;
   unsigned difference = 0;
@@ -37,7 +37,7 @@ bool same_secret(std::string_view one, std::string_view other) {
   return difference == 0;
 }
 
-// "localhost" of "localhost:8420", "[::1]" of "[::1]:8420"
+// Returns the host name without its port: "localhost" of "localhost:8420", "[::1]" of "[::1]:8420".
 std::string_view name_in(std::string_view host) {
   const std::size_t bracket = host.find(']');
   const std::size_t end = host.find(':', bracket == std::string_view::npos ? 0 : bracket);
@@ -51,12 +51,12 @@ bool names_loopback(std::string_view host) {
 
 bool is_loopback_address(std::string_view address) { return address.starts_with("127.") || address == "::1"; }
 
-// "encoders.example:8443" of "https://encoders.example:8443"
+// Returns host and port of an origin: "encoders.example:8443" of "https://encoders.example:8443".
 std::string_view host_in(std::string_view origin) {
   return origin.substr(std::min(origin.find("//") + 2, origin.size()));
 }
 
-// The origin of a URL, as browsers send it.
+// Returns the origin of a URL in the form that browsers send.
 std::string origin_of(std::string_view url) {
   if (url.empty()) return {};
   const std::size_t host = url.starts_with("https://") ? 8 : url.starts_with("http://") ? 7 : 0;
@@ -101,7 +101,8 @@ std::uint64_t Access::wrong_tokens() const {
   return wrong_tokens_;
 }
 
-// Counts a wrong token. Events are few, however many guesses there are: the first of a minute, and the end of patience.
+// Counts a wrong token and returns whether the address may try again. However many guesses arrive, only two of them add
+// an event: the first of a minute, and the one that exceeds the limit.
 bool Access::may_guess_on(const std::string& peer) const {
   const Time now = os::now();
   const std::lock_guard lock(mutex_);
@@ -133,7 +134,8 @@ std::string Access::who(const Request& request) const {
   return name;
 }
 
-// A page of another site can make a browser ask us under that site's own name, for which it has the answer read.
+// Checks that the request names this server. Otherwise a page of another site could make a browser send a request under
+// that site's own name and let the page read the response (DNS rebinding).
 bool Access::names_us(std::string_view host) const {
   return names_loopback(host) ||
          (!public_origin_.empty() && same_word(name_in(host), name_in(host_in(public_origin_))));
@@ -141,19 +143,20 @@ bool Access::names_us(std::string_view host) const {
 
 bool Access::is_from_own_page(const Request& request) const {
   if (!request.fetch_site.empty() && request.fetch_site != "same-origin" && request.fetch_site != "none") return false;
-  if (request.origin.empty()) return true;  // no browser
+  if (request.origin.empty()) return true;  // only browsers send Origin
   return same_word(request.origin, "http://" + request.host) || same_word(request.origin, "https://" + request.host) ||
          (!public_origin_.empty() && same_word(request.origin, public_origin_));
 }
 
-// A proxy need not say that it is one: where there is one, whoever only looks needs a token on this computer, too.
+// A proxy does not always add its header. With a configured proxy, even a read request from this computer therefore
+// needs a token.
 bool Access::needs_token(const Request& request, To what) const {
   if (what == To::anybody || what == To::change || !on_loopback_) return what != To::anybody;
   return has_tokens() && (request.is_forwarded || !public_origin_.empty());
 }
 
-// The last one of X-Forwarded-For is what the proxy itself saw. Only where there is one, and from this computer:
-// anybody can send such a header.
+// The last entry of X-Forwarded-For is the address that the proxy itself saw. It is used only with a configured proxy
+// and a request from this computer, because any client can send this header.
 std::string Access::client_of(const Request& request) const {
   if (public_origin_.empty() || !is_loopback_address(request.peer)) return request.peer;
   const std::string& list = request.forwarded_for;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Who may what. On loopback everybody of this computer may look; elsewhere, behind a proxy, and to change an encoder,
-// it takes a token.
+// Decides which requests are allowed. On loopback everybody on this computer may read; from elsewhere, behind a proxy,
+// and to change an encoder, a request needs a token.
 #pragma once
 
 #include <cstdint>
@@ -21,35 +21,35 @@ namespace absenc::serve {
 class Access {
  public:
   enum class To : std::uint8_t {
-    anybody,  // the page itself, and whether the server lives
-    look,
-    ask,  // of an encoder what costs its time, or keeps it from being read; changes nothing
-    change,
+    anybody,  // the page itself and the health check: no token needed
+    look,     // to read what the server knows
+    ask,      // to poll the encoder or interrupt its readings, without changing it
+    change,   // to change the encoder, or to acknowledge an alarm
   };
 
   struct Choices {
-    std::string token_file{};  // lines of a name and a token; "": there is none, which is for loopback only
-    std::string public_url{};  // where a proxy on this computer shows the page to others; "": there is none
-    bool on_loopback = false;  // nobody on another computer can reach the server itself
+    std::string token_file{};  // file with lines of a name and a token; "": no tokens, allowed on loopback only
+    std::string public_url{};  // URL at which a proxy on this computer shows the page; "": no proxy
+    bool on_loopback = false;  // the server listens on loopback, so no other computer can reach it directly
   };
-  /// Throws Failure when the file cannot be read, others may read it, or a token is shorter than 16 characters;
-  /// UsageError. `server_events` outlives it.
+  /// Throws Failure when the file cannot be read, others may read it, or a token is shorter than 16 characters; throws
+  /// UsageError when `choices` are inconsistent. `server_events` must outlive this object.
   Access(const Choices& choices, ServerEvents& server_events);
 
-  /// Reads the file again: tokens that are no longer in it end at once. Throws Failure as the constructor; then those
-  /// of before count.
+  /// Reads the token file again: tokens that are no longer in it become invalid at once. Throws Failure like the
+  /// constructor; the previous tokens then stay valid.
   void reload();
 
-  /// Why this is refused; nothing: it is not.
+  /// Returns the response that refuses the request; nothing if the request is allowed.
   [[nodiscard]] std::optional<Response> refusal(const Request& request, To what) const;
-  /// The address of whoever asks: by the word of a proxy on this computer where there is one.
+  /// Returns the address of the client. Behind a proxy on this computer it is the address that the proxy reports.
   [[nodiscard]] std::string client_of(const Request& request) const;
-  /// The name of the token that came with it, or "".
+  /// Returns the name of the token in the request; "" without a valid token.
   [[nodiscard]] std::string who(const Request& request) const;
-  /// What answers a request whose token is missing or wrong; a wrong one is counted.
+  /// Returns the response to a missing or wrong token, and counts a wrong token.
   [[nodiscard]] Response refuse_token(const Request& request) const;
   [[nodiscard]] bool has_tokens() const { return !token_file_.empty(); }
-  /// How many requests came with a wrong token.
+  /// Returns the number of requests with a wrong token.
   [[nodiscard]] std::uint64_t wrong_tokens() const;
 
  private:
@@ -63,16 +63,16 @@ class Access {
   [[nodiscard]] bool needs_token(const Request& request, To what) const;
 
   std::string token_file_;
-  std::string public_origin_;  // "https://encoders.example:8443"; "": there is no proxy
+  std::string public_origin_;  // "https://encoders.example:8443"; "": no proxy
   bool on_loopback_;
   ServerEvents* server_events_;
-  mutable std::mutex mutex_;  // guards what follows
+  mutable std::mutex mutex_;  // guards all members below
   std::vector<Secret> tokens_;
-  mutable std::map<std::string, Guesses> guesses_;  // by address
+  mutable std::map<std::string, Guesses> guesses_;  // wrong tokens within the last minute, by the address of the client
   mutable std::uint64_t wrong_tokens_ = 0;
 };
 
-/// {"error":"..."}
+/// Returns a response whose JSON body is {"error":"..."}.
 [[nodiscard]] Response error_response(unsigned status, std::string_view sentence);
 
 }  // namespace absenc::serve

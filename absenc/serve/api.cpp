@@ -21,15 +21,15 @@ using namespace client;
 
 namespace {
 
-constexpr std::int64_t most_rows = 5000;         // of one answer in JSON
-constexpr std::int64_t rows_of_a_page = 10'000;  // of CSV at a time
+constexpr std::int64_t most_rows = 5000;         // rows in one JSON response
+constexpr std::int64_t rows_of_a_page = 10'000;  // rows of CSV that are read from the history at a time
 
-/// Is refused with 400.
+/// An error that is answered with status 400.
 struct BadRequest : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// Is refused with 404.
+/// An error that is answered with status 404.
 struct NotFound : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
@@ -52,7 +52,7 @@ std::int64_t number_in(const Request& request, const std::string& name, std::int
   throw BadRequest(fmt::format("{} must be a whole number from {} to {}", name, least, most));
 }
 
-// Calendar seconds; the last hour when nothing else is asked for.
+// Returns the requested range in calendar seconds; the last hour by default.
 Range range_in(const Request& request) {
   constexpr std::int64_t latest = 1'000'000'000'000;
   Range range;
@@ -66,7 +66,7 @@ constexpr std::string_view encoders_path = "/api/encoders/";
 constexpr std::array<std::string_view, 10> parts_of_encoder{"acknowledge", "command", "doctor", "events",   "history",
                                                             "history.csv", "memory",  "points", "settings", "stream"};
 
-/// A path /api/encoders/NAME/PART. The name may contain slashes; the part is empty for the encoder itself.
+/// The parts of a path /api/encoders/NAME/PART. The name may contain slashes; the part is empty for the encoder itself.
 struct Target {
   std::string_view name;
   std::string_view part;
@@ -94,7 +94,7 @@ std::shared_ptr<Watch> require_encoder(const Fleet& fleet, std::string_view name
   throw NotFound(fmt::format("there is no encoder \"{}\" here{}", name, suggestion(name, names)));
 }
 
-// Says where a path of older versions is now.
+// Returns the error text for an unknown path, with the new location of a path of older versions.
 std::string unknown_path(const Request& request) {
   constexpr std::string_view api = "/api/";
   const std::string_view path = request.path;
@@ -216,7 +216,7 @@ void Api::post(const Request& request, const Reply& reply) {
   reply.send(response);
 }
 
-// That it answers is its health; what is wrong with encoders is for /metrics.
+// The server is healthy while it can answer and can store what it reads. Faults of encoders are in /metrics.
 Response Api::health() const {
   std::size_t live = 0;
   const Fleet::Watches watches = fleet_->all();
@@ -236,7 +236,7 @@ Response Api::health() const {
                            .set("mqtt_dropped", mqtt.dropped));
 }
 
-// Whether there are tokens, and whose this one is.
+// Reports whether the server has tokens, and the name of the token in the request.
 Response Api::token(const Request& request) const {
   const std::string who = access_->who(request);
   if (who.empty() && !request.authorization.empty()) return access_->refuse_token(request);
@@ -264,7 +264,7 @@ void Api::command(Watch& watch, const Request& request, const Reply& reply) {
   give(watch, std::move(order), request, reply);
 }
 
-// The alarm stays raised: only the encoder clears it.
+// The alarm stays raised, because only the encoder can clear it.
 void Api::acknowledge(Watch& watch, const Request& request, const Reply& reply) {
   const std::string alarm = request.value("alarm");
   if (alarm.empty()) throw BadRequest("alarm must name the alarm that is acknowledged");
@@ -278,7 +278,7 @@ void Api::acknowledge(Watch& watch, const Request& request, const Reply& reply) 
   chronicler_->when_written(server_events_->added(), answer);
 }
 
-// It opens the port anew, with other settings too: others on the line would lose it.
+// The doctor opens the port again with other settings, so other encoders on the same line would lose their port.
 void Api::doctor(Watch& watch, const Request& request, const Reply& reply) {
   const std::vector<std::string> others = fleet_->company_of(watch);
   if (others.empty()) return give(watch, examination_order(), request, reply);
@@ -288,7 +288,7 @@ void Api::doctor(Watch& watch, const Request& request, const Reply& reply) {
                        watch.name(), fmt::join(others, ", "), watch.name())));
 }
 
-// What answers is JSON of its own, or {"error":"..."}.
+// Queues the order. Unless the order has its own `done`, the response is the JSON result or {"error":"..."}.
 void Api::give(Watch& watch, Order order, const Request& request, const Reply& reply) {
   const std::string who = access_->who(request);
   order.who = who.empty() ? request.peer : fmt::format("{} from {}", who, request.peer);
@@ -297,7 +297,7 @@ void Api::give(Watch& watch, Order order, const Request& request, const Reply& r
       reply.send(done.good ? json_response(done.json) : error_response(502, done.text));
     };
   }
-  // The history is the record of who changed what: it has the command before anybody is told that it was done.
+  // The history records who changed what, so the command is stored there before the client gets its response.
   if (chronicler_ != nullptr && order.kind == Order::Kind::command) {
     order.done = [chronicler = chronicler_, server_events = server_events_,
                   answer = std::move(order.done)](const Done& done) {
@@ -331,7 +331,7 @@ void Api::past_as_csv(const std::string& encoder, const Request& request, const 
     std::weak_ptr<Stream> stream{};
   };
   const auto rest = std::make_shared<Rest>(Rest{encoder, range_in(request)});
-  // A page each time that the client has taken the one before.
+  // Sends the next page of rows each time the client has received the previous one.
   const auto next = [reader = &chronicler_->reader(), rest] {
     const std::shared_ptr<Stream> stream = rest->stream.lock();
     if (stream == nullptr || stream->over()) return;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What is asked for at which path.
+// HTTP API: maps paths to responses.
 #pragma once
 
 #include <memory>
@@ -17,12 +17,13 @@
 
 namespace absenc::serve {
 
-/// The state of everything, as in the event `state`: {"at_ms","encoders","history"}. `chronicler` null: no history.
+/// Returns the state of all encoders, as in the event `state`: {"at_ms","encoders","history"}. `chronicler` is null
+/// without a history.
 [[nodiscard]] client::Json state_json(const Fleet& fleet, const Chronicler* chronicler);
 
 class Api {
  public:
-  /// All of them outlive it; `chronicler` null: there is no history.
+  /// All arguments must outlive this object. `chronicler` is null without a history.
   Api(Fleet& fleet, const Access& access, Streams& streams, Worker& worker, const ServerEvents& server_events,
       Chronicler* chronicler, const Sending& sending);
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The files of the page, which are in absenc/serve/page: cmake/embed_page.py puts them into the program.
+// The files of the web page in absenc/serve/page, which cmake/embed_page.py embeds into the program.
 #pragma once
 
 #include <span>
@@ -8,8 +8,8 @@
 namespace absenc::serve {
 
 struct Asset {
-  std::string_view path;  // "/app.js"
-  std::string_view type;  // "text/javascript; charset=utf-8"
+  std::string_view path;  // path in the URL: "/app.js"
+  std::string_view type;  // content type: "text/javascript; charset=utf-8"
   std::string_view content;
 };
 

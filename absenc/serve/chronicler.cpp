@@ -16,7 +16,7 @@ namespace {
 
 constexpr Time between_trims = std::chrono::seconds(60);
 
-// "400 days", "1.5 hours"
+// Formats a duration roughly: "400 days", "1.5 hours".
 std::string rough_words(std::int64_t ms) {
   struct Measure {
     double ms;
@@ -69,7 +69,7 @@ void Chronicler::when_written(std::uint64_t added, std::function<void()> then) {
   changed_.notify_all();
 }
 
-// With the mutex held: whether somebody waits for what can be written.
+// Returns whether a caller of `when_written` waits for events that can be written now. The mutex must be held.
 bool Chronicler::is_awaited() const {
   return std::any_of(waiting_.begin(), waiting_.end(), [this](const auto& one) { return one.first <= added_; });
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Writes the history once a second, in a thread of its own: a slow disk delays nobody else.
+// Writes the history once a second in its own thread, so that a slow disk delays nothing else.
 #pragma once
 
 #include <chrono>
@@ -17,12 +17,13 @@
 
 namespace absenc::serve {
 
-/// Notices when the calendar's clock jumps.
+/// Detects jumps of the calendar clock.
 class ClockWatch {
  public:
-  static constexpr std::int64_t smallest_jump_ms = 10'000;  // NTP moves it by less
+  static constexpr std::int64_t smallest_jump_ms = 10'000;  // in milliseconds; NTP adjusts the clock by less
 
-  /// Returns by how much it has jumped since the last look, in milliseconds; 0: it has not. `now`: of os::now.
+  /// Returns the jump of the calendar clock since the last call, in milliseconds; 0 without one. `now` is a time of
+  /// os::now.
   std::int64_t look(std::int64_t calendar_ms, Time now);
 
  private:
@@ -33,19 +34,20 @@ class ClockWatch {
 
 class Chronicler {
  public:
-  /// `fleet` and `server_events`, which is told what happens to the history, outlive it. Throws HistoryInUse.
+  /// `fleet` and `server_events` must outlive this object. Events about the history are added to `server_events`.
+  /// Throws HistoryInUse.
   Chronicler(const std::string& path, const HistoryLimits& limits, const Fleet& fleet, ServerEvents& server_events);
-  /// Writes what there still is.
+  /// Writes the remaining rows.
   ~Chronicler();
 
-  /// `added`: how many there have been with them (ServerEvents::added).
+  /// `added` is the number of events since the start, including these (ServerEvents::added).
   void add(const std::vector<ServerEvent>& server_events, std::uint64_t added);
-  /// Calls `then` once the first `added` server_events are in the file, so that kill -9 does not lose them, or could
-  /// not be written; from the thread of the history.
+  /// Calls `then` in the thread of the history once the first `added` server events are in the file, where kill -9 does
+  /// not lose them, or writing them has failed.
   void when_written(std::uint64_t added, std::function<void()> then);
 
   struct Health {
-    std::string trouble{};  // why nothing can be written; "": nothing is wrong
+    std::string trouble{};  // why the history cannot be written; "" without an error
     std::uint64_t lost = 0;
   };
   [[nodiscard]] Health health() const;
@@ -61,13 +63,13 @@ class Chronicler {
   const Fleet* fleet_;
   ServerEvents* told_;
   ClockWatch clock_;
-  mutable std::mutex mutex_;  // guards what follows
+  mutable std::mutex mutex_;  // guards all members below
   std::condition_variable_any changed_;
   std::vector<ServerEvent> server_events_;
-  std::uint64_t added_ = 0;  // with those of `server_events_`
+  std::uint64_t added_ = 0;  // events since the start, including those in `server_events_`
   std::vector<std::pair<std::uint64_t, std::function<void()>>> waiting_;
   Health health_;
-  std::jthread thread_;  // last: it uses all of the others
+  std::jthread thread_;  // last member: the thread uses all others
 };
 
 }  // namespace absenc::serve

@@ -41,7 +41,7 @@ bool Connections::end_oldest_idle(Id but, const std::function<bool(const Open&)>
   return true;
 }
 
-// The address with the most idle connections gives one up, so that the few of others stay.
+// Closes an idle connection of the address with the most of them, so that addresses with few connections keep theirs.
 bool Connections::end_oldest_idle_of_busiest(Id but) {
   std::unordered_map<std::string, std::size_t> idle;
   for (const auto& [id, one] : open_) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Chooses the connection that goes when too many are open: no address shuts others out, and the oldest idle one goes
-// first.
+// Selects the connection to close when too many are open. One address cannot shut out others, and the longest idle
+// connection is closed first.
 #pragma once
 
 #include <cstddef>
@@ -12,34 +12,36 @@
 
 namespace absenc::serve {
 
-/// Not guarded against several threads.
+/// Not thread-safe.
 class Connections {
  public:
-  static constexpr std::size_t most = 480;             // for requests of any kind
-  static constexpr std::size_t most_of_address = 384;  // so that one client, or one proxy, leaves room for others
-  static constexpr std::size_t reserve = 32;           // beside them, for vital requests only
-  static constexpr Time request_time = std::chrono::seconds(10);  // a byte now and then does not prolong it
+  static constexpr std::size_t most = 480;             // connections for any request
+  static constexpr std::size_t most_of_address = 384;  // connections of one address, so that one client or proxy leaves
+                                                       // room for others
+  static constexpr std::size_t reserve = 32;           // additional connections, for vital requests only
+  static constexpr Time request_time = std::chrono::seconds(10);  // time limit for a whole request, even if bytes still
+                                                                  // arrive
 
   using Id = const void*;
-  /// `end` ends the connection of a socket; `remove` may come later.
+  /// `end` closes the connection of a socket; the call of `remove` may follow later.
   explicit Connections(std::function<void(int socket)> end) : end_(std::move(end)) {}
 
-  /// Ends another one, or this one, where there are too many.
+  /// Adds a connection. Closes another one, or this one, when the limit is exceeded.
   void add(Id id, int socket, std::string peer, Time now);
   void remove(Id id) { open_.erase(id); }
-  /// A whole request came; until `await_request` the connection is not idle.
+  /// A whole request was received; the connection is not idle until `await_request`.
   void begin_request(Id id);
   void await_request(Id id, Time now);
-  /// Whether it is one of the reserve, which answers vital requests only.
+  /// Returns whether the connection belongs to the reserve, which serves vital requests only.
   [[nodiscard]] bool is_of_reserve(Id id) const;
-  /// Ends those that have awaited the end of a request for longer than `request_time`.
+  /// Closes connections whose request has been incomplete for longer than `request_time`.
   void end_half_sent(Time now);
 
  private:
   struct Open {
     int socket = -1;
     std::string peer{};
-    Time idle_since = never;  // `never`: a request is being answered
+    Time idle_since = never;  // `never` while a request is being answered
     bool of_reserve = false;
     bool ended = false;
   };

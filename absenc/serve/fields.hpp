@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Numbers and texts one behind the other, as bytes for this computer alone: numbers are in its order.
+// Serializes numbers and texts one after the other. Numbers have the byte order of this computer, so the bytes cannot
+// be read on another one.
 #pragma once
 
 #include <cstddef>
@@ -22,7 +23,7 @@ class FieldWriter {
   std::string bytes_;
 };
 
-/// Checks as if a stranger had written them: a field that is cut throws client::Failure.
+/// Reads fields with all checks needed for untrusted input: a truncated field throws client::Failure.
 class FieldReader {
  public:
   explicit FieldReader(std::string bytes) : bytes_(std::move(bytes)) {}
@@ -31,7 +32,7 @@ class FieldReader {
   [[nodiscard]] std::uint64_t long_number();
   [[nodiscard]] std::string text();
   [[nodiscard]] bool at_end() const { return at_ == bytes_.size(); }
-  /// Nothing may follow. Throws client::Failure.
+  /// Checks that no bytes follow. Throws client::Failure.
   void end() const;
 
  private:

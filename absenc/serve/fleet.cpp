@@ -22,7 +22,7 @@ namespace {
 
 bool is_named(std::string_view name) { return name.find_first_of(":?") == std::string_view::npos; }
 
-// Whether two of these are equal tells whether anything about the encoder has changed.
+// Returns a text of all settings of an encoder: equal texts mean that nothing has changed.
 std::string description_of(const NamedEncoder& named) {
   std::string text = fmt::format("{} {} {}", named.address, named.rate_hz, named.has_company);
   for (const auto* settings : {&named.settings, &named.defaults}) {
@@ -50,7 +50,7 @@ Fleet::~Fleet() { end(); }
 
 void Fleet::end() {
   const Watches watches = all();
-  for (const auto& watch : watches) watch->request_stop();  // all at once, and then wait for each
+  for (const auto& watch : watches) watch->request_stop();  // requests all threads to stop first, then waits for each
   for (const auto& watch : watches) watch->wait();
 }
 
@@ -99,7 +99,7 @@ std::string Fleet::reload() {
       if (stays) going.push_back(one);
     }
   }
-  // What comes in the place of one may need its port.
+  // A new encoder may need the port of an ended one.
   for (const auto& watch : ending) watch->request_stop();
   for (const auto& watch : ending) watch->wait();
   std::vector<std::string> added;
@@ -114,7 +114,7 @@ std::string Fleet::reload() {
       continue;
     }
     added.push_back(now.name);
-    // Side by side and not all at once.
+    // Encoders of the same rate are read at different times, spread evenly over one period.
     const double share = now.rate > 0 ? static_cast<double>(i) / (now.rate * static_cast<double>(all.size())) : 0;
     const Time offset(static_cast<std::int64_t>(1e9 * share));
     next.push_back(

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The encoders that are served: those of absenc.toml, or those that were named.
+// The served encoders: those named on the command line, or all of absenc.toml.
 #pragma once
 
 #include <memory>
@@ -16,24 +16,24 @@ class Fleet {
  public:
   using Watches = std::vector<std::shared_ptr<Watch>>;
 
-  /// `names` as for `absenc read`; none: all of absenc.toml. `rate` in readings a second of those for which the file
-  /// has no `rate_hz`; 0: as fast as can be. `server_events` outlives it. Throws UsageError.
+  /// `names` are as for `absenc read`; empty means all of absenc.toml. `rate`: readings per second of encoders without
+  /// `rate_hz` in the file; 0: as fast as possible. `server_events` must outlive this object. Throws UsageError.
   Fleet(std::vector<std::string> names, double rate, ServerEvents& server_events);
   ~Fleet();
   Fleet(const Fleet&) = delete;
   Fleet& operator=(const Fleet&) = delete;
 
-  /// Ends all threads that read, and what they do for others. What they have counted can still be taken.
+  /// Ends all reading threads and their orders. Statistics can still be read afterwards.
   void end();
 
-  /// Reads absenc.toml again; those that it describes as before go on undisturbed. Throws UsageError: then all do.
-  /// Returns what changed, in words. From one thread.
+  /// Reads absenc.toml again. Encoders with unchanged settings continue without interruption. Throws UsageError: then
+  /// all encoders continue as before. Returns the changes in words. Call it from one thread only.
   std::string reload();
 
   [[nodiscard]] Watches all() const;
-  /// Null when there is none of this name.
+  /// Returns null for an unknown name.
   [[nodiscard]] std::shared_ptr<Watch> find(std::string_view name) const;
-  /// The names of the others on its line.
+  /// Returns the names of the other encoders on the same line.
   [[nodiscard]] std::vector<std::string> company_of(const Watch& watch) const;
 
  private:

@@ -16,7 +16,8 @@ using namespace client;
 
 namespace {
 
-// A second comes twice when the clock was set back, or the server began anew within it: it has the readings of both.
+// The same second occurs twice if the clock was set back or the server was restarted within it. The row then combines
+// the readings of both.
 constexpr const char* add_second = R"(
 INSERT INTO second SELECT id, ?, ?, ?, ?, ?, ?, ?, ?, ? FROM encoder WHERE name = ?
 ON CONFLICT (encoder, at) DO UPDATE SET
@@ -71,7 +72,7 @@ HistoryWriter::HistoryWriter(std::string path, const HistoryLimits& limits)
 }
 HistoryWriter::~HistoryWriter() = default;
 
-// A file that stood at the path before this server wrote a history there is left alone: it may be somebody else's.
+// A damaged file at the path that this server did not write is not replaced: it may belong to another program.
 void HistoryWriter::open() {
   try {
     file_.emplace(path_);
@@ -87,7 +88,7 @@ void HistoryWriter::open() {
   reader_.accept();
 }
 
-// Makes sure that what is written goes to a whole file at the path.
+// Opens a file that is intact and still at the path, if the current one is not.
 void HistoryWriter::require_file() {
   if (file_) {
     const HistoryFile::State state = file_->look();
@@ -177,7 +178,7 @@ void HistoryWriter::note_loss(std::size_t rows, const std::string& why) {
 void HistoryWriter::roll_back() {
   try {
     if (file_ && file_->sqlite().in_transaction()) file_->sqlite().run("ROLLBACK");
-  } catch (const Failure&) {  // then it has ended by itself
+  } catch (const Failure&) {  // SQLite has already rolled back
   }
 }
 
@@ -198,8 +199,8 @@ void HistoryWriter::trim() {
   }
 }
 
-// In 24 different hours, by one encoder. A clock that is wrong for a shorter time makes nothing old, also when the
-// server was started meanwhile.
+// Returns whether one encoder has rows in 24 different hours since `at_s`. A wrong clock that lasts less than that
+// deletes nothing, even if the server is started meanwhile.
 bool HistoryWriter::was_recorded_since(std::int64_t at_s) {
   constexpr std::int64_t hours = 24;
   Statement encoders(file_->sqlite(), "SELECT id FROM encoder");
@@ -215,7 +216,7 @@ bool HistoryWriter::was_recorded_since(std::int64_t at_s) {
   return false;
 }
 
-// By the number of rows, because a clock that was wrong may have put some of them anywhere.
+// Counts rows instead of comparing times, because a wrong clock may have given some rows any time.
 std::int64_t HistoryWriter::end_of_oldest_tenth() {
   Sqlite& sqlite = file_->sqlite();
   const std::int64_t most = sqlite.number(
@@ -253,7 +254,7 @@ void HistoryReader::accept() {
   refused_.clear();
 }
 
-// With the mutex held.
+// The mutex must be held.
 Sqlite& HistoryReader::database() {
   if (!refused_.empty()) throw Failure(refused_);
   if (!database_) database_.emplace("the history", path_, Sqlite::For::reading);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What was, in one SQLite file: each second's least, mean and greatest of every encoder, and what happened to them.
+// The history, one SQLite file: the minimum, mean and maximum of each second of every encoder, and all events.
 #pragma once
 
 #include <cstdint>
@@ -18,53 +18,54 @@
 namespace absenc::serve {
 
 struct HistoryLimits {
-  std::int64_t seconds = 30LL * 24 * 3600;    // what is older is deleted
-  std::int64_t bytes = 1024LL * 1024 * 1024;  // beyond it, the oldest is deleted
+  std::int64_t seconds = 30LL * 24 * 3600;    // older rows are deleted
+  std::int64_t bytes = 1024LL * 1024 * 1024;  // size limit of the file; above it the oldest rows are deleted
 };
 
-/// Calendar times in seconds, both included.
+/// A range of calendar times in seconds, both ends included.
 struct Range {
   std::int64_t from_s = 0;
   std::int64_t to_s = 0;
 };
 
-/// Reads beside the writer, from any thread.
+/// Reads the history while HistoryWriter writes it. Thread-safe.
 class HistoryReader {
  public:
-  /// Each question throws Failure where there is no history at `path`.
+  /// Opens no file yet: each query throws Failure if `path` has no history.
   explicit HistoryReader(std::string path);
   ~HistoryReader();
   HistoryReader(const HistoryReader&) = delete;
   HistoryReader& operator=(const HistoryReader&) = delete;
 
-  /// At most `most` rows, each of as many seconds as that takes: [[at_s, least, mean, greatest, speed least, mean,
-  /// greatest, readings, errors],...]
+  /// Returns at most `most` rows; each row covers as many seconds as this limit requires: [[at_s, least, mean,
+  /// greatest, speed least, mean, greatest, readings, errors],...]
   [[nodiscard]] client::Json seconds(const std::string& encoder, Range range, std::int64_t most);
-  /// The newest `most` of an encoder, "": of all.
+  /// Returns the newest `most` events of an encoder; "": of all encoders and the server.
   [[nodiscard]] client::Json server_events(const std::string& encoder, Range range, std::int64_t most);
-  /// Up to `most` rows of CSV, with where the next begin: behind `range.to_s` when there are no more.
+  /// Returns up to `most` rows of CSV, and the time in seconds from which the next rows start; this is later than
+  /// `range.to_s` after the last row.
   [[nodiscard]] std::pair<std::string, std::int64_t> csv(const std::string& encoder, Range range, std::int64_t most);
   [[nodiscard]] static std::string_view csv_header();
 
  private:
   friend class HistoryWriter;
-  /// Closes the file, so that the writer can change to another at the path: with its old log and index, SQLite would
-  /// read neither. Until `accept` each question throws Failure, with `why`.
+  /// Closes the file, so that the writer can change to another file at the path: SQLite could not read that file with
+  /// the old log and index. Until `accept`, each query throws Failure with `why`.
   void refuse(const std::string& why);
   void accept();
   Sqlite& database();
 
   std::string path_;
-  std::mutex mutex_;  // guards what follows
+  std::mutex mutex_;  // guards all members below
   std::optional<Sqlite> database_;
   std::string refused_;
 };
 
-/// Written by one thread. What was written before a loss of power or kill -9 stays, but for the last second.
+/// Writes the history from one thread. After kill -9 or a power failure only the last second is missing.
 class HistoryWriter {
  public:
-  /// Throws HistoryInUse when another server keeps the file. Whatever else is wrong with it is its trouble, and it is
-  /// tried again with each `write`.
+  /// Throws HistoryInUse when another server writes to the file. Any other error is stored in `trouble`, and each
+  /// `write` tries again.
   HistoryWriter(std::string path, const HistoryLimits& limits);
   ~HistoryWriter();
   HistoryWriter(const HistoryWriter&) = delete;
@@ -74,16 +75,17 @@ class HistoryWriter {
     std::string encoder;
     Second second;
   };
-  /// All of it or, when the disk is full, nothing: what was lost is counted. Begins anew where the file was moved,
-  /// removed, replaced, truncated or damaged; a damaged one is kept under another name.
+  /// Writes all rows, or none when the disk is full, and counts rows that are lost. Starts a new file if the old one
+  /// was moved, removed, replaced, truncated or damaged; a damaged file is renamed.
   void write(const std::vector<Entry>& seconds, const std::vector<ServerEvent>& server_events);
-  /// Deletes what is beyond the limits; cheap when there is nothing. By its age only once a day was recorded since.
+  /// Deletes rows beyond the limits; cheap when no row is. Age alone deletes rows only after a day of newer rows was
+  /// recorded, because the clock may be wrong.
   void trim();
 
-  /// Why the last `write` failed; "" when it did not.
+  /// Returns why the last `write` failed; "" after success.
   [[nodiscard]] const std::string& trouble() const { return trouble_; }
   [[nodiscard]] std::uint64_t lost() const { return lost_; }
-  /// Sentences about what happened to the history since the last call.
+  /// Returns sentences about changes of the history file since the last call.
   [[nodiscard]] std::vector<std::string> take_notes();
   [[nodiscard]] HistoryReader& reader() { return reader_; }
 
@@ -106,7 +108,7 @@ class HistoryWriter {
   HistoryLimits limits_;
   std::string trouble_;
   std::uint64_t lost_ = 0;
-  std::uint64_t lost_now_ = 0;  // since it was last told
+  std::uint64_t lost_now_ = 0;  // rows lost since the last report
   std::int64_t lost_since_ms_ = 0;
   std::vector<std::string> notes_;
 };

@@ -16,7 +16,7 @@ namespace {
 
 constexpr std::int64_t version = 1;
 
-// A write-ahead log keeps what was committed when the process is killed, and lets others read meanwhile.
+// A write-ahead log preserves committed rows when the process is killed, and allows reading at the same time.
 constexpr const char* schema = R"(
 CREATE TABLE IF NOT EXISTS encoder (id INTEGER PRIMARY KEY, name TEXT NOT NULL UNIQUE);
 CREATE TABLE IF NOT EXISTS second (
@@ -77,13 +77,14 @@ HistoryFile::HistoryFile(const std::string& path) : path_(path), kept_(lock(path
   sqlite_->run(fmt::format("PRAGMA user_version = {}", version));
   log_ = os::identity_of(log_of(path));
   index_ = os::identity_of(index_of(path));
-  // After kill -9 it is as long as it says once the log is written to it.
+  // After kill -9 the file has its full length only once the log is written into it.
   const bool is_in_file = sqlite_->number("PRAGMA wal_checkpoint(FULL)") == 0;
   if (is_in_file && is_shorter_than_it_says()) throw DamagedFile(fmt::format("the history {} was cut off", path));
   note_written();
 }
 
-// https://www.sqlite.org/fileformat.html, 1.3: the size of a page at 16, their number at 28.
+// The header has the page size at byte 16 and the number of pages at byte 28: https://www.sqlite.org/fileformat.html,
+// 1.3.
 bool HistoryFile::is_shorter_than_it_says() const {
   constexpr std::string_view magic{"SQLite format 3\0", 16};
   const std::string header = kept_->beginning(32);
@@ -93,7 +94,7 @@ bool HistoryFile::is_shorter_than_it_says() const {
   return kept_->state().size < page * std::int64_t{big_endian(header.substr(28, 4))};
 }
 
-// By a connection of its own, which has nothing of the file in memory.
+// Checks through a separate connection, which has no pages of the file in memory.
 bool HistoryFile::is_sound() const {
   if (kept_->state().size == 0) return false;  // SQLite would delete the log of an empty file
   try {
@@ -109,7 +110,8 @@ HistoryFile::State HistoryFile::look() const {
   if (!kept_->has_its_name()) {
     return os::identity_of(path_).number == 0 ? State::gone : State::replaced;
   }
-  // By SQLite of another program, which may also write our log to the file; or by `cp`, which mixes our log into it.
+  // The writer was SQLite in another program, which may also write our log to the file, or `cp`, which mixes our log
+  // into the new content.
   const bool is_changed = kept_->state().modified_ns != modified_ns_;
   if (!is_changed && !is_shorter_than_it_says()) return State::whole;
   if (!is_sound()) return State::damaged;
@@ -128,10 +130,10 @@ void HistoryFile::leave() {
   bool is_in_file = false;
   try {
     is_in_file = sqlite_->number("PRAGMA wal_checkpoint(FULL)") == 0;
-  } catch (const Failure&) {  // then the log is kept
+  } catch (const Failure&) {  // the log is then renamed below
   }
   close();
-  // A log that stays beside the path would be taken for that of the next file there.
+  // SQLite would apply a log that stays beside the path to the next file there.
   if (is_in_file) {
     remove_if_same(log_of(path_), log_);
   } else if (os::identity_of(log_of(path_)) == log_ && log_.number != 0) {
@@ -147,7 +149,7 @@ std::string HistoryFile::set_aside() {
   return name;
 }
 
-// Its log gets a name by which SQLite does not take it for that of the damaged file, and then writes it there.
+// The log is renamed too: under its old name SQLite would write it into the damaged file.
 std::string HistoryFile::set_aside(const std::string& path) {
   std::string name = new_name_beside(path);
   rename_to(path, name);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The file of a history while it is written. Others may move, remove, replace, overwrite or truncate it meanwhile;
-// SQLite would go on writing to what has no name any more, or mix its log into another file.
+// The history file while it is open for writing. Other programs may move, remove, replace, overwrite or truncate it.
+// SQLite alone would continue to write to a file without a name, or mix its log into another file.
 #pragma once
 
 #include <cstdint>
@@ -13,38 +13,39 @@
 
 namespace absenc::serve {
 
-/// Another server keeps it.
+/// Thrown when another server writes to the same file.
 struct HistoryInUse : client::Failure {
   using client::Failure::Failure;
 };
 
 class HistoryFile {
  public:
-  /// Makes it where there is none. Throws HistoryInUse, DamagedFile, Failure.
+  /// Opens the file, or creates it. Throws HistoryInUse, DamagedFile, Failure.
   explicit HistoryFile(const std::string& path);
 
   [[nodiscard]] Sqlite& sqlite() { return *sqlite_; }
 
   enum class State : std::uint8_t {
     whole,
-    changed,  // by another program, and whole
+    changed,  // another program changed the file, which is still intact
     gone,
     replaced,
     damaged,
   };
-  /// Compares the file at the path with the one that `note_written` saw.
+  /// Compares the file at the path with its state at the last `note_written`.
   [[nodiscard]] State look() const;
-  /// After each transaction: who else writes to the file is known by the time of its change.
+  /// Stores the modification time. Call it after each transaction: a different time later means that another program
+  /// wrote.
   void note_written();
 
-  /// Closes a `changed` file as it is, with its log.
+  /// Closes a `changed` file without changing it or its log.
   void close();
-  /// Closes a file that is `gone` or `replaced`: it has everything that was written, wherever it is, and its log no
-  /// longer stands beside the path.
+  /// Closes a file that is `gone` or `replaced`. All written rows are in that file, and its log is removed from the
+  /// path.
   void leave();
-  /// Closes a `damaged` file and renames it. Returns its new name. Throws Failure.
+  /// Closes a `damaged` file and renames it. Returns the new name. Throws Failure.
   std::string set_aside();
-  /// Renames what stands at `path`. Returns the new name. Throws Failure.
+  /// Renames the file at `path`. Returns the new name. Throws Failure.
   static std::string set_aside(const std::string& path);
 
  private:
@@ -52,10 +53,11 @@ class HistoryFile {
   [[nodiscard]] bool is_sound() const;
 
   std::string path_;
-  std::unique_ptr<os::OwnedFile> kept_;  // until the database is closed: closing it would undo SQLite's locks
+  std::unique_ptr<os::OwnedFile> kept_;  // stays open until the database is closed: closing it would release SQLite's
+                                         // locks
   std::optional<Sqlite> sqlite_;
-  os::FileIdentity log_;  // the write-ahead log and its index
-  os::FileIdentity index_;
+  os::FileIdentity log_;    // write-ahead log of SQLite
+  os::FileIdentity index_;  // index of the write-ahead log
   std::int64_t modified_ns_ = 0;
 };
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The history keeps its seconds when the calendar's clock is wrong.
+// Tests that the history keeps its rows when the calendar clock is wrong.
 #include "absenc/serve/history.hpp"
 
 #include <gtest/gtest.h>
@@ -56,7 +56,7 @@ std::size_t seconds_in(HistoryWriter& writer, const std::string& encoder) {
   return static_cast<std::size_t>(std::count(rows.begin(), rows.end(), '\n'));
 }
 
-// A minute of a clock that is 400 days ahead, during which the server may be started, is as this: all else is old.
+// Simulates a server start during a minute in which the clock is 400 days ahead, so that all older rows seem too old.
 TEST(History, IsDeletedForItsAgeOnceADayWasRecordedSince) {
   const std::string path = new_path();
   {
@@ -79,7 +79,7 @@ TEST(History, IsDeletedForItsAgeOnceADayWasRecordedSince) {
   remove_history(path);
 }
 
-// Also when the clock, and some rows, are years ahead.
+// One row is years ahead, as after a wrong clock.
 TEST(History, BeyondItsSizeLosesTheOldestTenthOfItsRows) {
   const std::string path = new_path();
   HistoryLimits limits;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// MQTT discovery of Home Assistant (https://www.home-assistant.io/integrations/mqtt/): a device for each encoder, with
-// an entity for each of its values. Unavailable while the server is gone or the encoder is not live.
+// MQTT discovery of Home Assistant (https://www.home-assistant.io/integrations/mqtt/): one device for each encoder, one
+// entity for each of its values. An entity is unavailable while the server is offline or the encoder is not live.
 #include <fmt/format.h>
 
 #include <string>
@@ -15,7 +15,7 @@ using namespace client;
 
 namespace {
 
-/// Letters, digits, - and _ only.
+/// Returns the text with only letters, digits, - and _.
 std::string object_id(std::string_view text) {
   std::string id = topic_level(text);
   for (char& c : id) {
@@ -74,7 +74,7 @@ class Discovery {
   [[nodiscard]] Retained alarm() const {
     Json json = entity("alarm", "Alarm");
     json.set("state_topic", state_topic_).set("device_class", "problem");
-    // Home Assistant takes None for "unknown".
+    // Home Assistant interprets None as "unknown".
     json.set("value_template", "{{ 'ON' if value_json.alarms else 'None' if value_json.alarms is none else 'OFF' }}");
     json.set("json_attributes_topic", state_topic_);
     return retained("binary_sensor", "alarm", json);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Whatever waits for an answer is a suspended connection of libmicrohttpd, which costs memory and no thread.
+// A request that waits for its answer is a suspended connection of libmicrohttpd, which needs memory but no thread.
 #include "absenc/serve/http.hpp"
 
 #include <microhttpd.h>
@@ -20,11 +20,13 @@ namespace absenc::serve {
 
 namespace {
 
-// The library would leave new ones waiting at its limit: Connections has ended others before.
+// Higher than the limits of Connections: at this limit the library would leave new connections unaccepted.
 constexpr unsigned most_connections = Connections::most + Connections::reserve + 64;
-constexpr std::size_t memory_for_each = 64 * 1024;  // headers and what waits to be written; more is refused with 431
-constexpr std::uint64_t most_body = 4096;           // nothing here takes one
-constexpr std::uint64_t most_read = 1 << 20;        // of a body of unknown length, until it is answered at its end
+constexpr std::size_t memory_for_each = 64 * 1024;  // bytes for headers and unsent output; larger headers are refused
+                                                    // with status 431
+constexpr std::uint64_t most_body = 4096;           // bytes; no request needs a body
+constexpr std::uint64_t most_read = 1 << 20;        // bytes of a body of unknown length that are read before the
+                                                    // connection is closed
 constexpr unsigned idle_seconds = 15;
 constexpr std::size_t block = 16 * 1024;
 
@@ -62,13 +64,14 @@ Request request_of(MHD_Connection* connection, const char* path, const char* met
   return request;
 }
 
-// For every answer: nothing is kept, framed, guessed or taken from elsewhere.
+// Sets the headers of every response: no caching, no embedding in other pages, no content sniffing, no external
+// content.
 void add_headers(MHD_Response* response, const std::string& type) {
   ::MHD_add_response_header(response, "Content-Type", type.c_str());
   ::MHD_add_response_header(response, "Cache-Control", "no-store");
   ::MHD_add_response_header(response, "X-Content-Type-Options", "nosniff");
   ::MHD_add_response_header(response, "Referrer-Policy", "no-referrer");
-  // Dygraphs puts its styles into the document.
+  // Dygraphs inserts style elements into the document.
   ::MHD_add_response_header(response, "Content-Security-Policy",
                             "default-src 'self'; style-src 'self' 'unsafe-inline'; base-uri 'none'; "
                             "form-action 'none'; frame-ancestors 'none'");
@@ -83,17 +86,17 @@ struct Stream::Sending {
   std::size_t most;
   std::function<void()> wanted;
 
-  std::mutex mutex;  // guards what follows
+  std::mutex mutex;  // guards all members below
   std::deque<Text> queue;
   std::size_t sent_of_first = 0;
   MHD_Connection* suspended = nullptr;
-  int socket = -1;  // while it is sent
+  int socket = -1;  // -1 unless a connection sends this stream
   Time taken_at = os::now();
-  bool ended = false;  // nothing more comes
-  bool over = false;   // nobody listens
+  bool ended = false;  // no more texts will be added
+  bool over = false;   // the connection has ended
   std::uint64_t dropped = 0;
 
-  // With the mutex held, so that a connection is never resumed before it is suspended.
+  // The mutex must be held, so that a connection is never resumed before it is suspended.
   void resume() {
     if (suspended != nullptr) ::MHD_resume_connection(std::exchange(suspended, nullptr));
   }
@@ -140,7 +143,7 @@ void Stream::push(Text text) {
   if (sending_->over || sending_->ended || text->empty()) return;
   std::deque<Text>& queue = sending_->queue;
   queue.push_back(std::move(text));
-  // The first may be half sent: it stays.
+  // The first text may be partly sent, so the second one is dropped.
   if (queue.size() > std::max<std::size_t>(sending_->most, 2)) {
     queue.erase(queue.begin() + 1);
     ++sending_->dropped;
@@ -184,7 +187,7 @@ struct Reply::Exchange {
   bool called = false;
   std::uint64_t body = 0;
 
-  std::mutex mutex;  // guards what follows
+  std::mutex mutex;  // guards all members below
   std::optional<Response> response;
   std::shared_ptr<Stream> stream;
   MHD_Connection* suspended = nullptr;
@@ -212,7 +215,7 @@ struct HttpServer::Daemon {
   os::Listener listener;
   MHD_Daemon* daemon = nullptr;
 
-  std::mutex mutex;  // guards what follows
+  std::mutex mutex;  // guards all members below
   bool ending = false;
   Connections connections{os::end_connection};
   std::unordered_map<Exchange*, std::weak_ptr<Exchange>> exchanges;
@@ -273,7 +276,7 @@ struct HttpServer::Daemon {
     return queued;
   }
 
-  // Its answer, or suspended until there is one.
+  // Queues the answer, or suspends the connection until there is one.
   MHD_Result respond(MHD_Connection* connection, Exchange& exchange) {
     const std::lock_guard lock(exchange.mutex);
     if (exchange.response) return queue(connection, *exchange.response);
@@ -297,7 +300,7 @@ struct HttpServer::Daemon {
       exchanges.emplace(exchange.get(), exchange);
       if (ending) return exchange->answer(Response{503, "text/plain", "the server ends\n"}, nullptr);
     }
-    // Copies of it end with the last one: whoever has forgotten the answer has given this.
+    // The last copy of `reply` calls this deleter. If no copy has answered by then, the client gets this response.
     const Reply reply(std::shared_ptr<Exchange>(exchange.get(), [exchange](Exchange*) {
       exchange->answer(Response{500, "text/plain", "nobody answered\n"}, nullptr);
     }));
@@ -371,7 +374,7 @@ struct HttpServer::Daemon {
     static_cast<void>(listener.socket.release());  // the daemon closes it
   }
 
-  // Nothing may be suspended when the daemon is stopped.
+  // Resumes all suspended connections first, because libmicrohttpd must not be stopped with suspended ones.
   void stop() {
     ::MHD_quiesce_daemon(daemon);
     std::vector<std::shared_ptr<Exchange>> waiting;

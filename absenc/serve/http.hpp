@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// HTTP, apart from what is served: one thread for all connections, answers from any thread, limits for everything that
-// a client can do. The library behind it is seen by http.cpp and http_request.cpp alone.
+// HTTP server without knowledge of encoders: one thread for all connections, responses from any thread, and a limit for
+// each resource that a client can use. Only http.cpp and http_request.cpp use libmicrohttpd.
 #pragma once
 
 #include <cstdint>
@@ -23,15 +23,15 @@ struct Request {
   std::string method;  // "GET", "POST" ...
   std::string path;
   std::multimap<std::string, std::string> query;
-  std::string peer;  // the address of whoever asks
-  std::string host;  // headers; "" where there is none
+  std::string peer;  // IP address of the client
+  std::string host;  // header Host; "" if it is missing, like the headers below
   std::string origin;
   std::string fetch_site;
   std::string authorization;
-  bool is_forwarded = false;  // a header says that a proxy passed it on
-  std::string forwarded_for;  // X-Forwarded-For, where there is one
+  bool is_forwarded = false;  // a header shows that a proxy forwarded the request
+  std::string forwarded_for;  // header X-Forwarded-For; "" if it is missing or occurs twice
 
-  /// The first of this name, or "".
+  /// Returns the first query value of this name; "" without one.
   [[nodiscard]] std::string value(const std::string& name) const;
 };
 
@@ -42,27 +42,27 @@ struct Response {
   std::vector<std::pair<std::string, std::string>> headers{};
 };
 
-/// A body that is made while it is sent: texts wait in a bounded queue until the client has taken those before. A
-/// client that is too slow loses the oldest, and nobody waits for it.
+/// A response body that is produced while it is sent. Texts wait in a bounded queue until the client has received the
+/// earlier ones. A slow client loses the oldest texts and delays no thread.
 class Stream {
  public:
   using Text = std::shared_ptr<const std::string>;
 
-  /// `wanted` is called from the thread of the connections when nothing is left to send; it must return soon.
+  /// `wanted` is called in the thread of the connections when the queue is empty; it must return quickly.
   explicit Stream(std::string type, std::size_t most = 64, std::function<void()> wanted = {});
   ~Stream();
   Stream(const Stream&) = delete;
   Stream& operator=(const Stream&) = delete;
 
   void push(Text text);
-  /// What is in the queue is sent first.
+  /// Ends the stream after the queued texts are sent.
   void end();
-  /// Ends the connection at once, also of a client that takes nothing.
+  /// Closes the connection at once, even if the client receives nothing.
   void break_off();
-  /// Nobody takes it any more.
+  /// Returns whether the connection has ended.
   [[nodiscard]] bool over() const;
   [[nodiscard]] std::uint64_t dropped() const;
-  /// When the client last took something.
+  /// Returns when the client last received data.
   [[nodiscard]] Time taken_at() const;
 
  private:
@@ -71,8 +71,8 @@ class Stream {
   std::unique_ptr<Sending> sending_;
 };
 
-/// Answers one request, from any thread, at once or later; only the first answer counts. When the last copy goes
-/// without one, the answer is 500.
+/// Answers one request, from any thread, immediately or later; only the first answer counts. If the last copy is
+/// destroyed without an answer, the server responds with status 500.
 class Reply {
  public:
   void send(Response response) const;
@@ -89,15 +89,15 @@ class HttpServer {
  public:
   using Handler = std::function<void(const Request&, Reply)>;
 
-  /// `handler` is called from the thread of the connections and must return soon. `vital`: paths that are answered
-  /// however many connections are open. Throws Failure.
+  /// `handler` is called in the thread of the connections and must return quickly. `vital`: paths that are answered
+  /// even when too many connections are open. Throws Failure.
   HttpServer(os::Listener listener, Handler handler, std::vector<std::string> vital);
-  /// Breaks off what is still being sent. Whoever streams must have ended before.
+  /// Aborts responses that are still being sent. Threads that write to a Stream must have ended before.
   ~HttpServer();
   HttpServer(const HttpServer&) = delete;
   HttpServer& operator=(const HttpServer&) = delete;
 
-  /// Ends connections whose request does not come to its end; to be called every second or so.
+  /// Closes connections whose request stays incomplete. Call it about once a second.
   void end_half_sent();
 
  private:

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The headers of a request, and what becomes of them.
+// Headers of an HTTP request, and checks of them.
 #pragma once
 
 #include <cstdint>
@@ -12,21 +12,21 @@
 
 namespace absenc::serve {
 
-/// In the order in which they came. Names are compared without their case.
+/// The headers in the order of the request. Names are compared without case.
 class Headers {
  public:
   void add(std::string name, std::string value) { all_.emplace_back(std::move(name), std::move(value)); }
 
   [[nodiscard]] std::size_t count(std::string_view name) const;
-  /// "": there is none.
+  /// Returns the first value of this name; "" without one.
   [[nodiscard]] std::string first(std::string_view name) const;
 
-  /// Why a proxy before us could read this request otherwise, and take a part of it for another one (RFC 9112, 3.2 and
-  /// 6.3); "" when it could not. `version`: "HTTP/1.1".
+  /// Returns why a proxy could interpret this request differently and take a part of it for another request (RFC 9112,
+  /// 3.2 and 6.3); "" if it cannot. `version`: "HTTP/1.1".
   [[nodiscard]] std::string_view ambiguity(std::string_view version) const;
-  /// Bytes of the body; 0 where no header says.
+  /// Returns the announced length of the body in bytes; 0 without Content-Length.
   [[nodiscard]] std::uint64_t announced_length() const;
-  /// To those who decide what the request may.
+  /// Copies the headers that access control needs.
   void hand_on(Request& request) const;
 
  private:

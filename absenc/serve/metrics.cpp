@@ -13,7 +13,7 @@ using namespace client;
 
 namespace {
 
-/// As the format has them: backslash, quote and line end are written with a backslash.
+/// Escapes a label value as the Prometheus format requires: backslash, quote and line feed.
 std::string label(std::string_view text) {
   std::string written;
   for (const char c : text) {
@@ -29,7 +29,7 @@ std::string label(std::string_view text) {
 
 class Page {
  public:
-  /// Lines of one metric stand together: every metric walks all encoders.
+  /// Begins a metric. The format requires all lines of a metric together, so each metric lists all encoders.
   void metric(std::string_view name, std::string_view kind, std::string_view help) {
     fmt::format_to(std::back_inserter(text), "# HELP {} {}\n# TYPE {} {}\n", name, help, name, kind);
   }
@@ -47,8 +47,8 @@ struct Seen {
   Snapshot snapshot;
 };
 
-// All that its replies report, raised or clear: a series that ends with its alarm could not be told from one that is
-// not known.
+// Writes every alarm that the replies report, with 1 or 0. If only raised alarms were written, a cleared alarm would
+// look like an unknown one.
 void add_alarms(Page& page, const Seen& seen) {
   if (seen.snapshot.state != State::live) return;
   for (const Flags& flags : alarms_of(*seen.unit, seen.snapshot.last.reading)) {
