@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What people are told to do can be done, and changes something.
+// Checks that a user can follow each advice, and that doing so has an effect.
 #include <algorithm>
 #include <array>
 #include <cctype>
@@ -11,12 +11,12 @@
 namespace absenc::kit {
 namespace {
 
-// ---- Commands in a text
+// ---- Commands named in a text
 
-/// A command that a text names.
+/// A command line quoted in a text.
 struct Named {
-  std::string text;                  // "absenc run ... reset"
-  const Command* command = nullptr;  // null: a command for every unit, or `unknown`
+  std::string text;                  // for example "absenc run ... reset"
+  const Command* command = nullptr;  // the unit's command; null if valid for every unit or `unknown`
   bool unknown = false;
 };
 
@@ -24,7 +24,7 @@ struct VerbName {
   std::string_view name;
   Verb verb;
 };
-/// Commands of the tool that carry out the one command which a unit has for them.
+/// Verbs of the tool that a unit implements with exactly one command.
 constexpr auto verb_names = std::to_array<VerbName>({{"alarms", Verb::read},
                                                      {"read", Verb::read},
                                                      {"info", Verb::info},
@@ -35,11 +35,11 @@ constexpr auto verb_names = std::to_array<VerbName>({{"alarms", Verb::read},
                                                      {"clear-alarms", Verb::clear_alarms},
                                                      {"memory read", Verb::memory_read},
                                                      {"memory write", Verb::memory_write}});
-/// Those that ask for the name of a setting, or of a command.
+/// Beginnings of command lines that continue with the name of a setting or of a command.
 constexpr std::string_view get_setting = "config get ... ";
 constexpr std::string_view set_setting = "config set ... ";
 constexpr std::string_view run_command = "run ... ";
-/// Those that need no command of the unit.
+/// Verbs of the tool that every unit supports.
 constexpr std::array<std::string_view, 3> for_all_units{"list", "identify", "doctor"};
 
 const Command* find_setter(const Unit& unit, std::string_view name) {
@@ -57,7 +57,7 @@ const Command* find_named(const Unit& unit, std::string_view words) {
   if (words.starts_with(set_setting)) return find_setter(unit, behind(set_setting));
   const bool gets = words.starts_with(get_setting);
   if (!gets && !words.starts_with(run_command)) return nullptr;
-  // Its arguments may follow.
+  // Arguments may follow the name.
   std::string_view name = behind(gets ? get_setting : run_command);
   name = name.substr(0, name.find(' '));
   const Command* const found = find_command(unit, name);
@@ -80,7 +80,7 @@ std::vector<Named> commands_in(const Unit& unit, std::string_view text) {
   return all;
 }
 
-// Without what stands in backquotes.
+// Returns the text without its parts in backquotes.
 std::string unquoted(std::string_view text) {
   std::string rest;
   bool quoted = false;
@@ -93,11 +93,11 @@ std::string unquoted(std::string_view text) {
 
 // ---- Rules for every advice
 
-/// To look again at what the advice is about is no advice.
+/// Phrases that send the reader back to the alarms which the advice explains.
 constexpr auto circular =
     std::to_array<std::string_view>({"read the alarms", "look at the alarms", "the other alarms", "see the alarms"});
 
-/// `what`: whose advice it is.
+/// Checks one advice. `what` names the alarm or error that it belongs to.
 void check_words(const Unit& unit, const std::string& what, std::string_view advice, Findings& findings) {
   const auto require = [&](bool holds, std::string_view text) {
     findings.require(holds, [&] { return what + " is advised \"" + std::string(advice) + "\": " + std::string(text); });
@@ -107,13 +107,14 @@ void check_words(const Unit& unit, const std::string& what, std::string_view adv
   }
   const std::string rest = unquoted(advice);
   for (const Command& command : unit.commands) {
-    const bool is_word = command.name.find('-') == std::string_view::npos;  // "zero" may be the number
+    // a one-word name such as "zero" may be ordinary text
+    const bool is_word = command.name.find('-') == std::string_view::npos;
     require(is_word || rest.find(command.name) == std::string::npos, "a command that it names is not in backquotes");
   }
   for (const std::string_view words : circular) require(rest.find(words) == std::string::npos, "that is circular");
 }
 
-/// The clauses of a message.
+/// Splits a message into lower-case clauses at ": " and "; ".
 std::vector<std::string> clauses_of(std::string_view text) {
   std::vector<std::string> clauses(1);
   for (std::size_t i = 0; i < text.size(); ++i) {
@@ -143,7 +144,7 @@ class Sick {
     const Command& command = *find_command(unit_, Verb::read);
     return world_.run(command, least_arguments(command));
   }
-  /// Whether the reading shows all of its alarms.
+  /// Returns whether the reading shows every alarm that this encoder has raised.
   [[nodiscard]] bool is_ill() {
     const Ended now = read();
     return now.seen.reading && (now.seen.reading->alarms & alarms_) == alarms_;
@@ -155,13 +156,13 @@ class Sick {
   World<Item> world_;
 };
 
-// Whether a command told what the reading does not.
+// Returns whether the command's result has a field that the reading lacks.
 bool tells_more(const Seen& told, const Seen& reading) {
   return std::any_of(told.fields.begin(), told.fields.end(),
                      [&](const auto& field) { return !reading.fields.contains(field.first); });
 }
 
-/// Does what the advice of this alarm names, one after the other, and returns whether the alarm is gone.
+/// Runs the commands that this alarm's advice names, in order. Returns whether the alarm has ended.
 template <class Item>
 bool follow_advice(const Unit& unit, const Configuration& way, std::size_t bit, Findings& findings) {
   const FlagInfo& flag = unit.alarms->flags[bit];
@@ -177,7 +178,7 @@ bool follow_advice(const Unit& unit, const Configuration& way, std::size_t bit, 
     explained = explained || (!ended.good() && !ended.detail.empty());
     told_more = told_more || (ended.good() && !one.command->changes_encoder && tells_more(ended.seen, before));
   }
-  sick.world().pass(std::chrono::seconds(1));  // it may be writing its memory
+  sick.world().pass(std::chrono::seconds(1));  // the encoder may be writing its memory
   const bool gone = !sick.is_ill();
   findings.require(named.empty() || gone || explained || told_more, [&] {
     return way.text + ", alarm " + std::string(flag.name) + ": whoever does \"" + std::string(flag.action) +
@@ -205,7 +206,7 @@ void check_alarms(const Unit& unit, Findings& findings) {
   }
 }
 
-/// Where a status flag sends to the alarms, the reading has one.
+/// Checks that a reading whose status flag refers to the alarms reports an alarm.
 template <class Item>
 void check_status(const Unit& unit, const Configuration& way, Findings& findings) {
   if (unit.alarms == nullptr || unit.status == nullptr) return;
@@ -247,7 +248,7 @@ void check_message(const Unit& unit, const std::string& what, const Command& com
   }
 }
 
-/// What can be wrong with an encoder, one after the other: `use(what, spoil)`.
+/// Calls `use(name, spoil)` for each problem that an encoder can have: alarms, conditions and line faults.
 template <class Item, class Use>
 void each_trouble(const Unit& unit, Use use) {
   use(std::string("nothing"), [](World<Item>&) {});
@@ -268,7 +269,8 @@ void each_trouble(const Unit& unit, Use use) {
   }
 }
 
-// An encoder that is asked ten thousand times a second takes long in real time; what fails does so soon.
+// Time limit of one conversation. A host that polls ten thousand times a second is slow to simulate, and a failure
+// shows early.
 constexpr Time patience = std::chrono::milliseconds(100);
 
 template <class Item>
@@ -285,7 +287,7 @@ void check_errors(const Unit& unit, const Configuration& way, Findings& findings
   });
 }
 
-// What the document says of bad replies.
+// Checks the advice that the unit's documents give for bad replies.
 void check_explanations(const Unit& unit, Findings& findings) {
   if (unit.explain == nullptr) return;
   for (const Vector& vector : unit.vectors) {

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a command that changes an encoder promises, by its verb, and whether it is so: asked on a good line.
+// Checks that a command which changes an encoder had the effect that its verb promises. The effect is read back over a
+// line without faults.
 #pragma once
 
 #include <algorithm>
@@ -10,7 +11,7 @@
 
 namespace absenc::kit {
 
-/// The argument of that role; none when the command has no such.
+/// Returns the value of the argument with this role, or null if the command has no such argument.
 [[nodiscard]] inline std::int64_t* argument(const Command& command, Values& values, Role role) {
   const Argument* const found = find_role(command.arguments, role);
   return found != nullptr ? &values[static_cast<std::size_t>(found - command.arguments.data())] : nullptr;
@@ -30,7 +31,7 @@ namespace absenc::kit {
   return values;
 }
 
-/// Arguments with which this command may work; none when the unit describes none.
+/// Returns random arguments that the command accepts, or nothing if the unit declares no writable memory for it.
 [[nodiscard]] inline std::optional<Values> change_arguments(const Unit& unit, const Command& command,
                                                             sim::Random& random) {
   if (command.verb != Verb::memory_write) return random_arguments(command, random);
@@ -44,7 +45,8 @@ namespace absenc::kit {
   return memory_arguments(command, area, address, static_cast<std::uint8_t>(random.below(256)));
 }
 
-/// What the encoder was set to may be what it is reached with.
+/// Applies the new setting to the host as well, for a setting (such as a baud rate or an address) that the host needs
+/// to reach the encoder.
 template <class Item>
 void follow(World<Item>& world, const Unit& unit, const Command& setter, Arguments arguments) {
   if (setter.changes_option.empty()) return;
@@ -62,7 +64,8 @@ void follow(World<Item>& world, const Unit& unit, const Command& setter, Argumen
   world.set_options(options);
 }
 
-/// Again after an error, as a session does: what an encoder sends unsolicited may come in between.
+/// Runs the command up to four times until it succeeds. A session repeats it too, because an unsolicited frame of the
+/// encoder may interrupt it.
 template <class Item>
 Ended run_repeated(World<Item>& world, const Command& command, Arguments arguments) {
   Ended result = world.run(command, arguments);
@@ -73,21 +76,22 @@ Ended run_repeated(World<Item>& world, const Command& command, Arguments argumen
   return result;
 }
 
-/// What the getter of a setting reports; empty when it cannot be read.
+/// Returns the fields that the setting's getter reports, or nothing if the setting cannot be read.
 template <class Item>
 Seen read_setting(World<Item>& world, const Unit& unit, const Command& setter) {
   const Command* getter = find_command(unit, setter.reads_back);
   return getter == nullptr ? Seen{} : run_repeated(world, *getter, least_arguments(*getter)).seen;
 }
 
-/// Whether a field has this value, as a number or in its text.
+/// Returns whether any field has this value, as a number or as text.
 [[nodiscard]] inline bool shows(const Seen& seen, std::int64_t value) {
   return std::any_of(seen.fields.begin(), seen.fields.end(), [&](const auto& field) {
     return field.second.number == value || field.second.bytes == std::to_string(value);
   });
 }
 
-/// Empty when the encoder is as the command that ended well promised. There must be no faults.
+/// Returns the promise that a successful command broke, or an empty text if the encoder is in the promised state. The
+/// line must have no faults.
 template <class Item>
 std::string broken_promise(World<Item>& world, const Unit& unit, const Command& command, Values values,
                            const Seen& written) {
@@ -132,12 +136,12 @@ std::string broken_promise(World<Item>& world, const Unit& unit, const Command& 
       const Seen now = read_setting(world, unit, command);
       if (!command.reads_back.empty() && now.fields.empty()) return "it cannot be read";
       for (const auto& [name, value] : now.fields) {
-        // Not one frame of many, nor where the shaft was.
+        // A numbered field is one of several frames, and a position field depends on the shaft: neither must match.
         if (name.find('#') != std::string::npos || is_of_reading(value.role)) continue;
         const auto found = written.fields.find(name);
         if (found != written.fields.end() && !(found->second == value)) return name + " reads as another";
       }
-      // Words in place of the number say that this encoder does not tell it.
+      // Text in place of a number means that the encoder cannot report this setting.
       const auto told = now.fields.find(std::string(command.reads_back));
       const bool in_words = told != now.fields.end() && !told->second.bytes.empty();
       if (!now.fields.empty() && !values.empty() && !in_words && !shows(now, values[0])) {

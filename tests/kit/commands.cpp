@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What needs no faults: commands, settings, memory and storage over the virtual encoder.
+// Checks of commands over the virtual encoder on a line without faults.
 #include <algorithm>
 
 #include "absenc/sim/place.hpp"
@@ -9,18 +9,19 @@
 namespace absenc::kit {
 namespace {
 
-/// What a unit's own model must be able to say.
+/// Returns whether every model of a unit must support this command.
 bool is_plain(const Command& command) {
   return command.verb == Verb::read || command.verb == Verb::read_part || command.verb == Verb::info ||
          command.verb == Verb::temperature || command.verb == Verb::config_get;
 }
 
-// Whether the caller has to do something first: the command exists, but not so.
+// Returns whether the command exists but needs an earlier step by the caller.
 bool is_refused(const Command& command, Error error) {
   return command.verb != Verb::read && (error == Error::unsupported || error == Error::invalid_argument);
 }
 
-// A virtual encoder can be given what no host is made for (a second for each answer), but never makes it wrong.
+// Runs every command that does not change the encoder. An unusual option (such as a reply time of one second) may make
+// a command fail, but must never make its result wrong.
 template <class Item>
 void run_commands(const Unit& unit, const Configuration& way, Findings& findings) {
   sim::Random random(7);

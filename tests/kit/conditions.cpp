@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What can be set around a virtual encoder is seen by its host.
+// Checks that a host can observe each condition of a virtual encoder.
 #include <algorithm>
 #include <array>
 #include <set>
@@ -10,9 +10,9 @@
 namespace absenc::kit {
 namespace {
 
-constexpr std::int64_t some_turns = 0x5'6000'0000;  // 5.375
+constexpr std::int64_t some_turns = 0x5'6000'0000;  // 5.375 turns in units of 2^-32 turn
 
-/// An encoder with one condition, and what its host is told.
+/// A virtual encoder with one condition set, and the host that reads it.
 template <class Item>
 class Setting {
  public:
@@ -25,7 +25,7 @@ class Setting {
 
   [[nodiscard]] bool made() const { return world_.made(); }
   void move() { world_.move(world_.place() + some_turns); }
-  // While the shaft goes on.
+  // Cuts the encoder's power while the shaft moves on by some turns.
   void lose_power() {
     world_.device().power_off(now());
     move();
@@ -52,7 +52,8 @@ std::uint32_t all_alarms(const Unit& unit) {
   return bits;
 }
 
-// Whether the same done to both is told differently: at once, after the power was away, of alarms, and after resets.
+// Returns whether two encoders ever report different results when both are treated equally: at once, after a power
+// cycle, with all alarms raised, and after resets.
 template <class Item>
 bool differ(const Unit& unit, Setting<Item>&& one, Setting<Item>&& other) {
   if (!one.made()) return false;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the descriptor says of itself, and the requests that commands make.
+// Checks the unit's declarations of memory, registers, settings and roles, and the requests of its commands.
 #include <algorithm>
 #include <array>
 #include <set>
@@ -19,7 +19,7 @@ bool takes(const Command* command, Role role, std::uint32_t least, std::uint32_t
 void declared_memory(const Unit& unit, Findings& findings) {
   const Command* reads = find_command(unit, Verb::memory_read);
   const Command* writes = find_command(unit, Verb::memory_write);
-  std::uint64_t after = 0;  // of the area before
+  std::uint64_t after = 0;  // end of the previous area
   for (const MemoryArea& area : unit.memory) {
     const auto require = [&](bool holds, const char* text) {
       findings.require(
@@ -84,7 +84,7 @@ void declared_settings(const Unit& unit, Findings& findings) {
   }
 }
 
-// Of each role there is one, or who looks for it finds the wrong one.
+// Checks that each role occurs once. With two, a search by role would find the wrong one.
 template <class Named>
 void declared_once(std::span<const Named> all, std::string_view whose, Findings& findings) {
   for (const Named& one : all) {
@@ -93,7 +93,7 @@ void declared_once(std::span<const Named> all, std::string_view whose, Findings&
   }
 }
 
-// What others need to make use of a command.
+// Checks that each command has the roles which its callers search for.
 void declared_roles(const Unit& unit, Findings& findings) {
   declared_once(unit.options, unit.id, findings);
   const auto has_field = [&](Role role) { return find_role(unit.fields, role) != nullptr; };
@@ -137,7 +137,7 @@ void request_of(const Unit& unit, const Configuration& way, const Command& comma
     const bool told = request.error() == Error::unsupported || request.error() == Error::invalid_argument;
     return findings.require(told, [&] { return what() + std::string(text_of(request.error()).name); });
   }
-  if (request->empty()) {  // clocks only
+  if (request->empty()) {  // the request consists of clocks only
     return findings.require(unit.link == LinkKind::clocked, [&] { return what() + "is sent without a byte"; });
   }
   Wire small(request->size() - 1);
@@ -145,10 +145,10 @@ void request_of(const Unit& unit, const Configuration& way, const Command& comma
                    [&] { return what() + "fits into less than it has"; });
   Seen seen;
   const Error error = unit.decode(way.options, held(unit, *request).frame(), {}, seen);
-  if (error == Error::invalid_argument) return;  // of options that no encoder has
+  if (error == Error::invalid_argument) return;  // no encoder has this combination of options
   findings.require(error == Error::none && !seen.fields.empty(),
                    [&] { return what() + "is " + std::string(text_of(error).name); });
-  // A field of the argument's name may be one of every request: then it stands in another.
+  // A field with the argument's name may belong to every request. The value may then be in another field.
   for (std::size_t i = 0; i < values.size(); ++i) {
     const Argument& one = command.arguments[i];
     if (!seen.fields.contains(std::string(one.name)) || (!one.required && values[i] == one.default_value)) continue;
@@ -158,7 +158,7 @@ void request_of(const Unit& unit, const Configuration& way, const Command& comma
   }
 }
 
-// What lies outside its range, and one argument too few or too many, is no request and no conversation.
+// Checks that a value outside its range, a missing argument and an extra argument are all refused.
 void refused_arguments(const Unit& unit, const Configuration& way, const Command& command, Findings& findings) {
   std::vector<std::byte> storage(unit.host_storage);
   const auto refused = [&](const Values& values) {

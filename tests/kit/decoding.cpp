@@ -22,7 +22,7 @@ class Decoding {
     if (seen.reading) reading_shows(seen);
   }
 
-  // No reply is no evidence: without one nothing more speaks against its own options.
+  // Checks that a request without a reply is no evidence against the options of its own vector.
   void unanswered() {
     if (unit_.probe == nullptr) return;
     struct Against final : EvidenceSink {
@@ -44,7 +44,7 @@ class Decoding {
             [&] { return "its request alone speaks against its options: " + std::string(why); });
   }
 
-  // Of a request that stops early, or goes on, nothing is told either.
+  // Checks that a truncated or extended request is refused without any field.
   void good_request() {
     if (request_.empty() || request_.can || unit_.link == LinkKind::clocked) return;
     const auto unknown = [&](const Held& request, std::string_view what) {
@@ -68,7 +68,7 @@ class Decoding {
       ++flipped;
       refused(reply_.flipped(bit), [&] { return "with bit " + std::to_string(bit) + " flipped"; });
     }
-    // Of some frames on CAN only the identifier means anything.
+    // In some CAN frames only the identifier has a meaning.
     const bool means_nothing = reply_.can && flipped == 0;
     for (std::size_t size = reply_.can ? 0 : 1; size < reply_.elements() && !means_nothing; ++size) {
       refused(reply_.cut(size), [&] { return "cut after " + std::to_string(size); });
@@ -91,7 +91,7 @@ class Decoding {
     return unit_.decode(options_, request_.frame(), reply.frame(), sink);
   }
 
-  // With an error no field may be put.
+  // Checks that the frame is refused and that no field or reading is reported with the error.
   template <class Text>
   void refused(const Held& reply, Text&& text) {
     Seen seen;
@@ -121,7 +121,8 @@ class Decoding {
     }
   }
 
-  // Of another identifier, where a request tells whose it is, and of other kinds.
+  // Checks that CAN frames with another identifier, extended frames and remote frames are refused. Identifiers are
+  // tried only if the request names the node.
   void other_frames() {
     for (unsigned bit = 0; bit < 11 && !request_.empty(); ++bit) {
       Held other = reply_;
@@ -137,7 +138,8 @@ class Decoding {
     refused(remote, [] { return std::string("as a remote frame"); });
   }
 
-  // Some questions are answered on one of several identifiers.
+  // Returns whether a vector's reply has this identifier, because some requests may be answered on one of several
+  // identifiers.
   [[nodiscard]] bool is_of_a_vector(std::uint32_t id) const {
     return std::any_of(unit_.vectors.begin(), unit_.vectors.end(), [&](const Vector& one) {
       const Held reply = held(unit_, one.reply);

@@ -15,8 +15,8 @@ namespace absenc::kit {
 namespace {
 
 constexpr unsigned places = 8;
-constexpr std::uint64_t exchanges_each = 4000;  // of one virtual encoder
-constexpr unsigned changes_each = 2;            // of each command, at its end
+constexpr std::uint64_t exchanges_each = 4000;  // exchanges per virtual encoder
+constexpr unsigned changes_each = 2;            // runs of each changing command per virtual encoder
 
 bool may_be_asked_often(const Command& command) {
   return !command.changes_encoder &&
@@ -24,33 +24,33 @@ bool may_be_asked_often(const Command& command) {
           command.verb == Verb::temperature || command.verb == Verb::config_get || command.verb == Verb::memory_read);
 }
 
-/// What a campaign has seen, over all its virtual encoders.
+/// Counters of a campaign, summed over all of its virtual encoders.
 struct Tally {
   std::uint64_t exchanges = 0;
   std::uint64_t conversations = 0;
   std::uint64_t accepted = 0;
   std::uint64_t damaged = 0;      // faults that changed bytes
-  std::uint64_t wrong = 0;        // in conversations with at least one of them
-  std::uint64_t broken = 0;       // rules, after faults
-  std::uint64_t misheard = 0;     // bytes of requests
+  std::uint64_t wrong = 0;        // wrong results of conversations with damaged bytes
+  std::uint64_t broken = 0;       // rule violations by the host after a fault
+  std::uint64_t misheard = 0;     // damaged bytes of requests
   std::uint64_t changes = 0;      // conversations that change the encoder
-  std::uint64_t changed = 0;      // that ended well
-  std::uint64_t not_changed = 0;  // though it was not so
+  std::uint64_t changed = 0;      // changes that the host reported as successful
+  std::uint64_t not_changed = 0;  // successful changes that had no effect
   std::string promise{};
   std::string rule{};
-  /// By command.
+  /// Counters of one command.
   struct Command {
     std::optional<Weight> weight{};
     std::uint64_t trials = 0;       // damaged replies
-    std::uint64_t misplaced = 0;    // wrong positions
-    std::uint64_t mistaken = 0;     // wrong values of anything else
-    std::uint64_t cost = 0;         // exchanges
-    std::optional<bool> unchecked;  // whether its reply has no check
+    std::uint64_t misplaced = 0;    // accepted replies with a wrong position
+    std::uint64_t mistaken = 0;     // accepted replies with another wrong value
+    std::uint64_t cost = 0;         // exchanges per conversation
+    std::optional<bool> unchecked;  // whether one of its replies has no check; empty if not yet known
   };
   std::map<std::string, Command> commands{};
 };
 
-/// In what a result is another than the truth; empty: in nothing.
+/// Difference between a result and the truth; an empty text means none.
 struct Difference {
   std::string text{};
   bool position = false;
@@ -81,22 +81,23 @@ class Campaign {
   }
 
  private:
-  /// What one command says on an undamaged line, at each place.
+  /// Results of one command on an undamaged line at each shaft position.
   struct Asked {
     const Command* command;
     Values arguments;
     std::array<std::optional<Seen>, places> truth{};
-    std::uint64_t cost = 0;              // exchanges
-    std::vector<std::string> varying{};  // fields that are not the same each time
+    std::uint64_t cost = 0;              // exchanges per conversation
+    std::vector<std::string> varying{};  // fields whose values vary between two runs at the same position
   };
 
   static sim::FaultRates rates_for(const Unit& unit, const Options& options, const ExchangeTest& wanted) {
     using sim::FaultKind;
     sim::FaultRates rates = sim::testing::damaged_replies(0.1);
-    if (unit.link == LinkKind::spi) rates = {};                        // there a reply is as long as what is clocked
-    rates[FaultKind::corrupt] = unit.link == LinkKind::can ? 0 : 0.1;  // CAN's own checksum sees that
+    if (unit.link == LinkKind::spi) rates = {};                        // the host clocks as many bits as it expects
+    rates[FaultKind::corrupt] = unit.link == LinkKind::can ? 0 : 0.1;  // CAN's own checksum detects that
     if (wanted.requests_too) rates[FaultKind::request_corrupt] = 0.02;
-    // Late enough to be given up, every other time. Nobody can tell how old it is what comes unsolicited.
+    // With odd seeds, replies are delayed beyond the host's timeout. Unsolicited frames are excluded, because a host
+    // cannot determine their age.
     const bool unsolicited = unit.link == LinkKind::can || (unit.streams != nullptr && unit.streams(options));
     if (wanted.seed % 2 == 1 && !wanted.requests_too && !unsolicited)
       rates.delay = unit.timing.turnaround_limit * 3 / 2;
@@ -113,7 +114,8 @@ class Campaign {
     if (!unit_.alarms->flags[bit].name.empty()) world_.device().raise_alarms(1u << bit);
   }
 
-  // The truth. A position is where the shaft stands, whatever the encoder says.
+  // Records the results of each command on an undamaged line. The true position is the shaft's, whatever the encoder
+  // reports.
   void learn() {
     for (std::int64_t& place : places_) place = static_cast<std::int64_t>(random_.next());
     for (const Command& command : unit_.commands) {
@@ -122,7 +124,7 @@ class Campaign {
       if (cost > 20 && !random_.chance(0.1)) continue;
       Asked asked{&command,
                   command.verb == Verb::memory_read ? least_arguments(command) : random_arguments(command, random_)};
-      // Others are asked for the first time where they are needed: some take a hundred exchanges.
+      // The other positions are recorded on first use, because some commands take a hundred exchanges.
       if (!learn_at(asked, 0)) continue;
       cost = asked.cost;
       if (command.verb == Verb::read) {
@@ -162,7 +164,7 @@ class Campaign {
   void one() {
     const bool reads = !reads_.empty() && random_.chance(0.95);
     Asked* chosen = &asked_[reads ? reads_[random_.below(reads_.size())] : random_.below(asked_.size())];
-    // What takes many exchanges comes so much less often.
+    // A command with many exchanges is chosen correspondingly less often.
     if (chosen->cost > 4 && !reads_.empty() && !random_.chance(4.0 / static_cast<double>(chosen->cost))) {
       chosen = &asked_[reads_[random_.below(reads_.size())]];
     }
@@ -172,7 +174,7 @@ class Campaign {
     if (!asked.truth[place_]) {
       world_.set_rates({});
       world_.pass(std::chrono::seconds(1));
-      (void)world_.run(*asked.command, asked.arguments);  // what came too late before has come
+      (void)world_.run(*asked.command, asked.arguments);  // absorb replies that were late
       if (!learn_at(asked, place_)) return;
     }
     world_.move(places_[place_]);
@@ -187,11 +189,12 @@ class Campaign {
     findings_.require(!result.unfounded, [&] { return where(asked) + "has a reading of nothing"; });
     if (!result.good()) return;
     ++tally_.accepted;
-    const bool may_miss = asked.command->verb == Verb::info && result.faults != 0;  // one of several questions
+    // info sends several requests, and a fault may lose one
+    const bool may_miss = asked.command->verb == Verb::info && result.faults != 0;
     const Difference wrong = difference(asked, result, may_miss);
     if (wrong.text.empty()) return;
     if (result.damaged == 0 && rates_[sim::FaultKind::request_corrupt] > 0 && is_so_now(asked, result.seen)) return;
-    // What no check covers is taken whatever comes in its place: also what was said before.
+    // A reply without a check accepts any bytes, also those of a previous reply.
     const bool unchecked = is_unchecked(asked);
     findings_.require(result.damaged != 0 || (unchecked && !quiet_),
                       [&] { return where(asked) + wrong.text + ", though no byte was damaged"; });
@@ -201,7 +204,8 @@ class Campaign {
     ++(wrong.position ? command.misplaced : command.mistaken);
   }
 
-  // A request that was misheard may have changed the encoder: then the truth is another one from now on.
+  // Returns whether the encoder now really reports these fields. A damaged request may have changed the encoder; the
+  // recorded truth is then discarded.
   bool is_so_now(const Asked& asked, const Seen& seen) {
     world_.set_rates({});
     const Ended now = world_.run(*asked.command, asked.arguments);
@@ -213,13 +217,13 @@ class Campaign {
     return true;
   }
 
-  // Changes over the same line, some of each command. Whatever ends well is so, seen over a good line; the encoder is
-  // not used for anything else after them.
+  // Runs commands that change the encoder over the faulty line. Each reported success is verified over a good line. The
+  // campaign ends with these runs, because they alter the encoder.
   void change() {
     for (const Command& command : unit_.commands) {
       if (!command.changes_encoder || command.verb == Verb::run) continue;
       for (unsigned i = 0; i < changes_each && findings_.count() == 0; ++i) {
-        // Some take a hundred good exchanges in a row: a better line as well.
+        // Every second run has fewer faults, because some changes need a hundred good exchanges in a row.
         sim::FaultRates rates = rates_;
         for (double& rate : rates.rates) rate *= i % 2 == 0 ? 1 : 0.03;
         change(command, rates);
@@ -232,7 +236,7 @@ class Campaign {
     if (!values) return;
     world_.set_rates({});
     world_.device().lower_alarms(0xFFFF'FFFF);
-    world_.pass(std::chrono::seconds(2));  // nothing is late any more
+    world_.pass(std::chrono::seconds(2));  // let delayed replies arrive
     world_.move(static_cast<std::int64_t>(random_.next()));
     world_.set_rates(rates);
     const Ended result = world_.run(command, *values);
@@ -268,8 +272,8 @@ class Campaign {
     return {};
   }
 
-  // Whether the reading says that a part of the conversation was lost: it reports fewer alarms than on a good line.
-  // Its position is the shaft's, and each flag that it does report is right.
+  // Returns whether the reading lost only a part of its conversation: it reports fewer alarms than on a good line, and
+  // every flag that it does report is right.
   [[nodiscard]] static bool is_part_of(const Reading& seen, const Reading& truth) {
     const std::uint32_t reported = seen.alarms_reported;
     if (reported == truth.alarms_reported || (reported & ~truth.alarms_reported) != 0) return false;
@@ -277,12 +281,12 @@ class Campaign {
            ((seen.status ^ truth.status) & seen.status_reported & truth.status_reported) == 0;
   }
 
-  // Options may say what a frame is checked with: what was counted with others is no measure.
+  // Returns the key of the command's counters. It includes the options, because they may select the frame check.
   [[nodiscard]] std::string called(const Asked& asked) const {
     return std::string(asked.command->name) + (way_.is_model ? "" : " " + way_.text);
   }
 
-  // What a check is worth depends on the frames of the conversation.
+  // Measures the command's frame check once, with the frames that the conversation exchanges.
   void weigh(const Asked& asked, std::uint64_t damaged) {
     Tally::Command& command = tally_.commands[called(asked)];
     command.trials += damaged;
@@ -294,7 +298,7 @@ class Campaign {
     }
   }
 
-  // Whether no bit of one of its replies is covered by a check.
+  // Returns whether no bit of one of the command's replies is covered by a check.
   bool is_unchecked(const Asked& asked) {
     std::optional<bool>& unchecked = tally_.commands[called(asked)].unchecked;
     if (unchecked) return *unchecked;
@@ -312,11 +316,11 @@ class Campaign {
 
   [[nodiscard]] std::vector<std::pair<Held, Held>> frames_of(const Asked& asked);
 
-  // A host breaks no rule.
+  // Counts the rules that the host violated. Before the first fault any violation is a finding.
   void judge_rules(const Asked& asked, bool struck, std::uint32_t before) {
     const std::uint32_t broken = world_.device().violation_count() - before;
     quiet_ = quiet_ && !struck;
-    if (broken == 0 || !way_.is_model) return;  // a virtual encoder can be given what no host keeps to
+    if (broken == 0 || !way_.is_model) return;  // unusual options allow what no host supports
     tally_.broken += broken;
     const std::span<const Violation> rules = world_.device().violations();
     if (tally_.rule.empty() && !rules.empty()) tally_.rule = where(asked) + std::string(rules.back().rule);
@@ -332,12 +336,12 @@ class Campaign {
   sim::FaultRates rates_;
   std::array<std::int64_t, places> places_{};
   unsigned place_ = 0;
-  bool quiet_ = true;  // no fault has struck yet: later the guard may ask again for what is late
+  bool quiet_ = true;  // no fault has occurred yet; later the reply guard may repeat a request whose reply was late
   std::vector<Asked> asked_;
-  std::vector<std::size_t> reads_;  // of them those that read the position
+  std::vector<std::size_t> reads_;  // indexes of the commands that read the position
 };
 
-/// What was on the line in a conversation without faults: requests, each with what came back.
+/// Returns the requests of a conversation without faults, each with its reply.
 template <class Item>
 std::vector<std::pair<Held, Held>> Campaign<Item>::frames_of(const Asked& asked) {
   World<Item> world(unit_, way_.options, 1);
@@ -400,7 +404,7 @@ void exchange(const Unit& unit, const ExchangeTest& wanted, Tally& tally, Findin
       findings.add("exchanges do not come together");
       break;
     }
-    // The models every other time, in between everything that options can be.
+    // Every even round uses a model, every odd round any configuration.
     const Configuration& way =
         round % 2 == 0 ? ways[round / 2 % std::max<std::size_t>(1, unit.models.size())] : ways[round / 2 % ways.size()];
     Campaign<Item> campaign(unit, way, wanted, 1000 * wanted.seed + round, tally, findings);
@@ -424,10 +428,10 @@ Findings check_exchanges(const Unit& unit, const ExchangeTest& wanted) {
     exchange<std::uint8_t>(unit, wanted, tally, findings);
   }
   judge_weights(tally, findings);
-  // A request that was misheard may be one that breaks them.
+  // A damaged request may itself violate a rule.
   findings.require(tally.broken <= tally.misheard,
                    [&] { return std::to_string(tally.broken) + " rules broken: " + tally.rule; });
-  // What was written is read back: two damaged replies would have to look good.
+  // A host reads a written value back, so a false success needs two damaged replies that both look good.
   findings.require(tally.not_changed == 0,
                    [&] { return std::to_string(tally.not_changed) + " changes were not made: " + tally.promise; });
   findings.note(std::to_string(tally.changed) + " of " + std::to_string(tally.changes) + " changes were made");

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the kit finds wrong with a unit, as text: tests of units demand that there is nothing, tests of the kit that a
-// toy with a mistake is found.
+// Collects the defects that the kit finds in a unit, as texts. Tests of units expect an empty list; tests of the kit
+// expect a finding for each toy unit with a mistake.
 #pragma once
 
 #include <cstdint>
@@ -11,12 +11,12 @@ namespace absenc::kit {
 
 class Findings {
  public:
-  /// The first ones are kept, all are counted.
+  /// Counts every finding and stores the text of the first 20.
   void add(std::string text) {
     if (texts_.size() < 20) texts_.push_back(std::move(text));
     ++count_;
   }
-  /// `text()` is made only where it is needed.
+  /// Adds a finding if `holds` is false. `text()` is called only in that case.
   template <class Text>
   void require(bool holds, Text&& text) {
     ++looks_;
@@ -26,9 +26,9 @@ class Findings {
 
   [[nodiscard]] const std::vector<std::string>& texts() const { return texts_; }
   [[nodiscard]] std::uint64_t count() const { return count_; }
-  /// How many things were demanded: a check that looks at nothing finds nothing.
+  /// Number of requirements checked, so that a test can detect a check which checked nothing.
   [[nodiscard]] std::uint64_t looks() const { return looks_; }
-  /// Figures for people.
+  /// Measured figures that a test prints, such as the number of exchanges.
   [[nodiscard]] const std::vector<std::string>& notes() const { return notes_; }
 
  private:

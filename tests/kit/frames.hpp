@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Frames of any link that own their bytes, what a unit makes of them, and what its options can be.
+// Frames of any link type that own their bytes, the fields that a unit decodes from them, and the configurations of a
+// unit that the tests use.
 #pragma once
 
 #include <map>
@@ -15,7 +16,8 @@ namespace absenc::kit {
 
 using Wire = std::vector<std::uint8_t>;
 
-/// A frame of whichever link. Its elements are what can be missing at its end: bytes; bits on clocked links.
+/// A frame of any link type that owns its bytes. Its elements, counted by `elements`, are bytes, or bits on a clocked
+/// link.
 struct Held {
   LinkKind link{};
   Wire bytes{};
@@ -26,18 +28,18 @@ struct Held {
   [[nodiscard]] Frame frame() const { return {.bytes = bytes, .bits = bits, .can = can ? &*can : nullptr}; }
   [[nodiscard]] std::size_t elements() const;
   [[nodiscard]] std::size_t bit_count() const;
-  /// The first `count` elements.
+  /// Returns the first `count` elements of the frame.
   [[nodiscard]] Held cut(std::size_t count) const;
-  /// With one bit inverted, counted as for Unit::is_checked.
+  /// Returns the frame with one bit inverted. Bits are numbered as for `Unit::is_checked`.
   [[nodiscard]] Held flipped(std::size_t bit) const;
-  /// With these bytes before and behind it; bytes only.
+  /// Returns the frame with extra bytes before and after it. Only for links that carry bytes.
   [[nodiscard]] Held between(Bytes before, Bytes after) const;
 };
 
-/// The frame behind a vector's request or reply.
+/// Returns the frame that a vector's request or reply describes.
 [[nodiscard]] Held held(const Unit& unit, Bytes text);
 
-/// One field. Real numbers as float: what differs by rounding is the same.
+/// Value of one field. A real number is a float, so that values which differ only by rounding are equal.
 struct Value {
   std::int64_t number = 0;
   float real = 0;
@@ -49,16 +51,17 @@ struct Value {
   }
 };
 
-/// Everything that was put, by name; of several with one name, as of scans, the later ones behind a number.
+/// Stores every field that a decoder reports, by name. A repeated name, as in a scan, gets a number from the second
+/// time on.
 struct Seen final : FieldSink {
   void put(const FieldValue& value) override;
   void put_reading(const Reading& one) override {
     reading = one;
     ++readings;
   }
-  /// Whether a position or turns are there.
+  /// Returns whether the fields include a position or turns.
   [[nodiscard]] bool has_position() const;
-  /// The numbers of this role.
+  /// Returns the values of all fields with this role.
   [[nodiscard]] std::vector<std::int64_t> numbers(Role role) const;
 
   std::map<std::string, Value> fields;
@@ -68,25 +71,26 @@ struct Seen final : FieldSink {
 
 [[nodiscard]] std::map<std::string, Value> expected_fields(const Vector& vector);
 
-/// Options as "name=value name=value"; none when they cannot be resolved.
+/// Parses options of the form "name=value name=value". Returns nothing if the unit does not accept them.
 [[nodiscard]] std::optional<Options> options_of(const Unit& unit, std::string_view text);
 
-/// A way in which an encoder can be: what was said to get there, and what became of it.
+/// One configuration of a unit that the tests use: a text that names it, and its options.
 struct Configuration {
   std::string text;
   Options options;
   bool is_model = false;
 };
-/// Each model, and each choice of each option and each end of its range beside the first model. None is there twice.
+/// Returns each model; and the first model with each choice of each option and with the minimum and maximum of each
+/// option. None is repeated.
 [[nodiscard]] std::vector<Configuration> configurations(const Unit& unit);
 
 using Values = std::vector<std::int64_t>;
-/// Defaults, and the least of what is required.
+/// Returns the default of each optional argument and the minimum of each required one.
 [[nodiscard]] Values least_arguments(const Command& command);
 [[nodiscard]] Values most_arguments(const Command& command);
-/// Each anywhere in its range, at an end of it more often than elsewhere.
+/// Returns a random value in the range of each argument. A quarter of the values lie at an end of the range.
 [[nodiscard]] Values random_arguments(const Command& command, sim::Random& random);
-/// What the request of a command has, or why it has none.
+/// Returns the bytes of the command's request, or the error of `encode`.
 [[nodiscard]] Result<Wire> encoded(const Unit& unit, const Options& options, const Command& command, Arguments values);
 
 [[nodiscard]] std::string to_text(Bytes bytes);

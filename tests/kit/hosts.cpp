@@ -9,7 +9,7 @@
 namespace absenc::kit {
 namespace {
 
-/// How a conversation with this reply ended.
+/// Result of a conversation with a supplied reply.
 struct Outcome {
   bool ended = false;
   unsigned asked = 0;
@@ -17,7 +17,7 @@ struct Outcome {
   Seen seen;
 };
 
-/// One command and one vector whose request it sends.
+/// Feeds the reply of one vector to a command that sends the vector's request.
 struct Feeding {
   const Unit& unit;
   const Vector& vector;
@@ -65,7 +65,8 @@ struct Feeding {
     return unit.decode(options, request.frame(), frame.frame(), seen);
   }
 
-  // What a unit makes of its raw fields (a temperature of a memory byte) has other names, but a position is what it is.
+  // Checks the reported fields against the vector. A unit may report its raw fields under other names (such as a
+  // temperature read from memory), but a position must match.
   void require_report(const Outcome& outcome) const {
     const bool reads = command.verb == Verb::read || command.verb == Verb::read_part;
     unsigned shared = 0;
@@ -84,7 +85,7 @@ struct Feeding {
     const bool has_reading = decoded(reply, frame) == Error::none && frame.reading.has_value();
     require(!reads || outcome.seen.reading.has_value() == has_reading, [] { return "has another reading"; });
     if (!reads || !has_reading || !outcome.seen.reading) return;
-    // What of it holds may be known from an earlier reply.
+    // The validity may come from an earlier reply, so only the position and the turns are compared.
     require(outcome.seen.reading->singleturn == frame.reading->singleturn &&
                 outcome.seen.reading->multiturn == frame.reading->multiturn,
             [] { return "reads another position"; });
@@ -94,7 +95,7 @@ struct Feeding {
                        [&](const FieldInfo& one) { return one.name == name && is_of_reading(one.role); });
   }
 
-  // ---- Links of characters
+  // ---- Links that carry characters
 
   static std::vector<Wire> bytewise(Bytes bytes) {
     std::vector<Wire> pieces;
@@ -105,12 +106,12 @@ struct Feeding {
   void characters() const {
     const Outcome whole = converse({reply.bytes});
     require(request.empty() || whole.asked > 0, [] { return "is not asked"; });
-    // Other procedures may go on after a good reply, and may ask again after one that is none.
+    // Longer procedures may continue after a good reply, and may repeat the request after a bad one.
     if (is_one_question()) {
       require(whole.error == vector.error, [&] { return "ends with " + std::string(text_of(whole.error).name); });
     }
     if (whole.error == Error::none && vector.error == Error::none) require_report(whole);
-    // A byte after a complete good reply belongs to whatever comes next: it is found there.
+    // A byte after a complete good reply belongs to the next reply, where it is detected.
     const FrameEnd end = unit.frame_end(options, Direction::reply, vector.reply);
     if (end.kind != FrameEnd::Kind::complete || end.size >= reply.bytes.size()) {
       const Outcome pieces = converse(bytewise(reply.bytes));
@@ -142,18 +143,18 @@ struct Feeding {
         reply.between({}, reply.bytes), [] { return std::string("takes a reply that comes twice"); }, false);
   }
 
-  // In one piece, and byte by byte where that is not another thing.
+  // Checks that the frame is refused in one piece and, if `in_pieces`, byte by byte.
   template <class Text>
   void refused(const Held& frame, Text&& text, bool in_pieces = true) const {
     Seen ignored;
-    if (decoded(frame, ignored) == Error::none) return;  // it stands for a byte that no check covers
+    if (decoded(frame, ignored) == Error::none) return;  // the changed byte is not covered by a check
     require(converse({frame.bytes}).error != Error::none, text);
     if (!in_pieces) return;
     require(converse(bytewise(frame.bytes)).error != Error::none, [&] { return text() + ", byte by byte"; });
   }
 
-  // ---- What comes by itself: frames without a pause, among which one is damaged. Whatever is taken for a position is
-  // that of the good ones.
+  // ---- Unsolicited frames. Sends eight frames without a pause, one of them damaged. Every reported position must be
+  // that of the good frames.
 
   void stream() const {
     if (vector.error != Error::none) return;
@@ -170,7 +171,7 @@ struct Feeding {
       stream_with(reply.between(std::array{byte}, {}), [] { return std::string("with garbage between"); });
     }
   }
-  // How many positions were found.
+  // Returns the number of positions found.
   template <class Text>
   unsigned stream_with(const Held& odd, Text&& text) const {
     unsigned good = 0;
@@ -199,7 +200,7 @@ struct Feeding {
     return good;
   }
 
-  // ---- Clocked links: the host takes as many bits as it wants, and behind the frame there is nothing.
+  // ---- Clocked links. The host reads as many bits as it expects; after the frame the line is idle.
 
   [[nodiscard]] bool bits() const {
     const bool taken = same_as_decoded(reply);
@@ -223,7 +224,7 @@ struct Feeding {
       });
       Seen seen;
       const Error error = decoded(clocked, seen);
-      // A conversation may demand more than a frame: a life counter that counts.
+      // A conversation may check more than a frame, such as a life counter that must advance.
       const bool as_decoded = error == Error::none && outcome.seen.fields == seen.fields;
       require(outcome.error != Error::none || as_decoded, [&] {
         return "makes " + to_text(outcome.seen.fields) + " of " + to_text(clocked) + ", which is " +
@@ -246,7 +247,7 @@ struct Feeding {
         return pieces;
       });
     };
-    if (vector.error != Error::none) return;  // others send such frames: they are none of this conversation
+    if (vector.error != Error::none) return;  // other nodes send such frames, and this conversation ignores them
     const CanFrame other{.id = 0x7A5, .size = 8, .data = {1, 2, 3, 4, 5, 6, 7, 8}};
     std::vector<CanFrame> echo = asks;
     echo.push_back(*reply.can);
@@ -266,7 +267,7 @@ struct Feeding {
   }
 };
 
-/// The arguments with which the command sends this request; none when it does not.
+/// Returns the arguments with which the command sends this vector's request, or nothing if it never does.
 std::optional<Values> arguments_for(const Unit& unit, const Options& options, const Command& command,
                                     const Vector& vector) {
   Seen asked;
@@ -281,14 +282,14 @@ std::optional<Values> arguments_for(const Unit& unit, const Options& options, co
   }
   const Result<Wire> request = encoded(unit, options, command, values);
   if (request && std::ranges::equal(*request, vector.request)) return values;
-  // Nothing is sent for what comes by itself.
+  // A command that only listens sends nothing.
   const bool unsolicited = !request && request.error() == Error::unsupported && vector.request.empty() &&
                            command.verb == Verb::read && unit.streams != nullptr && unit.streams(options);
   if (unsolicited) return values;
   return std::nullopt;
 }
 
-// Whether what came first may be a reading at all: of what is only named in a capture no conversation is made.
+// Returns whether the vector contains a reading. Some frames only occur in captures, and no conversation accepts them.
 bool has_reading(const Unit& unit, const Options& options, const Vector& vector) {
   Seen seen;
   return unit.decode(options, held(unit, vector.request).frame(), held(unit, vector.reply).frame(), seen) ==
@@ -318,7 +319,7 @@ void feed_vector(const Unit& unit, const Vector& vector, const Options& options,
   }
 }
 
-// How long a reading waits for its reply to begin; none where it asks for nothing.
+// Returns how long a reading waits for the first byte of its reply, or nothing if it sends no request.
 template <class Item>
 std::optional<Time> wait_for_reply(const Unit& unit, const Options& options) {
   using Kind = typename Step<Item>::Kind;
@@ -328,7 +329,7 @@ std::optional<Time> wait_for_reply(const Unit& unit, const Options& options) {
   if (conversation == nullptr) return std::nullopt;
   Time now{};
   Step<Item> step = conversation->next(now);
-  // It may wait for silence first.
+  // The conversation may first wait for silence on the line.
   for (unsigned i = 0; i < 10 && (step.kind == Kind::configure || step.kind == Kind::wait); ++i) {
     now += std::chrono::milliseconds(1);
     if (step.kind == Kind::wait) conversation->feed({.kind = Event<Item>::Kind::silence, .at = now});
@@ -342,7 +343,7 @@ std::optional<Time> wait_for_reply(const Unit& unit, const Options& options) {
   return step.answer != Time{} ? step.answer : step.gap;
 }
 
-// A capture takes a reply for late where every host would have given up: no sooner, and not much later.
+// Checks that the time after which a capture calls a reply late is within a third of the longest timeout of any host.
 void compare_limits(const Unit& unit, Findings& findings) {
   std::optional<Time> longest;
   for (const Configuration& way : configurations(unit)) {
@@ -357,7 +358,7 @@ void compare_limits(const Unit& unit, Findings& findings) {
   });
 }
 
-// Every command has a request in some configuration, or says that it has none of its own.
+// Checks that every command has a request in some configuration, or states that it has none.
 void find_requests(const Unit& unit, Findings& findings) {
   const std::vector<Configuration> ways = configurations(unit);
   for (const Command& command : unit.commands) {

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What every unit is tested with, from its descriptor alone: no line of it is written by the unit's author.
+// Checks that apply to every protocol unit. They use the unit's descriptor only, so a unit's author writes no code for
+// them.
 #pragma once
 
 #include <cstdint>
@@ -9,71 +10,71 @@
 
 namespace absenc::kit {
 
-/// Every vector through `decode` and `frame_end`: whole, cut at each element, with each bit flipped that is checked,
-/// one reply too many.
+/// Decodes every vector with `decode` and `frame_end`: whole, cut after each element, with each checked bit flipped,
+/// and with a second reply appended.
 [[nodiscard]] Findings check_decoding(const Unit& unit);
 
-/// Where the unit says that the fields of good replies stand: vectors, those that a flip makes of them, and what the
-/// virtual encoder answers. The bits, cut out and put together, are the field's number.
+/// Checks the bit positions that the unit states for the fields of good replies: the bits at these positions must give
+/// the field's value. Uses the vectors, the vectors with flipped bits that are still valid, and replies of the virtual
+/// encoder.
 [[nodiscard]] Findings check_places(const Unit& unit);
 
-/// Every vector's reply fed to the conversations of the commands whose request it has: whole, byte by byte, cut at each
-/// byte, with each bit flipped, garbage before and behind, one frame too many. A vector's reading that no command
-/// reads, and a command without a request, are findings.
+/// Feeds every vector's reply to the commands that send its request: whole, byte by byte, cut after each byte, with
+/// each bit flipped, with garbage before and after it, and twice. A vector with a reading that no command reads is a
+/// finding, and so is a command without a request.
 [[nodiscard]] Findings check_hosts(const Unit& unit);
 
-/// Silence is no reply: a command whose requests nobody answers ends with `timeout`, a scan too. Links whose host
-/// clocks the line have no silence.
+/// Checks that every command, a scan too, ends with `timeout` if no encoder answers. Does not apply where the host
+/// clocks the line, because such a line is never silent.
 [[nodiscard]] Findings check_silence(const Unit& unit);
 
-/// Requests of every command with random arguments: what `encode` makes is a good request with these arguments in its
-/// fields. Arguments outside their ranges are refused.
+/// Encodes every command with random arguments and decodes the request: its fields must contain these arguments.
+/// Arguments outside their ranges must be refused.
 [[nodiscard]] Findings check_requests(const Unit& unit, std::uint64_t seed);
 
-/// Each command in exactly the storage that it needs, which is at most what is declared, and no byte behind it is
-/// touched; with one byte less there is no conversation. The same of devices.
+/// Runs each command in the smallest storage that it accepts. This must be no larger than the declared size, no byte
+/// after it may be written, and one byte less must be refused. Checks devices in the same manner.
 [[nodiscard]] Findings check_storage(const Unit& unit);
 
-/// What the descriptor says of memory, registers and settings names commands and arguments that are there.
+/// Checks that the commands and arguments exist which the descriptor names for memory, registers and settings.
 [[nodiscard]] Findings check_declarations(const Unit& unit);
 
-/// Every setting is written and read back over the virtual encoder.
+/// Writes every setting to the virtual encoder and reads it back.
 [[nodiscard]] Findings check_settings(const Unit& unit);
 
-/// The first and the last byte of each memory area are written and read back; what cannot be written is refused.
+/// Writes the first and last byte of each memory area and reads them back. A write to a read-only area must be refused.
 [[nodiscard]] Findings check_memory(const Unit& unit);
 
-/// Each condition of the virtual encoder, at the ends of its range, is seen by a host: in some configuration a command
-/// tells something else than normally, at once, after the power was away, or of alarms and resets.
+/// Checks that a host can observe each condition of the virtual encoder at both ends of its range: in some
+/// configuration a command must report something else than normally, at once, after a power cycle, with alarms, or
+/// after a reset.
 [[nodiscard]] Findings check_conditions(const Unit& unit);
 
-/// Every alarm raised in the virtual encoder, and every command: what a reading says of the alarm, live and of the
-/// captured reply, is that it is raised, or nothing; without it, that it is clear, or nothing. Bits that are raised are
-/// reported, and so are flags that a reply carries. A part of a position is valid only where the whole reading says so
-/// too.
+/// Runs every command with each alarm raised and not raised in the virtual encoder. A reading, live or decoded from the
+/// captured reply, must report the alarm correctly or not at all. Raised bits must be reported, and so must flags that
+/// the reply carries. A part of a position may be valid only if the whole reading says so too.
 [[nodiscard]] Findings check_states(const Unit& unit);
 
-/// Whatever makes the position invalid, each alarm and each condition at the ends of its range, the zero is refused
-/// with a reason, and nothing of the encoder has changed.
+/// Checks that the zero command is refused with a reason, and leaves the encoder unchanged, while an alarm or a
+/// condition makes the position invalid.
 [[nodiscard]] Findings check_zero(const Unit& unit);
 
-/// What people are told to do, of alarms and of errors. A command that an advice names stands in backquotes, as
-/// "`absenc run ... reset`", and this unit has it. Carried out with the alarm raised, what an alarm's advice names ends
-/// the alarm, says why it does not, or tells what the reading does not. No advice is to look again at what it is about,
-/// and no message says a thing twice.
+/// Checks the advice for alarms and errors. Every command that an advice names must stand in backquotes, as "`absenc
+/// run ... reset`", and exist in this unit. With the alarm raised, the named commands must end the alarm, state why
+/// they cannot, or report more than the reading. No advice may be circular, and no message may repeat a clause.
 [[nodiscard]] Findings check_advice(const Unit& unit);
 
-/// On an undamaged line each command ends well, in each configuration of the unit, and positions are where the shaft
-/// stands.
+/// Checks that each command succeeds on an undamaged line in each configuration of the unit, and that positions match
+/// the shaft.
 [[nodiscard]] Findings check_commands(const Unit& unit);
 
-/// Host against virtual encoder in virtual time, over a line with every kind of fault. The shaft's place is known, and
-/// so is what each command says of it on an undamaged line: anything else is an error where no byte of the conversation
-/// was damaged, and elsewhere so rare as the check of the frames allows.
+/// Settings of `check_exchanges`, which runs a host against a virtual encoder in virtual time over a line with every
+/// kind of fault. Wrong results are findings if no byte of the conversation was damaged. With damaged bytes they may be
+/// no more frequent than the frame's check allows.
 struct ExchangeTest {
   std::uint64_t count = 100'000;
   std::uint64_t seed = 0;
-  bool requests_too = false;  // also what the encoder hears is damaged
+  bool requests_too = false;  // also damage requests
 };
 [[nodiscard]] Findings check_exchanges(const Unit& unit, const ExchangeTest& test);
 

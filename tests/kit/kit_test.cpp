@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Every unit with everything of the kit.
+// Runs every check of the kit on every unit.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -80,7 +80,8 @@ TEST_P(Kit, AdviceCanBeFollowed) {
 TEST_P(Kit, NoZeroIsSetOfAPositionThatDoesNotHold) { expect_none(check_zero(unit)); }
 TEST_P(Kit, MemoryKeepsItsBytes) { expect_none(check_memory(unit)); }
 
-/// The series of faults, of which sanitizers see the first (CMakePresets.json), and the unit.
+/// Parameters of a campaign: the number of the fault series and the unit. Sanitizer builds run only the first series
+/// (CMakePresets.json).
 using Series = std::tuple<unsigned, const Unit*>;
 
 class KitExchanges : public ::testing::TestWithParam<Series> {};
@@ -106,7 +107,7 @@ INSTANTIATE_TEST_SUITE_P(Seeds, KitExchanges,
                                             ::testing::ValuesIn(all_units().begin(), all_units().end())),
                          name_of_series);
 
-// The checksum of CAN sees what is damaged.
+// Returns the units that carry bytes. CAN is excluded, because its own checksum detects damage.
 std::vector<const Unit*> units_of_bytes() {
   std::vector<const Unit*> units(all_units().begin(), all_units().end());
   std::erase_if(units, [](const Unit* unit) { return unit->link == LinkKind::can; });

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Where a unit says that a field stands in a frame, there it stands.
+// Checks the bit positions that a unit states for its fields.
 #include <algorithm>
 #include <set>
 
@@ -15,7 +15,7 @@ bool bit_of(const Held& frame, std::size_t bit) {
   return (bytes[bit / 8] & (frame.link == LinkKind::clocked ? 0x80u >> bit % 8 : 1u << bit % 8)) != 0;
 }
 
-/// What these bits say; more than 64 say nothing.
+/// Returns the value of these bits and their number in `width`, at most 64.
 std::uint64_t cut_out(const Held& frame, const BitRanges& ranges, unsigned& width) {
   std::uint64_t value = 0;
   width = 0;
@@ -28,12 +28,12 @@ std::uint64_t cut_out(const Held& frame, const BitRanges& ranges, unsigned& widt
   return value;
 }
 
-/// Looks at each field of one good frame.
+/// Checks the bit positions of each field of one good frame.
 class Places final : public FieldSink {
  public:
   Places(const Unit& unit, Findings& findings) : unit_(unit), findings_(findings) {}
 
-  /// Whether it is one.
+  /// Checks the frame's fields. Returns whether the frame is valid.
   bool look(const Options& options, const Held& request, const Held& reply) {
     if (unit_.check(options, request.frame(), reply.frame()) != Error::none) return false;
     options_ = &options;
@@ -66,7 +66,7 @@ class Places final : public FieldSink {
     placed_.insert(info.role);
   }
 
-  /// Of what was seen, the position has a place.
+  /// Checks that at least one frame had bit positions for its position field.
   void conclude() {
     findings_.require(placed_.contains(Role::position), [] { return "no frame says where the position stands"; });
   }
@@ -80,7 +80,7 @@ class Places final : public FieldSink {
   std::set<Role> placed_;
 };
 
-// Where a flip makes another good frame, the fields follow it.
+// Checks all vectors, and each vector with one bit flipped if it is still valid.
 void look_at_vectors(const Unit& unit, Places& places) {
   for (const Vector& vector : unit.vectors) {
     const std::optional<Options> options = options_of(unit, vector.options);
@@ -91,7 +91,7 @@ void look_at_vectors(const Unit& unit, Places& places) {
   }
 }
 
-// What the virtual encoder says, wherever the shaft is.
+// Checks replies of the virtual encoder at random shaft positions.
 void look_at_exchanges(const Unit& unit, Places& places) {
   sim::Random random(11);
   for (const Configuration& way : configurations(unit)) {

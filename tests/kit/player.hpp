@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Plays the encoder for one conversation: one request gets what the test gives, in pieces; every other one gets what a
-// virtual encoder says.
+// Plays the encoder's side of one conversation. The request under test gets the reply that the test supplies, in
+// pieces; a virtual encoder answers every other request.
 #pragma once
 
 #include <algorithm>
@@ -20,18 +20,19 @@ template <class Item>
 class Player {
  public:
   using Pieces = std::vector<std::vector<Item>>;
-  /// What comes back for the request under test: `clocks` bits or items are what is asked for, 0: unknown.
+  /// Returns the pieces of the reply to the request under test. `clocks` is the number of bits or items that the host
+  /// wants, 0 if unknown.
   using Reply = std::function<Pieces(std::size_t clocks)>;
 
-  /// On a line on which nobody is.
+  /// Creates a line without an encoder.
   Player() = default;
   Player(const Unit& unit, const Options& options) : device_storage_(unit.device_storage) {
     device_ = unit.device(options, still_, device_storage_).template of<Item>();
     if (device_ != nullptr) device_->power_on(now_, Device<Item>::PowerOn::skip);
   }
 
-  /// False when the conversation does not end. An empty request is one that sends nothing: a pulse, or a wait.
-  /// `on_emit` is called for each result of one that streams.
+  /// Runs the conversation and returns whether it ended. An empty `request` means one that sends nothing: a pulse, or a
+  /// wait. `on_emit` is called for each result of a streaming conversation.
   template <class OnEmit>
   bool run(Conversation<Item>& conversation, const std::vector<Item>& request, const Reply& reply, OnEmit&& on_emit,
            unsigned most_steps = 2000) {
@@ -64,9 +65,9 @@ class Player {
     }
     return false;
   }
-  /// How often the request under test came.
+  /// Number of times the host sent the request under test.
   [[nodiscard]] unsigned asked() const { return asked_; }
-  /// How many requests came.
+  /// Number of requests that the host sent.
   [[nodiscard]] unsigned sent() const { return sent_; }
 
  private:

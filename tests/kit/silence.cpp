@@ -6,7 +6,7 @@
 namespace absenc::kit {
 namespace {
 
-// What a command says when every request of it meets silence.
+// Runs a command on a line without an encoder. It must end with a timeout.
 template <class Item>
 void meet_silence(const Unit& unit, const Configuration& way, const Command& command, Findings& findings) {
   std::vector<std::byte> storage(unit.host_storage);
@@ -14,13 +14,13 @@ void meet_silence(const Unit& unit, const Configuration& way, const Command& com
       unit.host(way.options, command, least_arguments(command), storage).template of<Item>();
   if (conversation == nullptr) return;
   Player<Item> player;
-  constexpr unsigned every_address = 100'000;  // steps
+  constexpr unsigned every_address = 100'000;  // steps, enough for a scan of every address
   const bool ended = player.run(
       *conversation, {}, [](std::size_t) { return typename Player<Item>::Pieces{}; }, [] {}, every_address);
-  if (ended && player.sent() == 0) return;  // a command that this encoder does not have
+  if (ended && player.sent() == 0) return;  // this configuration lacks the command
   const auto where = [&] { return std::string(command.name) + " of \"" + way.text + "\" in silence: "; };
   findings.require(ended, [&] { return where() + "does not end"; });
-  // Some commands have no reply, and what ends a stream succeeds when nothing comes.
+  // A command without a reply succeeds. A command that stops a stream succeeds when no byte arrives.
   const bool wants_none = command.verb == Verb::run && conversation->reading() == nullptr;
   const Error error = conversation->error();
   findings.require(!ended || error == Error::timeout || (wants_none && error == Error::none),
@@ -31,7 +31,7 @@ void meet_silence(const Unit& unit, const Configuration& way, const Command& com
 
 Findings check_silence(const Unit& unit) {
   Findings findings;
-  // Elsewhere the host's clock reads the level of the line, whoever is on it.
+  // On clocked links the host always reads some level, even without an encoder.
   const bool can_be_silent = unit.link != LinkKind::clocked && unit.link != LinkKind::spi;
   if (!can_be_silent) return findings;
   for (const Configuration& way : configurations(unit)) {

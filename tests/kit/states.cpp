@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Three states of an alarm: reported and clear, reported and raised, not reported.
+// Checks the three states of an alarm: reported and clear, reported and raised, not reported.
 #include <algorithm>
 
 #include "tests/kit/kit.hpp"
@@ -8,14 +8,14 @@
 namespace absenc::kit {
 namespace {
 
-/// One field of flags of a reading, of one channel.
+/// The flags of one channel of a reading: their field, the set bits, and the bits that are reported.
 struct Flags {
   const FieldInfo* field;
   std::uint32_t bits;
   std::uint32_t reported;
 };
 
-/// The bits of `field` that have a name.
+/// Returns a mask of the bits of `field` that have a name.
 std::uint32_t named(const FieldInfo& field) {
   std::uint32_t mask = 0;
   for (std::size_t i = 0; i < field.flags.size(); ++i) {
@@ -38,13 +38,13 @@ std::vector<Flags> status_of(const Unit& unit, const Reading& reading) {
   return both(unit.status, unit.second_status, reading.status, reading.status_reported);
 }
 
-/// A command's reading, and the fields and the reading of its last reply as a capture has them.
+/// A command's live reading, and the fields of its last reply decoded as from a capture.
 struct Said {
   std::optional<Reading> live;
   Seen captured;
 };
 
-/// One virtual encoder, with an alarm or without.
+/// A virtual encoder with at most one raised alarm.
 template <class Item>
 class Raised {
  public:
@@ -129,7 +129,7 @@ class States {
     if (!is_raised) require(!is_shown, "it is reported raised and is not");
   }
 
-  // A flag that options say this encoder does not have, and a status flag that sums it up.
+  // Returns the flags that the options declare absent on this encoder, and the status flags that summarize them.
   [[nodiscard]] std::uint32_t absent(const FieldInfo& field, const Reading& reading) const {
     std::uint32_t alarms = 0;
     for (std::size_t i = 0; i < unit_.alarms->flags.size(); ++i) {
@@ -143,7 +143,7 @@ class States {
     return mask;
   }
 
-  // A reading reports the flags that its reply shows as fields.
+  // Checks that a reading reports the flags that its reply carries as fields.
   void carries(const Seen& seen) {
     if (!seen.reading) return;
     const auto agrees = [&](const Flags& state) {
@@ -165,7 +165,7 @@ class States {
     require(!is_more(part->multiturn_validity(), whole->multiturn_validity()), "a part says that the turns hold");
   }
 
-  // In a capture, behind the reply to `read`.
+  // Checks a captured reading that is completed with the alarms of the previous reply to `read`.
   void completed(const Said& before, const Said& now, std::size_t bit, bool is_raised) {
     if (unit_.remembered == nullptr || !before.captured.reading || !now.captured.reading) return;
     const Reading reading = unit_.remembered(*before.captured.reading, *now.captured.reading);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What is stored: settings and memory over the virtual encoder, and the storage of machines.
+// Checks settings and memory of the virtual encoder, and the storage of conversations and devices.
 #include <set>
 
 #include "tests/kit/changes.hpp"
@@ -36,7 +36,8 @@ void change(const Unit& unit, const Configuration& way, const Command& command, 
     follow(world, unit, command, values);
     const std::string broken = broken_promise(world, unit, command, values, result.seen);
     findings.require(broken.empty(), [&] { return what() + broken; });
-    // What cannot be read may be so already, which is against the rules of some encoders.
+    // A setting that cannot be read may already have the new value. Writing it again violates the rules of some
+    // encoders.
     const std::string now = to_text(read_setting(world, unit, command).fields);
     findings.require(world.device().violation_count() == 0 || (command.verb == Verb::config_set && now == before),
                      [&] { return what() + std::string(world.device().violations()[0].rule); });
@@ -46,7 +47,7 @@ void change(const Unit& unit, const Configuration& way, const Command& command, 
   }
   findings.require(good > 0 || refused,
                    [&] { return way.text + ", " + std::string(command.name) + ": never ends well"; });
-  // However different, what was set must show.
+  // At least two values were set, so at least two must be read back.
   findings.require(set.size() < 2 || read.size() > 1,
                    [&] { return std::string(command.name) + ": whatever is set, the same is read"; });
 }
@@ -105,7 +106,7 @@ void try_registers(const Unit& unit, const Configuration& way, Findings& finding
 
 constexpr std::byte untouched{0xA5};
 
-/// The storage that a command is given, and what lies behind it.
+/// Storage of a given size with a fence after it, which shows writes beyond the end.
 struct Fenced {
   Fenced(std::size_t size_given, std::size_t behind) : bytes(size_given + behind + 64, untouched), size(size_given) {}
   [[nodiscard]] std::span<std::byte> given() { return std::span(bytes).first(size); }
@@ -131,7 +132,7 @@ void store(const Unit& unit, const Configuration& way, const Command& command, F
                      [&] { return std::string(command.name) + ": needs more than host_storage"; });
     return;
   }
-  std::size_t none = 0;  // with so many bytes there is no conversation
+  std::size_t none = 0;  // largest size that is too small
   std::size_t needed = unit.host_storage;
   findings.require(!made(0), [&] { return std::string(command.name) + ": is made of nothing"; });
   while (needed - none > 1) {
@@ -146,7 +147,7 @@ void store(const Unit& unit, const Configuration& way, const Command& command, F
     return std::pair(result.error, result.seen.fields);
   };
   const auto roomy = end(unit.host_storage);
-  // Parts of a procedure may need more than its beginning: then it says so.
+  // A later part of a procedure may need more storage than its start. It must then report that error.
   const auto tight = needed == unit.host_storage ? roomy : end(needed);
   findings.require(tight == roomy || tight.first == Error::buffer_too_small,
                    [&] { return std::string(command.name) + ": ends otherwise in what it needs than in more"; });

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A whole unit in a hundred lines, right or with one mistake: what the kit must find is shown by it. One byte asks, the
-// position comes with a CRC of 16 bits, or as one word of 14 bits with two parities, which any byte may begin.
+// A complete toy unit with one selectable mistake, which the kit must find. The request is one byte. The reply is a
+// 16-bit position with a 16-bit CRC, or one 14-bit word with two parity bits whose reply may begin with any byte.
 #pragma once
 
 #include <array>
@@ -13,24 +13,24 @@ namespace absenc::kit::toy {
 
 enum class Mistake : std::uint8_t {
   none,
-  parity,          // no mistake: a check that lets every fourth wrong word pass
+  parity,          // no mistake: a weak check that accepts a quarter of wrong words
   takes_two,       // the host takes the first two bytes for the reply
-  takes_anything,  // the host looks at no check
-  takes_more,      // the host takes what begins with a good reply, and leaves the rest to the next
-  says_nothing,    // the host reports nothing
-  has_no_request,  // encode fails
-  no_vector,       // vectors whose request no command sends
-  is_stale,        // the virtual encoder says where it was when it was asked last
-  is_wrong,        // the virtual encoder is a count beside its shaft
-  wants_more,      // host_storage is less than the host needs
-  overflows,       // the host is made whatever storage there is
-  flips_pass,      // decode does not look at the last byte
-  misplaced,       // where it says that the position stands, a part of it stands
-  no_condition,    // the virtual encoder is what it is, whatever is set
-  never_ends,      // the host waits for ever when nothing comes
-  takes_all,       // any arguments make a request
-  gives_up_late,   // captures wait for a reply longer than any host
-  zeroes_blindly,  // its position never holds, and its zero does not look
+  takes_anything,  // the host ignores the checksum
+  takes_more,      // the host accepts bytes that begin with a good reply and leaves the rest for the next command
+  says_nothing,    // the host reports no field
+  has_no_request,  // `encode` fails
+  no_vector,       // no command sends the request of the vectors
+  is_stale,        // the virtual encoder returns the position of the previous request
+  is_wrong,        // the virtual encoder's position is one count too high
+  wants_more,      // `host_storage` is smaller than the host needs
+  overflows,       // the host is constructed even if the storage is too small
+  flips_pass,      // `decode` ignores the last byte
+  misplaced,       // the stated bit positions cover only a part of the position
+  no_condition,    // the virtual encoder ignores its condition
+  never_ends,      // the host waits for ever if no byte arrives
+  takes_all,       // `encode` accepts any arguments
+  gives_up_late,   // captures wait longer for a reply than any host does
+  zeroes_blindly,  // the position is never valid, and the zero command ignores that
 };
 
 inline constexpr std::uint8_t ask = 0x5A;
@@ -183,7 +183,7 @@ struct Toy {
    private:
     const Shaft& shaft_;
     unsigned said_ = 0;
-    unsigned off_ = 0;  // its condition
+    unsigned off_ = 0;  // the condition: offset of the position, in counts
     unsigned before_ = 0;
     Time at_{};
     bool speaks_ = false;
@@ -267,8 +267,8 @@ inline constexpr Unit unit = [] {
   return made;
 }();
 
-/// What an encoder with a memory and others on its line declares, and nothing that it does. One role is forgotten,
-/// though all names are there.
+/// A descriptor without code for an encoder with memory on a shared line. The role `forgotten` is missing from it,
+/// while every name is present.
 template <Role forgotten>
 struct Declared {
   static constexpr Role kept(Role role) { return role == forgotten ? Role::other : role; }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The kit can fail: each toy has one mistake, and the kit finds it.
+// Tests the kit itself: each toy unit has one mistake, and the kit must find it.
 #include <gmock/gmock-more-matchers.h>
 #include <gtest/gtest.h>
 
@@ -31,7 +31,8 @@ void expect_no_finding() {
 
 TEST(KitToys, WithoutAMistakeNothingIsFound) { expect_no_finding<Mistake::none>(); }
 
-// Any byte may begin its reply, and its check lets wrong ones pass: so many, and no more.
+// The reply may begin with any byte, and its weak check accepts some wrong replies. The kit must accept their expected
+// number.
 TEST(KitToys, AWeakCheckIsNoMistake) {
   expect_no_finding<Mistake::parity>();
   EXPECT_THAT(check_exchanges(toy::unit<Mistake::parity>, few).notes(),

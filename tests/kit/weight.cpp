@@ -8,7 +8,7 @@
 namespace absenc::kit {
 namespace {
 
-/// Says one thing when it is asked.
+/// Sends the same reply to every request.
 template <class Item>
 class Parrot final : public Machine<Item> {
  public:
@@ -30,7 +30,7 @@ class Parrot final : public Machine<Item> {
   bool speaks_ = false;
 };
 
-/// What a frame says that is another than the undamaged one.
+/// Kinds of wrong values that a damaged reply decoded to.
 struct Wrong {
   bool position = false;
   bool others = false;

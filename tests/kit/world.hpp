@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A unit's virtual encoder and its host in virtual time, from the descriptor alone: a shaft to be put anywhere, a line
-// with faults, one conversation after the other.
+// Simulates a unit's virtual encoder and its host in virtual time, from the descriptor alone. A test sets the shaft's
+// position and the faults of the line, and runs conversations one after another.
 #pragma once
 
 #include <cstring>
@@ -18,24 +18,24 @@
 
 namespace absenc::kit {
 
-/// Stands where it is put.
+/// A shaft whose position the test sets.
 struct Hand final : Shaft {
   [[nodiscard]] ShaftState at(Time) const override { return {.position = position}; }
   std::int64_t position = 0;
 };
 
-/// How a conversation ended.
+/// Result of one conversation.
 struct Ended {
-  bool made = false;   // the unit has a conversation for it
-  bool ended = false;  // within the time
+  bool made = false;   // the unit supports this command
+  bool ended = false;  // ended before the time limit
   Error error = Error::none;
-  bool unfounded = false;  // it had a reading before anything came, or with an error
+  bool unfounded = false;  // had a reading before any byte arrived, or together with an error
   std::string detail{};
   std::string advice{};
-  Seen seen{};              // every result, in order
-  std::uint64_t damaged{};  // faults that changed bytes while it went on
-  std::uint64_t faults{};   // of all kinds
-  std::uint64_t asked{};    // requests answered meanwhile
+  Seen seen{};              // every reported field and reading, in order
+  std::uint64_t damaged{};  // faults that changed bytes during the conversation
+  std::uint64_t faults{};   // faults of any kind during the conversation
+  std::uint64_t asked{};    // requests that the encoder answered during the conversation
   Wire sent{};              // the last exchange, on links that carry bytes
   Wire received{};
 
@@ -62,7 +62,7 @@ class World {
     line_->attach(sim::Role::device, *faulty_);
   }
 
-  /// Whether the unit has a virtual encoder with these options.
+  /// Returns whether the unit has a virtual encoder for these options.
   [[nodiscard]] bool made() const { return device_ != nullptr; }
   [[nodiscard]] Device<Item>& device() { return *device_; }
   [[nodiscard]] Line& line() { return *line_; }
@@ -70,7 +70,8 @@ class World {
   [[nodiscard]] const Options& options() const { return options_; }
   void set_rates(const sim::FaultRates& rates) { faulty_->set_rates(rates); }
   void pass(Time time) { line_->run_until(line_->now() + time); }
-  /// Puts the shaft there. What was sent unsolicited has said where it was before.
+  /// Sets the shaft's position. Waits 5 ms if the encoder sends unsolicited frames, because those already sent show the
+  /// old position.
   void move(std::int64_t position) {
     shaft_.position = position;
     const bool unsolicited = is_can || (unit_.streams != nullptr && unit_.streams(options_));
@@ -78,7 +79,7 @@ class World {
   }
   [[nodiscard]] std::int64_t place() const { return shaft_.position; }
 
-  /// What the host knows of the encoder from now on; its end of the line follows.
+  /// Sets the options with which the host addresses the encoder, and configures the host's port to match.
   void set_options(const Options& options) {
     options_ = options;
     SetRate set(settings());
@@ -86,7 +87,7 @@ class World {
     line_->run(node_, line_->now());
   }
 
-  /// One conversation to its end; one that streams up to its first result.
+  /// Runs one conversation to its end, or a streaming one up to its first result.
   Ended run(const Command& command, Arguments arguments, Time limit = std::chrono::seconds(100)) {
     return run_in(host_storage_, command, arguments, limit);
   }
@@ -131,8 +132,8 @@ class World {
     return result;
   }
 
-  /// Faults after which a wrong result is possible. All others leave frames as they were; where the host is the clock,
-  /// each changes what it reads.
+  /// Number of faults that can cause a wrong result. Delays, echoes, missing and repeated replies leave frames intact,
+  /// except where the host clocks the line: there each changes the bits that it reads.
   [[nodiscard]] std::uint64_t changed_bytes() const {
     using sim::FaultKind;
     std::uint64_t sum = 0;
@@ -156,7 +157,7 @@ class World {
 
   static constexpr std::size_t none = ~std::size_t{0};
 
-  /// Sets the host's end of the line.
+  /// Configures the host's port.
   class SetRate final : public Machine<Item> {
    public:
     explicit SetRate(const LineSettings& line) : line_(line) {}
@@ -170,7 +171,8 @@ class World {
     LineSettings line_;
     bool done_ = false;
   };
-  /// At the host's end while nobody converses: a conversation in storage that is used again must not be on the line.
+  /// Occupies the host's end of the line between conversations, because a conversation whose storage is reused must not
+  /// stay attached.
   struct Idle final : Machine<Item> {
     void feed(const Event<Item>&) override {}
     Step<Item> next(Time) override { return {.kind = Step<Item>::Kind::done}; }
@@ -178,7 +180,7 @@ class World {
   };
 
   [[nodiscard]] LineSettings settings() const { return line_settings(unit_, options_).with_some_rate(); }
-  // As host::Session has it.
+  // Matches the rule of `host::Session` for which conversations the reply guard covers.
   [[nodiscard]] bool guarded(const Command& command) const {
     if (is_can) return command.verb == Verb::read || command.verb == Verb::read_part;
     return unit_.link != LinkKind::spi && unit_.link != LinkKind::clocked;
@@ -187,7 +189,7 @@ class World {
     if (node_ == none) {
       node_ = line_->attach(sim::Role::host, idle_, [this] { return !on_emit_ || on_emit_(); });
     }
-    // How long a chip stays unselected between two conversations is up to who runs them.
+    // The caller of a conversation controls how long the SPI chip stays deselected between conversations.
     if (unit_.link == LinkKind::spi) pass(std::chrono::microseconds(20));
     line_->replace(node_, machine);
   }

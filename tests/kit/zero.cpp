@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A zero that is made of a position which does not hold is wrong for ever: no host sets one.
+// Checks that a host never sets the zero from an invalid position, which would leave a wrong zero for good.
 #include "absenc/sim/place.hpp"
 #include "tests/kit/kit.hpp"
 #include "tests/kit/world.hpp"
@@ -15,7 +15,7 @@ std::optional<Reading> read_position(World<Item>& world, const Unit& unit) {
   return world.run(read, least_arguments(read)).seen.reading;
 }
 
-/// `spoil` does something to the encoder, `mend` takes it back.
+/// Tries to set the zero. `spoil` makes the position invalid, `mend` reverses that.
 template <class Item, class Spoil, class Mend>
 void try_zero(const Unit& unit, const Configuration& way, const std::string& what, Spoil spoil, Mend mend,
               Findings& findings) {
