@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// For the tests of units: a shaft to be turned by hand, a host that sends anything, and the faults of the campaigns.
+// Helpers for the tests of units: a shaft with a settable position, a host that sends any bytes, and the fault rates of
+// the campaigns.
 #pragma once
 
 #include <cstdint>
@@ -12,7 +13,7 @@
 
 namespace absenc::sim::testing {
 
-/// A shaft that can be grabbed: constant speed from where it was put.
+/// A shaft whose position and speed a test can set; the speed is constant from then on.
 template <unsigned singleturn_bits>
 struct TestShaft final : Shaft {
   [[nodiscard]] ShaftState at(Time time) const override {
@@ -21,7 +22,7 @@ struct TestShaft final : Shaft {
     state.position += static_cast<std::int64_t>(revolutions * 4294967296.0);
     return state;
   }
-  /// `counts` of so many bits after `turns` whole turns.
+  /// Sets the position to `turns` whole turns and `counts` of `singleturn_bits` bits.
   void put(std::int64_t turns, std::int64_t counts) {
     start.position = (turns << 32) + (counts << (32 - singleturn_bits));
   }
@@ -35,7 +36,7 @@ struct TestShaft final : Shaft {
   Time since{};
 };
 
-/// Sends any bytes and keeps what comes back until the line is silent.
+/// A host that sends one request of any bytes and stores the bytes received until the line is silent.
 class RawHost : public Machine<std::uint8_t> {
  public:
   RawHost(std::vector<std::uint8_t> request, Time answer, Time gap, Time at)
@@ -70,7 +71,7 @@ class RawHost : public Machine<std::uint8_t> {
   bool done_ = false;
 };
 
-/// `share` of the replies corrupted, and a fifth of it with each other fault of replies.
+/// Returns rates that corrupt `share` of the replies, and that apply each other reply fault to a fifth of `share`.
 inline FaultRates damaged_replies(double share) {
   FaultRates rates;
   for (const FaultKind kind : {FaultKind::drop, FaultKind::truncate, FaultKind::delay, FaultKind::echo,

@@ -8,10 +8,10 @@ namespace absenc::sim {
 
 namespace {
 
-// What begins later than this is kept here: in the carrier's hands it would keep the others from sending.
+// A transfer that begins later than this is held back: once handed to the port it would block the other devices.
 constexpr Time soon = std::chrono::milliseconds(1);
 
-// The shorter of two limits; 0: none.
+// Returns the shorter of two limits; 0 means no limit.
 Time shorter(Time one, Time other) {
   if (one == Time{} || other == Time{}) return std::max(one, other);
   return std::min(one, other);
@@ -37,7 +37,7 @@ void Bus::feed(const ByteEvent& event) {
   }
 }
 
-// Behind a transfer the line is idle: nobody has to wait until that is noticed.
+// The line is idle behind a transfer, so every device gets `silence` at once instead of waiting for its limit.
 void Bus::all_sent(const ByteEvent& event) {
   sending_ = false;
   for (Node& node : nodes_) {
@@ -98,7 +98,7 @@ Time Bus::first_begin() const {
   return first;
 }
 
-// Of all that is pending, what begins first and whatever begins before that has ended.
+// Combines into one transfer the pending transfer that begins first and all that begin before it ends.
 void Bus::merge() {
   std::vector<Node*> pending;
   for (Node& node : nodes_) {

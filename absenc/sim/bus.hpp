@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Several devices on one half-duplex line as one machine, for a carrier that knows no bits: a pseudo-terminal.
+// Combines several devices on one half-duplex line into one machine, for a port that does not simulate bits: a
+// pseudo-terminal.
 #pragma once
 
 #include <cstdint>
@@ -9,13 +10,13 @@
 
 namespace absenc::sim {
 
-/// Not a Line: without bits there is no time in which one could be simulated.
+/// Several devices on one half-duplex line, without bit timing. Not a Line, which simulates time bit by bit.
 ///
-/// Every device hears what comes, and what the others send. Characters that are sent at the same time reach the line as
-/// their AND, as in Line; they are aligned to whole characters.
+/// Every device receives the host's bytes and those of the other devices. Characters that are sent at the same time
+/// reach the line as their AND, as in Line, but aligned to whole characters.
 class Bus final : public Machine<std::uint8_t> {
  public:
-  /// The devices must outlive the bus. `character` is the line time of one.
+  /// `devices` must outlive the bus. `character` is the time of one character on the line.
   Bus(const std::vector<Machine<std::uint8_t>*>& devices, Time character);
 
   void feed(const Event<std::uint8_t>& event) override;
@@ -24,17 +25,17 @@ class Bus final : public Machine<std::uint8_t> {
  private:
   enum class Doing : std::uint8_t {
     waiting,
-    pending,  // has something to send
+    pending,  // has a transfer that has not begun
     sending,
     done,
   };
   struct Node {
     Machine<std::uint8_t>* device;
     Doing doing = Doing::waiting;
-    Step<std::uint8_t> wait{};        // what it asked for last
-    Time timer = never;               // when that is due
-    Time at{};                        // pending: when it begins
-    std::vector<std::uint8_t> out{};  // pending, sending
+    Step<std::uint8_t> wait{};        // last wait step of the device
+    Time timer = never;               // time of the device's next `timer` event
+    Time at{};                        // pending: time at which the transfer begins
+    std::vector<std::uint8_t> out{};  // pending, sending: the bytes of the transfer
   };
 
   void all_sent(const Event<std::uint8_t>& event);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Devices that answer a byte of theirs, on a bus and on sim::Line: what the host hears is the same.
+// Compares sim::Bus with sim::Line: the host must receive the same bytes from devices that answer one byte each.
 #include "absenc/sim/bus.hpp"
 
 #include <gtest/gtest.h>
@@ -17,7 +17,7 @@ using Wire = std::vector<std::uint8_t>;
 
 constexpr LineSettings settings{.rate = 1'000'000};
 
-/// Answers `key`, when it comes after silence, `after` later.
+/// Sends `reply` at `after` behind its `key`, if the key is the first byte after silence.
 struct Answerer final : Machine<std::uint8_t> {
   Answerer(std::uint8_t its_key, Wire its_reply, Time its_after = 5us)
       : key(its_key), reply(std::move(its_reply)), after(its_after) {}
@@ -60,7 +60,7 @@ struct Answerer final : Machine<std::uint8_t> {
   bool idle = true;
 };
 
-/// Asks for one byte after the other, when the line is idle for all.
+/// Sends one request byte after the other, each when the line has been idle long enough for all devices.
 struct Asker final : Machine<std::uint8_t> {
   explicit Asker(const Wire& all) : questions(all.begin(), all.end()) {}
 
@@ -100,7 +100,7 @@ TEST(Bus, HearsAsALineDoes) {
     std::vector<std::unique_ptr<Answerer>> made;
     made.push_back(std::make_unique<Answerer>(1, Wire{0x11, 0x22, 0x33}));
     made.push_back(std::make_unique<Answerer>(2, Wire{0xF0, 0xAA, 0x55}));
-    made.push_back(std::make_unique<Answerer>(2, Wire{0x3C, 0xFF}));  // at the same time
+    made.push_back(std::make_unique<Answerer>(2, Wire{0x3C, 0xFF}));  // answers the same request at the same time
     return made;
   };
   const Wire questions{1, 2, 9, 1};
@@ -122,7 +122,7 @@ TEST(Bus, HearsAsALineDoes) {
 
 TEST(Bus, WhatOverlapsIsMergedAndTheRestComesLater) {
   Answerer first(1, {0x81, 0x7E});
-  Answerer second(1, {0x0F, 0x0F}, 5us + 12us);  // about one character later
+  Answerer second(1, {0x0F, 0x0F}, 5us + 12us);  // starts about one character later
   Answerer late(1, {0x77}, 50ms);
   Bus bus({&second, &first, &late}, settings.character());
   Line<std::uint8_t> line(LinkKind::half_duplex, settings);

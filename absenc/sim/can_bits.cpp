@@ -7,10 +7,10 @@ namespace absenc::sim {
 
 namespace {
 
-/// The part that is covered by the CRC and, with it, stuffed.
+/// The part of a frame that is covered by the CRC and, with the CRC itself, by bit stuffing.
 class StuffedBits {
  public:
-  /// The lower `count` bits, the highest first.
+  /// Appends the lower `count` bits, most significant first.
   void append(std::uint32_t value, unsigned count) {
     while (count-- > 0) append((value >> count & 1) != 0);
   }
@@ -24,7 +24,8 @@ class StuffedBits {
   std::vector<bool> bits;
 
  private:
-  // Behind five equal bits comes one of the other kind, which counts as the first of the next run.
+  // Appends one bit, and behind five equal bits a stuff bit of the other level, which counts as the first of the next
+  // run.
   void put(bool bit) {
     run_ = !bits.empty() && bits.back() == bit ? run_ + 1 : 1;
     bits.push_back(bit);
@@ -57,7 +58,7 @@ std::vector<bool> can_bits(const CanFrame& frame) {
   for (const std::uint8_t byte : frame.remote ? Bytes() : frame.bytes()) stuffed.append(byte, 8);
   stuffed.append(stuffed.crc(), 15);
   std::vector<bool> bits = std::move(stuffed.bits);
-  bits.insert(bits.end(), {true, false, true});  // CRC delimiter, acknowledge, its delimiter
+  bits.insert(bits.end(), {true, false, true});  // CRC delimiter, acknowledge slot, acknowledge delimiter
   bits.insert(bits.end(), 7, true);              // end of frame
   return bits;
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A classic CAN frame as the bits that go over the bus (ISO 11898-1, 10.4): 0 is dominant, 1 recessive and idle.
+// The bits of a classic CAN frame on the bus (ISO 11898-1, 10.4): 0 is dominant, 1 recessive and idle.
 #pragma once
 
 #include <cstddef>
@@ -9,10 +9,10 @@
 
 namespace absenc::sim {
 
-/// From the start of the frame to its end, stuff bits included, as another node acknowledges it.
+/// Returns the bits from the start to the end of `frame`, with stuff bits and with the acknowledge bit of another node.
 [[nodiscard]] std::vector<bool> can_bits(const CanFrame& frame);
 
-/// Between two frames.
+/// Number of recessive bits between two frames.
 inline constexpr std::size_t can_intermission_bits = 3;
 
 }  // namespace absenc::sim

@@ -36,7 +36,7 @@ void FaultyDevice::feed(const Event<std::uint8_t>& event) {
   using Kind = Event<std::uint8_t>::Kind;
   switch (event.kind) {
     case Kind::received:
-      // A request that began while the device was deaf is not heard to its end either.
+      // A request that began while the device ignored the line is ignored to its end.
       if (deaf_ || event.at - unheard_at_ <= 2 * device_gap_) {
         unheard_at_ = event.at;
       } else {
@@ -47,7 +47,7 @@ void FaultyDevice::feed(const Event<std::uint8_t>& event) {
       if (deaf_) return;
       break;
     case Kind::silence:
-      if (silent_until_ != never) return;  // the device believes that it is about to send
+      if (silent_until_ != never) return;  // the device expects `sent`: its suppressed reply still lasts
       break;
     case Kind::sent:
       deaf_ = false;
@@ -112,7 +112,7 @@ bool FaultyDevice::strikes(FaultKind kind) {
   return true;
 }
 
-// False when nothing is to be sent.
+// Applies the faults to `reply`. Returns false when nothing is to be sent.
 bool FaultyDevice::damage(Step<std::uint8_t>& reply, Time now) {
   const std::vector<std::uint8_t> request = std::exchange(request_, {});
   const auto faults_before = counts_;
@@ -120,7 +120,7 @@ bool FaultyDevice::damage(Step<std::uint8_t>& reply, Time now) {
   if (strikes(FaultKind::silence)) reply_.clear();
   if (!reply_.empty()) {
     if (strikes(FaultKind::repeat)) reply_.insert(reply_.end(), reply.out.begin(), reply.out.end());
-    // A fault behind the bits that the host takes would be none.
+    // Faults apply only to bits that the host reads; damage behind them would have no effect.
     const auto taken = [&] { return reply.bits == 0 ? reply_.size() : std::min(reply_.size(), (reply.bits + 7) / 8); };
     if (strikes(FaultKind::corrupt)) flip_bits(std::span(reply_).first(taken()));
     if (taken() > 1 && strikes(FaultKind::truncate)) reply_.resize(1 + random_.below(taken() - 1));
@@ -143,7 +143,7 @@ bool FaultyDevice::damage(Step<std::uint8_t>& reply, Time now) {
   return !reply_.empty();
 }
 
-// 1 to 3 different bits.
+// Flips 1 to 3 different bits.
 void FaultyDevice::flip_bits(std::span<std::uint8_t> bytes) {
   std::array<std::uint64_t, 3> flipped{};
   const std::uint64_t count = 1 + random_.below(flipped.size());

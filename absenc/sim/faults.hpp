@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A virtual encoder that misbehaves on request: damages what a device machine sends, and what it hears.
+// A virtual encoder with injected faults: damages the replies that a device machine sends and the requests that it
+// receives.
 #pragma once
 
 #include <array>
@@ -16,25 +17,25 @@ namespace absenc::sim {
 enum class FaultKind : std::uint8_t {
   drop,             // one byte is lost
   corrupt,          // 1 to 3 bits are flipped
-  truncate,         // the reply stops at a random place, after at least one byte
-  delay,            // the reply comes late
-  echo,             // the request's bytes come before the reply
-  garbage,          // 1 to 4 random bytes come before the reply
+  truncate,         // the reply stops at a random byte, at least one byte is sent
+  delay,            // the reply is sent late
+  echo,             // the bytes of the request are sent before the reply
+  garbage,          // 1 to 4 random bytes are sent before the reply
   silence,          // no reply
-  repeat,           // the reply comes twice
+  repeat,           // the reply is sent twice
   request_corrupt,  // 1 to 3 bits of a byte that the device receives are flipped
 };
 
 inline constexpr std::array<std::string_view, 9> fault_names{"drop",    "corrupt", "truncate", "delay",          "echo",
                                                              "garbage", "silence", "repeat",   "request_corrupt"};
 
-/// How often each fault was injected, by FaultKind.
+/// Number of injected faults, indexed by FaultKind.
 using FaultCounts = std::array<std::uint64_t, fault_names.size()>;
 
-/// How often each fault is injected: 0 to 1, per reply, `request_corrupt` per byte (CAN: frame) received.
+/// Probability of each fault, 0 to 1 per reply; `request_corrupt` per byte (CAN: per frame) received.
 struct FaultRates {
   std::array<double, fault_names.size()> rates{};
-  Time delay = std::chrono::microseconds(200);  // how late a delayed reply is
+  Time delay = std::chrono::microseconds(200);  // additional delay of a late reply
 
   constexpr double& operator[](FaultKind kind) { return rates[static_cast<std::size_t>(kind)]; }
   constexpr double operator[](FaultKind kind) const { return rates[static_cast<std::size_t>(kind)]; }
@@ -45,14 +46,14 @@ struct FaultRate {
   double rate;
 };
 
-/// `corrupt=0.01`. Throws std::invalid_argument with a sentence that names the known kinds or the allowed range.
+/// Parses `corrupt=0.01`. Throws std::invalid_argument with a sentence that names the known kinds or the allowed range.
 [[nodiscard]] FaultRate parse_fault(std::string_view text);
 
-/// Stands between the line and a device machine, which must outlive it. The same seed gives the same faults.
+/// A machine between the line and a device machine; `device` must outlive it. The same seed gives the same faults.
 ///
-/// For character links; on clocked ones the bits that the device drives are damaged. A reply that a fault made longer
-/// or later is not the device's own timing: until it is sent, the device does not hear what comes (a real one would not
-/// either), so that it does not take it for a host that breaks the rules.
+/// On character links whole replies are damaged, on clocked links the bits that the device drives. A reply that a fault
+/// makes longer or later does not follow the device's own timing. Until it is sent, the device receives nothing (like a
+/// real one), so it does not report a protocol violation by the host.
 class FaultyDevice final : public Machine<std::uint8_t> {
  public:
   FaultyDevice(Machine<std::uint8_t>& device, const FaultRates& rates, std::uint64_t seed);
@@ -60,12 +61,12 @@ class FaultyDevice final : public Machine<std::uint8_t> {
   void feed(const Event<std::uint8_t>& event) override;
   Step<std::uint8_t> next(Time now) override;
 
-  /// From the next reply on.
+  /// Sets the rates, from the next reply on.
   void set_rates(const FaultRates& rates) { rates_ = rates; }
-  /// How many faults of this kind were injected.
+  /// Returns the number of injected faults of this kind.
   [[nodiscard]] std::uint64_t count(FaultKind kind) const { return counts_[static_cast<std::size_t>(kind)]; }
   [[nodiscard]] const FaultCounts& counts() const { return counts_; }
-  /// Replies with at least one fault.
+  /// Returns the number of replies with at least one fault.
   [[nodiscard]] std::uint64_t damaged_replies() const { return damaged_replies_; }
 
  private:
@@ -80,15 +81,16 @@ class FaultyDevice final : public Machine<std::uint8_t> {
   FaultCounts counts_{};
   std::uint64_t damaged_replies_ = 0;
 
-  std::vector<std::uint8_t> request_;  // since the last reply
+  std::vector<std::uint8_t> request_;  // bytes received since the last reply
   std::vector<std::uint8_t> reply_;
-  std::vector<std::uint8_t> heard_;  // what the device is told
-  bool misheard_ = false;            // the request was changed: the device may answer while the host still sends
-  bool deaf_ = false;                // a stretched reply, or one to a changed request, is pending or going on
-  Time unheard_at_ = -std::chrono::hours(1);  // the last byte that came while it was deaf
-  Time device_gap_{};                         // the pause after which the device takes a request for ended
-  Time silent_until_ = never;                 // a suppressed reply counts as sent then
-  Time device_timer_ = never;                 // what the device itself waits for
+  std::vector<std::uint8_t> heard_;  // bytes passed on to the device
+  bool misheard_ = false;            // the request was damaged, so the device may answer while the host still sends
+  bool deaf_ = false;  // the device receives nothing: a stretched reply, or one to a damaged request, is pending or
+                       // being sent
+  Time unheard_at_ = -std::chrono::hours(1);  // time of the last byte received while `deaf_`
+  Time device_gap_{};                         // pause after which the device considers a request complete
+  Time silent_until_ = never;                 // time at which a suppressed reply counts as sent
+  Time device_timer_ = never;                 // time of the timer that the device requested
 };
 
 }  // namespace absenc::sim

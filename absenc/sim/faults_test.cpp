@@ -24,13 +24,14 @@ using StepKind = Step<std::uint8_t>::Kind;
 const ByteVector request{0x32, 0x05};
 const ByteVector reply{0x11, 0x22, 0x33, 0x44};
 
-// Answers every two bytes 3 us later, and writes down what it hears while it sends or is about to.
+// Answers every two bytes 3 us later, and counts the bytes received while it sends or is about to send.
 class Device final : public Machine<std::uint8_t> {
  public:
   void feed(const Event<std::uint8_t>& event) override {
     if (event.kind == Kind::sent) sending = false;
     if (event.kind == Kind::timer) ++timers;
-    if (event.kind == Kind::silence && sending) ++violations;  // of the carrier: none is told during a transfer
+    // by the port: it must not report `silence` during a transfer
+    if (event.kind == Kind::silence && sending) ++violations;
     if (event.kind != Kind::received) return;
     if (sending) ++violations;
     heard.insert(heard.end(), event.items.begin(), event.items.end());
@@ -74,7 +75,7 @@ class Host final : public Machine<std::uint8_t> {
   Time first_at{};
 };
 
-// 1 Mbps: a character takes 10 us.
+// At 1 Mbps a character of 10 bits takes 10 us.
 struct Faults : testing::Test {
   Device device;
   Host host;
@@ -89,7 +90,7 @@ struct Faults : testing::Test {
     line.attach(Role::device, *faulty);
     node = line.attach(Role::host, host);
   }
-  // What comes back for one request.
+  // Sends one request and returns the bytes received within 1 ms.
   ByteVector ask() {
     host.heard.clear();
     host.ask = true;
@@ -180,7 +181,7 @@ TEST_F(Faults, GarbageComesBeforeTheReply) {
 
 TEST_F(Faults, SilentDeviceGoesOn) {
   damage(FaultKind::silence);
-  device.timer_at = microseconds(500);  // its own timers still come
+  device.timer_at = microseconds(500);  // timers of the device still run
   EXPECT_TRUE(ask().empty());
   EXPECT_FALSE(device.sending);
   EXPECT_EQ(device.timers, 1);
@@ -198,7 +199,7 @@ TEST_F(Faults, RequestCorruptReachesTheDeviceOnly) {
   EXPECT_EQ(faulty->count(FaultKind::request_corrupt), 2u);
 }
 
-// The host asks again after 150 us: in the middle of the delay. The device must not call that a broken rule.
+// The host's next request after 150 us falls into the delay. The device must not count that as a violation by the host.
 TEST_F(Faults, StretchedReplyIsNotTheHostsFault) {
   damage(FaultKind::delay);
   for (const FaultKind kind : {FaultKind::delay, FaultKind::repeat}) {
@@ -218,7 +219,7 @@ TEST_F(Faults, StretchedReplyIsNotTheHostsFault) {
   EXPECT_EQ(device.violations, 0);
 }
 
-// The device takes half of a misheard request for a whole one and answers while the host still sends.
+// The device takes half of a damaged request for a whole one and answers while the host still sends.
 TEST_F(Faults, MisheardRequestIsNotTheHostsFault) {
   damage(FaultKind::request_corrupt);
   host.asked = {1, 2, 3, 4};
@@ -239,7 +240,7 @@ TEST_F(Faults, RequestWhoseBeginningIsNotHeardIsNotHeardAtAll) {
   }
   line.run_until(microseconds(1000));
   EXPECT_EQ(device.heard.size(), 2u);
-  EXPECT_EQ(ask().size(), 8u);  // and the next one is answered again
+  EXPECT_EQ(ask().size(), 8u);  // the next request is answered again
 }
 
 TEST_F(Faults, EarlyRequestIsTheHostsFault) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A virtual node of a CAN bus that misbehaves on request: damages the frames that a device sends, and what it hears.
+// A virtual CAN node with injected faults: damages the frames that a device sends and those that it receives.
 #pragma once
 
 #include <deque>
@@ -8,10 +8,10 @@
 
 namespace absenc::sim {
 
-/// Stands between the bus and a device, which must outlive it. The faults are those of FaultRates, a frame in the place
-/// of a reply: `drop` loses the last byte of one, `truncate` any number of them, `echo` sends what was heard last,
-/// `garbage` a frame of random identifier and data before it. The checksum of CAN lets none of that through on a wire:
-/// it is what a node with a mistake in its program sends.
+/// A machine between the CAN bus and a device; `device` must outlive it. The faults are those of FaultRates with a
+/// frame in place of a reply: `drop` removes the last byte of a frame, `truncate` any number of bytes, `echo` sends the
+/// last received frame, `garbage` sends a frame of random identifier and data first. On a real bus the CAN checksum
+/// would discard frames damaged on the wire: these faults model a node with faulty software.
 class FaultyNode final : public Machine<CanFrame> {
  public:
   FaultyNode(Machine<CanFrame>& device, const FaultRates& rates, std::uint64_t seed);
@@ -19,11 +19,11 @@ class FaultyNode final : public Machine<CanFrame> {
   void feed(const Event<CanFrame>& event) override;
   Step<CanFrame> next(Time now) override;
 
-  /// From the next frame on.
+  /// Sets the rates, from the next frame on.
   void set_rates(const FaultRates& rates) { rates_ = rates; }
-  /// How many faults of each kind were injected.
+  /// Returns the number of injected faults of each kind.
   [[nodiscard]] const FaultCounts& counts() const { return counts_; }
-  /// Frames with at least one fault.
+  /// Returns the number of frames with at least one fault.
   [[nodiscard]] std::uint64_t damaged_frames() const { return damaged_; }
 
  private:

@@ -16,7 +16,7 @@ using StepKind = Step<CanFrame>::Kind;
 const CanFrame request{.id = 0x220, .size = 8, .data = {0x80, 0x20}};
 const CanFrame answer{.id = 0x120, .size = 8, .data = {0x47, 0x26}};
 
-/// One request to a device that answers each; what comes of it.
+/// Outcome of one request to a device that answers every request.
 struct Result {
   std::vector<CanFrame> frames;
   Time at{};

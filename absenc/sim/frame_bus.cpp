@@ -64,7 +64,7 @@ void FrameBus::serve(Node& node, Time now) {
         break;
       case FrameStep::Kind::configure:
         node.rate = step.rate;
-        // A bus has the rate of those on it: it changes when the last of them has.
+        // The bus changes its rate when the last of its nodes has changed to the new rate.
         if (std::all_of(nodes_.begin(), nodes_.end(), [&](const Node& one) { return one.rate == node.rate; })) {
           rate_ = node.rate;
           configuring_ = true;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Several nodes on one CAN bus as one machine, for a carrier that knows no bits: an adapter, or a virtual interface.
+// Combines several nodes on one CAN bus into one machine, for a port that does not simulate bits: an adapter or a
+// virtual interface.
 #pragma once
 
 #include <deque>
@@ -9,12 +10,13 @@
 
 namespace absenc::sim {
 
-/// Every node hears what comes, and what the others send. Without bits there is no arbitration and no collision: what
-/// is due at the same time goes out by identifier, and two frames of one identifier one after the other. A node whose
-/// `configure` asks for another bit rate than the carrier has hears nothing and is not heard.
+/// Several nodes on one CAN bus, without bit timing. Every node receives the host's frames and those of the other
+/// nodes. Arbitration and collisions are not simulated: frames that are due at the same time are sent by identifier,
+/// and two frames of one identifier one after the other. A node whose `configure` step requests another bit rate than
+/// the bus has neither receives nor sends.
 class FrameBus final : public Machine<CanFrame> {
  public:
-  /// The nodes must outlive the bus. `rate`: of the carrier, until the first node changes it.
+  /// `nodes` must outlive the bus. `rate` is the bit rate of the port, until the first node changes it.
   FrameBus(const std::vector<Machine<CanFrame>*>& nodes, std::uint32_t rate);
 
   void feed(const Event<CanFrame>& event) override;
@@ -23,7 +25,7 @@ class FrameBus final : public Machine<CanFrame> {
  private:
   enum class Doing : std::uint8_t {
     waiting,
-    pending,  // has something to send
+    pending,  // has a frame that has not begun
     sending,
     done,
   };
@@ -32,8 +34,8 @@ class FrameBus final : public Machine<CanFrame> {
     std::uint32_t rate;
     Doing doing = Doing::waiting;
     Time timer = never;
-    Time at{};                   // pending: when it begins
-    std::deque<CanFrame> out{};  // pending, sending
+    Time at{};                   // pending: time at which the frame begins
+    std::deque<CanFrame> out{};  // pending, sending: frames not yet sent
   };
 
   void serve(Node& node, Time now);
@@ -43,7 +45,7 @@ class FrameBus final : public Machine<CanFrame> {
   std::vector<Node> nodes_;
   std::uint32_t rate_;
   bool configuring_ = false;
-  Node* sender_ = nullptr;  // whose first frame is on its way
+  Node* sender_ = nullptr;  // node whose first frame is being sent
   CanFrame out_{};
 };
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A way between host and line that holds up what comes: a USB hiccup, a network. It keeps the order, and virtual time.
+// A port that delays received items, like a USB hiccup or a network. It keeps their order and runs in virtual time.
 #pragma once
 
 #include <algorithm>
@@ -15,7 +15,7 @@ namespace absenc::sim::testing {
 template <class Item>
 class LatePort final : public Port<Item> {
  public:
-  /// `delay()`: of what comes next, `never` if it is lost; it is asked once for each reply.
+  /// `delay` is called once per reply and returns its delay, or `never` if the reply is lost.
   LatePort(SimPort<Item>& inner, std::function<Time()> delay) : inner_(&inner), delay_(std::move(delay)) {}
 
   Time now() override {
@@ -26,7 +26,7 @@ class LatePort final : public Port<Item> {
 
   void begin(const Step<Item>& step) override {
     if (step.kind == Step<Item>::Kind::transfer || step.kind == Step<Item>::Kind::pulse) {
-      // The line may be behind this end: what is sent is sent now.
+      // The line's time may be behind this port's time: the transfer begins now.
       rest(std::max(time_, step.at));
       quiet_since_ = time_;
       heard_ = silence_told_ = false;
@@ -65,7 +65,7 @@ class LatePort final : public Port<Item> {
     }
   }
 
-  /// Nobody listens until then.
+  /// Advances the time to `until`; items received meanwhile are delivered later.
   void rest(Time until) {
     while (time_ < until) {
       const Event<Item> event = inner_->wait({.at = until});
@@ -102,7 +102,7 @@ class LatePort final : public Port<Item> {
   Time late_{};
   bool heard_ = false;
   bool silence_told_ = false;
-  bool answering_ = false;  // something has come since the last request
+  bool answering_ = false;  // an item was received since the last request
 };
 
 }  // namespace absenc::sim::testing

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The heart of sim::Line: serves machines, keeps the time and its deadlines. What the wires do: line_wires.cpp.
+// Main part of sim::Line: serves the machines, keeps the time and the deadlines. The wires are in line_wires.cpp.
 #include "absenc/sim/line.hpp"
 
 #include <algorithm>
@@ -78,7 +78,7 @@ bool Line<Item>::done(Node node) const {
   return nodes_[node]->done;
 }
 
-// The node whose timer or silence comes first.
+// Returns the node whose timer or silence is due first.
 template <class Item>
 auto Line<Item>::next_deadline() const -> Node {
   Node first = 0;
@@ -118,7 +118,7 @@ bool Line<Item>::step() {
   const Time time = next_event();
   if (time == never) return false;
   now_ = time;
-  // At one time deadlines come after what ends then (a character has arrived) and before the arbitration.
+  // At equal times deadlines come after events that end then (a character has arrived) and before the arbitration.
   const Node late = next_deadline();
   if (happenings_.empty() || happenings_.top().at > time ||
       (happenings_.top().kind == Kind::arbitrate && nodes_[late]->due == time)) {
@@ -142,7 +142,7 @@ bool Line<Item>::step() {
     case Kind::finished:
       if (current) finish(node);
       break;
-    case Kind::frame:  // the bus is free again even when the sender is gone
+    case Kind::frame:  // the bus becomes free even if the sender was replaced
       frame_on_bus_ = false;
       if (current) end_frame(node);
       schedule(Kind::arbitrate, now_, node);
@@ -176,7 +176,7 @@ void Line<Item>::feed(Node node, const Event<Item>& event) {
   serve(node);
 }
 
-// Asks the machine for steps until it waits.
+// Takes steps from the machine until it waits.
 template <class Item>
 void Line<Item>::serve(Node node) {
   using Kind = typename Step<Item>::Kind;
@@ -204,14 +204,14 @@ void Line<Item>::serve(Node node) {
         break;
     }
   }
-  state.due = never;  // done: nothing wakes it any more
+  state.due = never;  // the machine is done: no later event wakes it
 }
 
-// A transfer or pulse: now, or when its time has come.
+// Accepts a transfer or pulse; it begins now or at its time.
 template <class Item>
 void Line<Item>::take_up(Node node, const Step<Item>& step) {
   State& state = *nodes_[node];
-  // A device asked by chip select or clock answers into the transfer that is going on.
+  // A device selected by chip select or clock answers into the transfer in progress.
   const bool driven = state.role == Role::device && step.kind == Step<Item>::Kind::transfer &&
                       (kind_ == LinkKind::spi || kind_ == LinkKind::clocked);
   if (!driven && state.doing != Step<Item>::Kind::wait) {
@@ -229,7 +229,8 @@ void Line<Item>::take_up(Node node, const Step<Item>& step) {
   state.hold_low = step.hold_low;
   state.taken_up = now_;
   ++state.begin_generation;
-  // Not at once: whoever else is asked or attached at this time comes first, in whatever order.
+  // Scheduled instead of begun at once, so that every node served or attached at this time is handled first, in any
+  // order.
   if (!driven) schedule(ScheduledEvent::Kind::begin, step.at, node);
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A line in virtual time with any number of machines on it: every kind of link, exact to the nanosecond.
+// A line in virtual time with any number of machines attached: every kind of link, exact to the nanosecond.
 #pragma once
 
 #include <cstdint>
@@ -15,23 +15,24 @@ namespace absenc::sim {
 
 enum class Role : std::uint8_t { host, device };
 
-/// One shared line. Hosts and devices are machines of the same kind; the role only tells who is master where the
-/// wire has one (SPI, clocked, pulses) and which pair a full-duplex node drives.
+/// One shared line. Hosts and devices are machines of the same kind; the role only decides who drives the clock (SPI,
+/// clocked) and the pulses, and which pair a full-duplex node drives.
 ///
-/// Characters that overlap on one pair reach everybody as the AND of both (an idle line is high); a receiver sees
-/// those that begin during another as part of that one. CAN frames are arbitrated by identifier; the same identifier
-/// with other data is a `line_error` for everybody. A node hears its own characters only with `set_echo`, then
-/// before their `sent`. A machine that begins a transfer during another one of its own is a std::logic_error.
+/// Characters that overlap on one pair reach every receiver as the AND of both (an idle line is high); a receiver sees
+/// those that begin during another character as part of that one. CAN frames are arbitrated by identifier; the same
+/// identifier with other data is a `line_error` for every node. A node receives its own characters only with
+/// `set_echo`, then before their `sent`. A machine that begins a transfer during another one of its own causes a
+/// std::logic_error.
 template <class Item>
 class Line {
  public:
   using Node = std::size_t;
-  /// Called at an `emit` step; returns whether the node goes on (false: it is treated as done).
+  /// Called at an `emit` step. Returns whether the node continues; false: it is treated as done.
   using OnEmit = std::function<bool()>;
-  /// Called for every character or CAN frame that was on the wire, at its end.
+  /// Called at the end of every character or CAN frame on the wire.
   using Observer = std::function<void(Node sender, Time start, Time end, const Item& item)>;
-  /// Of SPI bytes or of `bits` clocks: what the host sent and what it received, the last byte left-aligned. `lead` is
-  /// the time from `start`, when the chip was selected, to the first clock.
+  /// One transfer of SPI bytes or of `bits` clocks: the items that the host sent and received, the last byte
+  /// left-aligned. `lead` is the time from `start`, when the chip was selected, to the first clock.
   struct Transfer {
     Time start;
     Time end;
@@ -39,12 +40,12 @@ class Line {
     std::span<const Item> out;
     std::span<const Item> in;
     Time lead{};
-    Time held_low = never;  // clocked: since when the clock line was held low before `start`; never: it was idle
-    Time low_after{};       // clocked: from the last edge of the clock the device drives the data line low for so long
+    Time held_low = never;  // clocked: time from which the clock line was held low before `start`; never: it was idle
+    Time low_after{};       // clocked: time for which the device drives the data line low after the last clock edge
   };
-  /// Called for every transfer of SPI or clocked bits, at its end.
+  /// Called at the end of every transfer of SPI bytes or clocked bits.
   using TransferObserver = std::function<void(const Transfer& transfer)>;
-  /// Called for every pulse, at its beginning.
+  /// Called at the beginning of every pulse.
   using PulseObserver = std::function<void(ExtraWire wire, Time start, Time end)>;
 
   Line(LinkKind kind, LineSettings settings);
@@ -52,11 +53,11 @@ class Line {
   Line(const Line&) = delete;
   Line& operator=(const Line&) = delete;
 
-  /// `machine` must outlive the line or be replaced. It is asked for its first step at once.
+  /// Attaches a machine and takes its first step at once. `machine` must outlive the line or be replaced.
   Node attach(Role role, Machine<Item>& machine, const OnEmit& on_emit = {});
-  /// The node goes on with another machine, from now. What the old one was still sending is cut off.
+  /// Gives the node another machine, from now on. A transfer of the old machine is cut off.
   void replace(Node node, Machine<Item>& machine);
-  /// Asks the machine for its next step, after something other than an event has changed it.
+  /// Takes the machine's next step, after something other than an event has changed it.
   void wake(Node node);
   void set_echo(Node node, bool echo);
   void observe(Observer observer);
@@ -66,16 +67,16 @@ class Line {
   [[nodiscard]] Time now() const { return now_; }
   [[nodiscard]] Role role(Node node) const;
   [[nodiscard]] bool done(Node node) const;
-  /// Observers were told everything that has begun before this time.
+  /// Returns the time before which all items that began were reported to the observers.
   [[nodiscard]] Time settled() const;
-  /// Time of the next event, or `never`.
+  /// Returns the time of the next event, or `never`.
   [[nodiscard]] Time next_event() const;
 
-  /// Handles the next event and advances `now` to it. False when there is none.
+  /// Handles the next event and advances `now` to it. Returns false if no event is scheduled.
   bool step();
-  /// Handles everything up to and including `limit`; then `now` is `limit`.
+  /// Handles all events up to and including `limit`; then `now` is `limit`.
   void run_until(Time limit);
-  /// Until the node is done. False when `limit` came first or nothing is left to happen.
+  /// Runs until the node is done. Returns false when `limit` is reached first or no event is left.
   bool run(Node node, Time limit = never);
 
  private:
@@ -83,12 +84,12 @@ class Line {
   struct ScheduledEvent {
     enum class Kind : std::uint8_t { begin, character, frame, transferred, finished, arbitrate } kind;
     Time at;
-    std::uint64_t order;  // the first scheduled comes first
+    std::uint64_t order;  // events of the same time are handled in the order in which they were scheduled
     Node node;
-    std::uint64_t generation;  // void when the node has moved on
+    std::uint64_t generation;  // the event is ignored if the node has begun another transfer since
     bool operator>(const ScheduledEvent& other) const {
       if (at != other.at) return at > other.at;
-      // Everybody who begins a CAN frame at that time takes part.
+      // All nodes that begin a CAN frame at this time take part in the arbitration, so it comes last.
       if ((kind == Kind::arbitrate) != (other.kind == Kind::arbitrate)) return kind == Kind::arbitrate;
       return order > other.order;
     }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What tests/shape_test.cpp does not need of sim::Line.
+// Tests of sim::Line for behaviour that tests/shape_test.cpp does not cover.
 #include "absenc/sim/line.hpp"
 #include "absenc/sim/can_bits.hpp"
 
@@ -17,7 +17,7 @@ namespace {
 using std::chrono::microseconds;
 using Byte = std::uint8_t;
 
-// Does one step when it is asked, and waits otherwise.
+// Returns the step in `todo` once, and waits otherwise.
 class Puppet final : public Machine<Byte> {
  public:
   void feed(const Event<Byte>& event) override {
@@ -75,7 +75,7 @@ TEST_F(LineTest, ReplaceAfterDone) {
   line.wake(host_node);
   EXPECT_TRUE(line.done(host_node));
   host.todo = send_two;
-  line.wake(host_node);  // a machine that is done is not asked again
+  line.wake(host_node);  // a machine that is done is not asked for further steps
   EXPECT_EQ(line.next_event(), never);
   line.replace(host_node, host);
   EXPECT_FALSE(line.done(host_node));
@@ -120,12 +120,12 @@ TEST(FullDuplex, EachDirectionIsAWireOfItsOwn) {
   line.attach(Role::device, another);
   line.attach(Role::host, host);
   line.run_until(microseconds(100));
-  EXPECT_EQ(items, "0:0 2:6 1:0 0:2 1:2 ");  // the devices' bytes are ANDed, the host's is whole
+  EXPECT_EQ(items, "0:0 2:6 1:0 0:2 1:2 ");  // bytes of the two devices are ANDed, the byte of the host is intact
   EXPECT_EQ(host.log, "10000 received 10000 sent 20000 received ");
-  EXPECT_EQ(one.log, "10000 received 20000 sent ");  // of the host, not of the other device
+  EXPECT_EQ(one.log, "10000 received 20000 sent ");  // received from the host, not from the other device
 }
 
-// Sends one frame when its timer comes, or at a time.
+// Sends one frame when its timer expires, or at a set time.
 class CanPuppet final : public Machine<CanFrame> {
  public:
   CanPuppet(std::uint32_t id, Time at, bool by_timer) : frame_{.id = id}, at_(at), by_timer_(by_timer) {}
@@ -153,7 +153,8 @@ class CanPuppet final : public Machine<CanFrame> {
 struct CanLine : testing::Test {
   Line<CanFrame> line{LinkKind::can, {.rate = 1'000'000}};
   CanPuppet host{0, microseconds(1'000'000), false};
-  // "57000 4 ": the end of a frame that began so many us after the start, and its identifier.
+  // Returns for example "57000 4 ": the end, in ns, of a frame that began `after` us after the start, and its
+  // identifier.
   static std::string seen(std::uint32_t id, std::size_t after) {
     return std::to_string((after + length(id)) * 1000) + ' ' + std::to_string(id) + ' ';
   }

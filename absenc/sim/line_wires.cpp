@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What happens on the wires of sim::Line: characters, SPI transfers, clocked bits, CAN frames, pulses.
+// The wires of sim::Line: characters, SPI transfers, clocked bits, CAN frames, pulses.
 #include <algorithm>
 #include <stdexcept>
 #include <type_traits>
@@ -12,14 +12,16 @@ namespace absenc::sim {
 
 namespace {
 
-// A UART samples the stop bit in its middle: two clocks that differ by more than 5 % no longer understand each other.
+// Returns whether two UART settings are compatible. A UART samples the stop bit in its middle, so two clocks may differ
+// by at most 5 %.
 bool understand(const LineSettings& a, const LineSettings& b) {
   const std::uint64_t larger = std::max(a.rate, b.rate);
   const std::uint64_t difference = larger - std::min(a.rate, b.rate);
   return difference * 20 <= larger && a.parity == b.parity;
 }
 
-// The arbitration field as a number: 11 identifier bits, RTR or SRR, IDE, 18 identifier bits, RTR. The lower one wins.
+// Returns the arbitration field as a number: 11 identifier bits, RTR or SRR, IDE, 18 identifier bits, RTR. The lower
+// number wins.
 std::uint32_t arbitration_field(const CanFrame& frame) {
   const std::uint32_t remote = frame.remote ? 1 : 0;
   if (!frame.extended) return frame.id << 21 | remote << 20;
@@ -77,7 +79,7 @@ void Line<Item>::begin_characters(Node node) {
   frame_character(node);
 }
 
-// Every receiver that is idle takes the character that begins now as its own.
+// Synchronises every idle receiver to the character that begins now.
 template <class Item>
 void Line<Item>::frame_character(Node sender) {
   for (const auto& receiver : nodes_) {
@@ -110,7 +112,7 @@ void Line<Item>::end_character(Node node) {
     if (!hears(receiver, sender)) continue;
     if (receiver.framed_sender == node && receiver.framed_from == from) {
       hear(other, node, item, false);
-    } else {  // part of another sender's character, but no silence either
+    } else {  // part of another sender's character, but not silence either
       receiver.silence.busy(now_);
       if (!receiver.done) arm(receiver);
     }
@@ -129,7 +131,7 @@ void Line<Item>::hear(Node node, Node sender, const Item& item, bool garbled) {
   }
 }
 
-// SPI and clocked links: the host's transfer moves everything at once; only its duration is simulated.
+// Begins a transfer on an SPI or clocked link: all items move at once, and only the duration is simulated.
 template <class Item>
 void Line<Item>::begin_transfer(Node node) {
   State& host = *nodes_[node];
@@ -152,7 +154,7 @@ template <class Item>
 void Line<Item>::end_transfer(Node node) {
   if constexpr (std::is_same_v<Item, std::uint8_t>) {
     State& host = *nodes_[node];
-    std::vector<Item> in(host.expect, 0xFF);  // nobody drives: pulled up
+    std::vector<Item> in(host.expect, 0xFF);  // a line that no device drives is pulled up
     Time low_after{};
     for (const auto& other : nodes_) {
       if (other->role == Role::host) continue;
@@ -184,7 +186,7 @@ void Line<Item>::end_transfer(Node node) {
   }
 }
 
-// The pending frame with the lowest arbitration field takes the bus when it is idle.
+// Gives the idle bus to the pending frame with the lowest arbitration field.
 template <class Item>
 void Line<Item>::arbitrate() {
   if constexpr (std::is_same_v<Item, CanFrame>) {
@@ -213,8 +215,9 @@ void Line<Item>::end_frame(Node node) {
     State& sender = *nodes_[node];
     const CanFrame frame = sender.out[sender.index];
     if (observer_) observer_(node, sender.start, now_, frame);
-    // Who began with the same arbitration field sent at the same time: unnoticed when all the rest was the same too,
-    // otherwise no frame survives. Nobody repeats it: the clash would never end.
+    // Nodes that began with the same arbitration field sent at the same time. If the rest of the frames is equal too,
+    // none of the nodes notices; otherwise all frames are lost. No node repeats its frame, because the clash would
+    // never end.
     std::vector<Node> senders;
     bool clash = false;
     for (Node other = 0; other < nodes_.size(); ++other) {
@@ -234,7 +237,7 @@ void Line<Item>::end_frame(Node node) {
   }
 }
 
-// line.cpp instantiates the class; these are the members it does not see.
+// line.cpp instantiates the class; these members are defined here and must be instantiated explicitly.
 template void Line<std::uint8_t>::begin(Node);
 template bool Line<std::uint8_t>::hears(const State&, const State&) const;
 template bool Line<std::uint8_t>::busy_towards(const State&) const;

@@ -18,15 +18,15 @@ namespace absenc::sim {
 
 namespace {
 
-constexpr double revolution = 4294967296.0;  // 2^32 position units
+constexpr double revolution = 4294967296.0;  // position units per revolution, 2^32
 
 struct Quotient {
   std::uint64_t whole;
   std::uint64_t remainder;
 };
 
-// a * b / divisor with a product of 128 bits, which standard C++ has no type for: long multiplication modulo the
-// divisor, one bit of b at a time. The divisor is below 2^63; `whole` wraps as a position does.
+// Returns a * b / divisor, whose 128-bit product has no type in standard C++: long multiplication modulo the divisor,
+// one bit of b at a time. The divisor is below 2^63; `whole` wraps as a position does.
 Quotient multiply_divide(std::uint64_t a, std::uint64_t b, std::uint64_t divisor) {
   const std::uint64_t a_whole = a / divisor;
   const std::uint64_t a_remainder = a % divisor;
@@ -52,7 +52,7 @@ std::uint64_t magnitude(std::int64_t value) {
   return value < 0 ? 0 - static_cast<std::uint64_t>(value) : static_cast<std::uint64_t>(value);
 }
 
-// a * b / divisor, rounded towards zero.
+// Returns a * b / divisor, rounded towards zero.
 std::int64_t scale(std::int64_t a, std::int64_t b, std::uint64_t divisor) {
   const std::uint64_t whole = multiply_divide(magnitude(a), magnitude(b), divisor).whole;
   return static_cast<std::int64_t>((a < 0) != (b < 0) ? 0 - whole : whole);
@@ -63,7 +63,7 @@ std::int32_t saturated(double value) {
   return static_cast<std::int32_t>(std::lround(std::clamp(value, -limit, limit)));
 }
 
-// A number and nothing else.
+// Parses text that is exactly one number, with blanks around it allowed.
 std::optional<double> number(std::string_view text) {
   const auto first = text.find_first_not_of(" \t\r");
   if (first == std::string_view::npos) return {};
@@ -88,7 +88,8 @@ std::optional<Motion::Knot> knot(std::string_view line) {
   if (comma == std::string_view::npos) return {};
   const auto seconds = number(line.substr(0, comma));
   const auto degrees = number(line.substr(comma + 1));
-  // 4e9 s are 126 years, 3.8e11 degrees a little less than 2^30 revolutions: differences of two do not overflow.
+  // Limits: 4e9 s are 126 years, 3.8e11 degrees a little less than 2^30 revolutions, so a difference of two cannot
+  // overflow.
   if (!seconds || !degrees || std::abs(*seconds) > 4e9 || std::abs(*degrees) > 3.8e11) return {};
   return Motion::Knot{Time(std::llround(*seconds * 1e9)), std::llround(*degrees / 360 * revolution)};
 }
@@ -112,7 +113,7 @@ Motion Motion::sine(std::int64_t start, double amplitude_degrees, double frequen
 
 Motion Motion::path(std::int64_t start, std::istream& csv, std::string_view name) {
   constexpr std::size_t longest_line = 1024;
-  constexpr std::size_t most_knots = 4'000'000;  // an hour, a thousand a second
+  constexpr std::size_t most_knots = 4'000'000;  // one hour with a thousand points per second
   Path path;
   std::array<char, longest_line + 1> buffer;
   bool heading_allowed = true;
@@ -150,7 +151,7 @@ ShaftState Motion::at(Time time) const {
 ShaftState Motion::offset_at(const Still&, Time) { return {}; }
 
 ShaftState Motion::offset_at(const ConstantSpeed& speed, Time time) {
-  // micro_rpm * ns * 2^32 / (60 * 1e6 * 1e9), with 2^17 cancelled.
+  // position = micro_rpm * ns * 2^32 / (60 * 1e6 * 1e9), both sides divided by 2^17.
   constexpr std::int64_t numerator = std::int64_t{1} << 15;
   constexpr std::uint64_t denominator = 457'763'671'875;  // 60e15 / 2^17
   return {scale(speed.micro_rpm * numerator, time.count(), denominator),
@@ -158,13 +159,13 @@ ShaftState Motion::offset_at(const ConstantSpeed& speed, Time time) {
 }
 
 ShaftState Motion::offset_at(const Sine& sine, Time time) {
-  // Whole periods are dropped exactly, so that the phase is as good after a day as at the start.
-  constexpr std::uint64_t one_period = 1'000'000'000'000'000;  // micro-hertz * ns
+  // Whole periods are removed exactly, so that the phase is as accurate after a day as at the start.
+  constexpr std::uint64_t one_period = 1'000'000'000'000'000;  // unit: micro-hertz * ns
   const auto phase = multiply_divide(sine.micro_hertz, magnitude(time.count()), one_period).remainder;
   const double turn = static_cast<double>(phase) / static_cast<double>(one_period);
   const double angle = 2 * std::numbers::pi * (time.count() < 0 ? -turn : turn);
-  const double angular = 2 * std::numbers::pi * static_cast<double>(sine.micro_hertz) / 1e6;  // rad/s of the phase
-  const double speed = sine.amplitude * angular * std::cos(angle);                            // revolutions a second
+  const double angular = 2 * std::numbers::pi * static_cast<double>(sine.micro_hertz) / 1e6;  // rad/s
+  const double speed = sine.amplitude * angular * std::cos(angle);                            // revolutions per second
   const double acceleration = -sine.amplitude * angular * angular * std::sin(angle);
   return {std::llround(sine.amplitude * std::sin(angle) * revolution), saturated(speed * 60e3),
           saturated(acceleration * 2 * std::numbers::pi)};

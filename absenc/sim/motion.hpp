@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// How a virtual encoder's shaft moves: still, at constant speed, as a sine, or as a file says.
+// Motion of a virtual encoder's shaft: still, at constant speed, as a sine, or along a path from a file.
 #pragma once
 
 #include <cstdint>
@@ -12,29 +12,30 @@
 
 namespace absenc::sim {
 
-/// A value: copies move alike and independently. Positions are in 2^-32 revolution and have no error that grows
-/// with time. After 2^31 revolutions the position wraps.
+/// A shaft motion as a value: copies move alike and independently. Positions are in 2^-32 revolution and have no error
+/// that grows with time. After 2^31 revolutions the position wraps.
 class Motion final : public Shaft {
  public:
-  /// A point of a path: where the shaft is, relative to the start position, at that time.
+  /// A point of a path: position of the shaft at `time`, relative to the start position.
   struct Knot {
     Time time;
     std::int64_t position;
   };
 
   [[nodiscard]] static Motion still(std::int64_t start);
-  /// -1 000 000 to 1 000 000 revolutions a minute, kept to 1e-6. Throws std::invalid_argument when outside.
+  /// Returns a motion at -1 000 000 to 1 000 000 revolutions per minute, rounded to 1e-6. Throws std::invalid_argument
+  /// outside this range.
   [[nodiscard]] static Motion constant_speed(std::int64_t start, double rpm);
-  /// start + amplitude * sin(2 pi frequency t): up to 36 000 000 degrees and 10 000 Hz, kept to 1e-6 Hz.
-  /// Throws std::invalid_argument when outside.
+  /// Returns the motion start + amplitude * sin(2 pi frequency t): up to 36 000 000 degrees and 10 000 Hz, rounded to
+  /// 1e-6 Hz. Throws std::invalid_argument outside this range.
   [[nodiscard]] static Motion sine(std::int64_t start, double amplitude_degrees, double frequency_hz);
-  /// Straight lines between `seconds,degrees` (relative to `start`), one a line, seconds rising; standing still before
-  /// the first and after the last. Lines that begin with # are skipped, and a heading. Throws std::invalid_argument
-  /// with `name` and the line that is wrong.
+  /// Returns a motion in straight lines between points `seconds,degrees` (degrees relative to `start`), one point per
+  /// line, seconds rising. The shaft stands still before the first and after the last point. A heading and lines that
+  /// begin with # are skipped. Throws std::invalid_argument with `name` and the number of the invalid line.
   [[nodiscard]] static Motion path(std::int64_t start, std::istream& csv, std::string_view name);
 
-  /// Lets the shaft stand at its start until then, and move behind it; 0 if this is not called, before which it moves
-  /// too.
+  /// Keeps the shaft at its start position until `time`, and starts the motion then. Without this call the motion has
+  /// its phase 0 at time 0 and also runs before it.
   void begin_at(Time time) {
     begin_ = time;
     rests_before_ = true;
@@ -48,11 +49,11 @@ class Motion final : public Shaft {
     std::int64_t micro_rpm;
   };
   struct Sine {
-    double amplitude;  // revolutions
+    double amplitude;  // amplitude in revolutions
     std::uint64_t micro_hertz;
   };
   struct Path {
-    std::vector<Knot> knots;  // at least one
+    std::vector<Knot> knots;  // at least one point
   };
   using Kind = std::variant<Still, ConstantSpeed, Sine, Path>;
 
@@ -68,8 +69,8 @@ class Motion final : public Shaft {
   Kind kind_;
 };
 
-/// `still`, `rpm=R`, `sine=DEGREES,HZ` or `file=CSV` (opened and read here). Throws std::invalid_argument with a
-/// sentence that says what is wrong and what is allowed.
+/// Parses `still`, `rpm=R`, `sine=DEGREES,HZ` or `file=CSV` (the file is opened and read here). Throws
+/// std::invalid_argument with a sentence that says what is wrong and what is allowed.
 [[nodiscard]] Motion parse_motion(std::string_view text, std::int64_t start_position);
 
 }  // namespace absenc::sim

@@ -44,13 +44,13 @@ TEST(Motion, ConstantSpeedIsExactAfterADay) {
   EXPECT_EQ(motion.at(24h).speed_millirpm, 6'000'000);
   EXPECT_EQ(Motion::constant_speed(0, -6000).at(24h).position, -6000 * 60 * 24 * revolution);
   EXPECT_EQ(motion.at(-10ms).position, 7 - revolution);
-  // 1/3 rpm is kept as 0.333333: a day at it is 479.99952 revolutions.
+  // 1/3 rpm is stored as 0.333333: a day at this speed is 479.99952 revolutions.
   EXPECT_NEAR(static_cast<double>(Motion::constant_speed(0, 1.0 / 3).at(24h).position),
               479.99952 * static_cast<double>(revolution), 1.0 * count_of_23_bits);
 }
 
 TEST(Motion, ConstantSpeedWrapsInsteadOfOverflowing) {
-  const Motion motion = Motion::constant_speed(0, 1'000'000);  // 2^31 revolutions after 35.8 h
+  const Motion motion = Motion::constant_speed(0, 1'000'000);  // reaches 2^31 revolutions after 35.8 h
   const auto wrapped = static_cast<std::int64_t>(60'000'000'000u * static_cast<std::uint64_t>(revolution));
   EXPECT_EQ(motion.at(1000h).position, wrapped);
 }
@@ -60,7 +60,7 @@ TEST(Motion, BeginsWhenItIsTold) {
   motion.begin_at(5s);
   EXPECT_EQ(motion.at(3s).position, 0);
   EXPECT_EQ(motion.at(5s).position, 0);
-  EXPECT_EQ(motion.at(5s).speed_millirpm, 0);  // an encoder that is switched on then is switched on at rest
+  EXPECT_EQ(motion.at(5s).speed_millirpm, 0);  // an encoder that is switched on at this time starts at rest
   EXPECT_EQ(motion.at(6s).position, revolution);
   EXPECT_EQ(motion.at(6s).speed_millirpm, 60'000);
 }
@@ -86,7 +86,9 @@ TEST(Motion, DerivativesAgreeWithPositions) {
       const double rpm = (after - before) / static_cast<double>(revolution) / 10e-6 * 60;
       EXPECT_NEAR(motion.at(time).speed_millirpm, rpm * 1e3, 2);
       const double radians = (after - 2 * here + before) / static_cast<double>(revolution) * 6.283185307;
-      EXPECT_NEAR(motion.at(time).acceleration, radians / 25e-12, 120);  // positions are whole units: 58 rad/s^2 each
+      EXPECT_NEAR(motion.at(time).acceleration, radians / 25e-12, 120);  // positions are whole units, so an
+                                                                         // acceleration error of up to 58 rad/s^2 per
+                                                                         // position remains
     }
   }
 }

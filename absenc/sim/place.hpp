@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Where a shaft stands, as a reading of so many bits has it.
+// Conversion of a shaft position to the counts of a reading, and comparison of readings with a position.
 #pragma once
 
 #include <optional>
@@ -9,11 +9,11 @@
 
 namespace absenc::sim {
 
-/// Counts of a turn; a linear encoder goes along its whole scale in one revolution.
+/// Returns the single-turn counts at `position`. A linear encoder covers its whole scale in one revolution.
 [[nodiscard]] constexpr std::uint64_t counts_at(std::int64_t position, unsigned bits) {
   const auto fraction = static_cast<std::uint64_t>(position) & 0xFFFF'FFFF;
   if (bits == 0) return 0;
-  // Beyond 32 bits the turns are part of it.
+  // With more than 32 bits the counts include the turns.
   return (bits <= 32 ? fraction >> (32 - bits) : static_cast<std::uint64_t>(position) << (bits - 32)) & low_mask(bits);
 }
 
@@ -21,7 +21,7 @@ namespace absenc::sim {
   return bits == 0 ? 0 : static_cast<std::uint64_t>(position >> 32) & low_mask(bits);
 }
 
-/// What of the reading holds is the place.
+/// Returns whether every valid part of `reading` agrees with `position`.
 [[nodiscard]] constexpr bool is_at(const Reading& reading, std::int64_t position) {
   if (reading.singleturn_bits != 0 && reading.singleturn_valid_bits != 0) {
     const unsigned open = reading.singleturn_bits - reading.singleturn_valid_bits;
@@ -30,7 +30,7 @@ namespace absenc::sim {
   return !reading.multiturn_valid || reading.multiturn == turns_at(position, reading.multiturn_bits);
 }
 
-/// Whether two readings say the same as far as both hold. What is not there says nothing.
+/// Returns whether two readings agree in every part that is valid in both; true if a reading is missing.
 [[nodiscard]] constexpr bool same_place(const std::optional<Reading>& one, const std::optional<Reading>& other) {
   if (!one || !other) return true;
   if (one->singleturn_valid_bits != 0 && other->singleturn_valid_bits != 0 && one->singleturn != other->singleturn) {

@@ -1,17 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
-// A tiny generator (splitmix64) with the same numbers on every platform: a failure is repeated from its seed.
+// A small pseudo-random generator (splitmix64) with the same numbers on every platform: a failure can be repeated from
+// its seed.
 #pragma once
 
 #include <cstdint>
 
 namespace absenc::sim {
 
-/// Not for secrets.
+/// Pseudo-random numbers; not for secrets.
 class Random {
  public:
   explicit constexpr Random(std::uint64_t seed) : state_(seed) {}
 
-  /// 64 random bits.
+  /// Returns 64 random bits.
   constexpr std::uint64_t next() {
     state_ += 0x9E3779B97F4A7C15;
     std::uint64_t mixed = state_;
@@ -20,15 +21,16 @@ class Random {
     return mixed ^ (mixed >> 31);
   }
 
-  /// 0 to limit - 1, each equally likely; `limit` must not be 0.
+  /// Returns a number from 0 to limit - 1, each equally likely; `limit` must not be 0.
   constexpr std::uint64_t below(std::uint64_t limit) {
-    const std::uint64_t uneven = (0 - limit) % limit;  // 2^64 mod limit: so many values would come once too often
+    const std::uint64_t uneven = (0 - limit) % limit;  // 2^64 mod limit: the lowest `uneven` values are rejected, or
+                                                       // some results would be more likely
     std::uint64_t value = next();
     while (value < uneven) value = next();
     return value % limit;
   }
 
-  /// True with this probability: 0 never, 1 always.
+  /// Returns true with this probability: 0 never, 1 always.
   constexpr bool chance(double probability) { return static_cast<double>(next() >> 11) * 0x1p-53 < probability; }
 
  private:

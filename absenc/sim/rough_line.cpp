@@ -13,7 +13,7 @@ namespace absenc::sim {
 
 namespace {
 
-// Mostly as long as what was there: nothing to allocate or to fill.
+// Copies `items` to `to`. Sizes are mostly equal, so resize rarely allocates or fills.
 template <class Item>
 void copy(std::span<const Item> items, std::vector<Item>& to) {
   to.resize(items.size());
@@ -88,7 +88,7 @@ void RoughLine<Item>::let_hear(std::span<const Item> request) {
   feed({.kind = Kind::received, .at = time_, .items = request});
 }
 
-// The host is the clock: what the device drives is there at the end.
+// Performs a transfer that the host clocks (SPI, clocked): the device's reply is complete at its end.
 template <class Item>
 void RoughLine<Item>::transfer(const Step<Item>& step) {
   if constexpr (std::is_same_v<Item, std::uint8_t>) {
@@ -122,7 +122,8 @@ Event<Item> RoughLine<Item>::wait(const Step<Item>& step) {
   for (;;) {
     Time quiet = silence_.due(step.answer, step.gap);
     const Time arrival = front_ != back_ ? held_[front_].at : never;
-    if (arrival != never && held_[front_].first <= quiet) quiet = never;  // it is being heard
+    // the item is being received, so the line is not silent
+    if (arrival != never && held_[front_].first <= quiet) quiet = never;
     const Time mine = std::min(timer, quiet);
     const Time next = due();
     if (next != never && next <= std::min(mine, arrival)) {
@@ -177,7 +178,7 @@ Event<Item> RoughLine<Item>::deliver() {
   return tell({.kind = Kind::received, .at = time_, .items = told_items_});
 }
 
-// ---- The device's side
+// ---- Device side
 
 template <class Item>
 Time RoughLine<Item>::due() const {
@@ -217,14 +218,14 @@ void RoughLine<Item>::feed(const Event<Item>& event) {
   serve_device();
 }
 
-// What the device wants, until it waits.
+// Carries out the device's steps until it waits.
 template <class Item>
 void RoughLine<Item>::serve_device() {
   while (carry_out(device_.next(time_))) {
   }
 }
 
-// Whether the device is to be asked for more.
+// Carries out one step. Returns whether the device must be asked for another one.
 template <class Item>
 bool RoughLine<Item>::carry_out(const Step<Item>& step) {
   using Kind = typename Step<Item>::Kind;
@@ -269,7 +270,7 @@ void RoughLine<Item>::hold(Time start, Time first, Time end, std::span<const Ite
   damage(held.items);
   if (host_rate_ != device_rate_) held.items.clear();
   const Time late = driven() ? Time{} : lateness();
-  // A line keeps the order.
+  // A line keeps the order of its frames.
   const Time before = back_ != front_ ? held_[back_ - 1].at : Time{};
   held.sent = start;
   held.at = std::max(end + late, before);
@@ -295,7 +296,7 @@ void RoughLine<Item>::draw_skip() {
     skip_ = 0;
     return;
   }
-  const double chance = static_cast<double>((random_.next() >> 11) + 1) * 0x1p-53;  // never 0
+  const double chance = static_cast<double>((random_.next() >> 11) + 1) * 0x1p-53;  // + 1: the chance is never 0
   skip_ = static_cast<std::uint64_t>(std::log(chance) / std::log1p(-rates_.bit));
 }
 
@@ -372,11 +373,11 @@ void RoughLine<Item>::damage(std::vector<Item>& items) {
   if (talked) talk_over(items);
   struck = struck || talked;
   if constexpr (std::is_same_v<Item, CanFrame>) {
-    if (struck) items.clear();  // the controllers see it, and nobody has the frame
+    if (struck) items.clear();  // the controllers detect the damage, and no node receives the frame
   }
   if (rates_.doubled > 0 && random_.chance(rates_.doubled) && !items.empty()) {
     double_one(items, count);
-    // On CAN the sender repeats a frame when it does not see that it was received.
+    // On CAN the sender repeats a frame when the acknowledge bit is lost.
     if constexpr (std::is_same_v<Item, CanFrame>) items.push_back(items.front());
     struck = true;
   }

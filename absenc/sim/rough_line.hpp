@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A bad line as the host's port: one device behind it, whole frames in virtual time, damaged at random on the way.
+// A host port on a bad line in virtual time: one device, whole frames, damaged at random in transit.
 #pragma once
 
 #include <cstdint>
@@ -12,64 +12,68 @@
 
 namespace absenc::sim {
 
-/// How often what is sent to the host is damaged on the way, 0 to 1: `bit` each data bit by itself, all others each
-/// frame. What a device itself does wrong is FaultRates, and stands between the device and this line.
+/// Probability, 0 to 1, of each kind of damage to data that is sent to the host: `bit` per data bit, all others per
+/// frame. Faults of the device itself are FaultRates, applied between the device and this line.
 struct RoughRates {
-  double bit = 0;      // is flipped
-  double burst = 0;    // 2 to 16 bits in a row: the first and last are flipped, those between by chance
-  double doubled = 0;  // one byte comes twice; where the host is the clock a bit, and the last one is lost
-  double talker = 0;   // somebody else sends random bytes over it, or beyond its end: what comes is the AND of both
-  double late = 0;     // it comes 10 us to 10 s late, each decade as often, and what follows not before it
+  double bit = 0;      // this bit is flipped
+  double burst = 0;    // 2 to 16 adjacent bits are damaged: the first and last are flipped, each bit between them with
+                       // probability 1/2
+  double doubled = 0;  // one byte arrives twice; where the host is the clock, one bit arrives twice and the last bit is
+                       // lost
+  double talker = 0;  // another sender sends random bytes during the frame or beyond its end; the host receives the AND
+                      // of both
+  double late = 0;  // the frame arrives 10 us to 10 s late, each decade equally likely; later frames do not overtake it
 };
 
 struct RoughCounts {
   std::uint64_t requests = 0;  // transfers and pulses of the host
-  std::uint64_t replies = 0;   // frames sent to it
-  std::uint64_t damaged = 0;   // of them, by any fault but `late`
+  std::uint64_t replies = 0;   // frames sent to the host
+  std::uint64_t damaged = 0;   // frames damaged by any fault except `late`
   std::uint64_t late = 0;
 };
 
-/// Faster than a Line, which moves characters one by one: whoever needs collisions or single characters takes that. A
-/// frame comes at its end, in one piece; between ends at different rates as a `line_error`. On CAN the controllers
-/// check: a damaged frame is a `line_error`. Clocked and SPI links have no late frames, and one rate.
+/// A damaged line that is faster than Line, which moves single characters; use Line for collisions or single
+/// characters. A frame arrives in one piece at its end; if the ends have different rates it arrives as a `line_error`.
+/// On CAN the controllers check: a damaged frame is a `line_error`. Clocked and SPI links have no late frames and only
+/// one rate.
 template <class Item>
 class RoughLine final : public Port<Item> {
  public:
   /// `device` must outlive the line. The same seed gives the same faults.
   RoughLine(LinkKind kind, LineSettings settings, Machine<Item>& device, std::uint64_t seed);
 
-  /// From the next frame on.
+  /// Sets the rates, from the next frame on.
   void set_rates(const RoughRates& rates);
 
   [[nodiscard]] Time now() override;
   void begin(const Step<Item>& step) override;
-  /// A wait for something that can never happen is a std::logic_error.
+  /// Throws std::logic_error if no event can ever end the wait.
   [[nodiscard]] Event<Item> wait(const Step<Item>& step) override;
-  /// Nobody listens until then.
+  /// Advances the time to `until` while the host is not waiting.
   void rest(Time until);
-  /// What has come and was not told is forgotten, as by a host that takes the newest only.
+  /// Discards frames that have arrived but were not reported, like a host that reads only the newest frame.
   void drop();
 
-  /// What is sent before now is old from now on.
+  /// Marks all frames sent so far as old.
   void mark();
-  /// Since when each old frame that the host was told since `mark` had been under way.
+  /// Returns the send time of each old frame that was reported to the host since `mark`.
   [[nodiscard]] std::span<const Time> old_frames() const { return old_; }
   [[nodiscard]] const RoughCounts& counts() const { return counts_; }
-  /// The last request and, of any length, what was sent for it before it was damaged.
+  /// Return the last request, and the device's reply to it (of any length) before it was damaged.
   [[nodiscard]] std::span<const Item> request() const { return request_; }
   [[nodiscard]] std::span<const Item> reply() const { return out_; }
-  /// Of the last transfer on a clocked link.
+  /// Returns the number of bits of the last transfer on a clocked link.
   [[nodiscard]] std::size_t bits() const { return bits_; }
 
  private:
-  // On its way to the host. No items: characters that cannot be read.
+  // A frame in transit to the host. No items: characters that cannot be read (a `line_error`).
   struct Held {
-    Time sent;   // when it was begun
-    Time first;  // when its first item is there
-    Time at;     // when it is whole
+    Time sent;   // time at which its transmission began
+    Time first;  // arrival time of the first item
+    Time at;     // arrival time of the whole frame
     std::vector<Item> items;
   };
-  // The device's side of the line.
+  // State of the device's end of the line.
   struct Side {
     Time answer{};
     Time gap{};
@@ -108,7 +112,7 @@ class RoughLine final : public Port<Item> {
   Random random_;
   RoughRates rates_{};
   RoughCounts counts_{};
-  std::uint64_t skip_ = ~std::uint64_t{0};  // good bits before the next that is flipped
+  std::uint64_t skip_ = ~std::uint64_t{0};  // number of good bits before the next flipped bit
 
   Time time_{};
   Time told_{};
@@ -117,14 +121,14 @@ class RoughLine final : public Port<Item> {
   std::uint32_t device_rate_;
   Side side_;
   std::vector<Item> request_;
-  std::vector<Item> out_;  // of the device
+  std::vector<Item> out_;  // items that the device sent last
   std::uint8_t behind_out_ = 0xFF;
   std::size_t bits_ = 0;
-  std::vector<Held> held_;  // from front_ to back_; what was told is used again
+  std::vector<Held> held_;  // frames from front_ to back_ are in transit; entries before front_ are reused
   std::size_t front_ = 0;
   std::size_t back_ = 0;
   std::vector<Item> told_items_;
-  // The host's side.
+  // State of the host's end of the line.
   bool sent_due_ = false;
   Silence silence_;
   Time mark_{};

@@ -27,7 +27,7 @@ SimPort<Item>::SimPort(LinkKind kind, LineSettings settings, Machine<Item>& devi
   if (real_time_.now) start_ = real_time_.now();
 }
 
-// What was due by now has happened, whether somebody waited for it or not.
+// Advances the line to real time: events that were due have then happened, whether or not a caller waited for them.
 template <class Item>
 void SimPort<Item>::keep_pace() {
   if (real_time_.now) line_.run_until(real_time_.now() - start_);
@@ -55,7 +55,7 @@ void SimPort<Item>::begin(const Step<Item>& step) {
 
 template <class Item>
 Event<Item> SimPort<Item>::wait(const Step<Item>& step) {
-  // What keeps pace with a clock may have passed it meanwhile.
+  // With a real-time clock the line may already have passed the timer's time.
   const bool is_past = step.at > told_ && step.at <= line_.now();
   if (hand_.heard.empty() && is_past) hand_.feed({.kind = Event<Item>::Kind::timer, .at = step.at});
   if (hand_.heard.empty()) advance(step);
@@ -69,7 +69,7 @@ Event<Item> SimPort<Item>::wait(const Step<Item>& step) {
 
 template <class Item>
 void SimPort<Item>::advance(const Step<Item>& step) {
-  // The limits hold while somebody waits, so that none is told for a step that is long over.
+  // The limits apply only during this wait, so no silence is reported for a step that ended long ago.
   struct Disarm {
     SimPort& port;
     ~Disarm() {
@@ -86,7 +86,7 @@ void SimPort<Item>::advance(const Step<Item>& step) {
 template <class Item>
 template <class Done>
 void SimPort<Item>::run_until(const Done& done) {
-  constexpr Time idle = std::chrono::milliseconds(100);  // nothing will happen, but a sleep may be broken off
+  constexpr Time idle = std::chrono::milliseconds(100);  // no event is expected, but the sleep may be interrupted
   while (!done()) {
     const Time due = line_.next_event();
     if (!real_time_.now) {

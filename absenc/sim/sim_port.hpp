@@ -11,15 +11,15 @@
 
 namespace absenc::sim {
 
-/// Holds virtual time to a clock of the caller's choice. With neither function, time jumps from event to event.
+/// Holds virtual time to a clock of the caller's choice. If both functions are empty, time jumps from event to event.
 struct RealTime {
   std::function<Time()> now;
-  /// May return early, and may throw to break off a wait.
+  /// Sleeps until the given time. May return early, and may throw to end a wait.
   std::function<void(Time)> sleep_until;
 };
 
 /// A private line with one device on it. Times are virtual, start at 0 when the port is made and are exact to the
-/// nanosecond; with a RealTime they keep pace with it, however late the caller comes.
+/// nanosecond. With a RealTime they follow its clock, also when the caller is late.
 template <class Item>
 class SimPort final : public Port<Item> {
  public:
@@ -27,12 +27,12 @@ class SimPort final : public Port<Item> {
   SimPort(LinkKind kind, LineSettings settings, Machine<Item>& device, RealTime real_time = {});
 
   [[nodiscard]] Time now() override;
-  /// A transfer or pulse during another one, which somebody broke off, waits until that has been sent.
+  /// A transfer or pulse that begins during an abandoned one waits until that one has been sent.
   void begin(const Step<Item>& step) override;
-  /// Without a RealTime, a wait for something that can never happen is a std::logic_error.
+  /// Without a RealTime, throws std::logic_error if no event can ever end the wait.
   [[nodiscard]] Event<Item> wait(const Step<Item>& step) override;
 
-  /// To observe it.
+  /// Returns the line, so that callers can observe it.
   [[nodiscard]] Line<Item>& line() { return line_; }
 
   void set_echo(bool echo) { line_.set_echo(host_node_, echo); }
@@ -42,7 +42,7 @@ class SimPort final : public Port<Item> {
     Event<Item> event;
     std::vector<Item> items;
   };
-  // The machine at the host's end: passes steps from the port's user and collects what happens.
+  // The machine at the host's end: passes on the steps of the port's user and queues the events.
   class Hand final : public Machine<Item> {
    public:
     void feed(const Event<Item>& event) override;
@@ -60,12 +60,12 @@ class SimPort final : public Port<Item> {
   void run_until(const Done& done);
 
   RealTime real_time_;
-  Time start_{};  // of virtual time, on the caller's clock
-  Time told_{};   // the last that was
+  Time start_{};  // start of virtual time, on the caller's clock
+  Time told_{};   // time of the last reported event
   Line<Item> line_;
   Hand hand_;
   typename Line<Item>::Node host_node_;
-  std::vector<Item> items_;  // of the event handed out last
+  std::vector<Item> items_;  // items of the last returned event
 };
 
 extern template class SimPort<std::uint8_t>;

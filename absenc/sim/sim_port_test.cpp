@@ -37,7 +37,7 @@ class Answerer final : public Machine<std::uint8_t> {
   bool pending_ = false;
 };
 
-// Asks a given number of times, 100 us apart, and emits every answer.
+// Sends a given number of requests, 100 us apart, and emits every reply.
 class Asker final : public Machine<std::uint8_t> {
  public:
   explicit Asker(int times) : left_(times) {}
@@ -73,7 +73,7 @@ class Asker final : public Machine<std::uint8_t> {
   Time asked_at_ = -microseconds(100);
 };
 
-constexpr LineSettings settings{.rate = 1'000'000};  // a character takes 10 us
+constexpr LineSettings settings{.rate = 1'000'000};  // a character of 10 bits takes 10 us
 
 TEST(SimPort, VirtualTimeJumpsAndIsExact) {
   Answerer device;
@@ -130,7 +130,7 @@ TEST(SimPort, ConfigureChangesTheHostsEnd) {
   EXPECT_EQ(port.wait({}).at, microseconds(5));
 }
 
-// A clock that runs 7 us every time somebody looks at it, and 30 us late out of every sleep.
+// A clock that advances 7 us at every look and 30 us too far in every sleep.
 struct SlowWorld {
   Time clock = std::chrono::seconds(1000);
   int sleeps = 0;
@@ -176,13 +176,13 @@ TEST(SimPort, LimitsDoNotRunWhileNobodyWaits) {
     EXPECT_EQ(port.wait(impatient).kind, Kind::sent);
     EXPECT_EQ(port.wait(impatient).kind, Kind::received);
     EXPECT_EQ(port.wait(impatient).kind, Kind::received);
-    world.clock += microseconds(1000);  // no silence is told for the step before
+    world.clock += microseconds(1000);  // no silence is reported for the previous step
     (void)port.now();
   }
   EXPECT_EQ(port.wait(impatient).kind, Kind::silence);
 }
 
-// A configuration is carried out at the time that it is now, not at that of the last event.
+// A configuration is carried out at the present time, not at the time of the last event.
 TEST(SimPort, ATimerThatPassedMeanwhileIsTold) {
   SlowWorld world;
   Mute mute;

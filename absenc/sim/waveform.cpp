@@ -12,14 +12,14 @@ namespace absenc::sim {
 
 namespace {
 
-// Wires, in the order in which the constructor names them.
+// Indices of the wires, in the order in which the constructor names them.
 constexpr std::size_t line = 0;
 constexpr std::size_t host = 0, device = 1;
 constexpr std::size_t cs = 0, sck = 1, mosi = 2, miso = 3;
 constexpr std::size_t clock = 0, data = 1;
 constexpr std::size_t can = 0;
 
-// The boundary after `part` of `parts` equal parts, to the nearest nanosecond.
+// Divides `length` into equal parts; the call returns the boundary after `part`, to the nearest nanosecond.
 struct Scale {
   Time start;
   Time length;
@@ -128,11 +128,11 @@ void Waveform::draw_clocked(const Line<std::uint8_t>::Transfer& seen) {
   const auto bits = static_cast<std::int64_t>(seen.bits);
   const std::int64_t idle = settings_.idle_clocks;
   const Scale half{seen.start, seen.end - seen.start, 2 * bits};
-  // It rises again in time for the first edge.
+  // The clock line rises again half a period before the first edge.
   if (seen.held_low != never) drive(clock, seen.held_low + half(1) - half(0), half(-1));
   for (std::int64_t i = 0; i < bits + idle; ++i) drive(clock, half(2 * i), half(2 * i + 1));
   for (std::int64_t i = 0; i < bits; ++i) {
-    // The first bit of an encoder that answers at once is there before the first edge.
+    // If the encoder answers without idle clocks, its first bit is on the line before the first edge.
     const Time from = i + idle == 0 ? seen.start : half(2 * (i + idle) - 1);
     if (!BitView{seen.in, seen.bits}[static_cast<std::size_t>(i)]) drive(data, from, half(2 * (i + idle) + 1));
   }
@@ -140,7 +140,7 @@ void Waveform::draw_clocked(const Line<std::uint8_t>::Transfer& seen) {
   drive(data, last_edge, last_edge + seen.low_after);
 }
 
-// CPHA 0: data stands before the leading edge, which takes it. CPHA 1: it comes with the leading edge.
+// With CPHA 0 data is stable before the leading edge, which samples it. With CPHA 1 data changes at the leading edge.
 void Waveform::draw_spi(const Line<std::uint8_t>::Transfer& seen) {
   const std::int64_t phase = (settings_.spi_mode & 1) != 0 ? 0 : 1;
   const Time first = seen.start + seen.lead;

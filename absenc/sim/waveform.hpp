@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The wires of a simulated conversation: when each changes its level.
+// Draws the wires of a simulated conversation: the times at which each wire changes its level.
 #pragma once
 
 #include <cstddef>
@@ -15,15 +15,16 @@
 
 namespace absenc::sim {
 
-/// Draws what it is told, or what it sees on a line, with levels as of logic: an idle line and a mark are 1. It keeps
-/// no more than what is not settled: characters of two pairs overlap, and files want their times in order.
+/// Draws the items that are passed to it or that it observes on a line, with logic levels: an idle line and a mark are
+/// 1. It stores only changes that are not settled yet: characters of two pairs overlap, and files need their times in
+/// order.
 ///
-/// - half duplex: `line`; full duplex: `host` and `device`, by who drives the pair
-/// - beside these, when there were pulses: `trigger`, `clear`, which a pulse pulls to 0
-/// - spi: `cs`, `sck`, `mosi`, `miso`; nobody on miso is 1
-/// - clocked: `clock`, idle high, and `data`, which changes at its rising edges. The host takes each bit at the falling
-///   edge behind. With `idle_clocks` that is so many clocks more than there are bits. Behind the last edge the device
-///   may hold `data` low: the timeout of BiSS, the monoflop of SSI.
+/// - half duplex: `line`; full duplex: `host` and `device`, named by the sender that drives the pair
+/// - additional wires after the first pulse: `trigger`, `clear`, which a pulse pulls to 0
+/// - spi: `cs`, `sck`, `mosi`, `miso`; `miso` is 1 while no device drives it
+/// - clocked: `clock`, idle high, and `data`, which changes at its rising edges. The host samples each bit at the next
+///   falling edge. `idle_clocks` adds as many clocks before the first bit. After the last edge the device may hold
+///   `data` low: the timeout of BiSS, the monoflop of SSI.
 /// - CAN: `can`, recessive is 1; every frame is acknowledged
 class Waveform {
  public:
@@ -31,42 +32,43 @@ class Waveform {
     std::string_view name;
     bool idle;  // the level before the first change
   };
-  /// Gets everything in the order of time, as soon as that is known.
+  /// Receives level changes and comments in the order of time, as soon as their order is known.
   struct Sink {
-    /// Inverts the level of this wire, of `wires()`.
+    /// Inverts the level of the wire with this index in `wires()`.
     virtual void change(Time at, std::size_t wire) = 0;
-    /// What an item was, in words.
+    /// Describes one item in words.
     virtual void comment(Time at, std::string_view words) = 0;
 
    protected:
     ~Sink() = default;
   };
 
-  /// `sink` must outlive it.
+  /// `sink` must outlive the waveform.
   Waveform(LinkKind kind, const LineSettings& settings, Sink& sink);
 
-  /// From now on everything on `line`, of the same kind and settings. Takes its observers; must outlive it.
+  /// Draws everything on `line`, of the same kind and settings, from now on. Replaces the line's observers; must
+  /// outlive the line.
   void observe(Line<std::uint8_t>& line);
   void observe(Line<CanFrame>& line);
 
-  /// One asynchronous character.
+  /// Draws one asynchronous character.
   void character(Role sender, Time start, Time end, std::uint8_t byte);
   void transfer(const Line<std::uint8_t>::Transfer& transfer);
   void frame(Time start, const CanFrame& frame);
   void pulse(ExtraWire wire, Time start, Time end);
 
-  /// The sink gets what is before `time`: nothing that is told later may begin before it.
+  /// Passes everything before `time` to the sink. No item drawn later may begin before `time`.
   void settle(Time time);
-  /// The sink gets all there is.
+  /// Passes everything to the sink.
   void finish() { settle(never); }
 
-  /// Those of pulses are added by the first pulse.
+  /// Returns the wires; those of pulses are added by the first pulse.
   [[nodiscard]] const std::vector<Wire>& wires() const { return wires_; }
-  /// Of the last item.
+  /// Returns the end of the last item.
   [[nodiscard]] Time end() const { return end_; }
 
  private:
-  // Drives a wire away from its idle level, or (-1) lets it go: it is idle when nobody drives it.
+  // A drive of a wire away from its idle level (`by` 1) or its release (-1). A wire without any drive is idle.
   struct Change {
     Time at;
     std::size_t wire;
@@ -88,8 +90,8 @@ class Waveform {
   LineSettings settings_;
   Sink* sink_;
   std::vector<Wire> wires_;
-  std::vector<int> drivers_;  // of each wire
-  // What the sink has not got yet:
+  std::vector<int> drivers_;  // number of active drives of each wire
+  // Changes and comments that the sink has not received yet.
   std::priority_queue<Change, std::vector<Change>, std::greater<>> changes_;
   std::vector<Comment> comments_;  // in the order of time
   Time end_{};

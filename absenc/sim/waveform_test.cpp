@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Waveforms as text, and as sigrok-cli's decoders read them.
+// Tests waveforms as text, and as the decoders of sigrok-cli read them.
 #include "absenc/sim/waveform.hpp"
 
 #include <gmock/gmock-matchers.h>
@@ -83,7 +83,7 @@ TEST(Waveform, CommentsListTheItems) {
 
 TEST(Waveform, Character) {
   Picture waveform(LinkKind::half_duplex, slow);
-  waveform.character(Role::host, 5us, 15us, 0x1A);  // 0 01011000 1
+  waveform.character(Role::host, 5us, 15us, 0x1A);  // bits on the line: 0 01011000 1
   EXPECT_EQ(body(waveform),
             "#0\n1!\n#5000\n0!\n#7000\n1!\n#8000\n0!\n#9000\n1!\n#11000\n0!\n#14000\n1!\n"
             "#25000\n");
@@ -92,7 +92,7 @@ TEST(Waveform, Character) {
 TEST(Waveform, ParityAndTwoStopBits) {
   for (const auto& [parity, high] : {std::pair{Parity::even, true}, std::pair{Parity::odd, false}}) {
     Picture waveform(LinkKind::full_duplex, {.rate = 1'000'000, .parity = parity, .stop_bits = 2});
-    waveform.character(Role::device, 0us, 12us, 0x80);  // 0 00000001 p 11
+    waveform.character(Role::device, 0us, 12us, 0x80);  // bits on the line: 0 00000001 p 11
     EXPECT_THAT(body(waveform), HasSubstr(high ? "#8000\n1\"\n#22000\n" : "#8000\n1\"\n#9000\n0\"\n#10000\n1\"\n"));
   }
 }
@@ -106,7 +106,7 @@ TEST(Waveform, CollisionIsTheAnd) {
 
 TEST(Waveform, BitsThatAreNoWholeNanoseconds) {
   Picture waveform(LinkKind::half_duplex, {.rate = 3'000'000});
-  waveform.character(Role::host, 0ns, 3333ns, 0x55);  // a change at each edge
+  waveform.character(Role::host, 0ns, 3333ns, 0x55);  // level changes at every bit
   std::string edges;
   for (const int edge : {333, 667, 1000, 1333, 1667, 2000, 2333, 2666, 3000}) {
     edges += "#" + std::to_string(edge) + '\n';
@@ -165,7 +165,8 @@ TEST(Waveform, DataIsLowForTheTimeoutBehindTheLastEdge) {
   picture.transfer(seen);
   EXPECT_THAT(body(picture), ::testing::EndsWith("#3000\n0!\n#3500\n1!\n0\"\n#23500\n1\"\n#33500\n"));
 
-  // BiSS: 20 us, or one and a half periods; SSI: the monoflop, which runs from the edge behind the last bit.
+  // BiSS: the data line is low for 20 us or one and a half periods. SSI: for the monoflop time, from the edge behind
+  // the last bit.
   biss::Format biss{};
   const auto biss_low = [&] {
     biss::testing::Bench bench(biss::line_settings, biss);
@@ -203,7 +204,7 @@ TEST(Waveform, PulsesHaveWiresOfTheirOwn) {
   EXPECT_EQ(body(waveform), "#0\n1!\n1\"\n1#\n1$\n#1000\n0#\n#3000\n1#\n#5000\n0$\n#6000\n1$\n#16000\n");
 }
 
-// Whoever keeps everything until the end runs out of memory.
+// A sink that receives everything only at the end would run out of memory.
 TEST(Waveform, HandsOverWhatIsSettled) {
   struct Counter final : Waveform::Sink {
     void change(Time at, std::size_t) override {
@@ -234,7 +235,7 @@ TEST(Waveform, HandsOverWhatIsSettled) {
   EXPECT_EQ(counter.last, 53us);
 }
 
-// What others see in a file.
+// Compares with independent decoders, those of sigrok-cli.
 struct Sigrok : ::testing::Test {
   Sigrok() {
     std::string name = std::filesystem::temp_directory_path() / "absenc-vcd-XXXXXX";
@@ -243,7 +244,7 @@ struct Sigrok : ::testing::Test {
   }
   ~Sigrok() override { std::filesystem::remove_all(directory); }
 
-  // The annotations, a line each, without the decoder's name.
+  // Returns the annotations, one per line, without the decoder's name.
   [[nodiscard]] std::string decode(Picture& waveform, const std::string& decoder, const std::string& what) const {
     const std::filesystem::path file = directory / "waveform.vcd";
     std::ofstream(file) << waveform.vcd();
@@ -266,7 +267,7 @@ struct Sigrok : ::testing::Test {
   std::filesystem::path directory;
 };
 
-// As the decoder prints them: those of a word backwards.
+// Returns the bits as the decoder prints them: each word backwards.
 std::string bits_of(BitView bits) {
   std::string text;
   for (std::size_t i = bits.size; i-- > 0;) text += bits[i] ? "1 " : "0 ";
@@ -284,7 +285,7 @@ TEST_F(Sigrok, ReadsTheBitsOfSsi) {
   ASSERT_EQ(read.error(), Error::none);
   const std::string bits = bits_of({read.exchange().received, 50});
   EXPECT_THAT(bits, ::testing::AllOf(HasSubstr("0 1"), HasSubstr("1 0")));
-  // What a controller reads in mode 2, which takes the falling edges: the idle line, and then the word.
+  // A controller in mode 2, which samples at falling edges, reads the idle level first and then the word.
   EXPECT_EQ(decode(waveform, "spi:clk=clock:miso=data:cpol=1:cpha=0:wordsize=51", "spi=miso-bits"), bits + "1 ");
 }
 
@@ -334,7 +335,7 @@ TEST_F(Sigrok, ReadsFramesOfCan) {
     waveform.frame(at, frame);
     at += settings.bits(can_bits(frame).size() + can_intermission_bits);
   };
-  add({.id = 0x000, .size = 8});  // the most stuff bits
+  add({.id = 0x000, .size = 8});  // the frame with the most stuff bits
   add({.id = 0x120, .size = 3, .data = {0x47, 0x26, 0xFF}});
   add({.id = 0x1ABCDE01, .extended = true, .size = 1, .data = {0x5A}});
   add({.id = 0x7E5, .remote = true});
@@ -357,7 +358,7 @@ TEST_F(Sigrok, ReadsTheBytesOfTformat) {
   Picture waveform(LinkKind::half_duplex, tformat::line_settings);
   waveform.observe(bench.line);
   bench.shaft.put(3, 4660);
-  bench.pass(20us);  // a decoder wants to see the line idle first
+  bench.pass(20us);  // a decoder needs to see the line idle first
   tformat::ReadPosition read({});
   bench.run(read);
   ASSERT_EQ(read.error(), Error::none);
