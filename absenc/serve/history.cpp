@@ -88,7 +88,7 @@ void HistoryWriter::open() {
   reader_.accept();
 }
 
-// Opens a file that is intact and still at the path, if the current one is not.
+// Ensures that the open file is intact and still at the path; opens or creates another file if needed.
 void HistoryWriter::require_file() {
   if (file_) {
     const HistoryFile::State state = file_->look();

@@ -49,7 +49,7 @@ std::string MqttHealth::metrics() const {
   return text;
 }
 
-// In the order in which each needs those above it.
+// In order of dependency: each member uses those above it.
 struct Mqtt::Parts {
   Parts(const MqttSettings& wanted, const Fleet& fleet, ServerEvents& server_events)
       : settings(wanted),

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Readings, events and states to an MQTT broker, by way of a spool on disk. Two threads: a broker that is away or a
-// name that is looked up for long keeps nothing from the spool, and neither keeps an encoder from being read.
+// Sends readings, events and states to an MQTT broker through a spool on disk. Two threads, so that neither an
+// unreachable broker nor a slow name lookup delays writing to the spool, and neither thread delays a reading.
 #pragma once
 
 #include <cstdint>
@@ -20,27 +20,29 @@ struct MqttHealth {
   std::string broker{};
   std::string prefix{};
   bool connected = false;
-  std::string trouble{};      // why it is not, what it refuses, or why the spool cannot be written; "": nothing
-  bool failing = false;       // what is read cannot be spooled, or the spool drops the oldest of it
+  std::string trouble{};      // why the broker is not connected, what it refuses, or why the spool cannot be written;
+                              // "" without an error
+  bool failing = false;       // new readings cannot be spooled, or the spool is full and drops the oldest
   std::uint64_t waiting = 0;  // messages in the spool
   std::int64_t waiting_bytes = 0;
-  std::uint64_t sent = 0;           // messages that the broker has taken since the start
-  std::uint64_t dropped = 0;        // readings since the start: the spool was full, or could not be written
-  std::uint64_t client_deaths = 0;  // of the process that speaks to the broker, since the start
-  std::map<std::string, std::uint64_t> taken{};  // by encoder: up to this number, its readings are in the spool or sent
+  std::uint64_t sent = 0;           // messages that the broker has acknowledged since the start
+  std::uint64_t dropped = 0;        // readings lost since the start, because the spool was full or could not be written
+  std::uint64_t client_deaths = 0;  // unexpected ends of the MQTT client process since the start
+  std::map<std::string, std::uint64_t> taken{};  // by encoder: number of its last reading that is in the spool or sent
 
-  /// "none", "good", "away" (the broker: what it shall have waits on disk) or "failing": readings are being dropped.
+  /// Returns "none" without a broker, "good", "away" while the broker is not connected and messages wait on disk, or
+  /// "failing" while readings are dropped.
   [[nodiscard]] std::string_view state() const;
   [[nodiscard]] client::Json json() const;
-  /// Lines for Prometheus.
+  /// Returns the metrics in the text format of Prometheus.
   [[nodiscard]] std::string metrics() const;
 };
 
 class Mqtt {
  public:
-  /// `fleet` and `server_events` outlive it. Throws Failure: the spool or a file cannot be used.
+  /// `fleet` and `server_events` must outlive this object. Throws Failure: the spool or a file cannot be used.
   Mqtt(const MqttSettings& settings, const Fleet& fleet, ServerEvents& server_events);
-  /// Spools what there still is; gives a broker that is there a second to take it.
+  /// Spools the remaining readings. A connected broker has one second to receive them.
   ~Mqtt();
   Mqtt(const Mqtt&) = delete;
   Mqtt& operator=(const Mqtt&) = delete;

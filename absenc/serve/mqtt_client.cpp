@@ -19,12 +19,12 @@ namespace {
 
 using namespace std::chrono_literals;
 
-constexpr std::size_t most_in_frame = 4096;  // of a frame from the process: it sends numbers and short texts
+constexpr std::size_t most_in_frame = 4096;  // bytes; the process sends only numbers and short texts
 constexpr Time time_to_start = 10s;
-constexpr Time longest_silence = 10s;  // of a connected one, which says each second that it lives
-constexpr Time time_to_end = 500ms;    // to leave the broker, or to be done with a dump
+constexpr Time longest_silence = 10s;  // of a connected process, which sends a sign of life each second
+constexpr Time time_to_end = 500ms;    // to disconnect from the broker, or to write a core dump
 
-// As words of the broker's may stand in it.
+// Replaces characters that are not printable ASCII: the text may come from the broker.
 std::string printable(std::string text) {
   std::replace_if(
       text.begin(), text.end(), [](unsigned char c) { return c < 0x20 || c > 0x7E; }, '?');
@@ -60,7 +60,7 @@ MqttClient::State MqttClient::work(Time longest) {
   if (state_ == State::lost) return state_;
   const os::Ready ready = os::wait_for_socket(process_.channel().get(), !outgoing_.empty(), longest);
   if (ready.to_read) receive();
-  // A process that ended closes its end: receiving tells what it said before.
+  // The process may have ended: its last frames are received first, because they give the reason.
   if (state_ != State::lost && !process_.channel().send(outgoing_)) note_end();
   if (state_ == State::connected && os::now() - heard_ > longest_silence) {
     process_.end({});
@@ -120,7 +120,7 @@ void MqttClient::lose(const std::string& why) {
   trouble_ = why;
 }
 
-// A library that ends its process does so at a packet that it cannot stand: nothing else reaches it from outside.
+// Only a packet of the broker can make the library end its process: nothing else reaches it from outside.
 void MqttClient::note_end() {
   const std::string how = process_.end(time_to_end);
   if (state_ == State::lost) return;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// One connection to a broker, by MQTT 5 or 3.1.1, as far as a sender needs it. A process of its own speaks to the
-// broker (mqtt_process.hpp): no packet of a broker can end the process that reads encoders.
+// One connection to a broker, by MQTT 5 or 3.1.1, with the functions that a sender needs. A separate process talks to
+// the broker (mqtt_process.hpp), so no packet of a broker can end the process that reads encoders.
 #pragma once
 
 #include <cstdint>
@@ -13,14 +13,14 @@
 
 namespace absenc::serve {
 
-/// How to reach a broker. Files are "" where there is none.
+/// Address and credentials of a broker. File names are "" if not used.
 struct Broker {
   std::string host{};
   std::uint16_t port = 0;
   bool tls = false;
-  std::string login_file{};  // one line: USER PASSWORD
-  std::string ca_file{};     // whom to trust; "": whom this computer trusts
-  std::string cert_file{};   // by which the broker knows us, with its key
+  std::string login_file{};  // file with one line: USER PASSWORD
+  std::string ca_file{};     // certificate authority; "": those that this computer trusts
+  std::string cert_file{};   // client certificate, used with `key_file`
   std::string key_file{};
 
   bool operator==(const Broker&) const = default;
@@ -30,44 +30,44 @@ struct Broker {
 
 enum class MqttVersion : std::uint8_t { v5, v3_1_1 };
 
-/// The broker publishes `will`, retained, when the connection ends without a good-bye.
+/// Identifies the client. The broker publishes `will`, retained, if the connection ends without a DISCONNECT packet.
 struct MqttIdentity {
   std::string id;
   std::string will_topic;
   std::string will;
 };
 
-/// For one thread, which makes and ends it.
+/// Not thread-safe: one thread creates, uses and destroys it.
 class MqttClient {
  public:
-  /// Starts the process. Throws Failure when the files cannot be used.
+  /// Starts the MQTT client process. Throws Failure when the files cannot be used.
   MqttClient(const Broker& broker, const MqttIdentity& identity, MqttVersion version);
   MqttClient(const MqttClient&) = delete;
   MqttClient& operator=(const MqttClient&) = delete;
 
   enum class State : std::uint8_t { connecting, connected, lost };
-  /// Begins to connect, to the broker's name or one of its addresses. `try_all`: tries all addresses of a name, one
-  /// after the other, until one takes the connection.
+  /// Starts to connect to the broker's name or to one of its addresses. `try_all`: tries all addresses of the name one
+  /// after the other until one accepts the connection.
   void connect(const std::string& host, bool try_all);
-  /// Sends and receives for at most this long.
+  /// Sends and receives for at most `longest`.
   State work(Time longest);
-  /// Why it is lost.
+  /// Returns why the connection is lost.
   [[nodiscard]] const std::string& trouble() const { return trouble_; }
-  /// The broker does not know this version of the protocol.
+  /// Returns whether the broker does not support this version of MQTT.
   [[nodiscard]] bool wrong_version() const { return wrong_version_; }
-  /// The process ended by itself, as it does at a packet that its library cannot stand.
+  /// Returns whether the process ended unexpectedly, as its library does at some malformed packets.
   [[nodiscard]] bool died() const { return died_; }
 
-  /// Returns the number by which it will be acknowledged.
+  /// Returns the number that the acknowledgement of this message will have.
   int publish(const std::string& topic, const std::string& payload, int qos, bool retain);
 
   struct Acknowledgement {
     int number = 0;
-    std::string refused{};  // why; "": the broker has taken it
+    std::string refused{};  // reason of the broker; "": the broker has accepted the message
   };
   [[nodiscard]] std::vector<Acknowledgement> take_acknowledgements();
 
-  /// Says good-bye, so that the will is not published.
+  /// Sends a DISCONNECT packet, so that the will is not published.
   void end();
 
  private:
@@ -85,7 +85,7 @@ class MqttClient {
   bool wrong_version_ = false;
   bool died_ = false;
   std::string trouble_;
-  Time heard_;  // when the process last sent something
+  Time heard_;  // when the process last sent a frame
   int last_number_ = 0;
   std::vector<Acknowledgement> acknowledgements_;
 };

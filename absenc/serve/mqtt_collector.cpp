@@ -17,9 +17,9 @@ using namespace client;
 
 namespace {
 
-constexpr std::size_t most_in_a_message = 250;                       // 15 kB: less than any broker refuses
-constexpr Time between_dropped_tellings = std::chrono::seconds(10);  // each is a message itself
-constexpr Time time_drops_show = std::chrono::seconds(30);           // in the health, after the last one
+constexpr std::size_t most_in_a_message = 250;                       // readings; about 15 kB
+constexpr Time between_dropped_tellings = std::chrono::seconds(10);  // each such event is a message too
+constexpr Time time_drops_show = std::chrono::seconds(30);           // in the health, after the last drop
 
 }  // namespace
 
@@ -41,7 +41,7 @@ MqttCollector::~MqttCollector() {
 
 void MqttCollector::add(const std::vector<ServerEvent>& server_events) {
   const std::lock_guard lock(mutex_);
-  // Who has seen an alarm is for the page: subscribers get the alarms themselves.
+  // Acknowledged alarms are not published: subscribers receive the alarms themselves.
   std::copy_if(server_events.begin(), server_events.end(), std::back_inserter(waiting_),
                [](const ServerEvent& one) { return one.kind != "acknowledged"; });
 }
@@ -62,7 +62,8 @@ void MqttCollector::work(const std::stop_token& stop) {
   }
 }
 
-// Random, so that after a loss of power, which may take back what stood in the file, no id comes for something else.
+// The text contains a random part that changes with each start. A power failure may undo the last writes to the spool;
+// the same id would then be used again for a different message.
 std::string MqttCollector::id_text(std::int64_t id) const { return fmt::format("{}-{}", spool_->run(), id); }
 
 void MqttCollector::collect() {

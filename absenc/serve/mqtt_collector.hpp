@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// From the encoders to the spool, in a thread of its own.
+// Writes readings and events to the spool, in its own thread.
 #pragma once
 
 #include <condition_variable>
@@ -18,18 +18,18 @@ namespace absenc::serve {
 
 class MqttCollector {
  public:
-  /// All outlive it. Throws Failure.
+  /// All arguments must outlive this object. Throws Failure.
   MqttCollector(const MqttSettings& settings, Spool& spool, const Fleet& fleet, ServerEvents& server_events);
-  /// Spools what there still is.
+  /// Spools the remaining readings and events.
   ~MqttCollector();
 
   void add(const std::vector<ServerEvent>& server_events);
 
   struct Figures {
-    std::string trouble{};      // why the spool cannot be written
-    std::uint64_t dropped = 0;  // readings
-    bool drops = false;         // some within the last seconds
-    std::map<std::string, std::uint64_t> taken{};
+    std::string trouble{};                         // why the spool cannot be written; "" without an error
+    std::uint64_t dropped = 0;                     // readings lost since the start
+    bool drops = false;                            // readings were dropped within the last 30 seconds
+    std::map<std::string, std::uint64_t> taken{};  // by encoder: number of its last reading on disk or sent
   };
   [[nodiscard]] Figures figures() const;
 
@@ -46,20 +46,21 @@ class MqttCollector {
   const Fleet* fleet_;
   ServerEvents* server_events_;
 
-  // Of the thread alone.
+  // The members below are used by the thread only.
   std::int64_t next_id_;
-  std::map<std::string, std::uint64_t> next_numbers_;  // of readings, by encoder
-  std::map<std::string, std::uint64_t> not_on_disk_;   // by encoder: up to this number they wait, partly in memory
-  Spool::Counts untold_{};                             // of what was dropped
+  std::map<std::string, std::uint64_t> next_numbers_;  // next number of a reading, by encoder
+  std::map<std::string, std::uint64_t> not_on_disk_;   // by encoder: number of its last reading, while messages wait in
+                                                       // memory
+  Spool::Counts untold_{};                             // dropped messages that no event has reported yet
   std::string untold_why_;
   Time next_told_{};
 
-  mutable std::mutex mutex_;  // guards what follows
+  mutable std::mutex mutex_;  // guards all members below
   std::condition_variable_any changed_;
   std::vector<ServerEvent> waiting_;
   Figures figures_;
   Time last_dropped_{};
-  std::jthread thread_;  // last: it uses all of the others
+  std::jthread thread_;  // last member: the thread uses all others
 };
 
 }  // namespace absenc::serve

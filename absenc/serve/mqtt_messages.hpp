@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Topics and payloads of MQTT, as docs/mqtt.md and docs/mqtt-schema.json have them.
+// MQTT topics and payloads, as defined in docs/mqtt.md and docs/mqtt-schema.json.
 #pragma once
 
 #include <cstdint>
@@ -16,32 +16,33 @@
 
 namespace absenc::serve {
 
-/// One level of a topic, for any name: what is no letter, digit, - or _ becomes %XX.
+/// Returns a name as one level of a topic: each character other than a letter, digit, - or _ becomes %XX.
 [[nodiscard]] std::string topic_level(std::string_view name);
 
-/// PREFIX/ENCODER/KIND; of the server itself, "", PREFIX/KIND.
+/// Returns PREFIX/ENCODER/KIND; for the server itself, whose `encoder` is "", PREFIX/KIND.
 [[nodiscard]] std::string topic_of(const std::string& prefix, std::string_view encoder, std::string_view kind);
 
-/// `first`: the number of the first of `readings`; they ascend by one.
+/// Returns the payload of a message with readings. `first` is the number of the first reading; numbers ascend by one.
 [[nodiscard]] std::string readings_text(const std::string& id, const Watch& watch, std::uint64_t first,
                                         std::span<const OutgoingReading> readings);
 [[nodiscard]] std::string event_text(const std::string& id, const ServerEvent& server_event);
 
-/// Of the server: "online" or "offline".
+/// Returns the payload of the server's state; `state` is "online" or "offline".
 [[nodiscard]] std::string server_state_text(std::string_view state, std::string_view why);
 
-/// A retained message that is to be, which is sent again when `condition` is another.
+/// A retained message. It is sent again when `condition` has changed.
 struct Retained {
   std::string topic;
   std::string condition;
   std::string payload;
 };
-/// Whether an encoder is live, its alarms in words; no value, because it is kept.
+/// Returns the state message of an encoder: whether it is live, and its alarms. It contains no position, because a
+/// retained position would become outdated.
 [[nodiscard]] Retained encoder_state(const std::string& prefix, const Watch& watch, const Snapshot& snapshot);
 
-/// What Home Assistant needs to show an encoder by itself: PREFIX/sensor/.../config.
+/// Returns the discovery messages from which Home Assistant creates an encoder's entities: PREFIX/sensor/.../config.
 [[nodiscard]] std::vector<Retained> home_assistant_entities(const MqttSettings& settings, const Watch& watch);
-/// All topics of it that an encoder of this name may have.
+/// Returns all discovery topics that an encoder of this name may have.
 [[nodiscard]] std::vector<std::string> home_assistant_topics(const MqttSettings& settings, std::string_view encoder);
 
 }  // namespace absenc::serve

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The only file that includes libmosquitto's header.
+// MQTT client process. Only this file includes libmosquitto's header.
 #include "absenc/serve/mqtt_process.hpp"
 
 #include <fmt/format.h>
@@ -31,11 +31,12 @@ namespace {
 using namespace std::chrono_literals;
 
 constexpr int keepalive_s = 15;
-constexpr int most_in_flight = 1000;  // as far as the broker allows it
+constexpr int most_in_flight = 1000;  // messages without acknowledgement; the broker may set a lower limit
 constexpr const char* trusted_here = "/etc/ssl/certs";
-constexpr std::size_t most_memory = 128'000'000;  // a packet of MQTT may be 256 MB, which nobody here waits for
-constexpr std::size_t most_frame = 256'000'000;   // of the parent
-constexpr std::size_t much_outgoing = 100'000;    // then nothing more is read of the broker until the parent takes it
+constexpr std::size_t most_memory = 128'000'000;  // bytes; an MQTT packet may have 256 MB, but none is expected
+constexpr std::size_t most_frame = 256'000'000;   // bytes of a frame from the parent
+constexpr std::size_t much_outgoing = 100'000;    // bytes; above it nothing is read from the broker until the parent
+                                                  // has received them
 constexpr Time between_signs_of_life = 1s;
 
 void require(int error, const std::string& what) {
@@ -43,7 +44,7 @@ void require(int error, const std::string& what) {
   throw Failure(what + ": " + (error == MOSQ_ERR_ERRNO ? std::strerror(errno) : ::mosquitto_strerror(error)));
 }
 
-/// One process, one connection.
+/// The MQTT client process, with one connection to a broker.
 class MqttProcess {
  public:
   explicit MqttProcess(os::Channel parent) : parent_(std::move(parent)) {}
@@ -53,7 +54,7 @@ class MqttProcess {
 
   void run() {
     while (!over_ || !outgoing_.empty()) {
-      if (!wait_and_talk()) return;  // without its parent nobody needs it
+      if (!wait_and_talk()) return;  // without its parent the process has no task
       if (!over_) turn_library();
       if (os::now() < next_sign_) continue;
       next_sign_ = os::now() + between_signs_of_life;
@@ -62,7 +63,7 @@ class MqttProcess {
   }
 
  private:
-  // False: the parent is gone.
+  // Waits for the parent or the broker, then exchanges frames with the parent. Returns false when the parent has ended.
   bool wait_and_talk() {
     const int broker = client_ == nullptr || over_ ? -1 : ::mosquitto_socket(client_);
     const bool reads = outgoing_.size() < much_outgoing;
@@ -84,8 +85,8 @@ class MqttProcess {
         break;
       case Wire::connect: {
         const std::string host = frame.text();
-        // The first of a name's addresses that takes the connection, and waits for that; else one address, and does
-        // not.
+        // mosquitto_connect tries each address of a name and waits for the connection; mosquitto_connect_async tries
+        // one address without waiting.
         const auto connect = frame.number() != 0 ? &::mosquitto_connect : &::mosquitto_connect_async;
         if (client_ != nullptr) note(connect(client_, host.c_str(), broker_.port, keepalive_s));
         break;
@@ -169,16 +170,16 @@ class MqttProcess {
     }
   }
 
-  // As mosquitto_loop does, which would wait for the broker alone.
+  // Does the work of mosquitto_loop, which would wait for the broker only and not for the parent.
   void turn_library() {
     if (client_ == nullptr || !connects_) return;
     if (::mosquitto_socket(client_) < 0) return lose("the connection was lost");
-    const bool is_over = (broker_events_ & (POLLERR | POLLHUP | POLLNVAL)) != 0;  // reading will tell why
+    const bool is_over = (broker_events_ & (POLLERR | POLLHUP | POLLNVAL)) != 0;  // reading reports the reason
     const bool reads = is_over || (broker_events_ & POLLIN) != 0;
     const bool writes = (broker_events_ & POLLOUT) != 0;
-    errno = 0;  // the library looks at it after calls that do not set it
+    errno = 0;  // the library reads errno after calls that do not set it
     int error = MOSQ_ERR_SUCCESS;
-    // TLS begins by reading, also when it wants to write.
+    // A TLS handshake begins with a read, even when the library wants to write.
     const bool begins = broker_.tls && !connected_ && writes;
     if (reads || begins) error = ::mosquitto_loop_read(client_, 1);
     errno = 0;
@@ -187,7 +188,7 @@ class MqttProcess {
     note(error);
   }
 
-  // Reasons of version 3.1.1 have numbers of their own, below 128.
+  // Reason codes of MQTT 3.1.1 are below 128 and have their own texts.
   void connect_answered(int reason) {
     if (reason == 0) {
       connected_ = true;
@@ -238,7 +239,7 @@ class MqttProcess {
   Broker broker_{};
   MqttVersion version_ = MqttVersion::v5;
   mosquitto* client_ = nullptr;
-  std::unordered_map<int, std::uint32_t> numbers_{};  // by the library's number: the parent's
+  std::unordered_map<int, std::uint32_t> numbers_{};  // number of a message at the parent, by its number in the library
   short broker_events_ = 0;
   Time next_sign_{};
   bool connects_ = false;
@@ -253,7 +254,7 @@ int run_mqtt_process() {
     MqttProcess(os::become_child("absenc-mqtt", most_memory)).run();
     return 0;
   } catch (const std::exception&) {
-    return 1;  // the parent sees it
+    return 1;  // the parent detects the end of this process
   }
 }
 

@@ -1,20 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
-// The process that speaks to the broker for `absenc serve`: this program, run again with a verb that nobody types.
+// The process that talks to the broker for `absenc serve`. It is this program, started again with an internal verb.
 //
-// libmosquitto 2.0.11 ends its process at some packets (assertions in its reader of properties). This process reads no
-// encoder and holds no message that is not also in the spool, so its end costs a connection and nothing else.
-// It is the program itself and no second file: /proc/self/exe is the same version in a build tree, installed, from the
-// Debian package and while that is being replaced by a newer one.
+// libmosquitto 2.0.11 ends its process at some packets, by assertions in its parser of properties. The separate process
+// reads no encoder, and each message that it holds is also in the spool, so its end costs only the connection.
+// It uses /proc/self/exe and no second program file: this is always the same version, in a build tree, installed, from
+// the Debian package, and while the package is being upgraded.
 #pragma once
 
 #include <string_view>
 
 namespace absenc::serve {
 
-/// The word that `absenc` is run with.
+/// The internal verb of `absenc` that starts the MQTT client process.
 inline constexpr std::string_view mqtt_process_verb = "serve-mqtt-client";
 
-/// Until the parent ends or wants it to end. Returns the status for `main`.
+/// Runs until the parent ends or sends Wire::leave. Returns the exit status for `main`.
 [[nodiscard]] int run_mqtt_process();
 
 }  // namespace absenc::serve

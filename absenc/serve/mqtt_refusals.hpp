@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// Topics that the broker does not take. Each is tried again after a pause that doubles; the others go on.
+// Topics that the broker refuses. Each is tried again after a pause that doubles; messages of other topics are still
+// sent.
 //
-// A broker says so by a reason (MQTT 5), or it just ends the connection. Then every topic that was on its way is a
-// suspect: from the second such end on, suspects are sent one at a time, each alone, until the broker has taken it or
-// ended the connection at it.
+// An MQTT 5 broker refuses a message with a reason. Other brokers just close the connection, so every topic without an
+// acknowledgement is a suspect. From the second such close on, suspects are sent one at a time, until the broker has
+// either acknowledged the topic or closed the connection at it.
 #pragma once
 
 #include <cstddef>
@@ -20,26 +21,26 @@ class MqttRefusals {
  public:
   enum class Verdict : std::uint8_t {
     send,
-    wait,  // until what is on its way has been acknowledged
-    skip,  // its pause is not over
+    wait,  // until all messages sent so far are acknowledged
+    skip,  // the topic is refused and its pause is not over
   };
-  /// `on_their_way`: messages that are not acknowledged yet.
+  /// `on_their_way`: number of messages without acknowledgement.
   [[nodiscard]] Verdict verdict(const std::string& topic, std::size_t on_their_way, Time now) const;
   void sent(const std::string& topic);
 
-  /// The broker refused it. Returns whether that is new.
+  /// Stores that the broker refused the topic. Returns whether the refusal or its reason is new.
   bool refuse(const std::string& topic, const std::string& why, Time now);
-  /// The broker took it. Returns whether it had refused it.
+  /// Stores that the broker accepted the topic. Returns whether it was refused before.
   bool take(const std::string& topic);
 
   void begin_connection();
-  /// The connection ended while these were on their way; `soon`: after a short time. Returns the topic that is now
-  /// refused, and was not before; else "".
+  /// Handles the end of a connection with these topics unacknowledged; `soon`: shortly after its start. Returns the
+  /// topic that is refused from now on; "" without a new one.
   std::string end_connection(const std::set<std::string>& on_their_way, bool soon, Time now);
 
-  /// Whether a topic's pause is over and it was not tried since; each is returned once.
+  /// Returns whether the pause of a refused topic has ended; true once for each pause.
   [[nodiscard]] bool take_due(Time now);
-  /// A sentence that names the refused topics; "": none is.
+  /// Returns a sentence that names the refused topics; "" without any.
   [[nodiscard]] std::string text() const;
   [[nodiscard]] bool has_suspects() const { return !suspects_.empty(); }
 
@@ -49,8 +50,8 @@ class MqttRefusals {
     Time pause{};
     Time retry{};
     bool ends_connection = false;
-    bool is_due = false;    // its pause is over: it is tried
-    bool is_tried = false;  // one message of it is on its way
+    bool is_due = false;    // the pause has ended and the topic may be tried
+    bool is_tried = false;  // one message of the topic is sent and not acknowledged
   };
 
   std::map<std::string, Refused> refused_;  // by topic

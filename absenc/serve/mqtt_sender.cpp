@@ -21,25 +21,26 @@ namespace {
 
 using namespace std::chrono_literals;
 
-constexpr std::size_t most_messages_out = 500;  // that are not acknowledged yet
+constexpr std::size_t most_messages_out = 500;  // messages without acknowledgement
 constexpr Time one_wait = 20ms;
 constexpr Time between_state_looks = 200ms;
-constexpr Time between_many_state_looks = 1s;  // of more encoders than many
+constexpr Time between_many_state_looks = 1s;  // with more than `many` encoders
 constexpr std::size_t many = 50;
-constexpr Time between_values = 1s;  // for Home Assistant
-constexpr Time first_pause = 500ms;  // between two attempts to connect; each is twice the one before
+constexpr Time between_values = 1s;  // of the values for Home Assistant
+constexpr Time first_pause = 500ms;  // before the second attempt to connect; each further pause is twice as long
 constexpr Time longest_pause = 5s;
 constexpr Time time_to_connect = 10s;
 constexpr Time time_to_finish = 1s;
-constexpr Time time_to_hold = 10s;  // a connection that lasts longer is good: the next pause is the first again
-constexpr Time between_connected_tellings = 60s;  // of a connection that comes and goes; else one that holds is told
+constexpr Time time_to_hold = 10s;  // after a connection of this length, the next pause is `first_pause` again
+constexpr Time between_connected_tellings = 60s;  // minimum time between two events about a connection that is often
+                                                  // lost; a lasting connection is reported at once
 
 }  // namespace
 
 MqttSender::MqttSender(const MqttSettings& settings, Spool& spool, const Fleet& fleet, ServerEvents& server_events)
     : settings_(&settings), spool_(&spool), fleet_(&fleet), server_events_(&server_events) {
   for (const auto& [name, next] : spool.next_numbers()) served_.insert(name);
-  static_cast<void>(MqttClient(settings.broker, identity(), version_));  // whether its files are good
+  static_cast<void>(MqttClient(settings.broker, identity(), version_));  // throws if a file is unusable
   thread_ = std::jthread([this](const std::stop_token& stop) { work(stop); });
 }
 
@@ -66,11 +67,11 @@ void MqttSender::work(const std::stop_token& stop) {
       attend(stop);
     } catch (const Failure& failure) {
       become_lost(failure.what());
-    } catch (const os::Failure& failure) {  // of its name
+    } catch (const os::Failure& failure) {  // the broker's name cannot be resolved
       become_lost(failure.what());
     }
     if (version_ != tried) continue;
-    version_ = MqttVersion::v5;  // a broker that was updated, or whose answer was a mistake
+    version_ = MqttVersion::v5;  // the broker may have been updated, or its answer was a mistake
     const bool held = connected_at_ != Time{} && os::now() - connected_at_ >= time_to_hold;
     if (has_taken_ && held) pause = first_pause;
     std::unique_lock lock(mutex_);
@@ -79,7 +80,8 @@ void MqttSender::work(const std::stop_token& stop) {
   }
 }
 
-// One connection, from its begin to its end. What was not acknowledged in it begins anew in the next, in order.
+// Handles one connection from its start to its end. Messages without acknowledgement are sent again, in order, by the
+// next connection.
 void MqttSender::attend(const std::stop_token& stop) {
   outstanding_.clear();
   messages_out_.clear();
@@ -90,7 +92,7 @@ void MqttSender::attend(const std::stop_token& stop) {
   retained_.clear();
   next_states_ = {};
   std::vector<std::string> hosts = os::addresses_of(settings_->broker.host);
-  const bool by_name = settings_->broker.tls;  // which the certificate is for
+  const bool by_name = settings_->broker.tls;  // the certificate is issued for the name
   const bool try_all = by_name && hosts.size() > 1;
   if (by_name) hosts = {settings_->broker.host};
   std::string why;
@@ -131,7 +133,8 @@ void MqttSender::begin() {
   figures_.trouble = refusals_.text();
 }
 
-// A connection that comes and goes is no event each time: after one, the next is told when it has held.
+// Reports the connection by an event. After an event, the next one needs a lasting connection or a minute, so that an
+// unstable connection does not fill the history.
 void MqttSender::tell_connected() {
   if (told_connected_) return;
   if (os::now() < next_told_connected_ && os::now() - connected_at_ < time_to_hold) return;
@@ -163,14 +166,14 @@ void MqttSender::step(MqttClient& client) {
   tell_connected();
   send_messages(client);
   const bool lost = client.work(one_wait) == MqttClient::State::lost;
-  settle(client);  // also what came before it was lost
+  settle(client);  // also acknowledgements that arrived before the loss
   if (!lost) return;
   note_death(client);
-  if (!client.died()) note_lost_connection();  // else a packet ended it, and no topic
+  if (!client.died()) note_lost_connection();  // otherwise a packet ended the process, and no topic is the cause
   throw Failure(client.trouble());
 }
 
-// A broker that may not say why it refuses a message ends the connection instead.
+// A broker may close the connection instead of refusing a message.
 void MqttSender::note_lost_connection() {
   std::set<std::string> topics;
   for (const auto& [number, sent] : outstanding_) topics.insert(sent.topic);
@@ -208,7 +211,7 @@ void MqttSender::send_states(MqttClient& client) {
   }
 }
 
-// What a broker keeps of an encoder that is no longer served would stand there for ever.
+// Otherwise the broker would keep the retained messages of an encoder that is no longer served.
 void MqttSender::clear_gone(MqttClient& client, const Fleet::Watches& watches) {
   std::set<std::string> now;
   for (const auto& watch : watches) now.insert(watch->name());
@@ -260,12 +263,12 @@ void MqttSender::send_messages(MqttClient& client) {
   }
 }
 
-// A message leaves the spool when the broker has said that it has it, and in no other way but for want of room.
+// Removes acknowledged messages from the spool. Otherwise a message leaves the spool only when it is full.
 void MqttSender::settle(MqttClient& client) {
   std::vector<std::int64_t> arrived;
   for (const MqttClient::Acknowledgement& one : client.take_acknowledgements()) {
     const auto found = outstanding_.find(one.number);
-    if (found == outstanding_.end()) continue;  // of QoS 0
+    if (found == outstanding_.end()) continue;  // messages with QoS 0 are not in `outstanding_`
     const Outstanding sent = found->second;
     outstanding_.erase(found);
     messages_out_.erase(sent.message);
@@ -285,7 +288,7 @@ void MqttSender::settle(MqttClient& client) {
 
 void MqttSender::settle_refused(const Outstanding& sent, const std::string& why) {
   const bool is_new = refusals_.refuse(sent.topic, why, os::now());
-  if (sent.message == 0) retained_.erase(sent.topic);  // to be sent when its pause is over
+  if (sent.message == 0) retained_.erase(sent.topic);  // the state is sent again when the pause is over
   {
     const std::lock_guard lock(mutex_);
     figures_.trouble = refusals_.text();
@@ -295,7 +298,7 @@ void MqttSender::settle_refused(const Outstanding& sent, const std::string& why)
 
 void MqttSender::settle_taken(const Outstanding& sent) {
   if (!refusals_.take(sent.topic)) return;
-  looked_to_ = 0;  // the others of this topic were skipped
+  looked_to_ = 0;  // other messages of this topic were skipped
   {
     const std::lock_guard lock(mutex_);
     figures_.trouble = refusals_.text();

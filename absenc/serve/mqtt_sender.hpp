@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// From the spool to the broker, in a thread of its own; and what the broker keeps: the state of the server and of each
-// encoder.
+// Sends messages from the spool to the broker, in its own thread, and publishes the retained states of the server and
+// of each encoder.
 #pragma once
 
 #include <condition_variable>
@@ -23,22 +23,22 @@ namespace absenc::serve {
 
 class MqttSender {
  public:
-  /// All outlive it. Throws Failure: a file for the connection cannot be used.
+  /// All arguments must outlive this object. Throws Failure: a file for the connection cannot be used.
   MqttSender(const MqttSettings& settings, Spool& spool, const Fleet& fleet, ServerEvents& server_events);
-  /// A broker that is there has a second to take what there is.
+  /// A connected broker has one second to receive the remaining messages.
   ~MqttSender();
 
   struct Figures {
     bool connected = false;
     std::string trouble{};
     std::uint64_t sent = 0;
-    std::uint64_t client_deaths = 0;  // of the process that speaks to the broker
+    std::uint64_t client_deaths = 0;  // unexpected ends of the MQTT client process
   };
   [[nodiscard]] Figures figures() const;
 
  private:
   struct Outstanding {
-    std::int64_t message = 0;  // its id; 0: of a state
+    std::int64_t message = 0;  // id of the message in the spool; 0: a retained state
     std::string topic{};
   };
 
@@ -70,26 +70,26 @@ class MqttSender {
   const Fleet* fleet_;
   ServerEvents* server_events_;
 
-  // Of the thread alone.
+  // The members below are used by the thread only.
   MqttVersion version_ = MqttVersion::v5;
-  std::unordered_map<int, Outstanding> outstanding_;  // by the number of the library
-  std::set<std::int64_t> messages_out_;               // ids, of those
-  std::int64_t looked_to_ = 0;  // the id up to which messages were sent, or skipped because their topic is refused
+  std::unordered_map<int, Outstanding> outstanding_;  // messages without acknowledgement, by their number at MqttClient
+  std::set<std::int64_t> messages_out_;               // ids of the spooled messages in `outstanding_`
+  std::int64_t looked_to_ = 0;                        // last id that was sent, or skipped because its topic is refused
   MqttRefusals refusals_;
-  std::set<std::string> served_;                 // encoders of which the broker may keep something
-  std::map<std::string, std::string> retained_;  // by topic: the condition that was sent
+  std::set<std::string> served_;                 // encoders that may have retained messages at the broker
+  std::map<std::string, std::string> retained_;  // by topic: condition of the retained message that was sent last
   Time next_states_{};
   Time next_values_{};
-  bool has_taken_ = false;  // the broker, a message on this connection
+  bool has_taken_ = false;  // the broker has acknowledged a message on this connection
   Time connected_at_{};
-  bool told_connected_ = false;  // of this connection
+  bool told_connected_ = false;  // an event has reported this connection
   Time next_told_connected_{};
-  std::set<std::string> told_lost_;  // why nothing arrives, since a connection was told
+  std::set<std::string> told_lost_;  // reported reasons of lost connections, since the last reported connection
 
-  mutable std::mutex mutex_;  // guards what follows
+  mutable std::mutex mutex_;  // guards all members below
   std::condition_variable_any changed_;
   Figures figures_;
-  std::jthread thread_;  // last: it uses all of the others
+  std::jthread thread_;  // last member: the thread uses all others
 };
 
 }  // namespace absenc::serve

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Frames between `absenc serve` and its MQTT client, which is a process of its own: four bytes of size, one of kind,
-// the fields. Each side checks what it reads as it would a stranger's.
+// Frames between `absenc serve` and its MQTT client process: size (4 bytes), kind (1 byte), fields. Each side checks
+// received frames like untrusted input.
 #pragma once
 
 #include <cstddef>
@@ -13,19 +13,20 @@
 
 namespace absenc::serve {
 
+/// The kind of a frame, with its fields.
 enum class Wire : std::uint8_t {
-  // To the client.
+  // Frames to the client process:
   begin,    // host, port, tls, login_file, ca_file, cert_file, key_file, id, will topic, will, version
   connect,  // host, whether to try all of its addresses
   publish,  // number, topic, payload, QoS, retain
-  leave,    // says good-bye to the broker and ends
-  // From it.
-  ready,         // the settings are good
-  failed,        // why they are not
-  connected,     //
-  lost,          // why, whether the broker does not know the version
-  acknowledged,  // number, why it was refused or ""
-  alive,         // every second
+  leave,    // disconnects from the broker and ends the process
+  // Frames from the client process:
+  ready,         // the settings can be used
+  failed,        // why the settings cannot be used
+  connected,     // no fields
+  lost,          // why, and whether the broker does not support the MQTT version
+  acknowledged,  // number, reason of a refusal or ""
+  alive,         // sign of life, every second
 };
 
 /// Builds one frame.
@@ -38,7 +39,7 @@ class WireFrame {
     return *this;
   }
 
-  /// The bytes to send.
+  /// Returns the bytes to send.
   [[nodiscard]] std::string bytes() const;
 
  private:
@@ -46,22 +47,22 @@ class WireFrame {
   FieldWriter fields_;
 };
 
-/// One frame that was received.
+/// The fields of a received frame.
 struct WireFields : FieldReader {
   WireFields(Wire what, FieldReader fields) : FieldReader(std::move(fields)), kind(what) {}
 
   Wire kind;
 };
 
-/// Puts received bytes together to frames.
+/// Assembles frames from received bytes.
 class WireReader {
  public:
-  /// `most`: bytes of the largest frame.
+  /// `most`: largest size of a frame in bytes.
   explicit WireReader(std::size_t most) : most_(most) {}
 
   /// Received bytes are appended here.
   std::string bytes{};
-  /// The next whole frame. Throws client::Failure: no frame begins like that.
+  /// Returns the next whole frame. Throws client::Failure at an invalid size or kind.
   [[nodiscard]] std::optional<WireFields> next();
 
  private:

@@ -19,7 +19,7 @@ using namespace client;
 
 namespace {
 
-constexpr std::size_t most_bytes = 4096;  // of memory in one answer
+constexpr std::size_t most_bytes = 4096;  // bytes of memory in one response
 
 using Between = std::function<void()>;
 
@@ -28,7 +28,7 @@ Done done_well(const Command& command, const Answer& answer, const std::string& 
           change};
 }
 
-// Settings are compared with what is read back.
+// Runs a command. A setting is read back and compared after it was written.
 Done do_command(Encoder& live, const Order& order) {
   const Command& command = *order.command;
   if (command.verb != Verb::config_set) {
@@ -40,8 +40,8 @@ Done do_command(Encoder& live, const Order& order) {
   return done_well(command, change.now, change.was_so ? "it was so already" : change.note, change.state);
 }
 
-// Asks for one after the other. What this encoder has not, or not with these options, is told in its place; `why` has
-// the first of these reasons while none was answered.
+// Sends one request after the other. A question that the encoder refuses, or that its options exclude, is reported with
+// its reason; `done` returns the first reason if no question was answered.
 class Questions {
  public:
   Questions(Encoder& live, const Between& between) : live_(&live), between_(&between) {}
@@ -64,9 +64,9 @@ class Questions {
     return std::nullopt;
   }
 
-  /// Of the question before.
+  /// Returns why the last question failed.
   [[nodiscard]] const std::string& reason() const { return last_; }
-  /// False: with these options there is no such question.
+  /// Returns false if the options of the encoder exclude the last question.
   [[nodiscard]] bool was_asked() const { return was_asked_; }
   [[nodiscard]] Done done(Json json) const {
     if (answered_) return {true, "read", std::move(json), ChangeState::none};
@@ -76,14 +76,15 @@ class Questions {
  private:
   Encoder* live_;
   const Between* between_;
-  bool asked_ = false;  // anything
+  bool asked_ = false;  // a question was sent before
   bool was_asked_ = false;
   bool answered_ = false;
   std::string first_;
   std::string last_;
 };
 
-// What it may be set to, as its setter says: "degrees: degC, 1 to 127; 0: never (0 to 127)". "": it can only be read.
+// Returns the range of a setting, from the arguments of its setter: "degrees: degC, 1 to 127; 0: never (0 to 127)"; ""
+// if the setting is read-only.
 std::string range_of(const Unit& unit, const Command& getter) {
   std::vector<std::string> texts;
   for (const Command& setter : unit.commands) {
@@ -96,7 +97,7 @@ std::string range_of(const Unit& unit, const Command& getter) {
   return fmt::format("{}", fmt::join(texts, ", "));
 }
 
-// Null: it does not hold.
+// Returns null for an invalid value.
 Json shown(const Column& column, const Value& value) {
   if (std::holds_alternative<Invalid>(value)) return {};
   if (std::holds_alternative<Unknown>(value)) return "unknown";
@@ -110,7 +111,7 @@ Json shown_row(const Column& column, const Value& value) {
   return Json::object().set("field", column.name).set("value", shown(column, value)).set("meaning", column.meaning);
 }
 
-// `wanted`: the command that reads one setting; null: all.
+// `wanted` is the command that reads one setting; null: all settings.
 Done read_settings(Encoder& live, const Command* wanted, const Between& between) {
   Json identity = Json::object();
   Json settings = Json::object();
@@ -137,7 +138,7 @@ Done read_settings(Encoder& live, const Command* wanted, const Between& between)
   return asked.done(json.set("rows", rows).set("failed", failed));
 }
 
-// What is told last of a register is its meaning.
+// Reads all readable registers. The last column of a reply has the meaning of the register.
 Done read_registers(Encoder& live, const Between& between) {
   const Command& command = *find_command(live.unit(), Verb::memory_read);
   Json registers = Json::array();

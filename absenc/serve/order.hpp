@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What somebody wants of an encoder beside its readings: a command, its settings, its memory, an examination.
+// Orders for an encoder besides its readings: a command, its settings, its memory, an examination.
 #pragma once
 
 #include <cstdint>
@@ -14,20 +14,20 @@
 
 namespace absenc::serve {
 
-/// How it ended.
+/// Result of an order.
 struct Done {
   bool good = false;
   std::string text{};
-  client::Json json{};  // of a command its fields
+  client::Json json{};  // for a command: the fields of the reply
   client::ChangeState change = client::ChangeState::none;
 };
 
 struct Order {
   enum class Kind : std::uint8_t {
     command,
-    settings,     // all that can be read, and what it says of itself; with `command` that alone
-    memory,       // the bytes of `addresses`; of encoders with registers all that can be read
-    examination,  // as `absenc doctor`
+    settings,     // all readable settings and identification; with `command` only this setting
+    memory,       // bytes at `addresses`; for encoders with registers all readable registers
+    examination,  // like `absenc doctor`
   };
 
   Kind kind = Kind::command;
@@ -35,27 +35,31 @@ struct Order {
   std::vector<std::int64_t> arguments{};
   client::MemoryImage addresses{};
   std::string who{};
-  std::function<void(const Done&)> done{};  // called once, from the thread of the encoder, after the event of it
+  std::function<void(const Done&)> done{};  // called once in the encoder's thread, after the event about the order was
+                                            // added
 
-  /// "zero", "doctor"
+  /// Returns the name for messages: "zero", "doctor".
   [[nodiscard]] std::string_view name() const;
   [[nodiscard]] bool changes_encoder() const { return kind == Kind::command && command->changes_encoder; }
 };
 
-/// `setting`: the command that reads one of them; "": all. Throws UsageError where the unit has none of it.
+/// `setting` names the command that reads one setting; "": all settings. Throws UsageError if the unit has none or not
+/// this one.
 [[nodiscard]] Order settings_order(const Unit& unit, std::string_view setting);
-/// `page` less than 0: what belongs to a copy of the memory. Throws also for more than can be read at once.
+/// `page` < 0: the addresses that a memory dump contains. Throws UsageError also if they are too many for one request.
 [[nodiscard]] Order memory_order(const Unit& unit, std::int64_t page);
 [[nodiscard]] Order examination_order();
 
-/// Of all but an examination. `between` is called between two requests of one that reads, and may read the position.
-/// Throws what the encoder and its port throw.
+/// Carries out any order but an examination. `between` is called between two requests of an order that reads, and may
+/// read the position. Throws the exceptions of the encoder and its port.
 [[nodiscard]] Done carry_out(client::Encoder& live, const Order& order, const std::function<void()>& between);
 
-/// A list of {"field","value","meaning"} for people, without what belongs to the exchange; null: it does not hold.
+/// Returns the fields of a reply for people as a list of {"field","value","meaning"}, without fields of the exchange
+/// itself; an invalid value is null.
 [[nodiscard]] client::Json shown_values(const client::Answer& answer);
 
-/// What of it can be read: {"settings":[names],"memory":[{"page","first","count","meaning","in_dump"}],"registers":n}
+/// Returns which settings and memory can be read:
+/// {"settings":[names],"memory":[{"page","first","count","meaning","in_dump"}],"registers":n}
 [[nodiscard]] client::Json readable_json(const Unit& unit);
 
 }  // namespace absenc::serve

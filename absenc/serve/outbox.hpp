@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Good readings on their way to other systems: each encoder keeps them until they are fetched.
+// Queues of good readings for other systems: each encoder stores its readings until they are taken.
 #pragma once
 
 #include <cstddef>
@@ -12,26 +12,28 @@
 
 namespace absenc::serve {
 
-/// One good reading. What does not hold is not there.
+/// One good reading. Members without a valid value are empty.
 struct OutgoingReading {
-  std::int64_t at_us = 0;                         // calendar, of when it was latched
-  std::optional<double> place{};                  // past the end of a turn: degrees, of linear encoders mm
-  std::optional<client::Estimate> speed{};        // rpm, of linear encoders mm/s
-  std::optional<double> joint{};                  // degrees, of linear encoders mm; where the settings say how it sits
-  std::optional<client::Estimate> joint_speed{};  // rpm, of linear encoders mm/s
+  std::int64_t at_us = 0;                         // calendar time at which the encoder latched the position
+  std::optional<double> place{};                  // continued past the end of a turn; degrees, for linear encoders mm
+  std::optional<client::Estimate> speed{};        // rpm, for linear encoders mm/s
+  std::optional<double> joint{};                  // degrees, for linear encoders mm; only if the settings describe the
+                                                  // joint
+  std::optional<client::Estimate> joint_speed{};  // rpm, for linear encoders mm/s
   std::optional<double> electrical_deg{};
   std::optional<std::uint64_t> counts{};
   std::optional<std::int64_t> turns{};
 };
 
-/// Bounded: whoever fetches too seldom loses the oldest, which are counted. Empty until somebody fetches.
+/// A bounded queue of readings. A consumer that takes them too rarely loses the oldest, which are counted. The queue
+/// stores nothing before the first `take`.
 class Outbox {
  public:
   static constexpr std::size_t most = 2048;
 
   struct Taken {
-    std::vector<OutgoingReading> readings{};  // the oldest first
-    std::uint64_t dropped = 0;                // before them
+    std::vector<OutgoingReading> readings{};  // oldest first
+    std::uint64_t dropped = 0;                // number of dropped readings before these
   };
 
   [[nodiscard]] bool wanted() const { return wanted_; }

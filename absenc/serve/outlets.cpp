@@ -27,7 +27,7 @@ constexpr std::array<std::string_view, 10> mqtt_names{"broker",   "login_file", 
                                                       "batch_ms", "home_assistant"};
 constexpr std::array<std::string_view, 1> udp_names{"to"};
 
-/// What stands below a heading of the file, and the options that win over it.
+/// The settings of one section of the file, overridden by options.
 class Given {
  public:
   Given(std::string_view section, std::span<const std::string_view> known, const std::vector<FileSection>& sections,
@@ -89,7 +89,7 @@ struct Place {
   std::optional<std::uint16_t> port;
 };
 
-// "HOST:PORT", "HOST", "[IPV6]:PORT"
+// Parses "HOST:PORT", "HOST" or "[IPV6]:PORT".
 std::optional<Place> host_and_port(std::string_view written) {
   const std::size_t bracket = written.rfind(']');
   const std::size_t colon = written.find(':', bracket == std::string_view::npos ? 0 : bracket);
@@ -128,7 +128,7 @@ Broker broker_of(const Given& given) {
   return broker;
 }
 
-// Two servers with one prefix would overwrite each other's state.
+// The default prefix contains the host name: two servers with the same prefix would overwrite each other's state.
 std::string usual_prefix() {
   std::string text = os::host_name();
   if (text.empty()) text = "server";

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Where readings are sent: [serve.mqtt] and [serve.udp] of absenc.toml, and the options of the command for the same.
+// Settings for sending readings to other systems: [serve.mqtt] and [serve.udp] of absenc.toml, and the options of the
+// command that override them.
 #pragma once
 
 #include <cstdint>
@@ -14,11 +15,11 @@ namespace absenc::serve {
 
 struct MqttSettings {
   Broker broker{};
-  std::string prefix{};          // of all topics
-  std::string spool{};           // the folder
-  std::int64_t spool_bytes = 0;  // at most
-  Time batch{};                  // what comes within it goes as one message
-  std::string home_assistant{};  // the prefix of its discovery; "": it is not used
+  std::string prefix{};          // prefix of all topics
+  std::string spool{};           // folder of the spool
+  std::int64_t spool_bytes = 0;  // maximum size of the spool
+  Time batch{};                  // readings within this time are sent as one message
+  std::string home_assistant{};  // prefix of the discovery topics; "": no discovery
 
   bool operator==(const MqttSettings&) const = default;
 };
@@ -35,14 +36,14 @@ struct Outlets {
   std::optional<UdpSettings> udp{};
 };
 
-/// "mqtt", "broker", "mqtts://hall.example": as in the file, which it wins over.
+/// An option that overrides a setting of the file: "mqtt", "broker", "mqtts://hall.example".
 struct OutletOption {
   std::string_view section;
   std::string_view setting;
   std::string value;
 };
 
-/// Reads absenc.toml, if there is one. Throws UsageError.
+/// Reads absenc.toml, if it exists, and applies the options. Throws UsageError.
 [[nodiscard]] Outlets read_outlets(const std::vector<OutletOption>& options);
 
 }  // namespace absenc::serve

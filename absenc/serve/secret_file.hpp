@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Files of names with their secrets, for their owner alone.
+// Files of names and secrets that only their owner may read.
 #pragma once
 
 #include <string>
@@ -12,11 +12,11 @@ struct Secret {
   std::string secret;
 };
 
-/// Lines of NAME SECRET, of at least `least` characters; `title` names them in what is thrown. Throws Failure when
-/// others may read the file, when a line is no such, and when there is none.
+/// Reads lines of NAME SECRET. `least` is the minimum length of a secret; `title` names the secrets in errors. Throws
+/// Failure if others may read the file, a line is invalid, or the file has no line.
 [[nodiscard]] std::vector<Secret> read_secrets(const std::string& title, const std::string& path, std::size_t least);
 
-/// A file of one: a user's name and password.
+/// Reads a file with one line: user name and password.
 [[nodiscard]] Secret read_secret(const std::string& path);
 
 }  // namespace absenc::serve

@@ -15,12 +15,14 @@ std::string Sending::change_to(const Outlets& outlets) {
       const std::lock_guard lock(mutex_);
       old = std::exchange(mqtt_, nullptr);
     }
-    old.reset();  // the next one may have its spool, which is locked
+    old.reset();  // the new object may use the same spool, which is locked
     now_.mqtt.reset();
     std::shared_ptr<Mqtt> next;
     if (outlets.mqtt) next = std::make_shared<Mqtt>(*outlets.mqtt, *fleet_, *server_events_);
     now_.mqtt = outlets.mqtt;
-    if (!outlets.mqtt) stop_passing(Watch::Outlet::mqtt);  // else they wait for the next one
+    if (!outlets.mqtt)
+      stop_passing(Watch::Outlet::mqtt);  // with MQTT still on, queued readings wait for the new
+                                          // object
     changed += fmt::format("; MQTT: {}", outlets.mqtt ? outlets.mqtt->broker.text() : "none");
     const std::lock_guard lock(mutex_);
     mqtt_ = std::move(next);

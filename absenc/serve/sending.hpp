@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What sends readings to other systems; can be changed while everything runs.
+// Sends readings to other systems by MQTT and UDP. The settings can be changed while the server runs.
 #pragma once
 
 #include <memory>
@@ -14,19 +14,20 @@ namespace absenc::serve {
 
 class Sending {
  public:
-  /// Both outlive it. Nothing is sent yet.
+  /// Both arguments must outlive this object. Nothing is sent before `change_to`.
   Sending(const Fleet& fleet, ServerEvents& server_events) : fleet_(&fleet), server_events_(&server_events) {}
 
-  /// What is as before goes on undisturbed. Returns what changed, in words, each with "; " before it. Throws Failure,
-  /// os::Failure: what could not be begun is not there, with the rest as it was. From one thread.
+  /// Applies new settings; unchanged outlets continue without interruption. Returns the changes in words, each with a
+  /// leading semicolon. Throws Failure, os::Failure: the outlet that could not be started is off, the others are as
+  /// before. Call it from one thread only.
   std::string change_to(const Outlets& outlets);
 
   void add(const std::vector<ServerEvent>& server_events);
-  /// Its state is "none" when there is none.
+  /// Returns the health of MQTT; its state is "none" if MQTT is off.
   [[nodiscard]] MqttHealth mqtt_health() const;
-  /// Of MQTT, null when there is none.
+  /// Returns the health of MQTT as JSON; null if MQTT is off.
   [[nodiscard]] client::Json json() const;
-  /// For Prometheus.
+  /// Returns the metrics of MQTT in the text format of Prometheus.
   [[nodiscard]] std::string metrics() const;
 
  private:
@@ -36,7 +37,7 @@ class Sending {
   const Fleet* fleet_;
   ServerEvents* server_events_;
   Outlets now_;
-  mutable std::mutex mutex_;  // guards which there are
+  mutable std::mutex mutex_;  // guards the pointers below
   std::shared_ptr<Mqtt> mqtt_;
   std::unique_ptr<UdpSender> udp_;
 };

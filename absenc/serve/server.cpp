@@ -25,7 +25,7 @@ using namespace std::chrono_literals;
 
 constexpr Time between_points = 33ms;
 constexpr Time between_states = 200ms;
-constexpr Time between_large_states = 1s;  // of more encoders than a screen shows
+constexpr Time between_large_states = 1s;  // for more encoders than a screen shows
 constexpr std::size_t large = 50;
 
 std::string url_of(const std::string& host, std::uint16_t port) {
@@ -35,7 +35,7 @@ std::string url_of(const std::string& host, std::uint16_t port) {
 
 }  // namespace
 
-// In the order in which each needs those above it.
+// In order of dependency: each member uses those above it.
 struct Server::Parts {
   explicit Parts(const Choices& choices)
       : listener(os::listen_at(choices.host, choices.port)),
@@ -58,13 +58,13 @@ struct Server::Parts {
   ~Parts() {
     teller.request_stop();
     teller.join();
-    http.reset();  // before what it asks
-    fleet.end();   // what a command tells at its end goes into the history
+    http.reset();  // stops requests before the parts that they use
+    fleet.end();   // before write_events, for the events of its last commands
     write_events();
     sending.change_to({});
   }
 
-  // Leads a program that finds one of the ports in use to this server.
+  // Publishes the ports in use, so that a program that finds one of them busy can name this server.
   void tell_ports() {
     std::vector<std::string> ports;
     for (const std::shared_ptr<Watch>& watch : fleet.all()) {
@@ -131,7 +131,7 @@ struct Server::Parts {
   Worker worker;
   std::optional<Api> api;
   std::optional<HttpServer> http;
-  std::set<std::string> traced;  // of the teller's thread
+  std::set<std::string> traced;  // used by the teller thread only
   std::mutex mutex;
   std::condition_variable_any changed;
   std::jthread teller;
@@ -147,7 +147,7 @@ std::string Server::history_trouble() const {
 std::size_t Server::encoders() const { return parts_->fleet.all().size(); }
 
 std::string Server::reload() {
-  const Outlets outlets = read_outlets(outlets_);  // before anything is changed
+  const Outlets outlets = read_outlets(outlets_);  // before any change, because it may throw
   try {
     parts_->access.reload();
   } catch (const client::Failure& failure) {

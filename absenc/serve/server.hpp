@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// `absenc serve` without its command line: encoders that are read, a page, HTTP, history, MQTT, UDP.
+// `absenc serve` without its command line: reads encoders and provides a page, HTTP, history, MQTT and UDP.
 #pragma once
 
 #include <cstdint>
@@ -14,32 +14,34 @@
 namespace absenc::serve {
 
 struct Choices {
-  std::vector<std::string> encoders{};  // as for `absenc read`; none: all of absenc.toml
-  double rate = 50;                     // readings a second, where absenc.toml has no rate_hz; 0: as fast as can be
+  std::vector<std::string> encoders{};  // as for `absenc read`; empty: all of absenc.toml
+  double rate = 50;                     // readings per second of encoders without rate_hz in absenc.toml; 0: as fast as
+                                        // possible
   std::string host = "127.0.0.1";
-  std::uint16_t port = 8420;  // 0: any that is free
-  std::string public_url{};   // of a proxy; "": none
-  std::string token_file{};   // "": none
-  std::string history{};      // the file; "": none is kept
+  std::uint16_t port = 8420;  // 0: any free port
+  std::string public_url{};   // URL of a proxy; "": no proxy
+  std::string token_file{};   // "": no tokens
+  std::string history{};      // path of the history file; "": no history
   HistoryLimits limits{};
-  std::vector<OutletOption> outlets{};  // win over what absenc.toml says of MQTT and UDP
+  std::vector<OutletOption> outlets{};  // override the settings of MQTT and UDP in absenc.toml
 };
 
 class Server {
  public:
-  /// Everything runs when it returns. Throws UsageError, Failure, os::Failure.
+  /// Starts all threads before it returns. Throws UsageError, Failure, os::Failure.
   explicit Server(const Choices& choices);
-  /// Within the time that one reading may take.
+  /// Ends within the time that one reading may take.
   ~Server();
   Server(const Server&) = delete;
   Server& operator=(const Server&) = delete;
 
-  /// "http://127.0.0.1:8420/"
+  /// Returns the URL of the page: "http://127.0.0.1:8420/".
   [[nodiscard]] const std::string& url() const;
   [[nodiscard]] std::size_t encoders() const;
-  /// Why the history cannot be written; "" when nothing is wrong, or none is kept.
+  /// Returns why the history cannot be written; "" without an error or without a history.
   [[nodiscard]] std::string history_trouble() const;
-  /// Reads absenc.toml again; returns what changed, in words. Throws UsageError: then nothing did. From one thread.
+  /// Reads absenc.toml again and returns the changes in words. Throws UsageError: then nothing has changed. Call it
+  /// from one thread only.
   std::string reload();
 
  private:

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What happens to encoders, for people: alarms, losses, changes, commands.
+// Events for people: alarms, losses, changes, commands.
 #pragma once
 
 #include <chrono>
@@ -14,7 +14,7 @@
 
 namespace absenc::serve {
 
-/// Microseconds of the calendar's clock since 1970.
+/// Returns the calendar time in microseconds since 1970.
 [[nodiscard]] inline std::int64_t calendar_us() {
   const auto now = std::chrono::system_clock::now().time_since_epoch();
   return std::chrono::duration_cast<std::chrono::microseconds>(now).count();
@@ -23,12 +23,12 @@ namespace absenc::serve {
 
 struct ServerEvent {
   std::int64_t at_ms = 0;
-  std::string encoder{};  // "": of the server itself
-  // alarm, alarm_over, acknowledged, failing, silent, lost, back, restarted, ended, examined, command, change, history,
-  // mqtt, access
+  std::string encoder{};  // "": the server itself
+  // One of alarm, alarm_over, acknowledged, failing, silent, lost, back, restarted, ended, examined, command, change,
+  // history, mqtt, access.
   std::string kind{};
   std::string text{};
-  std::string who{};  // of commands: who gave it
+  std::string who{};  // for a command: the user who ordered it
 
   [[nodiscard]] client::Json json() const {
     return client::Json::object()
@@ -40,7 +40,8 @@ struct ServerEvent {
   }
 };
 
-/// From the threads that read to whoever tells: bounded, so that a flood of them costs the oldest and no memory.
+/// A bounded queue of events from all threads to the thread that distributes them. A flood of events drops the oldest
+/// instead of using memory without limit.
 class ServerEvents {
  public:
   static constexpr std::size_t most = 10'000;
@@ -54,13 +55,13 @@ class ServerEvents {
     ++dropped_;
   }
 
-  /// How many there have been so far.
+  /// Returns the number of events since the start.
   [[nodiscard]] std::uint64_t added() const {
     const std::lock_guard lock(mutex_);
     return added_;
   }
 
-  /// All that came since the last time, the oldest first; `added` says how many there have been with them.
+  /// Takes all events since the last call, oldest first. Sets `added` to the number of events since the start.
   [[nodiscard]] std::vector<ServerEvent> take(std::uint64_t& added) {
     const std::lock_guard lock(mutex_);
     added = added_;

@@ -17,7 +17,7 @@ namespace fs = std::filesystem;
 
 namespace {
 
-constexpr std::size_t bytes_of_a_write = 65536;  // a disk that is nearly full may still take so much
+constexpr std::size_t bytes_of_a_write = 65536;  // small writes, because a nearly full disk may still accept one
 
 std::int64_t memory_bytes(std::int64_t most) { return std::clamp<std::int64_t>(most / 16, 64'000, 4'000'000); }
 
@@ -96,11 +96,11 @@ void Spool::write_waiting() {
   notes_.push_back(fmt::format("the spool {} can be written again", path_));
 }
 
-// As much as one write takes. False when nothing waits.
+// Writes the waiting messages that fit into one write. Returns false when none waits.
 bool Spool::write_some() {
   if (memory_.empty() && unwritten_numbers_.empty()) return false;
   std::string bytes;
-  // The numbers first: a write that is cut costs numbers, and gives none twice.
+  // The reading numbers come first: a truncated write may then skip numbers but never uses one twice.
   if (!unwritten_numbers_.empty()) bytes = spool_record({facts_.source, facts_.next_id, unwritten_numbers_});
   std::vector<std::size_t> offsets;
   const std::size_t start = newest_->log().size();
@@ -159,7 +159,7 @@ std::vector<Message> Spool::after(std::int64_t id, std::size_t most) {
       collect_of(part, id, most, found);
     } catch (const os::Failure&) {
       std::error_code error;
-      if (fs::exists(path_of(part.number), error)) break;  // another time
+      if (fs::exists(path_of(part.number), error)) break;  // the file exists: the next call tries again
       drop_part(i--, fmt::format("{} was removed", path_of(part.number)));
     }
   }
@@ -193,7 +193,7 @@ void Spool::remove(const std::vector<std::int64_t>& ids) {
   const std::lock_guard lock(mutex_);
   for (const std::int64_t id : ids) {
     const auto place = places_.find(id);
-    if (place == places_.end()) continue;  // it was dropped meanwhile
+    if (place == places_.end()) continue;  // the message was dropped meanwhile
     settle_one(id, place->second);
     places_.erase(id);
   }
@@ -216,7 +216,7 @@ void Spool::settle_one(std::int64_t id, const Place& place) {
   part->waiting_bytes -= place.bytes;
   try {
     if (file_of(*part).mark_arrived(place.offset) == 0) return;
-  } catch (const os::Failure&) {  // the file is gone: the mark is not needed
+  } catch (const os::Failure&) {  // the file is gone, so the mark is not needed
   }
   unmarked_.insert(id);
 }
@@ -226,7 +226,7 @@ void Spool::forget(const std::string& encoder) {
   facts_.next_numbers.erase(encoder);
   unwritten_numbers_.erase(encoder);
   if (newest_ == nullptr) return;
-  // Without room the number stays until a newer file is begun, which harms nobody.
+  // Without free space the number stays until the next file is started, which does no harm.
   [[maybe_unused]] const int ignored = newest_->log().append(spool_record_without(encoder));
   parts_.back().bytes = newest_->log().size();
 }

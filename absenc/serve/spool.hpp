@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// Messages on disk until a broker has taken them: kill -9 loses none that is there.
+// Stores messages on disk until a broker has acknowledged them: kill -9 loses no stored message.
 //
-// A folder of files that are only appended to (spool_file.hpp). A file whose messages have all arrived is deleted, so
-// that draining a full disk needs no room on it. While nothing can be written, new messages wait in memory, as far as
-// there is room, and are sent from there.
+// The spool is a folder of append-only files (spool_file.hpp). A file whose messages are all acknowledged is deleted,
+// so sending from a full disk needs no free space. While the disk cannot be written, new messages wait in memory, up to
+// a limit, and are sent from there.
 #pragma once
 
 #include <cstddef>
@@ -24,7 +24,7 @@
 
 namespace absenc::serve {
 
-/// Any thread may use it. Nothing but the constructor throws: trouble with the disk is in `condition`.
+/// Thread-safe. Only the constructor throws: later disk errors are in `condition`.
 class Spool {
  public:
   struct Counts {
@@ -35,57 +35,57 @@ class Spool {
     Counts& operator-=(const Counts& other);
   };
 
-  /// At most `bytes` of files. Throws Failure when another process has it or the folder around it is missing. A disk
-  /// that is full or cannot be written is none: it goes on in memory.
+  /// `bytes` limits the total size of the files. Throws Failure when another process uses the spool or the parent
+  /// folder is missing. A disk that is full or read-only is no error: messages wait in memory.
   Spool(std::string path, std::int64_t bytes);
 
-  /// Random, but the same for as long as the spool is kept: 16 characters.
+  /// Returns a random text of 16 characters that stays the same as long as the spool exists.
   [[nodiscard]] const std::string& source() const { return facts_.source; }
-  /// Random, and another each time that the spool is opened: 16 characters.
+  /// Returns a random text of 16 characters that is different each time the spool is opened.
   [[nodiscard]] const std::string& run() const { return run_; }
-  /// The number after the last one that an encoder's readings had; by its name.
+  /// Returns the next number for a reading of each encoder, by its name.
   [[nodiscard]] std::map<std::string, std::uint64_t> next_numbers();
-  /// The least that no message has had.
+  /// Returns the smallest message id that is not used yet.
   [[nodiscard]] std::int64_t next_id();
 
-  /// All of it, with the numbers that follow. What no longer has room, the oldest first, is dropped.
+  /// Stores messages and the next reading number of each encoder. If space is short, the oldest messages are dropped.
   void add(const std::vector<Message>& messages, const std::map<std::string, std::uint64_t>& next_numbers);
-  /// Up to `most` behind `id`, in order.
+  /// Returns up to `most` messages with ids above `id`, in ascending order.
   [[nodiscard]] std::vector<Message> after(std::int64_t id, std::size_t most);
-  /// They have arrived.
+  /// Removes acknowledged messages.
   void remove(const std::vector<std::int64_t>& ids);
-  /// Nothing more is known of this encoder.
+  /// Forgets the next reading number of an encoder.
   void forget(const std::string& encoder);
 
   [[nodiscard]] Counts held() const;
   [[nodiscard]] std::int64_t held_bytes() const;
 
   struct Condition {
-    std::string trouble{};   // why messages cannot be written; "": they are
-    bool in_memory = false;  // messages wait there, which kill -9 loses
+    std::string trouble{};   // why messages cannot be written to disk; "" without an error
+    bool in_memory = false;  // messages wait in memory, where kill -9 loses them
   };
   [[nodiscard]] Condition condition() const;
 
   struct Dropped {
     Counts counts{};
-    std::string why{};  // of the last ones
+    std::string why{};  // reason of the latest drop
   };
-  /// Since the last call.
+  /// Returns the messages dropped since the last call.
   [[nodiscard]] Dropped take_dropped();
-  /// Sentences about what happened to the files since the last call.
+  /// Returns sentences about changes of the files since the last call.
   [[nodiscard]] std::vector<std::string> take_notes();
 
  private:
-  struct Part {  // one file
+  struct Part {  // one file of the spool
     std::int64_t number = 0;
     std::int64_t first_id = 0, last_id = 0;
     Counts waiting{};
     std::int64_t waiting_bytes = 0;
     std::size_t bytes = 0;
-    bool damaged = false;  // something in it cannot be read: it is set aside, not deleted
+    bool damaged = false;  // a part of the file cannot be read: it will be renamed, not deleted
   };
-  struct Place {            // of a message that `after` has returned
-    std::int64_t part = 0;  // 0: in memory
+  struct Place {            // where a message returned by `after` is stored
+    std::int64_t part = 0;  // number of the file; 0: in memory
     std::size_t offset = 0;
     std::uint64_t readings = 0;
     std::int64_t bytes = 0;
@@ -117,27 +117,27 @@ class Spool {
   std::int64_t most_bytes_;
   std::string run_;
 
-  std::mutex mutex_;  // guards what follows
+  std::mutex mutex_;  // guards all members up to `shown_mutex_`
   SpoolFacts facts_;
   std::map<std::string, std::uint64_t> unwritten_numbers_;
   std::optional<os::OwnedFolder> folder_;
-  std::deque<Part> parts_;             // the oldest first
-  std::unique_ptr<SpoolFile> newest_;  // of the last part, which is appended to; null while there is none
+  std::deque<Part> parts_;             // oldest first
+  std::unique_ptr<SpoolFile> newest_;  // file of the last part, which is appended to; null if there is none
   std::int64_t next_part_ = 1;
   std::size_t part_limit_ = 0;
-  std::unique_ptr<SpoolFile> older_;  // the one that was read last
+  std::unique_ptr<SpoolFile> older_;  // the file that was read last, other than `newest_`
   std::int64_t older_number_ = 0;
   struct {
     std::int64_t part = 0, id = 0;
     std::size_t offset = 0;
-  } read_to_;                   // where `after` ended
-  std::deque<Message> memory_;  // behind all parts
+  } read_to_;                   // where the last call of `after` stopped reading
+  std::deque<Message> memory_;  // messages that are not on disk; newer than those in `parts_`
   Counts memory_counts_{};
   std::int64_t memory_bytes_ = 0;
   std::unordered_map<std::int64_t, Place> places_;
-  std::set<std::int64_t> unmarked_;  // arrived, but the disk did not take the mark
+  std::set<std::int64_t> unmarked_;  // acknowledged, but the disk did not store the mark
 
-  mutable std::mutex shown_mutex_;  // guards what follows, so that nobody waits for the disk who only asks
+  mutable std::mutex shown_mutex_;  // guards all members below, so that reading them never waits for the disk
   Counts held_{};
   std::int64_t held_bytes_ = 0;
   Condition condition_{};

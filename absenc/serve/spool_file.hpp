@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// One file of the spool: records that are appended and never moved. A message that has arrived is marked in its place,
-// which needs no room on the disk.
+// One file of the spool: records that are appended and never moved. An acknowledged message is marked in place, which
+// needs no free space on the disk.
 //
-//   checksum (4) | size of the body (4) | kind (1) | arrived (1) | body       numbers in the order of this computer
+//   checksum (4) | size of the body (4) | kind (1) | arrived (1) | body       numbers in this computer's byte order
 #pragma once
 
 #include <cstddef>
@@ -17,34 +17,34 @@
 namespace absenc::serve {
 
 struct Message {
-  std::int64_t id = 0;  // ascends for as long as the spool is kept
+  std::int64_t id = 0;  // ascends for as long as the spool exists
   std::string topic{};
   std::string payload{};
-  std::uint64_t readings = 0;  // in it
+  std::uint64_t readings = 0;  // number of readings in the message
 };
 
-/// The bytes that a message takes in the spool: its texts, and its record around them.
+/// Returns the bytes that a message needs in the spool: its texts and the record around them.
 [[nodiscard]] inline std::int64_t spool_bytes(const Message& message) {
   return static_cast<std::int64_t>(message.topic.size() + message.payload.size()) + 32;
 }
 
-/// Each file begins with these, so that the others may be deleted.
+/// Values that each file begins with, so that older files can be deleted.
 struct SpoolFacts {
   std::string source{};
   std::int64_t next_id = 1;
-  std::map<std::string, std::uint64_t> next_numbers{};  // of readings, by encoder
+  std::map<std::string, std::uint64_t> next_numbers{};  // next number of a reading, by encoder
 };
 
 [[nodiscard]] std::string spool_record(const Message& message);
 [[nodiscard]] std::string spool_record(const SpoolFacts& facts);
-/// A record that forgets an encoder's number.
+/// Returns a record that deletes an encoder's next reading number.
 [[nodiscard]] std::string spool_record_without(std::string_view encoder);
 
 class SpoolFile {
  public:
-  /// A new one, with `facts`. Throws os::Failure.
+  /// Creates a file that begins with `facts`. Throws os::Failure.
   SpoolFile(const std::string& path, const SpoolFacts& facts);
-  /// One that is there. Throws os::Failure.
+  /// Opens an existing file. Throws os::Failure.
   explicit SpoolFile(const std::string& path);
 
   [[nodiscard]] os::LogFile& log() { return log_; }
@@ -52,13 +52,14 @@ class SpoolFile {
 
   struct Found {
     Message message{};
-    std::size_t offset = 0;  // of its record
+    std::size_t offset = 0;  // offset of its record
     bool arrived = false;
   };
-  /// The next message from `offset` on, which is then behind it; facts before it go into `facts`, unless that is null.
-  /// Nothing at the end, and where a record is broken: then `offset` is not that of the end. Throws os::Failure.
+  /// Returns the next message at or after `offset` and moves `offset` behind it. Facts before it are merged into
+  /// `facts`, unless that is null. Returns nothing at the end of the file, and at a damaged record: then `offset` stays
+  /// before the end. Throws os::Failure.
   [[nodiscard]] std::optional<Found> next(std::size_t& offset, SpoolFacts* facts) const;
-  /// Returns 0 or the error of the system.
+  /// Marks the message as acknowledged. Returns 0 or the errno of the write.
   [[nodiscard]] int mark_arrived(std::size_t offset) const;
 
  private:

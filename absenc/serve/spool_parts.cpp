@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The files of a spool: what is there at the start, what becomes of them.
+// Files of a spool: loading at the start, creating, dropping, deleting.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -16,7 +16,7 @@ namespace {
 
 constexpr std::string_view part_suffix = ".part";
 
-// The size of one file. On a small disk it is smaller, because only what is deleted makes room.
+// Returns the size limit of one file. It is smaller on a small disk, because only deleting a whole file frees space.
 std::size_t part_bytes(std::int64_t most, const std::string& folder) {
   std::error_code error;
   const std::uintmax_t free = fs::space(folder, error).available;
@@ -26,7 +26,7 @@ std::size_t part_bytes(std::int64_t most, const std::string& folder) {
 
 }  // namespace
 
-// A file in its place is none of ours, or one of an older absenc.
+// Renames a plain file at the path of the folder: it may be a spool of an older absenc, or no spool.
 void Spool::open_folder() {
   std::error_code error;
   if (fs::exists(path_, error) && !fs::is_directory(path_, error)) set_aside(path_);
@@ -76,7 +76,8 @@ void Spool::load_part(std::int64_t number) {
   }
 }
 
-// Removed or moved while it was open. The newest file can still be read, because it is open; the others are lost.
+// Handles files that were removed or moved while open. The newest file is still open and can be read; the messages of
+// the others are lost.
 void Spool::look_at_folder() {
   if (folder_ && folder_->is_there() && (newest_ == nullptr || newest_->log().is_there())) return;
   if (folder_) {
@@ -106,7 +107,7 @@ void Spool::rescue_newest() {
     while (std::optional<SpoolFile::Found> one = newest_->next(offset, nullptr)) {
       if (!one->arrived && !unmarked_.contains(one->message.id)) rescued.push_back(std::move(one->message));
     }
-  } catch (const os::Failure&) {  // of the disk: the rest is lost
+  } catch (const os::Failure&) {  // a disk error: the remaining messages are lost
   }
   Counts lost = parts_.back().waiting;
   for (const Message& one : rescued) lost -= {1, one.readings};
@@ -147,7 +148,7 @@ void Spool::drop_part(std::size_t index, const std::string& why) {
   fs::remove(path_of(part.number), ignored);
 }
 
-// Counts the messages that can still be read; the others are lost.
+// Counts the messages that are still readable; the others are reported as dropped.
 void Spool::count_again(Part& part) {
   Counts readable;
   std::int64_t bytes = 0;
@@ -167,8 +168,8 @@ void Spool::count_again(Part& part) {
   drop(lost, fmt::format("{} cannot be read from byte {} of {} on", path_of(part.number), offset, part.bytes));
 }
 
-// Deletes the files whose messages have all arrived, but for the last one, which has the numbers. While nothing can be
-// written that one gives back its room.
+// Deletes files whose messages are all acknowledged, except the last file, which has the reading numbers. While the
+// disk cannot be written, the last file is shortened instead.
 void Spool::tidy() {
   if (newest_ != nullptr && !condition_.trouble.empty() && parts_.back().waiting.messages == 0) {
     if (newest_->log().shrink_to(spool_record(facts_))) {
@@ -203,7 +204,7 @@ Spool::Part* Spool::find_part(std::int64_t number) {
 
 std::string Spool::path_of(std::int64_t number) const { return fmt::format("{}/{:010}{}", path_, number, part_suffix); }
 
-// Beside its place: renaming needs no room.
+// Renames the file in its folder, because this needs no free space.
 void Spool::set_aside(const std::string& path) {
   std::error_code error;
   std::string to = path + ".bad";

@@ -8,7 +8,7 @@ namespace absenc::serve {
 
 namespace {
 
-constexpr int patience_ms = 2000;  // while another program has it locked
+constexpr int patience_ms = 2000;  // how long to wait for a lock of another program
 
 }  // namespace
 
@@ -64,7 +64,7 @@ Statement& Statement::bind(int parameter, double value) {
 
 Statement& Statement::bind(int parameter, const std::string& value) {
   const auto size = static_cast<int>(value.size());
-  // SQLITE_TRANSIENT, a cast of its own in C: it keeps a copy.
+  // This value is SQLITE_TRANSIENT, written without its C cast: SQLite copies the text.
   if (::sqlite3_bind_text(handle_, parameter, value.data(), size, reinterpret_cast<sqlite3_destructor_type>(-1)) !=
       SQLITE_OK) {
     database_->fail();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// As much of SQLite as the history needs, with errors thrown. The library behind it is seen by sqlite.cpp alone.
+// The parts of SQLite that the history uses, with exceptions for errors. Only sqlite.cpp includes the library's header.
 #pragma once
 
 #include <cstdint>
@@ -14,27 +14,27 @@ struct sqlite3_stmt;
 
 namespace absenc::serve {
 
-/// The file is no database, or damaged.
+/// Thrown when the file is no database or is damaged.
 struct DamagedFile : client::Failure {
   using client::Failure::Failure;
 };
 
-/// An open database. Everything throws client::Failure, in the words of SQLite.
+/// An open database. All functions throw client::Failure with SQLite's error text.
 class Sqlite {
  public:
   enum class For : std::uint8_t { writing, reading };
-  /// `title` begins what it says of errors.
+  /// `title` begins each error text.
   Sqlite(const std::string& title, const std::string& path, For what);
   ~Sqlite();
   Sqlite(const Sqlite&) = delete;
   Sqlite& operator=(const Sqlite&) = delete;
 
   void run(const std::string& sql);
-  /// The one number that this asks for.
+  /// Returns the number that a query with a single result yields; 0 without a row.
   [[nodiscard]] std::int64_t number(const std::string& sql);
-  /// Whether a transaction is open: a full disk may have ended it.
+  /// Returns whether a transaction is open. After an error, such as a full disk, SQLite may have ended it.
   [[nodiscard]] bool in_transaction() const;
-  /// When it is closed, the write-ahead log stays as it is: neither written to the database nor deleted.
+  /// Leaves the write-ahead log unchanged on close: it is neither written into the database nor deleted.
   void leave_log();
 
  private:
@@ -45,7 +45,7 @@ class Sqlite {
   sqlite3* handle_ = nullptr;
 };
 
-/// One that is prepared once and run often. Parameters count from 1, columns from 0.
+/// A prepared statement. Parameters are numbered from 1, columns from 0.
 class Statement {
  public:
   Statement(Sqlite& database, std::string_view sql);
@@ -58,11 +58,11 @@ class Statement {
   Statement& bind(int parameter, const std::string& value);
   Statement& bind_null(int parameter);
 
-  /// True while there is a row; false at the end, and it can be run again.
+  /// Returns true for each row. Returns false at the end; the statement can then be run again.
   bool next();
-  /// To the end.
+  /// Runs the statement to its end.
   void run();
-  /// Begins again, whatever happened.
+  /// Prepares the statement to run again, even after an error.
   void reset();
 
   [[nodiscard]] bool is_null(int column) const;

@@ -6,8 +6,9 @@
 
 namespace absenc::serve {
 
-/// Where a file stands that a service keeps, in $STATE_DIRECTORY, which systemd gives to it, or else in the user's
-/// folder for what programs keep, which is made. `option` would name it otherwise. Throws UsageError, Failure.
+/// Returns the path of a file that a service stores: in $STATE_DIRECTORY, which systemd sets, else in the user's state
+/// folder ($XDG_STATE_HOME/absenc or ~/.local/state/absenc), which is created. `option` is named in the error as the
+/// way to set another path. Throws UsageError, Failure.
 [[nodiscard]] std::string state_file(std::string_view name, std::string_view option);
 
 }  // namespace absenc::serve

@@ -20,7 +20,7 @@ Stream::Text event_text(std::string_view event, const client::Json& data) {
 
 std::shared_ptr<Stream> Streams::open(const std::string& trace, const std::string& peer) {
   auto stream = std::make_shared<Stream>("text/event-stream");
-  // A browser that has lost it comes back after a second.
+  // A browser reconnects one second after it lost the stream.
   stream->push(std::make_shared<const std::string>("retry: 1000\n\n"));
   const std::lock_guard lock(mutex_);
   if (!make_room(peer)) return nullptr;
@@ -39,7 +39,8 @@ bool Streams::make_room(const std::string& peer) {
   return break_off_slowest(peer, os::now() - patience);
 }
 
-// Breaks off the slowest of the streams whose client took nothing since `taken_before`.
+// Closes the slowest of the streams whose client received nothing since `taken_before`. Returns false without such a
+// stream.
 bool Streams::break_off_slowest(const std::string& peer, Time taken_before) {
   auto slowest = open_.end();
   for (auto one = open_.begin(); one != open_.end(); ++one) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The open event streams: what they are told is written once for all of them.
+// The open event streams. Each event is formatted once for all streams.
 #pragma once
 
 #include <cstdint>
@@ -19,22 +19,23 @@ class Streams {
  public:
   static constexpr std::size_t most = 300;
   static constexpr std::size_t most_of_address = 200;
-  static constexpr Time patience = std::chrono::seconds(5);  // without it, one that takes nothing gives way to others
+  static constexpr Time patience = std::chrono::seconds(5);  // a client that received nothing for this time may lose
+                                                             // its stream to a new one
 
-  /// `trace`: the encoder whose points it wants; "": none. `peer`: the address of whoever wants it. Null when there are
-  /// too many. An address that has the most of them gives one up for another that has fewer.
+  /// Opens a stream. `trace`: the encoder whose points it sends; "": none. `peer`: IP address of the client. Returns
+  /// null at the limit. At the limit, the address with the most streams loses one to an address with fewer.
   [[nodiscard]] std::shared_ptr<Stream> open(const std::string& trace, const std::string& peer);
 
-  /// To all of them, as an event of server-sent events.
+  /// Sends a server-sent event to all streams.
   void tell(std::string_view event, const client::Json& data);
-  /// To those that want the points of this encoder.
+  /// Sends an event to the streams that trace this encoder.
   void tell_traced(const std::string& encoder, std::string_view event, const client::Json& data);
 
-  /// Forgets those whose client has gone.
+  /// Removes streams whose client has disconnected.
   void tidy();
   [[nodiscard]] std::set<std::string> traced() const;
   [[nodiscard]] std::size_t count() const;
-  /// Messages that slow clients have lost so far.
+  /// Returns the number of messages that slow clients have lost.
   [[nodiscard]] std::uint64_t dropped() const;
 
  private:
@@ -48,7 +49,7 @@ class Streams {
 
   mutable std::mutex mutex_;
   std::vector<Open> open_;
-  std::uint64_t dropped_before_ = 0;  // by those that have gone
+  std::uint64_t dropped_before_ = 0;  // messages lost by streams that are closed
 };
 
 }  // namespace absenc::serve

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The readings of one encoder by time: seconds for the history, the last minute, points for those who look.
+// Readings of one encoder over time: seconds for the history, the last minute, points for plots.
 #pragma once
 
 #include <array>
@@ -12,14 +12,14 @@
 
 namespace absenc::serve {
 
-/// Position, continued past the end of a turn, and speed: in degrees and rpm, of linear encoders mm and mm/s.
+/// Position, continued past the end of a turn, and speed; in degrees and rpm, for linear encoders mm and mm/s.
 struct Point {
-  std::int64_t at_ms = 0;  // calendar
+  std::int64_t at_ms = 0;  // calendar time
   double place = 0;
   std::optional<client::Estimate> speed{};
 };
 
-/// Least, greatest and mean of the values of a second.
+/// Minimum, maximum and sum of the values of one second.
 struct Spread {
   std::uint64_t count = 0;
   double least = 0;
@@ -31,29 +31,30 @@ struct Spread {
 };
 
 struct Second {
-  std::int64_t at_s = 0;  // calendar
+  std::int64_t at_s = 0;  // calendar time
   std::uint64_t readings = 0;
   std::uint64_t errors = 0;
   Spread place{};
-  Spread speed{};                      // of the speeds that were reported, without their uncertainties
-  std::optional<double> last_place{};  // a mean says nothing where a turn begins anew
+  Spread speed{};                      // measured speeds, without their uncertainties
+  std::optional<double> last_place{};  // needed because a mean is wrong across the end of a turn
 };
 
-/// Not guarded against several threads.
+/// Not thread-safe.
 class TimeSeries {
  public:
   void count_errors(std::int64_t at_ms, std::uint64_t errors);
-  /// A good reading. `place`: where the position held; `speed`: where it is known.
+  /// Counts a good reading. `place` is empty if the position is invalid, `speed` if it is unknown.
   void count_reading(std::int64_t at_ms, std::optional<double> place, const std::optional<client::Estimate>& speed);
 
-  /// From now on points are kept until they are taken, the newest 4096 of them.
+  /// Starts or stops storing points for `take_points`, the newest 4096.
   void trace(bool on);
   [[nodiscard]] std::vector<Point> take_points();
-  /// The newest of the last 20 seconds with readings, 10 ms or more apart; the oldest first.
+  /// Returns the points of the last 20 seconds with readings, at least 10 ms apart, oldest first.
   [[nodiscard]] std::vector<Point> recent_points() const { return {recent_.begin(), recent_.end()}; }
-  /// The seconds before `now_s` that nobody has taken, the newest 120 of them.
+  /// Takes the seconds before `now_s` that were not taken yet, the newest 120 of them.
   [[nodiscard]] std::vector<Second> take_seconds(std::int64_t now_s);
-  /// The last 60 seconds with readings that are over, the oldest first: of a lost encoder those before.
+  /// Returns the last 60 completed seconds with readings, oldest first. For a lost encoder these are from before the
+  /// loss.
   [[nodiscard]] std::vector<Second> last_minute() const { return {last_minute_.begin(), last_minute_.end()}; }
   [[nodiscard]] std::uint64_t errors_last_minute(std::int64_t now_s) const;
 
@@ -62,7 +63,7 @@ class TimeSeries {
   void end_second();
   void add_point(const Point& point);
 
-  Second second_{};  // under way; at_s is 0 before the first
+  Second second_{};  // the current second; at_s is 0 before the first reading or error
   std::deque<Second> seconds_;
   std::deque<Second> last_minute_;
   bool traced_ = false;
@@ -72,7 +73,7 @@ class TimeSeries {
     std::int64_t at_s = 0;
     std::uint64_t count = 0;
   };
-  std::array<Errors, 60> errors_{};  // by the second of the minute
+  std::array<Errors, 60> errors_{};  // index: second within the minute
 };
 
 }  // namespace absenc::serve

@@ -45,7 +45,7 @@ TEST(TimeSeries, ErrorsOfTheLastMinute) {
   EXPECT_EQ(series.errors_last_minute(begin_s + 89), 60u);
   EXPECT_EQ(series.errors_last_minute(begin_s + 99), 50u);
   EXPECT_EQ(series.errors_last_minute(begin_s + 200), 0u);
-  EXPECT_TRUE(series.last_minute().empty());  // there was no reading
+  EXPECT_TRUE(series.last_minute().empty());  // no second had a reading
 }
 
 TEST(TimeSeries, PointsAreKeptWhileSomebodyLooks) {
@@ -71,7 +71,7 @@ TEST(TimeSeries, RecentPointsAreThoseOfTwentySecondsAndOfAClockThatIsSetBack) {
   EXPECT_EQ(recent.back().at_ms - recent.front().at_ms, 20'000);
   series.count_reading(begin_ms - 5000, 0, {});
   ASSERT_EQ(series.recent_points().size(), 1u);
-  series.count_reading(begin_ms - 4000, {}, {});  // the position did not hold
+  series.count_reading(begin_ms - 4000, {}, {});  // the position is invalid
   EXPECT_EQ(series.recent_points().size(), 1u);
 }
 

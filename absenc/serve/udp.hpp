@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Every reading as a datagram of JSON, as PlotJuggler takes it, in a thread of its own. What nobody takes is lost.
+// Sends every reading as a JSON datagram, in the format of PlotJuggler, in its own thread. Datagrams without a receiver
+// are lost.
 #pragma once
 
 #include <condition_variable>
@@ -14,7 +15,7 @@ namespace absenc::serve {
 
 class UdpSender {
  public:
-  /// `fleet` outlives it. Throws os::Failure: there is no such host.
+  /// `fleet` must outlive this object. Throws os::Failure if the host is unknown.
   UdpSender(const UdpSettings& settings, const Fleet& fleet);
   ~UdpSender();
 
@@ -25,7 +26,7 @@ class UdpSender {
   const Fleet* fleet_;
   std::mutex mutex_;
   std::condition_variable_any changed_;
-  std::jthread thread_;  // last: it uses all of the others
+  std::jthread thread_;  // last member: the thread uses all others
 };
 
 }  // namespace absenc::serve

@@ -17,7 +17,7 @@ namespace {
 
 double microseconds_of(Time time) { return static_cast<double>(time.count()) / 1e3; }
 
-// Since when the alarm is raised, and who has acknowledged it.
+// Adds the time since which the alarm is raised, and the user who has acknowledged it.
 void set_acknowledged(Json& json, const std::vector<RaisedAlarm>& raised, const FieldInfo& field,
                       const FlagInfo& flag) {
   const auto known = std::find_if(raised.begin(), raised.end(), [&](const RaisedAlarm& one) {
@@ -32,8 +32,7 @@ void set_acknowledged(Json& json, const std::vector<RaisedAlarm>& raised, const 
   json.set("acknowledged", acknowledged);
 }
 
-// Null: not all of them are reported, and of those that are none is raised. `known`: null leaves out who has
-// acknowledged them.
+// Returns null if no alarm is raised but not all alarms are reported. `known`: null omits acknowledgements.
 Json alarms_json(const Unit& unit, const Reading& reading, const std::vector<RaisedAlarm>* known = nullptr) {
   Json all = Json::array();
   const std::vector<Flags> channels = alarms_of(unit, reading);
@@ -50,7 +49,8 @@ Json alarms_json(const Unit& unit, const Reading& reading, const std::vector<Rai
   return all;
 }
 
-// A status is no alarm, but of encoders without alarms it is what they tell.
+// Returns the status flags. They are no alarms, but for encoders without alarms they are the only report of the
+// encoder.
 Json status_json(const Unit& unit, const Reading& reading) {
   Json all = Json::array();
   const std::vector<Flags> channels = status_of(unit, reading);
@@ -88,7 +88,7 @@ Json arguments_json(const Command& command) {
   });
 }
 
-// Of the commands of which the page says what will be.
+// Returns the name of a verb for which the page shows a hint; "" for the others.
 std::string_view name_of(Verb verb) {
   switch (verb) {
     case Verb::clear_alarms:
@@ -109,7 +109,7 @@ std::string_view name_of(Verb verb) {
 Json commands_json(const Unit& unit) {
   Json all = Json::array();
   for (const Command& command : unit.commands) {
-    if (command.verb == Verb::scan) continue;  // of a line, not of an encoder
+    if (command.verb == Verb::scan) continue;  // a scan addresses a line, not an encoder
     all.append(Json::object()
                    .set("name", command.name)
                    .set("meaning", command.meaning)
@@ -129,7 +129,7 @@ Json errors_json(const host::Counters& counters) {
   return json;
 }
 
-// Each bucket alone, the last without a limit.
+// Returns the count of each bucket, not cumulative; the last bucket has no limit.
 Json latency_json(const LatencyFigures& latency) {
   Json buckets = Json::array();
   std::uint64_t below = 0;
@@ -159,7 +159,7 @@ Json bad_json(const Details& details) {
   });
 }
 
-// What the encoder can count: positions of a turn or of the scale. Null where only a reply tells.
+// Sets the number of positions per turn or along the scale; null if only a reply reports it and none was received.
 void set_scale(Json& json, const Watch& watch, const Snapshot& snapshot) {
   Resolution known = watch.address().unit->resolution(watch.address().options);
   const Reading& reading = snapshot.last.reading;
@@ -176,7 +176,7 @@ void set_scale(Json& json, const Watch& watch, const Snapshot& snapshot) {
   json.set("has_turns", known.multiturn_bits != 0);
 }
 
-// The past of an encoder that is not live: never to be shown as the present.
+// Returns the last reading of an encoder that is not live. It must not be shown as the current position.
 Json last_reading_json(const Sample& last) {
   const std::int64_t age_ms = std::chrono::duration_cast<std::chrono::milliseconds>(os::now() - last.at).count();
   Json json = Json::object().set("at_ms", calendar_ms() - age_ms);
@@ -200,7 +200,7 @@ Json condition_json(const Watch& watch, const Snapshot& snapshot) {
 
 namespace {
 
-// Null is what was not set, does not hold or is not known.
+// Values that are not configured, invalid or unknown are null.
 void set_angles(Json& json, const Watch& watch, const JointAngles& angles) {
   const auto value = [](const std::optional<double>& one) { return one ? Json(*one) : Json(); };
   const std::optional<Estimate>& speed = angles.joint_speed_mm_s ? angles.joint_speed_mm_s : angles.joint_speed_rpm;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What is known of encoders, as JSON and for Prometheus. What is not live is never given as a present value.
+// State of encoders and server, as JSON and for Prometheus. Values of an encoder that is not live are never shown as
+// current.
 #pragma once
 
 #include <span>
@@ -14,37 +15,37 @@ namespace absenc::serve {
 
 [[nodiscard]] inline double seconds_of(Time time) { return std::chrono::duration<double>(time).count(); }
 
-/// At a glance: state, age_s, position, turns, speed with its uncertainty, alarms in words, errors of the last minute.
-/// Values are null unless the encoder is live and they hold.
+/// Returns the overview of an encoder: state, age_s, position, turns, speed with its uncertainty, alarms in words,
+/// errors of the last minute. Values are null if the encoder is not live or the value is invalid.
 [[nodiscard]] client::Json overview(const Watch& watch, const Snapshot& snapshot);
 
-/// What of it holds until it is told otherwise: state, why it is not live, alarms in words, status; no value.
+/// Returns the part of the overview that changes rarely: state, why the encoder is not live, alarms in words, status;
+/// no position.
 [[nodiscard]] client::Json condition_json(const Watch& watch, const Snapshot& snapshot);
 
-/// Positions in mm, not degrees.
+/// Returns whether the encoder is linear: positions in mm instead of degrees.
 [[nodiscard]] bool is_linear(const Watch& watch);
 
-/// All of it: also counters, latencies, the last bad exchanges, the fields of the last reply, and the commands that it
-/// has with their arguments.
+/// Returns the overview with counters, latencies, the last bad exchanges, the fields of the last reply, and the
+/// encoder's commands with their arguments.
 [[nodiscard]] client::Json details(const Watch& watch);
 
-/// {"encoder":name,"points":[[at_ms,position,speed,speed_uncertainty],...]}; a speed that is not known is
-/// null.
+/// Returns {"encoder":name,"points":[[at_ms,position,speed,speed_uncertainty],...]}; an unknown speed is null.
 [[nodiscard]] client::Json points(const Watch& watch, std::span<const Point> taken);
 
-/// {"encoders":[{"encoder":name,"seconds":[[at_s,position,speed],...]},...]}: last position and mean speed of the last
-/// 60 seconds in which it was read, null where its position or speed did not hold.
+/// Returns {"encoders":[{"encoder":name,"seconds":[[at_s,position,speed],...]},...]}: last position and mean speed of
+/// the last 60 seconds with readings; null if the position or the speed was invalid.
 [[nodiscard]] client::Json last_minute(const Fleet::Watches& watches);
 
-/// Of the server, beside the encoders.
+/// Statistics of the server.
 struct ServerFigures {
   std::size_t streams = 0;
-  std::uint64_t stream_drops = 0;  // messages that slow readers lost
+  std::uint64_t stream_drops = 0;  // messages lost by slow clients
   std::uint64_t history_lost = 0;  // rows that could not be written
-  std::uint64_t wrong_tokens = 0;  // requests
+  std::uint64_t wrong_tokens = 0;  // requests with a wrong token
 };
 
-/// The text format of Prometheus.
+/// Returns the metrics in the text format of Prometheus.
 [[nodiscard]] std::string metrics(const Fleet::Watches& watches, const ServerFigures& figures);
 
 }  // namespace absenc::serve

@@ -25,10 +25,10 @@ namespace {
 using namespace std::chrono_literals;
 
 constexpr Time between_summaries = 1s;
-constexpr Time between_tellings = 1s;    // of failures, which may come with each reading
-constexpr Time before_another_try = 5s;  // of what cannot be read as it is
+constexpr Time between_tellings = 1s;    // between two events about failures, which may occur with each reading
+constexpr Time before_another_try = 5s;  // before the next attempt to read an encoder in state `ended`
 
-// os::now is the steady clock.
+// Converts a time of os::now, which is the steady clock.
 std::chrono::steady_clock::time_point to_time_point(Time time) {
   return std::chrono::steady_clock::time_point(std::chrono::duration_cast<std::chrono::steady_clock::duration>(time));
 }
@@ -182,9 +182,9 @@ void Watch::work(const std::stop_token& stop) {
   while (!stop.stop_requested()) {
     try {
       read_on(stop);
-    } catch (const os::Interrupted&) {  // everybody ends: os::interrupted() tells the others
+    } catch (const os::Interrupted&) {  // the program ends: os::interrupted() stops the other threads
       return;
-    } catch (const os::Ended&) {  // asked to, while the line was never silent
+    } catch (const os::Ended&) {  // the end was requested while the line was busy
       return;
     } catch (const std::exception& error) {
       become(State::ended, error.what());
@@ -204,7 +204,7 @@ void Watch::read_on(const std::stop_token& stop) {
     publish(live, live.next());
     next = pace.next();
   };
-  // What is long is done in pieces, and readings come between.
+  // Reads the position between two requests of a long order, when a reading is due.
   const auto between = [&] {
     if (os::now() < next) return;
     read();
@@ -282,7 +282,8 @@ void Watch::summarize(const Encoder& live, const Sample& sample) {
   const Time now = os::now();
   const std::lock_guard lock(mutex_);
   const std::uint64_t before = known_.counters.bad();
-  const std::uint64_t errors = bad < before ? bad : bad - before;  // anew after it had ended
+  const std::uint64_t errors = bad < before ? bad : bad - before;  // the counters start at 0 when the encoder was
+                                                                   // opened again
   const std::int64_t at_ms = calendar_ms();
   series_.count_errors(at_ms, errors);
   if (sample.kind == Sample::Kind::reading) {
@@ -327,7 +328,7 @@ void Watch::pass_on(const Sample& sample) {
   }
 }
 
-// What was raised is so until the encoder reports that it is not.
+// Adds events for alarms that changed. An alarm stays raised until the encoder reports it as cleared.
 void Watch::tell_alarms(const Reading& reading) {
   const std::uint32_t alarms = reading.alarms | (alarms_ & ~reading.alarms_reported);
   if (alarms == alarms_) return;
@@ -359,7 +360,8 @@ void Watch::tell_alarms(const Reading& reading) {
   }
 }
 
-// Everybody is told of commands, and of examinations, which keep readings away; not of what was looked at.
+// Carries out an order. Commands are reported by an event, and so are examinations, because they interrupt the
+// readings.
 void Watch::carry_out(Encoder& live, const Order& order, const std::function<void()>& between,
                       const std::stop_token& stop) {
   const std::string_view name = order.name();
@@ -410,8 +412,8 @@ void Watch::carry_out(Encoder& live, const Order& order, const std::function<voi
   finish();
 }
 
-// It opens the port itself, and again with other settings where nobody answers. A virtual encoder that is opened anew
-// would be another one: it is examined as it is.
+// The examination opens the port itself, and tries other settings if no encoder replies. A virtual encoder would be a
+// new one if it were opened again, so it is examined as it is.
 Done Watch::examine(Encoder& live, const std::stop_token& stop) {
   const std::string words = "it is examined, readings go on afterwards";
   become(State::examined, words);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// One encoder read again and again by a thread of its own; others look at copies of what is known of it.
+// Reads one encoder continuously in its own thread; other threads get copies of its state.
 #pragma once
 
 #include <array>
@@ -24,17 +24,17 @@
 namespace absenc::serve {
 
 enum class State : std::uint8_t {
-  opening,   // its port was not there yet
-  live,      // the reading is new
-  silent,    // none has come for a while
+  opening,   // the port was not available yet
+  live,      // the last reading is recent
+  silent,    // no reading for a while
   failing,   // the last attempt failed
-  lost,      // the port has gone away
-  ended,     // it cannot be read as it is: `message` says why. It is tried again every few seconds
-  examined,  // an examination has its port; `message` says what it looks at
+  lost,      // the port has disappeared
+  ended,     // the encoder cannot be read: `message` reports why; the thread tries again every few seconds
+  examined,  // an examination uses the port: `message` reports its current step
 };
 [[nodiscard]] std::string_view name_of(State state);
 
-/// Up to which latencies are counted, by 1, 2 and 5 from 10 us to 1 s.
+/// Upper limits of the latency histogram, in steps of 1, 2 and 5 from 10 us to 1 s.
 inline constexpr std::array<Time, 16> latency_limits = [] {
   std::array<Time, 16> limits{};
   std::int64_t decade = 10'000;
@@ -50,78 +50,79 @@ struct LatencyFigures {
   Time median{};
   Time percentile_99{};
   Time longest{};
-  std::array<std::uint64_t, latency_limits.size()> within{};  // how many do not exceed each limit
+  std::array<std::uint64_t, latency_limits.size()> within{};  // cumulative: number of latencies up to each limit
   std::uint64_t count = 0;
   Time sum{};
 };
 
-/// An alarm that is raised, and who has seen it. Acknowledged is not cleared.
+/// A raised alarm and its acknowledgement. An acknowledged alarm is still raised.
 struct RaisedAlarm {
-  std::string_view channel{};  // name of the field with the alarms of a channel
+  std::string_view channel{};  // name of the field with the alarms of this channel
   std::string_view name{};
-  std::int64_t since_ms = 0;      // calendar
-  std::string acknowledged_by{};  // "": by nobody
+  std::int64_t since_ms = 0;      // calendar time
+  std::string acknowledged_by{};  // name of the token; "": not acknowledged
   std::int64_t acknowledged_ms = 0;
 };
 
-/// What is known of an encoder at a moment.
+/// A copy of the state of an encoder.
 struct Snapshot {
   State state = State::opening;
-  Time age{};  // of the reading, or of what is known instead
+  Time age{};  // age of the last reading, or of the last change of state
   bool has_reading = false;
-  std::optional<double> place{};  // of the last position that held, as in `Point`
-  client::Sample last{};          // only to be shown as the present one while `live`
-  std::string message{};          // why it is not
+  std::optional<double> place{};  // last valid position, as in `Point`
+  client::Sample last{};          // current only while `live`
+  std::string message{};          // why the encoder is not live
   host::Counters counters{};
   std::uint64_t readings = 0;
   std::uint64_t losses = 0;
-  std::uint64_t restarts = 0;  // of the position
+  std::uint64_t restarts = 0;  // restarts of the continued position
   std::uint64_t errors_last_minute = 0;
   std::vector<RaisedAlarm> raised{};
-  double rate = 0;           // readings a second
-  LatencyFigures latency{};  // at most a second old
+  double rate = 0;           // readings per second
+  LatencyFigures latency{};  // at most one second old
 };
 
-/// What only those ask for who look at one encoder.
+/// Additional data for the view of one encoder.
 struct Details {
-  std::vector<client::BadExchangeText> bad{};  // the newest first
-  client::Json fields{};                       // of the last reply, at most a second old
-  client::Json reply{};                        // the same for people: `shown_values`
+  std::vector<client::BadExchangeText> bad{};  // newest first
+  client::Json fields{};                       // fields of the last reply, at most one second old
+  client::Json reply{};                        // the same fields for people, as in `shown_values`
 };
 
 class Watch {
  public:
-  /// The first reading comes `offset` after the start. `server_events` outlives it.
+  /// The first reading is `offset` after the start. `server_events` must outlive this object.
   Watch(std::string name, const client::EncoderAddress& address, double rate, Time offset, ServerEvents& server_events);
   ~Watch();
   Watch(const Watch&) = delete;
   Watch& operator=(const Watch&) = delete;
 
-  /// It ends within the time that one reading may take.
+  /// Requests the thread to end, which happens within the time of one reading.
   void request_stop() { thread_.request_stop(); }
-  /// Until it has ended; the destructor does both.
+  /// Waits until the thread has ended. The destructor calls both functions.
   void wait();
 
   [[nodiscard]] Snapshot snapshot() const;
   [[nodiscard]] Details details() const;
-  /// The functions of TimeSeries, for any thread.
+  /// The following functions are those of TimeSeries, but thread-safe.
   void trace(bool on);
   [[nodiscard]] std::vector<Point> take_points();
   [[nodiscard]] std::vector<Point> recent_points() const;
   [[nodiscard]] std::vector<Second> take_seconds();
   [[nodiscard]] std::vector<Second> last_minute() const;
 
-  /// All good readings since the last time: each of those who send them on has them all.
+  /// Takes all good readings since the last call. Each outlet has its own queue.
   enum class Outlet : std::uint8_t { mqtt, udp };
   [[nodiscard]] Outbox::Taken take_passing(Outlet outlet);
-  /// Nobody takes them any more.
+  /// Stops storing readings for an outlet.
   void stop_passing(Outlet outlet);
 
-  /// "", or why it is not taken: another waits, an examination runs, or it has ended.
+  /// Gives an order to the thread. Returns "" or why the order is refused: another order waits, an examination runs, or
+  /// the thread has ended.
   [[nodiscard]] std::string_view give(Order order);
 
-  /// Keeps who has seen the alarm of this name, in all channels, until it is over. `who` stands in the history. Returns
-  /// "", or why it is refused: the alarm is not raised.
+  /// Acknowledges the alarm of this name, in all channels, until it is cleared. `who` is stored in the history. Returns
+  /// "" or why it is refused: the alarm is not raised.
   [[nodiscard]] std::string acknowledge(std::string_view alarm, const std::string& token, const std::string& who);
 
   [[nodiscard]] const std::string& name() const { return name_; }
@@ -151,25 +152,25 @@ class Watch {
   Time offset_;
   ServerEvents* server_events_;
 
-  mutable std::mutex mutex_;  // guards what follows
+  mutable std::mutex mutex_;  // guards all members below
   std::condition_variable_any changed_;
   Snapshot known_;
   Details details_;
-  Time known_at_{};  // of the last reading, or of the last change of state
+  Time known_at_{};  // time of the last reading, or of the last change of state
   std::optional<Order> order_;
-  bool over_ = false;      // nobody takes orders any more
-  bool examines_ = false;  // and takes none meanwhile
+  bool over_ = false;      // no more orders are accepted
+  bool examines_ = false;  // an examination runs; no orders are accepted meanwhile
   TimeSeries series_;
-  std::array<Outbox, 2> outboxes_;  // by Outlet
+  std::array<Outbox, 2> outboxes_;  // index: Outlet
 
-  // Of the thread alone.
+  // The members below are used by the thread only.
   Time next_summary_{};
-  Time next_told_{};  // of failures
+  Time next_told_{};  // when the next failure may be reported
   std::uint32_t alarms_ = 0;
   bool restarted_ = false;
-  bool command_runs_ = false;  // it is not broken off
+  bool command_runs_ = false;  // the running command must not be interrupted
 
-  std::jthread thread_;  // last: it uses all of the others
+  std::jthread thread_;  // last member: the thread uses all others
 };
 
 }  // namespace absenc::serve

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A thread for what takes long, so that nobody else waits for it.
+// A thread for long tasks, so that no other thread waits for them.
 #pragma once
 
 #include <condition_variable>
@@ -18,7 +18,8 @@ class Worker {
 
   Worker() : thread_([this](const std::stop_token& stop) { work(stop); }) {}
 
-  /// Jobs must not throw. False when too many wait already; `always`: it is the next part of one that was taken.
+  /// Adds a job, which must not throw. Returns false if too many jobs wait. `always`: adds the job anyway, because it
+  /// continues a previous one.
   bool add(std::function<void()> job, bool always = false) {
     const std::lock_guard lock(mutex_);
     if (jobs_.size() >= most && !always) return false;
@@ -45,7 +46,7 @@ class Worker {
   std::mutex mutex_;
   std::condition_variable_any changed_;
   std::deque<std::function<void()>> jobs_;
-  std::jthread thread_;  // last: it uses all of the others
+  std::jthread thread_;  // last member: the thread uses all others
 };
 
 }  // namespace absenc::serve
