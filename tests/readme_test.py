@@ -150,6 +150,11 @@ class Readme(unittest.TestCase):
             example = (SOURCE / "examples" / name).read_text(encoding="utf-8")
             self.assertEqual(textwrap.dedent(example.split("// [readme]\n")[1].rsplit("\n", 1)[0]).strip(), block.strip())
 
+    def test_first_lines_of_firmware_are_the_source_that_is_compiled(self):
+        shown = next(block for language, block in blocks((SOURCE / "docs/firmware.md").read_text(encoding="utf-8")) if language == "cpp")
+        source = (SOURCE / "firmware/hookup/first_reading.cpp").read_text(encoding="utf-8")
+        self.assertEqual(source.split("\n", 2)[2].strip(), shown.strip())
+
     def test_links_lead_to_files_and_headings(self):
         for name in [*PAGES, "docs/encoders.md"]:
             text = (SOURCE / name).read_text(encoding="utf-8")
