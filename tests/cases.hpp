@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// How many cases a long test takes: all, or where each of them takes many times as long, a share.
+// Reduces the number of cases of a long test where each case is slow, for example under a sanitizer.
 #pragma once
 
 #include <algorithm>
@@ -7,8 +7,8 @@
 
 namespace absenc {
 
-/// `all` times the percentage in ABSENC_CASES_PERCENT (0 to 100; without it all), at least 1. Only for counts of cases
-/// that are alike: what a test must see of each kind is no matter of their number.
+/// Returns `all` times the percentage in ABSENC_CASES_PERCENT (0 to 100, default 100), at least 1. Only for numbers of
+/// similar cases: a test that must cover each kind must not reduce the kinds.
 inline unsigned test_cases(unsigned all) {
   const char* const percent = std::getenv("ABSENC_CASES_PERCENT");
   if (percent == nullptr) return all;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Instantiates the templates of the freestanding layers, so that the ARM build sees what they would link.
+// Instantiates the templates of the freestanding layers, so that the ARM build shows which symbols they need.
 #include <array>
 #include <cstdint>
 
@@ -34,7 +34,7 @@ template class host::Statistics<CanFrame>;
 template class host::Session<std::uint8_t>;
 template class host::Session<CanFrame>;
 
-// Not static: what nobody uses would not be compiled.
+// The functions are not static, because the compiler would drop unused ones.
 bool drive_bytes(Machine<std::uint8_t>& machine, Port<std::uint8_t>& port) {
   return host::drive(machine, port, [] { return true; });
 }
@@ -56,14 +56,14 @@ std::uint64_t helpers(Bytes bytes, MutableBytes out) {
          static_cast<std::uint64_t>(wrapped_difference(1, 2, 17)) + static_cast<std::uint64_t>(degrees(1, 17));
 }
 
-// A word that is only known at run time.
+// Parses a word format that is only known at run time.
 Result<Word> word_of_text(std::string_view text, BitView bits) {
   WordFormat format;
   if (!parse_word_format(text, format).reason.empty()) return Error::invalid_argument;
   return decode_word(format, bits);
 }
 
-// A machine with its own state and every pointer to a unit: virtual tables and the list of units.
+// Uses the virtual tables and the list of units, so that the link contains them.
 struct Idle final : Machine<std::uint8_t> {
   void feed(const Event<std::uint8_t>&) override {}
   Step<std::uint8_t> next(Time) override { return {.kind = Step<std::uint8_t>::Kind::done}; }

@@ -1,13 +1,13 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
 # usage: freestanding.sh LINKED.o OBJECT.o...
-# Fails when the objects, linked into one, need more than a compiler brings along, or when one has a constant in writable
-# memory; prints their sizes.
+# Fails if the linked object needs symbols that a compiler does not provide, or if an object has a constant in writable
+# memory. Prints the sizes of the objects.
 set -euo pipefail
 nm=${NM:-arm-none-eabi-nm}
 size=${SIZE:-arm-none-eabi-size}
 
-# A global destructor asks for the first; the rest of __aeabi_ is arithmetic, memcpy and stack unwinding tables.
+# A global destructor needs __aeabi_atexit; the other __aeabi_ symbols are arithmetic, memcpy and stack unwinding tables.
 forbidden='^__aeabi_atexit$'
 allowed=(
   memcpy memmove memset memcmp strlen

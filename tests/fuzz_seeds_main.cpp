@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Runs a fuzz body as a plain test: over the seeds, every truncation and single-bit flip of them, and noise.
+// Runs a fuzz target as a plain test: with all seeds, with every truncation and single-bit flip of them, and with
+// random bytes.
 #include "tests/fuzz_seeds.hpp"
 
 #include <algorithm>
@@ -13,7 +14,7 @@ namespace {
 
 std::size_t runs = 0;
 
-// A copy of exactly its size, so that the address sanitizer sees a read behind its end.
+// Runs the target on a copy of exactly the input's size, so that the address sanitizer detects a read beyond its end.
 void run(absenc::Bytes input) {
   const absenc::Seed copy(input.begin(), input.end());
   LLVMFuzzerTestOneInput(copy.data(), copy.size());
@@ -35,7 +36,7 @@ void run_near(const absenc::Seed& seed) {
 
 int main() {
   for (const absenc::Seed& seed : absenc::fuzz_seeds()) run_near(seed);
-  std::mt19937 random(20240229);  // a fixed seed: a failure comes back
+  std::mt19937 random(20240229);  // a fixed seed makes failures reproducible
   for (int i = 0; i < 4000; ++i) {
     absenc::Seed noise(random() % 64);
     std::generate(noise.begin(), noise.end(), [&] { return static_cast<std::uint8_t>(random()); });

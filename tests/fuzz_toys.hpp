@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the fuzzers of all units need.
+// Helpers of all fuzz targets.
 #pragma once
 
 #include <cstdlib>

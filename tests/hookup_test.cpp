@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The ways of docs/firmware.md to a port, with stubs of the hardware: positions come through them, whole and in pieces.
+// Tests the firmware adapters of docs/firmware.md (UART, SPI, CAN) with stubs of the hardware: each reads a position,
+// whether its reply arrives whole or in pieces.
 #include <gtest/gtest.h>
 
 #include <array>
@@ -26,7 +27,7 @@ constexpr auto reply = std::to_array<std::uint8_t>({0x1A, 0x00, 0x45, 0x23, 0x01
 struct Uart {
   bool drives = false;
   std::vector<std::uint8_t> transmitted{};
-  MutableBytes buffer{};  // not empty: the DMA runs
+  MutableBytes buffer{};  // not empty while the DMA runs
   std::size_t count = 0;
 
   void drive(bool on) { drives = on; }
@@ -44,7 +45,7 @@ struct Uart {
   }
   void set_rate(std::uint32_t) {}
 
-  // What the encoder sends; whether the DMA is at its end.
+  // Delivers bytes from the encoder. Returns whether the DMA buffer is full.
   bool come(Bytes bytes) {
     EXPECT_FALSE(drives);
     for (const std::uint8_t byte : bytes) {
@@ -73,7 +74,7 @@ struct UartDmaTest : testing::Test {
 };
 
 TEST_F(UartDmaTest, AWholeReplyEndsTheTransfer) {
-  EXPECT_TRUE(uart.come(reply));  // with its last character, before the line is idle
+  EXPECT_TRUE(uart.come(reply));  // full with the last character, before the line becomes idle
   line.arrived(56us);
   expect_position();
 }
@@ -106,7 +107,7 @@ struct Spi {
     ++transfers;
   }
   void set_rate(std::uint32_t) {}
-  // `idle` clocks of a line that is high, then these bits, then ones.
+  // Fills the buffer with `idle` ones, then with these bits, then with ones.
   void come(Bytes bytes, unsigned idle) {
     for (std::size_t bit = 0; bit < 8 * buffer.size(); ++bit) {
       const std::size_t at = bit - idle;
@@ -138,7 +139,7 @@ TEST(SpiDmaTest, ReadsBiss) {
   ASSERT_NE(read.reading(), nullptr) << static_cast<int>(read.error());
 }
 
-// The same bits without the line before them, which the stub shows in the first clock.
+// The bits exclude the idle level, which the stub delivers in the first clock.
 TEST(SpiDmaTest, ReadsSsiBehindTheIdleClock) {
   constexpr auto bits = std::to_array<std::uint8_t>({0x1E, 0xF0, 0x00, 0x00});
   ssi::ReadPosition read{ssi::Format{}};

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Replies of any lateness, to any of the requests, on every unit whose replies can be late: no position that is shown
-// is older than its request. The shaft turns, so that its place tells the time.
+// Delays replies by various times on every unit whose replies can be late. No reported position may be older than its
+// request. The shaft turns steadily, so that a position gives the time at which it was sampled.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -43,7 +43,7 @@ const std::vector<Kind>& kinds() {
 struct Lateness {
   const char* name;
   Time time;
-  double share;  // of the replies
+  double share;  // share of the replies that are late, 0 to 1
 };
 
 struct Shown {
@@ -66,7 +66,7 @@ class Bench {
         port(line, std::move(delay)),
         session(unit, options, port, host_storage, host::EchoMode::automatic) {}
 
-  /// One reading, or what another command says of the position.
+  /// Runs one command that reports a position, and counts the outcome.
   void read(const Command& command, bool confirmed, Shown& shown) {
     const Conversation<Item>* ended = confirmed ? session.read(command) : session.run(command);
     if (ended->error() != Error::none) {
@@ -81,7 +81,8 @@ class Bench {
     if (age > 3ms) ++shown.stale;
   }
 
-  /// How long before its own time, as the host has it, the encoder was where the reading says: by the truth.
+  /// Returns how long before its timestamp the reading's position was really sampled. The shaft's true motion gives
+  /// that time.
   Time age_of(const Reading& reading) const {
     const auto fraction = static_cast<std::uint32_t>(reading.singleturn << (32 - reading.singleturn_bits));
     const auto truth = static_cast<std::uint32_t>(shaft.at(reading.latched).position);
@@ -128,7 +129,7 @@ double fraction(sim::Random& random) { return static_cast<double>(random.below(1
 
 bool is_on_can(const Kind& kind) { return find_unit(kind.unit)->link == LinkKind::can; }
 
-/// Readings at a rate, some of whose replies are late.
+/// Reads at a fixed period while a share of the replies is late.
 template <class Item>
 Shown run_on(const Kind& kind, const Lateness& lateness, Time period, unsigned count) {
   sim::Random random(1);
@@ -149,8 +150,8 @@ Shown run(const Kind& kind, const Lateness& lateness, Time period, unsigned coun
                          : run_on<std::uint8_t>(kind, lateness, period, count);
 }
 
-/// Any command that says a position and changes nothing, after any pause, with replies that are late by any time
-/// from 10 us to 10 s.
+/// Runs random commands that report a position and change nothing, with random pauses. Some replies are late by 10 us
+/// to 10 s.
 template <class Item>
 Shown run_anything(const Kind& kind, unsigned count, std::uint64_t seed) {
   sim::Random random(seed);
@@ -178,7 +179,7 @@ class LateReply : public ::testing::TestWithParam<std::size_t> {
   const Kind& kind = kinds()[GetParam()];
 };
 
-// Every lateness from a hiccup to seconds, also such that a reply comes just when the next is expected.
+// Covers delays from 1 ms to 5 s, some of which make a late reply arrive exactly when the next one is due.
 TEST_P(LateReply, IsNeverShownForALaterRequest) {
   constexpr unsigned readings = 40;
   for (const Time period : {Time{}, Time{1ms}, Time{10ms}, Time{100ms}, Time{500ms}, Time{2s}}) {
@@ -225,8 +226,8 @@ TEST_P(LateReply, OfAnyTimeIsNeverShownForALaterRequest) {
   EXPECT_GT(all.good, all.failed / 10);
 }
 
-/// A line that stands still for two seconds of every seven; behind each stall one of the replies comes that were held
-/// back, or all of them.
+/// Reads over a line that stalls for two seconds of every seven. After a stall, either all delayed replies arrive or
+/// only the first.
 template <class Item>
 Shown run_with_stalls(const Kind& kind, bool one_comes, Time& longest_silence) {
   constexpr Time stall = 2s;
@@ -266,7 +267,7 @@ TEST_P(LateReply, AfterAStallOfTwoSecondsReadingsGoOnWithinOne) {
                 one_comes ? "one reply " : "all of them", shown.good, shown.failed, shown.stale,
                 static_cast<double>(silence.count()) / 1e9);
     EXPECT_EQ(shown.stale, 0u);
-    // Where a single request was held up, nothing tells its reply from the first on a line that is always so late.
+    // If only one reply was delayed, the host cannot distinguish it from replies that are always that late.
     if (one_comes && !is_on_can(kind)) {
       EXPECT_LT(silence, 3s);
     }

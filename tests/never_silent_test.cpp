@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A line that is never silent: every command of every unit on a line of characters ends there in bounded time, says so,
-// and ends well on none of it.
+// Runs every command of every unit with a character link on a line that is never silent. Each command must end in
+// bounded time with an error.
 #include <gtest/gtest.h>
 
 #include <array>
@@ -18,7 +18,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-/// Says the next byte; gets the last request.
+/// Returns the next byte on the line; gets the last request.
 using Babble = std::function<std::uint8_t(Bytes request)>;
 
 struct Outcome {
@@ -26,8 +26,8 @@ struct Outcome {
   Time duration{};
 };
 
-/// A carrier on which a byte comes every `period`, and that would tell silence after a longer one. Bytes go before
-/// timers.
+/// Runs the conversation on a line with a byte every `period`. The simulated port would report silence only after a
+/// longer pause. If a byte and a timer are due together, the byte comes first.
 Outcome run(Conversation<std::uint8_t>& conversation, Time period, const Babble& babble) {
   constexpr unsigned most_bytes = 2'000'000;
   Time now = 1s;
@@ -81,7 +81,7 @@ Options defaults_of(const Unit& unit, std::span<const OptionText> settings = {})
   return options;
 }
 
-/// Every choice of every option of the unit that has choices, one at a time.
+/// Returns the default options, and each choice of each option with choices, one changed at a time.
 std::vector<Options> all_options(const Unit& unit) {
   std::vector<Options> all{defaults_of(unit)};
   for (const Option& option : unit.options) {
@@ -104,7 +104,7 @@ std::vector<std::int64_t> least_arguments(const Command& command) {
 
 class NeverSilent : public ::testing::TestWithParam<const Unit*> {
  protected:
-  // Each command on such a line.
+  // Runs each command on a line that is never silent.
   void expect_ends(const Options& options, Time period, const Kind& kind) {
     for (const Command& command : unit.commands) {
       const Any<Conversation> made = unit.host(options, command, least_arguments(command), storage_);
@@ -116,7 +116,7 @@ class NeverSilent : public ::testing::TestWithParam<const Unit*> {
       };
       EXPECT_TRUE(outcome.ended) << what() << "has not ended after " << outcome.duration / 1s << " s";
       EXPECT_LE(outcome.duration, 30s) << what();
-      // What is sent back over and over may by chance be a frame.
+      // An echo that repeats the request may happen to be a valid frame.
       if (kind.name == echo) continue;
       EXPECT_NE(made.bytes->error(), Error::none) << what() << "taken for good";
     }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The shape Step, Event, Machine (link/step.hpp) carries every kind of link: toy machines in virtual time, with
-// exact times. Host and device of every conversation are machines of the same kind.
+// Tests that `Step`, `Event` and `Machine` (link/step.hpp) fit every kind of link. Toy machines run in virtual time
+// with exact times. The host and the device of each conversation are machines of the same type.
 #include <gtest/gtest.h>
 
 #include <string>
@@ -19,7 +19,7 @@ using ByteToy = toy::Toy<Byte>;
 using CanToy = toy::Toy<CanFrame>;
 using Kind = Event<Byte>::Kind;
 
-// (a) Request and reply on half duplex: 2.5 Mbps, a character is 4 us, the answer begins 3 us after the request.
+// (a) Request and reply on half duplex: 2.5 Mbps, a character takes 4 us, the reply begins 3 us after the request.
 struct RequestReply : testing::Test {
   sim::Line<Byte> line{LinkKind::half_duplex, {.rate = 2'500'000}};
   std::vector<Byte> answer{0x1A, 0x00, 0x55};
@@ -41,7 +41,7 @@ struct RequestReply : testing::Test {
     host.idle.gap = microseconds(6);
     host.send({0x1A});
     EXPECT_TRUE(line.run(line.attach(Role::host, host)));
-    line.run_until(line.now());  // the device's `sent` is at the same time
+    line.run_until(line.now());  // the device's `sent` event has the same time
   }
 };
 
@@ -64,7 +64,7 @@ TEST_F(RequestReply, SilenceWhenTheReplyStops) {
 }
 
 TEST_F(RequestReply, CharacterThatHasBegunIsNoSilence) {
-  host.idle.at = microseconds(9);  // and a timer in the middle of it is not lost
+  host.idle.at = microseconds(9);  // the timer fires while a character is being received
   line.attach(Role::device, device);
   host.idle.answer = microseconds(4);
   host.send({0x1A});
@@ -72,7 +72,7 @@ TEST_F(RequestReply, CharacterThatHasBegunIsNoSilence) {
   EXPECT_EQ(host.log, "4000 sent, 9000 timer, 11000 received 1A, 15000 received 00, 19000 received 55");
 }
 
-// (b) An endless stream: nobody asks, many results, the caller ends it.
+// (b) An endless stream: the device sends without requests, and the caller ends the conversation.
 TEST(Stream, ManyResultsWithoutARequest) {
   sim::Line<Byte> line(LinkKind::full_duplex, {.rate = 1'000'000});
   Byte count = 0;
@@ -102,13 +102,14 @@ TEST(Stream, ManyResultsWithoutARequest) {
   EXPECT_NE(host.log.find("130000 received 81, 180000 silence, 210000 received FF"), std::string::npos) << host.log;
 }
 
-// (c) Full-duplex SPI, EncoLink's way: every frame brings position, its check and one byte of a register access;
-// the host's second byte carries the request for it. The access needs four frames, each of which is a reading too.
+// (c) Full-duplex SPI as in EncoLink: every frame carries the position, its check and one byte of a register access.
+// The host's second byte carries the request for the access. The access needs four frames, and each of them is a
+// reading too.
 class SpiDevice final : public Machine<Byte> {
  public:
   void feed(const Event<Byte>& event) override {
     if (event.kind == Kind::selected) {
-      const auto position = static_cast<Byte>(event.at / microseconds(1));  // latched now
+      const auto position = static_cast<Byte>(event.at / microseconds(1));  // latched when the chip is selected
       frame_ = {position, static_cast<Byte>(~position), register_byte_};
       selected_ = true;
     } else if (event.kind == Kind::received) {
@@ -123,12 +124,12 @@ class SpiDevice final : public Machine<Byte> {
  private:
   void hear(Byte request) {
     if (register_byte_ == 0x88) {
-      register_byte_ = static_cast<Byte>(address_ + 0x40);  // the register's value
+      register_byte_ = static_cast<Byte>(address_ + 0x40);  // value of the register
     } else if (previous_ == 0xCD) {
       address_ = request;
-      register_byte_ = 0x88;  // read ready
+      register_byte_ = 0x88;  // code for "read ready"
     } else {
-      register_byte_ = 0x33;  // idle
+      register_byte_ = 0x33;  // code for "idle"
     }
     previous_ = register_byte_ == 0x33 ? request : Byte{0};
   }
@@ -182,7 +183,7 @@ TEST(Spi, RegisterAccessRidesInPositionFrames) {
   std::string results;
   line.attach(Role::device, device);
   const auto node = line.attach(Role::host, host, [&] {
-    if (host.position == 50) host.read_register(0x4C);  // submitted while the stream goes on
+    if (host.position == 50) host.read_register(0x4C);  // requested while the stream continues
     results += std::to_string(line.now().count()) + (host.good ? " good " : " bad ") + std::to_string(host.position) +
                ' ' + std::to_string(host.value) + '\n';
     return host.value < 0;
@@ -198,7 +199,7 @@ struct Clocked : testing::Test {
   sim::Line<Byte> line{LinkKind::clocked, {.rate = 250'000}};
   std::string notes;
   ByteToy device{[this](ByteToy& self, const Event<Byte>& event) {
-    if (event.kind == Kind::selected) self.send({0x91, 0xA4, 0x8D, 0x3F});  // 13 + 13 bits, then ones
+    if (event.kind == Kind::selected) self.send({0x91, 0xA4, 0x8D, 0x3F});  // the word of 13 bits twice, then ones
     if (event.kind == Kind::sent && event.bits < 13) notes += "too few clocks: " + std::to_string(event.bits);
   }};
   ByteToy host{[](ByteToy& self, const Event<Byte>& event) {
@@ -230,11 +231,11 @@ TEST_F(Clocked, DeviceNoticesTooFewClocks) {
   EXPECT_EQ(notes, "too few clocks: 8");
 }
 
-// (e) CAN at 250 kbit: a frame without data takes 47 bits of 4 us, each data byte 8 more.
+// (e) CAN at 250 kbit/s: a frame without data takes 47 bits of 4 us, each data byte 8 more.
 struct Can : testing::Test {
   sim::Line<CanFrame> line{LinkKind::can, {.rate = 250'000}};
   static CanFrame frame(std::uint32_t id, Byte data) { return {.id = id, .size = 1, .data = {data}}; }
-  // Starts at the command 01 and then sends every millisecond.
+  // Starts on command 01 and then sends every millisecond.
   static CanToy::React cyclic(std::uint32_t id, Byte data) {
     return [=, at = Time{}](CanToy& self, const Event<CanFrame>& event) mutable {
       if (event.kind == CanToy::Kind::received && event.items[0].data[0] == 0x01) {
@@ -250,7 +251,8 @@ struct Can : testing::Test {
 
 TEST_F(Can, StartCommandThenCyclicFramesByArbitration) {
   CanToy high(cyclic(0x121, 0xB0));
-  CanToy low(cyclic(0x120, 0xA0));  // begins at the same nanosecond, is asked later, and wins
+  // begins at the same nanosecond, comes later in the list of nodes, and wins the arbitration
+  CanToy low(cyclic(0x120, 0xA0));
   CanToy host;
   host.send({frame(0x200, 0x01)});
   line.attach(Role::device, high);
@@ -285,7 +287,7 @@ TEST_F(Can, StandardFrameWinsAgainstExtendedOneWithTheSameBeginning) {
   EXPECT_EQ(standard.log, "242000 sent, 534000 received 04800000:");
 }
 
-// (f) A pulse on a line of its own asks for each frame: 10 us wide, the answer begins 30 us after its edge.
+// (f) A pulse on a separate wire requests each frame: 10 us wide, the reply begins 30 us after its edge.
 TEST(Trigger, PulseBeforeEachFrame) {
   sim::Line<Byte> line(LinkKind::half_duplex, {.rate = 1'000'000});
   ByteToy device([](ByteToy& self, const Event<Byte>& event) {
@@ -307,7 +309,7 @@ TEST(Trigger, PulseBeforeEachFrame) {
   EXPECT_EQ(device.log, "0 triggered 10000, 40000 sent, 100000 triggered 9000");
 }
 
-// (g) Another baud rate in the middle: both ends change after the last bit of the answer to the command 19.
+// (g) Another baud rate during the conversation: both ends change it after the last bit of the reply to command 19.
 struct BaudChange : testing::Test {
   static constexpr LineSettings fast{.rate = 2'000'000};
   sim::Line<Byte> line{LinkKind::half_duplex, {.rate = 1'000'000}};
@@ -359,7 +361,8 @@ TEST_F(BaudChange, HostThatDoesNotFollowGetsLineErrors) {
   EXPECT_EQ(device.log, "10000 received 19, 25000 sent, 40000 error");
 }
 
-// (h) Two nodes answer: the wire carries the AND. A transceiver that cannot mute itself hears its own bytes first.
+// (h) Two nodes reply at once: the wire carries the AND of their bits. A transceiver that cannot mute its receiver
+// receives its own bytes first.
 struct Collision : testing::Test {
   sim::Line<Byte> line{LinkKind::half_duplex, {.rate = 1'000'000}};
   static ByteToy::React answer(std::vector<Byte> bytes, Time delay) {

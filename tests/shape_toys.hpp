@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Toy machines for tests of the shape and the simulator: they write down what they are told and do what they are given.
+// Toy machines for tests of the machine interface and of the simulator. They log every event and run the steps that a
+// test queues.
 #pragma once
 
 #include <deque>
@@ -26,7 +27,7 @@ inline std::string text_of(const CanFrame& frame) {
   return text;
 }
 
-// A machine whose reaction to each event is a function. It writes down everything it is told.
+// A machine with a function as its reaction to each event. It logs all events.
 template <class Item>
 class Toy final : public Machine<Item> {
  public:
@@ -60,7 +61,7 @@ class Toy final : public Machine<Item> {
   void emit() { push({.kind = Step<Item>::Kind::emit}); }
   void finish() { push({.kind = Step<Item>::Kind::done}); }
 
-  Step<Item> idle{};  // what it waits with
+  Step<Item> idle{};  // the step while the queue is empty
   std::string log;
 
  private:

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Turns across pauses: every unit and model, slow and fast shafts, in virtual time. Whatever is presented as the way
-// between two readings is compared with the way of the true shaft.
+// Reads every unit and model across pauses, with slow and fast shafts, in virtual time. A reading that claims to
+// continue the previous one must match the true motion of the shaft.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -25,10 +25,10 @@ using Settings = std::vector<OptionText>;
 struct Case {
   const Unit* unit;
   std::string_view model{};
-  Settings encoder{};  // what the virtual encoder is
-  Settings known{};    // what the host was told
+  Settings encoder{};  // options of the virtual encoder
+  Settings known{};    // options that the host uses
   Take take = Take::newest;
-  unsigned turn_bits = 0;  // that the encoder really counts
+  unsigned turn_bits = 0;  // turn bits that the encoder really counts
 };
 
 void PrintTo(const Case& one, std::ostream* out) {
@@ -54,7 +54,7 @@ std::vector<Case> cases() {
   const auto add = [&](std::string_view unit, const Settings& encoder, const Settings& known, Take take) {
     all.push_back({.unit = find_unit(unit), .encoder = encoder, .known = known, .take = take});
   };
-  // Its identity says that it counts no turns; whoever is told nothing would expect 16 bits of them.
+  // The identity says that the encoder counts no turns. Without an option the host would expect 16 bits of turns.
   for (const std::string_view unit : {"encolink", "encolink-spi"})
     add(unit, {{"multiturn_bits", "0"}}, {}, Take::newest);
   for (const Take take : {Take::newest, Take::every}) {
@@ -67,7 +67,8 @@ std::vector<Case> cases() {
   return all;
 }
 
-/// Stands still for a millisecond, as encoders want it that are switched on, then turns.
+/// A shaft that turns at a constant speed. It stands still for the first millisecond, because some encoders must be
+/// switched on at rest.
 struct Spinning final : Shaft {
   explicit Spinning(double speed) : rpm(speed) {}
   [[nodiscard]] ShaftState at(Time time) const override {
@@ -78,7 +79,7 @@ struct Spinning final : Shaft {
   double rpm;
 };
 
-/// A turning virtual encoder, and whoever reads it now and then.
+/// A turning virtual encoder with the host session that reads it.
 template <class Item>
 class Bench {
  public:
@@ -99,7 +100,7 @@ class Bench {
 
   void pause(Time time) { port_->line().run_until(port_->line().now() + time); }
 
-  /// One reading; if it is said to continue the one before, it must have gone that way.
+  /// Reads once. If the unwrapper reports `continued`, the distance must match the shaft's motion.
   Joined read() {
     const Conversation<Item>* conversation = session_->read(*find_command(*case_.unit, Verb::read), case_.take);
     EXPECT_EQ(text_of(conversation->error()).name, "none") << conversation->detail();
@@ -132,7 +133,8 @@ class Bench {
   std::int64_t place_ = 0;
 };
 
-// Of a linear encoder the range is the revolution: as many metres a second as others have thousands of rpm.
+// For a linear encoder the measuring range replaces the revolution: its speed in metres per second is the value of
+// `rpm` / 1000.
 double speed_of(const Case& one, double rpm) {
   const Resolution resolution = one.unit->resolution(options_of(*one.unit, one.model, one.known));
   if (resolution.unit_um == 0) return rpm;
@@ -151,7 +153,8 @@ class Turns : public ::testing::TestWithParam<Case> {
         for (int i = 0; i < 3; ++i) bench.read();
         bench.pause(pause);
         const Joined joined = bench.read();
-        // Whoever counts turns has not lost them; who counts none cannot know, unless he reads what he missed.
+        // An encoder that counts turns loses none across the pause. Without a count the position is ambiguous, unless
+        // every missed reading is taken.
         const bool counts = GetParam().turn_bits > 0;
         if (counts) {
           EXPECT_EQ(joined, Joined::continued);

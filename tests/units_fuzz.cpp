@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Any bytes to every unit: as request and reply of its decoder, as captures of its probe, as what its conversations
-// receive, and as what its virtual encoder hears. The first bytes choose the unit, its options and the command.
+// Feeds arbitrary bytes to every unit: as request and reply to its decoder, as captures to its probe, as received bytes
+// to its conversations, and as requests to its virtual encoder. The first bytes select the unit, its options and the
+// command.
 #include <algorithm>
 #include <array>
 #include <cstddef>
@@ -28,7 +29,7 @@ struct Nowhere final : EvidenceSink {
   void put(const OptionEvidence&) override {}
 };
 
-/// All of them once: making them costs more than one input.
+/// Returns the configurations of every unit. They are computed once, because that takes longer than one input.
 const std::vector<std::vector<Configuration>>& all_configurations() {
   static const std::vector<std::vector<Configuration>> all = [] {
     std::vector<std::vector<Configuration>> made;
@@ -50,7 +51,7 @@ Held as_frame(const Unit& unit, Bytes bytes) {
   return frame;
 }
 
-// An error puts no field, a good frame at least one.
+// With an error no field may be reported; a good frame must report at least one.
 void decode(const Unit& unit, const Options& options, Bytes input) {
   for (std::size_t split = 0; split <= input.size() && split <= 16; ++split) {
     const Held request = as_frame(unit, input.first(split));
@@ -79,7 +80,7 @@ void probe(const Unit& unit, Options options, Bytes input) {
   (void)unit.probe(options, captures, nowhere);
 }
 
-/// Items of the link out of the input.
+/// Converts the input into items of the link: bytes or CAN frames.
 template <class Item>
 std::vector<Item> items_of(const Unit& unit, Bytes bytes) {
   if constexpr (std::is_same_v<Item, CanFrame>) {
@@ -93,8 +94,8 @@ std::vector<Item> items_of(const Unit& unit, Bytes bytes) {
   }
 }
 
-// Whatever comes back, at once or in pieces, a conversation ends when nothing more comes, and reports nothing with an
-// error.
+// Runs a conversation with the input as its reply, at once or in pieces. It must end after the last byte, and report
+// nothing together with an error.
 template <class Item>
 void converse(const Unit& unit, const Options& options, const Command& command, Bytes input, std::size_t piece) {
   using Kind = typename Event<Item>::Kind;
@@ -122,7 +123,7 @@ void converse(const Unit& unit, const Options& options, const Command& command, 
     now = std::max(now + std::chrono::milliseconds(1), step.kind == Wanted::wait ? Time{} : step.at);
     if (step.kind != Wanted::wait) {
       conversation->feed({.kind = Kind::sent, .at = now});
-      // Whoever is the clock gets as much as he asks for.
+      // A host that clocks the line receives as many bytes as it requests.
       if (clocks) items.resize(step.bits != 0 ? (step.bits + 7) / 8 : std::max(step.expect, step.out.size()));
       left = items;
     } else if (!left.empty() || unsolicited) {
@@ -140,7 +141,8 @@ void converse(const Unit& unit, const Options& options, const Command& command, 
   require(false);
 }
 
-// Bytes with pauses between them: the encoder says something whenever it says anything, and each time one thing.
+// Feeds the bytes with pauses to the virtual encoder. After each byte it must be waiting again within 100 steps, and it
+// must not send an empty frame.
 template <class Item>
 void ask_device(const Unit& unit, const Options& options, Bytes input) {
   using Kind = typename Event<Item>::Kind;
@@ -166,14 +168,14 @@ void ask_device(const Unit& unit, const Options& options, Bytes input) {
       require(!step.out.empty());
       now = std::max(now, step.at);
       device->feed({.kind = Kind::sent, .at = now});
-      if (streams) break;  // it never waits
+      if (streams) break;  // a streaming encoder never waits
     }
   }
 }
 
 template <class Item>
 void run(const Unit& unit, const Options& options, const Command& command, Bytes input) {
-  // A scan asks hundreds of times.
+  // A scan sends hundreds of requests, so its replies are short.
   const Bytes reply = input.first(std::min<std::size_t>(input.size(), command.verb == Verb::scan ? 8 : input.size()));
   converse<Item>(unit, options, command, reply, 1);
   converse<Item>(unit, options, command, reply, reply.size() + 1);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Writes the seeds of the fuzzers, one file each, into the folder given.
+// Writes the fuzz seeds, one file each, into the given folder.
 #include <cstddef>
 #include <cstdio>
 #include <filesystem>

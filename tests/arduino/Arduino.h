@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// As much of Arduino's core as a sketch with a serial port needs, with the macros that real cores have. At the other
-// end of Serial1 an encoder answers every request with one reply; of its bits every third reply has one flipped.
+// The part of Arduino's core that a sketch with a serial port needs, with the macros of real cores. An encoder on
+// Serial1 sends one reply to every request; in every third reply one bit is flipped.
 #pragma once
 
 #include <cstddef>
@@ -30,7 +30,8 @@ inline int direction = -1;
 inline void pinMode(int, int) {}
 inline void digitalWrite(int, int value) { direction = value; }
 
-// A step each, so that time goes on in loops that only look at it; it goes round as a real one does.
+// Each call advances the clock by 10 us, so that a loop which only polls it ends. The counter wraps around as on a real
+// board.
 inline std::uint32_t microseconds_passed = 0xFFFF'0000;
 inline std::uint32_t micros() { return microseconds_passed += 10; }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A virtual encoder of the library on a CAN interface: can_emulation INTERFACE. Serves it until standard input ends,
-// and says what becomes of it.
+// Runs a virtual encoder of the library on a CAN interface until standard input ends. Prints its address and position,
+// then switches its power off and on for each byte of input. Usage: can_emulation INTERFACE
 #include <cstdio>
 #include <string>
 #include <vector>
@@ -17,7 +17,7 @@ int main(int count, char** arguments) {
   std::printf("%s %llu\n", emulation.address().c_str(), static_cast<unsigned long long>(encoder.read().singleturn));
   std::fflush(stdout);
   while (std::getchar() != EOF) {
-    emulation.power_off();  // answered also while the interface is away
+    emulation.power_off();  // accepted also while the interface is down
     emulation.power_on();
     std::puts("switched");
     std::fflush(stdout);
