@@ -10,13 +10,13 @@
 
 namespace absenc::biss::testing {
 
-/// A shaft that is put somewhere and stays there.
+/// A shaft that stays at the position in `state`.
 struct TestShaft final : Shaft {
   [[nodiscard]] ShaftState at(Time) const override { return state; }
   ShaftState state{};
 };
 
-/// Clocks any number of bits, once.
+/// Clocks one transfer of any number of bits and records the samples of SLO.
 class RawHost final : public Machine<std::uint8_t> {
  public:
   RawHost(std::size_t bits, Time at, std::uint32_t rate) : bits_(bits), at_(at), rate_(rate) {}
@@ -46,7 +46,7 @@ class RawHost final : public Machine<std::uint8_t> {
   int step_ = 0;
 };
 
-/// `Device` and whatever machine talks to it.
+/// A virtual encoder of type `Device` on a line, with one host after the other.
 template <class Device>
 struct ClockedBench {
   template <class Format, class... More>
@@ -66,7 +66,7 @@ struct ClockedBench {
     finished = line.run(node, line.now() + std::chrono::seconds(10));
     return host;
   }
-  /// `bits` clocks after a pause.
+  /// Returns the samples of `bits` clocks that begin after a pause.
   std::string clock(std::size_t bits, Time pause = std::chrono::milliseconds(1), std::uint32_t rate = 200'000) {
     RawHost host(bits, line.now() + pause, rate);
     return run(host).text;

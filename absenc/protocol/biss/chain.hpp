@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Several BiSS encoders in one frame: after one start bit and one CDS, the word of each with its own check. README.md
-// draws the frame. Source: BiSS C Protocol Description rev D2.
+// Several BiSS encoders in one frame: one start bit and one CDS bit, then the word of each encoder with its own check.
+// README.md draws the frame. Source: BiSS C Protocol Description rev D2.
 #pragma once
 
 #include <array>
@@ -9,26 +9,27 @@
 
 namespace absenc::biss {
 
-/// Slave 0 is the farthest from the host, and its word comes last: channel i is that of slave `count - 1 - i`.
+/// Format of a chain's frames. Slave 0 is the farthest from the host and its word comes last: channel i belongs to
+/// slave `count - 1 - i`.
 struct ChainFormat {
-  static constexpr unsigned most = 8;  // data channels that a frame can have
+  static constexpr unsigned most = 8;  // the most data channels of a frame
   std::array<Channel, most> channels{};
   std::uint8_t count = 2;
-  std::uint8_t slave = 0;  // whose position a reading shows, and whose registers are meant
+  std::uint8_t slave = 0;  // the slave whose position a reading shows and whose registers are accessed
   RegisterOrder register_order = RegisterOrder::big;
   std::uint16_t register_delay_us = 0;
   bool start_sequence = false;
   Timeout timeout{};
   StopBit stop_bit = StopBit::next;
-  // As in Format.
+  // These members mean the same as in Format.
   std::uint32_t ma_khz = 1000;
   Time latency = 10us;
   Time ready{};
   std::uint32_t line_delay_ns = 0;
-  Scale scale{};  // of all: linear encoders
+  Scale scale{};  // scale of all linear encoders in the chain
 
   [[nodiscard]] constexpr Time period() const { return Time((1'000'000 + ma_khz / 2) / ma_khz); }
-  /// The channel of the slave that a reading shows.
+  /// Returns the channel of the slave whose position a reading shows.
   [[nodiscard]] constexpr unsigned shown() const { return slave < count ? count - 1u - slave : 0u; }
 };
 
@@ -56,7 +57,7 @@ struct ChainReply {
   bool cds = false;
 };
 
-/// As decode of one word: of a frame of which one word is wrong none is good.
+/// Decodes a frame of a chain; see decode of one word. If one word has an error, the whole frame is rejected.
 [[nodiscard]] constexpr Result<ChainReply> decode(const ChainFormat& format, BitView samples, Cds cds = Cds::zero) {
   if (!is_usable(format)) return Error::invalid_argument;
   ChainReply reply;
@@ -80,7 +81,7 @@ constexpr bool encode(const ChainFormat& format, const ChainReply& reply, BitBuf
   return true;
 }
 
-/// All of them turn with one shaft.
+/// Fills `reply` as if one shaft turned all encoders.
 constexpr void show(const ChainFormat& format, const ShaftState& state, std::uint32_t alarms, std::uint8_t life_counter,
                     ChainReply& reply) {
   for (unsigned i = 0; i < format.count; ++i) {

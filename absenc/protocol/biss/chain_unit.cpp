@@ -18,7 +18,7 @@ using namespace author;
 
 constexpr unsigned most = ChainFormat::most;
 
-// What options say of each word, in the order of the wire.
+// Options of one word; the words are numbered in the order of the line.
 template <unsigned>
 struct ChannelSettings {
   std::uint8_t singleturn_bits = 19;
@@ -46,7 +46,7 @@ struct ChainSettingsOf<std::index_sequence<channel...>> : ChainFormat, TimeoutSe
 using EveryChannel = std::make_index_sequence<most>;
 using ChainSettings = ChainSettingsOf<EveryChannel>;
 
-// ---- Names of each channel: channel0_crc_width
+// ---- Names with the channel number, as channel0_crc_width
 
 template <std::size_t size>
 struct Text {
@@ -112,7 +112,7 @@ constexpr auto chain_options = std::apply(
         },
         options_of_channels(EveryChannel{})));
 
-// ---- Fields of each channel; the shown one has those of any word besides
+// ---- Fields of each channel; the shown slave also has the fields of a single word
 
 enum ChannelField : std::size_t { in_multiturn, in_singleturn, in_error, in_warning, in_life_counter, in_crc, in_all };
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What stands behind a BiSS word: its life counter and its CRC, as the maker chose them. Source: BiSS C Protocol
-// Description rev D2; application note 21 (start value: that of the register in normal notation).
+// Life counter and CRC after a BiSS word; their sizes and parameters are the maker's choice. Sources: BiSS C Protocol
+// Description rev D2; application note 21 (the start value is that of the register in normal notation).
 #pragma once
 
 #include <cstddef>
@@ -11,26 +11,27 @@
 
 namespace absenc::biss {
 
-inline constexpr unsigned life_counter_bits = 6;  // before the CRC and under it; counts 0 to 63 and goes on at 0
+// Bits of the life counter: before the CRC and covered by it, counts 0 to 63, then 0 again.
+inline constexpr unsigned life_counter_bits = 6;
 
-/// The default is that of nearly all encoders: x^6 + x + 1, inverted.
+/// Check after a word. The default is used by nearly all encoders: x^6 + x + 1, inverted.
 struct Check {
-  std::uint8_t width = 6;     // bits, 0 to 16; 0: there is none
-  std::uint16_t poly = 0x03;  // without its highest power
+  std::uint8_t width = 6;     // bits of the CRC, 0 to 16; 0: no CRC
+  std::uint16_t poly = 0x03;  // polynomial without its highest power
   std::uint16_t init = 0;
   bool inverted = true;
   bool life_counter = false;
 
-  /// Behind the word.
+  /// Returns the bits that the check adds to the word.
   [[nodiscard]] constexpr unsigned bits() const { return width + (life_counter ? life_counter_bits : 0); }
   friend constexpr bool operator==(const Check&, const Check&) = default;
 };
 
-/// A polynomial ends in 1, or it is none.
+/// Returns whether the polynomial ends in 1; an even one does not detect every single bit error.
 [[nodiscard]] constexpr bool is_usable(const Check& check) { return check.width == 0 || (check.poly & 1) != 0; }
 
 inline constexpr Check crc6{};
-/// 0x190D9 with a life counter: that of the safety position word.
+/// Check of the safety position word: polynomial 0x190D9, with a life counter.
 inline constexpr Check crc16{16, 0x90D9, 0, true, true};
 
 [[nodiscard]] constexpr CrcParameters parameters_of(const Check& check) {
@@ -40,7 +41,7 @@ inline constexpr Check crc16{16, 0x90D9, 0, true, true};
 
 namespace detail {
 
-/// Of any parameters, one bit after the other.
+/// Computes a CRC of any parameters, bit by bit.
 template <class Bits>
 [[nodiscard]] constexpr std::uint16_t crc_bit_by_bit(const Check& check, const Bits& bits, std::size_t first,
                                                      std::size_t count) {
@@ -59,7 +60,8 @@ template <class Bits>
   return static_cast<std::uint16_t>(remainder ^ (check.inverted ? mask : 0));
 }
 
-/// As sent. `Source` as in word.hpp: a check that is known when the program is written costs what a hand would write.
+/// Returns the CRC as sent. `Source` as in word.hpp: a check that is known at compile time costs no more than code
+/// written for it by hand.
 template <class Source, class Bits>
 [[nodiscard]] constexpr std::uint16_t crc_as_sent(const Source& source, const Bits& bits, std::size_t first,
                                                   std::size_t count) {

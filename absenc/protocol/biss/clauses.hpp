@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the document demands of the encoder, with the place that says so.
+// Requirements of the document on the encoder and on the host, each with its paragraph.
 #pragma once
 
 #include <array>
@@ -60,7 +60,7 @@ inline constexpr auto clauses = with_registers(std::array<Clause, 3>{{
      .shown_with = "life_counter=true"},
 }});
 
-// BiSS Safety: a control word and a safety word, each with its own check.
+// Clauses of BiSS Safety: a control word and a safety word, each with its own check.
 inline constexpr auto safety_clauses = with_registers(std::array<Clause, 4>{{
     {"crc", "BiSS Safety, CPW and SPW", "CRC-6 over the control word, CRC-16 over the safety word, both inverted",
      Demand::checked},
@@ -93,7 +93,7 @@ inline constexpr auto chain_clauses = with_registers(std::array<Clause, 2>{{
      .errors = header_errors},
 }});
 
-// Of one encoder, of two words or of a chain: the line is the same.
+// Clauses for the host of all BiSS units: they share the line's timing.
 inline constexpr std::array<HostClause, 7> host_clauses{{
     {"silence", "BiSS C timing diagram", "after SLO that stayed as it was it clocks again", HostDemand::after_silence},
     {"damage", "BiSS C timing diagram, CRC", "after a frame with a wrong CRC it clocks again",

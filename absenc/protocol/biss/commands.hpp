@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the units of BiSS have in common: the commands of registers, and what goes wrong in words.
+// Options, commands and explanations that all BiSS units share.
 #pragma once
 
 #include <array>
@@ -27,7 +27,7 @@ inline constexpr std::array<Argument, 1> select_arguments{{{"bank", "that addres
 inline constexpr std::array<Argument, 2> command_arguments{
     {{"slaves", "bit n is slave n; 0: all, who do not answer", 0, 255}, {"command", "its number", 0, 3}}};
 
-/// Registers that have a name, and a command that reads them.
+/// A register with a name and with a command that reads it.
 struct NamedRegister {
   std::string_view name;
   unsigned address;
@@ -47,12 +47,12 @@ constexpr author::NoRequest no_request(const F&, Arguments) {
   return {};
 }
 
-// The options that all units of BiSS have.
+// Options of all BiSS units.
 template <auto member>
 inline constexpr auto clock_option = author::option<member>("ma_khz", "clock, kHz", 10, 10'000);
-/// The timeout as options say it.
+/// The BiSS timeout in the form of its options.
 struct TimeoutSettings {
-  std::uint16_t timeout_tenths = 0;  // of a microsecond
+  std::uint16_t timeout_tenths = 0;  // fixed timeout in 0.1 us; 0: unknown
   bool adaptive_timeout = false;
 
   [[nodiscard]] constexpr Timeout timeout_given() const {
@@ -94,7 +94,7 @@ constexpr void put_registers(FieldSink& sink, const F&, const Found& found) {
 template <class F>
 inline constexpr author::Finding<F, Found> registers_found{.put = put_registers<F>};
 
-/// A position, and what the registers do.
+/// Returns the commands of a unit: read a position, access registers.
 template <const auto& report, class F>
 [[nodiscard]] constexpr auto commands_of(bool (*is_readable)(const F&)) {
   constexpr auto request = no_request<F>;
@@ -152,15 +152,16 @@ template <class F>
   }
 }
 
-/// Around the end of the idle line a flip only changes the length of the ACK. Within the ACK, and at the start bit, it
-/// moves the frame, which a CRC of 6 bits misses once in 64 times.
+/// Returns whether an error in sample `bit` is always detected, or harmless. At the end of the idle line a flipped
+/// sample only changes the length of the ACK. Within the ACK and at the start bit it moves the frame, which a CRC of 6
+/// bits misses once in 64 times.
 [[nodiscard]] inline bool is_behind_ack(Frame reply, std::size_t bit) {
   const BitView samples = author::to_bits(reply);
   const std::size_t idle = samples[0] ? samples.end_of_run(0) : 0;
   return bit + 1 < idle || bit > samples.end_of_run(idle);
 }
 
-/// Where a CDS stands: behind the start bit.
+/// Returns the index of the CDS sample, which follows the start bit; nothing if the reply ends before it.
 [[nodiscard]] inline std::optional<std::size_t> place_of_cds(Frame reply) {
   const BitView samples = author::to_bits(reply);
   if (samples.size == 0) return std::nullopt;
@@ -168,9 +169,10 @@ template <class F>
   return start + 1 < samples.size ? std::optional(start + 1) : std::nullopt;
 }
 
-// ---- What the units of BiSS declare alike
+// ---- Parts of the declaration that all BiSS units share
 
-/// The CDM bits of a command's control frame, of those with several the one that does its work.
+/// Writes the CDM bits of the command's control frame, as '0' and '1'. If a command sends several control frames, it
+/// writes the one that reads or changes the register.
 template <class F>
 Result<std::size_t> encode_control(const F& format, const Command& command, Arguments arguments, MutableBytes out) {
   ControlMaster master;
@@ -207,10 +209,11 @@ Result<std::size_t> encode_control(const F& format, const Command& command, Argu
 
 template <class F>
 constexpr LineSettings line_of(const F&) {
-  return line_settings;  // the conversation sets its rate
+  return line_settings;  // the conversation sets the clock rate itself
 }
 
-/// A frame of the encoder; or, with a request, a control frame: the bits of CDM and those of CDS.
+/// Decodes a position frame; if `asked` is not empty, a control frame: `asked` has the CDM bits, `answered` the CDS
+/// bits.
 template <const auto& report, auto is_usable, class F>
 constexpr Error decode_frame(const F& format, Frame asked, Frame answered, FieldSink& sink) {
   if (!asked.empty()) {

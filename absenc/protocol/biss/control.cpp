@@ -53,7 +53,7 @@ bool ControlMaster::next(bool cds) {
 }
 
 void ControlMaster::fail(Error error) {
-  zeros_ = 0;  // whoever has not seen this frame counts from the next
+  zeros_ = 0;  // slaves that missed this frame begin to count zeros with the next one
   end(error);
 }
 
@@ -83,7 +83,7 @@ bool ControlMaster::step(bool cds) {
 bool ControlMaster::header(bool cds) {
   if (at_ == 0) {
     if (zeros_ < control_pause) return false;
-    if (cds) return end(Error::bad_framing);  // nobody has been asked
+    if (cds) return end(Error::bad_framing);  // CDS is 1 although no request was sent
     at_ = 1;
     return true;
   }
@@ -111,12 +111,12 @@ bool ControlMaster::direction(bool cds) {
         state_ = State::start;
         return true;
       }
-      // Of a write that nobody answers the lock bit tells whether somebody refuses.
+      // If a write is not answered, the number of lock bits shows whether a slave with this ID exists and refuses.
       return end(frame_.request.slave < frame_.slaves ? Error::request_rejected : Error::timeout);
   }
 }
 
-// The start bit goes on until the encoder's comes: it may need 20 ms.
+// Repeats the host's start bit until the encoder sends its own, which may take 20 ms.
 bool ControlMaster::started(bool cds) {
   const bool write = frame_.request.operation == Operation::write;
   if (!cds) {
@@ -157,7 +157,7 @@ bool ControlMaster::end_byte(bool is_last) {
 
 bool ControlMaster::acknowledge(bool cds) {
   const unsigned at = at_++;
-  if (at == direction_at) return true;  // S
+  if (at == direction_at) return true;  // start bit S
   if (frame_.request.slaves == 0) {
     frame_.executed = true;
     end(Error::none);
@@ -220,7 +220,7 @@ bool ControlSlaves::step(bool cdm, ControlTarget& target) {
   return false;
 }
 
-// Who receives a wrong one is silent.
+// A slave that receives a damaged header does not answer.
 bool ControlSlaves::end_header(const ControlTarget& target) {
   const Result<ControlRequest> request = request_of_header(bits_);
   if (!request) return end();
@@ -251,7 +251,8 @@ bool ControlSlaves::direction(bool cdm, ControlTarget& target) {
   }
 }
 
-// The host's start bit, which goes on while the encoder is not ready; `bits_` of a read are then what goes out.
+// Begins a byte at the host's start bit, which the host repeats while the encoder is not ready. For a read, `bits_` are
+// the bits to send.
 bool ControlSlaves::begin_byte(ControlTarget& target) {
   const bool write = request_.operation == Operation::write;
   const bool may_wait = !write || bytes_ > 0;
@@ -275,7 +276,7 @@ bool ControlSlaves::next_allowed(const ControlTarget& target) const {
          target.allows(request_.slave, next, request_.operation == Operation::write);
 }
 
-// CDM is looked at in the frame of P only.
+// Sends a byte to the host. CDM is examined only in the frame of P.
 bool ControlSlaves::read(bool cdm, ControlTarget& target) {
   const unsigned at = at_++;
   if (at < byte_bits) return (bits_ >> (byte_bits - 1 - at) & 1) != 0;
@@ -286,7 +287,7 @@ bool ControlSlaves::read(bool cdm, ControlTarget& target) {
   return begin_byte(target);
 }
 
-// A byte whose CRC is wrong comes back as it was sent, and is not stored.
+// Receives a byte. If its CRC is wrong it is still returned as received, but not stored.
 bool ControlSlaves::write(bool cdm, ControlTarget& target) {
   const unsigned at = at_++;
   if (at < byte_bits) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// BiSS control communication: one bit of the host (CDM) behind each frame, one of the encoders (CDS) in the next. What
-// a whole control frame says, and the two sides of it. README.md draws it. Source: BiSS C Protocol Description rev D2.
+// BiSS control communication. Each frame carries one bit of the host (CDM, after the frame) and one of the encoders
+// (CDS, in the next frame). This file has the content of a control frame and both sides of it. README.md draws it.
+// Source: BiSS C Protocol Description rev D2.
 #pragma once
 
 #include <array>
@@ -15,11 +16,11 @@
 
 namespace absenc::biss {
 
-inline constexpr unsigned control_pause = 14;    // zeros before a start bit; anywhere they end the control frame
-inline constexpr unsigned control_slaves = 8;    // that can have an ID
-inline constexpr std::size_t control_most = 64;  // bytes in one go
+inline constexpr unsigned control_pause = 14;  // zeros before a start bit; within a control frame, as many zeros end it
+inline constexpr unsigned control_slaves = 8;  // the most slaves that can have an ID
+inline constexpr std::size_t control_most = 64;  // the most bytes of one control frame
 
-/// x^4 + x + 1, inverted: over CTS and the ten bits behind it, and over each byte.
+/// CRC of control frames: x^4 + x + 1, inverted; over CTS and the ten bits after it, and over each byte.
 inline constexpr Check crc4{4, 0x3};
 
 [[nodiscard]] constexpr std::uint8_t crc4_of(std::uint64_t bits, unsigned count) {
@@ -28,16 +29,16 @@ inline constexpr Check crc4{4, 0x3};
 
 struct ControlRequest {
   enum class Operation : std::uint8_t { read, write, command } operation = Operation::read;
-  std::uint8_t slave = 0;    // of a register: 0 to 7
-  std::uint8_t address = 0;  // of the first register: 0 to 127
-  std::uint8_t slaves = 0;   // of a command: bit n is slave n; none: all of them, who do not answer
-  std::uint8_t command = 0;  // 0 to 3
+  std::uint8_t slave = 0;    // slave whose register is accessed, 0 to 7
+  std::uint8_t address = 0;  // address of the first register, 0 to 127
+  std::uint8_t slaves = 0;   // slaves that receive a command: bit n is slave n; 0: all slaves, without acknowledgement
+  std::uint8_t command = 0;  // number of a command, 0 to 3
 
   [[nodiscard]] constexpr bool is_command() const { return operation == Operation::command; }
   friend constexpr bool operator==(const ControlRequest&, const ControlRequest&) = default;
 };
 
-inline constexpr unsigned header_bits = 15;  // behind the start bit: CTS, ten bits, CRC
+inline constexpr unsigned header_bits = 15;  // bits after the start bit: CTS, ten bits, CRC
 
 [[nodiscard]] constexpr std::uint16_t header_of(const ControlRequest& request) {
   std::uint32_t bits = 0;
@@ -50,7 +51,7 @@ inline constexpr unsigned header_bits = 15;  // behind the start bit: CTS, ten b
   return static_cast<std::uint16_t>(bits << 4 | crc4_of(bits, 11));
 }
 
-/// What the header says; whether a register is read or written follows it. Error: bad_checksum.
+/// Decodes a header. Whether a register is read or written is sent after the header. Error: bad_checksum.
 [[nodiscard]] constexpr Result<ControlRequest> request_of_header(std::uint16_t header) {
   const std::uint32_t bits = header >> 4;
   if (crc4_of(bits, 11) != (header & 0xF)) return Error::bad_checksum;
@@ -66,50 +67,50 @@ inline constexpr unsigned header_bits = 15;  // behind the start bit: CTS, ten b
   return request;
 }
 
-/// A control frame with what was answered.
+/// A control frame with the answer of the encoders.
 struct ControlFrame {
   ControlRequest request{};
-  std::uint8_t slaves = 0;   // that have an ID, as the lock bits say
-  bool more_slaves = false;  // there are some without
+  std::uint8_t slaves = 0;   // number of slaves with an ID, from the lock bits
+  bool more_slaves = false;  // there are slaves without an ID
   ByteBuffer<control_most> data;
-  Buffer<std::uint16_t, control_most> start_delay;  // of each byte, in frames
+  Buffer<std::uint16_t, control_most> start_delay;  // number of frames by which each byte was delayed
   bool next_address_accepted = false;
-  std::uint8_t acknowledged = 0;  // of a command: bit n is slave n
+  std::uint8_t acknowledged = 0;  // slaves that acknowledged a command: bit n is slave n
   bool executed = false;
 };
 
-/// Of the bits of CDM and CDS, one each for every frame; without those of CDS what is asked. What is before the start
-/// bit are zeros, or nothing. What is written is taken from CDM alone where there are no bits of CDS; a start bit that
-/// was repeated is then told from data by the CRC. Errors: wrong_length (no bits), bad_framing (no start bit, or not
-/// enough zeros before it, or neither a read nor a write), truncated, bad_checksum (of the header or a byte), timeout
-/// (nobody has this ID, or it does not answer), unexpected_reply (what is written comes back otherwise),
-/// request_rejected.
+/// Decodes a control frame from the bits of CDM and CDS, one of each per frame. Before the start bit may be zeros or
+/// nothing. Without CDS bits only the request is decoded: written data is taken from CDM, and repeated start bits are
+/// told from data by the CRC. Errors: wrong_length (no bits), bad_framing (no start bit, too few zeros before it, or
+/// neither read nor write), truncated, bad_checksum (header or a byte), timeout (no slave has this ID, or it does not
+/// answer), unexpected_reply (written data is returned with another value), request_rejected.
 [[nodiscard]] Result<ControlFrame> decode_control(BitView cdm, BitView cds);
 
-/// The host's side of one control frame. It owns no line: each frame of the encoder brings a CDS, and asks for a CDM.
+/// The host's side of one control frame. It owns no line: the caller passes the CDS of each frame and sends the CDM
+/// that it returns.
 class ControlMaster {
  public:
-  /// The zeros before the next start bit are counted over several of them.
+  /// Construct once and use for several control frames: it counts the zeros before the next start bit across them.
   ControlMaster() = default;
 
-  /// Reads `count` registers, 1 to 64.
+  /// Begins to read `count` registers, 1 to 64.
   void read(unsigned slave, unsigned address, std::size_t count);
   void write(unsigned slave, unsigned address, Bytes bytes);
-  /// To the slaves of this mask; of none to all.
+  /// Begins a command to the slaves in the mask `slaves`; 0: to all.
   void command(std::uint8_t slaves, unsigned command);
-  /// Only looks who is there: `frame().slaves`.
+  /// Begins to count the slaves on the line; the result is `frame().slaves`.
   void look();
 
-  /// A frame came with this CDS: the CDM behind it.
+  /// Takes the CDS of a received frame and returns the CDM to send after it.
   bool next(bool cds);
-  /// A frame was lost, and with it a CDS: what was asked ends with this error.
+  /// Ends the control frame with `error` because a frame, and with it a CDS, was lost.
   void fail(Error error);
 
   [[nodiscard]] bool is_over() const { return over_; }
-  /// Whether it waits for a start bit of the encoder, which may take 20 ms.
+  /// Returns whether the host waits for a start bit of the encoder, which may take 20 ms.
   [[nodiscard]] bool is_waiting() const { return !over_ && state_ == State::start; }
   [[nodiscard]] Error error() const { return error_; }
-  /// What was found; of several bytes those before the error.
+  /// Returns the control frame; after an error, with the bytes before it.
   [[nodiscard]] const ControlFrame& frame() const { return frame_; }
 
  private:
@@ -127,36 +128,38 @@ class ControlMaster {
   ControlFrame frame_{};
   ByteBuffer<control_most> written_;
   std::uint16_t header_ = 0;
-  std::uint16_t in_ = 0;  // bits of this byte and its CRC
+  std::uint16_t in_ = 0;  // received bits of the present byte and its CRC
   std::uint16_t out_ = 0;
-  std::size_t count_ = 0;  // bytes wanted
-  unsigned at_ = 0;        // the frame since the start bit; since that of the byte
+  std::size_t count_ = 0;  // number of bytes to transfer
+  // Index of the next frame: counted from the start bit of the control frame, or from that of the byte.
+  unsigned at_ = 0;
   unsigned zeros_ = 0;
   unsigned delay_ = 0;
   State state_ = State::header;
   bool look_ = false;
   bool over_ = true;
-  bool answered_ = false;  // the first of the two bits of direction
+  bool answered_ = false;  // first of the two direction bits in CDS
   Error error_ = Error::none;
 };
 
-/// Appends what the host says for what `master` has begun: a bit of CDM for each frame, from the zeros before the start
-/// bit to those behind, as encoders that do all of it at once would be told. `slaves` of them have an ID.
+/// Appends the CDM bits of the control frame that `master` has begun, one per frame, including the zeros before the
+/// start bit and after the end. Assumes encoders that obey at once; `slaves`: number of slaves with an ID.
 void append_cdm(ControlMaster master, unsigned slaves, BitBuffer<1024>& out);
 
-/// What the encoders do with what is asked of them: `slave` is one of theirs.
+/// The encoders as ControlSlaves uses them. `slave` is always the ID of an existing slave.
 struct ControlTarget {
-  /// Whether the register may be read, or written.
+  /// Returns whether the register may be read, or written.
   [[nodiscard]] virtual bool allows(unsigned slave, unsigned address, bool write) const = 0;
   [[nodiscard]] virtual std::uint8_t read(unsigned slave, unsigned address) = 0;
   virtual void write(unsigned slave, unsigned address, std::uint8_t value) = 0;
-  /// The bit P behind a register, where the one behind it may be accessed so or not.
+  /// Returns the bit P after a register. `next_allowed`: whether the next register may be accessed too.
   [[nodiscard]] virtual bool stop_bit(bool next_allowed) const { return !next_allowed; }
-  /// Whether the byte can begin now: the encoder has it, or can take it.
+  /// Returns whether the byte can begin now: the encoder has its value, or can take a new one.
   [[nodiscard]] virtual bool is_ready() const = 0;
-  /// Whether the slave takes part: the command that ends that is taken back by another, which all hear.
+  /// Returns whether the slave takes part in register accesses. One command switches that off, another on; all slaves
+  /// receive both.
   [[nodiscard]] virtual bool listens(unsigned) const { return true; }
-  /// Whether the slave does this.
+  /// Returns whether the slave executes this command.
   [[nodiscard]] virtual bool obeys(unsigned slave, unsigned command) const = 0;
   virtual void execute(std::uint8_t slaves, unsigned command) = 0;
 
@@ -164,12 +167,12 @@ struct ControlTarget {
   ~ControlTarget() = default;
 };
 
-/// The encoders' side, of all that are on the line.
+/// The encoders' side of control frames, for all slaves on the line.
 class ControlSlaves {
  public:
   explicit ControlSlaves(unsigned count) : count_(count) {}
 
-  /// The host's CDM behind the last frame: what the CDS of the next is, see `cds`.
+  /// Takes the CDM after the last frame; sets the CDS of the next frame, see `cds`.
   void take(bool cdm, ControlTarget& target);
   [[nodiscard]] bool cds() const { return cds_; }
   void reset() { *this = ControlSlaves(count_); }
@@ -194,7 +197,7 @@ class ControlSlaves {
   ControlRequest request_{};
   std::uint16_t bits_ = 0;
   unsigned at_ = 0;
-  unsigned bytes_ = 0;  // of this control frame
+  unsigned bytes_ = 0;  // number of bytes transferred in this control frame
   unsigned zeros_ = 0;
   bool cds_ = false;
 };

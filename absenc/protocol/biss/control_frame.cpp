@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A control frame as a whole: decoded from CDM and CDS, and the CDM of a request.
+// Decodes a control frame from all its CDM and CDS bits, and makes the CDM bits of a request.
 #include "absenc/protocol/biss/control.hpp"
 
 #include "absenc/protocol/biss/control_bits.hpp"
@@ -28,9 +28,9 @@ void put_locks(ControlFrame& frame, const ControlBits& cds) {
   frame.more_slaves = cds[more_slaves_at];
 }
 
-// Byte after byte; `cdm` of a read only says how many.
+// Decodes the bytes of a register access. For a read, `cdm` only shows how many bytes there are.
 Error take_bytes(const ControlBits& cdm, const ControlBits& cds, bool write, ControlFrame& frame) {
-  bool refused = false;  // by P of the byte before; some encoders go on all the same
+  bool refused = false;  // p refused the next register; some encoders continue all the same
   for (unsigned due = direction_at + 3;; due += byte_bits + 2) {
     unsigned at = due;
     for (unsigned zeros = 0; !cds[at]; ++at) {
@@ -38,7 +38,7 @@ Error take_bytes(const ControlBits& cdm, const ControlBits& cds, bool write, Con
       if (zeros == control_pause) return refused ? Error::request_rejected : Error::timeout;
     }
     const bool first = due == direction_at + 3;
-    if (first && write && at != due) return Error::bad_framing;  // the first byte that is written is not delayed
+    if (first && write && at != due) return Error::bad_framing;  // the first written byte is never delayed
     if (!cds.has(at + byte_bits + 1) || !cdm.has(at + byte_bits)) return Error::truncated;
     const std::uint16_t answered = cds.load(at + 1, byte_bits);
     const std::uint16_t sent = write ? cdm.load(at, byte_bits) : answered;
@@ -53,7 +53,7 @@ Error take_bytes(const ControlBits& cdm, const ControlBits& cds, bool write, Con
   }
 }
 
-// Reads the data that the host writes, by CDM alone. While an encoder is not ready the host repeats its start bit.
+// Decodes the data that the host writes from CDM alone. While an encoder is not ready the host repeats its start bit.
 Error take_written(const ControlBits& cdm, ControlFrame& frame) {
   for (unsigned at = direction_at + 3;; at += byte_bits + 2) {
     while (!frame.data.empty() && cdm.has(at + byte_bits) && cdm[at] && !is_good_byte(cdm.load(at, byte_bits))) ++at;
@@ -72,7 +72,7 @@ Error take_register(const ControlBits& cdm, const ControlBits& cds, ControlFrame
   const bool first = cds[direction_at + 1];
   const bool second = cds[direction_at + 2];
   if (first == write) return write ? Error::unexpected_reply : Error::timeout;
-  if (second != write) return Error::request_rejected;  // the second is inverted
+  if (second != write) return Error::request_rejected;  // the second direction bit is the inverted first one
   if (!cdm[direction_at + 2]) return Error::timeout;
   return take_bytes(cdm, cds, write, frame);
 }

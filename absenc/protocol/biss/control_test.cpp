@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Control frames: what they say, and both sides of them against each other, frame by frame.
+// Control frames: decoding, and host and encoders against each other, frame by frame.
 #include "absenc/protocol/biss/control.hpp"
 
 #include <gtest/gtest.h>
@@ -26,7 +26,7 @@ Result<ControlFrame> decoded(std::string_view cdm, std::string_view cds) {
   return decode_control(BitText(cdm).bits.view(), BitText(cds).bits.view());
 }
 
-// From TI's table; the others are made by the rules of the protocol description.
+// From TI's table; the other frames follow the rules of the protocol description.
 constexpr std::string_view read_44 = "0000000000000011000100010011011010000000000000000";
 constexpr std::string_view read_44_answer = "0000000000000001000000000000000101000010100010000";
 
@@ -48,7 +48,7 @@ std::string cdm_of(const ControlMaster& master) {
   return text;
 }
 
-// Those of the protocol description, and of TI's table; behind them only zeros.
+// Compares with the frames of the protocol description and of TI's table. Only zeros may follow.
 TEST(BissControl, RequestsAreTheBitsThatAreDrawn) {
   const auto expect = [](const ControlMaster& master, std::string_view drawn) {
     const std::string cdm = cdm_of(master);
@@ -79,7 +79,7 @@ TEST(BissControl, WhatIsWrittenIsTakenFromCdmAlone) {
     return std::vector<unsigned>(data.begin(), data.end());
   };
   EXPECT_EQ(written("0000000000000011000100100010100110101010100100000"), (std::vector<unsigned>{0x55}));
-  // The second start bit is said three times: the encoder was late.
+  // The host sends the second start bit three times, because the encoder was late.
   EXPECT_EQ(written("00000000000000110001001000101001100000001110001110000001010010000"),
             (std::vector<unsigned>{1, 2}));
   EXPECT_TRUE(written(read_44).empty());
@@ -88,7 +88,7 @@ TEST(BissControl, WhatIsWrittenIsTakenFromCdmAlone) {
 }
 
 TEST(BissControl, NoBitOfAnAnswerFlipsUnnoticed) {
-  // Lock bits of others, and what is behind P, mean nothing here.
+  // Lock bits of other slaves and the bits after P have no meaning here.
   for (std::size_t i = 14 + 17; i < 14 + 32; ++i) {
     std::string cds(read_44_answer);
     cds[i] = cds[i] == '1' ? '0' : '1';
@@ -114,7 +114,7 @@ TEST(BissControl, WhatIsNoControlFrame) {
 
 // ---- Both sides
 
-/// Registers of some slaves; those at odd multiples of 16 are read only, from 0x70 on there are none.
+/// Registers of three slaves. Addresses with bit 4 set are read only; none exist from 0x70 on.
 struct Target : ControlTarget {
   [[nodiscard]] bool allows(unsigned slave, unsigned address, bool write) const override {
     return slave < 3 && address < 0x70 && !(write && (address & 0x10) != 0);
@@ -137,13 +137,14 @@ struct Target : ControlTarget {
   int executed = -1;
 };
 
-/// As frames go by: what was said in them.
+/// The CDM and CDS bits of a run, one per frame.
 struct Talk {
   std::string cdm;
   std::string cds;
 };
 
-/// `flip`: the bit of CDS that is received wrong; the frame in which it is wrong passes all checks of the position.
+/// Runs both sides to the end. `flip`: index of a CDS bit that is received wrong; the position's checks do not detect
+/// it.
 Talk run(ControlMaster& master, ControlSlaves& slaves, Target& target, std::size_t flip = ~std::size_t{0}) {
   Talk talk;
   for (unsigned i = 0; !master.is_over() && i < 2'000; ++i) {
@@ -170,7 +171,7 @@ TEST(BissControl, HostAndEncoderSayWhatTheTableShows) {
   EXPECT_EQ(talk.cdm.size(), 14u + 33u);
 }
 
-/// Answers P = 1 behind each register, and goes on all the same.
+/// Sends P = 1 after each register, and continues all the same.
 struct Stopping final : Target {
   [[nodiscard]] bool stop_bit(bool) const override { return true; }
 };
@@ -185,7 +186,7 @@ TEST(BissControl, AHostThatGoesOnBehindPIsDecoded) {
   EXPECT_EQ((run(master, slaves, target), master.error()), Error::request_rejected);
   EXPECT_EQ(master.frame().data.size(), 1u);
   EXPECT_EQ(master.frame().data[0], 10);
-  // LENZ's reader does not look at P of a read.
+  // LENZ's reader ignores P of a read.
   BitBuffer<256> cdm;
   BitBuffer<256> cds;
   slaves.reset();
@@ -195,7 +196,7 @@ TEST(BissControl, AHostThatGoesOnBehindPIsDecoded) {
     slaves.take(c == '1', target);
   }
   for (unsigned i = 0; i < 44; ++i) {
-    const bool goes_on = i == 13;  // in the frame of P
+    const bool goes_on = i == 13;  // the host continues, in the frame of P
     cdm.append(goes_on ? 1 : 0, 1);
     cds.append(slaves.cds() ? 1 : 0, 1);
     slaves.take(goes_on, target);
@@ -242,7 +243,7 @@ TEST(BissControl, EveryAccessEndsAsItShould) {
     }
     const std::string quiet(14, '0');
     const Result<ControlFrame> seen = decoded(quiet + talk.cdm + quiet, quiet + talk.cds + quiet);
-    // Nobody else knows that more was wanted than what an encoder has.
+    // The decoder cannot know that the host wanted more registers than the encoder has.
     const std::size_t size = master.frame().data.size();
     ASSERT_EQ(seen.error(), size > 0 ? Error::none : expected) << talk.cdm << '\n' << talk.cds;
     if (!seen) continue;
@@ -252,7 +253,7 @@ TEST(BissControl, EveryAccessEndsAsItShould) {
   }
 }
 
-// A start bit that gets lost moves all that follows, which four bits of CRC may miss: that shows as a delay.
+// A lost start bit shifts all bits after it, which four bits of CRC may miss: it shows as a delay.
 TEST(BissControl, AFlippedBitIsNoWrongByteUnlessItMovesTheStart) {
   for (std::size_t flip = 0; flip < 14 + 33 + 14; ++flip) {
     for (const bool write : {false, true}) {
@@ -306,7 +307,7 @@ TEST(BissControl, CommandsAreExecutedWhenAllAcknowledge) {
   EXPECT_EQ(master.frame().slaves, 3);
 }
 
-// Counted from the start bit, as the table counts.
+// Bits are counted from the start bit, as in the table.
 TEST(BissControl, EachRuleOfAControlFrameIsLookedAt) {
   const auto spoken = [](auto begin) {
     Target target;
@@ -339,11 +340,11 @@ TEST(BissControl, EachRuleOfAControlFrameIsLookedAt) {
   EXPECT_EQ(error(read.cdm, begin(read.cds, 5)), Error::truncated);
   EXPECT_EQ(error(read.cdm, begin(read.cds, 18)), Error::truncated);
   EXPECT_EQ(error(begin(read.cdm, 20), read.cds), Error::truncated);
-  EXPECT_EQ(error(flipped(read.cdm, {18}), read.cds), Error::timeout);                          // no S of the master
-  EXPECT_EQ(error(late(read.cdm, 13), late(read.cds, 13)), Error::none);                        // S of the encoder
-  EXPECT_EQ(error(late(read.cdm, 14), late(read.cds, 14)), Error::timeout);                     // 14 zeros end it
-  EXPECT_EQ(error(flipped(read.cdm, {32}), flipped(read.cds, {32})), Error::request_rejected);  // P
-  EXPECT_EQ(error(write.cdm, late(write.cds, 1)), Error::bad_framing);                          // no delay there
+  EXPECT_EQ(error(flipped(read.cdm, {18}), read.cds), Error::timeout);       // no S of the host
+  EXPECT_EQ(error(late(read.cdm, 13), late(read.cds, 13)), Error::none);     // s of the encoder is late
+  EXPECT_EQ(error(late(read.cdm, 14), late(read.cds, 14)), Error::timeout);  // 14 zeros end the frame
+  EXPECT_EQ(error(flipped(read.cdm, {32}), flipped(read.cds, {32})), Error::request_rejected);  // p refuses
+  EXPECT_EQ(error(write.cdm, late(write.cds, 1)), Error::bad_framing);  // no delay is allowed here
   EXPECT_EQ(error(write.cdm, flipped(write.cds, {20})), Error::bad_checksum);
   EXPECT_EQ(error(flipped(write.cdm, {19}), write.cds), Error::bad_checksum);
   EXPECT_EQ(error(spoken(written(0xA5)).cdm, write.cds), Error::unexpected_reply);
@@ -362,13 +363,13 @@ TEST(BissControl, EachRuleOfAControlFrameIsLookedAt) {
   };
   EXPECT_EQ(answered(written(0x5A), write.cds), Error::none);
   EXPECT_EQ(answered(written(0xA5), write.cds), Error::unexpected_reply);
-  EXPECT_EQ(answered(written(0x5A), flipped(write.cds, {0})), Error::bad_framing);  // nobody has been asked
+  EXPECT_EQ(answered(written(0x5A), flipped(write.cds, {0})), Error::bad_framing);  // CDS is 1 before any request
 }
 
 TEST(BissControl, AByteWhoseCrcIsWrongIsNotStored) {
   Target target;
   ControlSlaves slaves(1);
-  // A write of 0x55 to 0x48, with one bit of the data wrong.
+  // A write of 0x55 to 0x48 with one wrong data bit.
   for (const char c : std::string_view("0000000000000011000100100010100110101000100100000"))
     slaves.take(c == '1', target);
   EXPECT_EQ(target.writes, 0);

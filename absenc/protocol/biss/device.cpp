@@ -15,7 +15,7 @@ void LineDelay::apply(const Behaviour& behaviour, Time period, Samples& samples)
   const BitBuffer driven = samples;
   samples.clear();
   const auto bit = [&driven](std::size_t index, unsigned by) {
-    if (index < by) return true;  // still idle
+    if (index < by) return true;  // the line is still idle
     return index - by < driven.size() && driven.view()[index - by];
   };
   for (std::size_t i = 0; i < driven.size() + late && i < Samples::capacity(); ++i) {
@@ -31,10 +31,10 @@ void LineDelay::apply(const Behaviour& behaviour, Time period, Samples& samples)
 // ---- Registers
 
 namespace {
-// Of each slave: the banks, then what is behind them, without its bank select, which power off forgets.
+// Memory of each slave: the banks, then the registers after them without bank select, which is lost at power off.
 constexpr std::size_t direct = VirtualRegisters::banks * registers::bank_size;
 
-constexpr std::array<std::uint8_t, 8> identity{'A', 'b', 's', 'e', 'n', 'c', 'v', 'e'};  // device id, manufacturer
+constexpr std::array<std::uint8_t, 8> identity{'A', 'b', 's', 'e', 'n', 'c', 'v', 'e'};  // device id, then manufacturer
 }  // namespace
 
 VirtualRegisters::VirtualRegisters(unsigned slaves, RegisterOrder order, StopBit stop_bit)
@@ -42,7 +42,7 @@ VirtualRegisters::VirtualRegisters(unsigned slaves, RegisterOrder order, StopBit
   const unsigned lowest = registers::serial_number + (order == RegisterOrder::big ? 3 : 0);
   for (unsigned slave = 0; slave < most_slaves; ++slave) {
     const MutableBytes own = MutableBytes(memory_).subspan(slave * slave_size + direct);
-    own[registers::eds_bank - registers::bank_size] = 0;  // there is no electronic data sheet
+    own[registers::eds_bank - registers::bank_size] = 0;  // the virtual encoder has no electronic data sheet
     own[registers::profile - registers::bank_size] = 0;
     own[registers::profile + 1 - registers::bank_size] = 0;
     own[lowest - registers::bank_size] = static_cast<std::uint8_t>(slave + 1);
@@ -67,7 +67,7 @@ std::size_t VirtualRegisters::place(unsigned slave, unsigned address) const {
   return first + direct + (address - registers::bank_size);
 }
 
-// All but what tells which encoder this is, and banks that there are not.
+// Refuses banks that do not exist, and writes to registers that identify the encoder.
 bool VirtualRegisters::allows(unsigned slave, unsigned address, bool write) const {
   if (address < registers::bank_size) return bank_[slave] < banks;
   if (!write || address == registers::bank_select) return true;
@@ -102,7 +102,7 @@ bool VirtualRegisters::is_ready() const {
   return now_ - asked_at_ >= delay_;
 }
 
-// The commands of the standard; 2 and 3 are the maker's own.
+// Accepts the commands of the standard; 2 and 3 are defined by the maker.
 bool VirtualRegisters::obeys(unsigned, unsigned command) const { return command < 2; }
 
 void VirtualRegisters::execute(std::uint8_t slaves, unsigned command) {

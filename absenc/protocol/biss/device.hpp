@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A virtual BiSS-C encoder: what it puts on SLO at any clock, its registers, and the rules of timing that its host
-// breaks.
+// A virtual BiSS-C encoder: its samples on SLO at any clock, its registers, and checks of the host's timing.
 #pragma once
 
 #include "absenc/core/shaft.hpp"
@@ -12,18 +11,18 @@
 
 namespace absenc::biss {
 
-/// The encoder and the line to it.
+/// Times of a virtual encoder and of the line to it.
 struct Behaviour {
   Time latency = 10us;
-  Time line_delay{};            // there and back; SLO is sampled one period of MA after the edge that drives it
-  Time edge_noise = 20ns;       // a sample so near to a delayed edge is the old bit or the new one
-  Time register_delay{};        // from what asks for a register to its start bit
-  bool start_sequence = false;  // without it after power on SLO stays idle
+  Time line_delay{};       // Delay there and back. The host samples SLO one period of MA after the edge that drives it.
+  Time edge_noise = 20ns;  // a sample this close to a delayed edge reads the old bit or the new bit, at random
+  Time register_delay{};   // time from the request for a register to its start bit
+  bool start_sequence = false;  // after power on, SLO stays idle until the start sequence
 };
 
 using Samples = author::DrivenBits;
 
-/// What arrives late: by whole clocks, and by chance where an edge falls on a sample.
+/// Delays the samples by the line's delay: by whole clocks, and at random where an edge falls on a sample.
 class LineDelay {
  public:
   void apply(const Behaviour& behaviour, Time period, Samples& samples);
@@ -32,17 +31,17 @@ class LineDelay {
   std::uint32_t noise_ = 1;
 };
 
-/// The encoder without its line: also what stands behind an adapter.
+/// A virtual encoder without its line; also used behind an adapter.
 template <class F>
 class EncoderOf {
  public:
   EncoderOf(const F& format, const Shaft& shaft, const Behaviour& behaviour)
       : format_(format), shaft_(&shaft), behaviour_(behaviour) {}
 
-  /// What the host samples when its first falling edge of MA comes `at`: the whole frame, then 0 up to a full byte.
+  /// Fills `samples` for a frame whose first falling edge of MA is `at`: the whole frame, then zeros up to a full byte.
   void sample(Time at, Time period, Samples& samples, bool cds = false) {
     samples.clear();
-    // The half of a period without an edge that is longer than the timeout ends the frame: SLO is idle again.
+    // Half a period longer than the timeout ends the frame: SLO is idle again.
     if (period / 2 >= format_.timeout.of_encoder(period)) {
       samples.append(~std::uint64_t{0}, 64);
       return;
@@ -51,14 +50,15 @@ class EncoderOf {
     reply.ack_bits = head_bits(format_, behaviour_.latency, period);
     reply.cds = cds;
     show(format_, shaft_->at(at), alarms_, life_counter_, reply);
-    if (!encode(format_, reply, samples, silent_)) {  // not ready within all the clocks that anybody gives
+    if (!encode(format_, reply, samples, silent_)) {  // the position is not ready within the most clocks of a frame
       samples.clear();
       samples.append(low_mask(idle_bits), idle_bits);
       while (samples.size() < Samples::capacity()) samples.append(0, 1);
     }
     life_counter_ = static_cast<std::uint8_t>((life_counter_ + 1u) & low_mask(life_counter_bits));
     const std::size_t whole = std::min<std::size_t>(clocks(format_, behaviour_.latency, period), Samples::capacity());
-    while (samples.size() < whole) samples.append(0, 1);  // of slaves that are silent
+    // Zeros in place of the words of slaves whose process data are switched off.
+    while (samples.size() < whole) samples.append(0, 1);
     delay_.apply(behaviour_, period, samples);
     while (samples.size() % 8 != 0) samples.append(0, 1);
   }
@@ -69,7 +69,7 @@ class EncoderOf {
   [[nodiscard]] bool is_powered() const { return powered_; }
   void set_power(bool on) { powered_ = on; }
   void set_alarms(std::uint32_t alarms) { alarms_ = alarms; }
-  /// Slaves whose process data are switched off: bit n is slave n.
+  /// Sets the slaves whose process data are switched off: bit n is slave n.
   void set_silent(std::uint8_t slaves) { silent_ = slaves; }
 
  private:
@@ -84,21 +84,21 @@ class EncoderOf {
 };
 using Encoder = EncoderOf<Format>;
 
-/// The registers of all slaves of a line: what survives power off is `memory`.
+/// The registers of all slaves on a line. `memory` is what survives power off.
 class VirtualRegisters final : public ControlTarget {
  public:
   static constexpr unsigned banks = 4;
   static constexpr unsigned slave_size = banks * registers::bank_size + (registers::end - registers::bank_size);
   static constexpr unsigned most_slaves = ChainFormat::most;
 
-  /// Of so many slaves: 1 to `most_slaves`.
+  /// `slaves`: number of slaves, 1 to `most_slaves`.
   VirtualRegisters(unsigned slaves, RegisterOrder order, StopBit stop_bit);
   void power_on();
-  /// What is asked for now is there `delay` later.
+  /// Sets the present time; a register that is requested now is ready `delay` later.
   void set_time(Time at, Time delay);
   [[nodiscard]] MutableBytes memory() { return MutableBytes(memory_).first(std::size_t{slaves_} * slave_size); }
   [[nodiscard]] std::uint32_t written() const { return written_; }
-  /// Slaves whose process data are switched off.
+  /// Returns the slaves whose process data are switched off.
   [[nodiscard]] std::uint8_t silent() const { return silent_; }
 
   [[nodiscard]] bool allows(unsigned slave, unsigned address, bool write) const override;
@@ -122,11 +122,11 @@ class VirtualRegisters final : public ControlTarget {
   mutable Time asked_at_{};
   mutable bool asked_ = false;
   std::uint32_t written_ = 0;
-  std::uint8_t silent_ = 0;  // process data off: bit n is slave n
-  std::uint8_t closed_ = 0;  // control communication off
+  std::uint8_t silent_ = 0;  // slaves with process data switched off: bit n is slave n
+  std::uint8_t closed_ = 0;  // slaves with control communication switched off: bit n is slave n
 };
 
-/// How many slaves these frames carry words of.
+/// Returns the number of slaves whose words the frames carry.
 [[nodiscard]] constexpr unsigned slaves_of(const Format&) { return 1; }
 [[nodiscard]] constexpr unsigned slaves_of(const SafetyFormat&) { return 2; }
 [[nodiscard]] constexpr unsigned slaves_of(const ChainFormat& format) { return format.count; }
@@ -134,7 +134,7 @@ class VirtualRegisters final : public ControlTarget {
 template <class F>
 class VirtualEncoderOf final : public author::ClockedDevice {
  public:
-  /// Switched off until `power_on`. `shaft` must outlive the encoder.
+  /// Creates an encoder that is off until `power_on`. `shaft` must outlive it.
   VirtualEncoderOf(const F& format, const Shaft& shaft)
       : VirtualEncoderOf(format, shaft,
                          {.latency = format.ready > 0ns ? format.ready : std::min(format.latency, Behaviour{}.latency),
@@ -157,7 +157,7 @@ class VirtualEncoderOf final : public author::ClockedDevice {
     timeout_ = encoder_.format().timeout.of_encoder(period);
     period_ = period;
     if (period / 2 < timeout_) hold_low(timeout_);
-    // Else SLO is still low.
+    // SLO is still low from the frame before.
     if (!expect(at >= free_at_, "clocked before the BiSS timeout has passed", at)) {
       samples.append(0, 64);
       return;
@@ -174,7 +174,7 @@ class VirtualEncoderOf final : public author::ClockedDevice {
     needed_ = clocks(encoder_.format(), behaviour.latency, period);
   }
   void clocked(Time at, std::size_t clocks) override {
-    // Nobody tells a host whether it is needed.
+    // A host cannot know whether the encoder needs the start sequence, so it is accepted at any time.
     if (is_start_sequence(clocks)) {
       woken_ = true;
     } else if (needed_ > 0) {
@@ -182,7 +182,7 @@ class VirtualEncoderOf final : public author::ClockedDevice {
       count_answer();
     }
     clocked_before_ = true;
-    free_at_ = at - period_ / 2 + timeout_;  // from the last rising edge
+    free_at_ = at - period_ / 2 + timeout_;  // the timeout begins at the last rising edge
   }
   void started(Time) override {
     registers_.power_on();
@@ -190,18 +190,18 @@ class VirtualEncoderOf final : public author::ClockedDevice {
     clocked_before_ = false;
     woken_ = false;
   }
-  // An SPI controller clocks whole bytes.
+  // Returns whether the clocks are a start sequence. An SPI controller can only clock whole bytes.
   static bool is_start_sequence(std::size_t clocks) { return clocks == start_pulses || clocks == 8; }
 
   EncoderOf<F> encoder_;
   ControlSlaves slaves_;
   VirtualRegisters registers_;
-  unsigned needed_ = 0;  // clocks of this frame; 0: there is none
-  Time timeout_{};       // of this frame
-  Time period_{};        // of MA
-  Time free_at_{};       // the timeout after the last clock
+  unsigned needed_ = 0;  // clocks that this frame needs; 0: no frame was sent
+  Time timeout_{};       // timeout of this frame
+  Time period_{};        // period of MA
+  Time free_at_{};       // earliest time of the next frame: the timeout after the last clock
   bool clocked_before_ = false;
-  bool woken_ = false;  // by the start sequence
+  bool woken_ = false;  // the start sequence was received
 };
 using VirtualEncoder = VirtualEncoderOf<Format>;
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The virtual encoder and its line, sampled by hand.
+// The virtual encoder and its line, sampled directly.
 #include "absenc/protocol/biss/device.hpp"
 
 #include <gtest/gtest.h>
@@ -13,7 +13,7 @@ using testing::Bench;
 
 const Format bits_19{};
 
-// clang 14 leaves half of it unset when it is written as Format{.ready = ready}.
+// Assigns the members one by one: clang 14 leaves some of them uninitialised with Format{.ready = ready}.
 Format format_with(Time latency, Time ready, Time line_delay = {}) {
   Format format = bits_19;
   format.latency = latency;
@@ -36,7 +36,7 @@ TEST(BissDevice, SloIsLowBehindTheCrc) {
   const std::string samples = bench.clock(200, 1ms, 1'000'000);
   EXPECT_EQ(samples.substr(0, 35), "11110010100001100101000111111110011");
   EXPECT_EQ(samples.find('1', 35), std::string::npos);
-  // Within the timeout, too.
+  // SLO stays low within the timeout too.
   EXPECT_EQ(bench.clock(200, 10us, 1'000'000), std::string(200, '0'));
 }
 
@@ -57,11 +57,12 @@ TEST(BissDevice, ReportsWhatItsHostDoesWrong) {
   EXPECT_EQ(soon.last_rule(), "clocked before the BiSS timeout has passed");
   EXPECT_EQ(soon.encoder.answer_count(), 1u);
   EXPECT_EQ(soon.clock(16, 20us, 1'000'000), "1100000000001000");
-  EXPECT_EQ(soon.encoder.violation_count(), 2u);  // and that frame was too short
+  // The frame with the early clock and that with 16 clocks were both too short.
+  EXPECT_EQ(soon.encoder.violation_count(), 2u);
 }
 
 TEST(BissDevice, TimeoutIsThatOfItsFormat) {
-  // `pause`: behind the last period, half of which is behind the last edge.
+  // `pause` begins after the last period, half of which lies after the last edge.
   const auto allows = [](Timeout timeout, std::uint32_t rate, Time pause) {
     Format format = bits_19;
     format.timeout = timeout;
@@ -92,7 +93,7 @@ TEST(BissDevice, ItsOwnTimeIsThatOfTheOptionsOrTenMicroseconds) {
   EXPECT_EQ(ack(4us, 7us), 7u);
 }
 
-/// Good frames of 100 at a clock.
+/// Returns how many of 100 frames are valid at this clock.
 unsigned good_frames(Time line_delay, Time period) {
   testing::TestShaft shaft;
   shaft.state.position = 0x1234'5678'9ABC;
@@ -112,7 +113,7 @@ unsigned good_frames(Time line_delay, Time period) {
 TEST(BissDevice, LineDelayCorruptsAtHighClocks) {
   EXPECT_EQ(good_frames(300ns, 1us), 100u);
   EXPECT_EQ(good_frames(300ns, 330ns), 100u);
-  EXPECT_LT(good_frames(300ns, 315ns), 20u);  // an edge falls on the sample: now the old bit, now the new one
+  EXPECT_LT(good_frames(300ns, 315ns), 20u);  // an edge falls on the sample, which reads the old bit or the new one
   EXPECT_LT(good_frames(300ns, 290ns), 20u);
   EXPECT_EQ(good_frames(300ns, 227ns), 0u);  // a whole bit late: SLO goes low one sample late
 }

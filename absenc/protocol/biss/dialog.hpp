@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the procedures of BiSS registers speak through: frame after frame, each with a position that is decoded and
-// checked, and with the encoder's bit (CDS); the host's bit (CDM) is the level of MA until the next.
+// Connects a procedure of BiSS registers with the line, frame by frame. Each frame carries a position, which is decoded
+// and checked, and the encoder's bit (CDS). The host's bit (CDM) is the level of MA between two frames.
 #pragma once
 
 #include "absenc/protocol/author/dialog.hpp"
@@ -16,7 +16,7 @@ class ControlDialog : public author::ClockedHostOf<ProtocolOf<F>>, public author
  public:
   using Reply = typename ProtocolOf<F>::Reply;
 
-  /// The next frame: `const Result<Reply> reply = co_await dialog.frame()`.
+  /// Clocks the next frame: `const Result<Reply> reply = co_await dialog.frame()`.
   [[nodiscard]] auto frame() {
     struct Frame {
       ControlDialog& dialog;
@@ -26,9 +26,9 @@ class ControlDialog : public author::ClockedHostOf<ProtocolOf<F>>, public author
     };
     return Frame{*this};
   }
-  /// What the host says behind the last frame.
+  /// Sets the CDM bit after the last frame.
   void say(bool cdm) { cdm_ = cdm; }
-  /// Frames that were clocked, and those of them that were no good.
+  /// Number of clocked frames, and of those with an error.
   [[nodiscard]] std::uint32_t frames() const { return frames_; }
   [[nodiscard]] std::uint32_t bad_frames() const { return bad_frames_; }
   [[nodiscard]] Time now() const { return this->received_at(); }
@@ -36,9 +36,9 @@ class ControlDialog : public author::ClockedHostOf<ProtocolOf<F>>, public author
   [[nodiscard]] std::string_view advice() const override { return outcome_.advice; }
   [[nodiscard]] bool is_alone() const { return outcome_.alone; }
   [[nodiscard]] ChangeSent change_sent() const final { return this->change(); }
-  /// Frames without process data, which is what a command may have switched off, count as good: their CDS does.
+  /// Accepts frames without process data, which a command may have switched off: their CDS is valid.
   void take_empty_frames() { takes_empty_ = true; }
-  /// Each good position is handed out, before the next frame begins.
+  /// Emits each valid position before the next frame begins.
   void emit_positions() { emits_ = true; }
 
   Step<std::uint8_t> next(Time now) final {
@@ -51,7 +51,8 @@ class ControlDialog : public author::ClockedHostOf<ProtocolOf<F>>, public author
   ~ControlDialog() = default;
 
  private:
-  // The life counter has moved by one since the last frame, whose place in time is known while all are read.
+  // Returns sequence_mismatch if the life counter did not advance by one since the last frame. It can be checked
+  // because this dialog reads every frame.
   [[nodiscard]] Error moved(const Reply& reply) {
     const int now = life_counter_of(this->format(), reply);
     const int before = std::exchange(life_counter_, now);
@@ -73,7 +74,8 @@ class ControlDialog : public author::ClockedHostOf<ProtocolOf<F>>, public author
     if (last_) {
       const unsigned head = last_->delay_bits + last_->ack_bits;
       const unsigned expected = head_bits(this->format(), this->format().latency, this->format().period());
-      const bool again = late_.is_again(head);  // told of all: a late frame of long ago confirms nothing
+      // Called for every frame: a late frame must be confirmed by the frame right before it.
+      const bool again = late_.is_again(head);
       if (head > expected && !again) last_ = Error::truncated;
     }
     if (last_) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Names and meanings of what a BiSS frame has beside its word.
+// Names and meanings of the fields of a BiSS frame outside its word.
 #pragma once
 
 #include <array>
@@ -18,7 +18,8 @@ inline constexpr std::array<FieldInfo, 5> own_fields{{
     {"line_delay_us", FieldInfo::Kind::real, "us", "the same at the clock of ma_khz: 100 m of cable make 1 us"},
 }};
 
-/// The delay of the line, where the samples begin with the clock; others may begin anywhere in the idle line.
+/// Reports the delay of the line. It is known only if the samples begin with the clock; others may begin anywhere in
+/// the idle line.
 template <class F, class ReplyType>
 constexpr void put_line_delay(FieldSink& sink, const F& format, const ReplyType& reply) {
   if (reply.delay_bits == 0) return;

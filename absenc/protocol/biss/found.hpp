@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What control communication brings, and its fields: of a control frame that was captured, and of procedures.
+// Results of control communication and their fields, for captured control frames and for procedures.
 #pragma once
 
 #include <algorithm>
@@ -14,7 +14,7 @@
 
 namespace absenc::biss {
 
-/// Numbers with a space between them.
+/// Text of numbers, separated by spaces.
 class NumberList {
  public:
   constexpr void add(unsigned number) {
@@ -29,10 +29,10 @@ class NumberList {
   [[nodiscard]] constexpr std::string_view view() const { return {text_.view().data(), text_.size()}; }
 
  private:
-  Buffer<char, 96> text_;  // what has no room is left out
+  Buffer<char, 96> text_;  // numbers that do not fit are dropped
 };
 
-/// The two letters of a maker; bytes that are no letters or digits as "\\x00".
+/// Text of a manufacturer: two characters; bytes that are not printable as "\\x00".
 class MakerName {
  public:
   constexpr void append(Bytes bytes) {
@@ -71,14 +71,14 @@ struct Found {
   NumberList acknowledged;
   std::optional<bool> executed{};
   // Of procedures.
-  std::optional<bool> written{};  // false: it was there already
-  std::optional<bool> missing{};  // true: it was refused; else not told
+  std::optional<bool> written{};  // false: the register had this value already, so nothing was written
+  std::optional<bool> missing{};  // true: the encoder refused the register; otherwise not set
   std::optional<std::uint8_t> eds_bank{};
   std::optional<std::uint16_t> profile{};
   std::optional<std::uint64_t> serial_number{};
   ByteBuffer<6> device_id;
   MakerName manufacturer;
-  Reading reading{};  // none: positions are not what was asked for
+  Reading reading{};  // stays empty: these procedures do not report a position
 };
 
 namespace shown {
@@ -120,7 +120,7 @@ inline constexpr auto register_fields = author::fields_of<Found>(
     author::field<shown::manufacturer>("manufacturer", "", "two letters, which the BiSS Association gives",
                                        Role::identity));
 
-/// Registers that have a name, the first of them at this address.
+/// Stores the value of the named register at `address`.
 constexpr void tell(Found& found, RegisterOrder order, unsigned address, Bytes bytes) {
   const std::uint64_t number = order == RegisterOrder::big ? load_big_endian(bytes) : load_little_endian(bytes);
   switch (address) {
@@ -144,7 +144,7 @@ constexpr void tell(Found& found, RegisterOrder order, unsigned address, Bytes b
   }
 }
 
-/// A control frame as fields; of a request alone what it asks.
+/// Returns the fields of a control frame; without an answer, those of its request.
 [[nodiscard]] constexpr Found shown_by(const ControlFrame& frame, bool answered) {
   constexpr std::array<std::string_view, 3> names{"read", "write", "command"};
   const ControlRequest& request = frame.request;

@@ -20,29 +20,31 @@ namespace absenc::biss {
 
 using namespace std::chrono_literals;
 
-inline constexpr unsigned idle_bits = 2;  // SLO goes low on the second rising edge of MA
+inline constexpr unsigned idle_bits = 2;  // idle samples before the ACK: SLO goes low on the second rising edge of MA
 
 inline constexpr LineSettings line_settings{.rate = 1'000'000, .spi_mode = 3};
-inline constexpr Time shortest_period = 100ns;  // of MA: 10 MHz
-inline constexpr Time timeout_maximum = 40us;   // SLO stays low for 12.5 to 40 us after the last clock
-inline constexpr unsigned start_pulses = 2;     // of MA after power on, with 40 us before and behind them
+inline constexpr Time shortest_period = 100ns;  // shortest period of MA: 10 MHz
+// Longest BiSS timeout: SLO stays low for 12.5 to 40 us after the last clock.
+inline constexpr Time timeout_maximum = 40us;
+// Start sequence: pulses of MA after power on, with 40 us before and after them.
+inline constexpr unsigned start_pulses = 2;
 
-/// The time for which SLO stays low behind the last clock: fixed, or one and a half periods of MA (adaptive), in one
-/// byte.
+/// BiSS timeout, the time for which SLO stays low after the last clock: fixed, or one and a half periods of MA
+/// (adaptive). Takes one byte.
 class Timeout {
  public:
-  constexpr Timeout() = default;  // not known
-  /// 12.5 us to 40 us, in halves of a microsecond.
+  constexpr Timeout() = default;  // unknown timeout
+  /// Returns a fixed timeout of 12.5 us to 40 us, in steps of 0.5 us.
   static constexpr Timeout fixed(Time length) { return Timeout(static_cast<std::uint8_t>(length / 500ns)); }
   static constexpr Timeout adaptive() { return Timeout(is_adaptive); }
 
-  /// The time that the host leaves. An encoder that measures the period may be three of its own samples late (iC-PVS,
-  /// table 50): 1 us is more than that of any known.
+  /// Returns the pause that the host leaves between frames. An encoder that measures the period may be late by three of
+  /// its own samples (iC-PVS, table 50); 1 us is more than that for all known encoders.
   [[nodiscard]] constexpr Time of_host(Time period) const {
     if (code_ == is_adaptive) return Time(static_cast<std::int32_t>(one_and_a_half(period) + 1000));
     return Time(static_cast<std::int32_t>((code_ != 0 ? code_ : 80u) * 500u));
   }
-  /// The time that the virtual encoder takes.
+  /// Returns the timeout that the virtual encoder uses.
   [[nodiscard]] constexpr Time of_encoder(Time period) const {
     if (code_ == is_adaptive) return Time(one_and_a_half(period));
     return Time((code_ != 0 ? code_ : 40u) * 500u);
@@ -51,21 +53,21 @@ class Timeout {
 
  private:
   static constexpr std::uint8_t is_adaptive = 1;
-  // 32 bits: the longest period is 100 us.
+  // 32 bits suffice: the longest period is 100 us.
   static constexpr std::uint32_t one_and_a_half(Time period) {
     const auto clock = static_cast<std::uint32_t>(period.count());
     return clock + clock / 2;
   }
   explicit constexpr Timeout(std::uint8_t code) : code_(code) {}
 
-  std::uint8_t code_ = 0;  // halves of a microsecond
+  std::uint8_t code_ = 0;  // timeout in 0.5 us; 0: unknown, 1: adaptive
 };
 
-/// The bit P that the virtual encoder answers behind each register.
+/// The bit P that the virtual encoder sends after each register.
 enum class StopBit : std::uint8_t { next, zero, one };
 inline constexpr std::array<std::string_view, 3> stop_bit_choices{"next", "zero", "one"};
 
-/// Of registers that are one number.
+/// Byte order of registers that together are one number.
 enum class RegisterOrder : std::uint8_t { big, little };
 inline constexpr std::array<std::string_view, 2> register_order_choices{"big", "little"};
 
@@ -73,24 +75,25 @@ struct Format {
   WordFormat word = "position:19 error:1! warning:1!"_word;
   Check check{};
   Scale scale{};
-  std::uint16_t ma_khz = 1000;  // 10 to 10 000
-  // Of registers and the start, in no more memory than a reader of positions has without them.
-  std::uint8_t slave = 0;  // whose are meant: 0 to 7, counted from the end of the chain
+  std::uint16_t ma_khz = 1000;  // clock MA in kHz, 10 to 10 000
+  // The members for registers and start sequence fit into padding, so that a reader of positions needs no more memory.
+  std::uint8_t slave = 0;  // slave whose registers are accessed: 0 to 7, counted from the end of the chain
   RegisterOrder register_order = RegisterOrder::big;
-  std::uint16_t register_delay_us = 0;  // of the virtual encoder: until a register that was asked for is there
-  bool start_sequence = false;          // of the virtual encoder: it shows nothing before it
+  std::uint16_t register_delay_us = 0;  // virtual encoder: time in us until a requested register is ready
+  bool start_sequence = false;          // virtual encoder: SLO stays idle until the start sequence
   Timeout timeout{};
-  Time latency = 10us;  // the longest that the encoder needs, up to 1 ms: makes the number of clocks
-  // Of the virtual encoder.
+  // The longest time that the encoder needs for a position, up to 1 ms; it decides the number of clocks.
+  Time latency = 10us;
+  // Members for the virtual encoder.
   StopBit stop_bit = StopBit::next;
   std::uint32_t line_delay_ns = 0;
-  Time ready{};  // what it needs itself; 0: as `latency`, but at most 10 us
+  Time ready{};  // time that the virtual encoder needs for a position; 0: as `latency`, but at most 10 us
 
-  /// Of MA.
+  /// Returns the period of MA.
   [[nodiscard]] constexpr Time period() const { return Time((1'000'000u + ma_khz / 2u) / ma_khz); }
 };
 
-/// Turns and position, nError, nWarning.
+/// Returns the word format with turns, position, nError and nWarning.
 [[nodiscard]] constexpr WordFormat word_with_status(const PositionBits& bits) {
   WordFormat word = word_format(bits);
   word.add({"error", Meaning::error, 1, true});
@@ -98,30 +101,31 @@ struct Format {
   return word;
 }
 
-/// Word, life counter and CRC: what follows the CDS bit.
+/// Returns the bits after the CDS bit: word, life counter and CRC.
 [[nodiscard]] constexpr unsigned data_bits(const Format& format) { return format.word.bits() + format.check.bits(); }
 
-/// ACK bits of an encoder that needs `latency` from the second rising edge of MA until its position is ready. Both up
-/// to a second: a small processor divides 32 bits.
+/// Returns the ACK bits of an encoder whose position is ready `latency` after the second rising edge of MA. Both
+/// arguments are at most a second, so that a small processor divides 32 bits.
 [[nodiscard]] constexpr unsigned ack_bits(Time latency, Time period) {
   const auto needed = static_cast<std::uint32_t>(latency.count());
   const auto clock = static_cast<std::uint32_t>(period.count());
   return std::max(1u, static_cast<unsigned>((needed + clock - 1) / clock));
 }
 
-/// Clocks that the slaves between an encoder and the host add to the ACK: each passes it on one clock later.
+/// Returns the clocks that the slaves between an encoder and the host add to the ACK: each passes the start bit on one
+/// clock later.
 template <class AnyFormat>
 [[nodiscard]] constexpr unsigned passing_bits(const AnyFormat&) {
   return 0;
 }
 
-/// Clocks before the start bit, behind those of the idle line.
+/// Returns the clocks between the idle samples and the start bit.
 template <class AnyFormat>
 [[nodiscard]] constexpr unsigned head_bits(const AnyFormat& format, Time latency, Time period) {
   return ack_bits(latency, period) + passing_bits(format);
 }
 
-/// Clocks that a whole frame needs.
+/// Returns the clocks that a whole frame needs.
 template <class AnyFormat>
 [[nodiscard]] constexpr unsigned clocks(const AnyFormat& format, Time latency, Time period) {
   return idle_bits + head_bits(format, latency, period) + 2 + data_bits(format);
@@ -131,21 +135,21 @@ template <class WordType>
 struct ReplyWith {
   unsigned ack_bits = 1;
   WordType word{};
-  std::uint8_t life_counter = 0;  // of a check that has one
+  std::uint8_t life_counter = 0;  // life counter, if the check has one
   bool cds = false;               // the encoder's bit of control communication
-  std::uint16_t crc = 0;          // as sent
-  unsigned delay_bits = 0;        // idle samples more than those of an encoder at hand: the line's delay, in clocks
+  std::uint16_t crc = 0;          // CRC as sent
+  unsigned delay_bits = 0;        // extra idle samples: the line's delay in clocks
 };
 using Reply = ReplyWith<Word>;
 template <const Format& format>
 using ReplyTo = ReplyWith<typename Known<format>::Word>;
 
-/// Whether a CDS of 1 is right: only while registers are read and written.
+/// Whether a CDS of 1 is valid: only during control communication.
 enum class Cds : std::uint8_t { zero, any };
 
 namespace detail {
 
-// A word and what checks it, in `bits` from `first` on.
+// Decodes a word and its check from `bits`, beginning at `first`.
 template <class Source, class Bits, class Data>
 constexpr Error take_data(const Source& source, const Bits& bits, std::size_t first, Data& data) {
   const Check& check = source.format.check;
@@ -161,7 +165,7 @@ constexpr Error take_data(const Source& source, const Bits& bits, std::size_t fi
   return absenc::detail::take_word(source, bits, first, data.word);
 }
 
-// Where what follows the CDS bit begins: `size` bits. What is before it goes to `ack_bits`, `delay_bits` and `cds`.
+// Finds the index `first` of the `size` bits after the CDS bit. Stores ACK, delay and CDS in `head`.
 template <class ReplyType>
 constexpr Error take_head(BitView samples, std::size_t size, Cds cds, ReplyType& head, std::size_t& first) {
   if (samples.size == 0) return Error::wrong_length;
@@ -201,7 +205,7 @@ constexpr auto decode_by(const Source& source, BitView samples, Cds cds) {
   return result;
 }
 
-// Word, life counter and CRC.
+// Appends word, life counter and CRC.
 template <class Format, class Data, std::size_t Capacity>
 constexpr void append_data(const Format& format, const Data& data, BitBuffer<Capacity>& out) {
   const std::size_t first = out.size();
@@ -212,7 +216,7 @@ constexpr void append_data(const Format& format, const Data& data, BitBuffer<Cap
   out.append(crc_as_sent(source, out.view(), first, out.size() - first), format.check.width);
 }
 
-// Idle bits, ACK, start and CDS. False when `size` bits more do not fit.
+// Appends idle bits, ACK, start bit and CDS. Returns false if `size` more bits do not fit.
 template <class ReplyType, std::size_t Capacity>
 constexpr bool append_head(const ReplyType& head, std::size_t size, BitBuffer<Capacity>& out) {
   if (out.capacity() - out.size() < idle_bits + head.delay_bits + head.ack_bits + 2 + size) return false;
@@ -224,22 +228,22 @@ constexpr bool append_head(const ReplyType& head, std::size_t size, BitBuffer<Ca
 
 }  // namespace detail
 
-/// The frame in samples of any length that begin while SLO is idle (1) or in the ACK (0). What follows the CRC is
-/// ignored. Errors: wrong_length (no samples), line_stuck (all alike), bad_framing (no start bit, or CDS is 1 where it
-/// must not), truncated (the frame goes on behind the samples), bad_checksum (CRC, or the parity of the word).
+/// Decodes a frame from samples that begin while SLO is idle (1) or in the ACK (0). Samples after the CRC are ignored.
+/// Errors: wrong_length (no samples), line_stuck (all samples alike), bad_framing (no start bit, or CDS is 1 where it
+/// must be 0), truncated (the frame is longer than the samples), bad_checksum (CRC, or the parity of the word).
 [[nodiscard]] constexpr Result<Reply> decode(const Format& format, BitView samples, Cds cds = Cds::zero) {
   return detail::decode_by(Given<Format>{format, format.word}, samples, cds);
 }
 
-/// The same of a format that is known when the program is written, at the cost of what a hand would write for it. The
-/// word has `values` only where the format has some.
+/// Decodes a frame whose format is known at compile time, as fast as code written for it by hand. The result has
+/// `values` only if the format has some.
 template <const Format& format>
 [[nodiscard]] constexpr Result<ReplyTo<format>> decode(BitView samples, Cds cds = Cds::zero) {
   return detail::decode_by(Known<format>{}, samples, cds);
 }
 
-/// Appends idle bits, ACK, start, CDS, word and check; `reply.crc` is not used. `silent`: a bit for each slave whose
-/// process data are switched off. False when `out` is too small.
+/// Appends idle bits, ACK, start bit, CDS, word and check; `reply.crc` is ignored. `silent`: bit n is set if the
+/// process data of slave n are switched off. Returns false if `out` is too small.
 template <std::size_t Capacity>
 constexpr bool encode(const Format& format, const Reply& reply, BitBuffer<Capacity>& out, std::uint8_t silent = 0) {
   if (!detail::append_head(reply, data_bits(format), out)) return false;
@@ -247,7 +251,7 @@ constexpr bool encode(const Format& format, const Reply& reply, BitBuffer<Capaci
   return true;
 }
 
-/// What a virtual encoder says.
+/// Fills the reply of a virtual encoder.
 constexpr void show(const Format& format, const ShaftState& state, std::uint32_t alarms, std::uint8_t life_counter,
                     Reply& reply) {
   reply.word = word_of(format.word, state, alarms);
@@ -258,7 +262,7 @@ constexpr void show(const Format& format, const ShaftState& state, std::uint32_t
   return to_reading(format.word, reply.word, format.scale);
 }
 
-/// A format that is known when the program is written, where a host takes any format: what it asks of one.
+/// A format that is known at compile time, in the form that hosts of any format use.
 template <const Format& known>
 struct KnownFormat {
   static constexpr std::uint16_t ma_khz = known.ma_khz;
@@ -281,7 +285,7 @@ template <const Format& format>
   return to_reading(contents, reply.word, format.scale);
 }
 
-/// Whether zeros alone follow the CDS: process data are switched off. `head` gets what is before them.
+/// Returns whether only zeros follow the CDS: process data are switched off. `head` gets the bits before them.
 template <class ReplyType>
 [[nodiscard]] constexpr bool is_empty_frame(BitView samples, ReplyType& head) {
   std::size_t first = 0;
@@ -289,7 +293,7 @@ template <class ReplyType>
   return first < samples.size && !samples[first] && samples.end_of_run(first) == samples.size;
 }
 
-/// Whether these samples end before a frame does, whose encoder or line may need longer than was thought.
+/// Returns whether the samples ended before the frame did, because encoder or line need longer than expected.
 [[nodiscard]] constexpr bool needs_more(Error error, BitView samples) {
   if (error == Error::truncated) return true;
   return error == Error::bad_framing && samples.end_of_run(samples.end_of_run(0)) == samples.size;

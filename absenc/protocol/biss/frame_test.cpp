@@ -68,7 +68,8 @@ TEST(BissFrame, EveryOffsetInSixtyFourSamples) {
 
 bool skips(const Format& format) { return format.word.find(Meaning::skip) != nullptr; }
 
-// Noise, cut frames and frames with flips: a format known at compile time says the same as at run time.
+// Decodes noise, cut frames and frames with flipped bits: a format known at compile time must give the same results as
+// one known at run time.
 template <const Format& format>
 void agree(std::uint64_t seed) {
   sim::Random random(seed);
@@ -87,13 +88,14 @@ void agree(std::uint64_t seed) {
     std::copy(samples.bytes().begin(), samples.bytes().end(), copy.begin());
     if (random.chance(0.3)) copy[random.below(8)] ^= static_cast<std::uint8_t>(1u << random.below(8));
     const std::size_t size = random.chance(0.2) ? random.below(samples.size() + 1) : samples.size();
-    const BitView view{Bytes(copy).first((size + 7) / 8), size};  // as near to the end of the memory as can be
+    const BitView view{Bytes(copy).first((size + 7) / 8), size};  // the view ends at the end of its memory
     const auto known = decode<format>(view);
     const Result<Reply> given = decode(format, view);
     ASSERT_EQ(known.error(), given.error());
     if (!given) continue;
     ++good;
-    // What is accepted is the frame that its fields make; what is skipped is not kept.
+    // An accepted frame must equal the frame that its fields encode. Skipped bits are not stored, so they are not
+    // compared.
     Reply at_hand = *given;
     at_hand.delay_bits = 0;
     BitBuffer<512> again;
@@ -116,11 +118,10 @@ void agree(std::uint64_t seed) {
 
 constexpr Format plain{};
 constexpr Format turns{.word = "multiturn:16 position:32 error:1! warning:1!"_word};
-constexpr Format behind{.word =
-                            "position:13 multiturn:51 warning:1 gray parity:1!"_word};  // does not fit into a register
+constexpr Format behind{.word = "position:13 multiturn:51 warning:1 gray parity:1!"_word};  // does not fit into 64 bits
 constexpr Format values{.word = "position:20 temperature=value:8 error:1 skip:3 warning:1!"_word};
 constexpr Format checked{.word = "position:24 error:1! warning:1!"_word, .check = crc16};
-// 0x197 as RLS writes it, a start value, and none at all.
+// CRC 0x197 as RLS writes it, a CRC with a start value, a small CRC, and a long word.
 constexpr Format other_crc{.word = "position:24 error:1! warning:1!"_word, .check = {8, 0x97}};
 constexpr Format started{.word = "position:24 error:1! warning:1!"_word, .check = {16, 0x90D9, 0x1234, false, false}};
 constexpr Format small_crc{.word = "position:8 error:1! warning:1!"_word, .check = {5, 0x05}};

@@ -11,22 +11,21 @@
 
 namespace absenc::biss {
 
-/// The longest that an encoder may be busy, and the longest delay of its line: how much more than was thought a host
-/// looks for the frame.
+/// Longest extra delay of encoder and line, beyond the expected one, for which a host still searches the frame.
 inline constexpr Time longest_delay = 80us;
 
 template <class F>
 class ControlDialog;
 
 namespace detail {
-// Of any format: what is declared behind this file is found by its namespace.
+// Decodes a frame of any format. The call is found by argument-dependent lookup, so that formats can be declared later.
 template <class F>
 constexpr auto decoded(const F& format, BitView samples, Cds cds = Cds::zero) {
   return decode(format, samples, cds);
 }
 }  // namespace detail
 
-/// BiSS-C as the engine and the virtual encoder use it. F: Format, or what describes several words in a frame.
+/// BiSS-C for the engine and the virtual encoder. F: Format, or a format with several words per frame.
 template <class F>
 struct ProtocolOf {
   using Format = F;
@@ -39,7 +38,7 @@ struct ProtocolOf {
     return {std::uint32_t{format.ma_khz} * 1000, format.timeout.of_host(format.period())};
   }
   static constexpr unsigned clocks(const F& format) { return biss::clocks(format, format.latency, format.period()); }
-  /// Of a frame whose delay is not known.
+  /// Returns the clocks for a frame whose delay is unknown.
   static constexpr unsigned all_clocks(const F& format) {
     return std::min(most_clocks, biss::clocks(format, format.latency + longest_delay, format.period()));
   }
@@ -48,7 +47,7 @@ struct ProtocolOf {
 };
 using Protocol = ProtocolOf<Format>;
 
-/// The counter that must move from frame to frame; -1: these frames have none.
+/// Returns the life counter, which must advance with each frame; -1 if the frames have none.
 [[nodiscard]] constexpr int life_counter_of(const Format& format, const Reply& reply) {
   return format.check.life_counter ? reply.life_counter : -1;
 }
@@ -57,12 +56,12 @@ template <const Format& format>
   return format.check.life_counter ? reply.life_counter : -1;
 }
 
-/// Where frames begin that come later than was thought: believed is what comes twice. A start bit that gets lost makes
-/// a frame that is late, too, and whose CRC is good once in 64 times.
+/// Confirms frames that begin later than expected: accepts a delay that occurs twice in a row. A lost start bit also
+/// makes a frame look late, and its CRC is valid once in 64 times.
 class LateFrames {
  public:
-  /// `head`: clocks before the start bit, beyond those of the idle line; of a delay near a whole clock one more or
-  /// less.
+  /// Returns whether the last frame had the same delay. `head`: clocks before the start bit beyond the idle ones; a
+  /// difference of one is accepted, because the delay may be near a whole clock.
   [[nodiscard]] bool is_again(unsigned head) {
     const unsigned before = std::exchange(seen_, head);
     return before != 0 && head + 1 - before <= 2;
@@ -72,16 +71,17 @@ class LateFrames {
   unsigned seen_ = 0;
 };
 
-/// After power on an encoder may wait for two pulses of MA, with 40 us before and behind them, and show nothing until
-/// then. Nobody tells a host when that was: it gives them where its first frame brings nothing, once.
+/// Decides when to send the start sequence. After power on, an encoder may stay idle until it receives two pulses of
+/// MA, with 40 us before and after them. A host does not know when that was: it sends them once, if the first frame is
+/// stuck.
 class StartSequence {
  public:
-  /// What came of a frame was this.
+  /// Takes the result of a frame and returns whether the start sequence must follow.
   [[nodiscard]] bool is_due(Error error) {
     given_ = std::exchange(first_, false) && error == Error::line_stuck;
     return given_;
   }
-  /// Whether this transfer were the pulses, behind which the frame is clocked anew.
+  /// Returns whether the last transfer was the start sequence, so that the frame must be clocked again.
   [[nodiscard]] bool was_given() { return std::exchange(given_, false); }
 
  private:
@@ -89,13 +89,13 @@ class StartSequence {
   bool given_ = false;
 };
 
-/// One frame; where there are life counters two, which must follow each other (sequence_mismatch). With `finds`, more
-/// clocks are given where the line, or the encoder, takes longer than was thought, and the start sequence.
+/// Reads one frame; with life counters two, which must follow each other (sequence_mismatch). If `finds`, also searches
+/// a frame that is later than expected, and sends the start sequence if needed.
 template <class F, bool finds>
 class PositionReader : public author::ClockedHostOf<ProtocolOf<F>> {
   using Base = author::ClockedHostOf<ProtocolOf<F>>;
   using P = ProtocolOf<F>;
-  static constexpr unsigned most_late = 4;  // frames until two of them are alike
+  static constexpr unsigned most_late = 4;  // late frames that are read until two of them agree
 
  public:
   explicit PositionReader(const F& format) : Base(format) {}
@@ -109,8 +109,7 @@ class PositionReader : public author::ClockedHostOf<ProtocolOf<F>> {
     const Error error = this->take(samples);
     if constexpr (finds) {
       if (start_.is_due(error)) return this->clock(start_pulses);
-      // A line that only idles may be one whose delay is longer than was thought: it is looked at once for as long as
-      // any line takes.
+      // A line that stays idle may have a longer delay than expected: the host clocks once for the longest delay.
       if (error == Error::line_stuck && samples[0] && !second_ && !looked_further_) {
         looked_further_ = true;
         return this->clock(P::all_clocks(this->format()));
@@ -138,9 +137,9 @@ class PositionReader : public author::ClockedHostOf<ProtocolOf<F>> {
   [[no_unique_address]] std::conditional_t<finds, LateFrames, author::Later> late_{};
   [[no_unique_address]] std::conditional_t<finds, StartSequence, author::NoRequest> start_{};
 };
-/// What a drive that knows its line repeats.
+/// Reads the position of a known line; a drive polls with it.
 using ReadPosition = PositionReader<Format, false>;
-/// The same of a format that is known when the program is written: `static constexpr Format format{...};`.
+/// Reads the position with a format that is known at compile time: `static constexpr Format format{...};`.
 template <const Format& format>
 class ReadKnownPosition final : public PositionReader<KnownFormat<format>, false> {
  public:

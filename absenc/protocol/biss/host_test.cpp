@@ -109,7 +109,7 @@ TEST(BissHost, AddsTheClocksThatTheLineNeeds) {
   }
 }
 
-// Clocks these frames out, one after the other.
+// Feeds these frames to the reader, one after the other, and returns its error.
 template <class Reader>
 Error clock_out(Reader& read, std::span<const BitBuffer<128>> frames) {
   Time now{};
@@ -126,7 +126,7 @@ Error clock_out(Reader& read, std::span<const BitBuffer<128>> frames) {
   return read.error();
 }
 
-// Good frames and each of one wrong bit: what comes of them.
+// Compares both readers on valid frames, and on frames with each single bit wrong.
 template <const Format& format>
 void reads_as_any_format() {
   std::array<BitBuffer<128>, 2> good;
@@ -171,7 +171,7 @@ TEST(BissHost, KnownFormatsAreReadAsAnyFormat) {
   reads_as_any_format<known_linear>();
 }
 
-// A late frame that no other one is as late as may be what a lost start bit leaves.
+// A late frame whose delay is not repeated may be the result of a lost start bit.
 TEST(BissHost, FramesThatAreLateByChanceAreNoPosition) {
   FindPosition<Format> read(turns_19);
   Time now{};
@@ -194,7 +194,7 @@ TEST(BissHost, FramesThatAreLateByChanceAreNoPosition) {
   EXPECT_EQ(read.reading(), nullptr);
 }
 
-// README, timing: a host that nobody told otherwise gives the clocks of an encoder that needs 10 us.
+// README, timing: with default options a host gives the clocks of an encoder that needs 10 us.
 template <class F>
 void expect_ten_microseconds() {
   testing::ClockedBench<VirtualEncoderOf<F>> bench(line_settings, F{}, Behaviour{.latency = 10us});
@@ -246,8 +246,8 @@ TEST(BissHost, GivesTheStartSequenceWhereNothingComes) {
   clocks.clear();
   FindPosition<Format> nobody(format);
   EXPECT_EQ(bench.run(nobody).error(), Error::line_stuck);
-  const std::size_t longest = ProtocolOf<Format>::all_clocks(format);                  // the line may be a long one
-  EXPECT_EQ(clocks, (std::vector<std::size_t>{frame, start_pulses, frame, longest}));  // each once
+  const std::size_t longest = ProtocolOf<Format>::all_clocks(format);                  // the line's delay may be long
+  EXPECT_EQ(clocks, (std::vector<std::size_t>{frame, start_pulses, frame, longest}));  // each of them once
 }
 
 TEST(BissHost, LooksFurtherBeforeALineIsStuck) {
@@ -277,15 +277,15 @@ TEST(BissHost, SaysWhatToDo) {
   EXPECT_NE(found(Error::truncated, 10'000).find("raise it"), std::string_view::npos);
   EXPECT_NE(found(Error::bad_checksum, 10'000).find("try another one"), std::string_view::npos);
   EXPECT_NE(found(Error::invalid_argument, 1'000'000).find("lower latency_us"), std::string_view::npos);
-  EXPECT_EQ(found(Error::invalid_argument, 10'000), "");  // a word that is none
+  EXPECT_EQ(found(Error::invalid_argument, 10'000), "");  // the word format itself is invalid
   EXPECT_EQ(found(Error::line_stuck, 10'000), "");
 }
 
-// ---- BiSS Safety: two frames
+// ---- BiSS Safety: each reading takes two frames
 
 const Format safety{.word = word_with_status({.position = 24}), .check = crc16};
 
-/// What becomes of two frames with these life counters, in the second of which this bit is wrong.
+/// Reads two frames with these life counters, the second with bit `flip` wrong, and returns the error.
 Error read_safety(std::uint8_t first, std::uint8_t second, std::size_t flip = ~std::size_t{0}) {
   ReadPosition read(safety);
   Time now{};

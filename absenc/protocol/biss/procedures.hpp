@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a host does with the registers of a BiSS encoder, frame by frame, while positions go on being read.
+// Procedures that access the registers of a BiSS encoder, one bit per frame, while positions are read.
 #pragma once
 
 #include <algorithm>
@@ -15,16 +15,16 @@ using author::Outcome;
 using author::Part;
 using author::Procedure;
 
-/// How long an encoder may take with a start bit, and what a host allows.
+/// Longest time of an encoder until its start bit; the host waits twice as long.
 inline constexpr Time start_limit = 20ms;
-inline constexpr unsigned control_attempts = 4;  // of what may be asked again
+inline constexpr unsigned control_attempts = 4;  // attempts of a control frame that may be repeated
 
 inline constexpr std::string_view no_registers =
     "no encoder answers: it has no registers (or a line that only goes one way), or another ID (slave)";
 inline constexpr std::string_view refused =
     "the encoder refuses this register: it does not have it, or it is read only";
 
-/// One control frame, to its end.
+/// Runs one control frame to its end.
 template <class F>
 Part<Error> carry(ControlDialog<F>& dialog, ControlMaster& master) {
   Time waits_since{};
@@ -53,21 +53,21 @@ Part<Error> carry(ControlDialog<F>& dialog, ControlMaster& master) {
   return {.error = error, .detail = "the registers were not read"};
 }
 
-/// Whether the same may be asked once more: what a damaged frame spoiled, and a header that the encoder did not get.
+/// Returns whether a repetition may help: after a damaged frame, or a header that the encoder did not receive.
 [[nodiscard]] constexpr bool may_pass(Error error) {
   return error != Error::request_rejected && error != Error::busy && error != Error::invalid_argument;
 }
 
-/// Whether the encoder was late with a byte, or a start bit got lost: no CRC covers CDS, and what follows is then
-/// moved, which the four bits of a byte's CRC may miss.
+/// Returns whether a byte was late: the encoder delayed it, or a start bit was lost. No CRC covers CDS; the bits after
+/// a lost start bit are shifted, which the four bits of a byte's CRC may miss.
 [[nodiscard]] constexpr bool was_late(const ControlFrame& frame) {
   const auto delays = frame.start_delay.view();
   return std::any_of(delays.begin(), delays.end(), [](std::uint16_t delay) { return delay != 0; });
 }
 
-/// Registers one behind the other, 64 at the most; appended to `bytes`. Those that came late are read until the same
-/// comes twice. Where P says that the next one would be refused, it is asked for by a control frame of its own: some
-/// encoders answer P = 1 behind each register.
+/// Appends `count` registers to `bytes`, 64 at most. Late bytes are read until the same data is received twice. If P
+/// refuses the next register, it is read with a control frame of its own: some encoders send P = 1 after every
+/// register.
 template <class F>
 Part<Error> read_registers(ControlDialog<F>& dialog, ControlMaster& master, ByteBuffer<control_most>& bytes,
                            unsigned first, std::size_t count) {
@@ -97,7 +97,7 @@ Part<Error> read_registers(ControlDialog<F>& dialog, ControlMaster& master, Byte
   co_return error;
 }
 
-/// Read again after an error, and compared: whether it was written counts, not what was heard of it.
+/// Writes a register and compares it by reading it back, after an error too: the register decides, not the answer.
 template <class F>
 Part<Error> write_register(ControlDialog<F>& dialog, ControlMaster& master, unsigned address, std::uint8_t value) {
   const std::array<std::uint8_t, 1> bytes{value};
@@ -111,7 +111,7 @@ Part<Error> write_register(ControlDialog<F>& dialog, ControlMaster& master, unsi
   co_return error != Error::none ? error : Error::cross_check_failed;
 }
 
-/// The same, of what the command was asked for.
+/// Writes a register that the command is meant to change.
 template <class F>
 Part<Error> change_register(ControlDialog<F>& dialog, ControlMaster& master, unsigned address, std::uint8_t value) {
   dialog.changes();
@@ -120,13 +120,13 @@ Part<Error> change_register(ControlDialog<F>& dialog, ControlMaster& master, uns
   co_return error;
 }
 
-/// The bank that holds an address, where it is in one.
+/// Selects the bank of `address`, if the address belongs to a bank.
 template <class F>
 Part<Error> select_bank(ControlDialog<F>& dialog, ControlMaster& master, unsigned bank, unsigned address) {
   if (address >= registers::bank_size) co_return Error::none;
   ByteBuffer<control_most> selected;
   const Error error = co_await read_registers(dialog, master, selected, registers::bank_select, 1);
-  // An encoder with one bank need not have the register that selects it.
+  // An encoder with a single bank need not have a bank select register.
   if (error == Error::request_rejected && bank == 0) co_return Error::none;
   if (error != Error::none || selected[0] == bank) co_return error;
   const Error written =
@@ -158,7 +158,7 @@ Procedure read_memory(ControlDialog<F>& dialog, Found& found, Arguments argument
   co_return done;
 }
 
-// The byte is left alone where it is so already: what a register costs to write only its maker knows.
+// Writes a byte unless it has this value already: a register may wear out, and only its maker knows how fast.
 template <class F>
 Procedure write_memory(ControlDialog<F>& dialog, Found& found, Arguments arguments) {
   const auto address = static_cast<unsigned>(arguments[0]);
@@ -192,7 +192,7 @@ Procedure write_memory(ControlDialog<F>& dialog, Found& found, Arguments argumen
   co_return done;
 }
 
-// One that is refused is not there: that is an answer, too.
+// Reads a named register. A refusal means that the encoder does not have it, which is a result too.
 template <class F>
 Procedure read_setting(ControlDialog<F>& dialog, Found& found, unsigned address) {
   ControlMaster master;
@@ -220,7 +220,7 @@ Procedure write_bank(ControlDialog<F>& dialog, Found& found, Arguments arguments
   co_return done;
 }
 
-// What of these an encoder refuses it does not have.
+// Reads the registers that identify the encoder. Leaves out those that it refuses.
 template <class F>
 Procedure read_info(ControlDialog<F>& dialog, Found& found) {
   ControlMaster master;
@@ -251,8 +251,8 @@ Procedure read_info(ControlDialog<F>& dialog, Found& found) {
   co_return done;
 }
 
-/// The slaves of a mask; 0: all, who do not answer. Its last bit is said behind one frame more. The frames may have no
-/// process data, before the command or behind it.
+/// Sends a command to the slaves of a mask; 0: to all, without acknowledgement. The last bit is sent after one more
+/// frame. The frames may be without process data before or after the command.
 template <class F>
 Procedure send_command(ControlDialog<F>& dialog, Found& found, Arguments arguments) {
   ControlMaster master;

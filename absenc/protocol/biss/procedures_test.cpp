@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What procedures of registers refuse, wait for, verify and tell; and which frames they take.
+// Register procedures: requests they refuse, delays, read back, reported fields, and accepted frames.
 #include "absenc/protocol/biss/procedures.hpp"
 
 #include <gtest/gtest.h>
@@ -19,13 +19,13 @@ TEST(BissProcedures, WhatNoRegisterCanBeIsNotAsked) {
   Questions one;
   const auto refused = [&one](const Found&) { EXPECT_EQ(one.encoder.answer_count(), 0u); };
   const Error no = Error::invalid_argument;
-  refused(one.ask<read_memory<Format>>({60, 0, 5}, no));   // behind the bank
-  refused(one.ask<read_memory<Format>>({120, 0, 9}, no));  // behind the last
-  refused(one.ask<read_memory<Format>>({64, 1, 1}, no));   // what is behind the banks is on bank 0
+  refused(one.ask<read_memory<Format>>({60, 0, 5}, no));   // beyond the end of the bank
+  refused(one.ask<read_memory<Format>>({120, 0, 9}, no));  // beyond the last register
+  refused(one.ask<read_memory<Format>>({64, 1, 1}, no));   // registers outside the banks are on bank 0
   refused(one.ask<write_memory<Format>>({72, 1, 7, 1}, no));
   refused(one.ask<write_memory<Format>>({72, 7, 1, 1}, no));
-  refused(one.ask<write_memory<Format>>({68, 7, 0, 1}, no));  // the serial number
-  refused(one.ask<write_memory<Format>>({72, 7, 0, 0}, no));  // the maker's own
+  refused(one.ask<write_memory<Format>>({68, 7, 0, 1}, no));  // serial number
+  refused(one.ask<write_memory<Format>>({72, 7, 0, 0}, no));  // register defined by the maker
   refused(one.ask<write_memory<Format>>({3, 7, 1, 0}, no));
   EXPECT_EQ(one.ask<read_memory<Format>>({60, 0, 4}).bytes.size(), 4u);
   EXPECT_EQ(one.ask<read_memory<Format>>({120, 0, 8}).bytes.size(), 8u);
@@ -35,7 +35,7 @@ TEST(BissProcedures, WhatNoRegisterCanBeIsNotAsked) {
   EXPECT_EQ(one.ask<write_memory<Format>>({3, 7, 0, 0}).written, false);
 }
 
-// D2: up to 20 ms; a host allows twice that.
+// D2: an encoder takes up to 20 ms for a start bit; the host waits twice as long.
 TEST(BissProcedures, AStartBitIsWaitedForFortyMilliseconds) {
   const auto asked = [](std::uint16_t delay_us, Error expected) {
     Format format = testing::bits_24;
@@ -47,7 +47,7 @@ TEST(BissProcedures, AStartBitIsWaitedForFortyMilliseconds) {
   asked(42'000, Error::busy);
 }
 
-// LENZ's reader takes P = 1 behind a bank select for a fault; other encoders answer it behind each register.
+// LENZ's reader treats P = 1 after bank select as a fault; other encoders send it after each register.
 TEST(BissProcedures, StopBitDoesNotEndWhatIsRead) {
   for (const StopBit stop_bit : {StopBit::next, StopBit::zero, StopBit::one}) {
     Format format = testing::bits_24;
@@ -70,19 +70,19 @@ TEST(BissProcedures, CommandsOfTheStandardAreObeyed) {
   };
   one.ask<read_setting<Format>, registers::profile>({});
   EXPECT_EQ(position(), Error::none);
-  EXPECT_EQ(one.ask<send_command<Format>>({0, 0}).executed, true);  // process data of all off
+  EXPECT_EQ(one.ask<send_command<Format>>({0, 0}).executed, true);  // process data of all slaves off
   EXPECT_EQ(position(), Error::bad_checksum);
-  EXPECT_EQ(one.ask<send_command<Format>>({1, 0}).executed, true);  // those of slave 0 on
+  EXPECT_EQ(one.ask<send_command<Format>>({1, 0}).executed, true);  // process data of slave 0 on
   EXPECT_EQ(position(), Error::none);
   EXPECT_EQ(one.ask<send_command<Format>>({1, 1}).executed, true);  // control communication of slave 0 off
   one.ask<read_setting<Format>, registers::profile>({}, Error::timeout);
   EXPECT_EQ(position(), Error::none);
-  EXPECT_EQ(one.ask<send_command<Format>>({0, 1}).executed, true);  // that of all on
+  EXPECT_EQ(one.ask<send_command<Format>>({0, 1}).executed, true);  // control communication of all slaves on
   one.ask<read_setting<Format>, registers::profile>({});
-  one.ask<send_command<Format>>({1, 2}, Error::request_rejected);  // the maker's own
+  one.ask<send_command<Format>>({1, 2}, Error::request_rejected);  // command defined by the maker
 }
 
-/// An encoder that does not keep what is written.
+/// An encoder that loses the written value of register 3.
 struct Forgets final : Machine<std::uint8_t> {
   explicit Forgets(VirtualEncoder& of) : encoder(of) {}
   void feed(const Event<std::uint8_t>& event) override {
@@ -131,7 +131,7 @@ TEST(BissProcedures, WhatWasNotFoundIsNotTold) {
             (Names{"slaves", "more_slaves", "operation", "command", "broadcast", "executed"}));
 }
 
-// ---- Which frames are taken
+// ---- Accepted frames
 
 struct Seen {
   std::vector<Error> errors;
@@ -185,7 +185,7 @@ TEST(BissProcedures, TheLifeCounterMovesByOneFromFrameToFrame) {
   EXPECT_EQ(errors({41, 42, 42, 43, 45}), (Errors{none, none, moved, none, moved}));
 }
 
-// A start bit that got lost makes a late frame, too.
+// A lost start bit also makes a frame look late.
 TEST(BissProcedures, ALateFrameIsTakenWhenAnotherComesAsLate) {
   const auto errors = [](std::array<unsigned, 5> ack_bits) {
     std::array<Reply, 5> replies{};
@@ -195,7 +195,7 @@ TEST(BissProcedures, ALateFrameIsTakenWhenAnotherComesAsLate) {
   const Error none = Error::none;
   const Error late = Error::truncated;
   EXPECT_EQ(errors({10, 10, 9, 10, 10}), (Errors{none, none, none, none, none}));
-  // For the first of them there were too few clocks.
+  // The first of the late frames had too few clocks.
   EXPECT_EQ(errors({10, 12, 12, 12, 14}), (Errors{none, late, late, none, late}));
 }
 

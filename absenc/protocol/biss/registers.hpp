@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The registers of a BiSS encoder, as its standard profile lays them out. Source: BiSS C Protocol Description rev D2.
+// The registers of a BiSS encoder in its standard profile. Source: BiSS C Protocol Description rev D2.
 #pragma once
 
 #include <array>
@@ -11,17 +11,17 @@
 
 namespace absenc::biss::registers {
 
-inline constexpr unsigned bank_size = 0x40;  // 00 to 3F are those of the selected bank
+inline constexpr unsigned bank_size = 0x40;  // addresses 00 to 3F belong to the selected bank
 inline constexpr unsigned bank_select = 0x40;
-inline constexpr unsigned eds_bank = 0x41;       // with the electronic data sheet; 0: there is none
-inline constexpr unsigned profile = 0x42;        // two, as the device id and the manufacturer
-inline constexpr unsigned serial_number = 0x44;  // four
-inline constexpr unsigned device = 0x48;         // to 77: the maker's own
-inline constexpr unsigned device_id = 0x78;      // six
+inline constexpr unsigned eds_bank = 0x41;       // bank of the electronic data sheet; 0: none
+inline constexpr unsigned profile = 0x42;        // two registers
+inline constexpr unsigned serial_number = 0x44;  // four registers
+inline constexpr unsigned device = 0x48;         // to 77: defined by the maker
+inline constexpr unsigned device_id = 0x78;      // six registers
 inline constexpr unsigned manufacturer = 0x7E;
 inline constexpr unsigned end = 0x80;
 
-/// Of what has a name: its bytes, from this address on.
+/// Returns the size in bytes of a named register.
 [[nodiscard]] constexpr unsigned size_of(unsigned address) {
   switch (address) {
     case profile:
@@ -36,10 +36,10 @@ inline constexpr unsigned end = 0x80;
   }
 }
 
-inline constexpr unsigned most_banks = 256;  // an encoder may have fewer, or none
+inline constexpr unsigned most_banks = 256;  // an encoder may have fewer banks, or none
 
-/// Pages are banks; what is behind the banks is on page 0. A copy of the memory is the bank that the user may write:
-/// the rest says which encoder it is, and is not for another.
+/// Memory areas of the commands: pages are banks, and addresses outside the banks are on page 0. A memory dump has only
+/// the bank that users may write; the other areas identify the encoder and must not be copied to another one.
 inline constexpr std::array<MemoryArea, 6> areas = [] {
   return std::array<MemoryArea, 6>{{
       {.page = 0, .first = 0, .count = bank_size, .meaning = "bank"},
@@ -72,7 +72,7 @@ inline constexpr std::array<MemoryArea, 6> areas = [] {
   }};
 }();
 
-/// Null for an address that no bank has.
+/// Returns the area of an address; null if there is none.
 [[nodiscard]] constexpr const MemoryArea* find_area(unsigned bank, unsigned address) {
   for (const MemoryArea& area : areas) {
     if (area.has(bank, address)) return &area;

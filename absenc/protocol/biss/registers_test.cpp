@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A host that reads positions and registers from the same frames against a virtual encoder in virtual time, with
-// faults: a million; and without. ABSENC_FRAMES sets how many frames go by.
+// A host that reads positions and registers from the same frames, against a virtual encoder in virtual time: with
+// faults over a million frames, and without. ABSENC_FRAMES sets the number of frames.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -41,15 +41,15 @@ std::uint32_t frames_wanted(std::uint32_t usual = some) {
   return text == nullptr ? usual : static_cast<std::uint32_t>(std::atoll(text));
 }
 
-std::uint32_t limit = 0;  // of frames, for the next host: it begins when it is made
+std::uint32_t limit = 0;  // number of frames for the next host; a global, because a procedure starts in its constructor
 
-/// What a host did, and what it believed.
+/// Counts of a host's accesses, and the register values that it relies on.
 struct Work {
   std::uint32_t frames = limit;
   std::uint32_t reads = 0;
   std::uint32_t writes = 0;
   std::uint32_t failures = 0;
-  std::uint32_t wrong = 0;  // bytes that were taken for good
+  std::uint32_t wrong = 0;  // accepted bytes with a wrong value
   std::array<bool, registers::bank_size> read{};
   std::array<bool, registers::bank_size> written{};
   std::array<std::uint8_t, registers::bank_size> known{};
@@ -81,7 +81,7 @@ Procedure work_on_a_bank(ControlDialog<F>& dialog, Work& work) {
       const Error written = co_await write_register(dialog, master, address, value);
       ++work.writes;
       if (written != Error::none) ++work.failures;
-      is_known[address] = written == Error::none;  // else nobody knows
+      is_known[address] = written == Error::none;  // after a failed write the value is unknown
       known[address] = value;
       work.written[address] = work.written[address] || is_known[address];
     }
@@ -89,7 +89,7 @@ Procedure work_on_a_bank(ControlDialog<F>& dialog, Work& work) {
   co_return done;
 }
 
-/// The host with its storage.
+/// A host with its storage.
 template <class F>
 struct Host {
   struct Machine final : author::Run<ProtocolOf<F>, Work, work_on_a_bank<F>> {
@@ -104,10 +104,10 @@ struct Host {
 struct Outcome {
   std::uint64_t positions = 0;
   std::uint64_t wrong = 0;
-  std::uint64_t gaps = 0;  // a frame began later than the one before lets it
+  std::uint64_t gaps = 0;  // frames that began later than the timeout after the frame before
   std::uint64_t damaged = 0;
   sim::FaultCounts faults{};
-  std::uint32_t wrong_bytes = 0;  // that the encoder holds, of those that the host believes to have written
+  std::uint32_t wrong_bytes = 0;  // registers whose value differs from the one that the host believes to have written
   std::uint32_t frames = 0;
   std::uint32_t bad_frames = 0;
   std::size_t violations = 0;
@@ -155,9 +155,9 @@ void expect_all_of_the_bank(const Work& work) {
   }
 }
 
-/// How many of the frames that a fault damages are taken with another position, of frames in every place: what the
-/// decoder alone makes of them. `damage` changes the bytes of one. Most that are taken had an error in their ACK, which
-/// makes them begin early, or have lost their end; and the CRC of what is left is right by chance.
+/// Returns the share of damaged frames that the decoder accepts with another position, over random positions. `damage`
+/// changes the bytes of a frame. Most accepted ones had an error in their ACK, so that they begin early, or lost their
+/// end, and the CRC of the rest is valid by chance.
 template <class Damage>
 double taken_share(const Format& format, const Damage& damage) {
   constexpr unsigned frames = 400'000;
@@ -179,7 +179,7 @@ double taken_share(const Format& format, const Damage& damage) {
   return static_cast<double>(taken) / frames;
 }
 
-// As sim::FaultyDevice does it: one to three bits; the last bytes, for which nobody drives the line.
+// Damages as sim::FaultyDevice does: flips one to three bits, or leaves the last bytes undriven.
 void corrupt(sim::Random& random, std::span<std::uint8_t> bytes) {
   std::set<std::uint64_t> bits;
   for (const std::uint64_t count = 1 + random.below(3); bits.size() < count;)
@@ -197,7 +197,7 @@ TEST(BissRegisters, PositionsGoByWhileEveryRegisterIsReadAndWritten) {
   const Work& work = host.machine.found();
   EXPECT_EQ(host.machine.error(), Error::none);
   EXPECT_GE(seen.frames, frames_wanted());
-  EXPECT_EQ(seen.positions, seen.frames);  // none is missed
+  EXPECT_EQ(seen.positions, seen.frames);  // no position is missed
   EXPECT_EQ(seen.wrong, 0u);
   EXPECT_EQ(seen.gaps, 0u);
   EXPECT_EQ(seen.violations, 0u);
@@ -218,7 +218,7 @@ TEST(BissRegisters, FaultsMakeNoWrongByte) {
   const Work& work = host.machine.found();
   EXPECT_GT(seen.damaged, seen.frames / 500);
   EXPECT_EQ(seen.positions + seen.bad_frames, seen.frames);
-  EXPECT_LE(seen.bad_frames, seen.damaged);  // no other is missed
+  EXPECT_LE(seen.bad_frames, seen.damaged);  // no undamaged frame is rejected
   EXPECT_EQ(seen.gaps, 0u);
   const auto times = [&seen](sim::FaultKind kind) {
     return static_cast<double>(seen.faults[static_cast<std::size_t>(kind)]);
@@ -260,7 +260,7 @@ TEST(BissRegisters, EachThatHasANameIsReadAlone) {
   EXPECT_FALSE(found.missing);
 }
 
-// The registers of a bank that is not there are refused, as others are that an encoder does not have.
+// Registers of a bank that does not exist are refused, like registers that an encoder does not have.
 TEST(BissRegisters, OneThatIsRefusedIsMissing) {
   Questions one;
   one.ask<write_bank<Format>>({200});

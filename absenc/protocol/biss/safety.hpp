@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// BiSS Safety: a control position word and a safety position word of the same shaft in one frame, each under a check of
-// its own. README.md draws the frame. Source: BiSS Safety concept.
+// BiSS Safety: a control position word and a safety position word of the same shaft in one frame, each with its own
+// check. README.md draws the frame. Source: BiSS Safety concept.
 #pragma once
 
 #include <algorithm>
@@ -9,7 +9,7 @@
 
 namespace absenc::biss {
 
-/// One of several words in a frame.
+/// Format of one of several words in a frame.
 struct Channel {
   WordFormat word = "position:19 error:1! warning:1!"_word;
   Check check{};
@@ -19,19 +19,19 @@ struct Channel {
   return channel.word.bits() + channel.check.bits();
 }
 
-/// What a channel says.
+/// Content of a channel.
 struct ChannelData {
   Word word{};
   std::uint8_t life_counter = 0;
-  std::uint16_t crc = 0;  // as sent
+  std::uint16_t crc = 0;  // CRC as sent
 };
 
 struct SafetyFormat {
   Channel cpw{.word = "position:24 error:1! warning:1!"_word};
   Channel spw{.word = "position:16 error:1! warning:1!"_word, .check = crc16};
-  std::uint8_t compare_bits = 13;          // of the position, that both words promise (ACC_MIN)
-  std::int8_t previous_life_counter = -1;  // that of the frame before; -1: not known
-  // As in Format.
+  std::uint8_t compare_bits = 13;          // upper bits of the position in which both words must agree (ACC_MIN)
+  std::int8_t previous_life_counter = -1;  // life counter of the frame before; -1: unknown
+  // These members mean the same as in Format.
   std::uint32_t ma_khz = 1000;
   Time latency = 10us;
   Time ready{};
@@ -60,15 +60,16 @@ struct SafetyReply {
 
 namespace detail {
 
-// SLO is low behind the last word of a frame: zeros are no word that somebody sent, although a CRC that is not inverted
-// would be right for them (as sent it would be an encoder at zero whose nE and nW both report).
+// SLO is low after the last word of a frame. Zeros are therefore not a word, although a CRC that is not inverted would
+// be valid for them; as a word, they would be position zero with nE and nW both active.
 constexpr Error take_channel(const Channel& channel, BitView samples, std::size_t first, ChannelData& data) {
   const std::size_t end = first + data_bits(channel);
   if (channel.check.width != 0 && !samples[first] && samples.end_of_run(first) >= end) return Error::line_stuck;
   return take_data(Given<Channel>{channel, channel.word}, samples, first, data);
 }
 
-// The upper bits of the position, and the turns where both have them: of a count at the border of a turn they decide.
+// Returns the upper bits of the position, with the turns above them if both words have turns: near zero, one count
+// changes the turns.
 constexpr std::uint64_t promised(const Channel& channel, const Word& word, unsigned bits, unsigned turns) {
   const std::uint64_t position = word.position >> (channel.word.bits_of(Meaning::position) - bits);
   return ((word.multiturn & low_mask(turns)) << bits | position) & low_mask(turns + bits);
@@ -76,14 +77,14 @@ constexpr std::uint64_t promised(const Channel& channel, const Word& word, unsig
 
 }  // namespace detail
 
-/// Whether there is something to compare, and both have it.
+/// Returns whether both words have a valid check and the compared bits.
 [[nodiscard]] constexpr bool is_usable(const SafetyFormat& format) {
   if (!is_usable(format.cpw.check) || !is_usable(format.spw.check)) return false;
   return format.compare_bits >= 1 && format.compare_bits <= format.cpw.word.bits_of(Meaning::position) &&
          format.compare_bits <= format.spw.word.bits_of(Meaning::position);
 }
 
-/// Whether both words show the same place, within one count of what they promise.
+/// Returns whether both words have the same position, within one count of the compared bits.
 [[nodiscard]] constexpr bool agree(const SafetyFormat& format, const SafetyReply& reply) {
   const unsigned turns = std::min({format.cpw.word.bits_of(Meaning::multiturn),
                                    format.spw.word.bits_of(Meaning::multiturn), 64u - format.compare_bits});
@@ -94,8 +95,8 @@ constexpr std::uint64_t promised(const Channel& channel, const Word& word, unsig
   return difference <= 2;
 }
 
-/// As decode of one word; and sequence_mismatch (the life counter is not the one behind `previous_life_counter`),
-/// cross_check_failed (the words differ by more than one count of what both promise).
+/// Decodes a frame of BiSS Safety; see decode of one word. Errors also: sequence_mismatch (the life counter does not
+/// follow `previous_life_counter`), cross_check_failed (the words differ by more than one count of the compared bits).
 [[nodiscard]] constexpr Result<SafetyReply> decode(const SafetyFormat& format, BitView samples, Cds cds = Cds::zero) {
   if (!is_usable(format)) return Error::invalid_argument;
   SafetyReply reply;
@@ -130,7 +131,7 @@ constexpr void show(const SafetyFormat& format, const ShaftState& state, std::ui
   return format.spw.check.life_counter ? reply.spw.life_counter : -1;
 }
 
-/// The position is that of the control word; what either word warns of counts.
+/// Returns the position of the control word, with the errors and warnings of both words.
 [[nodiscard]] constexpr Reading reading_of(const SafetyFormat& format, const SafetyReply& reply) {
   Word word = reply.cpw.word;
   word.error = word.error || reply.spw.word.error;

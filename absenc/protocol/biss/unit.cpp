@@ -17,7 +17,7 @@ namespace {
 
 using namespace author;
 
-// The members of the check are those of the format, as options are.
+// Options of the unit. The members of the check are members here, because each is an option.
 struct Settings : WordSettings<Format>, TimeoutSettings {
   std::uint8_t crc_width = crc6.width;
   std::uint16_t crc_poly = crc6.poly;
@@ -70,7 +70,7 @@ constexpr bool is_possible(const Format& format) {
 }
 constexpr bool is_readable(const Format& format) { return is_possible(format) && absenc::is_usable(format.scale); }
 
-// In the order of the wire.
+// Reports the fields in the order of the line.
 constexpr void put_reply(FieldSink& sink, const Format& format, const NoRequest&, const Reply& reply) {
   put_line_delay(sink, format, reply);
   sink.put({&own_fields[field_ack_bits], reply.ack_bits});
@@ -85,7 +85,7 @@ constexpr auto commands = commands_of<report, Format>(is_readable);
 bool is_checked(const Options& values, Frame, Frame reply, std::size_t bit) {
   return format_by(values).check.width != 0 && is_behind_ack(reply, bit);
 }
-// Behind the start bit and CDS.
+// Returns the bits of a field; the word begins after start bit and CDS.
 BitRanges bits_in(const Options& values, Frame, Frame reply, const FieldInfo& field) {
   const BitView samples = to_bits(reply);
   const std::size_t start = samples.end_of_run(samples[0] ? samples.end_of_run(0) : 0);

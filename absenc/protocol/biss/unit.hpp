@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// BiSS-C as the neutral layers see it.
+// The BiSS-C protocols as units.
 #pragma once
 
 #include "absenc/protocol/unit.hpp"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// BiSS frames with their source.
+// BiSS test frames with their source.
 #pragma once
 
 #include <array>

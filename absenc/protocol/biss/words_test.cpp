@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Frames of several words: which formats there can be, what does not fit, and what BiSS Safety compares.
+// Frames of several words: usable formats, frames that do not fit, and the comparison of BiSS Safety.
 #include <gtest/gtest.h>
 
 #include "absenc/protocol/biss/bench_test.hpp"
@@ -24,7 +24,7 @@ TEST(BissWords, AChainHasOneToEightWordsWithAPositionEach) {
   EXPECT_TRUE(is_usable(format));
   format.count = ChainFormat::most + 1;
   expect_unusable(format);
-  format.count = format.slave;  // nobody has this number
+  format.count = format.slave;  // no slave has this number
   expect_unusable(format);
   format = {};
   format.channels[1].word = WordFormat{};
@@ -44,7 +44,7 @@ TEST(BissWords, BothWordsOfSafetyNeedACheck) {
   expect_unusable(format);
 }
 
-// Else the CRC does not see every wrong bit.
+// With an even polynomial the CRC does not detect every single bit error.
 TEST(BissWords, APolynomialEndsInOne) {
   Options options;
   const std::array<OptionText, 2> even{{{"crc_width", "6"}, {"crc_poly", "2"}}};
@@ -80,7 +80,7 @@ TEST(BissWords, SafetyComparesBothWordsAndCountsFrames) {
     EXPECT_TRUE(encode(format, reply, frame));
     return decode(format, frame.view()).error();
   };
-  // 13 of 24 and of 16 bits.
+  // 13 bits are compared, of 24 and of 16.
   EXPECT_EQ(error(0x123456, 0x1234, 5), Error::none);
   EXPECT_EQ(error(0x123456, 0x1234 + 8, 5), Error::none);
   EXPECT_EQ(error(0x123456, 0x1234 + 16, 5), Error::cross_check_failed);
@@ -94,7 +94,7 @@ TEST(BissWords, SafetyComparesBothWordsAndCountsFrames) {
   EXPECT_EQ(error(0x123456, 0x1234, 1), Error::sequence_mismatch);
 }
 
-// At any clock the clocks of an encoder that needs 10 us: no more and no fewer.
+// Checks at several clocks that the host gives exactly the clocks of an encoder that needs 10 us.
 template <class F>
 void expect_clocks_of_ten_microseconds() {
   for (const std::uint16_t khz : std::to_array<std::uint16_t>({100, 1'000, 4'400, 10'000})) {
@@ -111,7 +111,7 @@ void expect_clocks_of_ten_microseconds() {
   }
 }
 
-// Behind the frame of an encoder alone SLO is low: identify would take the zeros for another word.
+// After the frame of a single encoder SLO is low: identify must not take these zeros for another word.
 TEST(BissWords, ZerosBehindAFrameAreNoWord) {
   ChainFormat chain;
   chain.count = 2;

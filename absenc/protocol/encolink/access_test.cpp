@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Registers of the virtual AksIM-2 are read and written, on both interfaces.
+// Registers of the virtual AksIM-2 are read and written through channels 2 and 3, on both interfaces.
 #include "absenc/protocol/encolink/procedures.hpp"
 
 #include "absenc/protocol/author/dialog.hpp"
@@ -16,14 +16,14 @@ using PowerOn = Bench::PowerOn;
 class EncolinkRegister : public testing::OnBothInterfaces {};
 INSTANTIATE_TEST_SUITE_P(Interfaces, EncolinkRegister, ::testing::Values(Interface::uart, Interface::spi));
 
-/// Damages these frames, counted from 0.
+/// Damages the replies with these frame numbers, counted from 0.
 author::testing::Tamper damaging(std::vector<unsigned> frames) {
   return [=](unsigned nth, RawBytes& reply) {
     if (std::find(frames.begin(), frames.end(), nth) != frames.end()) reply[1] ^= 0x10;
   };
 }
 
-/// So often the encoder hears one byte for another.
+/// Replaces the byte `right` by `wrong` in the first `times` requests that carry it, as received by the encoder.
 author::testing::Tamper mishearing(std::uint8_t right, std::uint8_t wrong, int times) {
   return [=](unsigned, RawBytes& request) mutable {
     for (std::uint8_t& byte : request) {
@@ -32,7 +32,7 @@ author::testing::Tamper mishearing(std::uint8_t right, std::uint8_t wrong, int t
   };
 }
 
-// Positions a second while the longest register is read: channel 3 must not cost a single frame.
+// Counts positions while the longest register is read: channel 3 must not cost a single frame.
 TEST_P(EncolinkRegister, IsReadWhilePositionsGoOn) {
   for (const std::string_view settings : {testing::single, testing::multi}) {
     Bench bench(settings, interface);
@@ -40,7 +40,7 @@ TEST_P(EncolinkRegister, IsReadWhilePositionsGoOn) {
     bench.shaft.put(0, 0x12345);
     std::uint64_t last = 0;
     unsigned wrong = 0;
-    Time begun{};  // behind the identity, which every register access asks first
+    Time begun{};  // time after the identity, which every register access reads first
     const Told read = bench.run("memory-read", {registers[part_number].address}, [&](const auto& emitted) {
       Told now;
       now.take(emitted);
@@ -52,7 +52,8 @@ TEST_P(EncolinkRegister, IsReadWhilePositionsGoOn) {
     EXPECT_EQ(wrong, 0u);
     EXPECT_EQ(read.texts.at("register"), "order_number");
     EXPECT_EQ(read.numbers.at("length"), 20);
-    EXPECT_EQ(read.emits, read.frames - 2 - 1);  // without the identity's, and the last one is the end
+    // All frames but the two of the identity and the last one, which ends the procedure.
+    EXPECT_EQ(read.emits, read.frames - 2 - 1);
     EXPECT_EQ(bench.first_violation(), "");
     const auto size = static_cast<std::int64_t>(bench.encoder.format().frame_bytes());
     const Time frame = interface == Interface::uart
@@ -155,7 +156,7 @@ TEST_P(EncolinkRegister, BusyForEverEndsWhilePositionsGoOn) {
   EXPECT_LT(read.took, busy_limit + 10ms);
 }
 
-// The third byte of the keys, so that it never saw an access; or the address, so that its checksum is wrong.
+// Damages the third key byte, so that the encoder detects no access, or the address, so that the checksum is wrong.
 TEST_P(EncolinkRegister, AnAccessThatIsMisheardIsRepeated) {
   for (const auto& [right, wrong, error, words] :
        std::to_array<std::tuple<std::uint8_t, std::uint8_t, Error, std::string_view>>(
@@ -175,8 +176,8 @@ TEST_P(EncolinkRegister, DamagedFramesBeginTheAccessAnew) {
   for (const auto& [frames, error] : std::vector<std::pair<std::vector<unsigned>, Error>>{
            {{9, 60, 130}, Error::none},
            {{9, 10, 40, 70}, Error::none},
-           {{9, 10, 40, 70, 100}, Error::bad_checksum},  // the fifth try
-           {{9, 10, 11}, Error::bad_checksum}}) {        // as often as a frame is asked for
+           {{9, 10, 40, 70, 100}, Error::bad_checksum},  // the fifth attempt fails too
+           {{9, 10, 11}, Error::bad_checksum}}) {        // the third damaged frame in a row
     Bench bench(testing::single, interface);
     bench.tampered.replies(damaging(frames));
     const Told read = bench.run("memory-read", {0x4C});
@@ -190,7 +191,7 @@ TEST_P(EncolinkRegister, UnpluggedInTheMiddle) {
   struct Case {
     std::string_view command;
     std::vector<std::int64_t> arguments;
-    unsigned after;  // positions
+    unsigned after;  // number of positions after which the encoder is switched off
     std::string_view words;
   };
   for (const Case& one : std::vector<Case>{
@@ -208,7 +209,7 @@ TEST_P(EncolinkRegister, UnpluggedInTheMiddle) {
     EXPECT_FALSE(told.reading);
     EXPECT_EQ(bench.device.memory_version(), 0u);
   }
-  // Not even the identity came: nothing was written.
+  // Not even the identity was received, so nothing was written.
   Bench bench(testing::multi, interface);
   bench.tampered.replies([](unsigned, RawBytes& reply) { reply.clear(); });
   const Told save = bench.run("save");
@@ -216,7 +217,7 @@ TEST_P(EncolinkRegister, UnpluggedInTheMiddle) {
   EXPECT_FALSE(says(save.detail, "may have been executed")) << save.detail;
 }
 
-// The answer to the write is lost, so it must be read back before it is written again.
+// The answer to the write is lost, so the register must be read back before it is written again.
 TEST_P(EncolinkRegister, AWriteIsNotRepeatedBlindly) {
   Bench bench(testing::single, interface);
   bench.tampered.replies(damaging({22}));
@@ -230,7 +231,7 @@ TEST_P(EncolinkRegister, AWriteIsNotRepeatedBlindly) {
   EXPECT_EQ(written, 1u);
 }
 
-// The encoder does not know the operation that it hears: it stays idle, and has the old value.
+// The encoder receives an unknown operation: channel 3 stays idle, and the register keeps its value.
 TEST_P(EncolinkRegister, AWriteThatWasNotExecutedIsRepeated) {
   for (const auto& [times, error] :
        std::to_array<std::pair<int, Error>>({{2, Error::none}, {3, Error::cross_check_failed}})) {
@@ -241,8 +242,8 @@ TEST_P(EncolinkRegister, AWriteThatWasNotExecutedIsRepeated) {
   }
 }
 
-// Frames 0 and 1 are for the identity, 2 resets the channels; cycles of 7 follow. The one under way when the access
-// ends says idle as well.
+// Frames 0 and 1 are for the identity, frame 2 resets the channels; cycles of 7 frames follow. The cycle in progress
+// when the access ends is idle too.
 TEST_P(EncolinkRegister, AnAnswerMayCome8CyclesLate) {
   for (const auto& [more, asked] : std::to_array<std::pair<unsigned, unsigned>>({{7, 1}, {8, 2}})) {
     Bench bench(testing::single, interface);
@@ -272,11 +273,11 @@ TEST_P(EncolinkRegister, AnAnswerMayCome8CyclesLate) {
   }
 }
 
-/// Changes what channel 3 says on a UART, a byte a cycle of seven frames.
+/// Changes the channel 3 bytes on a UART, one per cycle of seven frames.
 struct OnChannel3 {
   OnChannel3(Bench& bench, std::function<std::uint8_t(std::uint8_t)> change) : change_(std::move(change)) {
     bench.tampered.requests([this](unsigned, RawBytes& request) {
-      if (request[0] == 0xAA) at_ = 7;  // the next reply is none of the cycle yet
+      if (request[0] == 0xAA) at_ = 7;  // the next reply does not belong to the new cycle yet
     });
     bench.tampered.replies([this](unsigned, RawBytes& reply) {
       if (at_ == 7) {
@@ -303,14 +304,14 @@ TEST(EncolinkAccess, AnswersBeginWithReady) {
   EXPECT_EQ(read.detail, "channel 3 says neither idle nor busy nor ready");
 }
 
-// The encoder counts no calibration, or says that the ring is too eccentric.
+// The encoder does not count the calibration, or reports that the ring is too eccentric.
 TEST(EncolinkAccess, ASelfCalibrationMayFailOrNeverEnd) {
   for (const auto& [says, error, words] : std::to_array<std::tuple<std::uint8_t, Error, std::string_view>>(
            {{calibration::out_of_range, Error::cross_check_failed, "too eccentric"},
             {0, Error::timeout, "does not end"}})) {
     Bench bench(testing::single);
     unsigned reads = 0;
-    unsigned step = 0;  // of the answer: ready, good, the value
+    unsigned step = 0;  // progress of the answer: 0 ready, 1 status, 2 value
     const OnChannel3 changed(bench, [&, status = says](std::uint8_t told) {
       if (step == 0)
         step = told == channel3::read_ready ? 1 : 0;
@@ -323,7 +324,7 @@ TEST(EncolinkAccess, ASelfCalibrationMayFailOrNeverEnd) {
     const Told told = bench.run("self-calibrate");
     EXPECT_EQ(told.error, error);
     EXPECT_TRUE(testing::says(told.detail, words)) << told.detail;
-    EXPECT_EQ(told.took > 10s, error == Error::timeout);  // the vendor allows the shaft as long
+    EXPECT_EQ(told.took > 10s, error == Error::timeout);  // the vendor allows the shaft 10 s
   }
 }
 
@@ -359,7 +360,7 @@ TEST_P(EncolinkRegister, APresetNeedsAShaftThatStands) {
 
 TEST_P(EncolinkRegister, ACommandIsNeverRepeated) {
   Bench bench(testing::single, interface);
-  bench.tampered.replies(damaging({100}));  // while it is busy
+  bench.tampered.replies(damaging({100}));  // frame 100 arrives while the encoder is busy
   const Told save = bench.run("save");
   EXPECT_EQ(save.error, Error::bad_checksum);
   EXPECT_EQ(save.detail, "the answer to the command was lost: it may have been executed");
@@ -368,7 +369,7 @@ TEST_P(EncolinkRegister, ACommandIsNeverRepeated) {
   EXPECT_EQ(bench.device.memory_version(), 1u);
 }
 
-// After a refusal bytes of data may follow: the next access must not begin among them.
+// After a refusal, bytes of data may follow: the next access must not begin among them.
 author::Procedure read_twice(Dialog& dialog, Found& found) {
   const Fate refused = co_await attempt_read(dialog, found, 0x1234, 20);
   if (refused != Fate::refused) co_return found.why;

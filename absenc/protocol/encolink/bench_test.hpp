@@ -23,8 +23,8 @@ struct Bench : author::testing::UnitBench<20> {
       : UnitBench(interface == Interface::spi ? spi_unit : encolink::unit, settings) {
     shaft.put(7, 0x12345);
   }
-  /// Requests one after the other, filled up to `size` where the interface brings as much at the same time; and the
-  /// replies.
+  /// Sends the requests one after the other, each padded with zeros to `size` (on SPI a reply has the length of its
+  /// request), and returns the replies.
   std::vector<RawBytes> ask(std::vector<RawBytes> requests, std::size_t size = 0) {
     std::vector<RawBytes> replies;
     for (RawBytes& request : requests) {
@@ -36,7 +36,7 @@ struct Bench : author::testing::UnitBench<20> {
   VirtualEncoder& encoder = static_cast<VirtualEncoder&>(device);
 };
 
-/// What is so on both interfaces.
+/// Base of tests that run on UART and SPI.
 class OnBothInterfaces : public ::testing::TestWithParam<Interface> {
  protected:
   const Interface interface = GetParam();

@@ -24,9 +24,9 @@ struct Told {
   Error error;
 };
 
-/// Exchanges of an encoder that stands still, as a capture has them.
+/// Feeds the follower with the captured exchanges of an encoder that stands still.
 struct Conversation {
-  /// `channel2`: the byte behind the reply.
+  /// Adds one exchange. `channel2`: the last byte of the reply.
   void exchange(std::uint8_t config, std::uint8_t ra, std::uint8_t channel2, const Position& at = here) {
     Position position = at;
     position.channel2 = channel2;
@@ -35,12 +35,12 @@ struct Conversation {
     take();
   }
   void reset() { exchange(0xAA, 0, 0); }
-  /// All frames of a cycle, with these `ra` bytes.
+  /// Adds all frames of a cycle; `ra`: the register access bytes in its requests.
   void cycle(std::uint8_t channel3 = channel3::idle, std::uint16_t status = 0, Bytes ra = {}, Position at = here) {
     const ReplyBytes bytes = encode_cycle(format, {at, status, channel3});
     for (std::size_t i = 0; i < bytes.size(); ++i) exchange(0, i < ra.size() ? ra[i] : std::uint8_t{0}, bytes[i]);
   }
-  /// As many cycles as it takes.
+  /// Adds as many cycles as the access needs.
   void ask(const RegisterRequest& request) {
     for (Bytes left = encode_access(request).view(); !left.empty();) {
       const AccessBytes all = encode_access(request);
@@ -57,7 +57,7 @@ struct Conversation {
           {{one.request.begin(), one.request.end()}, {one.reply.begin(), one.reply.end()}, one.first, one.error});
     }
   }
-  /// Accesses, not cycles.
+  /// Returns the register accesses without the cycles.
   [[nodiscard]] std::vector<Told> accesses() const {
     std::vector<Told> all;
     for (const Told& one : told) {
@@ -175,7 +175,7 @@ TEST(EncolinkFollower, ARefusalIsOneWithItsReason) {
     line.ask(writes ? write_request(0x4C, 2, 1) : read_request(0x4C, 3));
     line.cycle(writes ? channel3::write_ready : channel3::read_ready);
     line.cycle(static_cast<std::uint8_t>(writes ? AccessStatus::denied : AccessStatus::byte_count));
-    for (int i = 0; i < 4; ++i) line.cycle(0);  // bytes that mean nothing follow
+    for (int i = 0; i < 4; ++i) line.cycle(0);  // bytes without a meaning follow
     const std::vector<Told> told = line.accesses();
     ASSERT_EQ(told.size(), 1u);
     std::string fields;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The virtual AksIM-2 by itself: what it answers, when, and which rules it watches.
+// The virtual AksIM-2 alone: its replies, their times, and the rules that it checks.
 #include "absenc/protocol/encolink/device.hpp"
 
 #include "absenc/core/hex.hpp"
@@ -53,7 +53,7 @@ TEST(EncolinkDevice, WhatIsNoRequestIsForgotten) {
   Bench bench(testing::single);
   const auto replies = bench.ask({{0xAB, 0x00}, {0x55, 0x00}, position_request, {0xBB}, position_request});
   for (std::size_t i = 0; i < replies.size(); ++i) {
-    EXPECT_EQ(decode_position(single, replies[i]).has_value(), i != 3) << i;  // this one was cut short
+    EXPECT_EQ(decode_position(single, replies[i]).has_value(), i != 3) << i;  // request 3 was cut short
   }
 }
 
@@ -69,11 +69,11 @@ TEST(EncolinkDevice, WatchesItsHost) {
 
   Bench loud(testing::single);
   loud.ask({RawBytes(6)});
-  EXPECT_EQ(loud.device.violation_count(), 2u);  // requests, not bytes
+  EXPECT_EQ(loud.device.violation_count(), 2u);  // violations are counted per request, not per byte
   EXPECT_EQ(loud.first_violation(), "request during the encoder's transmission");
 }
 
-/// Two transfers of SPI, so long after each other.
+/// Makes two SPI transfers with this pause between them.
 class SpiHost final : public Machine<std::uint8_t> {
  public:
   explicit SpiHost(Time pause) : pause_(pause) {}
@@ -103,7 +103,7 @@ TEST(EncolinkDevice, WatchesTheTimesOfSpi) {
   fastest.rate = 4'000'000;
   LineSettings fast = spi_settings;
   fast.rate = 8'000'000;
-  LineSettings early = spi_settings;  // how a controller selects is how its line was set up
+  LineSettings early = spi_settings;  // the line's settings decide how long NCS is low before the first clock
   early.select_lead = 4999ns;
   for (const auto& [settings, pause, rule] : std::to_array<std::tuple<LineSettings, Time, std::string>>(
            {{spi_settings, 5us, ""},
@@ -161,7 +161,7 @@ TEST(EncolinkDevice, TransmitsByItselfAtItsRate) {
   EXPECT_EQ(ends[95] - ends[0], 19 * 500us);
 }
 
-/// What channel 3 says, a byte a cycle, to a register access.
+/// Returns the channel 3 bytes, one per cycle, that answer a register access.
 RawBytes answer_to(Bench& bench, Bytes access) {
   std::vector<RawBytes> requests(80, position_request);
   requests[0] = {0xAA, 0x00};

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Frames, the identity and register accesses, as no vector has them.
+// Cases of frames, identities and register accesses that the vectors do not cover.
 #include "absenc/protocol/encolink/frame.hpp"
 
 #include <gtest/gtest.h>
@@ -61,7 +61,7 @@ TEST(EncolinkFrame, WhatOfAReadingHolds) {
   EXPECT_FALSE(to_reading(single, {}).multiturn_valid);
 }
 
-// A frame has two bits, and no alarm by name: a cycle of channel 2 has these.
+// A frame has only two status bits and no named alarms: a cycle of channel 2 has these.
 TEST(EncolinkFrame, BitsOfAFrameReportAlarmsOnlyWhereTheyAreClear) {
   EXPECT_EQ(to_reading(multi, {}).status_reported, general::error | general::warning);
   EXPECT_EQ(to_reading(multi, {}).alarms_reported, 0xFFFFu);
@@ -74,7 +74,7 @@ TEST(EncolinkFrame, BitsOfAFrameReportAlarmsOnlyWhereTheyAreClear) {
   EXPECT_EQ(to_reading(alone, {}).status_reported, general::error | general::warning);
 }
 
-// Which alarm it is the cycle before said; the clear bit of the frame says only that there is no warning.
+// The earlier cycle reported which alarm is set. The clear bit of the frame only reports that no warning is set.
 TEST(EncolinkFrame, ACycleIsRememberedWhereABitOfTheFrameIsSet) {
   constexpr Position bad{.singleturn = 5, .error = true};
   constexpr Position warned{.singleturn = 5, .warning = true};
@@ -84,7 +84,7 @@ TEST(EncolinkFrame, ACycleIsRememberedWhereABitOfTheFrameIsSet) {
   EXPECT_EQ(remembered(lost, to_reading(multi, bad)).alarms_reported, 0xFFFFu);
   EXPECT_EQ(remembered(hot, to_reading(multi, warned)).alarms, status::temperature);
   EXPECT_EQ(remembered(hot, to_reading(multi, warned)).alarms_reported, 0xFFFFu);
-  // An alarm that has come or gone: which one the next cycle tells.
+  // An alarm appeared or vanished: only the next cycle reports which one.
   EXPECT_EQ(remembered(hot, to_reading(multi, bad)).alarms, 0u);
   EXPECT_EQ(remembered(hot, to_reading(multi, bad)).alarms_reported, status::warnings);
   EXPECT_EQ(remembered(lost, to_reading(multi, {.singleturn = 5})).alarms, 0u);
@@ -173,9 +173,9 @@ TEST(EncolinkUnit, EncodesTheBytesThatDoTheWork) {
                          {"temperature", {}, of(hex<"00CDEF89AB5900020000004C05">)},
                          {"save", {}, of(hex<"00CDEF89AB580001000000496342">)},
                          {"memory-write", {0, 0x12345678, 0}, of(hex<"00CDEF89AB58000400000000123456787B">)},
-                         {"memory-read", {0x1234, 0}, {}},  // how many bytes?
+                         {"memory-read", {0x1234, 0}, {}},  // the number of bytes is unknown
                          {"memory-write", {0x1234, 0, 0}, {}},
-                         {"memory-write", {0x64, 1, 0}, {}},  // 20 of them
+                         {"memory-write", {0x64, 1, 0}, {}},  // this register has 20 bytes
                          {"memory-write", {0x49, 0x63, 9}, {}}}) {
     std::array<std::uint8_t, 64> bytes{};
     const Result<std::size_t> size = unit.encode({}, *find_command(unit, one.command), one.arguments, bytes);

@@ -34,7 +34,7 @@ TEST(EncolinkHostSpi, ThePositionIsTakenWhenNcsFalls) {
   bench.pass(1ms);
   const Told read = bench.run("position");
   ASSERT_TRUE(read.reading);
-  // What was on the line before is not known.
+  // The line was idle for an unknown time, so the host waits for `spi_pause` first.
   EXPECT_EQ(read.reading->latched, 1ms + spi_pause);
   EXPECT_EQ(read.reading->received, 1ms + spi_pause + spi_lead + 40us);
   EXPECT_EQ(read.took, spi_pause + spi_lead + 40us);
@@ -52,17 +52,18 @@ TEST_P(EncolinkHost, WhatIsWrongIsSaid) {
     Error error;
     std::string_view words;
   };
-  for (const Case& one : std::vector<Case>{
-           {"us", "resolution=19 multiturn_bits=16", none, Error::out_of_range, "resolution"},  // 0x12345 is odd
-           {"us", "multiturn_bits=0", none, Error::unexpected_reply, "multiturn_bits"},
-           {"us", "resolution=17", none, Error::unexpected_reply, "another resolution"},
-           {"u", testing::multi, [](unsigned, RawBytes& reply) { reply.resize(4); }, Error::wrong_length,
-            "ended early"},
-           {"u", testing::multi, [](unsigned, RawBytes& reply) { reply.clear(); }, Error::timeout, ""},
-           {"u", "", [](unsigned, RawBytes& reply) { reply.resize(7); }, Error::wrong_length,
-            "did not identify itself"},
-           {"s", testing::multi, all(0x00), Error::line_stuck, "MISO stayed low"},
-           {"s", testing::multi, all(0xFF), Error::line_stuck, "MISO stayed high"}}) {
+  for (const Case& one :
+       std::vector<Case>{// Bit 0 of 0x12345 is set and would be padding.
+                         {"us", "resolution=19 multiturn_bits=16", none, Error::out_of_range, "resolution"},
+                         {"us", "multiturn_bits=0", none, Error::unexpected_reply, "multiturn_bits"},
+                         {"us", "resolution=17", none, Error::unexpected_reply, "another resolution"},
+                         {"u", testing::multi, [](unsigned, RawBytes& reply) { reply.resize(4); }, Error::wrong_length,
+                          "ended early"},
+                         {"u", testing::multi, [](unsigned, RawBytes& reply) { reply.clear(); }, Error::timeout, ""},
+                         {"u", "", [](unsigned, RawBytes& reply) { reply.resize(7); }, Error::wrong_length,
+                          "did not identify itself"},
+                         {"s", testing::multi, all(0x00), Error::line_stuck, "MISO stayed low"},
+                         {"s", testing::multi, all(0xFF), Error::line_stuck, "MISO stayed high"}}) {
     if (one.interfaces.find(interface == Interface::uart ? 'u' : 's') == std::string_view::npos) continue;
     Bench bench(testing::multi, interface);
     bench.tampered.replies(one.tamper);
@@ -109,7 +110,7 @@ TEST_P(EncolinkHost, TheIdentityCountsAgainstTheOptionsWhereItIsAskedFor) {
   EXPECT_EQ(identify.numbers.at("frame_bytes"), 5);
   EXPECT_EQ(identify.texts.at("part_number"), "MB080SLA17MENT00");
 
-  Bench coarse("resolution=20 multiturn_bits=12", interface);  // which it cannot say
+  Bench coarse("resolution=20 multiturn_bits=12", interface);  // the identity does not report the number of turn bits
   const Told turns = coarse.run("info");
   ASSERT_TRUE(turns.reading);
   EXPECT_EQ(turns.reading->multiturn_bits, 12u);
@@ -200,7 +201,7 @@ TEST_P(EncolinkHost, TheDetailedStatusTakesOneCycle) {
   constexpr std::uint16_t raised = status::temperature | status::multiturn_mismatch;
   for (const std::string_view settings : {testing::single, testing::multi}) {
     Bench bench(settings, interface);
-    bench.shaft.spin(3000, bench.line.now());  // each frame another position: the first of the cycle counts
+    bench.shaft.spin(3000, bench.line.now());  // each frame has another position; the first frame of the cycle counts
     bench.device.raise_alarms(raised);
     const Told read = bench.run("alarms");
     ASSERT_EQ(read.error, Error::none) << read.detail;
@@ -234,7 +235,7 @@ TEST_P(EncolinkHost, Channel2ThatDisagreesIsAnErrorOfItsOwn) {
   EXPECT_EQ(status.error, Error::cross_check_failed);
   EXPECT_TRUE(says(status.detail, "channel 2 has another position")) << status.detail;
   bench.pass(spi_pause);
-  EXPECT_EQ(bench.run("position").error, Error::none);  // positions go on
+  EXPECT_EQ(bench.run("position").error, Error::none);  // positions stay readable
   const Told read = bench.run("memory-read", {0x4C});
   EXPECT_EQ(read.error, Error::cross_check_failed);
   EXPECT_TRUE(says(read.detail, "channel 2 has another position")) << read.detail;
@@ -243,7 +244,7 @@ TEST_P(EncolinkHost, Channel2ThatDisagreesIsAnErrorOfItsOwn) {
 
 // Frame 0 resets the channels; the cycle begins in frame 1.
 TEST_P(EncolinkHost, ACycleThatIsNotGoodIsReadAgain) {
-  const auto turned = [](unsigned frame, RawBytes& reply) {  // other turns in the frame in which it begins
+  const auto turned = [](unsigned frame, RawBytes& reply) {  // changes the turns in the first frame of the cycle
     if (frame % 10 != 1) return;
     ++reply[1];
     reply[5] = checksum(Bytes(reply).first(5));
@@ -257,8 +258,8 @@ TEST_P(EncolinkHost, ACycleThatIsNotGoodIsReadAgain) {
     Error error;
     unsigned frames;
   };
-  for (const Case& one : std::vector<Case>{{at(4, 6), Error::none, 2 * 10},      // channel 2
-                                           {at(3, 0), Error::none, 3 + 1 + 10},  // the frame
+  for (const Case& one : std::vector<Case>{{at(4, 6), Error::none, 2 * 10},      // channel 2 byte
+                                           {at(3, 0), Error::none, 3 + 1 + 10},  // position frame
                                            {turned, Error::cross_check_failed, 3 * 10},
                                            {damaged, Error::bad_checksum, 3 * 10}}) {
     Bench bench(testing::multi, interface);
@@ -274,7 +275,7 @@ TEST_P(EncolinkHost, ZerosWithoutChannel2AreNotReady) {
   bench.restart(PowerOn::real);
   bench.line.wake(0);
   const Told early = bench.run("position");
-  ASSERT_TRUE(early.reading);  // well formed
+  ASSERT_TRUE(early.reading);  // the zeros are a well-formed position
   EXPECT_FALSE(early.reading->ready);
   bench.pass(start_up);
   bench.shaft.put(0, 0);
@@ -283,7 +284,7 @@ TEST_P(EncolinkHost, ZerosWithoutChannel2AreNotReady) {
   EXPECT_TRUE(late.reading->ready);
 }
 
-// A real zero of an encoder whose channel 2 is wrong: it is not starting.
+// The position is really zero and channel 2 is wrong: the encoder is not starting.
 TEST_P(EncolinkHost, ZerosBesideAWrongChannel2AreReady) {
   const auto damaged = [](unsigned, RawBytes& reply) { reply.back() ^= 0x01; };
   const auto none = [](unsigned, RawBytes&) {};
@@ -300,7 +301,8 @@ TEST_P(EncolinkHost, ZerosBesideAWrongChannel2AreReady) {
   }
 }
 
-// At 10 000 rpm 175 counts a microsecond: the time of a reading is that at which the encoder took it.
+// At 10 000 rpm a turn of 20 bits advances by 175 counts per microsecond, so `latched` must be the time of the
+// position.
 TEST_P(EncolinkHost, LatchedIsWhenTheEncoderTookThePosition) {
   for (const std::string_view told : {testing::multi, std::string_view("")}) {
     Bench bench(testing::multi, interface);
@@ -335,7 +337,7 @@ constexpr std::string_view streaming = "resolution=20 multiturn_bits=16 stream_r
 TEST(EncolinkListen, FindsTheFramesByTheirChecksums) {
   Bench bench("resolution=20 multiturn_bits=16 stream_rate=5000");
   bench.shaft.spin(60, bench.line.now());
-  bench.pass(1ms + 95us);  // into the middle of a frame
+  bench.pass(1ms + 95us);  // starts to listen in the middle of a frame
   Listen listen(testing::multi_format);
   std::vector<std::uint64_t> seen;
   bench.listen(listen, [&] {
@@ -363,7 +365,7 @@ TEST(EncolinkListen, LatchedIsWhenTheEncoderTookThePosition) {
   EXPECT_EQ(compared, 9u);
 }
 
-// "Nothing is sent then."
+// Document: "Nothing is sent then."
 TEST(EncolinkListen, AnEncoderThatTransmitsByItselfIsNotAsked) {
   Bench bench(streaming);
   std::size_t sent = 0;
@@ -394,7 +396,7 @@ TEST(EncolinkListen, ReportsDamagedFramesAndGoesOn) {
   bench.listen(listen, [&] {
     if (listen.error() != Error::none) errors.push_back(listen.error());
     if (listen.error() != Error::none) return true;
-    // The first is from before it was put there.
+    // The first position is from before the shaft was set.
     EXPECT_TRUE(good == 0 || listen.reading()->singleturn == 0x12345u) << listen.reading()->singleturn;
     return ++good < 40;
   });
@@ -429,7 +431,7 @@ TEST(EncolinkListen, AReadingIsOfWhatStillComes) {
   for (int i = 0; i < 3; ++i) {
     listen.feed({.kind = Event<std::uint8_t>::Kind::received, .at = 1ms, .items = frame});
   }
-  for (int i = 0; i < 2; ++i) {  // the first one only shows where frames begin
+  for (int i = 0; i < 2; ++i) {  // the first of the three frames only establishes alignment
     EXPECT_EQ(listen.next(1ms).kind, Kind::emit);
     EXPECT_NE(listen.reading(), nullptr);
   }
