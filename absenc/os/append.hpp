@@ -6,9 +6,9 @@
 
 namespace absenc::os {
 
-/// Appends `line`, which has its end, by one write, so that lines of several processes stay whole; makes the file and
-/// its folders for this user alone. A cut last line, as a full disk leaves it, gets its end first. Returns 0, or the
-/// error of the system.
+/// Appends `line`, which includes its line end, in one write, so that lines of several processes stay intact. Creates
+/// the file and its folders, accessible for this user only. If the last line is incomplete, as after a full disk, it is
+/// ended first. Returns 0 or a value of errno.
 [[nodiscard]] int append_line(const std::string& path, std::string_view line);
 
 }  // namespace absenc::os

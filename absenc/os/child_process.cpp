@@ -36,7 +36,7 @@ struct Ends {
   Descriptor ours, other;
 };
 
-/// posix_spawn takes these steps in the child before the program begins.
+/// The steps that posix_spawn performs in the child before the program begins.
 struct SpawnSteps {
   explicit SpawnSteps(int channel) {
     ::posix_spawn_file_actions_init(&files);
@@ -46,7 +46,7 @@ struct SpawnSteps {
     }
     ::posix_spawn_file_actions_adddup2(&files, channel, channel_of_child);
     ::posix_spawn_file_actions_addclosefrom_np(&files, channel_of_child + 1);
-    // Ctrl-C and systemd signal all processes at once: the child is still needed for the good-bye of its parent.
+    // Ctrl-C and systemd signal all processes at once, but the parent needs the child to close its connections.
     sigset_t blocked;
     ::sigemptyset(&blocked);
     for (const int signal : {SIGINT, SIGTERM, SIGHUP, SIGQUIT, SIGPIPE}) ::sigaddset(&blocked, signal);
@@ -76,7 +76,8 @@ void limit(__rlimit_resource what, rlim_t most) {
   ::setrlimit(what, &both);
 }
 
-// The kernel counts pages that are private and may be written: statm's sixth number (proc(5)).
+// Returns the memory that the kernel counts for RLIMIT_DATA (private, writable pages): the sixth number of statm
+// (proc(5)).
 std::size_t data_bytes() {
   std::ifstream file("/proc/self/statm");
   std::size_t pages = 0;
@@ -97,7 +98,7 @@ bool Channel::send(std::string& bytes) const {
 }
 
 bool Channel::receive(std::string& bytes) const {
-  std::array<char, 65536> piece;  // not cleared: only what was received is read
+  std::array<char, 65536> piece;  // not initialised: only received bytes are read
   for (;;) {
     const ssize_t size = ::recv(end_.get(), piece.data(), piece.size(), MSG_DONTWAIT);
     if (size < 0 && errno == EINTR) continue;
@@ -113,7 +114,7 @@ ChildProcess::ChildProcess(std::vector<std::string> arguments) : channel_(Descri
   std::vector<char*> words;
   for (std::string& one : arguments) words.push_back(one.data());
   words.push_back(nullptr);
-  // By this name it is the very same program, also when a newer one was installed in its place meanwhile.
+  // /proc/self/exe is the running program, even if a newer version was installed at its path since.
   const int error = ::posix_spawn(&number_, "/proc/self/exe", &steps.files, &steps.attributes, words.data(), ::environ);
   if (error != 0) throw system_failure("starting this program again", error);
   channel_ = Channel(std::move(ends.ours));
@@ -141,11 +142,11 @@ std::string ChildProcess::end(Time longest) {
 }
 
 Channel become_child(const char* name, std::size_t bytes) {
-  // A parent that ended before this has closed its end of the channel.
+  // If the parent has ended before this call, its end of the channel is closed already.
   ::prctl(PR_SET_PDEATHSIG, SIGKILL);
   ::prctl(PR_SET_NAME, name);
   ::fcntl(channel_of_child, F_SETFD, FD_CLOEXEC);
-  limit(RLIMIT_CORE, 1);  // 0 would still start a program that takes cores; 1 does not (core(5))
+  limit(RLIMIT_CORE, 1);  // 0 would still start a program that collects core files; 1 does not (core(5))
   limit(RLIMIT_DATA, data_bytes() + bytes);
   return Channel(Descriptor(channel_of_child));
 }

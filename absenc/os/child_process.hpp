@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A second process of this program, for code that must not be able to end the first one, and the connection to it.
+// A second process of this program, for code that must not be able to crash the first process, and the connection to
+// it.
 #pragma once
 
 #include <sys/types.h>
@@ -12,36 +13,37 @@
 
 namespace absenc::os {
 
-/// One end of a connection between two processes. Neither call waits.
+/// One end of a connection between two processes. Neither call blocks.
 class Channel {
  public:
   explicit Channel(Descriptor end) : end_(std::move(end)) {}
 
   [[nodiscard]] int get() const { return end_.get(); }
-  /// Sends as much of `bytes` as there is room for and removes that from it. False: the other end is closed.
+  /// Sends as many of `bytes` as there is room for and removes them from `bytes`. Returns false if the other end is
+  /// closed.
   [[nodiscard]] bool send(std::string& bytes) const;
-  /// Appends what has arrived, at most 64 kB. False: the other end is closed, and everything was received.
+  /// Appends the received bytes, at most 64 kB. Returns false if the other end is closed and everything was received.
   [[nodiscard]] bool receive(std::string& bytes) const;
 
  private:
   Descriptor end_;
 };
 
-/// This program, run again. It inherits no file, port or socket but its end of the channel, and no terminal's signals.
-/// The thread that makes it keeps it: the kernel kills it when that thread ends.
+/// A second process that runs this program. It inherits no file, port or socket except its end of the channel, and
+/// receives no signals of the terminal. The kernel kills it when the thread that created it ends.
 class ChildProcess {
  public:
-  /// `arguments`: those of its `main`. Throws Failure.
+  /// Starts the process with `arguments` for its `main`. Throws Failure.
   explicit ChildProcess(std::vector<std::string> arguments);
-  /// Kills it, if it still runs.
+  /// Kills the process if it still runs.
   ~ChildProcess();
   ChildProcess(const ChildProcess&) = delete;
   ChildProcess& operator=(const ChildProcess&) = delete;
 
   [[nodiscard]] const Channel& channel() const { return channel_; }
   [[nodiscard]] pid_t number() const { return number_; }
-  /// Gives it this long to end by itself, then kills it. Returns how it ended by itself, "by signal 6 (Aborted)" or
-  /// "with status 1"; "": with status 0, or it was killed here.
+  /// Waits up to `longest` for the process to end, then kills it. Returns how it ended, "by signal 6 (Aborted)" or
+  /// "with status 1"; "" for status 0 or if it was killed here.
   std::string end(Time longest);
 
  private:
@@ -49,8 +51,8 @@ class ChildProcess {
   pid_t number_ = -1;
 };
 
-/// The child calls this first and gets its end of the channel. From then on the process ends with its parent, has
-/// `name` in lists of processes, leaves no core file and takes at most `bytes` of memory more than it has now.
+/// Returns the child's end of the channel; the child must call this first. From then on the process ends with its
+/// parent, appears as `name` in process lists, writes no core file and can allocate at most `bytes` more memory.
 [[nodiscard]] Channel become_child(const char* name, std::size_t bytes);
 
 }  // namespace absenc::os

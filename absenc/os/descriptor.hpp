@@ -11,7 +11,7 @@ namespace absenc::os {
 class Descriptor {
  public:
   Descriptor() = default;
-  /// Takes over `number`; negative: none.
+  /// Takes ownership of `number`; a negative number means no descriptor.
   explicit Descriptor(int number) : number_(number) {}
   Descriptor(Descriptor&& other) noexcept : number_(std::exchange(other.number_, -1)) {}
   Descriptor& operator=(Descriptor&& other) noexcept {
@@ -24,7 +24,7 @@ class Descriptor {
     if (number_ >= 0) ::close(std::exchange(number_, -1));
   }
 
-  /// Whoever gets it closes it.
+  /// Returns the descriptor, which the caller must close.
   [[nodiscard]] int release() { return std::exchange(number_, -1); }
 
   [[nodiscard]] int get() const { return number_; }

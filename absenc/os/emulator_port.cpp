@@ -37,9 +37,9 @@ void check(bool good, const std::string& what) {
   if (!good) throw system_failure(what, errno);
 }
 
-// A socket whose name in the kernel is that of the link: it lives as long as the process that bound it, so that the
-// link of an emulator that was killed is told from one in use, whoever has got the number of its terminal since. The
-// terminal is not opened for that, which whoever talks there would notice.
+// Returns a socket that is bound to a kernel name derived from `link`, to mark the link as in use. The name lives as
+// long as the process that bound it, so a link left by a killed emulator can be told from one in use, even if another
+// program has got the number of its terminal. Opening the terminal instead would be noticed by its user.
 Descriptor bind_name_of(const fs::path& link) {
   struct stat folder {};
   Descriptor socket(::socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0));
@@ -51,7 +51,8 @@ Descriptor bind_name_of(const fs::path& link) {
   const std::string file = link.filename();
   const std::size_t room = sizeof address.sun_path - 1 - name.size();
   name += file.substr(file.size() - std::min(file.size(), room));
-  std::copy(name.begin(), name.end(), address.sun_path + 1);  // behind a zero: no file
+  std::copy(name.begin(), name.end(), address.sun_path + 1);  // begins with a zero byte: an abstract name without a
+                                                              // file
   const auto size = static_cast<socklen_t>(offsetof(sockaddr_un, sun_path) + 1 + name.size());
   if (::bind(socket.get(), reinterpret_cast<sockaddr*>(&address), size) < 0) return {};
   return socket;
@@ -62,14 +63,14 @@ Descriptor bind_name_of(const fs::path& link) {
 EmulatorPort::EmulatorPort(std::string link, std::optional<std::uint16_t> tcp_port) {
   set_latency(2ms);
   set_idle_latency(200us);
-  set_read_at_once(true);  // to write wakes the reader, who is often let run first
+  set_read_at_once(true);  // a write wakes the reader, which often runs before the writer
   open_terminal();
   if (tcp_port) listen_on(*tcp_port);
   for (const Descriptor* end : {&master_, &watch_, &listener_}) {
     if (*end) poller().add(end->get());
   }
   link_ = std::move(link);
-  if (!link_.empty()) make_link();  // last: whoever waits for it may open it
+  if (!link_.empty()) make_link();  // last step: a program that waits for the link may open it at once
 }
 
 EmulatorPort::~EmulatorPort() {
@@ -88,9 +89,10 @@ void EmulatorPort::open_terminal() {
   check(static_cast<bool>(slave_), what);
   termios settings{};
   check(::tcgetattr(slave_.get(), &settings) == 0, what);
-  ::cfmakeraw(&settings);  // the echo of a terminal would send the host's requests back to it
+  ::cfmakeraw(&settings);  // with the terminal's echo, the host's requests would be sent back to it
   check(::tcsetattr(slave_.get(), TCSANOW, &settings) == 0, what);
-  // After our own open, which is not to be seen. Without inotify only comfort is lost.
+  // The watch is added after this port's own open, which must not be counted. If inotify is missing, leftovers of the
+  // last user are not cleared.
   watch_ = Descriptor(::inotify_init1(IN_NONBLOCK | IN_CLOEXEC));
   if (watch_) ::inotify_add_watch(watch_.get(), terminal_.c_str(), IN_OPEN | IN_CLOSE);
 }
@@ -137,7 +139,7 @@ void EmulatorPort::make_link() {
 }
 
 std::size_t EmulatorPort::read_some(MutableBytes into, std::span<const int> ready) {
-  // First of all, so that nothing that comes now is taken for a remainder.
+  // Handled first: bytes that arrive from now on must not be discarded as leftovers.
   if (std::find(ready.begin(), ready.end(), watch_.get()) != ready.end()) users_changed();
   std::size_t filled = 0;
   for (const int descriptor : ready) {
@@ -157,10 +159,11 @@ std::size_t EmulatorPort::read_some(MutableBytes into, std::span<const int> read
   return filled;
 }
 
-// On a busy machine a program that could run is not let run for milliseconds, in which a host gives up and asks again:
-// both requests are there at once then, and the host has broken no rule. The kernel's threads that carry the bytes of
-// pseudo-terminals are kept waiting as we are, at other moments: the longest delay of a second is taken for theirs.
-// Who was kept waiting for longer than half a millisecond finds that time gone: before, there is nothing to look for.
+// Returns how long received bytes may have waited, because this thread could not run. On a busy machine a ready thread
+// may wait for milliseconds. A host that times out and repeats its request meanwhile has broken no rule, although both
+// requests arrive at once. Kernel threads that carry the bytes of pseudo-terminals wait as well, at other times, so the
+// longest delay of the last second is used. The delay is read at most every 0.5 ms, because shorter delays do not
+// matter.
 Time EmulatorPort::lateness() {
   const Time now = os::now();
   if (now < looked_ + 500us) return late_;
@@ -185,16 +188,17 @@ void EmulatorPort::drop_client(int descriptor) {
 
 void EmulatorPort::accept_client() {
   Descriptor client(::accept4(listener_.get(), nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC));
-  if (!client || clients_.size() == most_clients) return;  // too many: closed at once
+  if (!client || clients_.size() == most_clients) return;  // too many clients: the connection is closed at once
   const int on = 1;
   ::setsockopt(client.get(), IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
   poller().add(client.get());
   clients_.push_back(std::move(client));
 }
 
-// A program has opened or closed the slave. Because we keep it open, it never gets the clean start of a real port:
-// an exclusive mode (TIOCEXCL) that the last user left would lock the next one out, and the next one would read
-// replies to the last one. Replies of this moment are left alone: they may be on their way to another user.
+// Handles an open or close of the slave by a program. Because this port keeps the slave open, the next user does not
+// get the clean state of a real port: an exclusive mode (TIOCEXCL) left by the last user would lock the next one out,
+// and the next one would read replies to the last one. Replies of the last 200 ms are left alone: they may be for
+// another user.
 void EmulatorPort::users_changed() {
   std::array<std::byte, 4096> events;
   while (::read(watch_.get(), events.data(), events.size()) > 0) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The line of a virtual encoder: a pseudo-terminal and, if asked, TCP, for any program to connect to.
+// The line of a virtual encoder: a pseudo-terminal and optionally a TCP port, to which any program can connect.
 #pragma once
 
 #include <cstddef>
@@ -13,26 +13,26 @@
 
 namespace absenc::os {
 
-/// All ends are one line: the device hears what comes from any of them, and each gets what the device sends. Like a
-/// wire, the line keeps nothing: what nobody reads is lost. Latency is 2 ms at first: a pause that long is a gap, and
-/// one of 0.2 ms where the device waits for nothing more.
+/// A pseudo-terminal and TCP clients as one line: the device receives bytes from every end, and each end receives the
+/// bytes of the device. Like a wire, the line stores nothing: bytes that no program reads are lost. The default latency
+/// is 2 ms: a pause of that length is a gap. It is 0.2 ms where the device expects no more bytes.
 ///
-/// A device that configures the line hears a terminal only at its own rate. A terminal that nobody has set (the
-/// kernel's 38400 baud) and TCP have none: they are heard at every rate. So a change of the rate that went wrong shows
-/// without hardware. Devices that share the line (sim::Bus) do not feel it.
+/// A device that configures the line communicates with a terminal only at its own rate. A terminal at the default rate
+/// (the kernel's 38400 baud) and TCP clients have no rate: they work at every rate. So a wrong change of the rate shows
+/// without hardware. Devices that share the line (sim::Bus) are not affected by rates.
 class EmulatorPort final : public StreamPort {
  public:
-  /// `link`: path of a symbolic link to the pseudo-terminal, removed at the end; empty: none. It replaces a link to a
-  /// pseudo-terminal that no other EmulatorPort has, and nothing else. `tcp_port`: listens there on 127.0.0.1; 0: on a
-  /// free one. Throws Failure: `in_use` for either, `system`.
+  /// `link` is the path of a symbolic link to the pseudo-terminal, removed at the end; empty for none. It replaces only
+  /// a link to a pseudo-terminal that no other EmulatorPort uses. `tcp_port` is the port to listen on at 127.0.0.1; 0
+  /// for any free one. Throws Failure: `in_use` for either, `system`.
   explicit EmulatorPort(std::string link = {}, std::optional<std::uint16_t> tcp_port = {});
   ~EmulatorPort() override;
 
-  /// What to open: the link if there is one, otherwise the pseudo-terminal.
+  /// Returns the path for other programs to open: the link if there is one, otherwise the pseudo-terminal.
   [[nodiscard]] const std::string& path() const { return link_.empty() ? terminal_ : link_; }
-  /// 0 when it does not listen.
+  /// Returns the TCP port, or 0 when the port does not listen.
   [[nodiscard]] std::uint16_t tcp_port() const { return tcp_port_; }
-  /// Bytes that an end did not take because it did not read.
+  /// Returns the number of bytes that were lost because an end did not read them.
   [[nodiscard]] std::uint64_t dropped() const { return dropped_; }
 
  private:
@@ -52,20 +52,20 @@ class EmulatorPort final : public StreamPort {
   void write_terminal(Bytes bytes);
 
   Descriptor master_;
-  Descriptor slave_;  // kept open: without it the master fails whenever no program has the slave open
-  Descriptor name_;   // says to others that the link is served
-  Descriptor watch_;  // inotify: programs that open or close the slave
+  Descriptor slave_;  // kept open: the master fails while no program has the slave open
+  Descriptor name_;   // bound socket that marks the link as in use
+  Descriptor watch_;  // inotify: reports programs that open or close the slave
   Descriptor listener_;
   std::vector<Descriptor> clients_;
   std::string terminal_;
   std::string link_;
   std::uint16_t tcp_port_ = 0;
   RunDelay delay_;
-  Time looked_{};  // when it was asked
+  Time looked_{};  // time of the last look at `delay_`
   Time late_{};
   Time late_until_{};
   std::uint64_t dropped_ = 0;
-  std::uint32_t device_rate_ = 0;  // 0: the device did not say
+  std::uint32_t device_rate_ = 0;  // 0: the device has not set a rate
 };
 
 }  // namespace absenc::os

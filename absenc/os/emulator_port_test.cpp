@@ -47,11 +47,11 @@ TEST(EmulatorPort, TalksToASerialPort) {
   SerialPort host(device.path(), fast);
   host.begin(transfer(request));
   EXPECT_EQ(receive(device), request);
-  EXPECT_EQ(device.wait({.at = never, .gap = 1ns}).kind, Kind::silence);  // 2 ms
+  EXPECT_EQ(device.wait({.at = never, .gap = 1ns}).kind, Kind::silence);  // after 2 ms
   const Data reply{1, 2, 3};
   device.begin(transfer(reply));
   EXPECT_EQ(receive(host), reply);
-  expect_quiet(device);  // no echo
+  expect_quiet(device);  // the device receives no echo
   EXPECT_EQ(device.dropped(), 0u);
 }
 
@@ -103,8 +103,8 @@ TEST(EmulatorPort, IsOneLineForAllItsEnds) {
     EXPECT_EQ(receive(first), reply);
     EXPECT_EQ(receive(second), reply);
   }
-  expect_quiet(device);          // sees `second` go
-  for (int i = 0; i < 2; ++i) {  // a first write to a closed connection succeeds
+  expect_quiet(device);          // handles the end of `second`
+  for (int i = 0; i < 2; ++i) {  // the first write to a closed connection succeeds
     device.begin(transfer(request));
     EXPECT_EQ(receive(first), request);
   }
@@ -124,7 +124,7 @@ TEST(EmulatorPort, RefusesClientsAboveItsLimit) {
   EXPECT_EQ(failure_of([&] { static_cast<void>(hosts.back()->wait({.at = never})); }).kind(), Failure::Kind::lost);
 }
 
-// What a busy machine does: two threads want one processor, and the one that others wait for has to wait.
+// Simulates a busy machine: two threads compete for one processor, and the one under test has to wait.
 TEST(EmulatorPort, TellsThatItWasKeptFromLooking) {
   cpu_set_t before;
   cpu_set_t one;
@@ -166,10 +166,10 @@ TEST(EmulatorPort, GoesOnWhenAUserLeaves) {
 TEST(EmulatorPort, KeepsNothingForTheNextUser) {
   EmulatorPort device;
   const Data frame(1000, 0x55);
-  while (device.dropped() == 0) device.begin(transfer(frame));  // nobody reads
+  while (device.dropped() == 0) device.begin(transfer(frame));  // no program reads
   const Time written = now();
-  sleep_until(written + 200ms);  // later than anything that may be on its way
-  // Not a SerialPort, which discards by itself.
+  sleep_until(written + 200ms);  // later than any reply that may still be in transit
+  // A SerialPort would discard the bytes itself.
   const Descriptor host(::open(device.path().c_str(), O_RDWR | O_NOCTTY));
   put(host.get(), request);
   EXPECT_EQ(receive(device), request);
@@ -194,14 +194,14 @@ TEST(EmulatorPort, IsNotLockedByAUserWhoLeft) {
     ASSERT_EQ(::ioctl(greedy.get(), TIOCEXCL), 0);
   }
   expect_quiet(device);
-  // As root we could open it anyway: ask for the flag.
+  // root can open the terminal in any case, so the test reads the flag.
   const Descriptor next(::open(device.path().c_str(), O_RDWR | O_NOCTTY));
   int exclusive = 1;
   ASSERT_EQ(::ioctl(next.get(), TIOCGEXCL, &exclusive), 0);
   EXPECT_EQ(exclusive, 0);
 }
 
-// A host that is slow with its bytes is waited for, whoever has nothing more to expect is ready for the next request.
+// After a byte the port waits long for the rest of a request, but only briefly where no more bytes are expected.
 TEST(EmulatorPort, APauseIsShorterWhereNothingMoreIsDue) {
   EmulatorPort device;
   device.set_latency(std::chrono::hours(1));
@@ -228,7 +228,7 @@ TEST(EmulatorPort, IgnoresRatesAndWires) {
 TEST(EmulatorPort, LinksToItself) {
   const TemporaryDirectory directory;
   const fs::path link = directory.path() / "encoder";
-  fs::create_symlink("/dev/pts/999999", link);  // of an emulator that was killed
+  fs::create_symlink("/dev/pts/999999", link);  // left by an emulator that was killed
   {
     EmulatorPort device(link);
     EXPECT_EQ(device.path(), link);
@@ -255,7 +255,7 @@ TEST(EmulatorPort, IsNotReplacedWhileItLives) {
     }
     EXPECT_EQ(fs::read_symlink(link), terminal);
   }
-  // A program that is no emulator has got the number of one that was killed.
+  // A program that is no emulator has the terminal number of a killed emulator.
   const Descriptor other(::posix_openpt(O_RDWR | O_NOCTTY | O_CLOEXEC));
   std::array<char, 64> name{};
   ASSERT_EQ(::grantpt(other.get()), 0);
@@ -264,7 +264,7 @@ TEST(EmulatorPort, IsNotReplacedWhileItLives) {
   fs::create_symlink(name.data(), link);
   const EmulatorPort third(link);
   EXPECT_NE(fs::read_symlink(link), name.data());
-  // So has an emulator on another link.
+  // An emulator with another link has the terminal number of a killed emulator.
   const fs::path stale = directory.path() / "stale";
   fs::create_symlink(fs::read_symlink(link), stale);
   const EmulatorPort fourth(stale);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// For tests: stands in for the kernel behind a CAN port: one interface, can0, whose other end the test holds.
+// Test replacement for the kernel behind a CAN port: one interface, can0, whose other end the test holds.
 #pragma once
 
 #include <linux/can.h>
@@ -65,7 +65,7 @@ class FakeCan final : public CanKernel {
     return size;
   }
 
-  /// A frame on the bus.
+  /// Puts a frame on the bus.
   void put(const can_frame& frame) const { ::send(other_end_.get(), &frame, sizeof frame, 0); }
 
   std::string interface = "can0";
@@ -76,7 +76,7 @@ class FakeCan final : public CanKernel {
   short flags = IFF_UP;
   std::deque<int> write_errors;
   bool keep_last_error = false;
-  Time age{};  // how long ago the kernel had what is read now
+  Time age{};  // time since the kernel received the frame that is read now
   int bound = 0;
   std::map<std::pair<int, int>, std::uint32_t> options;
   std::vector<can_frame> written;

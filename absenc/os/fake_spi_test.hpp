@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// For tests: stands in for the kernel behind an SPI port and writes down what it is asked for.
+// Test replacement for the kernel behind an SPI port. It logs all requests.
 #pragma once
 
 #include <fcntl.h>
@@ -20,7 +20,7 @@
 
 namespace absenc::os::testing {
 
-/// One controller with one chip select, /dev/spidev0.0. Its messages are answered by a Spidev.
+/// One controller with one chip select, /dev/spidev0.0. A Spidev answers its messages.
 class FakeSpi final : public SpiKernel {
  public:
   static constexpr const char* path = "/dev/spidev0.0";
@@ -30,7 +30,7 @@ class FakeSpi final : public SpiKernel {
     connect(LinkKind::spi, {.rate = 500'000, .spi_mode = 1}, nobody_);
   }
 
-  /// What stands at the far side, instead of nothing.
+  /// Connects `device` to the controller; without this call nothing is connected.
   void connect(LinkKind kind, const LineSettings& settings, Machine<std::uint8_t>& device) {
     const SpidevSettings before = spidev_ ? spidev_->settings() : SpidevSettings{0, 16, 500'000, ~0u};
     device_ = std::make_unique<SpiDevice>(kind, settings, device);
@@ -38,7 +38,7 @@ class FakeSpi final : public SpiKernel {
     spidev_->settings() = before;
   }
 
-  // Every call gives a file description of its own, as of a device: locks work.
+  // Each call opens a new file description, as for a device, so that locks work.
   int open(const std::string& name) override {
     if (name == path && open_error == 0) return ::open(file_.c_str(), O_RDWR | O_CLOEXEC);
     errno = open_error != 0 ? open_error : ENOENT;
@@ -66,10 +66,10 @@ class FakeSpi final : public SpiKernel {
 
   std::map<unsigned long, int> refusals;  // request -> errno
   int open_error = 0;
-  std::uint32_t mode_mask = ~0u;  // the others are taken, but not done
+  std::uint32_t mode_mask = ~0u;  // bits outside the mask are accepted without effect
   std::uint32_t highest_speed = ~0u;
-  int missing = 0;       // bytes that a message falls short of
-  bool shorted = false;  // the data line, to low
+  int missing = 0;       // number of bytes by which a message is too short
+  bool shorted = false;  // the data line is shorted to low
   std::string log;
 
  private:
@@ -80,7 +80,8 @@ class FakeSpi final : public SpiKernel {
 
   static void* at(const UserMemory& memory) { return reinterpret_cast<void*>(memory.address); }
 
-  // As the kernel serves CUSE: it fetches and stores what it is told to.
+  // Serves a request like the kernel serves CUSE: it copies the memory that the reply asks for, until the reply is
+  // final.
   int carry(unsigned long request, void* argument) {
     Data in;
     std::vector<UserMemory> out;

@@ -11,7 +11,7 @@ namespace absenc::os {
 using namespace std::chrono_literals;
 
 namespace {
-constexpr std::size_t most_kept = 4096;  // frames that nobody waits for
+constexpr std::size_t most_kept = 4096;  // limit for received frames that no caller has taken
 }
 
 void FramePort::push(const CanFrame& frame, Time at) { push_happened({EventKind::received, at, frame}); }
@@ -68,7 +68,7 @@ Event<CanFrame> FramePort::wait(const Step<CanFrame>& step) {
     collect(std::min(waiting_.due(), end_));
     const Time time = os::now();
     if (time >= end_) throw Ended{};
-    // Frames go before limits: that we come late to look is not the fault of the other side.
+    // Frames go before limits: a late look by this program is not the fault of the other side.
     if (!happened_.empty()) continue;
     if (const std::optional<Event<CanFrame>> event = waiting_.over(time)) return *event;
   }

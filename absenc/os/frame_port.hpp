@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Steps and events (link/step.hpp) over anything that carries CAN frames: the timing that all such ports share.
+// Steps and events (link/step.hpp) on any port that carries CAN frames: the common timing of such ports.
 #pragma once
 
 #include <deque>
@@ -9,12 +9,13 @@
 
 namespace absenc::os {
 
-/// Every function throws Failure, Interrupted (os/signals.hpp) or Ended.
+/// Base of all CAN ports. Every function throws Failure, Interrupted (os/signals.hpp) or Ended.
 ///
-/// A transfer begins at `at`, never earlier; `begin` blocks until then. What came before it, or before `now` was
-/// called, is told with a time that is not later: a conversation can leave it aside, however long it waited in a queue,
-/// because answers on CAN carry no number. `sent` carries the time before the frame was handed over, because nothing
-/// tells when the controller got it through: an answer is never older. `timer` is reported as by StreamPort.
+/// A transfer begins at `at`, never earlier; `begin` blocks until then. A frame received before the transfer began, or
+/// before `now` was called, is reported with a time that is not later, however long it waited in a queue. Because
+/// replies on CAN carry no number, the machine can tell such an old frame only by its time. `sent` carries the time
+/// before the frame was handed to the kernel, because the kernel does not report when the controller has sent it; so a
+/// reply is never older than `sent`. `timer` is reported as by StreamPort.
 class FramePort : public Port<CanFrame> {
  public:
   FramePort() = default;
@@ -26,25 +27,25 @@ class FramePort : public Port<CanFrame> {
   void begin(const Step<CanFrame>& step) final;
   [[nodiscard]] Event<CanFrame> wait(const Step<CanFrame>& step) final;
 
-  /// What the way between the bus and this program adds to the answer and gap limits of a step.
+  /// Returns the delay between the bus and this program, which is added to the answer and gap limits of a step.
   [[nodiscard]] Time latency() const { return latency_; }
   void set_latency(Time latency) { latency_ = latency; }
 
-  /// A transfer due within `slack` is sent at once. 0 at first.
+  /// Sets the slack: a transfer due within `slack` is sent at once. Default 0.
   void set_send_slack(Time slack) { send_slack_ = slack; }
 
-  /// From `end` on the port throws Ended. `never` at first.
+  /// Sets the time from which the port throws Ended. Default `never`.
   void set_end(Time end) { end_ = end; }
 
  protected:
-  /// Pushes what has come; blocks until there is something or `deadline` has come. Does not block when that lies
-  /// behind.
+  /// Pushes received frames. Blocks until at least one frame is received or `deadline` is reached; does not block if
+  /// `deadline` is in the past.
   virtual void collect(Time deadline) = 0;
   virtual void send(const CanFrame& frame) = 0;
   virtual void apply(const LineSettings& settings) = 0;
 
   void push(const CanFrame& frame, Time at);
-  /// A frame was destroyed on the bus.
+  /// Reports that a frame was destroyed on the bus.
   void push_error(Time at);
   [[nodiscard]] Time end() const { return end_; }
 

@@ -1,16 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
-// SIGHUP as something to wait for: by it a service is told to read its files again.
+// SIGHUP as a descriptor to wait for: the signal requests a service to read its files again.
 #pragma once
 
 #include "absenc/os/descriptor.hpp"
 
 namespace absenc::os {
 
-/// Readable when SIGHUP has come. Call it before other threads are started, which else would be ended by the signal.
-/// Throws Failure.
+/// Returns a descriptor that is readable after SIGHUP. Call it before other threads are started, or the signal would
+/// end the process through one of them. Throws Failure.
 [[nodiscard]] Descriptor catch_hangups();
 
-/// Takes what has come out of it; false when nothing had.
+/// Takes pending SIGHUPs out of the descriptor. Returns false if none was pending.
 bool take_hangup(const Descriptor& hangups);
 
 }  // namespace absenc::os

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Bytes of standard input: of a terminal, a pipe or a file.
+// Reading of standard input: a terminal, a pipe or a file.
 #pragma once
 
 #include <cstddef>
@@ -10,8 +10,8 @@
 
 namespace absenc::os {
 
-/// Returns how many bytes came, as soon as there are some; 0 at the end of the input; nothing when `deadline` (`never`:
-/// none) came first. Throws Failure, Interrupted, Ended.
+/// Reads into `into` as soon as bytes are available and returns their number; 0 at the end of the input; nothing if
+/// `deadline` (`never`: no deadline) is reached first. Throws Failure, Interrupted, Ended.
 [[nodiscard]] std::optional<std::size_t> read_standard_input(MutableBytes into, Time deadline);
 
 }  // namespace absenc::os

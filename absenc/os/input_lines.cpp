@@ -15,8 +15,8 @@ namespace {
 constexpr std::size_t longest_line = 4096;
 }
 
-// The kernel stops a program in the background that reads its terminal, unless the signal is ignored: then it reads
-// EIO.
+// The kernel stops a background program that reads its terminal. If SIGTTIN is ignored, the read fails with EIO
+// instead.
 InputLines::InputLines(int descriptor) : descriptor_(descriptor) {
   if (::isatty(descriptor) == 1) static_cast<void>(::signal(SIGTTIN, SIG_IGN));
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Lines that somebody writes while something else goes on: looked for, never waited for.
+// Non-blocking reading of lines, for input while a command does other work.
 #pragma once
 
 #include <string>
@@ -9,20 +9,20 @@ namespace absenc::os {
 
 class InputLines {
  public:
-  /// `descriptor` stays the caller's. Of a terminal: while it belongs to another program, because this one runs in the
-  /// background, nothing is taken from it, and this one goes on.
+  /// `descriptor` is not closed here. If it is a terminal and this program runs in the background, nothing is read and
+  /// the program is not stopped.
   explicit InputLines(int descriptor = 0);
 
-  /// The whole lines that are there, without their ends, as far as one read brings them. Never blocks. What stands
-  /// behind the last line end when the input ends is a line too.
+  /// Returns the complete lines of one read, without their line ends. Never blocks. At the end of the input an
+  /// incomplete last line is returned too.
   [[nodiscard]] std::vector<std::string> take();
-  /// Nothing comes any more.
+  /// Returns whether the input has ended.
   [[nodiscard]] bool ended() const { return ended_; }
 
  private:
   int descriptor_;
   bool ended_ = false;
-  std::string begun_;  // a line that is not whole yet
+  std::string begun_;  // beginning of a line that is not complete yet
 };
 
 }  // namespace absenc::os

@@ -40,7 +40,7 @@ Failure::Kind kind_of(int error) {
   throw Failure(kind_of(error), "the file " + path + " cannot be made: " + std::generic_category().message(error));
 }
 
-// Returns 0, or the error of the system, EEXIST when there is a file `to` already.
+// Renames `from` to `to` if no file `to` exists. Returns 0 or a value of errno; EEXIST if `to` exists.
 int rename_to_new(const std::string& from, const std::string& to) {
   if (::renameat2(AT_FDCWD, from.c_str(), AT_FDCWD, to.c_str(), RENAME_NOREPLACE) == 0) return 0;
   if (errno != EINVAL && errno != ENOSYS) return errno;
@@ -105,7 +105,7 @@ void OwnFile::require_there() const {
 
 void OwnFile::sync() {
   require_there();
-  // What cannot be synchronised, a pipe or /dev/null, needs not be.
+  // A pipe or /dev/null cannot be synchronised and need not be.
   if (::fsync(file_.get()) < 0 && errno != EINVAL && errno != EROFS) throw system_failure("writing " + path_, errno);
 }
 

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Files of ours that must still be readable after the disk was full or the process killed: of whole lines, or of
-// blocks.
+// Output files that must stay readable after a full disk or a killed process: files of complete lines, or of blocks.
 #pragma once
 
 #include <cstdint>
@@ -12,12 +11,13 @@
 
 namespace absenc::os {
 
+/// A new file that this process writes; it must still have its name at every write.
 class OwnFile {
  public:
-  /// Waits for the disk. Throws Failure, as `require_there` too.
+  /// Waits until the content is on the disk. Throws Failure, also as `require_there` does.
   void sync();
-  /// Throws Failure, `lost`, when the file is no longer what its path leads to, or was cut: what is written then is
-  /// nowhere to be found.
+  /// Throws Failure `lost` if the path does not lead to this file any more or the file was truncated: further data
+  /// would not be found.
   void require_there() const;
 
   [[nodiscard]] const std::string& path() const { return path_; }
@@ -26,42 +26,45 @@ class OwnFile {
  protected:
   enum class Appears : std::uint8_t { at_once, later };
 
-  /// Makes the file. Throws Failure: `in_use` when there is one already, `no_permission`, `not_found`, `system`.
+  /// Creates the file. Throws Failure: `in_use` if the file exists, `no_permission`, `not_found`, `system`.
   OwnFile(const std::string& path, Appears appears);
   ~OwnFile();
   OwnFile(const OwnFile&) = delete;
   OwnFile& operator=(const OwnFile&) = delete;
 
-  /// What is written survives the end of this process (not of the power: `sync`). Returns 0, or the error of the
-  /// system.
+  /// Writes `bytes` at offset `at`. They survive the end of this process, and a power failure only after `sync`.
+  /// Returns 0 or a value of errno.
   [[nodiscard]] int put(std::uint64_t at, std::string_view bytes);
 
   std::string path_;
   Descriptor file_;
   std::uint64_t size_ = 0;
   bool appeared_ = false;
-  std::string beside_;  // its name until it appears, where the file system has no files without a name
+  std::string beside_;  // temporary name until `appear`, on file systems without nameless files
 };
 
+/// An output file of complete lines.
 class LineFile final : public OwnFile {
  public:
   explicit LineFile(const std::string& path) : OwnFile(path, Appears::at_once) {}
-  /// Hands `lines` to the system at once, which costs a few us. When they do not all fit, none of them stays. Throws
-  /// Failure, as `require_there` too.
+  /// Writes `lines` to the system at once, which takes a few us. If they do not all fit, none of them remains. Throws
+  /// Failure, also as `require_there` does.
   void append(std::string_view lines);
 };
 
+/// An output file that is written in blocks at any offset and has no name until `appear`.
 class BlockFile final : public OwnFile {
  public:
   explicit BlockFile(const std::string& path) : OwnFile(path, Appears::later) {}
-  /// Gives the file its name: until then nobody sees it, and it is gone when the process ends. Throws Failure, `in_use`
-  /// too when another has taken the name meanwhile.
+  /// Gives the file its name. Before this call no other process sees the file, and it disappears when the process ends.
+  /// Throws Failure; `in_use` if another file has taken the name.
   void appear();
-  /// Anywhere; what lies between the end and `at` is zero. Throws Failure, as `require_there` too.
+  /// Writes at any offset; a hole between the end and `at` reads as zeros. Throws Failure, also as `require_there`
+  /// does.
   void write(std::uint64_t at, Bytes bytes);
-  /// Makes it at least so long. Throws Failure.
+  /// Extends the file to at least `size` bytes. Throws Failure.
   void grow(std::uint64_t size);
-  /// What is behind the end is zero. Throws Failure.
+  /// Reads `bytes` at offset `at`; bytes behind the end read as zeros. Throws Failure.
   void read(std::uint64_t at, MutableBytes bytes) const;
 };
 

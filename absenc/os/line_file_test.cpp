@@ -17,7 +17,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// A directory of its own.
+/// A temporary directory, removed at the end.
 struct Directory {
   Directory() {
     std::string name = fs::temp_directory_path() / "absenc-line-file-XXXXXX";
@@ -64,7 +64,7 @@ TEST(LineFile, TakesBackWhatDoesNotFit) {
   const Directory directory;
   LineFile file(directory.path / "log");
   file.append("whole line\n");
-  // A limit of the process stands for the full disk: the first part of the write succeeds.
+  // A file size limit of the process simulates the full disk: the first part of the write succeeds.
   rlimit before{};
   ASSERT_EQ(::getrlimit(RLIMIT_FSIZE, &before), 0);
   auto* const handler = std::signal(SIGXFSZ, SIG_IGN);

@@ -40,7 +40,7 @@ std::uint16_t port_of(int socket) {
   if (::getsockname(socket, reinterpret_cast<sockaddr*>(&address), &size) < 0) {
     throw system_failure("getsockname", errno);
   }
-  // The port stands at the same place of both.
+  // The port has the same offset in IPv4 and IPv6 addresses.
   return ntohs(reinterpret_cast<const sockaddr_in&>(address).sin_port);
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A TCP port that programs on this computer or others connect to.
+// A TCP port that listens for connections from this or other computers.
 #pragma once
 
 #include <cstdint>
@@ -13,18 +13,19 @@ namespace absenc::os {
 
 struct Listener {
   Descriptor socket;
-  std::uint16_t port = 0;    // the one it got, when any was asked for
-  bool on_loopback = false;  // nobody on another computer can reach it
+  std::uint16_t port = 0;    // the actual port, also when any free port was requested
+  bool on_loopback = false;  // only this computer can reach the port
 };
 
-/// `host`: a name, an IPv4 or an IPv6 address, that one also in brackets; `port` 0: any that is free. Throws Failure:
-/// `not_found` (no such host here), `in_use`, `no_permission`, `system`.
+/// Listens at `host`: a name, an IPv4 or an IPv6 address, that one also in brackets. `port` 0 means any free port.
+/// Throws Failure: `not_found` (no such host here), `in_use`, `no_permission`, `system`.
 [[nodiscard]] Listener listen_at(const std::string& host, std::uint16_t port);
 
-/// "127.0.0.1"; "" of what is no internet address.
+/// Returns the address as text, for example "127.0.0.1"; "" if it is no internet address.
 [[nodiscard]] std::string host_text(const sockaddr& address);
 
-/// Whoever reads or writes there finds it at its end; it stays open until its owner closes it.
+/// Shuts down the connection: every reader and writer of it gets its end. The descriptor stays open until its owner
+/// closes it.
 void end_connection(int socket);
 
 }  // namespace absenc::os

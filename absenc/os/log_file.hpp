@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A folder that one process keeps, and files in it that are only appended to.
+// A folder owned by one process, with files that are only appended to.
 #pragma once
 
 #include <cstddef>
@@ -11,14 +11,14 @@
 
 namespace absenc::os {
 
-/// A folder, locked (flock) for as long as this lives.
+/// A folder, locked (flock) for the lifetime of the object.
 class OwnedFolder {
  public:
-  /// Makes it where there is none, but not its parent. Throws Failure: `in_use` when another process keeps it,
-  /// `not_found` when its parent is missing.
+  /// Creates the folder if it is missing, but not its parent. Throws Failure: `in_use` if another process owns it,
+  /// `not_found` if its parent is missing.
   explicit OwnedFolder(const std::string& path);
 
-  /// Whether it still has its name: it may have been removed, moved or replaced.
+  /// Returns whether the path still leads to this folder: it may have been removed, moved or replaced.
   [[nodiscard]] bool is_there() const;
 
  private:
@@ -26,25 +26,26 @@ class OwnedFolder {
   Descriptor folder_;
 };
 
+/// A file that is only appended to, except for `replace` and `shrink_to`.
 class LogFile {
  public:
   enum class Open : std::uint8_t { fresh, existing };
-  /// Throws Failure.
+  /// Opens the file, new or existing. Throws Failure.
   LogFile(const std::string& path, Open how);
 
-  /// Writes all of it at the end, or nothing. Returns 0, or the error of the system.
+  /// Appends all of `bytes` or nothing. Returns 0 or a value of errno.
   [[nodiscard]] int append(std::string_view bytes);
-  /// Replaces a byte that is there, which needs no room on the disk. Returns 0, or the error of the system.
+  /// Replaces an existing byte, which needs no room on the disk. Returns 0 or a value of errno.
   [[nodiscard]] int replace(std::size_t offset, char byte) const;
-  /// Replaces all of it by `bytes`, which are no more than there are: that needs no room either. False: nothing was
-  /// done, or not all of it.
+  /// Replaces the whole content by `bytes`, which must not be longer: this needs no room on the disk. Returns false if
+  /// not everything was written.
   [[nodiscard]] bool shrink_to(std::string_view bytes);
-  /// Up to `size` bytes: fewer at the end of the file. Throws Failure.
+  /// Returns up to `size` bytes from `offset`; fewer at the end of the file. Throws Failure.
   [[nodiscard]] std::string read(std::size_t offset, std::size_t size) const;
-  /// Waits for the disk.
+  /// Waits until the content is on the disk.
   void sync() const;
   [[nodiscard]] std::size_t size() const { return size_; }
-  /// Whether it still has a name.
+  /// Returns whether the file still has a name.
   [[nodiscard]] bool is_there() const;
 
  private:

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What sends over a network: names of computers, waiting for a socket, UDP to one place.
+// Network helpers for senders: computer names, waiting for a socket, UDP to one address.
 #pragma once
 
 #include <cstdint>
@@ -12,32 +12,34 @@
 
 namespace absenc::os {
 
-/// To one place, which is told and never waited for.
+/// UDP datagrams to one address. Sending never blocks.
 class Datagrams {
  public:
-  /// `host`: a name, which is looked up now, or an address. Throws Failure: `not_found`, `system`.
+  /// Resolves `host`, a name or an address, once. Throws Failure: `not_found`, `system`.
   Datagrams(const std::string& host, std::uint16_t port);
 
-  /// False when there was no room for it, or nobody is there: it is lost.
+  /// Sends one datagram. Returns false if the datagram is lost, because there was no room for it or the other side is
+  /// unreachable.
   [[nodiscard]] bool send(std::string_view text);
 
  private:
   Descriptor socket_;
 };
 
-/// The addresses of a computer, as text, in the order in which they are to be tried; looked up now. Throws Failure:
+/// Resolves `host` now. Returns the addresses as text, in the order in which they are to be tried. Throws Failure
 /// `not_found`.
 [[nodiscard]] std::vector<std::string> addresses_of(const std::string& host);
 
-/// What a socket of somebody else's library is ready for.
+/// Directions in which a socket of another library is ready.
 struct Ready {
   bool to_read = false;
   bool to_write = false;
 };
-/// Waits at most this long, or until a signal comes. Any number of open descriptors is good, as select() has it not.
+/// Waits until the socket is ready, at most `longest`, or until a signal arrives. Works with any descriptor number,
+/// unlike select().
 [[nodiscard]] Ready wait_for_socket(int socket, bool for_writing, Time longest);
 
-/// Of this computer; "" when it has none.
+/// Returns the name of this computer; "" if it has none.
 [[nodiscard]] std::string host_name();
 
 }  // namespace absenc::os

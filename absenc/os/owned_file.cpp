@@ -33,13 +33,14 @@ FileIdentity identity_of(const std::string& path) {
 OwnedFile::OwnedFile(const std::string& path) : path_(path) {
   constexpr int most_tries = 100;
   for (int tries = 0; tries < most_tries; ++tries) {
-    // To open a device may already do something to it.
+    // The type is checked before opening, because opening a device may already have an effect.
     struct stat named {};
     const bool there = ::stat(path.c_str(), &named) == 0;
     if (there) require_regular(is_regular(named), path);
     const int make = there ? 0 : O_CREAT | O_EXCL;
     file_ = Descriptor(::open(path.c_str(), O_RDWR | O_NONBLOCK | O_NOCTTY | O_CLOEXEC | make, 0666));
-    if (!file_ && (errno == EEXIST || (there && errno == ENOENT))) continue;  // somebody else was faster
+    // Another process created or removed the file meanwhile.
+    if (!file_ && (errno == EEXIST || (there && errno == ENOENT))) continue;
     if (!file_) throw system_failure("opening " + path, errno);
     made_ = made_ || !there;
     struct stat opened {};
@@ -49,10 +50,11 @@ OwnedFile::OwnedFile(const std::string& path) : path_(path) {
       if (errno != EWOULDBLOCK) throw system_failure("locking " + path, errno);
       throw Failure(Failure::Kind::in_use, "another program keeps " + path);
     }
-    // Until it was locked it may have been replaced.
+    // The file may have been replaced before it was locked.
     if (identity_of(path) == identity_of(opened)) return;
   }
-  throw system_failure("opening " + path, ELOOP);  // a link to itself; or somebody replaces it all the time
+  throw system_failure("opening " + path, ELOOP);  // a link to itself, or another process replaces the file again and
+                                                   // again
 }
 
 void OwnedFile::replace(std::string_view content, Durable durable) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A file that one process keeps up to date, as the memory of a virtual encoder.
+// A file that one process owns and keeps up to date, for example the memory of a virtual encoder.
 #pragma once
 
 #include <cstdint>
@@ -11,42 +11,43 @@
 
 namespace absenc::os {
 
-/// Tells files apart, whatever their names.
+/// Identifies a file independently of its names.
 struct FileIdentity {
   std::uint64_t device = 0;
-  std::uint64_t number = 0;  // 0: there is no file
+  std::uint64_t number = 0;  // inode number; 0: no file
 
   bool operator==(const FileIdentity&) const = default;
 };
 
-/// Of the file at `path`.
+/// Returns the identity of the file at `path`.
 [[nodiscard]] FileIdentity identity_of(const std::string& path);
 
-/// Locked (flock) from the constructor to the end of the object, also while it is replaced: the lock is on the file
-/// itself, and on each new one before it takes the place. Whoever opened the old one looks whether it still has its
-/// name.
+/// A file that is locked (flock) for the lifetime of the object, also while it is replaced: the lock belongs to the
+/// file itself, and each new file is locked before it takes the name. A process that opened the old file must check
+/// whether that file still has its name.
 class OwnedFile {
  public:
-  /// Makes an empty file where there is none. Throws Failure: `in_use` when another process keeps it, `unsupported`
-  /// when it is no regular file.
+  /// Creates an empty file if none exists. Throws Failure: `in_use` if another process owns it, `unsupported` if it is
+  /// not a regular file.
   explicit OwnedFile(const std::string& path);
 
-  /// Whether the constructor made it.
+  /// Returns whether the constructor created the file.
   [[nodiscard]] bool made() const { return made_; }
 
-  /// There is always a whole file, the old one or the new one. Afterwards the system has it, whatever becomes of this
-  /// process; with `Durable::yes` the disk has it too. Throws Failure.
+  /// Replaces the file by a new one with `content`. At every time the path leads to a complete file, the old one or the
+  /// new one. The content then survives the end of this process; with `Durable::yes` also a power failure. Throws
+  /// Failure.
   void replace(std::string_view content, Durable durable);
 
-  /// Whether the path still leads to this file.
+  /// Returns whether the path still leads to this file.
   [[nodiscard]] bool has_its_name() const;
   struct State {
-    std::int64_t size = 0;         // bytes
-    std::int64_t modified_ns = 0;  // calendar time of the last write
+    std::int64_t size = 0;         // in bytes
+    std::int64_t modified_ns = 0;  // calendar time of the last write, in nanoseconds
   };
-  /// Throws Failure.
+  /// Returns size and modification time. Throws Failure.
   [[nodiscard]] State state() const;
-  /// The first `size` bytes, or as many as there are. Throws Failure.
+  /// Returns the first `size` bytes, or fewer if the file is shorter. Throws Failure.
   [[nodiscard]] std::string beginning(std::size_t size) const;
 
  private:

@@ -29,7 +29,7 @@ void Poller::remove(int descriptor) { ::epoll_ctl(epoll_.get(), EPOLL_CTL_DEL, d
 
 void Poller::arm(Time deadline) {
   const auto whole = std::chrono::duration_cast<std::chrono::seconds>(deadline);
-  itimerspec setting{};  // all zero would disarm it
+  itimerspec setting{};  // all zero would disarm the timer
   setting.it_value = {whole.count(), deadline > whole ? (deadline - whole).count() : whole.count() == 0 ? 1 : 0};
   if (::timerfd_settime(timer_.get(), TFD_TIMER_ABSTIME, &setting, nullptr) < 0) {
     throw system_failure("timerfd_settime", errno);
@@ -39,9 +39,9 @@ void Poller::arm(Time deadline) {
 
 std::span<const int> Poller::wait(Time deadline) {
   if (interrupts_ < 0 && interrupt_descriptor() >= 0) add(interrupts_ = interrupt_descriptor());
-  // Deadlines mostly move on with every exchange. The timer stays at an old one, which costs one vain wake-up when it
-  // comes, instead of being set for every wait.
-  // A deadline that is over only asks what is there: that needs no timer.
+  // Deadlines mostly move later with every exchange. An armed timer is left at its old, earlier deadline: that costs
+  // one useless wake-up, but saves setting the timer at every wait. A deadline in the past needs no timer: the wait
+  // only checks which descriptors are ready.
   const bool over = deadline < armed_ && now() >= deadline;
   if (!over && deadline < armed_) arm(deadline);
   const Time patience = EndQuestion::patience();

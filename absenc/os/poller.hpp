@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Waits for bytes on a few descriptors, for a deadline and for Ctrl-C at the price of one system call, however many
-// there are: the reason why ports do not use `wait_for`.
+// Waits for bytes on a few descriptors, for a deadline and for Ctrl-C with one system call, whatever the number of
+// descriptors. Ports use it instead of `wait_for` for this reason.
 #pragma once
 
 #include <array>
@@ -14,18 +14,20 @@ namespace absenc::os {
 
 class Poller {
  public:
-  static constexpr std::size_t most_ready = 16;  // told at once; the others come with the next wait
+  static constexpr std::size_t most_ready = 16;  // maximum per call of `wait`; further descriptors follow with the next
+                                                 // call
 
   /// Throws Failure.
   Poller();
 
-  /// From now on `wait` tells when there is something to read, or an error to fetch. Throws Failure.
+  /// Makes `wait` report `descriptor` when it is readable or has an error. Throws Failure.
   void add(int descriptor);
-  /// Must come before the descriptor is closed.
+  /// Removes a descriptor; call it before the descriptor is closed.
   void remove(int descriptor);
 
-  /// Blocks until there is something to read and returns where; empty when `deadline` came first (`never`: none).
-  /// What is ready at once is seen even after the deadline. Throws Interrupted, Ended and Failure.
+  /// Blocks until a descriptor is readable and returns the readable ones; empty if `deadline` (`never`: no deadline) is
+  /// reached first. Descriptors that are ready at once are reported even after the deadline. Throws Interrupted, Ended
+  /// and Failure.
   [[nodiscard]] std::span<const int> wait(Time deadline);
 
  private:
@@ -33,8 +35,8 @@ class Poller {
 
   Descriptor epoll_;
   Descriptor timer_;
-  Time armed_ = never;   // what the timer is set to: never later than the deadline
-  int interrupts_ = -1;  // once they are caught
+  Time armed_ = never;   // time for which the timer is set: never later than the deadline
+  int interrupts_ = -1;  // descriptor of caught interrupts; -1 before
   std::array<int, most_ready> ready_{};
 };
 

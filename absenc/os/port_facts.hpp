@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What Linux tells of a serial port besides its bytes: which driver it has, how long it holds bytes back, and which
-// damaged characters its UART has counted.
+// Properties of a serial port that Linux reports: its driver, how long it holds bytes back, and how many damaged
+// characters its UART has counted.
 #pragma once
 
 #include <cstdint>
@@ -10,34 +10,34 @@
 
 namespace absenc::os {
 
-/// Of the UART, since it was made.
+/// Counts of damaged characters, since the UART was initialised.
 struct LineCounts {
-  std::uint64_t breaks = 0;   // the line stayed low for more than a character
-  std::uint64_t framing = 0;  // no stop bit where it should be
+  std::uint64_t breaks = 0;   // breaks: the line was low for longer than a character
+  std::uint64_t framing = 0;  // characters without a stop bit
   std::uint64_t parity = 0;
-  std::uint64_t overruns = 0;  // the computer was too slow
+  std::uint64_t overruns = 0;  // characters lost because the computer was too slow
 
   [[nodiscard]] LineCounts since(const LineCounts& before) const {
     return {breaks - before.breaks, framing - before.framing, parity - before.parity, overruns - before.overruns};
   }
 };
 
-/// What is not known is empty.
+/// Properties of a port; unknown ones are empty.
 struct PortFacts {
-  std::string driver{};                     // "ftdi_sio", "serial8250"
+  std::string driver{};                     // for example "ftdi_sio", "serial8250"
   std::optional<unsigned> latency_timer{};  // milliseconds
   std::optional<bool> kernel_direction{};   // whether the kernel switches an RS-485 transceiver
   std::optional<LineCounts> counts{};
-  bool pseudo_terminal = false;  // it has no line, and so no rate
+  bool pseudo_terminal = false;  // a pseudo-terminal has no line and so no rate
 };
 
-/// Of the port at `path`, which nobody should have open: what its driver tells is left out else. `sys` is a parameter
-/// for tests.
+/// Returns the properties of the port at `path`. The port should not be open in any program, or the properties known to
+/// its driver are missing. `sys` is a parameter for tests.
 [[nodiscard]] PortFacts port_facts(const std::string& path, const std::filesystem::path& sys = "/sys/class/tty");
 
-/// Whether such a driver is that of a mobile modem, behind whose ports no line is.
+/// Returns whether `driver` is that of a mobile modem, whose ports lead to no line.
 [[nodiscard]] bool is_modem_driver(const std::string& driver);
-/// Whether it is that of a UART of the computer itself, which has no transceiver that switches by itself.
+/// Returns whether `driver` is that of a built-in UART, which has no transceiver that switches direction by itself.
 [[nodiscard]] bool is_bare_uart(const std::string& driver);
 
 }  // namespace absenc::os

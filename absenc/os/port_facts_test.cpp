@@ -12,7 +12,7 @@ namespace absenc::os {
 
 namespace fs = std::filesystem;
 
-// A folder in the place of /sys/class/tty, and a plain file in that of the port.
+// A folder replaces /sys/class/tty, and a regular file replaces the port.
 TEST(PortFacts, WhatSysTellsOfAPort) {
   const testing::TemporaryDirectory directory;
   const fs::path port = directory.path() / "ttyUSB7";
@@ -25,7 +25,7 @@ TEST(PortFacts, WhatSysTellsOfAPort) {
   const PortFacts facts = port_facts(port, directory.path() / "sys");
   EXPECT_EQ(facts.driver, "ftdi_sio");
   EXPECT_EQ(facts.latency_timer, 16u);
-  EXPECT_FALSE(facts.counts);  // it is no terminal
+  EXPECT_FALSE(facts.counts);  // a regular file has no counts, because it is no terminal
   EXPECT_FALSE(facts.kernel_direction);
 
   const PortFacts unknown = port_facts(directory.path() / "ttyUSB8", directory.path() / "sys");

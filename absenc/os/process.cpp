@@ -23,7 +23,7 @@ void protect_standard_streams() {
   std::signal(SIGXFSZ, SIG_IGN);
   for (const int stream : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
     if (::fcntl(stream, F_GETFD) >= 0 || errno != EBADF) continue;
-    // The lowest free number is this one.
+    // open() returns the lowest free number, which is this stream.
     if (::open("/dev/null", stream == STDOUT_FILENO ? O_RDONLY : O_RDWR) < 0) throw system_failure("/dev/null", errno);
   }
 }
@@ -37,7 +37,7 @@ int write_standard_output(std::string_view bytes) {
       const int error = errno;
       struct stat file {};
       const bool is_file = ::fstat(STDOUT_FILENO, &file) == 0 && S_ISREG(file.st_mode);
-      // Unless another program has written behind it.
+      // The part that was written is removed, unless another program has written behind it.
       if (done > 0 && is_file && file.st_size == ::lseek(STDOUT_FILENO, 0, SEEK_CUR)) {
         [[maybe_unused]] const int ignored = ::ftruncate(STDOUT_FILENO, file.st_size - done);
         ::lseek(STDOUT_FILENO, -done, SEEK_CUR);
@@ -64,7 +64,8 @@ Time processor_time() {
 RunDelay::RunDelay() : file_(::open("/proc/thread-self/schedstat", O_RDONLY | O_CLOEXEC)) { (void)take(); }
 
 Time RunDelay::take() {
-  std::array<char, 64> text{};  // "time on a processor, time ready to run but not let, time slices": nanoseconds
+  std::array<char, 64> text{};  // in nanoseconds: time on a processor, time ready to run but waiting; then the number
+                                // of time slices
   if (!file_ || ::pread(file_.get(), text.data(), text.size() - 1, 0) <= 0) return {};
   char* end = text.data();
   std::strtoull(end, &end, 10);
@@ -85,7 +86,8 @@ std::string folder_of(const std::string& path) {
   return folder.empty() ? "." : folder;
 }
 
-// Without a name: whatever becomes of the process, nothing stays. Not every file system has such files.
+// Opens a file without a name, which leaves nothing behind however the process ends. Not every file system supports
+// this.
 Descriptor open_nameless(const std::string& folder, mode_t mode) {
   return Descriptor(::open(folder.c_str(), O_TMPFILE | O_RDWR | O_CLOEXEC, mode));
 }
@@ -121,7 +123,7 @@ void NewFile::write(std::string_view content) {
 
 Descriptor NewFile::take_place(Durable durable) {
   if (durable == Durable::yes && ::fsync(file_.get()) < 0) throw system_failure("writing " + path_, errno);
-  if (beside_.empty()) {  // a name cannot be given in the place of another
+  if (beside_.empty()) {  // linkat(2) cannot replace an existing name, so the file gets a temporary one first
     beside_ = path_ + "." + std::to_string(::getpid());
     ::unlink(beside_.c_str());
     if (::linkat(AT_FDCWD, meanwhile_.c_str(), AT_FDCWD, beside_.c_str(), AT_SYMLINK_FOLLOW) < 0) {

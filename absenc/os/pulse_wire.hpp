@@ -11,40 +11,40 @@ struct gpiod_line;
 
 namespace absenc::os {
 
-/// Which wire it is. Levels are those of a UART's own pins, where RTS and DTR are low while they are set; a driver of
-/// RS-232 turns them over. They are pulsed only where the user names them: opening a port sets both.
+/// A wire for pulses. Levels are those of the UART's own pins, where a set RTS or DTR is low; an RS-232 driver inverts
+/// them. A wire is pulsed only if the user names it, because opening a port sets both RTS and DTR.
 struct PulseWire {
   enum class Kind { none, rts, dtr, gpio } kind = Kind::none;
-  std::string name{};           // gpio: as `gpioinfo` lists it
-  bool active_high = false;     // the level during the pulse; the other one is held at rest
-  std::optional<Time> width{};  // instead of what the protocol asks for
+  std::string name{};           // gpio: name of the line as `gpioinfo` lists it
+  bool active_high = false;     // level during the pulse; at rest the wire has the other level
+  std::optional<Time> width{};  // pulse width that replaces the one requested by the protocol
 };
 
-/// For ExtraWire::trigger and ExtraWire::clear.
+/// The wires of ExtraWire::trigger and ExtraWire::clear.
 struct PulseWires {
   PulseWire trigger{};
   PulseWire clear{};
 };
 
-/// The calls behind a PulseOutput. Few machines that test this have such wires, and no kernel offers virtual ones: a
-/// test overrides these, and sees exactly what is asked of the system. Each fails with errno.
+/// The system calls of a PulseOutput. Few test machines have such wires, and the kernel offers no virtual ones, so
+/// tests override these calls and see every request. A call that fails sets errno.
 struct WireKernel {
   virtual ~WireKernel() = default;
-  /// ioctl(2) with TIOCMBIS or TIOCMBIC.
+  /// Calls ioctl(2) with TIOCMBIS or TIOCMBIC.
   virtual int set_modem_lines(int descriptor, unsigned long request, int lines);
   virtual gpiod_line* find_gpio(const std::string& name);
-  /// As an output at 0.
+  /// Requests the line as an output at level 0.
   virtual int request_gpio(gpiod_line* line, bool active_low);
   virtual int set_gpio(gpiod_line* line, int value);
   virtual void release_gpio(gpiod_line* line);
 };
 [[nodiscard]] WireKernel& system_wires();
 
-/// A wire that is held at rest from the beginning.
+/// A wire that is held at rest from its construction on.
 class PulseOutput {
  public:
-  /// `descriptor`: of the serial port `path`. Throws Failure: `not_found`, `no_permission` and `in_use` for a GPIO
-  /// line, `unsupported` when the port has no such wire, `system`.
+  /// `descriptor` belongs to the serial port `path`. Throws Failure: `not_found`, `no_permission` and `in_use` for a
+  /// GPIO line, `unsupported` if the port has no such wire, `system`.
   PulseOutput(PulseWire wire, int descriptor, std::string path, WireKernel& kernel);
   PulseOutput(const PulseOutput&) = delete;
   PulseOutput& operator=(const PulseOutput&) = delete;

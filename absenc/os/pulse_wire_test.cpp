@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Above a stand-in for the kernel: what is asked of RTS, DTR and GPIO lines.
+// Tests requests for RTS, DTR and GPIO lines with a test replacement of the kernel.
 #include "absenc/os/pulse_wire.hpp"
 
 #include <gtest/gtest.h>
@@ -20,7 +20,7 @@ using namespace testing;
 using Wire = PulseWire::Kind;
 using Log = std::vector<std::string>;
 
-/// One GPIO line, "CLK", and modem lines that do what they are told.
+/// A kernel with one GPIO line, "CLK", and modem lines that follow every request.
 class FakeWires final : public WireKernel {
  public:
   int set_modem_lines(int, unsigned long request, int lines) override {
@@ -156,7 +156,7 @@ TEST_F(PulseWireTest, RtsHasOneUseOnly) {
   EXPECT_NE(std::string(failure.what()).find("use DTR or a GPIO line"), std::string::npos);
 }
 
-// The real calls, as far as they go without a wire.
+// Tests the real system calls as far as possible without a wire.
 TEST(SystemWires, TellThatAPseudoTerminalHasNone) {
   const PseudoTerminal terminal;
   for (const Wire wire : {Wire::rts, Wire::dtr}) {

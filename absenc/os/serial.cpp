@@ -25,12 +25,12 @@ Descriptor open_terminal(const std::string& path, SerialUse use) {
   const int access = use == SerialUse::receive ? O_RDONLY : O_RDWR;
   Descriptor descriptor(::open(path.c_str(), access | O_NOCTTY | O_NONBLOCK | O_CLOEXEC));
   if (!descriptor) throw open_failure(path, errno);
-  // Before anything waits for it: epoll refuses plain files.
+  // Checked before any wait: epoll refuses regular files with a less clear error.
   if (!terminal_state(descriptor.get())) throw open_failure(path, errno);
   return descriptor;
 }
 
-// 136 to 143: slaves of Unix98 pseudo-terminals (Documentation/admin-guide/devices.txt).
+// Slaves of Unix98 pseudo-terminals have major numbers 136 to 143 (Documentation/admin-guide/devices.txt).
 bool is_pseudo(const struct stat& status) { return major(status.st_rdev) >= 136 && major(status.st_rdev) <= 143; }
 
 bool is_pseudo_terminal(int descriptor) {
@@ -42,7 +42,7 @@ bool uses_rts(const PulseWires& wires) {
   return wires.trigger.kind == PulseWire::Kind::rts || wires.clear.kind == PulseWire::Kind::rts;
 }
 
-// The device's end of a USB cable (u_serial.c of the kernel) has no line, and keeps whatever rate it had.
+// The device's end of a USB cable (u_serial.c of the kernel) has no line and accepts any rate.
 bool is_gadget(const std::string& path) {
   std::error_code ignored;
   return std::filesystem::canonical(path, ignored).filename().native().starts_with("ttyGS");
@@ -76,7 +76,7 @@ SerialPort::SerialPort(const std::string& path, const LineSettings& settings, Rs
   if (!before) throw open_failure(path, errno);
   before_ = *before;
   lock();
-  ::tcflush(descriptor(), TCOFLUSH);  // what another program left unsent must not hold us up
+  ::tcflush(descriptor(), TCOFLUSH);  // unsent bytes of another program must not delay the first request
   try {
     apply(settings);
     if (uses_rts(wires) && rs485 == Rs485::on) {
@@ -84,7 +84,7 @@ SerialPort::SerialPort(const std::string& path, const LineSettings& settings, Rs
                     "RTS cannot switch the direction of RS-485 and carry pulses: use DTR or a GPIO line for them");
     }
     if (use == SerialUse::receive) {
-      const int rts = TIOCM_RTS;  // the kernel raised it when the port was opened
+      const int rts = TIOCM_RTS;  // the kernel set RTS when the port was opened
       ::ioctl(descriptor(), TIOCMBIC, &rts);
     } else {
       set_direction(uses_rts(wires) ? Rs485::off : rs485);
@@ -103,15 +103,15 @@ SerialPort::~SerialPort() {
   if (!pseudo_) ::ioctl(descriptor(), TIOCNXCL);
 }
 
-// flock keeps out every program that asks, root's as well; TIOCEXCL those that do not ask, but for root's.
+// flock keeps out every program that uses it, also those of root; TIOCEXCL keeps out all programs except those of root.
 void SerialPort::lock() const {
   if (::flock(descriptor(), LOCK_EX | LOCK_NB) < 0) throw open_failure(path_, errno);
-  // TIOCEXCL lasts until the last descriptor is closed. A virtual encoder keeps its side of the slave open, so that
-  // the flag would outlive us and lock the next user out.
+  // TIOCEXCL lasts until the last descriptor is closed. A virtual encoder keeps its side of the slave open, so the flag
+  // would outlive this port and lock out the next user.
   if (!pseudo_) ::ioctl(descriptor(), TIOCEXCL);
 }
 
-// Parity and stop bits are those of the wiring, whatever a conversation does with the rate.
+// Parity and stop bits belong to the wiring, so a change of the rate leaves them.
 void SerialPort::change_rate(std::uint32_t rate) {
   LineSettings settings = line_;
   settings.rate = rate;
@@ -121,7 +121,7 @@ void SerialPort::change_rate(std::uint32_t rate) {
 void SerialPort::apply(const LineSettings& settings) {
   if (settings.rate == 0) throw Failure(Failure::Kind::bad_rate, "a serial port needs a baud rate above 0");
   const std::optional<LineSettings> set = set_terminal(descriptor(), settings);
-  if (!set) fail(errno);  // it may go away just then
+  if (!set) fail(errno);  // the port may disappear at this time
   const LineSettings given = *set;
   line_ = settings;
   if (is_gadget(path_)) return;
@@ -131,7 +131,7 @@ void SerialPort::apply(const LineSettings& settings) {
                       std::to_string(nearest_rate(settings.rate, given.rate, clock_of_rates())) +
                       ": use that, or another adapter");
   }
-  if (pseudo_) return;  // it has no line: parity is taken back, characters take no time
+  if (pseudo_) return;  // without a line parity is ignored and characters take no time
   if (given.parity != settings.parity || given.stop_bits != settings.stop_bits) {
     throw Failure(Failure::Kind::unsupported,
                   "the port " + path_ + " cannot do " + std::string(name_of(settings.parity)) + " parity with " +
@@ -168,9 +168,9 @@ void SerialPort::set_direction(Rs485 rs485) {
 }
 
 void SerialPort::shorten_latency() {
-  // USB frames, the receive FIFO's own time-out (4 characters) and scheduling. On a pseudo-terminal it is scheduling
-  // alone, of two processes, which a busy machine may hold up for a time slice or two: 2 ms gave false timeouts. The
-  // limit only matters when something is wrong.
+  // The latency covers USB frames, the receive FIFO's own timeout (4 characters) and scheduling. On a pseudo-terminal
+  // it covers only the scheduling of two processes, which a busy machine may delay by a time slice or two: 2 ms gave
+  // false timeouts. The limit only matters when a reply is missing.
   set_latency(pseudo_ ? 20ms : 10ms);
   if (pseudo_) return;
   serial_struct serial{};

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A serial port of Linux: UARTs, USB adapters, and pseudo-terminals, which virtual encoders offer.
+// A serial port of Linux: UARTs, USB adapters, and pseudo-terminals of virtual encoders.
 #pragma once
 
 #include <cstdint>
@@ -15,34 +15,34 @@
 
 namespace absenc::os {
 
-/// Who switches an RS-485 transceiver to sending.
+/// Selects the component that switches an RS-485 transceiver to sending.
 enum class Rs485 : std::uint8_t {
-  automatic,  // the kernel with RTS where the port can and RTS is free, otherwise the adapter; for half-duplex lines
-  on,         // the kernel; a port that cannot is an error
+  automatic,  // half-duplex lines: the kernel with RTS if the port supports it and RTS is free, otherwise the adapter
+  on,         // the kernel; a port that does not support it is an error
   off,        // not the kernel; for full-duplex lines
 };
 
-/// Whether a port is to send at all.
+/// Directions in which a port is used.
 enum class SerialUse : std::uint8_t {
   both,
-  receive,  // it is opened without writing, so that nothing can be sent; RTS, by which some adapters send, is released
+  receive,  // opened without writing, so that nothing can be sent; RTS, which makes some adapters send, is released
 };
 
-/// Whether characters take no time there, and any rate does.
+/// Returns whether `path` is a pseudo-terminal, where characters take no time and every rate works.
 [[nodiscard]] bool is_pseudo_terminal(const std::string& path);
 
-/// Raw, 8 data bits. Locked against other programs; the previous settings come back when it is closed.
+/// A serial port in raw mode with 8 data bits, locked against other programs. Closing restores the previous settings.
 class SerialPort final : public DescriptorPort {
  public:
-  /// What came before is discarded. Throws Failure of every kind but `lost`; `bad_rate` when the port's nearest rate
-  /// is more than 1 % away. A pulse without its wire in `wires` is `unsupported`. `kernel` must outlive the port.
+  /// Discards bytes received before. Throws Failure of every kind except `lost`; `bad_rate` if the port's nearest rate
+  /// differs by more than 1 %. A pulse without its wire in `wires` is `unsupported`. `kernel` must outlive the port.
   SerialPort(const std::string& path, const LineSettings& settings, Rs485 rs485 = Rs485::automatic,
              const PulseWires& wires = {}, WireKernel& kernel = system_wires(), SerialUse use = SerialUse::both);
   ~SerialPort() override;
 
-  /// What could be better about this port, one sentence each, with the remedy.
+  /// Returns hints about settings of this port that could be better, one sentence each, with the remedy.
   [[nodiscard]] const std::vector<std::string>& notes() const { return notes_; }
-  /// Whether the kernel switches the direction.
+  /// Returns whether the kernel switches the transceiver's direction.
   [[nodiscard]] bool kernel_direction() const { return kernel_direction_; }
 
  private:

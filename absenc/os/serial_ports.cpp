@@ -26,7 +26,7 @@ bool is_number(std::string_view text) {
   return !text.empty() && std::all_of(text.begin(), text.end(), [](unsigned char c) { return std::isdigit(c) != 0; });
 }
 
-// The first link in the folder that leads to the file; "" when none does.
+// Returns the first link in `folder` that leads to `file`; "" if none does.
 std::string link_to(const fs::path& file, const fs::path& folder) {
   std::error_code error;
   for (const auto& entry : fs::directory_iterator(folder, error)) {
@@ -35,7 +35,7 @@ std::string link_to(const fs::path& file, const fs::path& folder) {
   return {};
 }
 
-// "sleep (process 4711)"; of absenc with its verb, "absenc serve (process 4711)".
+// Returns a text like "sleep (process 4711)"; for absenc with its verb, "absenc serve (process 4711)".
 std::string program(const std::string& process) {
   std::string name = first_line(fs::path("/proc") / process / "comm");
   if (name == "absenc") {
@@ -47,7 +47,7 @@ std::string program(const std::string& process) {
   return (name.empty() ? "a program" : name) + " (process " + process + ")";
 }
 
-// The process that holds a flock on the file, from a line like "1: FLOCK  ADVISORY  WRITE 4711 00:1a:7 0 EOF".
+// Returns the process that holds a flock on the file, from a line like "1: FLOCK  ADVISORY  WRITE 4711 00:1a:7 0 EOF".
 std::string lock_holder(const struct stat& file) {
   std::ifstream locks("/proc/locks");
   std::string number, kind, mode, access, process, inode, rest;
@@ -63,7 +63,7 @@ std::string lock_holder(const struct stat& file) {
   return {};
 }
 
-// A process that has the file open; only those of the same user can be looked into.
+// Returns a process that has the file open; only processes of the same user can be inspected.
 std::string opener(const fs::path& file) {
   std::error_code ignored;
   for (const auto& process : fs::directory_iterator("/proc", ignored)) {
@@ -88,7 +88,7 @@ Failure in_use(const std::string& path) {
                                                              : Holder::program;
     return {what + holder + ": end it, or use another port", who};
   }
-  // A server reads for many: who ended it would take the encoder from all of them.
+  // The advice is not to end the server: it may read this encoder for several clients.
   const std::string process = holder.substr(server.size(), holder.size() - server.size() - 1);
   const std::string page = page_of_server(path, process);
   const std::string where =
@@ -128,7 +128,7 @@ std::vector<std::string> serial_ports(const fs::path& sys) {
   std::error_code ignored;
   for (const auto& entry : fs::directory_iterator(sys, ignored)) {
     if (!fs::exists(entry.path() / "device", ignored)) continue;
-    // PCs list 4 or 32 ports of the 16550 driver whether they are there or not; type 0 is "unknown".
+    // PCs list 4 or 32 ports of the 16550 driver whether they exist or not; type 0 is "unknown".
     if (first_line(entry.path() / "type") == "0") continue;
     ports.push_back("/dev/" + entry.path().filename().string());
   }
@@ -142,8 +142,7 @@ std::optional<unsigned> latency_timer(const std::string& terminal, const fs::pat
 
 std::string driver_of(const std::string& terminal, const fs::path& sys) {
   std::error_code error;
-  // Since Linux 6.5 two devices of the kernel's own stand between a terminal and its UART
-  // (drivers/tty/serial/serial_base_bus.c).
+  // Since Linux 6.5 two kernel devices lie between a terminal and its UART (drivers/tty/serial/serial_base_bus.c).
   for (fs::path device = fs::canonical(sys / terminal / "device", error); !error; device = device.parent_path()) {
     const std::string driver = fs::canonical(device / "driver", error).filename();
     if (error || (driver != "port" && driver != "ctrl")) return driver;
@@ -157,7 +156,7 @@ std::string holder_of(const std::string& path) {
   struct stat status {};
   std::string holder;
   if (::stat(path.c_str(), &status) == 0) holder = lock_holder(status);
-  // A pseudo-terminal is always open in the program that made it, which is not the one that is in the way.
+  // The program that made a pseudo-terminal always has it open; it is not the one that blocks the port.
   if (holder.empty() && !file.native().starts_with("/dev/pts/")) holder = opener(file);
   return holder;
 }
@@ -183,7 +182,8 @@ Failure open_failure(const std::string& path, int error) {
     case ENXIO:
     case ENODEV:
       return no_port(path);
-    case EIO:  // from the terminal's ioctl: a 16550 that is only listed, or a line that was hung up since it was opened
+    // From the terminal's ioctl: a 16550 that is listed but does not exist, or a line that was hung up after opening.
+    case EIO:
       return {Failure::Kind::not_found, "the port " + path +
                                             " is there, but no hardware is behind it, or not any more: check the name, "
                                             "or plug it in again"};

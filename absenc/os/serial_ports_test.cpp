@@ -22,8 +22,8 @@ namespace fs = std::filesystem;
 
 namespace {
 
-/// A folder in the place of /sys, laid out as the kernel does: the terminal's device is below an interface of the USB
-/// device, which alone has its numbers.
+/// A folder with the layout of /sys: the terminal's device is below an interface of the USB device, and only the USB
+/// device has its identification numbers.
 class ListedPorts : public ::testing::Test {
  protected:
   void write(const fs::path& file, std::string_view text) const {
@@ -74,7 +74,7 @@ TEST_F(ListedPorts, AnAdapterSaysWhoItIs) {
 
 TEST_F(ListedPorts, AChipThatTheNumbersDoNotTellHasNoRate) {
   plug_in("0403", "6010", "0700");
-  EXPECT_EQ(look().highest_rate, 12'000'000u);  // by its release
+  EXPECT_EQ(look().highest_rate, 12'000'000u);  // the release number identifies the chip
   write("devices/usb1/1-2/bcdDevice", "9999");
   EXPECT_FALSE(look().highest_rate);
   write("devices/usb1/1-2/idVendor", "10c4");

@@ -28,7 +28,7 @@ bool contains(const Failure& failure, std::string_view part) {
   return std::string_view(failure.what()).find(part) != std::string_view::npos;
 }
 
-// The last field of struct termios2.
+// Returns the rate: the last field of struct termios2.
 std::uint32_t rate_of(const TerminalState& state) {
   std::uint32_t rate = 0;
   std::memcpy(&rate, state.data() + state.size() - sizeof rate, sizeof rate);
@@ -48,7 +48,7 @@ static_assert(nearest_rate(2'500'000, 9600, 5'000'000) == 9600, "the driver has 
 
 TEST(SerialPort, SetsAnyRateAndPutsEverythingBack) {
   const PseudoTerminal terminal;
-  const auto before = terminal_state(terminal.master.get());  // of the slave: a master has none of its own
+  const auto before = terminal_state(terminal.master.get());  // settings of the slave: a master has none of its own
   ASSERT_TRUE(before);
   {
     const SerialPort port(terminal.path, fast);
@@ -69,7 +69,7 @@ TEST(SerialPort, ChangesTheRate) {
   EXPECT_EQ(failure_of(zero).kind(), Kind::bad_rate);
 }
 
-// A pseudo-terminal takes parity back, but not which one it would be, nor the stop bits.
+// A pseudo-terminal clears the parity flag, but leaves the odd-parity and stop-bit flags.
 TEST(SerialPort, AChangeOfTheRateLeavesParityAndStopBits) {
   const PseudoTerminal terminal;
   SerialPort port(terminal.path, {.rate = 19'200, .parity = Parity::odd, .stop_bits = 2});
@@ -90,7 +90,7 @@ TEST(SerialPort, CarriesEveryByteUnchanged) {
   for (std::size_t i = 0; i < all.size(); ++i) all[i] = static_cast<std::uint8_t>(i);
   const Descriptor slave(::open(terminal.path.c_str(), O_RDWR | O_NOCTTY));
   set_terminal(slave.get(), fast);
-  put(terminal.master.get(), {0x55});  // to be discarded, once it has arrived
+  put(terminal.master.get(), {0x55});  // must be discarded when the port is opened
   pollfd readable{slave.get(), POLLIN, 0};
   ASSERT_EQ(::poll(&readable, 1, 5000), 1);
   SerialPort port(terminal.path, fast);
@@ -111,7 +111,7 @@ TEST(SerialPort, CarriesEveryByteUnchanged) {
     got.insert(got.end(), event.items.begin(), event.items.end());
   }
   EXPECT_EQ(got, all);
-  EXPECT_EQ(get(terminal.master.get(), 0), Data{});  // no echo
+  EXPECT_EQ(get(terminal.master.get(), 0), Data{});  // the port sends no echo
 }
 
 TEST(SerialPort, IsLostWithItsOtherSide) {
@@ -132,7 +132,7 @@ TEST(SerialPort, IsForOneProgramAtATime) {
     const Failure failure = failure_of([&] { const SerialPort second(terminal.path, {.rate = 9600}); });
     EXPECT_EQ(failure.kind(), Kind::in_use);
     EXPECT_TRUE(contains(failure, "(process " + std::to_string(::getpid()) + ")")) << failure.what();
-    EXPECT_EQ(rate_of(*terminal_state(terminal.master.get())), fast.rate);  // the first is not disturbed
+    EXPECT_EQ(rate_of(*terminal_state(terminal.master.get())), fast.rate);  // the first user's settings are not changed
   }
   int exclusive = 1;
   const Descriptor slave(::open(terminal.path.c_str(), O_RDWR | O_NOCTTY));
@@ -162,7 +162,7 @@ TEST(SerialPort, SaysWhenThePseudoTerminalHasNoWires) {
   EXPECT_EQ(failure_of([&] { const SerialPort other(second.path, fast, Rs485::on); }).kind(), Kind::unsupported);
 }
 
-// Opens `path` as an ordinary user in a child; its exit status tells whether the message had `part`.
+// Opens `path` as an ordinary user in a child process, whose exit status shows whether the message contained `part`.
 void expect_no_permission(const std::string& path, const std::string& part) {
   const pid_t child = ::fork();
   ASSERT_GE(child, 0);

@@ -19,7 +19,7 @@ fs::path folder_in(const char* variable, const char* name) {
   return value == nullptr || *value == '\0' ? fs::path() : fs::path(value) / name;
 }
 
-// A link and what it leads to are one port.
+// Returns the same file name for a link and for the port that it leads to.
 std::string file_name(const std::string& port) {
   std::error_code error;
   const fs::path path = fs::canonical(port, error);
@@ -39,10 +39,10 @@ void ServedPorts::set(const std::vector<std::string>& ports) {
   for (const std::string& port : ports) {
     if (folder.empty()) break;
     std::string file = folder / file_name(port);
-    // In one step, because others read it at any time.
+    // Written under another name and renamed, because other programs may read it at any time.
     const std::string part = file + "." + std::to_string(::getpid());
     std::ofstream(part) << ::getpid() << " " << url_ << "\n";
-    // Everybody may read it, also of a service whose files are its own.
+    // All users may read it, even if the service creates its files for itself only.
     fs::permissions(part, fs::perms::group_read | fs::perms::others_read, fs::perm_options::add, error);
     fs::rename(part, file, error);
     if (error) {
@@ -63,7 +63,7 @@ std::string page_of_server(const std::string& port, const std::string& holder) {
     std::ifstream file(folder / file_name(port));
     std::string process;
     std::string url;
-    // A server that was killed leaves its file behind, which says nothing of who has the port now.
+    // A server that was killed leaves its file behind, so the process number must match.
     if (file >> process >> url && process == holder) return url;
   }
   return {};

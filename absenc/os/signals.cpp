@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The handler makes an eventfd readable that every wait watches. Against blocking the signals outside ppoll: prompts
-// and computations can be interrupted as well, all threads wake, and a line that is never quiet cannot hide a signal.
+// The signal handler makes an eventfd readable, which every wait watches. Unlike blocking the signals outside ppoll,
+// this also interrupts prompts and computations, wakes all threads, and works on a line that is never quiet.
 #include "absenc/os/signals.hpp"
 
 #include <sys/eventfd.h>
@@ -22,7 +22,7 @@ namespace absenc::os {
 
 namespace {
 
-// What a handler may touch must be free of locks.
+// A signal handler may use only lock-free variables.
 static_assert(std::atomic<int>::is_always_lock_free && std::atomic<bool>::is_always_lock_free);
 std::atomic<int> wake{-1};  // the eventfd
 std::atomic<bool> came{false};
@@ -40,7 +40,7 @@ void install() {
   if (wake < 0) throw system_failure("eventfd", errno);
   struct sigaction action {};
   action.sa_handler = on_signal;
-  // Without SA_RESTART: a prompt that reads the terminal returns as well.
+  // Without SA_RESTART a prompt that reads the terminal returns as well.
   for (const int signal : {SIGINT, SIGTERM}) {
     if (::sigaction(signal, &action, nullptr) < 0) throw system_failure("sigaction", errno);
   }
@@ -94,7 +94,7 @@ bool wait_for(std::span<pollfd> watched, Time deadline) {
   std::array<pollfd, most_watched + 1> all;
   std::copy(watched.begin(), watched.end(), all.begin());
   pollfd& signal = all[watched.size()];
-  signal = {interrupt_descriptor(), POLLIN, 0};  // -1: not looked at
+  signal = {interrupt_descriptor(), POLLIN, 0};  // -1 is ignored by poll
   for (;;) {
     const Time patience = EndQuestion::patience();
     const Time look = patience == never ? deadline : std::min(deadline, now() + patience);
@@ -102,7 +102,8 @@ bool wait_for(std::span<pollfd> watched, Time deadline) {
     if (look != never) timeout = time_left(look);
     const int ready = ::ppoll(all.data(), watched.size() + 1, look == never ? nullptr : &timeout, nullptr);
     if (ready < 0) {
-      if (errno == EINTR) continue;  // ours is readable now, any other is none of our business
+      // SIGINT and SIGTERM have made the eventfd readable; other signals do not matter here.
+      if (errno == EINTR) continue;
       throw system_failure("ppoll", errno);
     }
     if (signal.revents != 0) {
@@ -123,7 +124,8 @@ void sleep_until(Time time) {
 }
 
 void reach(Time time) {
-  constexpr Time wake_up = std::chrono::microseconds(100);  // the kernel is as late: timer slack and scheduling
+  constexpr Time wake_up = std::chrono::microseconds(100);  // the kernel may wake a thread this much late: timer slack
+                                                            // and scheduling
   if (time - now() > wake_up) sleep_until(time - wake_up);
   while (now() < time) {
   }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The clock of all ports, and waiting that Ctrl-C ends.
+// The clock of all ports, and waits that Ctrl-C ends.
 #pragma once
 
 #include <poll.h>
@@ -12,53 +12,53 @@
 
 namespace absenc::os {
 
-/// Makes SIGINT and SIGTERM end the waits below, also where the parent had them ignored (as a shell does for what it
-/// puts in the background). Call it early in main; further calls change nothing. Throws Failure.
+/// Makes SIGINT and SIGTERM end the waits below, even if the parent process ignored them (as a shell does for
+/// background programs). Call it early in main; further calls change nothing. Throws Failure.
 void catch_interrupts();
 
-/// Whether such a signal has come since `catch_interrupts`, for loops that never wait.
+/// Returns whether SIGINT or SIGTERM was received since `catch_interrupts`, for loops that never wait.
 [[nodiscard]] bool interrupted();
 
-/// Readable when such a signal has come; -1 before `catch_interrupts`.
+/// Returns a descriptor that is readable after SIGINT or SIGTERM; -1 before `catch_interrupts`.
 [[nodiscard]] int interrupt_descriptor();
-/// Takes the signal out of it; false when another thread was faster.
+/// Takes the signal out of the descriptor. Returns false if another thread has taken it.
 bool take_interrupt();
 
-/// While one lives, every wait of this thread that takes longer asks `over` each 20 ms, and where it is true ends with
-/// Ended: for what no descriptor tells, such as a signal that somebody else handles (an interpreter), or another
-/// thread.
+/// While an object exists, every longer wait of this thread calls `over` every 20 ms and throws Ended if it returns
+/// true: for conditions that no descriptor reports, such as a signal handled by an interpreter, or another thread.
 class EndQuestion {
  public:
-  /// `over` must outlive it; empty: nothing is asked.
+  /// `over` must outlive the object; an empty function is never called.
   explicit EndQuestion(const std::function<bool()>& over);
   ~EndQuestion();
   EndQuestion(const EndQuestion&) = delete;
   EndQuestion& operator=(const EndQuestion&) = delete;
 
-  /// How long a wait may take until it calls `ask`; `never`: nobody asks.
+  /// Returns how long a wait may take before it must call `ask`; `never` if no object exists.
   [[nodiscard]] static Time patience();
-  /// Throws Ended.
+  /// Calls `over`. Throws Ended if it returns true.
   static void ask();
 
  private:
   const std::function<bool()>* outer_;
 };
 
-/// CLOCK_MONOTONIC.
+/// Returns the time of CLOCK_MONOTONIC.
 [[nodiscard]] Time now();
 
 inline constexpr std::size_t most_watched = 32;
 
 /// Blocks until one of `watched` (at most `most_watched`) has an event, then sets `revents` of all and returns true;
-/// false when `deadline` came first (`never`: no deadline). What is ready at once is seen even after the deadline.
-/// Throws Interrupted once for each signal, or for several that came together, so that unwinding may wait again;
-/// throws Ended (EndQuestion) and Failure.
+/// returns false if `deadline` (`never`: no deadline) is reached first. Events that are ready at once are seen even
+/// after the deadline. Throws Interrupted once for each signal, or for several that arrived together, so that unwinding
+/// code may wait again; throws Ended (EndQuestion) and Failure.
 bool wait_for(std::span<pollfd> watched, Time deadline);
 
-/// Throws as `wait_for` does. Late by the kernel's timer slack (50 us) and scheduling, never early.
+/// Sleeps until `time`: late by the kernel's timer slack (50 us) and scheduling, never early. Throws as `wait_for`
+/// does.
 void sleep_until(Time time);
 
-/// Returns in the moment itself, give or take a look at the clock: the last 100 us are spent looking. Throws as
+/// Returns exactly at `time`, within one read of the clock: it polls the clock for the last 100 us. Throws as
 /// `wait_for` does.
 void reach(Time time);
 

@@ -15,10 +15,10 @@ using Kind = Failure::Kind;
 
 namespace {
 
-constexpr Time answer_time = 300ms;  // an adapter on USB takes 1 or 2
+constexpr Time answer_time = 300ms;  // timeout for an adapter's reply; on USB it takes 1 or 2 ms
 constexpr Time settling_time = 20ms;
-constexpr std::size_t most_waiting = 64;  // frames, as common adapters keep
-constexpr unsigned most_reads = 1024;     // so that a line that is never silent does not hold anybody up
+constexpr std::size_t most_waiting = 64;  // number of frames, as many as common adapters queue
+constexpr unsigned most_reads = 1024;  // limit per call, so that a line that is never silent does not block the caller
 
 Bytes bytes_of(std::string_view text) { return {reinterpret_cast<const std::uint8_t*>(text.data()), text.size()}; }
 
@@ -31,11 +31,11 @@ void SlcanLine::write(Bytes text) { bytes_->begin({.kind = ByteStep::Kind::trans
 void SlcanLine::collect(Time deadline) {
   collected_ = false;
   deadline = reach(bytes_->now()) ? Time{} : std::min(deadline, due());
-  // Without a wait everything that is there, however many reads that takes; with one until there is something.
+  // Without a wait all available bytes are read, in any number of reads; with a wait only until one event was received.
   const bool everything = deadline <= bytes_->now();
   for (unsigned reads = 0; reads < most_reads && (everything || !collected_); ++reads) {
     const Time now = bytes_->now();
-    // A port of bytes reports a timer only when it lies ahead; what is there already comes before it.
+    // A byte port reports a timer only if it is in the future; available bytes are reported before it.
     const ByteEvent event = bytes_->wait({.at = deadline <= now ? now + 1ns : deadline});
     if (event.kind == ByteEvent::Kind::timer) {
       if (!everything) reach(event.at);
@@ -60,7 +60,7 @@ bool SlcanLine::hears_until(Time deadline) {
 
 SlcanPort::SlcanPort(std::shared_ptr<Port<std::uint8_t>> bytes, std::string name, const LineSettings& settings)
     : SlcanLine(std::move(bytes)), name_(std::move(name)) {
-  write(bytes_of("\r\r\r"));  // ends whatever somebody began
+  write(bytes_of("\r\r\r"));  // ends any command that another program has begun
   settle();
   apply(settings);
 }
@@ -68,7 +68,7 @@ SlcanPort::SlcanPort(std::shared_ptr<Port<std::uint8_t>> bytes, std::string name
 SlcanPort::~SlcanPort() {
   try {
     write(bytes_of("C\r"));
-  } catch (const Failure&) {  // it is gone
+  } catch (const Failure&) {  // the port has disappeared
   } catch (const Interrupted&) {
   } catch (const Ended&) {
   }
@@ -80,7 +80,7 @@ void SlcanPort::apply(const LineSettings& settings) {
     throw Failure(Kind::bad_rate, name_ + ": the adapter has no bit rate of " + std::to_string(settings.rate) +
                                       " bit/s: 10, 20, 50, 100, 125, 250, 500, 800 kbit/s and 1 Mbit/s are there");
   }
-  static_cast<void>(ask("C\r"));  // refused by many that are closed already
+  static_cast<void>(ask("C\r"));  // many adapters refuse this if they are closed already
   settle();
   const std::string set{'S', static_cast<char>(*code), '\r'};
   const Answer rate = ask(set);
@@ -100,7 +100,8 @@ void SlcanPort::apply(const LineSettings& settings) {
   }
 }
 
-// Answers bear no number: those to what nobody waits for must be over before the next question.
+// Waits until late replies have been received. Replies carry no number, so replies to earlier commands must not arrive
+// after the next command.
 void SlcanPort::settle() {
   constexpr unsigned most_answers = 64;
   bool heard = true;
@@ -179,8 +180,8 @@ void SlcanAdapter::take_frame(Bytes line, Time at) {
   waiting_.push_back(*frame);
 }
 
-// The nodes hear a frame when it has ended; then the next one begins. One at a time, also when we come late: between
-// two of them a node can send what it has to.
+// Reports at most one frame whose transmission has ended, and begins the next one. One per call even if this is late:
+// between two frames a node must be able to send its own.
 bool SlcanAdapter::reach(Time now) {
   if (waiting_.empty() || bus_free_ > now) return false;
   push(waiting_.front(), bus_free_);
@@ -189,13 +190,13 @@ bool SlcanAdapter::reach(Time now) {
   return true;
 }
 
-// Without stuff bits.
+// Returns the duration of `frame` on the bus, without stuff bits.
 Time SlcanAdapter::duration(const CanFrame& frame) const {
   const std::int64_t bits = (frame.extended ? 67 : 47) + (frame.remote ? 0 : 8 * frame.size);
   return Time(std::chrono::seconds(1)) * bits / std::max<std::int64_t>(1, rate_);
 }
 
-// False for what is no command, or not allowed now.
+// Executes a command. Returns false if it is unknown or not allowed now.
 bool SlcanAdapter::execute(Bytes line) {
   const auto letter = static_cast<char>(line[0]);
   switch (letter) {
@@ -229,7 +230,7 @@ bool SlcanAdapter::execute(Bytes line) {
       if (!open_) return false;
       answer("F00\r");
       return true;
-    case 's':  // bit timing registers, acceptance code and mask: taken, and without effect
+    case 's':  // bit timing registers, acceptance code and mask: accepted, without effect
     case 'M':
     case 'm':
       if (open_) return false;

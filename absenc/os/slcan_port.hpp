@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// CAN through an adapter on a serial port that speaks the ASCII protocol of Lawicel (link/slcan.hpp), and the other end
-// of that: an adapter on a pseudo-terminal, behind which virtual nodes are.
+// CAN through an adapter on a serial port with the ASCII protocol of Lawicel (link/slcan.hpp), and the other end of
+// this protocol: a simulated adapter on a pseudo-terminal with virtual nodes behind it.
 #pragma once
 
 #include <deque>
@@ -13,20 +13,20 @@
 
 namespace absenc::os {
 
-/// Frames and answers as lines over a port of bytes.
+/// CAN frames and adapter replies as lines over a byte port.
 class SlcanLine : public FramePort {
  protected:
   explicit SlcanLine(std::shared_ptr<Port<std::uint8_t>> bytes) : bytes_(std::move(bytes)) {}
 
   void write(Bytes text);
   void collect(Time deadline) final;
-  /// Collects until something came, or the deadline; whether something did.
+  /// Collects until something is received or the deadline is reached. Returns whether something was received.
   bool hears_until(Time deadline);
-  /// When something is to happen though nothing comes; `never`: no time.
+  /// Returns the time of the next event that does not depend on received bytes; `never` if none is due.
   [[nodiscard]] virtual Time due() const { return never; }
-  /// It may have come; whether something was pushed.
+  /// Handles the event of `due()` if its time is reached. Returns whether an event was pushed.
   virtual bool reach(Time) { return false; }
-  /// A line without its CR, a refusal, or garbage came.
+  /// Handles a line without its CR, a refusal, or garbage.
   virtual void take(slcan::LineReader::Found found, Bytes line, Time at) = 0;
 
  private:
@@ -35,15 +35,15 @@ class SlcanLine : public FramePort {
   bool collected_ = false;
 };
 
-/// The adapter is opened at the bit rate of `settings`, and closed at the end.
+/// A CAN adapter, opened at the bit rate of `settings` and closed at the end.
 class SlcanPort final : public SlcanLine {
  public:
-  /// `name` as in "/dev/ttyACM0", for messages. Throws Failure: `bad_rate` when the adapter has no such bit rate or
-  /// refuses it, `system` when it refuses to open.
+  /// `name` is for example "/dev/ttyACM0" and is used in messages. Throws Failure: `bad_rate` if the adapter does not
+  /// support the bit rate or refuses it, `system` if it refuses to open.
   SlcanPort(std::shared_ptr<Port<std::uint8_t>> bytes, std::string name, const LineSettings& settings);
   ~SlcanPort() override;
 
-  /// What could be better about the adapter, one sentence each.
+  /// Returns hints about the adapter, one sentence each.
   [[nodiscard]] const std::vector<std::string>& notes() const { return notes_; }
 
  private:
@@ -57,24 +57,24 @@ class SlcanPort final : public SlcanLine {
 
   std::string name_;
   std::vector<std::string> notes_;
-  bool asking_ = false;  // what comes answers a command, not a frame
+  bool asking_ = false;  // a command is outstanding: the next line is its reply, not that of a frame
   Answer answer_ = Answer::none;
   unsigned garbage_ = 0;
 };
 
-/// Plays the adapter: what a host sends reaches the device that is driven on this port, and the other way round, while
-/// the host has opened it at the bit rate that the device has. Each frame takes its time on the bus: those that a host
-/// sends at once wait for it, as many as an adapter keeps, and the others are refused (BEL).
+/// Simulates an adapter: passes frames between the host and the device that is driven on this port, while the host has
+/// opened the adapter at the device's bit rate. Each frame takes its time on the bus. Frames that the host sends at
+/// once are queued, as many as an adapter can store; further frames are refused (BEL).
 class SlcanAdapter final : public SlcanLine {
  public:
   SlcanAdapter(std::shared_ptr<Port<std::uint8_t>> bytes, const LineSettings& settings)
       : SlcanLine(std::move(bytes)), device_rate_(settings.rate) {}
 
-  /// Frames that were lost because the host had the adapter closed or at another bit rate.
+  /// Returns the number of frames lost because the host had closed the adapter or set another bit rate.
   [[nodiscard]] std::uint64_t lost() const { return lost_; }
-  /// Frames that were refused because too many waited for the bus.
+  /// Returns the number of frames refused because the queue was full.
   [[nodiscard]] std::uint64_t overflowed() const { return overflowed_; }
-  /// Lines that are no command.
+  /// Returns the number of lines that are no valid command.
   [[nodiscard]] std::uint64_t garbage() const { return garbage_; }
 
  private:
@@ -90,12 +90,12 @@ class SlcanAdapter final : public SlcanLine {
   [[nodiscard]] bool connected() const { return open_ && rate_ == device_rate_; }
 
   std::uint32_t device_rate_;
-  std::uint32_t rate_ = 0;  // as the host has set it; 0: not yet
+  std::uint32_t rate_ = 0;  // bit rate set by the host; 0: not set yet
   bool open_ = false;
   bool listen_only_ = false;
   bool with_time_ = false;
-  std::deque<CanFrame> waiting_;  // of the host; the first is on the bus
-  Time bus_free_{};               // when that, or the last one, has ended
+  std::deque<CanFrame> waiting_;  // queued frames of the host; the first one is on the bus
+  Time bus_free_{};               // end of the frame on the bus, or of the last one
   std::uint64_t lost_ = 0;
   std::uint64_t overflowed_ = 0;
   std::uint64_t garbage_ = 0;

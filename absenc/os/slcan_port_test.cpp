@@ -26,7 +26,7 @@ const CanFrame request{.id = 0x220, .size = 8, .data = {0x80, 0x20}};
 
 FrameStep sending(const CanFrame& frame) { return {.kind = FrameStep::Kind::transfer, .out = {&frame, 1}}; }
 
-/// A port of bytes in memory: answers commands as an adapter does, unless told otherwise.
+/// A byte port in memory that answers commands like an adapter, unless a test changes the replies.
 class FakeAdapter final : public Port<std::uint8_t> {
  public:
   Time now() override { return os::now(); }
@@ -121,7 +121,7 @@ TEST(SlcanPort, ChangesItsBitRate) {
   EXPECT_EQ(adapter->written, "C\rS6\rO\r");
 }
 
-/// The adapter with a program in front of it that is only bytes.
+/// The simulated adapter, with the test as its host.
 struct Adapter : ::testing::Test {
   std::shared_ptr<FakeAdapter> host = std::make_shared<FakeAdapter>();
   SlcanAdapter port{host, bus};
@@ -143,7 +143,7 @@ struct Adapter : ::testing::Test {
 
 TEST_F(Adapter, AnswersAsAdaptersDo) {
   EXPECT_EQ(say("\r\r"), "\r\r");
-  EXPECT_EQ(say("O\r"), "\a");  // no bit rate yet
+  EXPECT_EQ(say("O\r"), "\a");  // refused: no bit rate is set yet
   EXPECT_EQ(say("S5\r"), "\r");
   EXPECT_EQ(say("S9\r"), "\a");
   EXPECT_EQ(say("C\r"), "\a");
@@ -156,7 +156,7 @@ TEST_F(Adapter, AnswersAsAdaptersDo) {
   EXPECT_EQ(say("F\r"), "F00\r");
   EXPECT_EQ(say("t22088020000000000000\r"), "z\r");
   EXPECT_EQ(heard, std::vector<CanFrame>{request});
-  EXPECT_EQ(say("T000002208\r"), "\a");  // 8 bytes that are not there
+  EXPECT_EQ(say("T000002208\r"), "\a");  // refused: the 8 data bytes are missing
   EXPECT_EQ(say("T000002200\r"), "Z\r");
   EXPECT_EQ(say("r2208\r"), "z\r");
   EXPECT_TRUE(heard[0].remote);
@@ -189,7 +189,7 @@ TEST_F(Adapter, NothingPassesAtAnotherBitRate) {
   EXPECT_EQ(port.lost(), 2u);
 }
 
-constexpr Time frame_time = 111 * 4us;  // 47 + 8 * 8 bits at 250 kbit/s
+constexpr Time frame_time = 111 * 4us;  // (47 + 8 * 8) bits at 250 kbit/s
 
 TEST_F(Adapter, FramesSentAtOnceComeOneAfterTheOther) {
   say("S5\rO\r");
@@ -223,7 +223,7 @@ TEST_F(Adapter, ListensOnly) {
   EXPECT_NE(host->written.find("t1208"), std::string::npos);
 }
 
-// Both ends over a real pseudo-terminal, each in its own thread.
+// Runs SlcanPort and SlcanAdapter over a real pseudo-terminal, each in its own thread.
 TEST(Slcan, BothEndsOfAPseudoTerminal) {
   const auto terminal = std::make_shared<EmulatorPort>();
   terminal->set_end(now() + 60s);

@@ -30,7 +30,7 @@ using Kind = Failure::Kind;
 
 namespace {
 
-constexpr Time queue_patience = 500ms;  // a bus that carries anything empties the queue of a controller in 10 ms
+constexpr Time queue_patience = 500ms;  // a working bus empties the queue of a controller within 10 ms
 constexpr Time queue_pause = 500us;
 constexpr std::size_t most_at_once = 256;
 
@@ -39,7 +39,8 @@ constexpr std::string_view check_bus =
 
 Time time_of(const timespec& time) { return std::chrono::seconds(time.tv_sec) + Time(time.tv_nsec); }
 
-// The kernel stamps frames with the time of day. Both clocks are read together: again, when something else ran between.
+// Converts a kernel time stamp, which is calendar time, to os::now. Both clocks are read together, and again if another
+// thread ran between the two reads.
 Time since_boot(const timespec& stamp) {
   constexpr Time together = std::chrono::microseconds(20);
   timespec day{};
@@ -70,7 +71,7 @@ Failure no_interface(const std::string& interface) {
 
 }  // namespace
 
-// ---- The kernel
+// ---- System calls
 
 int CanKernel::open() { return ::socket(PF_CAN, SOCK_RAW | SOCK_CLOEXEC | SOCK_NONBLOCK, CAN_RAW); }
 
@@ -186,7 +187,7 @@ void SocketCan::set_options() {
 }
 
 void SocketCan::collect(Time deadline) {
-  // Without a wait only what is there already: the socket does not block.
+  // Without a wait it only reads available frames: the socket does not block.
   if (deadline > os::now() && poller_.wait(deadline).empty()) return;
   for (std::size_t i = 0; i < most_at_once; ++i) {
     can_frame frame{};
@@ -194,7 +195,7 @@ void SocketCan::collect(Time deadline) {
     const ssize_t size = kernel_->read(socket_.get(), frame, at);
     if (size < 0 && (errno == EAGAIN || errno == EINTR)) return;
     if (size < 0) fail("reading from " + interface_, errno);
-    if (size != static_cast<ssize_t>(sizeof frame)) continue;  // CAN FD, which was not asked for
+    if (size != static_cast<ssize_t>(sizeof frame)) continue;  // CAN FD, which is not enabled
     if ((frame.can_id & CAN_ERR_FLAG) != 0) {
       take_error(frame, at);
     } else {
@@ -234,7 +235,7 @@ void SocketCan::send(const CanFrame& from) {
   const Time limit = os::now() + queue_patience;
   for (;;) {
     if (kernel_->write(socket_.get(), frame) == static_cast<ssize_t>(sizeof frame)) return;
-    // Neither is told by poll(2) when it is over.
+    // poll(2) does not report the end of either condition, so the call is repeated.
     const bool full = errno == ENOBUFS || errno == EAGAIN;
     if (!full && errno != EINTR) fail("sending on " + interface_, errno);
     if (os::now() >= limit) {

@@ -14,28 +14,28 @@ struct can_frame;
 
 namespace absenc::os {
 
-/// The system calls of SocketCan: a test overrides them where the kernel has no CAN. All but `received` as the call
-/// they are named after: negative, with errno, when refused.
+/// The system calls of SocketCan; tests override them where the kernel has no CAN. Each returns a negative number and
+/// sets errno on failure, like the call that it is named after.
 struct CanKernel {
   virtual ~CanKernel() = default;
-  /// socket(PF_CAN, SOCK_RAW, CAN_RAW), not blocking.
+  /// Calls socket(PF_CAN, SOCK_RAW, CAN_RAW), non-blocking.
   virtual int open();
   virtual int control(int descriptor, unsigned long request, void* argument);
-  /// setsockopt(2).
+  /// Calls setsockopt(2).
   virtual int set(int descriptor, int level, int name, const void* value, std::size_t size);
-  /// To an interface, by its index.
+  /// Binds the socket to the interface with this index.
   virtual int bind(int descriptor, int index);
   virtual ssize_t write(int descriptor, const can_frame& frame);
-  /// `at`: when the kernel had it, on the clock of os::now.
+  /// Reads a frame. `at` is the time at which the kernel received it, on the clock of os::now.
   virtual ssize_t read(int descriptor, can_frame& frame, Time& at);
 };
 [[nodiscard]] CanKernel& system_can_kernel();
 
-/// The bit rate is that of the interface: `ip link` sets it, and nothing here; virtual ones have none. Own frames do
-/// not come back; those of other programs on the same interface do.
+/// A CAN interface. Its bit rate is set by `ip link`, never here; virtual interfaces have none. Frames sent here are
+/// not received; those of other programs on the same interface are.
 class SocketCan final : public FramePort {
  public:
-  /// Throws Failure, which says what to type. `kernel` must outlive the port.
+  /// Throws Failure, which states the command to type. `kernel` must outlive the port.
   explicit SocketCan(const std::string& interface, const LineSettings& settings,
                      CanKernel& kernel = system_can_kernel());
 
@@ -48,7 +48,7 @@ class SocketCan final : public FramePort {
   void set_options();
   void take(const can_frame& frame, Time at);
   void take_error(const can_frame& frame, Time at);
-  // Such an interface has no bit rate: any suits it.
+  // A virtual interface has no bit rate: every rate is accepted.
   [[nodiscard]] bool is_virtual() const { return interface_.starts_with("vcan") || interface_.starts_with("vxcan"); }
   [[nodiscard]] std::string up_command(std::uint32_t rate) const;
   [[noreturn]] void fail(const std::string& what, int error) const;
@@ -60,7 +60,7 @@ class SocketCan final : public FramePort {
   Poller poller_;
 };
 
-/// "can0", "vcan0" and so on, sorted. `sys` is a parameter for tests.
+/// Returns the CAN interfaces, "can0", "vcan0" and so on, sorted. `sys` is a parameter for tests.
 [[nodiscard]] std::vector<std::string> can_interfaces(const std::filesystem::path& sys = "/sys/class/net");
 
 }  // namespace absenc::os

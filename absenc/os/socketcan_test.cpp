@@ -82,7 +82,7 @@ TEST(SocketCan, SendsAndReceives) {
   kernel.put(raw(0x120, {0x47, 0x26}));
   const FrameEvent sent = port.wait({.at = never});
   EXPECT_EQ(sent.kind, EventKind::sent);
-  EXPECT_LE(sent.at, kernel.written_at);  // an answer can come before the call returns
+  EXPECT_LE(sent.at, kernel.written_at);  // a reply can be received before the call returns
   const FrameEvent received = port.wait({.at = never});
   ASSERT_EQ(received.kind, EventKind::received);
   EXPECT_GE(received.at, sent.at);
@@ -180,14 +180,15 @@ TEST(SocketCan, AnInterfaceThatGoesAway) {
 TEST(SocketCan, ItsBitRateIsNotOurs) {
   FakeCan kernel;
   SocketCan port("can0", line, kernel);
-  port.begin({.kind = FrameStep::Kind::configure, .rate = line.rate});  // as it is
+  port.begin({.kind = FrameStep::Kind::configure, .rate = line.rate});  // equal to the interface's rate, so it is
+                                                                        // accepted
   const Failure other = failure_of([&] { port.begin({.kind = FrameStep::Kind::configure, .rate = 500'000}); });
   EXPECT_EQ(other.kind(), Failure::Kind::unsupported);
   EXPECT_NE(std::string(other.what()).find("bitrate 500000"), std::string::npos);
   EXPECT_EQ(failure_of([&] { port.begin({.kind = FrameStep::Kind::pulse}); }).kind(), Failure::Kind::unsupported);
 }
 
-// The same call on a socket that every kernel has.
+// Tests the same system call on a UDP socket, which every kernel has.
 TEST(SocketCan, TheKernelsStampIsOfWhenItCame) {
   const Descriptor socket(::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0));
   sockaddr_in address{};
@@ -200,13 +201,13 @@ TEST(SocketCan, TheKernelsStampIsOfWhenItCame) {
   const int on = 1;
   ASSERT_EQ(system_can_kernel().set(socket.get(), SOL_SOCKET, SO_TIMESTAMPNS, &on, sizeof on), 0);
   const can_frame frame = raw(0x120, {1, 2});
-  // Stamps begin some time after they were asked for; until then, one is of when the frame is read.
+  // The kernel enables time stamps some time after the request; until then a stamp is the time of the read.
   Time before{}, after{}, at{};
   for (int attempt = 0; attempt < 100 && (attempt == 0 || at > after + 1ms); ++attempt) {
     before = now();
     ASSERT_EQ(::sendto(socket.get(), &frame, sizeof frame, 0, generic, size), static_cast<ssize_t>(sizeof frame));
     after = now();
-    reach(after + 10ms);  // it waits in the queue
+    reach(after + 10ms);  // the frame waits in the queue
     can_frame received{};
     ASSERT_EQ(system_can_kernel().read(socket.get(), received, at), static_cast<ssize_t>(sizeof frame));
     EXPECT_EQ(received.can_id, 0x120u);
@@ -225,7 +226,7 @@ TEST(SocketCan, ListsInterfaces) {
   EXPECT_TRUE(can_interfaces(sys.path() / "none").empty());
 }
 
-// The machine that tests may have no CAN: then the kernel's own answer is one of two sentences.
+// The test machine may have no CAN, so the kernel may give either of two errors.
 TEST(SocketCan, TheRealKernelSaysThatThereIsNoSuchInterface) {
   const std::string what = failure_of([] { const SocketCan port("absenc-none", line); }).what();
   EXPECT_TRUE(what.find("there is no CAN interface absenc-none") != std::string::npos ||

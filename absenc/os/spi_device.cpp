@@ -11,9 +11,9 @@ namespace absenc::os {
 
 namespace {
 
-constexpr Time deselected_time = std::chrono::microseconds(10);  // the kernel's own between two transfers
+constexpr Time deselected_time = std::chrono::microseconds(10);  // pause that the kernel makes between two transfers
 
-constexpr std::size_t most_heard = 4096;  // bytes of a chip that stays selected: no device listens longer
+constexpr std::size_t most_heard = 4096;  // in bytes, while a chip stays selected: no device reads more
 
 constexpr bool idles_high(std::uint8_t mode) { return (mode & 2) != 0; }
 constexpr bool samples_at_trailing_edge(std::uint8_t mode) { return (mode & 1) != 0; }
@@ -94,7 +94,7 @@ Time SpiDevice::clock(const SpiTransfer& transfer, Time at) {
   period_ = period_ == Time{} ? period : std::min(period_, period);
   heard_.resize(std::min(heard_.size() + transfer.size, most_heard));
   std::fill(transfer.in.begin(), transfer.in.end(), std::uint8_t{0});
-  // Both sides then change and sample at the same edge: the device samples what was there before.
+  // Both sides then change and sample at the same edge: the device samples the bit that was on the line before.
   const bool heard_late = samples_at_trailing_edge(transfer.mode) && !shifts_at_leading_edge(transfer.mode);
   for (std::size_t bit = 0; bit < 8 * transfer.size; ++bit, ++clocks_) {
     const std::uint8_t mask = mask_of(bit, transfer.lsb_first);
@@ -134,7 +134,7 @@ void SpiDevice::ask(Time now) {
   }
 }
 
-// Mode 2 and 3 show a clocked device the same edges.
+// Returns whether `mode` works with the device. Modes 2 and 3 give a clocked device the same edges.
 bool SpiDevice::suits(std::uint8_t mode) const {
   return kind_ == LinkKind::clocked ? idles_high(mode) : mode == settings_.spi_mode;
 }
@@ -145,7 +145,7 @@ bool SpiDevice::shifts_at_leading_edge(std::uint8_t mode) const {
   return shifts_at_rising_edge != idles_high(mode);
 }
 
-// What the controller samples with this clock: how often has the device shifted by then?
+// Returns the bit that the controller samples at this clock, from the number of shifts of the device until then.
 bool SpiDevice::driven(std::size_t clock, std::uint8_t mode) const {
   std::size_t shifts = clock;
   if (samples_at_trailing_edge(mode) && shifts_at_leading_edge(mode)) ++shifts;
@@ -153,7 +153,7 @@ bool SpiDevice::driven(std::size_t clock, std::uint8_t mode) const {
   if (kind_ == LinkKind::spi) {
     before_first_bit = samples_at_trailing_edge(settings_.spi_mode) ? 1 : 0;
   } else if (!idles_high(mode) && shifts > 0) {
-    --shifts;  // a rising edge before the first falling one, which latches
+    --shifts;  // the first rising edge precedes the first falling edge, which latches
   }
   if (shifts < before_first_bit) return true;
   const std::size_t bit = shifts - before_first_bit;

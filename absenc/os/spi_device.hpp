@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The far side of an SPI controller: makes the edges of a message into the events of a device machine, and what it
-// drives into samples.
+// The device side of an SPI controller: converts the clock edges of a message to events of a device machine, and its
+// output to samples.
 #pragma once
 
 #include <cstddef>
@@ -12,44 +12,45 @@
 
 namespace absenc::os {
 
-/// A part of a message, as spidev has them.
+/// A part of a message, like spidev's transfers.
 struct SpiTransfer {
-  std::size_t size = 0;    // bytes; without both buffers nothing is clocked
-  Bytes out{};             // of `size`, or empty: zeros
-  MutableBytes in{};       // of `size`, or empty: nobody looks
+  std::size_t size = 0;    // number of bytes; without both buffers nothing is clocked
+  Bytes out{};             // bytes of the host, `size` of them; empty: zeros are sent
+  MutableBytes in{};       // buffer for the device's bytes, `size` of them; empty: they are discarded
   std::uint32_t rate = 0;  // Hz
   std::uint8_t mode = 0;   // 2 * CPOL + CPHA
   bool lsb_first = false;
-  Time delay{};           // behind the last bit
-  bool deselect = false;  // behind `delay`; of the last transfer: the chip stays selected
+  Time delay{};           // pause behind the last bit
+  bool deselect = false;  // deselects the chip behind `delay`; in the last transfer: the chip stays selected
 };
 
-/// One device machine. Whether the controller's mode suits it or not, an edge is what it is: who samples at an edge at
-/// which the other side shifts gets the old bit, and a bit that nobody drives is 1. The device is told a message at
-/// once, with the times at which its parts will be. It is no Port, because a message is asked and answered in one call;
-/// who serves it answers when that time has come.
+/// One device machine behind a controller, simulated edge by edge in every SPI mode. A side that samples at an edge at
+/// which the other side shifts gets the old bit, and a bit that no side drives is 1. A whole message is processed in
+/// one call, with the future times of its parts; the caller must answer the program when that time is reached. For this
+/// reason it is no Port.
 class SpiDevice {
  public:
-  /// `kind`: spi or clocked, otherwise std::invalid_argument. `device` must outlive it.
+  /// `kind` must be spi or clocked, otherwise throws std::invalid_argument. `device` must outlive this object.
   SpiDevice(LinkKind kind, const LineSettings& settings, Machine<std::uint8_t>& device);
 
-  /// Asks the device for its first step, as every carrier does before the first event: it may want a timer.
+  /// Takes the device's first step, which every carrier does before the first event: the device may want a timer.
   void begin(Time now) { ask(now); }
-  /// Returns when it ends. On a clocked link a pause of the clock between two transfers ends a word.
+  /// Processes a message and returns the time of its end. On a clocked link a pause of the clock between two transfers
+  /// ends a word.
   Time message(std::span<const SpiTransfer> transfers, Time start);
 
-  /// The controller was set to another mode between two messages: its clock rests at the level of that until the next.
+  /// Sets the mode between two messages: until the next message the clock line rests at the idle level of this mode.
   void rest(std::uint8_t mode);
 
-  /// When the device wants to be woken.
+  /// Returns the time at which `wake` must be called.
   [[nodiscard]] Time timer() const { return timer_; }
-  /// Nothing happens before `timer()`.
+  /// Reports the device's timer; does nothing before `timer()`.
   void wake(Time now);
 
   [[nodiscard]] const LineSettings& settings() const { return settings_; }
-  /// Messages in which something was clocked.
+  /// Returns the number of messages in which bits were clocked.
   [[nodiscard]] std::uint64_t messages() const { return messages_; }
-  /// Those whose clock or sampling did not suit the device.
+  /// Returns the number of messages whose clock or sampling did not suit the device.
   [[nodiscard]] std::uint64_t wrong_modes() const { return wrong_modes_; }
 
  private:
@@ -68,18 +69,18 @@ class SpiDevice {
   Time timer_ = never;
   std::uint64_t messages_ = 0;
   std::uint64_t wrong_modes_ = 0;
-  bool held_low_ = false;  // since the last message
+  bool held_low_ = false;  // the clock line has been low since the last message
 
-  // Since the chip was selected, or the first clock:
+  // State since the chip was selected or since the first clock.
   bool selected_ = false;
   std::vector<std::uint8_t> driven_;
   std::uint8_t behind_driven_ = 0xFF;
   std::vector<std::uint8_t> heard_;
   std::size_t clocks_ = 0;
   bool last_out_ = false;
-  Time period_{};  // the shortest
+  Time period_{};  // shortest clock period
   Time selected_at_{};
-  Time lead_{};  // to the first clock
+  Time lead_{};  // time to the first clock
 };
 
 }  // namespace absenc::os

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a controller samples, and what a device is told, edge by edge.
+// Tests which bits a controller samples and which events a device gets, edge by edge.
 #include "absenc/os/spi_device.hpp"
 
 #include <gmock/gmock-matchers.h>
@@ -22,8 +22,8 @@ constexpr LineSettings chip_settings{.rate = 1'000'000, .spi_mode = 1};
 const Data driven{0x95, 0xC6, 0x12};
 const Data sent{0xA7, 0x01, 0x80};
 
-// Both ends as shift registers on three wires, with the edges one by one. Whoever samples at an edge sees the wire as
-// it was before.
+// Reference model: both ends as shift registers on three wires, edge by edge. A side that samples at an edge gets the
+// level before the edge.
 struct Wires {
   explicit Wires(std::uint8_t host, std::uint8_t chip) : host_mode(host), chip_mode(chip) {}
 
@@ -122,7 +122,7 @@ TEST(SpiDevice, EveryModeOnEveryChip) {
   }
 }
 
-// Clocked devices latch at the first falling edge and shift at each rising one behind it.
+// Clocked devices latch at the first falling edge and shift at each later rising edge.
 TEST(SpiDevice, EveryModeOnAClockedDevice) {
   for (std::uint8_t idle = 0; idle < 2; ++idle) {
     for (std::uint8_t mode = 0; mode < 4; ++mode) {
@@ -243,7 +243,7 @@ TEST(SpiDevice, WakesTheDeviceOnceWhenItWants) {
   EXPECT_EQ(toy.log, "");
   device.wake(6ms);
   EXPECT_EQ(toy.log, "6000000 timer");
-  EXPECT_EQ(device.timer(), never);  // what lies in the past is no timer
+  EXPECT_EQ(device.timer(), never);  // a time in the past sets no timer
 }
 
 TEST(SpiDevice, HasNoOtherLinks) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The hosts of biss and ssi, and one of SPI, on an SPI port whose far side is a virtual encoder.
+// Runs the hosts of biss, ssi and an SPI protocol on an SPI port with a virtual encoder behind it.
 #include <gtest/gtest.h>
 
 #include "absenc/host/drive.hpp"
@@ -49,7 +49,7 @@ TEST_F(SpiEncoder, SsiOfEveryLength) {
   }
 }
 
-// The same 1000 clocks, of which the frame needs 41, on each thing that carries a clocked line.
+// Clocks 1000 bits, of which the frame needs 41, on each kind of port that carries a clocked line.
 TEST_F(SpiEncoder, SloIsLowBehindTheCrcWhateverCarriesIt) {
   constexpr std::size_t clocks = 1000;
   const auto samples = [&](Port<std::uint8_t>& port) {
@@ -110,7 +110,7 @@ TEST_F(SpiEncoder, Biss) {
   EXPECT_EQ(encoder.violation_count(), 0u) << encoder.violations()[0].rule;
 }
 
-/// An encoder with registers behind the controller, and who asks for them.
+/// A BiSS encoder with registers behind the controller, and a host that reads them.
 struct BissRegisters {
   BissRegisters(FakeSpi& kernel, const Shaft& shaft) : encoder(biss::Format{}, shaft) {
     EXPECT_EQ(resolve_options(biss::unit, {}, {}, options).kind, OptionError::Kind::none);
@@ -134,7 +134,7 @@ TEST_F(SpiEncoder, RegistersAreAskedForByTheLevelOfTheClock) {
   EXPECT_EQ(info.error(), Error::none);
 }
 
-// Two pulses are a byte of them here.
+// With this controller the two pulses of the start sequence are one byte.
 TEST_F(SpiEncoder, BissIsStartedByAByteOfPulses) {
   biss::Format format;
   format.start_sequence = true;
@@ -148,7 +148,7 @@ TEST_F(SpiEncoder, BissIsStartedByAByteOfPulses) {
   EXPECT_EQ(encoder.violation_count(), 0u);
 }
 
-// Positions all the same: only who asks for registers is told, by what they can be read.
+// Positions can be read without mode changes; only a register access fails, with advice.
 TEST_F(SpiEncoder, AControllerThatOnlyIdlesHighReadsNoRegisters) {
   BissRegisters registers(kernel, shaft);
   SpiPort port(FakeSpi::path, LinkKind::clocked, biss::line_settings, {}, kernel);
@@ -188,7 +188,7 @@ TEST_F(SpiEncoder, Encolink) {
     encolink::VirtualEncoder shifted(format, shaft);
     EXPECT_EQ(read(shifted, {{}, mode}), Error::bad_checksum) << int{mode};
   }
-  // The time between chip select and clock does not make it slower.
+  // The time between chip select and clock does not count as a slow clock.
   encolink::VirtualEncoder hurried(format, shaft);
   EXPECT_EQ(read(hurried, {4'100'000, {}}), Error::none);
   ASSERT_GT(hurried.violation_count(), 0u);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// An SPI controller of Linux (spidev): encoders that speak SPI, and as the clock master those that are clocked (SSI,
+// An SPI controller of Linux (spidev), for encoders with SPI and, as the clock master, for clocked encoders (SSI,
 // BiSS).
 #pragma once
 
@@ -15,32 +15,33 @@
 
 namespace absenc::os {
 
-/// The system calls of SpiPort. Machines that build and test this rarely have an SPI controller or the right to make a
-/// virtual one (os/cuse): a test overrides these two, and sees exactly what is asked of the kernel.
+/// The system calls of SpiPort. Build machines rarely have an SPI controller or the right to create a virtual one
+/// (os/cuse), so tests override these calls and see every request to the kernel.
 struct SpiKernel {
   virtual ~SpiKernel() = default;
-  /// As open(2) with O_RDWR: negative, with errno, when refused.
+  /// Works like open(2) with O_RDWR: negative, with errno, on failure.
   virtual int open(const std::string& path);
-  /// As ioctl(2).
+  /// Works like ioctl(2).
   virtual int control(int descriptor, unsigned long request, void* argument);
 };
 [[nodiscard]] SpiKernel& system_kernel();
 
-/// What the user says of the controller; goes before what the protocol asks for, now and in every `configure`.
+/// Controller settings chosen by the user; they override those of the protocol, also in every `configure` step.
 struct SpiChoice {
   std::optional<std::uint32_t> speed;  // Hz
   std::optional<std::uint8_t> mode;    // 0 to 3
 };
 
-/// Every function throws Failure or Interrupted (os/signals.hpp). Locked against other programs that lock it.
+/// A port on an SPI controller, locked against other programs that use locks. Every function throws Failure or
+/// Interrupted (os/signals.hpp).
 ///
-/// A transfer begins at `at`, never earlier, and `begin` blocks until it is over. `expect` says on an `spi` link
-/// how many bytes come at least; on a `clocked` one nothing is sent but clocks. A controller clocks whole bytes: after
-/// `idle_clocks` the first `bits` bits are handed out, and up to seven clocks more are given.
-/// `timer` is reported as by StreamPort.
+/// A transfer begins at `at`, never earlier, and `begin` blocks until it is over. On an `spi` link `expect` is the
+/// minimum number of bytes to receive; on a `clocked` link nothing is sent but clocks. A controller clocks whole bytes:
+/// the first `bits` bits after `idle_clocks` are returned, and up to seven more clocks are given. `timer` is reported
+/// as by StreamPort.
 class SpiPort final : public Port<std::uint8_t> {
  public:
-  /// `path`: /dev/spidevB.C. `kind` is spi or clocked. `kernel` must outlive the port.
+  /// `path` is /dev/spidevB.C, `kind` spi or clocked. `kernel` must outlive the port.
   SpiPort(const std::string& path, LinkKind kind, const LineSettings& settings, const SpiChoice& choice = {},
           SpiKernel& kernel = system_kernel());
   SpiPort(const SpiPort&) = delete;
@@ -50,7 +51,7 @@ class SpiPort final : public Port<std::uint8_t> {
   void begin(const Step<std::uint8_t>& step) override;
   [[nodiscard]] Event<std::uint8_t> wait(const Step<std::uint8_t>& step) override;
 
-  /// As the controller has them.
+  /// Returns the settings that the controller uses.
   [[nodiscard]] const LineSettings& settings() const { return settings_; }
 
  private:
@@ -71,20 +72,20 @@ class SpiPort final : public Port<std::uint8_t> {
   SpiChoice choice_;
   SpiKernel* kernel_;
   Descriptor descriptor_;
-  std::uint32_t board_flags_ = 0;  // of the mode: how the chip select is wired
+  std::uint32_t board_flags_ = 0;  // mode flags that describe how the chip select is wired
   LineSettings settings_{};
 
   std::vector<std::uint8_t> out_;
   std::vector<std::uint8_t> in_;
   Waiting<std::uint8_t> waiting_;
   Time sent_at_{};              // end of the last transfer
-  Time sent_late_{};            // how long the call took that made it
-  bool sent_pending_ = false;   // `sent` is to be reported,
-  bool heard_pending_ = false;  // and then `received`
-  bool idle_low_ = false;       // the data line, before the first bit of a clocked transfer
+  Time sent_late_{};            // duration of the system call of the last transfer
+  bool sent_pending_ = false;   // `sent` is still to be reported
+  bool heard_pending_ = false;  // `received` is still to be reported, after `sent`
+  bool idle_low_ = false;       // the data line was low before the first bit of a clocked transfer
 };
 
-/// "/dev/spidev0.0" and so on, sorted. `sys` is a parameter for tests.
+/// Returns the controllers' chip selects, "/dev/spidev0.0" and so on, sorted. `sys` is a parameter for tests.
 [[nodiscard]] std::vector<std::string> spi_devices(const std::filesystem::path& sys = "/sys/class/spidev");
 
 }  // namespace absenc::os

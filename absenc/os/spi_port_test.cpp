@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What SpiPort asks of the kernel, and what it says when the kernel refuses.
+// Tests SpiPort's requests to the kernel, and its messages when the kernel refuses.
 #include "absenc/os/spi_port.hpp"
 
 #include <gmock/gmock-matchers.h>
@@ -43,7 +43,7 @@ struct SpiPortTest : ::testing::Test {
     EXPECT_EQ(event.kind, ByteEvent::Kind::received);
     return data(event.items);
   }
-  // At the far side, always the same bytes.
+  // A device that always sends the same bytes.
   toy::Toy<std::uint8_t> device{[](auto& self, const ByteEvent& event) {
     if (event.kind == ByteEvent::Kind::selected) self.send({0x12, 0x34, 0x56});
   }};
@@ -98,7 +98,7 @@ TEST_F(SpiPortTest, ExchangesAsManyBytesAsAreSentOrExpected) {
 
 TEST_F(SpiPortTest, WaitsBetweenChipSelectAndClock) {
   LineSettings slow = encoder_settings;
-  slow.select_lead = 4'500ns;  // rounded up
+  slow.select_lead = 4'500ns;  // rounded up to whole microseconds
   SpiPort port = open(LinkKind::spi, slow);
   kernel.log.clear();
   port.begin({.kind = ByteStep::Kind::transfer, .expect = 3});
@@ -136,7 +136,7 @@ TEST_F(SpiPortTest, TellsThatTheIdleLineWasLow) {
   EXPECT_FALSE(idle_low(ssi_settings));
   kernel.shorted = true;
   EXPECT_TRUE(idle_low(ssi_settings));
-  EXPECT_FALSE(idle_low(biss_settings));  // none of its clocks shows the idle line
+  EXPECT_FALSE(idle_low(biss_settings));  // BiSS has no clock that shows the idle line
 }
 
 TEST_F(SpiPortTest, BeginsNotBeforeItsTimeAndStampsTheEnd) {
@@ -165,9 +165,9 @@ TEST_F(SpiPortTest, TellsTimerGapAndAnswer) {
   const ByteStep quiet{.at = port.now() + 1h, .answer = 1h, .gap = 3ms};
   const ByteEvent silence = port.wait(quiet);
   EXPECT_EQ(silence.kind, ByteEvent::Kind::silence);
-  const Time again = port.now() + 5ms;  // one silence for each transfer
+  const Time again = port.now() + 5ms;  // each transfer reports one silence
   EXPECT_EQ(port.wait({.at = again, .gap = 3ms}).kind, ByteEvent::Kind::timer);
-  port.begin({.kind = ByteStep::Kind::transfer});  // of nothing: nothing comes
+  port.begin({.kind = ByteStep::Kind::transfer});  // an empty transfer: nothing is received
   EXPECT_EQ(port.wait({}).kind, ByteEvent::Kind::sent);
   EXPECT_EQ(port.wait({.at = never, .answer = 1ms, .gap = 1h}).kind, ByteEvent::Kind::silence);
 }
@@ -192,7 +192,7 @@ TEST_F(SpiPortTest, SaysThatTheModeIsRefused) {
             "the controller of /dev/spidev0.0 refused SPI mode 3 (Invalid argument): swap the two wires of the clock "
             "pair and set spi_mode=1, or use another controller");
   kernel.refusals.clear();
-  kernel.mode_mask = SPI_CPHA;  // taken, but not done
+  kernel.mode_mask = SPI_CPHA;  // other bits are accepted without effect
   EXPECT_THAT(refusal(Kind::unsupported, LinkKind::clocked, biss_settings), HasSubstr("refused SPI mode 3"));
 }
 

@@ -11,8 +11,8 @@ namespace absenc::os {
 
 namespace {
 
-constexpr std::size_t most_bytes = 4096;   // the module's parameter bufsiz
-constexpr std::size_t most_buffers = 255;  // a request of FUSE has 256, and one holds the transfers
+constexpr std::size_t most_bytes = 4096;   // default of the kernel module's parameter bufsiz
+constexpr std::size_t most_buffers = 255;  // a FUSE request has 256 buffers, one of which holds the list of transfers
 constexpr std::uint8_t most_wires = 1;
 constexpr std::uint32_t lsb_first = SPI_LSB_FIRST;
 
@@ -37,7 +37,7 @@ bool is_message(unsigned long request) {
   return _IOC_TYPE(request) == SPI_IOC_MAGIC && _IOC_NR(request) == 0 && _IOC_DIR(request) == _IOC_WRITE;
 }
 
-// What the program must bring for these, and make room for.
+// Memory that the program must provide for these transfers, and room for their results.
 struct Buffers {
   SpidevReply reply{.again = true};
   std::size_t in = 0;
@@ -63,7 +63,7 @@ Buffers buffers_of(UserMemory list, std::span<const spi_ioc_transfer> transfers)
 int refused(std::span<const spi_ioc_transfer> transfers, const Buffers& buffers) {
   if (buffers.in > most_bytes || buffers.out > most_bytes) return EMSGSIZE;
   if (buffers.reply.in.size() - 1 + buffers.reply.out.size() > most_buffers) return EMSGSIZE;
-  std::uint64_t all = 0;  // with those that have no buffer
+  std::uint64_t all = 0;  // includes transfers without a buffer
   for (const spi_ioc_transfer& transfer : transfers) {
     all += transfer.len;
     if (all > INT32_MAX) return EMSGSIZE;
@@ -122,7 +122,7 @@ SpidevReply Spidev::get(unsigned long request) const {
   }
 }
 
-// 0 or errno.
+// Changes a setting. Returns 0 or a value of errno.
 int Spidev::set(unsigned long request, Bytes value) {
   switch (request) {
     case SPI_IOC_WR_MODE:
@@ -149,8 +149,8 @@ int Spidev::set_mode(std::uint32_t wanted) {
   return 0;
 }
 
-// First the list of transfers is fetched, then what they point to. Another thread of the program may change the list
-// between the two: what counts is the list that came with the buffers.
+// Processes a message in two passes: the first requests the list of transfers, the second their buffers. Another thread
+// of the program may change the list between the two passes; the list that came with the buffers counts.
 SpidevReply Spidev::message(std::uint64_t address, std::size_t size, Bytes in, std::size_t room, Time now) {
   if (size % sizeof(spi_ioc_transfer) != 0) return error_reply(EINVAL);
   if (size == 0) return {};

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The kernel's driver spidev and a controller in front of an SpiDevice: answers what programs ask of /dev/spidevB.C.
+// The kernel's driver spidev and a controller in front of an SpiDevice: answers requests of programs to /dev/spidevB.C.
 #pragma once
 
 #include <cstddef>
@@ -10,7 +10,7 @@
 
 namespace absenc::os {
 
-/// Of the program that asks.
+/// A memory range of the program that made the request.
 struct UserMemory {
   std::uint64_t address;
   std::size_t size;
@@ -19,37 +19,38 @@ struct UserMemory {
 };
 
 struct SpidevReply {
-  int result = 0;  // as ioctl, read and write return it; negative: -errno
-  /// The same again, with what stands at `in`, and room for what goes to `out`: one after the other.
+  int result = 0;  // return value of ioctl, read and write; negative: -errno
+  /// True if the request must be repeated, with the content of `in` and room for `out`, concatenated.
   bool again = false;
   std::vector<UserMemory> in{};
   std::vector<UserMemory> out{};
-  std::vector<std::uint8_t> bytes{};  // for that room
-  Time at{};                          // not before: the message is over then
+  std::vector<std::uint8_t> bytes{};  // content for the ranges in `out`
+  Time at{};                          // earliest time for the reply: the end of the message
 };
 
-/// What it is set to, and how it can be set.
+/// Settings of the controller and their possible values.
 struct SpidevSettings {
-  std::uint32_t mode = 0;  // with the flags of <linux/spi/spi.h>
+  std::uint32_t mode = 0;  // mode with the flags of <linux/spi/spi.h>
   std::uint8_t word_bits = 8;
-  std::uint32_t speed;      // Hz
-  std::uint32_t mode_bits;  // those that the controller has
+  std::uint32_t speed;      // in Hz
+  std::uint32_t mode_bits;  // mode flags that the controller supports
 };
 
-/// As Documentation/spi/spidev.rst has it, with the module's own limits. The controller sends words of 8 bits on one
-/// wire, at every speed, and selects the chip as it is wired. At first it is in mode 0, as without a word in the device
-/// tree. It never touches the memory of the program that asks but says which it wants, as the kernel wants it from
-/// CUSE; tests fetch it by pointer.
+/// Implements Documentation/spi/spidev.rst with the kernel module's own limits. The controller sends words of 8 bits on
+/// one wire at every speed, and selects the chip as it is wired. It begins in mode 0, the default without an entry in
+/// the device tree. It never reads memory of the requesting program itself but returns the ranges that it needs, as the
+/// kernel requires of CUSE; tests read them by pointer.
 class Spidev {
  public:
   explicit Spidev(SpiDevice& device);
 
   void open() { ++users_; }
-  /// The last one gives the speed back.
+  /// Closes the device; the last close resets the speed.
   void close();
 
-  /// `in`: what `in` of the last reply asked for; empty at first. `room`: the same of `out`. Errors: ENOTTY (no request
-  /// of spidev), EINVAL, EMSGSIZE (more than 4096 bytes either way, or more than 255 buffers).
+  /// Handles an ioctl. `in` is the content of the ranges `in` of the last reply, empty at first; `room` is the total
+  /// size of its ranges `out`. Errors: ENOTTY (no request of spidev), EINVAL, EMSGSIZE (more than 4096 bytes in a
+  /// direction, or more than 255 buffers).
   [[nodiscard]] SpidevReply control(unsigned long request, std::uint64_t address, Bytes in, std::size_t room, Time now);
   [[nodiscard]] SpidevReply read(std::size_t size, Time now);
   [[nodiscard]] SpidevReply write(Bytes bytes, Time now);

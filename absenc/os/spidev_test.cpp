@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the far side of spidev answers, and which memory of the program it asks for.
+// Tests the replies of Spidev, and which memory of the program it requests.
 #include "absenc/os/spidev.hpp"
 
 #include <gmock/gmock-more-matchers.h>
@@ -30,7 +30,7 @@ Data bytes_of(const Value& value) {
   return bytes;
 }
 
-// spi_ioc_transfer, with what is not said being 0.
+// The fields of spi_ioc_transfer, 0 by default.
 struct One {
   std::uint64_t tx_buf = 0;
   std::uint64_t rx_buf = 0;
@@ -65,7 +65,7 @@ struct SpidevTest : ::testing::Test {
     return spidev.control(_IOC(_IOC_WRITE, SPI_IOC_MAGIC, 0, count * sizeof(spi_ioc_transfer)), 0x1000, list_and_bytes,
                           room, 1ms);
   }
-  // errno of a message of one transfer, whatever memory it asks for.
+  // Returns the errno of a message of one transfer.
   int refused(const One& transfer) {
     const SpidevReply reply = message(bytes_of(transfer), 1, 0);
     return -reply.result;
@@ -161,7 +161,7 @@ TEST_F(SpidevTest, AsksForTheTransfersAndThenForTheirBuffers) {
 
 TEST_F(SpidevTest, AListThatChangedMeanwhileIsAskedForAgain) {
   Data in = bytes_of(One{.tx_buf = 0x2000, .len = 5});
-  in.insert(in.end(), {1, 2});  // they came for a list that had two bytes
+  in.insert(in.end(), {1, 2});  // bytes that were fetched for a list with a two-byte buffer
   const SpidevReply reply = message(in, 1, 0);
   EXPECT_TRUE(reply.again);
   EXPECT_THAT(reply.in, ElementsAre(UserMemory{0x1000, 32}, UserMemory{0x2000, 5}));

@@ -29,7 +29,7 @@ void StreamPort::begin(const ByteStep& step) {
       pulse(step);
       break;
     case ByteStep::Kind::configure:
-      reach(sent_at_);  // what is on its way leaves with the old settings
+      reach(sent_at_);  // bytes in transit leave with the old settings
       change_rate(step.rate);
       break;
     case ByteStep::Kind::wait:
@@ -40,7 +40,7 @@ void StreamPort::begin(const ByteStep& step) {
 }
 
 void StreamPort::transfer(const ByteStep& step) {
-  // The first comparison spares most transfers a look at the clock.
+  // The first comparison saves most transfers a read of the clock.
   if (step.at > waiting_.told() + send_slack_ && step.at > os::now() + send_slack_) reach(step.at);
   const Time before = os::now();
   if (!step.out.empty()) write_all(step.out);
@@ -60,9 +60,9 @@ ByteEvent StreamPort::wait(const ByteStep& step) {
     const Time time = os::now();
     if (time >= end_) throw Ended{};
     if (!ready.empty()) {
-      // Bytes go before limits: that we come late to look is not the fault of the other side.
+      // Bytes go before limits: a late look by this program is not the fault of the other side.
       if (const std::size_t size = read_some(buffer_, ready); size > 0) {
-        const Time at = std::max(time, sent_at_);  // an echo comes before the computed end of sending
+        const Time at = std::max(time, sent_at_);  // an echo is received before the computed end of sending
         waiting_.silence.heard(at);
         return waiting_.tell(
             {.kind = ByteEvent::Kind::received, .at = at, .items = {buffer_.data(), size}, .late = lateness()});
@@ -128,7 +128,7 @@ std::size_t DescriptorPort::read_some(MutableBytes into, std::span<const int>) {
 }
 
 void DescriptorPort::write_all(Bytes bytes) {
-  constexpr Time patience = 3s;  // a line always moves: longer than the slowest one needs for a full buffer
+  constexpr Time patience = 3s;  // longer than the slowest line needs to send a full buffer
   for (;;) {
     const ssize_t size = write_some(bytes);
     if (size < 0 && errno != EAGAIN && errno != EINTR) fail(errno);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Steps and events (link/step.hpp) over anything that carries a stream of bytes: the timing all such ports share,
-// and the port over one file descriptor.
+// Steps and events (link/step.hpp) on any port that carries a byte stream: the common timing of such ports, and the
+// port on one file descriptor.
 #pragma once
 
 #include <array>
@@ -17,10 +17,10 @@
 
 namespace absenc::os {
 
-/// Every function throws Failure, Interrupted (os/signals.hpp) or Ended.
+/// Base of all byte stream ports. Every function throws Failure, Interrupted (os/signals.hpp) or Ended.
 ///
-/// A transfer begins at `at`, never earlier; `begin` blocks until then. `timer` is reported when the `at` of a wait
-/// lay ahead of the last event, or of the last call of `now`.
+/// A transfer begins at `at`, never earlier; `begin` blocks until then. `timer` is reported if the `at` of a wait was
+/// later than the last event and the last call of `now`.
 class StreamPort : public Port<std::uint8_t> {
  public:
   StreamPort(const StreamPort&) = delete;
@@ -31,45 +31,47 @@ class StreamPort : public Port<std::uint8_t> {
   void begin(const Step<std::uint8_t>& step) final;
   [[nodiscard]] Event<std::uint8_t> wait(const Step<std::uint8_t>& step) final;
 
-  /// What the way between the line and this program adds to the answer and gap limits of a step.
+  /// Returns the delay between the line and this program, which is added to the answer and gap limits of a step.
   [[nodiscard]] Time latency() const { return latency_; }
   void set_latency(Time latency) { latency_ = latency; }
-  /// The same to the gap limit where nothing more is due (`expect` 0), when that is less. `never` at first.
+  /// Sets the delay that is added to the gap limit where no more bytes are expected (`expect` 0), if it is less than
+  /// `latency`. Default `never`.
   void set_idle_latency(Time latency) { idle_latency_ = latency; }
 
-  /// A transfer due within `slack` is sent at once: for a virtual encoder, whose line takes no time. 0 at first.
+  /// Sets the slack: a transfer due within `slack` is sent at once. For a virtual encoder, whose line takes no time.
+  /// Default 0.
   void set_send_slack(Time slack) { send_slack_ = slack; }
 
-  /// From `end` on the port throws Ended. `never` at first.
+  /// Sets the time from which the port throws Ended. Default `never`.
   void set_end(Time end) { end_ = end; }
 
-  /// The time of a character on the line; 0: not known, or there is no line, as behind a pseudo-terminal.
+  /// Returns the duration of a character on the line; 0 if unknown or if there is no line, as behind a pseudo-terminal.
   [[nodiscard]] Time character_time() const { return character_time_; }
 
  protected:
   StreamPort();
 
-  /// Line time of a character: `sent` is computed from it, because tcdrain blocks for milliseconds. 0 at first: a
-  /// transfer has left when it is written.
+  /// Sets the duration of a character. `sent` is computed from it, because tcdrain blocks for milliseconds. Default 0:
+  /// a transfer counts as sent when it is written.
   void set_character_time(Time time) { character_time_ = time; }
-  /// Whoever is at the other end may read what is written, and answer it, before the call that writes it has returned:
-  /// `sent` is told with the time before that call, not after it. false at first.
+  /// With `yes`, `sent` gets the time before the write, because the program at the other end may read and answer the
+  /// bytes before the write returns. Default false: the time after the write.
   void set_read_at_once(bool yes) { read_at_once_ = yes; }
   [[nodiscard]] Time end() const { return end_; }
-  /// End of the last transfer.
+  /// Returns the end of the last transfer.
   [[nodiscard]] Time sent_at() const { return sent_at_; }
 
-  /// Where bytes come from: to be filled by the derived port.
+  /// Returns the poller; the derived port adds its descriptors.
   [[nodiscard]] Poller& poller() { return poller_; }
-  /// What has come on these descriptors, as far as it fits; 0 when that was not bytes.
+  /// Reads bytes from the ready descriptors, as many as fit; returns 0 if none of the events were bytes.
   virtual std::size_t read_some(MutableBytes into, std::span<const int> ready) = 0;
-  /// How long this program may have been kept from looking at what `read_some` brought; 0: not known.
+  /// Returns how long this program may have been unable to read the bytes of `read_some`; 0 if unknown.
   virtual Time lateness() { return {}; }
   virtual void write_all(Bytes bytes) = 0;
   /// Both throw `unsupported` unless overridden.
   virtual void drive(ExtraWire wire, bool active);
   virtual void change_rate(std::uint32_t rate);
-  /// How long a pulse lasts: as asked, unless overridden.
+  /// Returns the duration of a pulse: `asked`, unless overridden.
   [[nodiscard]] virtual Time pulse_width(ExtraWire wire, Time asked) const;
 
  private:
@@ -88,15 +90,15 @@ class StreamPort : public Port<std::uint8_t> {
 
   Waiting<std::uint8_t> waiting_;
   Time sent_at_{};             // end of the last transfer
-  Time sent_late_{};           // it may have ended so much earlier
-  bool sent_pending_ = false;  // `sent` is to be reported
+  Time sent_late_{};           // the last transfer may have ended earlier by this time
+  bool sent_pending_ = false;  // `sent` is still to be reported
   std::array<std::uint8_t, 4096> buffer_;
 };
 
-/// A stream port over one descriptor that reads and writes. Its latency is 0 at first.
+/// A stream port on one descriptor for reading and writing. Its default latency is 0.
 class DescriptorPort : public StreamPort {
  public:
-  /// `name` as in "the port /dev/ttyUSB0", for messages. Makes the descriptor non-blocking.
+  /// `name` is for example "the port /dev/ttyUSB0" and is used in messages. Makes the descriptor non-blocking.
   DescriptorPort(Descriptor descriptor, std::string name);
 
   [[nodiscard]] const std::string& name() const { return name_; }
@@ -104,13 +106,13 @@ class DescriptorPort : public StreamPort {
  protected:
   [[nodiscard]] int descriptor() const { return descriptor_.get(); }
 
-  /// As write(2).
+  /// Works like write(2).
   virtual ssize_t write_some(Bytes bytes);
 
   std::size_t read_some(MutableBytes into, std::span<const int> ready) override;
   void write_all(Bytes bytes) override;
 
-  /// Throws what `error`, a value of errno, or 0 at the end of the file, means of this port.
+  /// Throws the exception for `error`, a value of errno, or 0 for the end of the file.
   [[noreturn]] void fail(int error) const;
 
  private:

@@ -75,7 +75,7 @@ TEST_F(StreamPortTest, ComputesTheEndOfSending) {
   EXPECT_GE(first, before + 2s);
   EXPECT_LE(first, now() + 2s);
   port_.begin(transfer(request_));
-  EXPECT_EQ(port_.wait({}).at, first + 2s);  // queued behind the first
+  EXPECT_EQ(port_.wait({}).at, first + 2s);  // sent after the first transfer
 }
 
 TEST_F(StreamPortTest, AnEchoDoesNotComeBeforeTheEndOfSending) {
@@ -102,7 +102,7 @@ TEST_F(StreamPortTest, ReportsSilenceOnceWhenNoAnswerComes) {
 TEST_F(StreamPortTest, ReportsSilenceOnceAfterAGap) {
   port_.set_latency(2ms);
   put(peer_.get(), {1});
-  // No gap before the first byte: only the timer is left.
+  // Before the first byte no gap limit applies: only a timer would end the wait.
   EXPECT_EQ(port_.wait({.at = never, .gap = 1ns}).kind, Kind::received);
   const ByteEvent silence = port_.wait({.at = never, .answer = 1ns, .gap = 1ms});
   ASSERT_EQ(silence.kind, Kind::silence);
@@ -161,7 +161,7 @@ TEST_F(StreamPortTest, ATimerThatPassesWhileSendingIsNotLost) {
 }
 
 TEST_F(StreamPortTest, TheEarlierOfTimerAndSilenceComesFirst) {
-  // Even when both have passed before we look.
+  // Also if both have passed before the port checks.
   const auto first_of = [this](Time timer, Time answer) {
     port_.begin(transfer(request_));
     const Time sent = port_.wait({}).at;
@@ -182,7 +182,8 @@ TEST_F(StreamPortTest, WaitsForAnAnswerAfterEachTransfer) {
   port_.begin(transfer(request_));
   EXPECT_EQ(port_.wait({.at = never}).kind, Kind::sent);
   port_.set_end(now() + 5s);
-  EXPECT_EQ(port_.wait({.at = never, .answer = 1ms}).kind, Kind::silence);  // the gap limit would be none
+  // The answer limit applies; only the gap limit would be none.
+  EXPECT_EQ(port_.wait({.at = never, .answer = 1ms}).kind, Kind::silence);
 }
 
 TEST_F(StreamPortTest, WritesOnWhenTheOtherSideIsSlow) {
@@ -206,7 +207,7 @@ TEST_F(StreamPortTest, EndsWhileTheOtherSideTakesNothing) {
   const Time end = now() + 5ms;
   port_.set_end(end);
   EXPECT_THROW(port_.begin(transfer(many)), Ended);
-  EXPECT_LT(now(), end + 2s);  // before it gives the other side up
+  EXPECT_LT(now(), end + 2s);  // before the port's own limit for a stalled peer
 }
 
 TEST_F(StreamPortTest, EndsWhileWaiting) {
@@ -222,8 +223,8 @@ TEST_F(StreamPortTest, EndsWhileWaiting) {
 TEST_F(StreamPortTest, IsLostWhenTheOtherSideCloses) {
   put(peer_.get(), {1});
   peer_.close();
-  EXPECT_EQ(port_.wait({.at = never}).kind, Kind::received);  // what came before is not lost with it
-  errno = EAGAIN;                                             // of some call before: the end of a stream sets none
+  EXPECT_EQ(port_.wait({.at = never}).kind, Kind::received);  // bytes received before the close are not lost
+  errno = EAGAIN;  // left by an earlier call: the end of a stream does not set errno
   const Failure failure = failure_of([&] { static_cast<void>(port_.wait({.at = never})); });
   EXPECT_EQ(failure.kind(), Failure::Kind::lost);
   EXPECT_STREQ(failure.what(), "the line went away: unplugged, or closed at the other end?");

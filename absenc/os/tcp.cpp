@@ -17,7 +17,7 @@ using namespace std::chrono_literals;
 
 namespace {
 
-// 0, or an errno; `descriptor` is the connection then.
+// Connects to `address`. Returns 0 with the connection in `descriptor`, or a value of errno.
 int connect_to(const addrinfo& address, Time deadline, Descriptor& descriptor) {
   descriptor = Descriptor(::socket(address.ai_family, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0));
   if (!descriptor) return errno;
@@ -54,7 +54,7 @@ Descriptor open_connection(const std::string& host, std::uint16_t port) {
     Descriptor descriptor;
     error = connect_to(*address, deadline, descriptor);
     if (error != 0) continue;
-    const int on = 1;  // a request must not wait for the acknowledgement of the one before
+    const int on = 1;  // TCP_NODELAY: a request must not wait for the acknowledgement of the previous one
     ::setsockopt(descriptor.get(), IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
     return descriptor;
   }
@@ -68,7 +68,7 @@ TcpPort::TcpPort(const std::string& host, std::uint16_t port)
   set_latency(200ms);
 }
 
-// Unlike write, without SIGPIPE when the other side has closed.
+// Unlike write(2), send(2) with MSG_NOSIGNAL raises no SIGPIPE after the other side has closed.
 ssize_t TcpPort::write_some(Bytes bytes) { return ::send(descriptor(), bytes.data(), bytes.size(), MSG_NOSIGNAL); }
 
 }  // namespace absenc::os

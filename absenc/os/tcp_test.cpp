@@ -33,7 +33,7 @@ struct Listener {
     sockaddr_in6 address{};
     socklen_t size = sizeof address;
     ::getsockname(socket.get(), reinterpret_cast<sockaddr*>(&address), &size);
-    port = ntohs(address.sin6_port);  // at the same place in both
+    port = ntohs(address.sin6_port);  // the port has the same offset in IPv4 and IPv6 addresses
   }
   void listen(int backlog) const { ASSERT_EQ(::listen(socket.get(), backlog), 0); }
   [[nodiscard]] Descriptor accept() const { return Descriptor(::accept(socket.get(), nullptr, nullptr)); }
@@ -69,7 +69,7 @@ TEST(TcpPort, KnowsIpv6) {
 }
 
 TEST(TcpPort, SaysThatNobodyListens) {
-  const Listener listener;  // bound, so that nobody else takes the port
+  const Listener listener;  // bound, so that no other program takes the port
   const Failure failure = failure_of([&] { const TcpPort port("127.0.0.1", listener.port); });
   EXPECT_EQ(failure.kind(), Kind::not_found);
   EXPECT_EQ(std::string(failure.what()), "nothing listens on 127.0.0.1 port " + std::to_string(listener.port) +
@@ -85,7 +85,7 @@ TEST(TcpPort, SaysThatTheHostIsUnknown) {
 TEST(TcpPort, GivesUpAServerThatDoesNotAnswer) {
   const Listener listener;
   listener.listen(0);
-  const TcpPort first("127.0.0.1", listener.port);  // the queue is full: further requests to connect are dropped
+  const TcpPort first("127.0.0.1", listener.port);  // the queue is full: further connection requests are dropped
   const Time begin = now();
   EXPECT_EQ(failure_of([&] { const TcpPort second("127.0.0.1", listener.port); }).kind(), Kind::lost);
   EXPECT_GE(now() - begin, 3s);
@@ -101,7 +101,7 @@ TEST(TcpPort, IsLostWhenTheServerCloses) {
   server.close();
   EXPECT_EQ(failure_of([&] { static_cast<void>(port.wait({.at = never})); }).kind(), Kind::lost);
   const Data bytes{1};
-  EXPECT_EQ(failure_of([&] { port.begin(transfer(bytes)); }).kind(), Kind::lost);  // and no SIGPIPE
+  EXPECT_EQ(failure_of([&] { port.begin(transfer(bytes)); }).kind(), Kind::lost);  // and raises no SIGPIPE
 }
 
 }  // namespace

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the tests of this folder share.
+// Helpers shared by the tests of this folder.
 #pragma once
 
 #include <fcntl.h>
@@ -29,7 +29,7 @@ using Data = std::vector<std::uint8_t>;
   return {.kind = ByteStep::Kind::transfer, .out = out, .at = at};
 }
 
-/// A directory of its own, removed at the end.
+/// A temporary directory, removed at the end.
 class TemporaryDirectory {
  public:
   TemporaryDirectory() {
@@ -47,7 +47,7 @@ class TemporaryDirectory {
   std::filesystem::path path_;
 };
 
-/// A bare pseudo-terminal.
+/// A bare pseudo-terminal, with both its master and its path.
 struct PseudoTerminal {
   PseudoTerminal() : master(::posix_openpt(O_RDWR | O_NOCTTY | O_CLOEXEC)) {
     ::grantpt(master.get());
@@ -64,7 +64,7 @@ inline void put(int descriptor, const Data& bytes) {
   ASSERT_EQ(::write(descriptor, bytes.data(), bytes.size()), static_cast<ssize_t>(bytes.size()));
 }
 
-/// What one read gives; empty when nothing comes within `milliseconds`.
+/// Returns the bytes of one read; empty if nothing is received within `milliseconds`.
 [[nodiscard]] inline Data get(int descriptor, int milliseconds = 5000) {
   pollfd readable{descriptor, POLLIN, 0};
   if (::poll(&readable, 1, milliseconds) <= 0) return {};
@@ -74,7 +74,7 @@ inline void put(int descriptor, const Data& bytes) {
   return bytes;
 }
 
-/// The Failure that `action` throws; without one the test fails.
+/// Returns the Failure that `action` throws; the test fails if it throws none.
 [[nodiscard]] inline Failure failure_of(const std::function<void()>& action) {
   try {
     action();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The identity of a USB adapter, and the greatest rate of its chip.
+// The identity of a USB adapter, and the highest rate of its chip.
 #pragma once
 
 #include <cstdint>
@@ -9,28 +9,28 @@
 
 namespace absenc::os {
 
-/// From the descriptors of the USB device; what it does not have is empty.
+/// Identity from the descriptors of the USB device; missing ones are empty.
 struct UsbAdapter {
   std::uint16_t vendor = 0;     // idVendor
   std::uint16_t product = 0;    // idProduct
-  std::uint16_t release = 0;    // bcdDevice: tells chips of one product number apart
+  std::uint16_t release = 0;    // bcdDevice: distinguishes chips with the same product number
   std::string maker{};          // iManufacturer
   std::string name{};           // iProduct
   std::string serial_number{};  // iSerialNumber
 };
 
-/// A chip between USB and UART.
+/// A bridge chip between USB and UART.
 struct AdapterChip {
   std::string_view name;       // "FT232R"
-  std::uint32_t highest_rate;  // bits a second, by its data sheet
+  std::uint32_t highest_rate;  // in bits per second, from its data sheet
 };
 
-/// Reads the identity of the adapter behind a terminal ("ttyUSB0"); empty when it is not on USB. `sys` is a parameter
-/// for tests.
+/// Reads the identity of the adapter behind a terminal ("ttyUSB0"); empty if it is not on USB. `sys` is a parameter for
+/// tests.
 [[nodiscard]] std::optional<UsbAdapter> usb_adapter(const std::string& terminal,
                                                     const std::filesystem::path& sys = "/sys/class/tty");
 
-/// Null when the numbers do not tell the chip.
+/// Returns the chip of the adapter, or null if the numbers do not identify it.
 [[nodiscard]] const AdapterChip* chip_of(const UsbAdapter& adapter);
 
 }  // namespace absenc::os

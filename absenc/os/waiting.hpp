@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a wait ends with when nothing comes, alike for every port.
+// The timer and the silence limit that end a port's wait, common to all ports.
 #pragma once
 
 #include <algorithm>
@@ -11,7 +11,7 @@
 
 namespace absenc::os {
 
-/// What a port knows of its machine: its time, the timer that it was promised, and how long nothing came.
+/// Timing state of a port: the time known to its machine, the requested timer, and the silence limit.
 template <class Item>
 class Waiting {
  public:
@@ -20,23 +20,24 @@ class Waiting {
 
   Silence silence;
 
-  /// The time that the machine knows: of `now`, or of its last event.
+  /// Returns the time known to the machine: that of `now` or of its last event.
   [[nodiscard]] Time told() const { return told_; }
   Time now() { return told_ = os::now(); }
-  /// An event may be told late: a timer behind its time is still to come.
+  /// Returns `event` and records its time as known to the machine: a timer later than this time is still to be
+  /// reported, even if the event is reported late.
   Event<Item> tell(const Event<Item>& event) {
     told_ = event.at;
     return event;
   }
 
-  /// Who waits with this step. A timer stays due when another event came in its moment and the machine asks for it once
-  /// more.
+  /// Starts a wait with this step. A timer stays due if another event occurred at the same time and the machine
+  /// requests the timer again.
   void begin(const Step<Item>& step, Time latency = {}) {
     timer_ = step.at > told_ || step.at == timer_ ? step.at : never;
     silence_ = silence.due(step.answer, step.gap, latency);
   }
   [[nodiscard]] Time due() const { return std::min(timer_, silence_); }
-  /// The timer or the silence that is due at this time, or nothing.
+  /// Returns the timer or silence event that is due at `time`, or nothing.
   std::optional<Event<Item>> over(Time time) {
     using Kind = typename Event<Item>::Kind;
     if (time < due()) return {};
@@ -50,8 +51,8 @@ class Waiting {
 
  private:
   Time told_{};
-  Time timer_ = never;    // that was promised and not yet told
-  Time silence_ = never;  // that is to be told in this wait
+  Time timer_ = never;    // requested timer that was not reported yet
+  Time silence_ = never;  // time at which silence is due in this wait
 };
 
 }  // namespace absenc::os

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Measures how late this computer wakes a thread: a reply that is no later than that tells nothing of its encoder.
+// Measures how late this computer wakes a thread: a reply delayed by no more than this may be punctual.
 #pragma once
 
 #include <atomic>
@@ -11,10 +11,10 @@
 
 namespace absenc::os {
 
-/// Waits for a millisecond, again and again, in a thread of its own, as long as it exists.
+/// Sleeps for a millisecond again and again in its own thread, as long as the object exists.
 class WakeupWatch {
  public:
-  /// The longest that it was woken too late.
+  /// Returns the longest delay of a wake-up so far.
   [[nodiscard]] Time latest() const { return Time(latest_.load()); }
 
  private:

@@ -57,7 +57,7 @@ std::string checked(const std::string& name) {
 std::vector<iovec> ranges(const std::vector<UserMemory>& memory) {
   std::vector<iovec> found;
   for (const UserMemory& one : memory) {
-    // An address of another process, which only the kernel looks at.
+    // an address of another process, which only the kernel uses
     found.push_back({reinterpret_cast<void*>(static_cast<std::uintptr_t>(one.address)), one.size});
   }
   return found;
@@ -65,7 +65,7 @@ std::vector<iovec> ranges(const std::vector<UserMemory>& memory) {
 
 }  // namespace
 
-/// What libfuse calls. Nothing is thrown through it: who has to wait is answered by `serve`.
+/// Callbacks of libfuse. They throw nothing, because libfuse is C; requests that must wait are answered by `serve`.
 struct SpidevNodeCalls {
   using Asked = SpidevNode::Asked;
 
@@ -134,7 +134,7 @@ SpidevNode::SpidevNode(const std::string& name, Spidev& spidev) : spidev_(&spide
   fuse_opt_free_args(&arguments);
   const std::string what = "making " + path_;
   if (!session_) throw Failure(Kind::system, what + " failed: libfuse made no session");
-  // The session takes the descriptor over.
+  // The session takes ownership of the descriptor.
   const std::string descriptor_name = "/dev/fd/" + std::to_string(control.get());
   if (fuse_session_mount(session_.get(), descriptor_name.c_str()) != 0) {
     throw Failure(Kind::system, what + " failed: libfuse did not take " + control_path);
@@ -146,7 +146,7 @@ SpidevNode::SpidevNode(const std::string& name, Spidev& spidev) : spidev_(&spide
     wait_for({&readable, 1}, never);
     process_one();
   }
-  // The kernel refuses silently.
+  // The kernel reports no error if it refuses the name.
   if (!std::filesystem::exists(path_, ignored)) {
     throw Failure(Kind::system,
                   "the kernel did not make " + path_ + ": see what it says in dmesg, or choose another name");
@@ -176,7 +176,7 @@ void SpidevNode::process_one() {
   fuse_buf buffer{};
   const int size = fuse_session_receive_buf(session_.get(), &buffer);
   const std::unique_ptr<void, decltype(&std::free)> memory(buffer.mem, std::free);
-  if (size == -EINTR || size == -EAGAIN) return;  // the program that asked has gone
+  if (size == -EINTR || size == -EAGAIN) return;  // the requesting program has ended
   if (size > 0) fuse_session_process_buf(session_.get(), &buffer);
   if (size <= 0 || fuse_session_exited(session_.get()) != 0) {
     throw Failure(Kind::lost, "the kernel took " + path_ + " away: see what it says in dmesg");

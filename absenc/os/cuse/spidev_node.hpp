@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A character device of this computer that is served by this process (CUSE): any program that speaks spidev finds a
-// Spidev behind it. A library of its own, which is linked by the command only and not installed: nobody who uses
-// absenc-os then gets libfuse.
+// A character device that this process serves (CUSE): any program that uses spidev reaches a Spidev. It is a library of
+// its own, linked only by the command and not installed, so that users of absenc-os do not need libfuse.
 #pragma once
 
 #include <cstdint>
@@ -17,8 +16,8 @@ namespace absenc::os {
 
 class SpidevNode {
  public:
-  /// Makes /dev/`name`; it is gone with the object. `spidev` must outlive it. Throws Failure: `not_found` (the kernel's
-  /// module is not there), `no_permission`, `in_use` (the name), `unsupported` (what is no name), `system`.
+  /// Creates /dev/`name`, which is removed with the object. `spidev` must outlive it. Throws Failure: `not_found` (the
+  /// kernel module is not loaded), `no_permission`, `in_use` (the name), `unsupported` (the name is invalid), `system`.
   SpidevNode(const std::string& name, Spidev& spidev);
   SpidevNode(const SpidevNode&) = delete;
   SpidevNode& operator=(const SpidevNode&) = delete;
@@ -26,8 +25,8 @@ class SpidevNode {
 
   [[nodiscard]] const std::string& path() const { return path_; }
 
-  /// Answers whoever opens it, one message at a time and each when it is over, until `end`. Throws as `wait_for`
-  /// (os/signals.hpp), and Failure when the kernel takes the device away.
+  /// Answers requests of programs until `end`, one message at a time and each at its end. Throws as `wait_for`
+  /// (os/signals.hpp), and Failure if the kernel removes the device.
   void serve(Time end = never);
 
  private:
@@ -49,7 +48,7 @@ class SpidevNode {
   Spidev* spidev_;
   std::string path_;
   bool made_ = false;
-  std::optional<Pending> pending_;  // to be answered when it is over
+  std::optional<Pending> pending_;  // request that is answered when its message is over
   std::unique_ptr<fuse_session, CloseSession> session_;
 };
 
