@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the document demands of the encoder, with the place that says so.
+// Requirements of the document on the encoder and on the host, each with its paragraph.
 #pragma once
 
 #include <array>
@@ -105,7 +105,7 @@ inline constexpr auto can_clauses = std::array{
            .demand = Demand::as_drawn,
            .errors = any_of(Error::out_of_range)},
     Clause{"node", "3.4.1 (3)", "a request to another node is not answered", Demand::foreign_silent},
-    // The number of the node and its bit rate are left alone: README.md says why.
+    // No clauses for setting the node number and the bit rate; README.md gives the reason.
     Clause{.id = "cyclic",
            .paragraph = "3.4.1 (3) 7, 8",
            .words = "after command 31 the node sends as many readings a second as it was told",
@@ -126,7 +126,7 @@ inline constexpr auto can_clauses = std::array{
            .demand = Demand::zero},
 };
 
-// ---- What hosts do that break a clause, or are about one
+// ---- Commands and frames of hosts that break a clause or just keep it
 
 namespace script {
 using std::chrono::milliseconds;
@@ -137,7 +137,8 @@ inline constexpr std::array direction_often{HostStep{milliseconds(20), "set-dire
 inline constexpr std::array zero_often{HostStep{milliseconds(20), "zero", {}, 12}};
 
 inline constexpr std::array two_at_once{HostStep{{}, "bc aa b1 bc aa b1"}};
-// Time before the frame: what is sent during it is garbled.
+// The reply begins 20 ms after the request (`acquisition_us`); a second request within that time breaks the rule
+// `turn`.
 inline constexpr std::array soon_again{HostStep{{}, "position"}, HostStep{milliseconds(5), "position"}};
 
 inline constexpr HostStep enter{milliseconds(1), "7e5:0401000000000000"};
@@ -182,7 +183,7 @@ inline constexpr std::array<HostClause, 7> modbus_host_clauses{{
      .breaks = {script::direction_often, script::zero_often}},
 }};
 
-// Of the modes only bus is one in which bytes ask.
+// Host clauses of the serial unit. Only in bus mode do bytes request a position.
 inline constexpr std::array<HostClause, 4> serial_host_clauses{{
     {"asks", "3.1.5 (1)", "requests are as drawn", HostDemand::asks},
     {"silence", "3.1.5 (1)", "after no reply it asks again", HostDemand::after_silence},

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What captured frames say of an option: each of its values is judged by the first frame that contradicts it.
+// Judges the values of an option by captured frames: a value is impossible if one frame contradicts it.
 #pragma once
 
 #include <optional>
@@ -9,9 +9,9 @@
 
 namespace absenc::raa38 {
 
-/// Tells every value from `first` to `last`. `against(value, i)` is why capture i contradicts it; empty: it does not.
-/// Whether one is possible, which `value` then is: as it was, if that is, because the position of a shaft that was not
-/// turned has as many bits as it likes.
+/// Reports each value from `first` to `last` with its evidence. `against(value, i)` returns why capture i contradicts
+/// the value, or an empty text. Returns whether a value is possible and sets `value` to it. A possible `value` is left
+/// unchanged, because the position of a shaft that stands still fits many numbers of bits.
 template <class Against>
 bool judge(EvidenceSink& sink, std::size_t option, std::int64_t first, std::int64_t last, std::size_t captures,
            std::int64_t& value, std::string_view agrees, Against&& against) {

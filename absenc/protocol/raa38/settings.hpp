@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The settings that a virtual RAA38S6 keeps over power off on lines where it can be told any. Writing them wears.
+// Settings that a virtual RAA38S6 keeps over power off, on lines with commands to change them. Each write wears the
+// memory.
 #pragma once
 
 #include <algorithm>
@@ -14,8 +15,8 @@ namespace absenc::raa38 {
 
 class Settings {
  public:
-  // Where each lies in the memory: its number on the line, its rate as the document numbers them, whether it counts
-  // down, counts of the shaft at its zero, how often it was written.
+  // Memory layout: number on the line, index of the bit rate, 1 if it counts down, shaft position at its zero in
+  // counts, number of writes.
   static constexpr std::size_t number_at = 0;
   static constexpr std::size_t rate_at = 1;
   static constexpr std::size_t direction_at = 2;
@@ -34,12 +35,12 @@ class Settings {
   [[nodiscard]] bool counts_down() const { return memory_[direction_at] != 0; }
   [[nodiscard]] std::uint32_t writes() const { return load(writes_at); }
 
-  /// The direction mirrors the position at the zero.
+  /// Returns the position in counts. The direction mirrors it at the zero.
   [[nodiscard]] std::uint32_t position(Time at) const {
     const std::uint32_t up = counts(at) - load(zero_at);
     return static_cast<std::uint32_t>((counts_down() ? 0u - up : up) & low_mask(bits_));
   }
-  /// False: it was so already.
+  /// Writes a setting. Returns false if the memory had this value already.
   bool write(std::size_t at, Bytes value) {
     const MutableBytes kept = MutableBytes(memory_).subspan(at, value.size());
     const bool changes = !std::equal(value.begin(), value.end(), kept.begin());
@@ -48,7 +49,7 @@ class Settings {
     ++version_;
     return changes;
   }
-  /// As `write`: the zero is where the shaft stands.
+  /// Makes the present shaft position the zero. Returns false as `write` does.
   bool write_zero(Time at) {
     std::array<std::uint8_t, 4> zero{};
     store_little_endian(zero, counts(at));

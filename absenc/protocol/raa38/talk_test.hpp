@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// For tests: encoders and a host on one line in virtual time, and how a conversation ended, as the unit makes it.
+// For tests: encoders and a host on one line in virtual time, and the results of the unit's conversations.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -34,12 +34,12 @@ struct Collector final : FieldSink {
   return text.find(words) != std::string_view::npos;
 }
 
-/// How a conversation ended.
+/// Result of a conversation.
 struct End {
   Error error = Error::none;
-  std::string words{};   // what was found, and what to do
-  std::string fields{};  // "name=value name=value ", real ones left out
-  std::string left{};    // the same of what it leaves when it is broken off
+  std::string words{};   // detail and advice
+  std::string fields{};  // "name=value name=value ", without real numbers
+  std::string left{};    // the same for what report_left reports of an interrupted command
   std::optional<Reading> reading{};
   Time took{};
 
@@ -58,7 +58,7 @@ template <class Item>
   return end;
 }
 
-/// With an error nothing may be shown.
+/// Checks the error and its words. With an error, fields and reading must be empty.
 [[nodiscard]] inline ::testing::AssertionResult ended(const End& end, Error error, std::string_view words = {}) {
   const bool good = end.error == error && says(end.words, words);
   const bool silent = error == Error::none || (end.fields.empty() && !end.reading);
@@ -66,12 +66,12 @@ template <class Item>
          << text_of(end.error).name << ": " << end.words << ": " << end.fields;
 }
 
-/// `options_of(format)` makes the unit's options of a format.
+/// A line with one or more encoders and a host. `options_of(format)` must make the unit's options of a format.
 template <class Item, class Encoder, class Format, const Unit& unit>
 struct Bench {
   Bench(const Format& own, LinkKind kind, const LineSettings& settings) : format(own), line(kind, settings) {}
 
-  /// One more encoder on the line, on the same shaft.
+  /// Adds an encoder to the line, on the same shaft.
   Encoder& add(const Format& of_it) {
     encoders.emplace_back(of_it, shaft);
     encoders.back().power_on(line.now(), Device<Item>::PowerOn::skip);
@@ -80,13 +80,13 @@ struct Bench {
   }
   Encoder& encoder() { return encoders.front(); }
 
-  /// To its end, or until `on_emit` returns false.
+  /// Runs a host to its end, or until `on_emit` returns false.
   template <class Machine>
   Machine& run(Machine& machine, const std::function<bool()>& on_emit = {}) {
     const Time start = line.now();
     emitted = on_emit;
     if (host_end) {
-      line.replace(*host_end, machine);  // at the rate to which the one before has set this end
+      line.replace(*host_end, machine);  // the new host starts at the rate that the host before has set
     } else {
       host_end = line.attach(sim::Role::host, machine, [this] { return !emitted || emitted(); });
     }
@@ -95,7 +95,7 @@ struct Bench {
     line.replace(*host_end, idle);
     return machine;
   }
-  /// A command, and how it ends.
+  /// Runs a command and returns its result.
   End does(const Format& told, std::string_view command, std::vector<std::int64_t> arguments = {}) {
     Talk<Item> talk(unit, options_of(told), command, std::move(arguments));
     End end = end_of<Item>(run(*talk));
@@ -113,7 +113,7 @@ struct Bench {
   };
 
   Format format;
-  sim::testing::TestShaft<21> shaft;  // what the finest of these encoders sees
+  sim::testing::TestShaft<21> shaft;  // shaft with 21 bits, the finest resolution of these encoders
   sim::Line<Item> line;
   std::list<Encoder> encoders;
   std::optional<std::size_t> host_end{};
@@ -122,7 +122,7 @@ struct Bench {
   Time took{};
 };
 
-/// How long a conversation takes with a line on which something sends without a pause from its first request on.
+/// Returns how long a conversation takes if something sends without a pause from its first request on.
 inline Time time_with_noise(Conversation<std::uint8_t>& conversation) {
   using Kind = Step<std::uint8_t>::Kind;
   constexpr std::uint8_t noise = 0x55;

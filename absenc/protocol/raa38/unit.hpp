@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The RAA38S6 as the neutral layers see it: a unit for each line it is made for.
+// The RAA38S6 as units: one for each kind of line.
 #pragma once
 
 #include "absenc/protocol/unit.hpp"

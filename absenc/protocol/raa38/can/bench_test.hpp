@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// For tests: virtual nodes, nodes that do as a test says, and a host on one CAN bus in virtual time.
+// For tests: virtual nodes, scripted nodes, and a host on one CAN bus in virtual time.
 #pragma once
 
 #include "absenc/protocol/raa38/can/device.hpp"
@@ -29,7 +29,7 @@ struct Talk final : raa38::testing::Talk<CanFrame> {
       : raa38::testing::Talk<CanFrame>(can_unit, options_of({}), name, std::move(arguments)) {}
 };
 
-/// Sends one frame and keeps what comes until `until`.
+/// Sends one frame and records all received frames until `until`.
 class RawHost final : public Machine<CanFrame> {
  public:
   RawHost(const CanFrame& request, Time until) : request_(request), until_(until) {}
@@ -58,27 +58,27 @@ struct Bench : raa38::testing::Bench<CanFrame, VirtualNode, Format, can_unit> {
       : raa38::testing::Bench<CanFrame, VirtualNode, Format, can_unit>(own, LinkKind::can, {.rate = own.bit_rate()}) {
     add(own);
   }
-  /// A second node of the same number that answers otherwise: it counts the other way.
+  /// Adds a second node with the same number that counts down, so that its replies differ.
   void add_twin() {
     add({.positive = 1, .negative = 0, .cyclic = 0});
     static_cast<void>(raw(encode(Order::direction, 0x20, 0)));
     ASSERT_NE(encoders.front().settings().position(line.now()), encoders.back().settings().position(line.now()));
   }
-  /// `counts` of the encoder's own bits.
+  /// Sets the position; `counts` are of the encoder's resolution.
   void put(std::int64_t counts) { shaft.put(0, counts << (21 - format.bits)); }
-  /// What comes within 20 ms of a request.
+  /// Sends a request and returns the frames received within 20 ms.
   Frames raw(const CanFrame& request) {
     RawHost host(request, line.now() + 20ms);
     return run(host).heard;
   }
-  /// How many frames come by themselves.
+  /// Returns the number of frames that nodes send without a request.
   std::size_t count(Time duration) {
     RawHost host(CanFrame{.id = 0x7FF}, line.now() + duration);
     return run(host).heard.size();
   }
 };
 
-/// Answers what it is sent by a function of it, and may send by itself.
+/// A node whose answers are made by a function of the received frame. It can also send frames cyclically.
 struct Scripted final : Machine<CanFrame> {
   using Script = std::function<Frames(const CanFrame& heard)>;
   explicit Scripted(Script says_what) : script(std::move(says_what)) {}
@@ -105,9 +105,9 @@ struct Scripted final : Machine<CanFrame> {
 
   Script script;
   CanFrame unsolicited = encode_position(0x20, 49);
-  Time period{};             // 0: it sends nothing by itself
-  Time wobble{};             // each second one comes so much later
-  unsigned* left = nullptr;  // how many frames it still sends by itself; null: it goes on
+  Time period{};             // period of cyclic frames; 0: none
+  Time wobble{};             // periods are alternately shorter and longer by this time
+  unsigned* left = nullptr;  // number of cyclic frames left to send; null: no limit
   std::uint32_t rate = 250'000;
   bool tell_rate = true;
 
@@ -118,7 +118,7 @@ struct Scripted final : Machine<CanFrame> {
   bool sending = false;
 };
 
-/// How a command ends with such a node, on a bus of `rate`.
+/// Runs a command against a scripted node on a bus of `rate` and returns its result.
 inline End with(Scripted node, std::string_view command, std::vector<std::int64_t> arguments = {},
                 const Format& format = {}, std::uint32_t rate = 250'000) {
   sim::Line<CanFrame> line(LinkKind::can, {.rate = rate});
@@ -128,7 +128,7 @@ inline End with(Scripted node, std::string_view command, std::vector<std::int64_
   return raa38::testing::end_of<CanFrame>(*talk);
 }
 
-/// A node that answers each order as it should, and stands at a place.
+/// Returns the correct answer of a node at position `counts`.
 [[nodiscard]] inline Frames obedient(const CanFrame& heard, std::uint64_t counts) {
   const OrderInfo& info = *order_of(heard);
   if (info.answer == Answer::position) return {encode_position(0x20, counts)};

@@ -11,7 +11,7 @@ using namespace std::chrono_literals;
 using FrameStep = Step<CanFrame>;
 using FrameEvent = Event<CanFrame>;
 
-// The document gives neither.
+// Times of the virtual node; the document gives none.
 constexpr Time answer_time = 200us;
 constexpr Time start_up_time = 100ms;
 
@@ -27,7 +27,7 @@ void VirtualNode::send_by_itself(std::uint8_t readings_per_s, Time from) {
 }
 
 void VirtualNode::power_on(Time now, PowerOn kind) {
-  // What a file of another encoder may have brought.
+  // The memory may be from a file of another encoder.
   if (node() == 0) memory()[Settings::number_at] = format_.node;
   if (rate_of_index(settings_.rate()) == nullptr) memory()[Settings::rate_at] = rates[format_.rate].index;
   powered_ = true;
@@ -56,7 +56,7 @@ FrameStep VirtualNode::next(Time now) {
     pending_.clear();
     pending_.append(rest.view().subspan(1));
   } else if (now >= next_cyclic_) {
-    // Skips what it could not send: it never sends two at once.
+    // A node that was delayed skips frames instead of sending two at once.
     next_cyclic_ += period() * (1 + (now - next_cyclic_) / period());
     out_ = encode_position(node(), settings_.position(now));
     step.at = now;
@@ -88,7 +88,7 @@ void VirtualNode::hear(const CanFrame& frame, Time at) {
   const bool for_all = function == Function::configuration;
   if (!for_all && (function != Function::command || node_of(frame) != node())) return;
   const bool sets = for_all && info != nullptr && info->answer == Answer::error;
-  // What nodes answer on 7E5 is heard there by the others.
+  // Answers of other nodes on 7E5 are received too and must be ignored.
   if (sets && is_zero_from(frame, 1) && !configuring_) return;
   if (!rules_.expect(!frame.remote && frame.size == frame_size, "a frame without its 8 bytes of data", at)) return;
   if (!for_all && !rules_.expect(frame.data[1] == node(), "the second byte is not the node's number", at)) return;
@@ -98,7 +98,7 @@ void VirtualNode::hear(const CanFrame& frame, Time at) {
   }
   const std::string_view unknown = for_all ? "an unknown configuration command" : "an unknown command";
   if (!rules_.expect(info != nullptr, unknown, at)) return;
-  // The rate's first byte is another table of rates, which the document does not have.
+  // The first byte of the rate selects a table of rates; the document only has table 0.
   const bool is_other_table = info->order == Order::rate && frame.data[1] != 0;
   const std::uint8_t value = frame.data[info->value_at];
   if (sets) return configure(*info, is_other_table ? std::uint8_t{0xFF} : value, at);
@@ -112,7 +112,7 @@ void VirtualNode::answer(const CanFrame& frame, Time at) {
 
 void VirtualNode::obey(const OrderInfo& info, std::uint8_t value, Time at) {
   const bool changes = info.order == Order::zero || info.order == Order::direction;
-  // Its answer could be taken for a position, and the other way round.
+  // The answer could be taken for a position, and a position for the answer.
   if (changes) rules_.expect(readings_per_s_ == 0, "a setting changed while the node sends by itself", at);
   if (info.order == Order::enter) configuring_ = value == 1;
   if (info.order == Order::start && readings_per_s_ == 0) send_by_itself(format_.cyclic, at);
@@ -128,7 +128,7 @@ void VirtualNode::obey(const OrderInfo& info, std::uint8_t value, Time at) {
   if (info.answer == Answer::code) answer(encode_answer(node(), info.order), at);
 }
 
-// A new rate holds when the answer is out.
+// Applies a setting. A new bit rate becomes active after the answer was sent.
 void VirtualNode::configure(const OrderInfo& info, std::uint8_t value, Time at) {
   const bool known = meaning_of(info, value).has_value();
   const bool is_rate = info.order == Order::rate;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A virtual RAA38S6 on CAN: the node that the document describes, with its settings in a memory that wears out.
+// A virtual RAA38S6 on CAN: the node that the document describes, with settings in a memory that wears out.
 #pragma once
 
 #include "absenc/protocol/conversation.hpp"
@@ -50,13 +50,13 @@ class VirtualNode final : public Device<CanFrame> {
   Settings settings_;
 
   bool powered_ = false;
-  bool configuring_ = false;  // configuration mode
+  bool configuring_ = false;  // the node is in configuration mode
   bool sending_ = false;
-  bool switch_rate_ = false;  // when all is sent
-  bool tell_rate_ = false;    // this end of the line must be set
+  bool switch_rate_ = false;  // the bit rate changes after the last pending answer
+  bool tell_rate_ = false;    // the node's end of the line must be set to its bit rate
   std::uint8_t readings_per_s_ = 0;
   Time next_cyclic_ = never;
-  Buffer<Pending, 8> pending_;  // answers, the first due first
+  Buffer<Pending, 8> pending_;  // answers, the earliest first
   CanFrame out_{};
   std::uint64_t answer_count_ = 0;
   HostRules rules_;

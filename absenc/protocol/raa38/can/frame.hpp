@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// RAA38S6 on CAN: frames of 8 bytes, called CANopen but its own. README.md, section CAN, draws them.
+// RAA38S6 on CAN: frames of 8 bytes. The document calls it CANopen, but the protocol is its own. README.md, section
+// CAN, draws the frames.
 #pragma once
 
 #include <array>
@@ -17,7 +18,7 @@ namespace absenc::raa38::can {
 
 inline constexpr std::uint8_t frame_size = 8;
 
-/// Who a frame is for, by its identifier (the table of COB-IDs, its two wrong figures put right).
+/// Purpose of a frame by its identifier; from the table of COB-IDs, with its two wrong numbers corrected.
 enum class Function : std::uint8_t {
   nmt,                  // 000
   sync,                 // 080
@@ -26,8 +27,8 @@ enum class Function : std::uint8_t {
   command,              // 201 to 2FF: to the node
   sdo_reply,            // 581 to 5FF: from the node
   sdo_request,          // 601 to 67F: to the node
-  configuration_reply,  // 7E4: where slaves of CiA 305 answer
-  configuration,        // 7E5: to all nodes; these answer here too
+  configuration_reply,  // 7E4: identifier on which slaves of CiA 305 answer
+  configuration,        // 7E5: to all nodes; RAA38S6 also answer on it
   unknown,
 };
 
@@ -47,32 +48,32 @@ enum class Function : std::uint8_t {
   return frame.extended ? Function::unknown : function_of(frame.id);
 }
 
-/// Of a frame that has one in its identifier.
+/// Returns the node number of a frame whose identifier contains one.
 [[nodiscard]] constexpr std::uint8_t node_of(const CanFrame& frame) {
   const Function function = function_of(frame);
   const bool has_eight_bits = function == Function::reply || function == Function::command;
   return static_cast<std::uint8_t>(frame.id & (has_eight_bits ? 0xFF : 0x7F));
 }
 
-/// Names of those that CANopen has and this encoder only lists; of the others empty.
+/// Names of the CANopen functions that this encoder only lists; empty for the functions it uses.
 inline constexpr std::array<std::string_view, 10> function_names{"NMT", "SYNC", "EMCY", "", "", "SDO RX", "SDO TX"};
 [[nodiscard]] constexpr bool is_only_named(Function function) {
   return !function_names[static_cast<std::size_t>(function)].empty();
 }
 
-/// Those of the settings, from either side.
+/// Returns whether the frame is a setting or the answer to one.
 [[nodiscard]] constexpr bool configures(Function function) {
   return function == Function::configuration || function == Function::configuration_reply;
 }
 
-/// The bit rates of the document, by their numbers in the table of CiA 305.
+/// A bit rate of the document with its index in the table of CiA 305.
 struct Rate {
   std::uint8_t index;
   std::uint32_t bits_per_second;
 };
 inline constexpr std::array<Rate, 3> rates{{{0, 1'000'000}, {2, 500'000}, {3, 250'000}}};
 
-/// Null for an index that the document does not have.
+/// Returns the rate of an index; null if the document does not have it.
 [[nodiscard]] constexpr const Rate* rate_of_index(std::uint8_t index) {
   for (const Rate& rate : rates) {
     if (rate.index == index) return &rate;
@@ -87,20 +88,21 @@ inline constexpr std::array<Rate, 3> rates{{{0, 1'000'000}, {2, 500'000}, {3, 25
 }
 
 struct Format {
-  unsigned bits = 14;         // 10 to 21
-  std::uint8_t node = 0x20;   // 1 to 255
+  unsigned bits = 14;         // bits of the position, 10 to 21
+  std::uint8_t node = 0x20;   // number of the node, 1 to 255
   std::uint8_t rate = 2;      // index into `rates`
-  bool listens = false;       // reads what the node sends by itself
-  std::uint8_t positive = 0;  // what 22 carries to count up, and to count down: the document does not say
+  bool listens = false;       // host: read the positions that the node sends without a request
+  std::uint8_t positive = 0;  // values of command 22 for counting up and down; the document does not state them
   std::uint8_t negative = 1;
-  std::uint8_t cyclic = 10;     // virtual: readings a second after power on, unsolicited; 0: none
-  bool answers_on_7e4 = false;  // virtual: its answers to configurations, else on 7E5
+  // Virtual encoder: positions per second that it sends without a request after power on; 0: none.
+  std::uint8_t cyclic = 10;
+  bool answers_on_7e4 = false;  // virtual encoder: answers settings on 7E4 instead of 7E5
 
   [[nodiscard]] constexpr std::uint32_t bit_rate() const { return rates[rate].bits_per_second; }
   [[nodiscard]] constexpr std::uint32_t answer_id() const { return answers_on_7e4 ? 0x7E4 : 0x7E5; }
 };
 
-/// What frames and commands are shown as, in this order.
+/// Fields of frames and commands, in the order of the report.
 struct Values {
   using Number = std::optional<std::int64_t>;
   Number node{};
@@ -121,21 +123,21 @@ struct Values {
   Number after{};
 };
 
-// ---- What nodes are told
+// ---- Orders to a node
 
 enum class Order : std::uint8_t { start, zero, direction, cyclic, read, enter, node, rate };
 
-/// What a node answers.
+/// Kind of answer to an order.
 enum class Answer : std::uint8_t { none, position, code, error };
 
-/// A row of the document's tables.
+/// A row of the document's command tables.
 struct OrderInfo {
   Order order;
-  std::uint8_t code;  // byte 0
+  std::uint8_t code;  // value of byte 0
   std::string_view name;
-  bool for_all;  // on 7E5, to all nodes; else on 2NN with the node in byte 1
+  bool for_all;  // true: on 7E5 to all nodes; false: on 2NN with the node in byte 1
   Answer answer;
-  std::uint8_t value_at = 0;  // byte of its value; 0: it has none
+  std::uint8_t value_at = 0;  // index of the byte with the order's value; 0: the order has no value
   std::uint8_t least = 0;
   std::uint8_t most = 255;
   Values::Number Values::*shown = nullptr;
@@ -152,7 +154,7 @@ inline constexpr std::array<OrderInfo, 8> orders{{
 }};
 [[nodiscard]] constexpr const OrderInfo& info_of(Order order) { return orders[static_cast<std::size_t>(order)]; }
 
-/// The order in a frame, or the one that it answers on 7E5 or 7E4; null for none.
+/// Returns the order in a frame, or the one that a frame on 7E5 or 7E4 answers; null if there is none.
 [[nodiscard]] constexpr const OrderInfo* order_of(const CanFrame& frame) {
   const bool for_all = configures(function_of(frame));
   for (const OrderInfo& info : orders) {
@@ -161,14 +163,14 @@ inline constexpr std::array<OrderInfo, 8> orders{{
   return nullptr;
 }
 
-/// What the value of an order stands for; none: the document does not have it.
+/// Returns the meaning of an order's value, such as a bit rate; nothing if the document does not have the value.
 [[nodiscard]] constexpr Values::Number meaning_of(const OrderInfo& info, std::uint8_t value) {
   if (info.order != Order::rate) return value < info.least || value > info.most ? Values::Number{} : value;
   const Rate* const rate = rate_of_index(value);
   return rate != nullptr ? Values::Number(rate->bits_per_second) : Values::Number{};
 }
 
-/// The value that carries what a command was given; none: the document does not have it.
+/// Returns the value that an order carries for a command's argument; nothing if the document does not have it.
 [[nodiscard]] constexpr std::optional<std::uint8_t> value_of(const Format& format, Order order, std::int64_t argument) {
   if (order == Order::direction) return argument == 0 ? format.positive : format.negative;
   if (order != Order::rate) return static_cast<std::uint8_t>(argument);
@@ -178,7 +180,7 @@ inline constexpr std::array<OrderInfo, 8> orders{{
 
 // ---- Frames
 
-/// To `node`, or to all.
+/// Returns the frame of an order to `node`, or to all nodes.
 [[nodiscard]] constexpr CanFrame encode(Order order, std::uint8_t node, std::uint8_t value = 0) {
   const OrderInfo& info = info_of(order);
   CanFrame frame{.id = info.for_all ? 0x7E5u : 0x200u | node, .size = frame_size, .data = {info.code}};
@@ -187,25 +189,25 @@ inline constexpr std::array<OrderInfo, 8> orders{{
   return frame;
 }
 
-/// `counts` least significant byte first.
+/// Returns the frame of a position, `counts` least significant byte first.
 [[nodiscard]] constexpr CanFrame encode_position(std::uint8_t node, std::uint64_t counts) {
   CanFrame frame{.id = 0x100u | node, .size = frame_size};
   store_little_endian(frame.data, counts);
   return frame;
 }
 
-/// The answer to zero, direction and cyclic. It is bit for bit the position that its code is.
+/// Returns the answer to zero, direction and cyclic. Its bits equal those of a position with the value of its code.
 [[nodiscard]] constexpr CanFrame encode_answer(std::uint8_t node, Order order) {
   return encode_position(node, info_of(order).code);
 }
 
-/// `error`: 0 for success.
+/// Returns the answer to a setting. `error`: 0 for success.
 [[nodiscard]] constexpr CanFrame encode_configuration_answer(std::uint32_t id, Order order, std::uint8_t error) {
   return {.id = id, .size = frame_size, .data = {info_of(order).code, error}};
 }
 
-/// What every frame must be before it is looked at. Errors: bad_framing (a remote frame), wrong_length,
-/// unexpected_reply (a 29-bit identifier).
+/// Checks the form that all frames share. Errors: bad_framing (a remote frame), wrong_length, unexpected_reply (a
+/// 29-bit identifier).
 [[nodiscard]] constexpr Error check_shape(const CanFrame& frame) {
   if (frame.remote) return Error::bad_framing;
   if (frame.size != frame_size) return Error::wrong_length;
@@ -219,8 +221,8 @@ inline constexpr std::array<OrderInfo, 8> orders{{
   return true;
 }
 
-/// The position of a reply, in counts. Errors: those of `check_shape`, unexpected_reply, out_of_range (more bits than
-/// the encoder has).
+/// Returns the position of a reply, in counts. Errors: those of `check_shape`, unexpected_reply, out_of_range (more
+/// bits than the encoder has).
 [[nodiscard]] constexpr Result<std::uint32_t> decode_position(const Format& format, const CanFrame& frame) {
   if (const Error error = check_shape(frame); error != Error::none) return error;
   if (function_of(frame) != Function::reply) return Error::unexpected_reply;
@@ -229,7 +231,7 @@ inline constexpr std::array<OrderInfo, 8> orders{{
   return static_cast<std::uint32_t>(counts);
 }
 
-/// The answer to a configuration. Errors: those of `check_shape`, unexpected_reply (an answer to something else),
+/// Checks the answer to a setting. Errors: those of `check_shape`, unexpected_reply (an answer to another order),
 /// out_of_range, request_rejected.
 [[nodiscard]] constexpr Error check_configuration_answer(Order order, const CanFrame& frame) {
   if (const Error error = check_shape(frame); error != Error::none) return error;
@@ -240,12 +242,12 @@ inline constexpr std::array<OrderInfo, 8> orders{{
   return frame.data[1] == 0 ? Error::none : Error::request_rejected;
 }
 
-/// Whether the frame has the identifier of this node's replies.
+/// Returns whether the frame has the identifier of this node's replies.
 [[nodiscard]] constexpr bool is_from(const CanFrame& frame, std::uint8_t node) {
   return function_of(frame) == Function::reply && node_of(frame) == node;
 }
 
-// ---- What is shown of them
+// ---- Fields of frames
 
 [[nodiscard]] constexpr Values values_of(const Format& format, std::uint8_t node, std::uint64_t counts) {
   return {.node = node, .singleturn = static_cast<std::int64_t>(counts), .angle = degrees(counts, format.bits)};
@@ -283,7 +285,7 @@ constexpr Result<Values> decode_request(const CanFrame& frame) {
   return frame.data[1] == node_of(frame) ? Result<Values>(values) : Error::cross_check_failed;
 }
 
-// To an order, of this node.
+// Decodes the answer of `node` to an order.
 constexpr Result<Values> decode_answer(const Format& format, const OrderInfo& info, std::uint8_t node,
                                        const CanFrame& frame) {
   switch (info.answer) {
@@ -306,8 +308,8 @@ constexpr Result<Values> decode_answer(const Format& format, const OrderInfo& in
 
 }  // namespace detail
 
-/// A reply to `request`, or `request` alone when there is no reply; either may be null. Without a request, a frame that
-/// a node sends is a position.
+/// Decodes a reply to `request`, or `request` alone if `reply` is null. Both may be null. A frame of a node without a
+/// request is taken as a position.
 [[nodiscard]] constexpr Result<Values> decode(const Format& format, const CanFrame* request, const CanFrame* reply) {
   if (reply == nullptr) return request == nullptr ? Error::wrong_length : detail::decode_request(*request);
   if (reply->remote) return Error::bad_framing;

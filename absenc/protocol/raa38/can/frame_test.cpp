@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Frames that are none of what is looked for.
+// Invalid and unexpected frames.
 #include "absenc/protocol/raa38/can/frame.hpp"
 
 #include <gtest/gtest.h>

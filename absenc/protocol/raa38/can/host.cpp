@@ -14,12 +14,13 @@ Read::Read(const Format& format, Way way) : format_(format) {
 }
 
 void Read::heard(const CanFrame& frame, Time at) {
-  // Another device may use that identifier; but when nothing else comes it is what the user looks for.
+  // A 29-bit frame may be another device's; it is kept because without a reply it is the evidence that the user needs.
   if (frame.extended && frame.id == encode_position(format_.node, 0).id) keep(frame, at);
   if (!is_from(frame, format_.node)) return;
   keep(frame, at);
   const Result<std::uint32_t> counts = decode_position(format_, frame);
-  // Nothing tells when the node took the position: after it was asked, or some time before it sent it by itself.
+  // The document does not state when the node takes the position: not before the request, and before it starts to send
+  // a cyclic frame.
   if (counts) {
     reading_ = {.singleturn = *counts,
                 .singleturn_bits = format_.bits,
@@ -42,7 +43,7 @@ unsigned Nodes::count() const {
   return static_cast<unsigned>(std::count_if(at.begin(), at.end(), [](const Heard& node) { return node.is_there(); }));
 }
 
-// ---- In words
+// ---- Explanations
 
 Explanation explain(const Format&, Error error, std::span<const CanFrame> request, std::span<const CanFrame> reply) {
   const bool asks = reply.empty();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The RAA38S6 on CAN, as a host talks to it; README.md, section CAN, says why.
+// Host procedures of the RAA38S6 on CAN; README.md, section CAN, gives the reasons.
 #pragma once
 
 #include <array>
@@ -13,9 +13,9 @@ namespace absenc::raa38::can {
 
 using namespace std::chrono_literals;
 
-// The document gives no times; these are far beyond what any controller needs.
-inline constexpr Time answer_limit = 50ms;  // without any frame on the bus
-inline constexpr Time busy_limit = 250ms;   // on a bus that others keep busy
+// The document gives no times; these are far longer than any controller needs.
+inline constexpr Time answer_limit = 50ms;  // timeout of a reply on a bus without other frames
+inline constexpr Time busy_limit = 250ms;   // timeout of a reply on a bus that others keep busy
 inline constexpr Time listening_time = 1200ms;
 
 struct Protocol {
@@ -26,7 +26,7 @@ struct Protocol {
 
   static constexpr author::Manner manner(const Format&, const CanFrame&) { return {}; }
   static constexpr author::CanHostTimes host_times(const Format&) { return {answer_limit, busy_limit}; }
-  /// "220:8020000000000000"
+  /// Returns the frame as text, as "220:8020000000000000".
   static constexpr ByteBuffer<4 + 2 * frame_size> encode(const Format&, const CanFrame& frame) {
     constexpr std::string_view digits = "0123456789abcdef";
     ByteBuffer<4 + 2 * frame_size> text;
@@ -41,11 +41,11 @@ struct Protocol {
   }
 };
 
-/// What a frame with such an error shows, and what to do. Either may be empty.
+/// Explains the error of a frame. `request` or `reply` may be empty.
 [[nodiscard]] Explanation explain(const Format& format, Error error, std::span<const CanFrame> request,
                                   std::span<const CanFrame> reply);
 
-/// One position: asked for (80, 01), or the next that the node sends by itself.
+/// Reads one position: requested (orders 80 and 01), or the next that the node sends without a request.
 class Read : public author::CanEngine {
  public:
   enum class Way : std::uint8_t { ask, start, listen };
@@ -54,7 +54,7 @@ class Read : public author::CanEngine {
   [[nodiscard]] const Format& format() const { return format_; }
   [[nodiscard]] const Reading& found() const { return reading_; }
   [[nodiscard]] const Reading* reading() const final {
-    return reading_.singleturn_bits != 0 ? &reading_ : nullptr;  // of a good end only
+    return reading_.singleturn_bits != 0 ? &reading_ : nullptr;  // set only after a successful end
   }
 
  private:
@@ -65,9 +65,9 @@ class Read : public author::CanEngine {
   Reading reading_{};
 };
 
-/// The frame by which a node is asked for its position; of `listen`, what asks it once.
+/// Returns the frame that requests a position; for `listen`, the single read request.
 [[nodiscard]] constexpr CanFrame position_request(const Format& format, Read::Way way) {
-  // Each on its own: the table of orders is not linked then.
+  // Two calls with constant orders, so that the table of orders is not linked.
   return way == Read::Way::start ? encode(Order::start, format.node) : encode(Order::read, format.node);
 }
 
@@ -75,32 +75,33 @@ using Dialog = author::DialogOf<Protocol>;
 
 // ---- One node
 
-/// 31: so many readings a second, 0: none. Whether that came true is heard. Error: cross_check_failed.
+/// Order 31: sets the number of positions per second that the node sends, 0 for none, and counts the received ones.
+/// Error: cross_check_failed (another number arrives).
 author::Procedure set_cyclic(Dialog& dialog, Values& found, Arguments arguments);
 
-/// 20: the position is 0 here, as the document lets one guess: read before and after. Nothing is written when it is 0
-/// already. 22: the counting direction, which no command reads. The position then is either the same or mirrored.
-/// Errors: invalid_argument (the shaft turns), cross_check_failed (any other position), timeout (neither answer nor
-/// effect of 22).
+/// Changes the zero or the direction. Order 20 makes the present position 0, as the document suggests; the position is
+/// read before and after, and nothing is written if it is 0 already. Order 22 sets the counting direction, which no
+/// command reads; the position afterwards must be the same or mirrored. Errors: not_still (the shaft turns),
+/// cross_check_failed (any other position), timeout (order 22 has neither an answer nor an effect).
 author::Procedure change(Dialog& dialog, Values& found, Order order, Arguments arguments);
 
-/// The number of the node, if it answers. No other is asked: on a CANopen bus the requests to them are process data of
-/// other devices. Errors: timeout, bad_framing (frames are destroyed: two nodes may have the number).
+/// Reports the number of the node if it answers. No other number is requested: on a CANopen bus such requests are
+/// process data of other devices. Errors: timeout, bad_framing (frames are destroyed: two nodes may share the number).
 author::Procedure look_for_node(Dialog& dialog, Values& found);
 
-// ---- Every node of the bus
+// ---- All nodes on the bus
 
-/// What was heard of one number.
+/// Frames received from one node number.
 struct Heard {
-  std::uint16_t unsolicited = 0;  // frames that it sent by itself
-  std::uint16_t per_second = 0;   // those of the first second
-  std::uint8_t answers = 0;       // to one request
-  std::uint8_t damaged = 0;       // requests at which frames were destroyed
+  std::uint16_t unsolicited = 0;  // frames sent without a request
+  std::uint16_t per_second = 0;   // frames without a request in the first second
+  std::uint8_t answers = 0;       // answers to one request
+  std::uint8_t damaged = 0;       // requests during which frames were destroyed
   bool readable = false;          // `counts` fits the format
-  std::uint32_t counts = 0;       // of the last frame
+  std::uint32_t counts = 0;       // position in the last frame
 
   [[nodiscard]] constexpr bool is_there() const { return unsolicited != 0 || answers != 0 || damaged > 1; }
-  /// Two answers to one request, or destroyed frames each time.
+  /// Returns whether two nodes seem to share the number: two answers to one request, or destroyed frames each time.
   [[nodiscard]] constexpr bool clash() const {
     return (unsolicited == 0 && answers > 1) || (damaged > 1 && answers == 0 && unsolicited == 0);
   }
@@ -109,22 +110,23 @@ struct Heard {
 struct Nodes {
   std::array<Heard, 256> at{};
 
-  /// How many numbers somebody has.
+  /// Returns how many node numbers are in use.
   [[nodiscard]] unsigned count() const;
 };
 
-/// Listens, because after power on nodes send unsolicited, then asks every number. Error: timeout when nobody is there.
+/// Finds all nodes. Listens first, because nodes may send without a request after power on, then requests every number.
+/// Error: timeout if no node is found.
 author::Procedure scan(Dialog& dialog, Nodes& nodes);
 
 struct Surveyed : Values {
   Nodes nodes{};
-  bool verified = false;  // what was written
+  bool verified = false;  // the written setting was verified
 };
 
-/// 11: another number; it must answer under the new one and no longer under the old one. 13: another bit rate, to which
-/// this end of the line goes too; back when the node is not there. On 7E5, which reaches every node: only with one on
-/// the bus. Errors: invalid_argument (others are there, or the document does not have that rate), timeout,
-/// request_rejected, cross_check_failed (the encoder did not do it).
+/// Order 11 sets the node number; the node must answer under the new number and no longer under the old one. Order 13
+/// sets the bit rate; the host switches too, and back if the node does not answer. Both are sent on 7E5, which reaches
+/// every node, so only one node may be on the bus. Errors: invalid_argument (other nodes are on the bus, or the
+/// document does not have that rate), timeout, request_rejected, cross_check_failed (the node kept its old setting).
 author::Procedure configure(Dialog& dialog, Surveyed& found, Order order, Arguments arguments);
 
 }  // namespace absenc::raa38::can

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// One node: its position, what it sends by itself, zero and direction.
+// One node: its position, cyclic positions, zero and direction.
 #include "absenc/protocol/raa38/can/bench_test.hpp"
 
 namespace absenc::raa38::can {
@@ -7,7 +7,7 @@ namespace {
 
 using namespace testing;
 
-/// Drives a conversation without a bus: the test says what happens.
+/// Drives a conversation without a bus: the test feeds each event.
 struct ByHand {
   explicit ByHand(std::string_view command) : talk(command) {}
   Step<CanFrame>::Kind next() { return talk->next(now).kind; }
@@ -27,7 +27,7 @@ CanFrame extended_position() {
   return frame;
 }
 
-// ---- A position
+// ---- Position
 
 TEST(CanRead, AsksAndListens) {
   Bench bench;
@@ -45,7 +45,7 @@ TEST(CanRead, NobodyThere) {
   Bench bench({.node = 0x21, .cyclic = 0});
   EXPECT_TRUE(ended(bench.does(Format{}, "position"), Error::timeout, "scan"));
   EXPECT_TRUE(ended(bench.does(Format{}, "listen"), Error::timeout, "by itself"));
-  // Frames of others never end, so the line is never silent.
+  // Frames of other nodes arrive all the time, so the bus is never silent.
   Bench busy({.node = 0x21, .cyclic = 255});
   const End read = busy.does(Format{}, "position");
   EXPECT_TRUE(ended(read, Error::timeout));
@@ -57,10 +57,10 @@ TEST(CanRead, WhatWasUnderWayBeforeIsNoAnswer) {
     ByHand by_hand(command);
     by_hand.next();
     if (command == "position") {
-      by_hand.receive(encode_position(0x20, 1));  // before the request is out
+      by_hand.receive(encode_position(0x20, 1));  // received before the request was sent
       by_hand.sent();
     }
-    by_hand.receive(encode_position(0x20, 2), -1ms);  // from a queue, told late
+    by_hand.receive(encode_position(0x20, 2), -1ms);  // received from a queue, with an earlier time
     EXPECT_EQ(by_hand.next(), Kind::wait);
     by_hand.receive(encode_position(0x20, 3), 1ms);
     EXPECT_EQ(by_hand.next(), Kind::done);
@@ -77,7 +77,7 @@ TEST(CanRead, FramesOfOthersAreLeftAside) {
     by_hand.receive(other);
     EXPECT_EQ(by_hand.next(), Kind::wait);
     by_hand.tell(Event<CanFrame>::Kind::silence, by_hand.now + 50ms);
-    // A long identifier is told where nothing else comes.
+    // A 29-bit frame is reported if no other frame arrives.
     const bool is_long = other.extended;
     EXPECT_EQ(by_hand.talk->error(), is_long ? Error::unexpected_reply : Error::timeout);
     EXPECT_EQ(says(by_hand.talk->detail(), "29 bits"), is_long);
@@ -111,7 +111,7 @@ TEST(CanRead, DestroyedFramesAreNamed) {
   EXPECT_TRUE(ended(bench.does("position"), Error::bad_framing, "one number"));
 }
 
-// ---- What it sends by itself
+// ---- Cyclic positions
 
 TEST(CanCyclic, StartsAndStops) {
   Bench bench;
@@ -123,7 +123,7 @@ TEST(CanCyclic, StartsAndStops) {
   EXPECT_EQ(bench.encoder().violation_count(), 0u);
 }
 
-// A position of 49 is no answer: what counts is what the node does.
+// A position of 49 looks like the answer: only the node's send rate decides.
 TEST(CanCyclic, ANodeThatDoesNotObey) {
   for (const std::int64_t rate : {0, 10}) {
     Scripted deaf([](const CanFrame&) { return Frames{}; });
@@ -167,9 +167,10 @@ TEST(CanZero, AShaftThatTurns) {
   EXPECT_EQ(bench.encoder().settings().writes(), 0u);
 }
 
-// A node that has another meaning for command 20, or none: its answer looks right, its position does not move.
+// A node that uses command 20 for something else, or not at all: it answers correctly, but its position does not
+// change.
 TEST(CanZero, AnAnswerAloneIsNoZero) {
-  // 32 is the answer read as a position: at 21 bits that would be near 0.
+  // 32 is the answer read as a position; at 21 bits that is near 0.
   for (const std::uint32_t counts : {32u << 10, 1'000'000u}) {
     Scripted stubborn([&](const CanFrame& heard) { return obedient(heard, counts); });
     const End zero = with(stubborn, "zero", {}, {.bits = 21});
@@ -183,7 +184,7 @@ TEST(CanZero, AnAnswerAloneIsNoZero) {
   EXPECT_TRUE(ended(with(silent, "direction", {1}), Error::timeout, "is the same"));
 }
 
-// The answer to 20 comes after its time, where a position is due: at 21 bits, 32 is near 0.
+// The answer to order 20 arrives late, in place of a position: at 21 bits, 32 is near 0.
 TEST(CanZero, ALateAnswerIsNoZero) {
   bool owed = false;
   Scripted late([&](const CanFrame& heard) {
@@ -194,7 +195,7 @@ TEST(CanZero, ALateAnswerIsNoZero) {
   EXPECT_TRUE(ended(with(late, "zero", {}, {.bits = 21}), Error::cross_check_failed));
 }
 
-// A carrier hands frames out some milliseconds late: how often the node sends is known by many of them.
+// The carrier delivers frames some milliseconds late: only many frames show the send rate.
 TEST(CanZero, SendsAgainAsOftenAlsoBehindASlowCarrier) {
   unsigned left = 1000;
   unsigned rate = 0;
@@ -224,7 +225,7 @@ TEST(CanZero, ANodeThatNoLongerSendsIsTold) {
   EXPECT_TRUE(ended(with(exhausted, "zero"), Error::cross_check_failed, "no longer sends"));
 }
 
-// It stops one frame later than it was told: its position is 32, as the answer to 20 would be.
+// The node sends one more frame after the stop order: its position is 32, which looks like the answer to order 20.
 TEST(CanZero, WhatItStillSentByItselfIsNoAnswer) {
   for (const Time period : {80ms, 100ms}) {
     unsigned left = 1000;
@@ -242,7 +243,7 @@ TEST(CanZero, WhatItStillSentByItselfIsNoAnswer) {
   }
 }
 
-// ---- The direction
+// ---- Direction
 
 TEST(CanDirection, IsMirrored) {
   Bench bench;
@@ -268,7 +269,7 @@ TEST(CanDirection, AnotherPositionIsNoDirection) {
   EXPECT_TRUE(ended(with(jumping, "direction", {1}), Error::cross_check_failed, "mirror image"));
 }
 
-// The position 32 may be a late answer to 22.
+// The position 32 may be a late answer to order 22.
 TEST(CanDirection, APositionThatIsNotThereAgainIsNone) {
   unsigned looks = 0;
   Scripted late([&](const CanFrame& heard) {

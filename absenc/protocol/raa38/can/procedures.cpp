@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a host does that has several steps: first with one node, then with all of the bus.
+// Procedures with several frames: first those for one node, then those for all nodes on the bus.
 #include <algorithm>
 
 #include "absenc/core/bits.hpp"
@@ -13,15 +13,16 @@ namespace {
 using namespace author;
 using MaybeFrame = std::optional<CanFrame>;
 
-// To know how often a node sends, to 1 % where a carrier hands frames out some milliseconds late.
+// Enough frames to measure the send rate to 1 % if the carrier delivers frames some milliseconds late.
 constexpr unsigned enough_frames = 4;
 constexpr Time enough_time = 500ms;
-constexpr unsigned most_looks = 3;   // at how often it sends
-constexpr Time slowest_period = 1s;  // of a node that sends by itself: TT = 1
-// A window of its own, always to its end: a cyclic position may look like the answer.
+constexpr unsigned most_looks = 3;   // attempts to measure the send rate
+constexpr Time slowest_period = 1s;  // longest period of a node that sends cyclically: TT = 1
+// Time for which answers to a command are received. It is never shortened, because a cyclic position may look like the
+// answer.
 constexpr Time command_window = answer_limit;
 
-/// How often a node sends by itself.
+/// Measures how often a node sends without a request.
 struct Cadence {
   unsigned count = 0;
   Time first{};
@@ -31,22 +32,22 @@ struct Cadence {
     if (count++ == 0) first = at;
     last = at;
   }
-  /// Mean, 0 with fewer than two frames.
+  /// Returns the mean period, 0 with fewer than two frames.
   [[nodiscard]] Time period() const { return count < 2 ? Time{} : (last - first) / (count - 1); }
-  /// Rounded; 1 for a single frame.
+  /// Returns the rounded frames per second; 1 for a single frame.
   [[nodiscard]] unsigned per_second() const {
     if (count == 0) return 0;
     const Time mean = period();
     if (mean <= Time{}) return 1;
     return std::clamp(static_cast<unsigned>((Time(1s) + mean / 2) / mean), 1u, 255u);
   }
-  /// Two of the periods that it had, and a little: long enough to hear that it is silent.
+  /// Returns the time after which a node without a frame is silent: two periods and a margin.
   [[nodiscard]] Time pause() const { return count < 2 ? listening_time : 2 * period() + answer_limit; }
 };
 
-// ---- What is heard until the time is over
+// ---- Receiving until a time is over
 
-// What the node sends; until `enough`, where that is wanted.
+// Measures how often the node sends; with `until_enough`, only until enough frames were received.
 Part<Cadence> hear_node(Dialog& dialog, bool until_enough = false) {
   Cadence cadence;
   for (;;) {
@@ -59,7 +60,7 @@ Part<Cadence> hear_node(Dialog& dialog, bool until_enough = false) {
   co_return cadence;
 }
 
-// Whether the answer to an order comes.
+// Sends an order and returns whether its answer arrives.
 Part<bool> is_answered(Dialog& dialog, Order order, std::uint8_t value) {
   const std::uint8_t node = dialog.format().node;
   bool answered = false;
@@ -72,7 +73,7 @@ Part<bool> is_answered(Dialog& dialog, Order order, std::uint8_t value) {
   co_return answered;
 }
 
-// What this node answers with to the question where it is.
+// Requests the position of a node and returns the reply.
 Part<MaybeFrame> read(Dialog& dialog, std::uint8_t node, Time pause = {}) {
   dialog.ask(encode(Order::read, node), pause);
   MaybeFrame frame;
@@ -83,7 +84,7 @@ Part<MaybeFrame> read(Dialog& dialog, std::uint8_t node, Time pause = {}) {
   co_return frame;
 }
 
-// The position, or why there is none.
+// A position, or the reason that it is missing.
 struct Look {
   Outcome outcome{};
   std::uint32_t counts = 0;
@@ -92,14 +93,14 @@ struct Look {
 Part<Look> look(Dialog& dialog, Time pause = {}) {
   const MaybeFrame frame = co_await read(dialog, dialog.format().node, pause);
   const Result<std::uint32_t> counts = frame ? decode_position(dialog.format(), *frame) : dialog.missing();
-  // Other frames follow before the end is told.
+  // The exchange is copied, because other frames may follow before the procedure ends.
   const Exchange<CanFrame> exchange = dialog.exchange();
   const Explanation words = explain(dialog.format(), counts.error(), exchange.sent, exchange.received);
   co_return Look{counts ? done : only(counts.error(), words.detail, words.advice), *counts};
 }
 
-// ---- Commands whose answer looks like a position: no position counts until the time for the answer is over. The node
-// is made to be silent first, and sends again afterwards as it did before.
+// ---- Commands whose answer looks like a position. The node is stopped first and restarted with its old rate
+// afterwards; no position is accepted until the time for the answer is over.
 
 Part<Cadence> hush(Dialog& dialog) {
   dialog.listen(listening_time);
@@ -107,7 +108,7 @@ Part<Cadence> hush(Dialog& dialog) {
   if (before.count != 0) {
     co_await is_answered(dialog, Order::cyclic, 0);
     dialog.listen(before.pause());
-    // A node that cannot be stopped is dealt with all the same.
+    // If the node cannot be stopped, the command continues all the same.
     co_await hear_node(dialog);
   }
   co_return before;
@@ -125,7 +126,7 @@ Part<Outcome> let_send_again(Dialog& dialog, Cadence before, Outcome outcome) {
   co_return outcome;
 }
 
-// A shaft that stands still.
+// Reads the position twice; fails if the shaft turns.
 Part<Look> look_twice(Dialog& dialog) {
   const Look first = co_await look(dialog);
   if (first.outcome.error != Error::none) co_return first;
@@ -139,7 +140,7 @@ Part<Look> look_twice(Dialog& dialog) {
   co_return second;
 }
 
-// Looked at twice afterwards, in case that a late answer was taken for the position 32.
+// Takes two positions, because the first may be a late answer that looks like position 32.
 Outcome judge_zero(const Format& format, const Values& found, std::uint32_t first, std::uint32_t second) {
   if (is_near(first, 0, format.bits, zero_millidegrees) && is_near(second, 0, format.bits, zero_millidegrees)) {
     return done;
@@ -151,7 +152,7 @@ Outcome judge_zero(const Format& format, const Values& found, std::uint32_t firs
 }
 
 Outcome judge_direction(const Format& format, Values& found, std::uint32_t first, std::uint32_t second) {
-  // It may have trembled before and after.
+  // The shaft may have vibrated before and after.
   const auto is_at = [&](std::uint64_t place) {
     return is_near(second, place, format.bits, 2 * standstill_millidegrees);
   };
@@ -186,7 +187,7 @@ Part<Outcome> change_quietly(Dialog& dialog, Values& found, Order order, std::ui
                     : judge_direction(dialog.format(), found, first.counts, second.counts);
 }
 
-// By the number of frames: a carrier may hand them out in bunches.
+// Compares the number of received frames, not their times: the carrier may deliver them in bursts.
 Outcome judge_cyclic(Dialog& dialog, unsigned wanted, bool answered, const Cadence& heard) {
   if (wanted == 0) {
     if (heard.count == 0) return done;
@@ -201,7 +202,7 @@ Outcome judge_cyclic(Dialog& dialog, unsigned wanted, bool answered, const Caden
 
 }  // namespace
 
-// ---- One node
+// ---- Commands for one node
 
 Procedure set_cyclic(Dialog& dialog, Values& found, Arguments arguments) {
   const unsigned wanted = arguments.empty() ? 0 : static_cast<unsigned>(arguments[0]);
@@ -210,7 +211,7 @@ Procedure set_cyclic(Dialog& dialog, Values& found, Arguments arguments) {
   dialog.changes();
   found.answered = co_await is_answered(dialog, Order::cyclic, static_cast<std::uint8_t>(wanted));
   Outcome outcome = done;
-  // Whoever hands out frames may be busy: what they were late by at one look they are not at the next.
+  // The carrier may deliver frames late; a repeated measurement corrects that.
   for (unsigned looks = 0; looks < most_looks; ++looks) {
     dialog.listen(wanted == 0 ? listening_time : std::max(5 * slowest_period / wanted / 2, enough_time) + answer_limit);
     const Cadence heard = co_await hear_node(dialog);
@@ -238,28 +239,28 @@ Procedure change(Dialog& dialog, Values& found, Order order, Arguments arguments
   co_return end;
 }
 
-// ---- Every node of the bus
+// ---- Commands for all nodes
 
 namespace {
 
 constexpr Time between_requests = 2ms;  // the request and one answer take 1 ms at 250 kbit/s
-constexpr unsigned answering = 10;      // so many requests later a frame is no answer any more, but sent by itself
+constexpr unsigned answering = 10;      // a frame this many requests later counts as unsolicited, not as an answer
 constexpr Time last_answers = 100ms;
-constexpr Time entering_time = 20ms;  // nothing is answered to "enter configuration"
+constexpr Time entering_time = 20ms;  // time after "enter configuration", which is not answered
 constexpr Time answer_window = 100ms;
-constexpr Time switching_time = 50ms;  // until a controller is on the bus again with another bit rate
+constexpr Time switching_time = 50ms;  // time that a controller needs to rejoin the bus with another bit rate
 constexpr int rate_attempts = 3;
-constexpr auto most_clashes = 16;  // more numbers that are shared are a line on which nothing goes well
+constexpr auto most_clashes = 16;  // more shared numbers than this indicate a bad line
 
 constexpr std::string_view alone = "connect this one alone: 7E5 reaches every node on the bus";
 constexpr std::string_view shared = "two nodes share the number, or the line is bad";
 constexpr std::string_view which = "`absenc scan` shows which: set node=";
 
-// Nobody was asked yet, or all were.
+// Values of `asked`: no number was requested yet, or all were.
 constexpr unsigned nobody = 0;
 constexpr unsigned everybody = 256;
 
-// Until the time is over. `asked`: the last number that was asked.
+// Counts the frames of all nodes until the time is over. `asked`: the last number that was requested.
 Part<bool> hear_nodes(Dialog& dialog, Nodes& nodes, unsigned asked) {
   Time from = never;
   while (const MaybeFrame frame = co_await dialog.heard()) {
@@ -269,7 +270,7 @@ Part<bool> hear_nodes(Dialog& dialog, Nodes& nodes, unsigned asked) {
     Heard& node = nodes.at[number];
     if (from == never) from = dialog.heard_at();
     if (asked == nobody && dialog.heard_at() - from < 1s) ++node.per_second;
-    // Where answers are late, they come while the next numbers are asked; but none comes before its own request.
+    // Late answers arrive while the next numbers are requested; no answer arrives before its own request.
     const unsigned early = dialog.came_early() && node.damaged == 0 ? 1 : 0;
     const bool was_asked = asked == everybody || (number + early <= asked && number + answering > asked);
     if (!was_asked) {
@@ -302,7 +303,7 @@ Part<bool> survey(Dialog& dialog, Nodes& nodes) {
   co_return true;
 }
 
-// 7E5 reaches every node: goes on when this one is the only one.
+// Stops the procedure unless this node is the only one on the bus, because 7E5 reaches every node.
 Part<bool> be_alone(Dialog& dialog, Nodes& nodes) {
   co_await survey(dialog, nodes);
   const Heard& node = nodes.at[dialog.format().node];
@@ -323,7 +324,7 @@ Part<bool> hear_out(Dialog& dialog) {
   co_return true;
 }
 
-// Without an answer perhaps not without effect.
+// Writes a setting. It may take effect even if the answer is lost.
 Part<bool> write(Dialog& dialog, Surveyed& found, Order order, std::uint8_t value) {
   dialog.ask_for(encode(Order::enter, 0, 1), entering_time);
   co_await hear_out(dialog);
@@ -356,7 +357,7 @@ Part<Outcome> verify_node(Dialog& dialog, std::uint8_t before, std::uint8_t node
   co_return only(Error::timeout, "it answers neither under its old number nor under the new one", supply);
 }
 
-// This end of the line goes to the rate too, which takes a moment.
+// Sets the host to the new rate, which takes `switching_time`, and checks whether the node answers.
 Part<Outcome> verify_rate(Dialog& dialog, std::uint32_t bits_per_second) {
   const Format& format = dialog.format();
   dialog.configure(bits_per_second, switching_time);

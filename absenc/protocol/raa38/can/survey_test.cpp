@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Every node of the bus: who is there, and the settings that reach all of them.
+// All nodes on the bus: finding them, and the settings that reach all of them.
 #include "absenc/protocol/raa38/can/bench_test.hpp"
 
 namespace absenc::raa38::can {
@@ -46,25 +46,25 @@ TEST(CanScan, AWrongBitRateIsNotManyClashes) {
   EXPECT_TRUE(ended(with(noise, "scan", {}, {}, 500'000), Error::bad_framing, "bit rate"));
 }
 
-/// Every identifier that a host sends with one command, to a bus on which nobody is.
+/// Returns all identifiers that a host sends with one command on a bus where no node answers.
 std::vector<std::uint32_t> identifiers_of(std::string_view command, const Format& format) {
   sim::Line<CanFrame> line(LinkKind::can, {.rate = format.bit_rate()});
   std::vector<std::uint32_t> sent;
   line.observe([&](std::size_t, Time, Time, const CanFrame& frame) { sent.push_back(frame.id); });
-  Scripted listener([](const CanFrame&) { return Frames{}; });  // who acknowledges
+  Scripted listener([](const CanFrame&) { return Frames{}; });  // acknowledges frames on the bus
   line.attach(sim::Role::device, listener);
   raa38::testing::Talk<CanFrame> talk(can_unit, options_of(format), command, {});
   EXPECT_TRUE(line.run(line.attach(sim::Role::host, *talk), 20s));
   return sent;
 }
 
-// On a CANopen bus 201 to 27F are process data of other devices.
+// On a CANopen bus, identifiers 201 to 27F are process data of other devices.
 TEST(CanNode, AsksTheGivenNodeOnly) {
   EXPECT_EQ(identifiers_of("node", {.node = 0x42}), std::vector<std::uint32_t>{0x242});
   EXPECT_EQ(identifiers_of("scan", {.node = 0x42}).size(), 255u);
 }
 
-// By the words that people see before it is sent.
+// The text `disturbs` warns users before the command is sent.
 TEST(CanNode, EveryCommandThatAsksOthersSaysSo) {
   for (const Command& command : can_unit.commands) {
     if (!command.arguments.empty() && command.verb != Verb::config_set) continue;
@@ -89,7 +89,8 @@ TEST(CanNode, IsTheOneThatAnswers) {
   EXPECT_TRUE(ended(bench.does(Format{}, "node"), Error::timeout, "`absenc scan` asks them all"));
 }
 
-// A slow adapter hands answers out while the next number is being asked; what comes before a number was asked is none.
+// A slow adapter delivers answers while the next number is requested. A frame before the request for its number is no
+// answer.
 TEST(CanScan, AnswersThatComeWhileItIsSendingAreHeard) {
   for (const bool unasked_too : {false, true}) {
     Talk find("scan");
@@ -162,11 +163,11 @@ TEST(CanSetNode, NotWithOthersOnTheBus) {
   EXPECT_TRUE(ended(bench.does("set-node", {0x42}), Error::timeout, "no node answers"));
 }
 
-/// A node that may answer a setting, but does not do it.
+/// A node that may answer a setting, but does not apply it.
 struct Settings {
   Frames answer{};
-  bool dies = false;         // answers nothing any more afterwards
-  std::uint8_t appears = 0;  // another node that answers afterwards
+  bool dies = false;         // it answers nothing afterwards
+  std::uint8_t appears = 0;  // number of another node that answers afterwards
 };
 
 End set(const Settings& one, std::string_view command, std::int64_t value) {

@@ -37,7 +37,7 @@ constexpr auto options = author::OptionsOf{
 };
 
 constexpr Argument force{"force", "1: write even what is set already", 0, 1, 0, false, Role::force};
-// RPDO1 of CANopen, by which a master moves drives, has the identifiers 201 to 27F, TPDO2 those from 281 on.
+// CANopen uses identifiers 201 to 27F for RPDO1, by which a master moves drives, and those from 281 on for TPDO2.
 constexpr std::string_view asks_all =
     "asks every number, by 201#8001 to 2FF#80FF: on a CANopen bus these are process data of other devices, which may "
     "obey them";
@@ -46,7 +46,7 @@ constexpr std::array<Argument, 2> node_arguments{{{"node", "new number", 1, 255}
 constexpr std::array<Argument, 2> rate_arguments{{{"rate", "1000000, 500000 or 250000", 1, 1'000'000}, force}};
 constexpr std::array<Argument, 1> direction_arguments{{{"direction", "0: positive, 1: negative", 0, 1}}};
 
-/// The one frame that does a command's work.
+/// Returns the one frame that does a command's work.
 template <Order order>
 constexpr Result<CanFrame> to(const Format& format, Arguments arguments) {
   const auto value = value_of(format, order, arguments.empty() ? 0 : arguments[0]);
@@ -54,7 +54,7 @@ constexpr Result<CanFrame> to(const Format& format, Arguments arguments) {
   return encode(order, format.node, *value);
 }
 
-// ---- What is shown
+// ---- Reported fields
 
 using enum FieldInfo::Kind;
 constexpr auto fields = author::fields_of<Values>(
@@ -76,7 +76,7 @@ constexpr auto fields = author::fields_of<Values>(
     field<&Values::before>({"before", counts, "counts", "position before the command"}),
     field<&Values::after>({"after", counts, "counts", "position after it"}));
 
-// A position with what it is of.
+// Reports the fields, and the position as a reading.
 constexpr void put_found(FieldSink& sink, const Format& format, const Values& found) {
   fields.put(sink, found);
   if (!found.singleturn) return;
@@ -159,7 +159,7 @@ constexpr auto commands = std::array{
         {"direction", Verb::config_set, 0, "set the counting direction", direction_arguments, true, false}),
 };
 
-// ---- What is declared
+// ---- Declaration
 
 constexpr auto models = std::array{author::ModelText{"RAA38S6", "one turn of 10 to 21 bits: option bits", 0, ""}};
 
@@ -170,22 +170,23 @@ constexpr Error decode_frames(const Format& format, Frame request, Frame reply, 
   if (values) put_found(sink, format, *values);
   return values.error();
 }
-// The controller of the bus does it.
+// The CAN controller delivers whole frames.
 constexpr FrameEnd end_of_frame(const Options&, Direction, Bytes bytes) {
   return {FrameEnd::Kind::complete, bytes.size()};
 }
-// The CRC of CAN is the controller's: here only what must be as it is.
+// Returns whether a wrong bit is detected by this protocol. The CRC of CAN is checked by the controller; here only bits
+// with a fixed value are checked.
 bool is_checked(const Options& values, Frame request, Frame reply, std::size_t bit) {
   if (is_only_named(function_of(*reply.can))) return false;
   const OrderInfo* const asked = request.can != nullptr ? order_of(*request.can) : &info_of(Order::read);
   return (asked != nullptr && asked->answer != Answer::position) || bit >= options.format(values).bits;
 }
-// The node is in the identifier.
+// Returns the bits of a field. The node number is in the identifier, so it has none.
 BitRanges bits_in(const Options& values, Frame, Frame, const FieldInfo& field) {
   if (&field != fields.of<&Values::singleturn>()) return {};
   return author::bits_of(0, 0, options.format(values).bits);
 }
-// Nothing answers NMT, SYNC and emergencies, nor the command that enters the configuration.
+// Returns whether a request is answered. NMT, SYNC, emergencies and the command that enters configuration mode are not.
 bool awaits_answer(const Options&, Frame request) {
   const Function function = function_of(*request.can);
   if (function != Function::command && function != Function::configuration) return function == Function::sdo_request;

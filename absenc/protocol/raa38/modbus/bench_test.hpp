@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// For tests: virtual RAA38S6 slaves, slaves that do as a test says, and a host on one Modbus line in virtual time.
+// For tests: virtual RAA38S6 slaves, scripted slaves, and a host on one Modbus line in virtual time.
 #pragma once
 
 #include "absenc/protocol/raa38/modbus/device.hpp"
@@ -31,7 +31,7 @@ struct Talk final : raa38::testing::Talk<std::uint8_t> {
       : raa38::testing::Talk<std::uint8_t>(modbus_unit, options_of(format), name, std::move(arguments)) {}
 };
 
-/// With its CRC.
+/// Returns the frame of `body` with its CRC.
 [[nodiscard]] inline Wire framed(const Wire& body) {
   modbus::FrameBytes frame;
   frame.append(body);
@@ -45,14 +45,14 @@ struct Bench : raa38::testing::Bench<std::uint8_t, VirtualEncoder, Format, modbu
                                                                                  own.line()) {
     add(own);
   }
-  /// `counts` of the encoder's own bits.
+  /// Sets the position; `counts` are of the encoder's resolution.
   void put(std::int64_t counts) { shaft.put(0, counts << (21 - format.bits)); }
-  /// Sends any bytes, CRC included, after 20 ms of silence.
+  /// Sends `request` unchanged after 20 ms of silence and returns the reply.
   Wire raw(const Wire& request) {
     sim::testing::RawHost host(request, 100ms, 20ms, line.now() + 20ms);
     return run(host).reply;
   }
-  /// The same with the CRC appended, and of what comes, which must be good, without.
+  /// Sends `request` with a CRC appended and returns the reply without its CRC, which must be valid.
   Wire body(const Wire& request) {
     const Wire reply = raw(framed(request));
     if (reply.empty()) return {};
@@ -61,7 +61,7 @@ struct Bench : raa38::testing::Bench<std::uint8_t, VirtualEncoder, Format, modbu
   }
 };
 
-/// Answers each request by a function of it and of how many came before, instead of an encoder.
+/// A slave whose reply to each request is made by a function of the request and of the number of earlier requests.
 class Scripted final : public Machine<std::uint8_t> {
  public:
   using Script = std::function<Wire(Bytes request, unsigned before)>;
@@ -96,7 +96,7 @@ struct Conversed : End {
   std::vector<Time> asked_at{};
 };
 
-/// How a command ends with such a slave.
+/// Runs a command against a scripted slave and returns its result.
 [[nodiscard]] inline Conversed with(const Scripted::Script& script, std::string_view command,
                                     std::vector<std::int64_t> arguments = {}, const Format& format = {}) {
   sim::Line<std::uint8_t> line{LinkKind::half_duplex, line_settings};

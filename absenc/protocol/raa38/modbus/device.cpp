@@ -11,7 +11,8 @@ using modbus::Exception;
 using modbus::FrameBytes;
 using namespace std::chrono_literals;
 
-// "Do not regularly send in case the internal structure of the device would be damaged": what nobody needs in a minute.
+// Document: "Do not regularly send in case the internal structure of the device would be damaged". More settings than
+// this within a minute break the rule.
 constexpr std::uint32_t most_settings = 10;
 constexpr Time settings_window = 1min;
 
@@ -21,7 +22,7 @@ constexpr bool is_address(std::uint8_t address) {
 
 }  // namespace
 
-// A memory that came from outside may hold anything.
+// A memory from outside may have any content.
 void VirtualEncoder::started() {
   if (!is_address(address())) memory()[Settings::number_at] = format_.address;
   if (settings_.rate() >= bauds.size()) memory()[Settings::rate_at] = static_cast<std::uint8_t>(format_.baud);
@@ -47,7 +48,7 @@ void VirtualEncoder::request(Bytes body, Time at, FrameBytes& reply) {
     case function::set_parameter:
       return set_parameter(body, at, reply);
     default:
-      // Codes from 80 on are refusals; of the maker's own, A0 is only for address FF.
+      // Ignores codes from 80 on, which are refusals, and A0, which is only for address FF.
       if (body[1] < modbus::refusal_bit) refuse(reply, address(), body[1], Exception::illegal_function);
   }
 }
@@ -59,7 +60,7 @@ void VirtualEncoder::read(Bytes body, Time at, FrameBytes& reply) {
   const auto registers = static_cast<std::uint16_t>(body[4] << 8 | body[5]);
   if (registers == 0 || registers > modbus::most_registers) return refused(Exception::illegal_data_value);
   if (first != 0 || registers > 2) return refused(Exception::illegal_data_address);
-  // One register would hold a part of the position that looks like a whole one.
+  // One register would carry a part of the position that looks like a whole one.
   if (registers == 1 && format_.bits > 16) return refused(Exception::illegal_data_value);
   append_position(registers, at, reply);
 }
@@ -100,7 +101,7 @@ bool VirtualEncoder::apply(std::uint8_t value, Time at) {
   } else if (baud_found != baud_parameters.end()) {
     const auto index = static_cast<std::uint8_t>(baud_found - baud_parameters.begin());
     wrote(settings_.write(Settings::rate_at, {&index, 1}), at);
-    set_rate(baud());  // the reply goes out at the old one
+    set_rate(baud());  // the reply is still sent at the old baud rate
   } else {
     return false;
   }

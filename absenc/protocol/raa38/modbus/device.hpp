@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A virtual RAA38S6 as a Modbus RTU slave: address, baud rate, direction and zero survive power off, writing them
-// wears, and it lists the rules its host breaks. Several of them share a line.
+// A virtual RAA38S6 as a Modbus RTU slave. Address, baud rate, direction and zero survive power off, and writing them
+// wears the memory. It reports timing and settings errors of its host. Several of them can share a line.
 #pragma once
 
 #include <cstdint>
@@ -13,7 +13,7 @@ namespace absenc::raa38::rtu {
 
 class VirtualEncoder final : public modbus::Server {
  public:
-  /// Switched off until `power_on`. `shaft` must outlive the encoder.
+  /// Creates an encoder that is off until `power_on`. `shaft` must outlive it.
   VirtualEncoder(const Format& format, const Shaft& shaft)
       : Server(format.line()),
         format_(format),
@@ -40,7 +40,7 @@ class VirtualEncoder final : public modbus::Server {
 
   Format format_;
   Settings settings_;
-  std::uint32_t recent_settings_ = 0;  // within a minute
+  std::uint32_t recent_settings_ = 0;  // number of settings within the last minute
   Time recent_since_{};
 };
 

@@ -25,16 +25,16 @@ TEST(Raa38ModbusDevice, AnswersAsTheManualShows) {
 TEST(Raa38ModbusDevice, RefusesAsTheStandardSays) {
   Bench bench;
   const std::pair<Wire, Wire> rows[]{
-      {{1, 4, 0, 0, 0, 1}, {1, 0x84, 1}},  // input registers
-      {{1, 1, 0, 0, 0, 1}, {1, 0x81, 1}},  // coils
+      {{1, 4, 0, 0, 0, 1}, {1, 0x84, 1}},  // read input registers
+      {{1, 1, 0, 0, 0, 1}, {1, 0x81, 1}},  // read coils
       {{1, 6, 0, 0, 0, 1}, {1, 0x86, 1}},  // write a register
       {{1, 0x11}, {1, 0x91, 1}},           // report server id
-      {{1, 3, 0, 1, 0, 1}, {1, 0x83, 2}},  // register 1
-      {{1, 3, 0, 0, 0, 3}, {1, 0x83, 2}},  // three registers
+      {{1, 3, 0, 1, 0, 1}, {1, 0x83, 2}},  // reads register 1
+      {{1, 3, 0, 0, 0, 3}, {1, 0x83, 2}},  // reads three registers
       {{1, 3, 0xFF, 0xFF, 0, 1}, {1, 0x83, 2}},
-      {{1, 3, 0, 0, 0, 0}, {1, 0x83, 3}},    // none
-      {{1, 3, 0, 0, 0, 126}, {1, 0x83, 3}},  // more than a frame holds
-      {{1, 3, 0, 0}, {1, 0x83, 3}},          // no request of this function
+      {{1, 3, 0, 0, 0, 0}, {1, 0x83, 3}},    // reads no register
+      {{1, 3, 0, 0, 0, 126}, {1, 0x83, 3}},  // reads more registers than a frame can carry
+      {{1, 3, 0, 0}, {1, 0x83, 3}},          // truncated request
   };
   for (const auto& [request, reply] : rows) EXPECT_EQ(bench.body(request), reply);
   EXPECT_EQ(bench.encoder().violation_count(), 0u);
@@ -48,10 +48,10 @@ TEST(Raa38ModbusDevice, IsSilentToWhatIsNotForIt) {
   Bench bench;
   for (const Wire& request : {
            Wire{2, 3, 0, 0, 0, 1},
-           Wire{0, 3, 0, 0, 0, 1},  // broadcast
+           Wire{0, 3, 0, 0, 0, 1},  // address 0: broadcast
            Wire{0xFF, 3, 0, 0, 0, 1},
-           Wire{1, 0xA0},     // A0 is asked of FF
-           Wire{1, 0x83, 2},  // the refusal of another
+           Wire{1, 0xA0},     // A0 is only for address FF
+           Wire{1, 0x83, 2},  // a refusal of another slave
            Wire{1, 0xA1},
            Wire{1, 0xCC, 1, 1},
        }) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What an RAA38S6 says over Modbus RTU (RAA38S6 Operation Manual, 3.1.7): encoded, decoded, checked, and shown.
+// Requests and replies of an RAA38S6 over Modbus RTU (RAA38S6 Operation Manual, 3.1.7): encode, decode, check.
 #pragma once
 
 #include <array>
@@ -19,7 +19,7 @@ using modbus::CrcOrder;
 
 namespace function {
 inline constexpr std::uint8_t read = modbus::read_holding_registers;
-inline constexpr std::uint8_t ask_address = 0xA0;  // these three are the maker's own
+inline constexpr std::uint8_t ask_address = 0xA0;  // functions A0, A1 and CC are specific to the maker
 inline constexpr std::uint8_t set_address = 0xA1;
 inline constexpr std::uint8_t set_parameter = 0xCC;
 
@@ -28,7 +28,7 @@ inline constexpr std::uint8_t set_parameter = 0xCC;
 }
 }  // namespace function
 
-inline constexpr std::uint8_t any_address = 0xFF;  // who asks for the address
+inline constexpr std::uint8_t any_address = 0xFF;  // address in the request for the encoder's address
 
 namespace parameter {
 inline constexpr std::uint8_t zero = 0x00;
@@ -40,7 +40,7 @@ inline constexpr std::array<std::uint32_t, 5> bauds{2400, 4800, 9600, 19'200, 57
 inline constexpr std::array<std::uint8_t, bauds.size()> baud_parameters{0x24, 0x48, 0x96, 0x19, 0x57};
 inline constexpr std::size_t baud_at_shipping = 3;
 
-/// What function CC sets, in words.
+/// Returns the meaning of a parameter of function CC, in words.
 [[nodiscard]] constexpr std::string_view name_of_setting(std::uint8_t value) {
   constexpr std::array<std::string_view, bauds.size()> baud_names{"2400 baud", "4800 baud", "9600 baud", "19200 baud",
                                                                   "57600 baud"};
@@ -52,7 +52,7 @@ inline constexpr std::size_t baud_at_shipping = 3;
   return "unknown";
 }
 
-/// The index of a baud rate; empty when the encoder does not have it.
+/// Returns the index of a baud rate; nothing if the encoder does not have it.
 [[nodiscard]] constexpr std::optional<std::size_t> baud_index(std::uint64_t baud) {
   for (std::size_t i = 0; i < bauds.size(); ++i) {
     if (bauds[i] == baud) return i;
@@ -62,20 +62,21 @@ inline constexpr std::size_t baud_at_shipping = 3;
 
 inline constexpr LineSettings line_settings{.rate = bauds[baud_at_shipping]};
 
-/// How a virtual encoder's reply to a request of two registers looks; the document has all three.
+/// Form of the virtual encoder's reply to a request of two registers; the document has all three.
 enum class Data : std::uint8_t {
-  four_bytes,     // byte count 04
-  three_bytes,    // byte count 03
+  four_bytes,     // byte count 04, four bytes
+  three_bytes,    // byte count 03, three bytes
   three_as_four,  // byte count 04, three bytes
 };
 
 struct Format {
   std::uint8_t address = 1;
-  unsigned bits = 14;      // 10 to 21
-  unsigned registers = 0;  // to ask for: 1, 2; 0: as many as the bits need
+  unsigned bits = 14;      // bits of the position, 10 to 21
+  unsigned registers = 0;  // number of registers to request, 1 or 2; 0: as many as the bits need
   std::size_t baud = baud_at_shipping;
   Data data = Data::four_bytes;
-  CrcOrder address_crc = CrcOrder::low_first;  // virtual: of its reply to A0; low_first or high_first
+  // Virtual encoder: byte order of the CRC in its reply to A0, low_first or high_first.
+  CrcOrder address_crc = CrcOrder::low_first;
 
   [[nodiscard]] constexpr unsigned asked() const { return registers != 0 ? registers : bits > 16 ? 2 : 1; }
   [[nodiscard]] constexpr LineSettings line() const { return {.rate = bauds[baud]}; }
@@ -85,8 +86,8 @@ struct Format {
 struct Request {
   std::uint8_t function = function::read;
   std::uint8_t address = 1;
-  std::uint8_t value = 0;            // set_address: the new one; set_parameter: the parameter
-  std::uint16_t first_register = 0;  // read
+  std::uint8_t value = 0;            // set_address: the new address; set_parameter: the parameter
+  std::uint16_t first_register = 0;  // register to read first; only for the function `read`
   std::uint16_t registers = 1;
 };
 
@@ -117,8 +118,8 @@ using RequestBytes = ByteBuffer<8>;
   return {.address = format.address, .registers = static_cast<std::uint16_t>(format.asked())};
 }
 
-/// Errors: wrong_length, bad_checksum, unsupported (another function), unexpected_reply (the address is asked of a
-/// single one).
+/// Decodes a request. Errors: wrong_length, bad_checksum, unsupported (another function), unexpected_reply (A0 sent to
+/// a single address instead of FF).
 [[nodiscard]] constexpr Result<Request> decode_request(Bytes bytes) {
   if (bytes.size() < modbus::shortest_frame) return Error::wrong_length;
   const std::uint8_t code = bytes[1];
@@ -139,34 +140,35 @@ using RequestBytes = ByteBuffer<8>;
 
 struct Reply {
   std::uint8_t function = function::read;
-  std::uint8_t address = 1;      // ask_address: the one that is told; set_address: the new one
-  std::uint32_t singleturn = 0;  // read
-  std::uint8_t value = 0;        // set_parameter
+  std::uint8_t address = 1;      // ask_address: the encoder's address; set_address: the new address
+  std::uint32_t singleturn = 0;  // position; only for the function `read`
+  std::uint8_t value = 0;        // parameter; only for the function `set_parameter`
   CrcOrder order = CrcOrder::low_first;
-  std::size_t doubtful_size = 0;  // of a reading whose length the CRC cannot vouch for
+  std::size_t doubtful_size = 0;  // length of a reply to `read` if the CRC cannot prove this length; otherwise 0
 };
 
-/// Whether a good reply to a reading would also be good with its last byte lost, or with a 00 behind it: then the CRC
-/// does not tell whether it has three bytes of data or four.
+/// Returns whether a valid reply to a read request would still be valid without its last byte, or with a 00 appended:
+/// the CRC then does not prove whether the reply has three bytes of data or four.
 [[nodiscard]] constexpr bool length_is_doubtful(Bytes reply) {
   return reply.size() > 7 && reply[1] == function::read && reply[2] == 4 && (reply.size() == 8 || reply.back() == 0);
 }
 
-/// Whether a second reply leaves the first one's length in doubt.
+/// Returns whether a second reply leaves the length of the first one in doubt.
 [[nodiscard]] constexpr bool differ_doubtfully(const Reply& first, const Reply& second) {
   return second.doubtful_size != 0 && second.doubtful_size != first.doubtful_size;
 }
 
 namespace detail {
 
-// A refusal of a function of the maker's looks like its reply; only that of set_address has another length.
+// Returns the exception code of a refusal. Refusals of A0 and CC have the form of a reply and are not recognised; that
+// of A1 has another length.
 constexpr std::optional<std::uint8_t> refusal_of(const Request& request, Bytes reply) {
   if (request.function != function::read && request.function != function::set_address) return std::nullopt;
   return modbus::refusal_code(reply, request.function);
 }
 
-// Header, byte count, data, CRC. Two registers may come with two, three or four bytes of data: the text of 3.1.7 says
-// two or three, its table counts four and shows three.
+// Checks header, byte count, data and CRC. Two registers may have two, three or four bytes of data: the text of 3.1.7
+// says two or three, its table counts four and shows three.
 constexpr bool read_length_is_right(const Request& request, Bytes reply) {
   if (reply.size() < modbus::shortest_frame) return false;
   const std::size_t count = reply[2];
@@ -195,13 +197,14 @@ constexpr bool is_answer(const Request& request, Bytes reply) {
 
 }  // namespace detail
 
-/// Errors: wrong_length, bad_checksum, unexpected_reply, request_rejected, unsupported (a reading of other registers),
-/// out_of_range.
+/// Decodes a reply. Errors: wrong_length, bad_checksum, unexpected_reply, request_rejected, unsupported (reading other
+/// registers), out_of_range.
 [[nodiscard]] constexpr Result<Reply> decode_reply(const Format& format, const Request& request, Bytes bytes) {
   const std::optional<std::uint8_t> refusal = detail::refusal_of(request, bytes);
   if (!refusal && !detail::length_is_right(request, bytes)) return Error::wrong_length;
   Reply reply{.function = request.function, .address = bytes[0], .order = modbus::crc_order(bytes)};
-  const bool either = request.function == function::ask_address;  // labelled "MSB first", unlike all others
+  // The document labels the CRC of this reply "MSB first", unlike all others.
+  const bool either = request.function == function::ask_address;
   if (reply.order == CrcOrder::wrong || (reply.order == CrcOrder::high_first && !either)) return Error::bad_checksum;
   if (refusal) return bytes[0] == request.address ? Error::request_rejected : Error::unexpected_reply;
   if (!detail::is_answer(request, bytes)) return Error::unexpected_reply;
@@ -220,7 +223,7 @@ constexpr bool is_answer(const Request& request, Bytes reply) {
   return reply;
 }
 
-/// The request that a reply by itself seems to answer.
+/// Returns the request that a captured reply seems to answer.
 [[nodiscard]] constexpr Request assumed_request(const Format& format, Bytes reply) {
   Request request = read_request(format);
   if (reply.size() < modbus::shortest_frame) return request;
@@ -231,7 +234,7 @@ constexpr bool is_answer(const Request& request, Bytes reply) {
   return request;
 }
 
-/// How many bytes a reply has that begins so; two registers counted as four bytes may come one byte shorter.
+/// Returns the length of a reply that begins with `begun`. Two registers counted as four bytes may be one byte shorter.
 [[nodiscard]] constexpr std::size_t reply_length(const Request& request, Bytes begun) {
   if (request.function == function::set_address) return 4;
   if (request.function != function::read) return 5;
@@ -240,9 +243,9 @@ constexpr bool is_answer(const Request& request, Bytes reply) {
   return begun.size() > 2 && begun[2] == 3 ? 8 : 9;
 }
 
-// ---- How a host speaks
+// ---- Protocol of the host
 
-/// The document gives no time; slaves of this kind need a few milliseconds.
+/// Timeout of a reply. The document gives no time; slaves of this kind need a few milliseconds.
 inline constexpr Time answer_limit = std::chrono::milliseconds(50);
 
 struct Protocol {
@@ -255,7 +258,7 @@ struct Protocol {
     return modbus::client_times({.rate = rate}, answer_limit);
   }
   static constexpr author::HostTimes host_times(const Format& format) { return host_times(format, format.line().rate); }
-  /// Settings wear the memory: nothing is repeated by itself.
+  /// Settings wear the memory: the engine repeats no request.
   static constexpr author::Manner manner(const Format&, const Request&) { return {}; }
   static constexpr RequestBytes encode(const Format&, const Request& request) { return encode_request(request); }
   static constexpr Result<Request> decode_request(const Format&, Bytes bytes) { return rtu::decode_request(bytes); }
@@ -277,7 +280,7 @@ struct Protocol {
   }
 };
 
-/// Function 03. A reply whose length the CRC cannot vouch for is confirmed by a second one.
+/// Reads a position with function 03. If the CRC does not prove the length of the reply, a second reply confirms it.
 using ReadPosition = author::ReadConfirmed<Protocol>;
 
 }  // namespace absenc::raa38::rtu

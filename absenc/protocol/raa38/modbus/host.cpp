@@ -6,7 +6,7 @@
 
 namespace absenc::raa38::rtu {
 
-// ---- In words
+// ---- Explanations
 
 namespace {
 
@@ -104,7 +104,7 @@ using namespace author;
 using namespace std::chrono_literals;
 
 constexpr unsigned most_damaged_answers = 3;
-constexpr Time memory_time = 20ms;  // for the encoder to keep a setting; the document gives none
+constexpr Time memory_time = 20ms;  // time that the encoder needs to store a setting; the document gives none
 constexpr Request which_address{.function = function::ask_address, .address = any_address};
 
 constexpr Explanation too_few_registers{"one register has 16 bits, and the position has more",
@@ -114,7 +114,7 @@ constexpr Request setting(const Format& format, std::uint8_t value) {
   return {.function = function::set_parameter, .address = format.address, .value = value};
 }
 
-// Function 03, so often at the most. Asking on is of no use where it is refused.
+// Reads the position, up to `attempts` times; stops if the encoder refuses.
 Part<Result<Reply>> look(Dialog& dialog, std::uint8_t address, unsigned attempts) {
   Request request = read_request(dialog.format());
   request.address = address;
@@ -138,8 +138,8 @@ void set_rate(Dialog& dialog, std::uint32_t rate) {
   dialog.set_rate(rate, Protocol::host_times(dialog.format(), rate));
 }
 
-// Nobody answered at the address of the format: ends the command if the encoder tells another one by A0, at the baud
-// rate to which the line is set.
+// Called when no encoder answered at the address of the format. Sends A0 and ends the command if an encoder reports
+// another address. `baud`: rate to which the line is set.
 Part<bool> ask_who_is_there(Dialog& dialog, Found& found, std::uint32_t baud) {
   const std::uint8_t asked = dialog.format().address;
   const Result<Reply> told = co_await dialog.attempt(which_address).repeated(2);
@@ -156,7 +156,8 @@ Part<bool> ask_who_is_there(Dialog& dialog, Found& found, std::uint32_t baud) {
   co_return true;
 }
 
-// The encoder at the address of the format, so often at the most.
+// Reads the position of the encoder at the address of the format, up to `attempts` times. Stops the procedure if that
+// fails.
 Part<Reply> look_at_it(Dialog& dialog, Found& found, unsigned attempts) {
   const Result<Reply> reply = co_await look(dialog, dialog.format().address, attempts);
   if (!reply) {
@@ -168,14 +169,14 @@ Part<Reply> look_at_it(Dialog& dialog, Found& found, unsigned attempts) {
   co_return *reply;
 }
 
-// The position in the last reply.
+// Stores the position of the last reply in `found`.
 void show_position(const Dialog& dialog, Found& found) {
   found.reading = dialog.last_reading();
   found.singleturn = dialog.last().singleturn;
   found.angle = degrees(dialog.last().singleturn, dialog.format().bits);
 }
 
-// Where a setting put the encoder it must answer, or else, when it did not take it, where it was.
+// Checks where the encoder answers after a setting: with the new one, or with the old one if it was not accepted.
 Part<Outcome> look_for_it(Dialog& dialog, std::uint8_t address, std::uint32_t rate, std::string_view at_the_old_one) {
   const Format& format = dialog.format();
   const bool moves_rate = rate != format.line().rate;
@@ -224,7 +225,7 @@ Procedure find_baud(Dialog& dialog, Found& found) {
   const std::size_t own = dialog.format().baud;
   found.baud = bauds[own];
   const Result<Reply> first = co_await look(dialog, dialog.format().address, 2);
-  if (first || first.error() == Error::request_rejected) co_return done;  // a refusal is understood
+  if (first || first.error() == Error::request_rejected) co_return done;  // an encoder that refuses is there too
   if (dialog.is_noisy()) co_return {first.error()};
   const Explanation reason = explain_reply(read_request(dialog.format()), first.error(), dialog.reply());
   if (first.error() == Error::timeout) co_await ask_who_is_there(dialog, found, bauds[own]);
@@ -305,7 +306,7 @@ Procedure set_address(Dialog& dialog, Found& found, Arguments arguments) {
       co_await dialog.attempt({.function = function::set_address, .address = format.address, .value = address})
           .changes();
   if (!answer && answer.error() == Error::request_rejected) co_return {answer.error()};
-  // A lost reply does not tell whether it was done: asking does.
+  // If the reply is lost, only a request at the new address shows whether the address was set.
   const Outcome end = co_await look_for_it(dialog, address, format.line().rate,
                                            "the encoder answers at its old address still: it did not take the new one");
   co_return end;
@@ -320,11 +321,11 @@ Procedure set_baud(Dialog& dialog, Found& found, Arguments arguments) {
   }
   found.baud = bauds[*baud];
   found.written = false;
-  set_rate(dialog, format.line().rate);  // a port that cannot change its rate must say so before the encoder has
+  set_rate(dialog, format.line().rate);  // a port that cannot change its rate must fail before the encoder has changed
   co_await look_at_it(dialog, found, 3);
   if (*baud == format.baud && arguments[1] == 0) co_return done;
   found.written = true;
-  // Its reply may come at the new rate.
+  // The reply may be sent at the new rate, so it is ignored.
   static_cast<void>(co_await dialog.attempt(setting(format, baud_parameters[*baud])).changes());
   const Outcome end =
       co_await look_for_it(dialog, format.address, bauds[*baud],
@@ -370,7 +371,8 @@ Procedure set_zero(Dialog& dialog, Found& found, Arguments arguments) {
   found.written = second.singleturn != 0 || arguments[0] != 0;
   if (!*found.written) co_return done;
   static_cast<void>(
-      co_await dialog.attempt(setting(dialog.format(), parameter::zero)).changes());  // perhaps done without a reply
+      // ignored: the zero may be set without a reply
+      co_await dialog.attempt(setting(dialog.format(), parameter::zero)).changes());
   co_await dialog.rest(memory_time);
   const Result<Reply> now = co_await look(dialog, dialog.format().address, 3);
   if (!now) co_return {now.error(), "the zero was sent, but then the position could not be read"};

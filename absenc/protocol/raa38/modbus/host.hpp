@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a host does with an RAA38S6 over Modbus RTU beside reading its position; README.md says why. A setting is sent
-// once, and not at all where the encoder has it already: its memory wears out. What became of it is read back as far as
-// anything can be read.
+// Host procedures of an RAA38S6 over Modbus RTU; README.md gives the reasons. A setting is sent once, and not at all if
+// the encoder has it already, because its memory wears out. Each setting is read back if the protocol allows it.
 #pragma once
 
 #include <array>
@@ -15,11 +14,11 @@
 
 namespace absenc::raa38::rtu {
 
-/// What bad frames turn out to be, in words: a reply to `request`, which may be empty, or with an empty one why none
-/// came; or what is wrong with the request.
+/// Explains an error: of `reply` to `request`, which may be empty; with an empty reply, why none was received or what
+/// is wrong with the request.
 [[nodiscard]] Explanation explain(const Format& format, Error error, Bytes request, Bytes reply);
 
-/// What frames and commands are shown as, in this order.
+/// Fields of frames and commands, in the order of the report.
 struct Values {
   std::optional<std::uint16_t> address{};
   std::optional<std::uint16_t> function{};
@@ -40,51 +39,54 @@ struct Values {
   std::optional<bool> refuses{};
 };
 
-/// What became of a command.
+/// Result of a command.
 struct Found : Values {
   Reading reading{};
-  Sentence words{};  // of the error
+  Sentence words{};  // text of the error's detail
 };
 
 using Dialog = author::DialogOf<Protocol>;
 
-// Where nobody answers at the address of the format, all of these ask A0, and name the address that it told.
+// If no encoder answers at the address of the format, all these procedures send A0 and name the address in its reply.
 
-/// One position.
+/// Reads the position once.
 author::Procedure look_once(Dialog& dialog, Found& found);
 
-/// No command reads the direction: the position is all there is to see of it.
+/// Reads the position: no command reads the direction, so the position is all that can be reported.
 author::Procedure look_at_direction(Dialog& dialog, Found& found);
 
-/// A0. Where that gets no good answer, as with several encoders on the line, the one at the address of the format is
-/// asked for its position.
+/// Reads the address with A0. If A0 gets no valid reply, as with several encoders on the line, checks whether the
+/// encoder at the address of the format answers.
 author::Procedure ask_address(Dialog& dialog, Found& found);
 
-/// Finds the baud rate at which the encoder answers: first that of the format, then the others. Leaves the line as it
-/// was. Error: timeout, or what came at the rate of the format.
+/// Finds the baud rate at which the encoder answers: first that of the format, then the others. Leaves the line at its
+/// old rate. Error: timeout, or that of the reply at the rate of the format.
 author::Procedure find_baud(Dialog& dialog, Found& found);
 
-/// A0 first, which a single encoder answers; otherwise every address from the first argument to the second. An answer
-/// that is damaged every time tells of two encoders with one address, or of a bad line. Error: timeout when nobody
-/// answers.
+/// Finds the slaves on a line. Sends A0 first, which a single encoder answers, otherwise requests every address from
+/// the first argument to the second. If all replies of an address are damaged, two encoders share it or the line is
+/// bad. Error: timeout if no slave answers.
 struct Slaves {
   enum class Kind : std::uint8_t { none, answers, clash, refuses };
   std::array<Kind, modbus::last_address + 1> at{};
 };
 author::Procedure scan(Dialog& dialog, Slaves& found, Arguments arguments);
 
-/// A1. Refuses (invalid_argument) an address at which somebody answers. Verified by asking the new address; errors:
-/// cross_check_failed (it has its old one), timeout (it answers at neither).
+/// Sets the address with A1. Refuses an address at which another slave answers (invalid_argument). Reads the position
+/// at the new address to verify; errors: cross_check_failed (it still has its old address), timeout (it answers at
+/// neither).
 author::Procedure set_address(Dialog& dialog, Found& found, Arguments arguments);
 
-/// CC with a baud rate; verified at the new rate, to which the line is set. Errors: invalid_argument (the encoder does
-/// not have it), cross_check_failed (it has its old one), timeout (it answers at neither); then the line is as before.
+/// Sets the baud rate with CC, sets the line to it and verifies there. Errors: invalid_argument (the encoder does not
+/// have this rate), cross_check_failed (it still has its old rate), timeout (it answers at neither). After an error the
+/// line has its old rate.
 author::Procedure set_baud(Dialog& dialog, Found& found, Arguments arguments);
 
-/// CC with a direction. Only its echo tells that it was taken; the position before and after is reported.
+/// Sets the direction with CC. Only the echo of the request confirms it. Reports how the position changed.
 author::Procedure set_direction(Dialog& dialog, Found& found, Arguments arguments);
 
-/// CC 00: the position becomes 0 here. The shaft must stand still (invalid_argument); read back (cross_check_failed).
+/// Makes the present position zero with CC 00. Errors also: not_still (the shaft turns), cross_check_failed (the
+/// position is not zero afterwards).
 author::Procedure set_zero(Dialog& dialog, Found& found, Arguments arguments);
 
 }  // namespace absenc::raa38::rtu

@@ -14,7 +14,7 @@ const Wire position_of_1 = framed({1, 3, 2, 0, 9});
 
 // ---- Reading
 
-// How many positions a second come over the line, against what its silences allow.
+// Compares the positions per second with the limit that the silences on the line set.
 TEST(Raa38ModbusHost, IsAsFastAsTheSilencesAllow) {
   for (std::size_t baud = 0; baud < bauds.size(); ++baud) {
     Bench bench({.baud = baud});
@@ -22,7 +22,7 @@ TEST(Raa38ModbusHost, IsAsFastAsTheSilencesAllow) {
     const Time start = bench.line.now();
     constexpr int readings = 200;
     for (int i = 0; i < readings; ++i) ASSERT_EQ(bench.position(), 0x1555u);
-    // Silence, 8 characters, silence, the encoder's time, 7 characters.
+    // Silence, 8 characters, silence, the encoder's answer time, 7 characters.
     const LineSettings line = bench.format.line();
     const Time least = modbus::frame_silence(line) * 2 + 200us + 15 * line.character();
     const auto seconds = std::chrono::duration<double>(bench.line.now() - start);
@@ -53,8 +53,8 @@ TEST(Raa38ModbusHost, OneRegisterDoesNotHold17Bits) {
   EXPECT_TRUE(ended(raa38::testing::end_of<std::uint8_t>(*read), Error::invalid_argument, "16 bits"));
 }
 
-// One position in 256 has a CRC that ends with 00: without its last byte the frame is good as another form. A procedure
-// trusts it as little.
+// One position in 256 has a CRC that ends with 00: without its last byte the frame is a valid frame of another form.
+// Reader and procedures must both detect it.
 TEST(Raa38ModbusHost, AReplyThatLostItsLastByteIsNotAPosition) {
   Wire whole;
   std::uint32_t position = 0x100000;
@@ -116,7 +116,7 @@ TEST(Raa38ModbusHost, ALineThatIsNeverSilentIsGivenUpAtOnce) {
   }
 }
 
-// ---- What is asked of the encoder beside its position
+// ---- Address, baud rate, direction and scan
 
 TEST(Raa38ModbusHost, TheAddressIsAskedOfWhoeverIsThere) {
   Bench bench({.address = 42});
@@ -274,7 +274,7 @@ TEST(Raa38ModbusSettings, ARefusalIsToldAndNotAskedForAgain) {
   EXPECT_TRUE(ended(with(refuses, "set-address", {2}), Error::request_rejected, "illegal function"));
 }
 
-// The document gives no time for it; whoever asks at once may hear the old value, or nothing.
+// The document gives no time for storing a setting; a request right after it may read the old value, or get no reply.
 TEST(Raa38ModbusSettings, TheEncoderHasTimeToKeepASetting) {
   const std::pair<std::string_view, std::int64_t> commands[]{
       {"set-address", 2}, {"set-baud", 9600}, {"set-direction", 1}, {"zero", 0}};
@@ -313,7 +313,7 @@ TEST(Raa38ModbusSettings, ABaudRateIsFollowed) {
     }
   }
   EXPECT_TRUE(ended(Bench().does("set-baud", {38'400}), Error::invalid_argument, "57600"));
-  // A port that cannot change its rate says so before the encoder does.
+  // A port that cannot change its rate must fail before the encoder has changed.
   EXPECT_EQ(Talk({}, "set-baud", {9600})->next(Time{}).kind, Step<std::uint8_t>::Kind::configure);
 }
 

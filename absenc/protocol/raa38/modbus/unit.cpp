@@ -53,7 +53,7 @@ constexpr std::array<Argument, 2> scan_arguments{
     {{"first", "address to ask", modbus::first_address, modbus::last_address, modbus::first_address, false},
      {"last", "address to ask", modbus::first_address, modbus::last_address, modbus::last_address, false}}};
 
-// ---- The one request that does the command's work; procedures send more.
+// ---- Requests. Each is the one that does the command's work; procedures send more.
 
 constexpr Request to_read(const Format& format, Arguments) { return read_request(format); }
 constexpr Request to_ask_address(const Format&, Arguments) {
@@ -77,14 +77,15 @@ constexpr Result<Request> to_set_baud(const Format& format, Arguments arguments)
 
 constexpr bool has_too_few_registers(const Format& format) { return format.asked() == 1 && format.bits > 16; }
 
-// ---- Where a frame ends
+// ---- End of a frame
 
 constexpr bool is_good(Bytes bytes, std::size_t size) {
   return bytes.size() >= size && modbus::crc_order(bytes.first(size)) == CrcOrder::low_first;
 }
 
-// Silence tells frames apart. In a mere run of bytes three data bytes counted as four are told from four by the CRC,
-// and where a 00 follows, which the CRC does not see, by what the position can be.
+// Returns the length of a reply in bytes without pauses. On the line, silence separates frames. Without it, the CRC
+// decides between three and four data bytes after byte count 04; a following 00 leaves the CRC valid, so the range of
+// the position decides then.
 std::size_t length_in_run(const Format& format, const Request& request, Bytes bytes) {
   const std::size_t length = reply_length(request, bytes);
   if (length != 9 || !is_good(bytes, 8)) return length;
@@ -109,9 +110,9 @@ FrameEnd frame_end(const Options& values, Direction way, Bytes bytes) {
   return {bytes.size() < length ? FrameEnd::Kind::incomplete : FrameEnd::Kind::complete, length};
 }
 
-// ---- What captured frames tell. Whose address they have does not matter.
+// ---- Evidence of captured frames. Their address does not matter.
 
-/// What a good capture says; `reply` is empty where there was none. Or what is wrong with it whatever the options.
+/// Content of a valid capture, or why it is invalid with any options. `reply` is empty if there was none.
 struct Judged {
   Request request{};
   std::optional<Reply> reply{};
@@ -128,7 +129,7 @@ Judged look_at(const Capture& capture) {
   if (capture.reply.empty()) return {*request};
   const Result<Reply> reply = decode_reply(most, *request, capture.reply);
   if (reply) return {*request, *reply};
-  // A refusal is a good frame, which tells nothing of the bits.
+  // A refusal is a valid frame without evidence for the bits.
   if (reply.error() == Error::request_rejected) return {*request};
   return {.wrong = text_of(reply.error()).description};
 }
@@ -161,7 +162,7 @@ bool probe(Options& values, std::span<const Capture> captures, EvidenceSink& sin
   return bits_found && registers_found;
 }
 
-// ---- What is shown
+// ---- Reported fields
 
 constexpr auto fields = author::fields_of<Values>(
     field<&Values::address>("address", "", "address of the encoder", Role::encoder),
@@ -255,7 +256,7 @@ constexpr auto commands = std::array{
         {"scan", Verb::scan, 0, "who answers on the line", scan_arguments, false, false}),
 };
 
-// ---- What is declared
+// ---- Declaration
 
 constexpr auto models = std::array{author::ModelText{"RAA38S6", "single-turn, 10 to 21 bits (option bits)", 0, ""}};
 
@@ -287,7 +288,8 @@ constexpr author::Declaration<Protocol, VirtualEncoder> declaration{
     .frame_end = frame_end,
     .bits = bits_in,
     .probe = probe,
-    // Between the longest pause inside a frame, 1.5 characters, and the shortest between two, 3.5.
+    // Pause that separates frames: above 1.5 characters, the longest pause inside a frame, and below 3.5, the shortest
+    // between frames.
     .timing = {.pause_bits = 25, .turnaround_limit = answer_limit},
 };
 

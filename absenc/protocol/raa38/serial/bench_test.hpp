@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// For tests: virtual RAA38S6 and a host on one asynchronous line in virtual time.
+// For tests: virtual RAA38S6 encoders and a host on one asynchronous line in virtual time.
 #pragma once
 
 #include "absenc/protocol/raa38/serial/device.hpp"
@@ -37,7 +37,7 @@ struct Talk final : raa38::testing::Talk<std::uint8_t> {
       : raa38::testing::Talk<std::uint8_t>(serial_unit, options_of(format), name) {}
 };
 
-/// A virtual encoder of which a test may change what it sends: `frame` counts from 0; nothing left: nothing is sent.
+/// A virtual encoder whose frames a test can change. Frames are counted from 0; an emptied frame is not sent.
 struct Tampered final : Device<std::uint8_t> {
   using Tamper = author::testing::Tamper;
   Tampered(const Format& format, const Shaft& shaft) : encoder(format, shaft) {}
@@ -77,9 +77,9 @@ struct Bench : raa38::testing::Bench<std::uint8_t, Tampered, Format, serial_unit
     put(383);
     add(own);
   }
-  /// One more, which is a count away from all others.
+  /// Adds an encoder whose zero differs by one count from that of the others.
   void add_twin(const Format& of_it) { add(of_it).memory()[2] = 4; }
-  /// Of 14 bits.
+  /// Sets the position in counts of 14 bits.
   void put(std::int64_t counts) { shaft.put(0, counts << 7); }
 };
 

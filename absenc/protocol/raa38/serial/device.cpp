@@ -9,7 +9,7 @@ ByteStep VirtualEncoder::next(Time now) {
   if (std::exchange(pending_, false)) return character();
   const bool streams = format().mode == Mode::timing && is_on(now) && !is_transmitting();
   if (streams && now >= due_) {
-    // What was held up is made up for, so that the rate stays; after a long time there is no use in it.
+    // Delayed frames are sent afterwards, so that the rate stays; after a long delay they are dropped.
     if (now - due_ > most_backlog) due_ = now;
     transmit(encode_position(format(), position(due_)), due_);
     due_ += format().period() > Time{} ? format().period() : virtual_period;
@@ -25,7 +25,7 @@ ByteStep VirtualEncoder::next(Time now) {
   return step;
 }
 
-// As long as the frame was ordered to take.
+// Sends the next character at its time in the ordered duration of the frame.
 ByteStep VirtualEncoder::character() {
   const auto before = static_cast<std::int64_t>(sent_);
   const Time at = frame_at_ + before * format().transmission / static_cast<std::int64_t>(frame_.size());
@@ -61,10 +61,11 @@ void VirtualEncoder::triggered(const ByteEvent& event) {
   transmit(encode_position(format(), position(event.at)), event.at + Protocol::device_times(format()).answer_time);
 }
 
-// Two of one number send at the same time: only a request breaks a rule.
+// Reports a request during a transmission. Two encoders with one number send at the same time, so that only the bytes
+// of a request count, not other bytes.
 void VirtualEncoder::hear_meanwhile(const ByteEvent& event) {
   const std::uint32_t own = 0xBCAA00u | number_mark | format().unit;
-  // Had this program been let run, the frame might have been out before.
+  // If this program was not scheduled, the frame should already have been sent before the request arrived.
   const bool may_have_waited = event.late > Protocol::device_times(format()).answer_time + format().transmission;
   for (const std::uint8_t byte : event.items) {
     meanwhile_ = (meanwhile_ << 8 | byte) & 0xFFFFFF;

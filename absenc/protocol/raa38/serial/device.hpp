@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A virtual RAA38S6 on an asynchronous line: transmits by itself, on a pulse, or when its number is asked for.
+// A virtual RAA38S6 on an asynchronous line: transmits by itself, on a pulse, or on a request with its number.
 #pragma once
 
 #include <optional>
@@ -8,7 +8,7 @@
 
 namespace absenc::raa38::serial {
 
-/// Memory: its zero. What the format does not know is as in frame.hpp.
+/// A virtual encoder; its memory is its zero. Unknown members of the format have the values of frame.hpp.
 class VirtualEncoder final : public author::BusDevice<Protocol, VirtualEncoder, 4> {
  public:
   using BusDevice::BusDevice;
@@ -27,13 +27,13 @@ class VirtualEncoder final : public author::BusDevice<Protocol, VirtualEncoder, 
   [[nodiscard]] Position position(Time at) const;
   [[nodiscard]] Step<std::uint8_t> character();
 
-  Time due_{};  // timing: when the next frame begins
-  // Of a frame that is sent character by character:
+  Time due_{};  // timing mode: start of the next frame
+  // State of a frame that is sent character by character.
   Bytes frame_{};
   Time frame_at_{};
   std::size_t sent_ = 0;
   bool pending_ = false;
-  std::uint32_t meanwhile_ = 0;  // the last three characters that were heard while it sends
+  std::uint32_t meanwhile_ = 0;  // the last three characters received while a frame is sent
 };
 
 }  // namespace absenc::raa38::serial

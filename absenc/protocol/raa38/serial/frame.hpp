@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The RAA38S6 on asynchronous lines (RS-485, RS-232, RS-422 carry the same bytes): its frames, with every check that
-// they allow, and times. README.md draws them.
+// Frames of the RAA38S6 on asynchronous lines, their checks and their times. RS-485, RS-232 and RS-422 carry the same
+// bytes. README.md draws them.
 #pragma once
 
 #include <algorithm>
@@ -21,15 +21,15 @@ using namespace std::chrono_literals;
 
 /// What starts a frame.
 enum class Mode : std::uint8_t {
-  timing,     // nothing: the encoder transmits at its refresh rate
+  timing,     // the encoder itself, at its refresh rate
   handshake,  // a falling edge on CLK
   bus,        // a request with the encoder's number
 };
 
-/// Second byte of a frame: the tables say 81, the text of the bus the encoder's number.
+/// Second byte of a frame: 81 in the document's tables, the encoder's number in its text about the bus.
 enum class SecondByte : std::uint8_t { automatic, fixed, echo };
 
-/// How the zero is set, of encoders that were ordered so.
+/// How the zero of an encoder is set, as ordered.
 enum class Zeroing : std::uint8_t {
   none,
   line,     // a pulse on CLR
@@ -38,57 +38,57 @@ enum class Zeroing : std::uint8_t {
 
 inline constexpr std::uint8_t header = 0xFF;
 inline constexpr std::uint8_t fixed_second_byte = 0x81;
-inline constexpr std::uint8_t number_mark = 0xB0;  // Bx: unit x
-inline constexpr std::uint8_t clear_mark = 0xC0;   // Cx: its zero
+inline constexpr std::uint8_t number_mark = 0xB0;  // bx: read unit x
+inline constexpr std::uint8_t clear_mark = 0xC0;   // cx: set the zero of unit x
 inline constexpr unsigned unit_count = 16;         // x is one hexadecimal digit
 inline constexpr unsigned least_bits = 10;
 inline constexpr unsigned most_bits = 21;
 inline constexpr std::size_t request_bytes = 3;
 inline constexpr std::size_t frame_capacity = 6;
 
-// ---- Times. The document states T2 and nothing else; the rest is ours.
+// ---- Times. The document states only T2; all others are assumed.
 
-inline constexpr Time trigger_width = 10us;  // T2, at least (3.1.3)
-inline constexpr Time clear_width = 1ms;     // of the pulse on CLR
+inline constexpr Time trigger_width = 10us;  // T2: shortest pulse on CLK (3.1.3)
+inline constexpr Time clear_width = 1ms;     // width of the pulse on CLR
 
-// How long a host waits, when the options do not say what was ordered.
-inline constexpr Time answer_limit = 100ms;  // T3, and from a request to its answer
-inline constexpr Time answer_slack = 5ms;    // beyond a T3 that is given
-inline constexpr Time gap_limit = 10ms;      // between characters: 1200 baud
-inline constexpr Time patience = 1s;         // with a line that is never silent: two frames at 1200 baud are 130 ms
-inline constexpr Time listen_limit = 1s;     // without a good frame of an encoder that transmits by itself
-inline constexpr Time scan_silence = 200ms;  // before a scan: longer than most refresh rates take
-inline constexpr Time zero_limit = 500ms;    // until the position must be zero
+// Timeouts of the host if the options do not give the ordered times.
+inline constexpr Time answer_limit = 100ms;  // timeout of a reply: T3, or from a request to its reply
+inline constexpr Time answer_slack = 5ms;    // added to a T3 that the options give
+inline constexpr Time gap_limit = 10ms;      // timeout between two characters; suits 1200 baud
+inline constexpr Time patience = 1s;      // timeout on a line that is never silent; two frames at 1200 baud take 130 ms
+inline constexpr Time listen_limit = 1s;  // timeout of a stream without a valid frame
+inline constexpr Time scan_silence = 200ms;  // listening before a scan; longer than the period of most refresh rates
+inline constexpr Time zero_limit = 500ms;    // time within which the position must become zero
 inline constexpr Time zero_poll = 10ms;
 
-// The virtual encoder, where the options do not say.
-inline constexpr Time virtual_period = 10ms;        // refresh rate 100 Hz
-inline constexpr Time virtual_acquisition = 100us;  // T3
-inline constexpr Time most_backlog = 50ms;          // a stream that was held up longer leaves frames out
-inline constexpr Time request_gap = 2ms;            // after which the beginning of a request is forgotten
+// Times of the virtual encoder if the options do not give them.
+inline constexpr Time virtual_period = 10ms;        // time between frames: refresh rate 100 Hz
+inline constexpr Time virtual_acquisition = 100us;  // T3 of the virtual encoder
+inline constexpr Time most_backlog = 50ms;          // a stream that was delayed longer drops frames
+inline constexpr Time request_gap = 2ms;            // silence after which an incomplete request is dropped
 
-/// How an encoder was ordered.
+/// Configuration of an encoder, as it was ordered.
 struct Format {
-  unsigned bits = 14;  // of a turn
+  unsigned bits = 14;  // bits of a turn, 10 to 21
   SecondByte second_byte = SecondByte::automatic;
   Mode mode = Mode::timing;
   std::uint8_t unit = 1;
   Zeroing zeroing = Zeroing::none;
-  std::int32_t zero_unit = -1;          // the x of Cx; -1: that of Bx
-  std::int64_t refresh_millihertz = 0;  // 0: not known
-  Time acquisition{};                   // T3, or from a request to its answer; 0: not known
-  Time transmission{};                  // T1 - T3, of a frame; 0: as long as its characters take
+  std::int32_t zero_unit = -1;          // the x of Cx; -1: as in Bx
+  std::int64_t refresh_millihertz = 0;  // frames per second in 0.001 Hz; 0: unknown
+  Time acquisition{};                   // T3, or the time from a request to its reply; 0: unknown
+  Time transmission{};                  // T1 - T3, duration of a frame; 0: as long as its characters take
 
   [[nodiscard]] constexpr std::size_t data_bytes() const { return bits <= 16 ? 2 : 3; }
   [[nodiscard]] constexpr std::size_t frame_bytes() const { return data_bytes() + 3; }
-  /// Between two frames that nobody asks for; 0: not known.
+  /// Returns the time between two frames in timing mode; 0: unknown.
   [[nodiscard]] constexpr Time period() const {
     return refresh_millihertz > 0 ? Time(1'000'000'000'000 / refresh_millihertz) : Time{};
   }
   [[nodiscard]] constexpr std::uint8_t zeroed_unit() const {
     return zero_unit < 0 ? unit : static_cast<std::uint8_t>(zero_unit);
   }
-  /// Of frames that nobody asked for.
+  /// Returns the second byte of the encoder's own frames.
   [[nodiscard]] constexpr std::uint8_t own_second_byte() const {
     return second_byte == SecondByte::echo ? static_cast<std::uint8_t>(number_mark | unit) : fixed_second_byte;
   }
@@ -104,7 +104,7 @@ struct Position {
 using FrameBytes = ByteBuffer<frame_capacity>;
 using RequestBytes = ByteBuffer<request_bytes>;
 
-/// "Sum of the first n bytes, the bottom eight bits". The order of the bytes is lost in it.
+/// Returns the checksum: "Sum of the first n bytes, the bottom eight bits". It does not detect exchanged bytes.
 [[nodiscard]] constexpr std::uint8_t checksum(Bytes bytes) {
   unsigned sum = 0;
   for (const std::uint8_t byte : bytes) sum += byte;
@@ -122,7 +122,7 @@ using RequestBytes = ByteBuffer<request_bytes>;
   return bytes;
 }
 
-/// Whose answer a frame may be. Without a request the frame itself tells.
+/// Matches a frame of any unit. Used without a request, where the frame itself shows its unit.
 inline constexpr int anybody = -1;
 
 [[nodiscard]] constexpr bool second_byte_fits(const Format& format, int unit, std::uint8_t second_byte) {
@@ -131,7 +131,8 @@ inline constexpr int anybody = -1;
   return numbered || (format.second_byte == SecondByte::automatic && second_byte == fixed_second_byte);
 }
 
-/// `unit` 0 to 15, or `anybody`. Errors: wrong_length, bad_checksum, unexpected_reply, out_of_range.
+/// Decodes a frame of `unit`, 0 to 15, or `anybody`. Errors: wrong_length, bad_checksum, unexpected_reply,
+/// out_of_range.
 [[nodiscard]] constexpr Result<Position> decode_position(const Format& format, Bytes bytes, int unit = anybody) {
   if (bytes.size() != format.frame_bytes()) return Error::wrong_length;
   if (checksum(bytes.first(bytes.size() - 1)) != bytes.back()) return Error::bad_checksum;
@@ -145,13 +146,13 @@ struct Request {
   enum class Kind : std::uint8_t {
     read,        // BC AA Bx
     zero_clear,  // BC AA Cx
-    trigger,     // a pulse on CLK, which has no bytes
+    trigger,     // a pulse on CLK, without bytes
     clear,       // a pulse on CLR
   } kind = Kind::read;
-  std::uint8_t unit = 0;  // 0 to 15
+  std::uint8_t unit = 0;  // number of the unit, 0 to 15
 };
 
-/// Nothing for a pulse.
+/// Returns the bytes of a request; empty for a pulse.
 [[nodiscard]] constexpr RequestBytes encode_request(const Request& request) {
   RequestBytes bytes;
   if (request.kind == Request::Kind::trigger || request.kind == Request::Kind::clear) return bytes;
@@ -162,7 +163,7 @@ struct Request {
   return bytes;
 }
 
-/// Errors: wrong_length, unexpected_reply.
+/// Decodes a request. Errors: wrong_length, unexpected_reply.
 [[nodiscard]] constexpr Result<Request> decode_request(Bytes bytes) {
   if (bytes.size() != request_bytes) return Error::wrong_length;
   const unsigned mark = bytes[2] & 0xF0u;
@@ -173,7 +174,7 @@ struct Request {
                  static_cast<std::uint8_t>(bytes[2] & 0x0Fu)};
 }
 
-/// What frames and commands are shown as, in this order.
+/// Fields of frames and commands, in the order of the report.
 struct Values {
   std::optional<std::uint8_t> encoder_address{};
   std::optional<bool> clash{};
@@ -228,7 +229,8 @@ struct Protocol {
     return encode_position(format, position);
   }
   static constexpr Result<Position> decode(const Format& format, const Request& request, Bytes bytes) {
-    if (request.kind == Request::Kind::zero_clear) return Error::unexpected_reply;  // nothing answers it
+    // The encoder does not answer zero clearing.
+    if (request.kind == Request::Kind::zero_clear) return Error::unexpected_reply;
     return decode_position(format, bytes, request.kind == Request::Kind::read ? request.unit : anybody);
   }
   static constexpr Reading reading(const Format& format, const Request&, const Position& position) {
@@ -240,12 +242,12 @@ struct Protocol {
   }
 };
 
-/// What asks this encoder for a position.
+/// Returns the request that makes this encoder send a position.
 [[nodiscard]] constexpr Request position_request(const Format& format) {
   return {format.mode == Mode::bus ? Request::Kind::read : Request::Kind::trigger, format.unit};
 }
 
-/// One position of an encoder that is asked.
+/// Reads one position of an encoder that is not streaming.
 using ReadPosition = author::ReadPosition<Protocol>;
 
 }  // namespace absenc::raa38::serial

@@ -24,8 +24,8 @@ TEST(RaaFrame, TheFirstCheckThatFailsNamesTheError) {
   EXPECT_EQ(error({0xFF, 0xB2, 0x01, 0x7F, 0x31}), Error::none);
 }
 
-// A standing shaft repeats its frame. With the sizes that the encoders have, no other place in the repetition gives
-// another position: a search can never settle there.
+// An encoder that stands still repeats its frame. For all its frame sizes, reading the repetition from another byte on
+// never gives another position, so a search cannot align wrongly.
 TEST(RaaFrame, ARepeatedFrameReadElsewhereIsNoOtherPosition) {
   for (const unsigned bits : {10u, 14u, 16u, 17u, 21u}) {
     const Format format{.bits = bits};

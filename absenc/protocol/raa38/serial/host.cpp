@@ -7,11 +7,11 @@
 
 namespace absenc::raa38::serial {
 
-// ---- In words
+// ---- Explanations
 
 namespace {
 
-// A request of a bus tells the mode, whatever the option says.
+// Returns whether bus rules apply: a bus request proves it, whatever the option mode is.
 bool is_on_bus(const Format& format, Bytes request) {
   return format.mode == Mode::bus || decode_request(request).has_value();
 }
@@ -27,7 +27,7 @@ Explanation explain_other(const Format& format, Bytes request, Bytes reply) {
           "check unit and second_byte; `absenc scan` shows who answers"};
 }
 
-// Why a stream has no good frame.
+// Explains why a stream has no valid frame.
 Explanation explain_stream(Error error) {
   switch (error) {
     case Error::timeout:
@@ -70,7 +70,7 @@ Explanation explain(const Format& format, Error error, Bytes request, Bytes repl
   }
 }
 
-// ---- A stream
+// ---- Stream
 
 Listen::Listen(const Format& format) : format_(format), decoder_(format) {}
 
@@ -80,10 +80,11 @@ ByteStep Listen::next(Time now) {
     arm_ = true;
     return {.kind = ByteStep::Kind::emit};
   }
-  // Whoever stops at a result and comes back later has not waited in vain meanwhile.
+  // The timeout restarts here: the time that the caller takes with a result does not count.
   if (arm_) deadline_ = now + std::max(listen_limit, 4 * format_.period());
   arm_ = false;
-  if (!done_ && now >= deadline_) give_up();  // bytes that are no frames may come before every timer
+  // Bytes that are no frames do not extend the deadline, so it is checked even while they arrive.
+  if (!done_ && now >= deadline_) give_up();
   if (done_) return {.kind = ByteStep::Kind::done};
   return {.at = deadline_};
 }
@@ -124,7 +125,7 @@ void Listen::take(const Found& found) {
   ++good_;
 }
 
-// The frames that came at once were sent one after the other.
+// Returns when the position was taken. Frames that were received together were sent one after the other.
 Time Listen::latched_time(const Found& found) const {
   if (found.at != heard_at_) return found.at;
   const auto behind = static_cast<std::int64_t>(waiting_.size() - taken_);
@@ -167,7 +168,7 @@ using namespace author;
 
 constexpr unsigned scan_attempts = 2;
 
-// The newest frame of what comes first.
+// Returns the newest frame of the first bytes with a valid frame.
 Part<Result<Position>> hear_one(Dialog& dialog) {
   StreamDecoder decoder(dialog.format());
   Position position{.second_byte = dialog.format().own_second_byte()};
@@ -192,7 +193,7 @@ Part<Result<Position>> hear_one(Dialog& dialog) {
   co_return position;
 }
 
-// The next position, whatever starts a frame.
+// Reads the next position in any mode.
 Part<Result<Position>> look(Dialog& dialog) {
   Result<Position> position = Error::timeout;
   if (dialog.format().mode == Mode::timing) {
@@ -222,11 +223,11 @@ Procedure set_zero(Dialog& dialog, Values& found) {
   const Result<Position> second = co_await look(dialog);
   if (!second) co_return {second.error()};
   const Outcome why_not = objection_to_zero(position_reading(first->singleturn, format.bits),
-                                                position_reading(second->singleturn, format.bits));
+                                            position_reading(second->singleturn, format.bits));
   if (why_not.error != Error::none) co_return why_not;
   const Request by_command{Request::Kind::zero_clear, format.zeroed_unit()};
   co_await dialog.ask(format.zeroing == Zeroing::line ? Request{Request::Kind::clear} : by_command).changes();
-  // It is not told whether that worked.
+  // The encoder does not confirm zero clearing, so the position is polled.
   const Time give_up_at = dialog.received_at() + zero_limit;
   Result<Position> now = Error::timeout;
   do {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a host does with an RAA38S6 on an asynchronous line beside asking for a position.
+// Host procedures of an RAA38S6 on an asynchronous line, and the conversation that receives a stream.
 #pragma once
 
 #include <array>
@@ -22,12 +22,12 @@ inline constexpr auto fields = author::fields_of<Values>(
     author::field<&Values::unit>("unit", "", "the number behind B or C"),
     author::field<&Values::skipped>("skipped", "bytes", "so far, that belonged to no good frame"));
 
-/// About a reply to `request`, which may be empty, as to a pulse; with an empty reply about the request, or why none
-/// came.
+/// Explains an error of `reply` to `request`, which is empty for a pulse; with an empty reply, why none was received or
+/// what is wrong with the request.
 [[nodiscard]] Explanation explain(const Format& format, Error error, Bytes request, Bytes reply);
 
-/// Listens to an encoder that transmits by itself, as long as it is driven. Emits every frame, and every loss of the
-/// frames with its error. Ends only when nothing good comes any more: timeout, bad_framing, out_of_range.
+/// Receives the frames of a streaming encoder and sends nothing. Emits every frame, and every loss of frames with its
+/// error. Ends when no valid frame arrives any more: timeout, bad_framing, out_of_range.
 class Listen final : public Conversation<std::uint8_t> {
  public:
   explicit Listen(const Format& format);
@@ -45,7 +45,7 @@ class Listen final : public Conversation<std::uint8_t> {
   [[nodiscard]] const StreamDecoder& decoder() const { return decoder_; }
 
  private:
-  // Frames of as many bytes as a port hands out at once.
+  // Most frames in the bytes that a port delivers at once.
   static constexpr std::size_t most_waiting = 1024;
 
   void take(const Found& found);
@@ -56,14 +56,14 @@ class Listen final : public Conversation<std::uint8_t> {
   Format format_;
   StreamDecoder decoder_;
   Buffer<Found, most_waiting> waiting_;
-  std::size_t taken_ = 0;  // of `waiting_`
+  std::size_t taken_ = 0;  // number of emitted results in `waiting_`
   bool done_ = false;
-  bool heard_ = false;  // anything, since the last good frame
-  bool arm_ = true;     // the time to the next good frame begins
+  bool heard_ = false;  // bytes or damaged characters were received since the last valid frame
+  bool arm_ = true;     // the timeout must be restarted
   Time deadline_{};
-  Time heard_at_{};         // of the bytes that are being worked on,
-  Time heard_before_{};     // and of those before
-  std::uint64_t good_ = 0;  // frames
+  Time heard_at_{};         // time of the bytes that are being processed
+  Time heard_before_{};     // time of the bytes before them
+  std::uint64_t good_ = 0;  // number of valid frames
   StreamCounts counts_{};
   Reading reading_{};
   FrameBytes frame_;
@@ -73,14 +73,14 @@ class Listen final : public Conversation<std::uint8_t> {
 
 using Dialog = author::DialogOf<Protocol>;
 
-/// Reads, sets the zero, and reads until the position is zero. The shaft must stand still. Errors: unsupported and
-/// invalid_argument when the settings have no way to do it, or it turns; cross_check_failed when it is not zero after
-/// half a second.
+/// Reads the position, sets the zero, and reads until the position is zero. Errors: unsupported and invalid_argument
+/// (the options have no way to set the zero), not_still (the shaft turns), cross_check_failed (not zero after half a
+/// second).
 author::Procedure set_zero(Dialog& dialog, Values& found);
 
-/// Listens whether somebody transmits unsolicited, then asks every number of a bus, whatever the mode. An answer that
-/// is damaged every time tells of two encoders with one number, or of a bad line. Errors: timeout when nobody answers,
-/// unexpected_reply when somebody transmits unsolicited.
+/// Finds the units on a bus. Listens for encoders that transmit without a request, then requests every number, in any
+/// mode. If all replies of a number are damaged, two encoders share it or the line is bad. Errors: timeout if no unit
+/// answers, unexpected_reply if an encoder transmits without a request.
 using Units = std::array<Values, unit_count>;
 author::Procedure scan(Dialog& dialog, Units& found);
 

@@ -110,10 +110,10 @@ TEST(RaaHandshake, ABadSumIsNotForTwoEncoders) {
 TEST(RaaBus, TwoWithOneNumberAreNeverAPosition) {
   Bench bench(bus);
   bench.add_twin(with(bus, &Format::second_byte, SecondByte::echo));
-  EXPECT_TRUE(ended(bench.does("position"), Error::bad_checksum));  // FF 81 01 7F 00 and FF B1 01 7E 2F
+  EXPECT_TRUE(ended(bench.does("position"), Error::bad_checksum));  // FF 81 01 7F 00 and FF B1 01 7E 2F collide
 }
 
-// BC AA may stand in a frame, though no sum makes a request of it.
+// A frame may contain BC AA, but its checksum never completes a request.
 TEST(RaaBus, TheBeginOfARequestInsideAFrameOfAnotherIsNone) {
   Bench bench(with(bus, &Format::bits, 16u));
   bench.add(with(bench.format, &Format::unit, std::uint8_t{2}));
@@ -151,7 +151,7 @@ TEST_P(RaaZero, ThatHadNoEffectIsTold) {
 }
 
 TEST_P(RaaZero, IsNotSetWhileTheShaftTurns) {
-  for (const int rpm : {60, 2}) {  // the slow one is seen because some time goes by between two looks
+  for (const int rpm : {60, 2}) {  // the slow speed is detected because some time passes between the two readings
     Bench bench(GetParam());
     bench.shaft.spin(rpm, Time{});
     EXPECT_TRUE(ended(bench.does("zero"), Error::not_still, "nothing was changed")) << rpm;
@@ -237,9 +237,9 @@ TEST(RaaScan, NobodyAndSomebodyWhoTransmitsByHimself) {
   EXPECT_TRUE(ended(Bench(timing).does("scan"), Error::unexpected_reply, "something comes although nobody asks"));
 }
 
-// ---- The rules of the virtual encoder
+// ---- Rules that the virtual encoder checks
 
-/// Two pulses on CLK, or two requests.
+/// Sends two pulses on CLK, or two requests.
 struct Twice final : Machine<std::uint8_t> {
   Twice(Time pulse_width, Time second, Wire bytes = {}) : width(pulse_width), due(second), request(std::move(bytes)) {}
   void feed(const Event<std::uint8_t>&) override {}

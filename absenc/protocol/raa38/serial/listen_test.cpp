@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The stream of a virtual encoder in virtual time, and what `Session` makes of it.
+// The stream of a virtual encoder in virtual time, received directly and by a Session.
 #include "absenc/host/session.hpp"
 #include "absenc/protocol/raa38/serial/bench_test.hpp"
 #include "absenc/sim/sim_port.hpp"
@@ -11,7 +11,7 @@ using namespace testing;
 
 constexpr Format fast{.mode = Mode::timing, .refresh_millihertz = 1'000'000};
 
-/// The results of so many emits.
+/// Results that a host emitted.
 struct Results {
   std::vector<std::uint32_t> positions;
   std::vector<Time> times;
@@ -37,7 +37,7 @@ Results listen(Bench& bench, std::size_t count = SIZE_MAX) {
 
 TEST(RaaListen, EveryFrameAtTheRateOfTheStream) {
   Bench bench(fast);
-  bench.shaft.spin(60, Time{});  // 16.384 counts a frame
+  bench.shaft.spin(60, Time{});  // 16.384 counts per frame
   const Results results = listen(bench, 1000);
   ASSERT_EQ(results.positions.size(), 1000u);
   EXPECT_TRUE(results.errors.empty());
@@ -145,7 +145,7 @@ TEST(RaaSession, ReadsEveryFrameOfTheStream) {
   EXPECT_EQ(bench.encoder.answer_count(), bench.session.counters().good);
 }
 
-// A pause of the caller must not bring old positions.
+// A pause of the caller must not return old positions.
 TEST(RaaSession, TheNewestIsNew) {
   SessionBench bench;
   bench.read(host::Take::newest);
@@ -153,7 +153,7 @@ TEST(RaaSession, TheNewestIsNew) {
     bench.clock += 50ms;
     const Reading reading = *bench.read(host::Take::newest).reading();
     EXPECT_GT(reading.received, bench.clock - 2ms);
-    const auto frame = static_cast<std::uint64_t>(reading.received / 1ms);  // which began then
+    const auto frame = static_cast<std::uint64_t>(reading.received / 1ms);  // the frame that began at this time
     EXPECT_EQ(reading.singleturn, 16'384 * frame / 1000 % 16'384);
   }
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Finds the frames in what an encoder transmits by itself: whole frames where the last one says that they must be, and
-// a search by header, checksum, range and period where something was lost.
+// Finds frames in the bytes of a streaming encoder: directly after each other while aligned; by header, checksum, range
+// and period after bytes were lost.
 #pragma once
 
 #include <algorithm>
@@ -13,26 +13,27 @@
 
 namespace absenc::raa38::serial {
 
-/// A frame, or why the one that was due is none: told once, until the frames are found again.
+/// A frame, or the error that ended the alignment. Each loss of alignment is reported once.
 struct Found {
   Error error = Error::none;
   std::uint32_t singleturn = 0;
-  Time at{};  // when its last byte was there
+  Time at{};  // time at which its last byte was received
 };
 
-/// A frame is believed where the one before it ended; one that has an FF inside only when another header follows, which
-/// may be a period later. Anywhere else two good ones must stand in a row, and both are handed out: a disturbance costs
-/// the frames that it hits, and one good one where it leaves no two together.
+/// While aligned, a frame is accepted where the one before it ended. A frame with an FF inside is accepted only when
+/// another header follows, which may take a period. Without alignment, two valid frames must follow each other; both
+/// are then handed out. A disturbance therefore costs the frames that it hits, and one valid frame if it leaves no two
+/// together.
 class StreamDecoder {
  public:
-  /// Of what nobody asks an encoder of this format for.
+  /// `format`: that of a streaming encoder.
   explicit constexpr StreamDecoder(const Format& format)
       : format_(format),
         frame_(format.frame_bytes()),
         second_byte_(format.own_second_byte()),
         discarded_(format.frame_bytes()) {}
 
-  /// `at`: when these bytes were there. Calls `on_frame(const Found&)` in the order of the line.
+  /// Takes bytes that were received at `at`. Calls `on_frame(const Found&)` in the order of the line.
   template <class OnFrame>
   constexpr void feed(Bytes bytes, Time at, OnFrame&& on_frame) {
     for (const std::uint8_t byte : bytes) {
@@ -43,7 +44,7 @@ class StreamDecoder {
     }
   }
 
-  /// A character came that cannot be used.
+  /// Takes a damaged character.
   template <class OnFrame>
   constexpr void disturbed(OnFrame&& on_frame) {
     discarded_.skip(size_ + 1);
@@ -54,15 +55,15 @@ class StreamDecoder {
     on_frame(Found{.error = Error::bad_framing});
   }
 
-  /// Whether the next frame is known to begin where the last one ended.
+  /// Returns whether the next frame must begin where the last one ended.
   [[nodiscard]] constexpr bool in_step() const { return in_step_; }
-  /// Bytes that belong to no frame.
+  /// Returns the number of bytes that belong to no frame.
   [[nodiscard]] constexpr std::uint64_t skipped() const { return discarded_.skipped(); }
-  /// Frames that were damaged, or could not be told from damaged ones.
+  /// Returns the number of frames that were damaged or could not be distinguished from damaged ones.
   [[nodiscard]] constexpr std::uint64_t discarded() const { return discarded_.count(); }
-  /// Whether something looked like a frame but for a position with too many bits.
+  /// Returns whether a frame was valid except for a position with too many bits.
   [[nodiscard]] constexpr bool saw_larger_positions() const { return saw_larger_positions_; }
-  /// The bytes of the last frame that was none.
+  /// Returns the bytes of the last invalid frame.
   [[nodiscard]] constexpr Bytes bad() const { return bad_.view(); }
 
  private:
@@ -74,12 +75,12 @@ class StreamDecoder {
     return decode_position(format_, Bytes(window_).subspan(offset, frame_));
   }
 
-  // The next frame where it must be. False: more bytes are needed.
+  // Takes the next frame while aligned. Returns false if more bytes are needed.
   template <class OnFrame>
   constexpr bool follow(OnFrame& on_frame) {
     if (size_ < frame_) return false;
-    // Where bytes were lost, the header of the next frame slips into a frame: FF 81 02 (FF 80 lost) FF 81 is a good one
-    // to every check but that no header follows it.
+    // After lost bytes the next header may be inside a frame: FF 81 02 (FF 80 lost) FF 81 passes all checks except that
+    // no header follows it.
     const bool may_hold_header =
         std::find(window_.begin() + 2, window_.begin() + end(frame_), header) != window_.begin() + end(frame_);
     const bool good = frame_at(0).has_value();
@@ -92,7 +93,7 @@ class StreamDecoder {
     return true;
   }
 
-  // Two in a row. What cannot begin any is dropped.
+  // Searches two valid frames in a row and drops bytes that cannot begin one.
   template <class OnFrame>
   constexpr bool search(OnFrame& on_frame) {
     if (size_ < frame_) return false;
@@ -110,7 +111,7 @@ class StreamDecoder {
     return true;
   }
 
-  // Two frames nearer to each other than the refresh rate allows are made of something else.
+  // Returns whether the second frame is earlier than the refresh rate allows, so that the bytes are no frames.
   [[nodiscard]] constexpr bool is_too_early() const {
     const Time between = times_[2 * frame_ - 1] - times_[frame_ - 1];
     return between > Time{} && between < format_.period() / 2;
@@ -141,12 +142,12 @@ class StreamDecoder {
   [[nodiscard]] static constexpr std::ptrdiff_t end(std::size_t count) { return static_cast<std::ptrdiff_t>(count); }
 
   Format format_;
-  std::size_t frame_;  // its bytes
+  std::size_t frame_;  // bytes of a frame
   std::uint8_t second_byte_;
   bool in_step_ = false;
   bool saw_larger_positions_ = false;
   DiscardedFrames discarded_;
-  std::array<std::uint8_t, 2 * frame_capacity> window_{};  // what may still become a frame
+  std::array<std::uint8_t, 2 * frame_capacity> window_{};  // bytes that may still become a frame
   std::array<Time, 2 * frame_capacity> times_{};
   std::size_t size_ = 0;
   FrameBytes bad_;

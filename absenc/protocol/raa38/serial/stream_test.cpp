@@ -83,7 +83,7 @@ TEST(RaaStream, ADisturbanceCostsWhatItHits) {
 TEST(RaaStream, BeginsInTheMiddleOfAFrameWithTheHeaderInItsData) {
   const Format format{.bits = 14};
   Wire wire;
-  for (int i = 0; i < 5; ++i) append(wire, encode_position(format, {0x3F81}));  // FF 81 3F 81 40
+  for (int i = 0; i < 5; ++i) append(wire, encode_position(format, {0x3F81}));  // the frame is FF 81 3F 81 40
   for (std::size_t cut = 0; cut < 5; ++cut) {
     StreamDecoder decoder(format);
     const Heard heard = hear(decoder, Bytes(wire).subspan(cut));
@@ -101,7 +101,7 @@ TEST(RaaStream, FramesOfAnotherNumberAreNone) {
   }
 }
 
-// Two bytes were lost: FF 81 02 .. .. FF 81 02 09 8B. What stands there has a right sum and fits into 10 bits.
+// Two bytes are lost: FF 81 02 .. .. FF 81 02 09 8B. The first five bytes have a valid checksum and fit into 10 bits.
 TEST(RaaStream, AHeaderThatSlippedIntoAFrameIsNoPosition) {
   const Format format{.bits = 10};
   for (std::size_t piece = 1; piece < 20; ++piece) {
@@ -115,7 +115,7 @@ TEST(RaaStream, AHeaderThatSlippedIntoAFrameIsNoPosition) {
   }
 }
 
-// The sum of FF 81 00 7F is FF: such a frame waits for the next header, and no longer.
+// The checksum of FF 81 00 7F is FF: such a frame waits for the next header, but not longer.
 TEST(RaaStream, AFrameWithFFInsideWaitsForTheNextHeader) {
   const Format format{.bits = 14};
   StreamDecoder decoder(format);
@@ -148,7 +148,7 @@ TEST(RaaStream, ADamagedCharacterIsADisturbance) {
   EXPECT_EQ(hear(decoder, stream(format, 5, 7)).positions, range(5, 7));
 }
 
-// ---- The refresh rate: what checksum and range let pass
+// ---- Refresh rate: rejects frames that pass checksum and range
 
 TEST(RaaStream, FramesNearerThanTheRefreshRateAllowsAreNone) {
   const Format format{.bits = 14};
@@ -166,7 +166,7 @@ TEST(RaaStream, FramesNearerThanTheRefreshRateAllowsAreNone) {
   EXPECT_EQ(believed_plainly, 2u);
 }
 
-// The operating system hands over what came whenever it likes: that must not keep a good stream from being found.
+// The operating system delivers bytes in pieces of any size; this must not prevent the alignment to a valid stream.
 TEST(RaaStream, PiecesThatEndInsideEveryFrameOnlyDelay) {
   const Format format{.bits = 14};
   const Wire wire = stream(format, 1, 100);
@@ -182,12 +182,12 @@ TEST(RaaStream, PiecesThatEndInsideEveryFrameOnlyDelay) {
   }
 }
 
-// ---- A million frames, cut, joined and polluted
+// ---- A million frames, cut, joined and disturbed
 
 struct Tally {
   std::uint64_t sent = 0;
-  std::uint64_t lost = 0;   // frames that no disturbance hit
-  std::uint64_t wrong = 0;  // positions that were never sent
+  std::uint64_t lost = 0;   // frames that were not received, although no disturbance hit them
+  std::uint64_t wrong = 0;  // positions that were received, but never sent
   std::uint64_t disturbances = 0;
 };
 
@@ -196,8 +196,8 @@ struct Sent {
   bool hit = false;
 };
 
-/// Adds garbage rich in headers behind the last frame, or cuts it, flips one of its bits, takes a byte out; whether
-/// that hit it.
+/// Disturbs the end of the stream: adds random bytes with many headers, cuts the last frame, flips a bit, or removes a
+/// byte. Returns whether the last frame was hit.
 bool disturb(Wire& wire, std::size_t size, sim::Random& random) {
   switch (random.below(4)) {
     case 0:
@@ -219,9 +219,10 @@ bool disturb(Wire& wire, std::size_t size, sim::Random& random) {
   }
 }
 
-// Both in the order of the line: what was heard and not sent next is wrong, what was sent and not heard is lost.
+// Compares sent and received positions in order. A received position that was not sent next is wrong; a sent one that
+// was not received is lost.
 void judge(Tally& tally, const std::vector<Sent>& sent, const std::vector<std::uint32_t>& heard) {
-  constexpr std::size_t most_missing = 12;  // in a row
+  constexpr std::size_t most_missing = 12;  // most lost frames in a row
   std::size_t next = 0;
   for (const std::uint32_t position : heard) {
     const std::size_t end = std::min(sent.size(), next + most_missing);
@@ -267,7 +268,7 @@ TEST(RaaStream, AMillionFramesCutJoinedAndPolluted) {
               static_cast<unsigned long long>(all.lost), static_cast<unsigned long long>(all.wrong));
   EXPECT_GE(all.sent, 1'000'000u);
   EXPECT_LE(all.lost * 20, all.disturbances) << "most cost no good frame at all";
-  // A damaged frame passes an 8-bit sum by chance; two bytes joined from two frames do as well.
+  // A damaged frame, or parts of two frames, pass an 8-bit checksum by chance.
   EXPECT_LE(all.wrong * 1000, all.disturbances);
 }
 

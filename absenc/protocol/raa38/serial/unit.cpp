@@ -20,7 +20,7 @@ namespace {
 constexpr std::array<std::string_view, 3> mode_choices{"timing", "handshake", "bus"};
 constexpr std::array<std::string_view, 3> second_byte_choices{"auto", "81", "echo"};
 constexpr std::array<std::string_view, 3> zeroing_choices{"none", "line", "command"};
-constexpr std::int64_t most_us = 10'000'000'000;  // ns: 10 s
+constexpr std::int64_t most_us = 10'000'000'000;  // 10 s in nanoseconds
 
 using author::decimal;
 using author::option;
@@ -48,7 +48,7 @@ constexpr auto options = author::OptionsOf{
 constexpr std::size_t bits_option = options.find("bits");
 constexpr std::size_t second_byte_option = options.find("second_byte");
 
-// ---- Where a frame ends
+// ---- End of a frame
 
 FrameEnd frame_end(const Options& values, Direction direction, Bytes bytes) {
   const Format format = options.format(values);
@@ -61,7 +61,7 @@ FrameEnd frame_end(const Options& values, Direction direction, Bytes bytes) {
   return good ? FrameEnd{FrameEnd::Kind::complete, size} : FrameEnd{FrameEnd::Kind::no_frame};
 }
 
-// ---- What captured frames say of bits and second_byte
+// ---- Evidence of captured frames for bits and second_byte
 
 std::string_view against_bits(std::int64_t bits, Bytes reply) {
   if (reply.empty()) return {};
@@ -95,7 +95,7 @@ bool probe(Options& values, std::span<const Capture> captures, EvidenceSink& sin
   });
 }
 
-// ---- What is shown
+// ---- Reported fields
 
 constexpr Values values_of_request(const Format&, const Request& request) {
   return {.command = request.kind == Request::Kind::read ? "read" : "zero_clear", .unit = request.unit};
@@ -143,9 +143,9 @@ constexpr auto commands = std::array{
         {"zero", Verb::zero, 0, "make this the zero of the turn", {}, true, false}),
 };
 
-// ---- What is declared
+// ---- Declaration
 
-// The document names no speed.
+// The document gives no highest speed.
 constexpr auto models =
     std::array{author::ModelText{"RAA38S6", "10 to 21 bits, single-turn; by itself, by pulse, on a bus", 0, ""}};
 
@@ -155,11 +155,11 @@ BitRanges bits_in(const Options& values, Frame, Frame, const FieldInfo& field) {
   if (&field != fields.of<&Values::singleturn>()) return {};
   return author::big_endian_bits(2, format.data_bytes(), format.bits);
 }
-// "T1: baud rate": not stated, must be given.
+// Document: "T1: baud rate". It states no value, so the user must give one.
 constexpr LineSettings line_of(const Format&) { return {.rate = 0}; }
 constexpr Resolution resolution_of(const Format& format) { return {format.bits, 0}; }
 constexpr Result<Request> guess_request(const Format&, Bytes) { return Request{Request::Kind::trigger}; }
-// A pulse is no byte either.
+// Returns whether frames come without a request. A pulse has no bytes, so its frames count as unsolicited too.
 bool is_streaming(const Options& values) { return options.format(values).mode != Mode::bus; }
 bool is_answered(const Options&, Frame request) {
   const Result<Request> asked = decode_request(request.bytes);
@@ -174,7 +174,7 @@ constexpr author::Declaration<Protocol, VirtualEncoder> declaration{
     .id = "raa38",
     .name = "RAA38S6, RS-485, RS-232 or RS-422",
     .document = "Absolute Encoder Operation Manual, RAA38S6 series",
-    .link = LinkKind::half_duplex,  // of three kinds of line the one that allows least
+    .link = LinkKind::half_duplex,  // the most restrictive of the three kinds of line
     .options = options.infos,
     .format = author::format_of<options>,
     .models = models,
