@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Characters to runs: pauses, the beginning and the end of the capture, and which channel is whose.
+// Splits characters into runs: handles pauses, the beginning and the end of the capture, and finds which channel
+// carries requests.
 #include "absenc/capture/annotate/annotate.hpp"
 
 #include <algorithm>
@@ -9,7 +10,7 @@ namespace absenc::capture {
 
 namespace {
 
-// Characters from which it is decided who sends what.
+// number of characters after which the requests' channel is decided
 constexpr std::size_t enough_characters = 2000;
 
 struct Score final : AnnotationSink {
@@ -73,7 +74,7 @@ void Annotator::hold(const Character& character) {
   if (held_.size() == enough_characters) find_roles();
 }
 
-// Both ways are tried on what came so far; that which explains more of it is right.
+// Tries both assignments of the channels on the characters so far, and takes the one that explains more of them.
 void Annotator::find_roles() {
   constexpr std::array<std::array<Carries, 2>, 2> ways{
       {{Carries::requests, Carries::replies}, {Carries::replies, Carries::requests}}};

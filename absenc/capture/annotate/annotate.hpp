@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Finds the frames of a protocol among the characters of a line, pairs requests with their replies and decodes them, by
-// the functions of the unit that decode them live.
+// Finds the frames of a protocol among the characters of a line, pairs requests with their replies and decodes them,
+// with the same functions of the unit as live readings.
 #pragma once
 
 #include <array>
@@ -16,27 +16,29 @@
 
 namespace absenc::capture {
 
-/// What a channel carries.
+/// Kind of frames that a channel carries.
 enum class Carries : std::uint8_t {
   both,
   requests,
   replies,
-  one,  // of two channels, one carries requests and one replies: found by what is on them
+  one,  // unknown: of two channels, one carries requests and the other replies; detected from their content
 };
 
-/// The times of the unit's line in a capture. 0 ticks a bit: the characters have no lengths, and what is a tick apart
-/// belongs to different frames. 0 ticks a second: the line has the unit's own rate.
+/// Returns the times of the unit's line in ticks of a capture. `ticks_per_bit` 0: the characters have no lengths, and
+/// characters more than a tick apart belong to different frames. `ticks_per_second` 0: the line has the unit's own
+/// rate.
 [[nodiscard]] LineTicks line_ticks(const Unit& unit, double ticks_per_bit, std::uint64_t ticks_per_second);
 
-/// Characters in, exchanges out. Memory is fixed.
+/// Converts characters to annotated exchanges. Memory is fixed.
 ///
-/// Where the line pauses, a frame ends. The first characters of a capture, up to the first pause, may be the end of a
-/// frame or not even characters: they are told as cut. On a line that never pauses, what is believed to be a frame has
-/// a good one next to it: a weak checksum finds frames everywhere. On a line of both directions a frame is a request or
-/// a reply by what was said before, never by its bytes alone: some replies equal their requests.
+/// A pause on the line ends a frame. The first characters of a capture, up to the first pause, may be the end of a
+/// frame or no characters at all: they are reported as cut. On a line that never pauses, a frame is accepted only if
+/// another good frame follows, because a weak checksum finds frames everywhere. On a line with both directions a frame
+/// is classified as request or reply by the frames before it, never by its bytes alone: some replies equal their
+/// requests.
 ///
-/// Where times are those of arrival (`by_arrival`), a pause may lie within a frame and none between two. Then frames
-/// are told apart by length and content alone, and pauses only judge bytes that are no good frame: see
+/// With arrival times (`by_arrival`) a pause may lie within a frame and be missing between two. Frames are then
+/// separated by length and content alone, and pauses only help to judge bytes that are no good frame: see
 /// annotate_arrival.cpp.
 class Annotator {
  public:
@@ -44,49 +46,50 @@ class Annotator {
     std::array<Carries, 2> channels{Carries::both, Carries::replies};
     std::size_t channel_count = 1;
     LineTicks ticks{};
-    Tick begin = 0;              // of the capture
-    bool begins_silent = false;  // nothing was on the line before it
-    bool by_arrival = false;     // characters have the time at which a program received them; of one channel only
-    Tick gap = 1;                // by arrival: a pause that the way from line to program does not make by itself
+    Tick begin = 0;              // first tick of the capture
+    bool begins_silent = false;  // the line was silent before the capture
+    bool by_arrival = false;     // characters have the time of their arrival at a program; only for one channel
+    Tick gap = 1;  // by_arrival: shortest pause that must come from the line, because transport to the program does not
+                   // cause it
   };
 
-  /// `unit` and `sink` must outlive it.
+  /// `unit` and `sink` must outlive the annotator.
   Annotator(const Unit& unit, const Options& options, const Settings& settings, AnnotationSink& sink);
   Annotator(const Annotator&) = delete;
   Annotator& operator=(const Annotator&) = delete;
 
-  /// In the order of their beginnings.
+  /// Adds a character; characters must be in the order of their begin times.
   void put(const Character& character);
-  /// The capture ends here.
+  /// Ends the capture at `end`.
   void finish(Tick end);
-  /// By arrival: hands out what is whole and good so far, without waiting for what follows.
+  /// by_arrival: reports all complete good frames so far, without waiting for further characters.
   void hand_out();
-  /// By arrival: nothing has come for so long that no frame goes on, and no reply comes any more.
+  /// by_arrival: the line was silent for so long that no frame continues and no reply can follow.
   void fall_silent();
-  /// What each channel carries; `one` while it is not known.
+  /// Returns what a channel carries; `one` while it is not known.
   [[nodiscard]] Carries carries(std::size_t channel) const { return channels_[channel].carries; }
 
  private:
   struct Channel {
     Carries carries = Carries::both;
     Run run;
-    bool synchronised = false;    // there was a pause
-    bool in_step = false;         // a frame is known to begin where the run, or what is left of it, begins
-    std::size_t last_size = 0;    // of the last good frame in this run that nobody asked for; 0: none
-    std::size_t stream_size = 0;  // the same, in any run
+    bool synchronised = false;    // a pause was found, so the beginnings of frames are known
+    bool in_step = false;         // a frame is known to begin at the first character of the run
+    std::size_t last_size = 0;    // size of the last good unsolicited frame in this run; 0: none
+    std::size_t stream_size = 0;  // size of the last good unsolicited frame in any run
   };
 
-  // Who sends what, when nobody said.
+  // Detection of the channels' directions.
   void hold(const Character& character);
   void find_roles();
 
-  // Runs.
+  // Splitting into runs.
   void take(const Character& character);
   [[nodiscard]] Tick pause_of(const Channel& channel) const;
   void close(Channel& channel, bool cut);
   void parse(Channel& channel, bool whole, bool cut);
 
-  // Frames of the run from `at_` on; each returns how many characters it took, 0: none.
+  // Parsing of the run from `at_` on. Each function returns the number of characters that it consumed, 0 for none.
   std::size_t next_frame();
   std::size_t whole_frame();
   std::size_t answer_here();
@@ -116,18 +119,18 @@ class Annotator {
   Exchanges exchanges_;
   Options options_;
   std::array<Channel, 2> channels_{};
-  std::array<std::size_t, 256> reply_sizes_{};  // of the last good reply to a request with this first byte
-  std::vector<Character> held_;                 // until it is known who sends what
+  std::array<std::size_t, 256> reply_sizes_{};  // size of the last good reply, indexed by the first byte of its request
+  std::vector<Character> held_;                 // characters stored until the channels' directions are known
 
-  bool is_first_ = true;  // what belongs to the first frame may lie before the capture
+  bool is_first_ = true;  // the rest of the first frame may lie before the capture
 
-  // While a run is parsed.
+  // State while a run is parsed.
   Channel* channel_ = nullptr;
   std::size_t at_ = 0;
-  bool whole_ = true;  // nothing will be added to the run
-  bool cut_ = false;   // the capture ends with it
+  bool whole_ = true;  // no characters will be added to the run
+  bool cut_ = false;   // the capture ends with this run
   std::size_t last_reply_at_ = 0;
-  std::size_t last_reply_size_ = 0;  // of the reply that ended at `at_`; 0: none did
+  std::size_t last_reply_size_ = 0;  // size of the reply that ended at `at_`; 0: no reply ended there
 };
 
 }  // namespace absenc::capture

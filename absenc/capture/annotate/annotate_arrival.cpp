@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// Characters with the time at which a program received them. Adapters, the kernel and other programs hand on several
-// frames at once, and parts of one with pauses between them. So a good frame is one by its length and content; where
-// bytes are none, what follows decides, or a silence that no frame has in it, and then a pause is where they are cut.
+// Parsing of characters with arrival times at a program. Adapters, the kernel and other programs pass on several frames
+// at once, and parts of one frame with pauses between them. So a good frame is found by its length and content. For
+// other bytes the following characters decide, or a silence that cannot occur within a frame; they are then cut at
+// pauses.
 #include <algorithm>
 
 #include "absenc/capture/annotate/annotate.hpp"
@@ -26,13 +27,14 @@ bool Annotator::has_gap(std::size_t before) const {
   return before == 0 || (before < run.size() && run.begin(before) - run.begin(before - 1) >= settings_.gap);
 }
 
-// Whether pauses are on both sides of these bytes at `at_`.
+// Returns whether pauses are on both sides of the `size` bytes at `at_`.
 bool Annotator::stands_alone(std::size_t size) const {
   const bool is_end = whole_ && size == rest(at_).size();
   return has_gap(at_) && (is_end || has_gap(at_ + size));
 }
 
-// The frame at `at_` that is whole and good whatever follows, or 0: the next characters may be part of it.
+// Returns the size of the frame at `at_` if it is complete and good whatever follows, or 0: the next characters may
+// belong to it.
 std::size_t Annotator::whole_frame() {
   if (!channel_->in_step) return 0;
   const auto answered = [&](std::size_t size) {
@@ -40,7 +42,7 @@ std::size_t Annotator::whole_frame() {
     return reply_at(request, at_ + size, reply_sizes_[request[0]]) != 0;
   };
   const std::size_t size = request_at(at_);
-  // The host has given a request up and asks once more, and again.
+  // The host had a timeout and repeats its request.
   const auto repeats = [&] {
     if (size == 0 || !stands_alone(size) || rest(at_ + size).size() < size) return false;
     const Bytes behind = rest(at_ + size);

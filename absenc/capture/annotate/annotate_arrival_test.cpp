@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Characters as programs receive them: frames in parts and several at once, from anywhere on, damaged, unanswered.
+// Tests characters with arrival times: frames in parts and several at once, beginning anywhere, damaged, without
+// replies.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -43,7 +44,7 @@ struct Finder final : AnnotationSink {
   std::vector<Found> found;
 };
 
-/// A request with its reply; a request that no encoder answers has none.
+/// A request with its reply; `reply` is empty if the encoder sent none.
 struct Spoken {
   Wire request;
   Wire reply;
@@ -57,7 +58,7 @@ std::string hex(const Wire& wire) {
   return text;
 }
 
-// The first difference: hundreds of exchanges would be printed else.
+// Returns the first difference only: the whole lists have hundreds of exchanges.
 std::string difference(const std::vector<Spoken>& found, const std::vector<Spoken>& spoken) {
   const auto text = [](const std::vector<Spoken>& all, std::size_t i) {
     return i < all.size() ? hex(all[i].request) + " > " + hex(all[i].reply) : std::string("nothing");
@@ -81,7 +82,8 @@ class Arrival : public ::testing::TestWithParam<const Unit*> {
     annotator = std::make_unique<Annotator>(unit, options, settings, finder);
   }
 
-  // All that host and encoder say in exchanges of a request and one reply; none where the encoder sends by itself.
+  // Returns exchanges of one request and one reply between host and encoder; none if the encoder only sends unsolicited
+  // frames.
   std::vector<Spoken> talk(std::size_t count, std::uint64_t seed) {
     Talker talker(unit, options, {}, seed);
     std::vector<Spoken> spoken;
@@ -169,7 +171,7 @@ TEST_P(Arrival, AnExchangeIsHandedOutWhenItIsWhole) {
     late += good().size() <= i ? 1u : 0u;
   }
   EXPECT_EQ(difference(good(), spoken), "");
-  EXPECT_LE(late, spoken.size() / 20);  // the first of a length that differs from that before
+  EXPECT_LE(late, spoken.size() / 20);  // an exchange is late if its length differs from that of the previous one
 }
 
 TEST_P(Arrival, FromTheMiddleOfAnExchange) {
@@ -185,7 +187,7 @@ TEST_P(Arrival, FromTheMiddleOfAnExchange) {
     annotator->fall_silent();
     const std::vector<Spoken> found = good();
     ASSERT_GE(found.size() + 3, spoken.size()) << from << " " << hex(finder.found[0].reply) << " " << hex(all);
-    // None that was not said, and the last ones in their order.
+    // Each exchange found was really sent, and the last ones are in their order.
     for (std::size_t i = 1; i <= found.size(); ++i) {
       ASSERT_EQ(found[found.size() - i], spoken[spoken.size() - i]) << from;
     }
@@ -195,7 +197,7 @@ TEST_P(Arrival, FromTheMiddleOfAnExchange) {
   }
 }
 
-// On a line of one pair, as a tap receives it.
+// A line with one pair of wires, as a tap receives it.
 TEST_P(Arrival, ADamagedReplyCostsNoOtherExchange) {
   if (unit.link != LinkKind::half_duplex) return;
   const std::vector<Spoken> spoken = talk(400, 5);
@@ -244,7 +246,7 @@ TEST_P(Arrival, RequestsThatNobodyAnswers) {
     EXPECT_EQ(finder.found[i].request, spoken[0].request);
     EXPECT_EQ(finder.found[i].remark, Remark::unanswered);
   }
-  // And the encoder is there again.
+  // The encoder answers again.
   for (const Spoken& one : spoken) {
     receive(one.request);
     receive(one.reply);

@@ -8,8 +8,9 @@ namespace absenc::capture {
 
 // ---- Bursts
 
-// Without the clocks that show the idle line before the first bit, and the edge with which a clock that was held low
-// rises again; with the bit that stood on the line behind the last clock, if it is wanted.
+// Returns the word in a burst without the clocks that show the idle line before the first bit, and without the edge
+// with which a clock that was held low rises again. With `with_last` it includes the bit on the line behind the last
+// clock.
 Frame BurstAnnotator::word_of(const Burst& burst, bool with_last) {
   const bool rises = burst.low_before && judge_.unit().control_bit != nullptr;
   const std::size_t idle = judge_.unit().line.idle_clocks + (rises ? 1u : 0u);
@@ -42,8 +43,8 @@ void BurstAnnotator::put(const Burst& burst) {
   sink_.put(annotation);
 }
 
-// Decodes a word; what is decoded goes to `word`, without the encoder's bit of control communication, which is
-// returned.
+// Decodes a word; the decoded bits are returned in `word`, without the encoder's control communication bit, which is
+// returned in `answered`.
 Error BurstAnnotator::decode_as(const Burst& burst, bool with_last, Frame& word, bool& answered) {
   word = word_of(burst, with_last);
   const std::optional<std::size_t> place = judge_.control_bit(word);
@@ -59,7 +60,7 @@ Error BurstAnnotator::decode_as(const Burst& burst, bool with_last, Frame& word,
 void BurstAnnotator::decode_word(const Burst& burst, Annotation& annotation) {
   bool answered = false;
   annotation.error = decode_as(burst, false, annotation.reply, answered);
-  // A host that gives a clock for each bit and no more takes the last bit behind it.
+  // A host that gives only one clock per bit takes the last bit behind the last clock.
   if (annotation.error != Error::none && burst.has_last && !burst.cut) {
     const bool good = decode_as(burst, true, annotation.reply, answered) == Error::none;
     annotation.error = good ? Error::none : decode_as(burst, false, annotation.reply, answered);
@@ -111,7 +112,7 @@ bool ControlFrames::settle(bool fell) {
   return !open_;
 }
 
-// A host that lost a word, and with it a bit, does not take what came with it.
+// If a word was lost, a bit of the control frame is missing, so the host discards the control frame.
 Annotation ControlFrames::annotation(Judge& judge) const {
   Annotation annotation{.kind = Annotation::Kind::exchange,
                         .error = error_,
@@ -166,7 +167,7 @@ void CanAnnotator::finish(Tick end) {
   while (waiting_ != 0) give_up(0, end > asked_[0].at + ticks_.limit ? Remark::unanswered : Remark::cut);
 }
 
-// Which of the waiting requests this frame answers: the oldest that takes it.
+// Pairs the frame with the oldest outstanding request that it answers. Returns false if there is none.
 bool CanAnnotator::answers(const CanRecord& record) {
   const Frame reply{.bytes = record.frame.bytes(), .can = &record.frame};
   for (std::size_t i = 0; i < waiting_; ++i) {
@@ -178,7 +179,7 @@ bool CanAnnotator::answers(const CanRecord& record) {
   return false;
 }
 
-// The same of a frame that is no good reply to anything: the newest that it would answer if it were.
+// Pairs a bad frame with the newest request that it would answer if it were good. Returns false if there is none.
 bool CanAnnotator::answers_badly(const CanRecord& record) {
   const Frame reply{.bytes = record.frame.bytes(), .can = &record.frame};
   for (std::size_t i = waiting_; i-- > 0;) {
@@ -190,7 +191,8 @@ bool CanAnnotator::answers_badly(const CanRecord& record) {
   return false;
 }
 
-// Who asks the same encoder again has given the reply before up: what comes now answers the new request.
+// A host that repeats a request to the same encoder no longer expects the earlier reply: the next reply answers the new
+// request.
 void CanAnnotator::end_waits(const CanFrame& request) {
   for (std::size_t i = 0; i < waiting_;) {
     const CanFrame& asked = asked_[i].frame;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The annotators of links whose frames need not be found: SPI exchanges and clocked words, and CAN frames.
+// Annotators for links whose frame boundaries are known: SPI exchanges and clocked words, and CAN frames.
 #pragma once
 
 #include <array>
@@ -15,22 +15,22 @@
 
 namespace absenc::capture {
 
-/// Control frames of clocked links: the bits that the host says with the level of its clock in each pause, and those of
-/// the encoder in the next word. They begin with a 1 behind so many zeros, and end with so many.
+/// Collects control frames of clocked links: the host's bits are the level of its clock in each pause, the encoder's
+/// bits are in the following words. A control frame begins with a 1 behind `zeros` zeros, and ends with `zeros` zeros.
 class ControlFrames {
  public:
   static constexpr unsigned zeros = 14;
 
-  /// Whether the encoder's bit may be 1: something is asked for.
+  /// Returns whether the encoder's bit may be 1, because a control frame is in progress.
   [[nodiscard]] bool may_answer() const { return open_; }
-  /// The next word, and what was wrong with it. `settle` comes before the next.
+  /// Adds the next word with the encoder's bit and the word's error. Call `settle` before the next word.
   void put(const Burst& burst, bool answered, Error error);
-  /// The next word comes, or the end; whether the clock fell before it. True: the word that was put is the last of a
-  /// control frame.
+  /// Completes the last added word at the beginning of the next word or at the end; `fell` is whether the clock fell
+  /// between the two. Returns true if that word is the last of a control frame.
   bool settle(bool fell);
-  /// The capture ends. True: a control frame goes on.
+  /// Ends the capture. Returns true if a control frame is incomplete.
   bool finish() { return std::exchange(open_, false); }
-  /// The one that has ended, decoded; valid until the next word, and until `judge` decodes the next.
+  /// Returns the completed control frame, decoded; valid until the next word and until `judge` decodes again.
   [[nodiscard]] Annotation annotation(Judge& judge) const;
 
  private:
@@ -41,7 +41,7 @@ class ControlFrames {
     [[nodiscard]] Frame frame() const { return {.bytes = bytes, .bits = size}; }
   };
 
-  // A word whose rest is not over.
+  // A word whose following rest has not ended.
   struct Pending {
     Tick begin;
     Tick end;
@@ -60,14 +60,14 @@ class ControlFrames {
   bool open_ = false;
 };
 
-/// SPI exchanges, each a request and its reply, and clocked words, which nobody asks for.
+/// Annotates SPI exchanges, each with request and reply, and clocked words, which have no request.
 class BurstAnnotator {
  public:
-  /// `unit` and `sink` must outlive it.
+  /// `unit` and `sink` must outlive the annotator.
   BurstAnnotator(const Unit& unit, const Options& options, AnnotationSink& sink) : judge_(unit, options), sink_(sink) {}
 
   void put(const Burst& burst);
-  /// The capture ends here, and with it a control frame that goes on.
+  /// Ends the capture, and with it an incomplete control frame.
   void finish();
 
  private:
@@ -78,19 +78,19 @@ class BurstAnnotator {
 
   Judge judge_;
   AnnotationSink& sink_;
-  std::vector<std::uint8_t> shifted_;   // without the clocks that show the idle line
-  std::vector<std::uint8_t> silenced_;  // without the encoder's bit of control communication
+  std::vector<std::uint8_t> shifted_;   // the word without the clocks that show the idle line
+  std::vector<std::uint8_t> silenced_;  // the word without the encoder's control communication bit
   ControlFrames control_;
 };
 
-/// CAN frames of any number of nodes, who answer in any order or speak unsolicited.
+/// Annotates CAN frames of any number of nodes, which answer in any order or send unsolicited frames.
 class CanAnnotator {
  public:
   CanAnnotator(const Unit& unit, const Options& options, const LineTicks& ticks, AnnotationSink& sink)
       : judge_(unit, options), ticks_(ticks), sink_(sink) {}
 
   void put(const CanRecord& record);
-  /// The capture ends here.
+  /// Ends the capture at `end`.
   void finish(Tick end);
 
  private:

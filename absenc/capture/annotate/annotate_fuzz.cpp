@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Any bytes with any pauses as the characters of any line: each belongs to exactly one annotation, and what is called
-// good is.
+// Feeds any bytes with any pauses as characters of any line: each must belong to exactly one annotation, and a frame
+// annotated as good must be good.
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -29,7 +29,7 @@ struct Check final : AnnotationSink {
     require(annotation.contents.reading == nullptr || annotation.error == Error::none);
     const bool is_echo = annotation.remark == Remark::echo;
     bytes += annotation.request.bytes.size() * (is_echo ? 2 : 1) + annotation.reply.bytes.size();
-    // A late reply may have an echo before it: one remark is shown.
+    // A late reply may have an echo before it, but an annotation has only one remark.
     if (annotation.remark == Remark::late) hidden += annotation.request.bytes.size();
     if (annotation.error != Error::none || annotation.remark == Remark::cut) return;
     if (annotation.remark == Remark::undocumented) return;
@@ -39,7 +39,7 @@ struct Check final : AnnotationSink {
   const Unit& unit;
   const Options& options;
   std::size_t bytes = 0;
-  std::size_t hidden = 0;  // so many more at the most
+  std::size_t hidden = 0;  // upper limit of the bytes missing in annotations
 };
 
 void annotate(const Unit& unit, const Options& options, Annotator::Settings settings, Bytes data, bool pauses,
@@ -64,7 +64,7 @@ void annotate(const Unit& unit, const Options& options, Annotator::Settings sett
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   if (size == 0) return 0;
   const Bytes bytes(data, size);
-  std::size_t turn = size + data[0];  // each input meets each kind of line, of one unit or another
+  std::size_t turn = size + data[0];  // varies the kind of line and the unit for each input
   for (const Unit* unit : all_units()) {
     if (unit->link != LinkKind::half_duplex && unit->link != LinkKind::full_duplex) continue;
     Options options;
@@ -80,7 +80,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
       settings.channel_count = 2;
     }
     annotate(*unit, options, settings, bytes, true, 1);
-    // Seldom, because it takes long: a line that never pauses.
+    // A line that never pauses; tested for few inputs, because it takes long.
     if (carries == Carries::both && size % 16 == 5) {
       annotate(*unit, options, settings, bytes, false, 1 + 2 * Run::capacity / size);
     }

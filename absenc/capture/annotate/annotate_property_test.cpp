@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Thousands of random exchanges of every unit with faults, as they would be captured: the annotator, which is told
-// neither who speaks nor where a frame begins, finds each with its error, exactly where it was.
+// Captures thousands of random exchanges of every unit with faults. The annotator, which knows neither the sender nor
+// the frame boundaries, must find each exchange with its error and exact times.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -24,7 +24,7 @@ using testing::Talker;
 using Kind = Annotation::Kind;
 using Wire = std::vector<std::uint8_t>;
 
-/// An annotation that owns what it has.
+/// An annotation that owns its data.
 struct Kept {
   Kind kind;
   Remark remark;
@@ -64,7 +64,7 @@ std::string to_text(const Kept& one) {
          (one.turnaround ? " after " + std::to_string(*one.turnaround) : "");
 }
 
-// ---- What should be found, from who said what
+// ---- Expected annotations, computed from the transmissions of each side
 
 class Truth {
  public:
@@ -124,7 +124,7 @@ class Truth {
 
  private:
   ControlFrames control_;
-  std::size_t stream_size_ = 0;  // of the last good frame that nobody asked for
+  std::size_t stream_size_ = 0;  // size of the last good unsolicited frame
   std::optional<Reading> reading(Error error) {
     return error == Error::none && judge_.contents().reading != nullptr ? std::optional(*judge_.contents().reading)
                                                                         : std::nullopt;
@@ -160,7 +160,7 @@ class Truth {
     add(Kind::reply, Remark::none, error, said, reading(error));
   }
 
-  // The frame behind a disturbance is as good as any: a host that listens takes it.
+  // The frame behind a disturbance is valid: a listening host accepts it.
   void add_disturbed(const Said& said, Wire::const_iterator middle, const Wire& last) {
     const Wire before(said.bytes.begin(), middle);
     const Tick each = (said.end - said.begin) / said.bytes.size();
@@ -199,7 +199,7 @@ class Truth {
       one.remark = Remark::undocumented;
     }
     one.reading = reading(one.error);
-    // Nobody can tell whether this is the reply or the request again.
+    // The reply equals its request, so this may be a late reply or the repeated request.
     if (one.error == Error::none && *one.turnaround > static_cast<Tick>(limit_.count()) && one.request == one.reply) {
       add(Kind::request, Remark::unanswered, Error::timeout, asked, {});
       return add(Kind::request, Remark::unanswered, Error::timeout, said, {});
@@ -220,10 +220,10 @@ class Truth {
   Time limit_;
 };
 
-// ---- The comparison
+// ---- Comparison of found and expected annotations
 
-// Every good exchange as it was, and an error wherever one was. What several faults have made may look like something
-// else than it was: of the bad ones, `share` must be found as they were.
+// Requires every good exchange as expected, and an error at each expected error. Several faults together may look like
+// another error, so only a `share` of the bad ones must match exactly.
 void expect_same(const std::vector<Kept>& found, const std::vector<Kept>& expected, double share = 1) {
   std::size_t next = 0;
   std::size_t bad = 0;
@@ -246,7 +246,8 @@ void expect_same(const std::vector<Kept>& found, const std::vector<Kept>& expect
     if (share == 1) ADD_FAILURE() << context << "\nfound " << to_text(found[next]);
     const std::size_t first = next;
     bool has_error = false;
-    // A host may ask again while a doubled reply is still coming: what is found as it was is not part of this one.
+    // A host may repeat its request during a doubled reply: an annotation that matches the next expected one is not
+    // part of this one.
     const std::string following = i + 1 < expected.size() ? to_text(expected[i + 1]) : "";
     for (; next < found.size() && found[next].begin >= one.begin && found[next].end <= one.end; ++next) {
       if (to_text(found[next]) == following) break;
@@ -271,7 +272,7 @@ sim::FaultRates faults_of(const Unit& unit, const Options& options) {
   sim::FaultRates rates = sim::testing::damaged_replies(0.05);
   rates[sim::FaultKind::request_corrupt] = 0.005;
   rates.delay = unit.timing.turnaround_limit * 3 / 2;
-  // Two frames of a stream are two, however they follow each other.
+  // Two frames of a stream look the same as one frame sent twice.
   if (unit.streams != nullptr && unit.streams(options)) {
     rates[sim::FaultKind::repeat] = rates[sim::FaultKind::delay] = 0;
   }
@@ -300,7 +301,7 @@ class Characters : public ::testing::TestWithParam<const Unit*> {
   const Unit& unit = *GetParam();
   Options options = testing::options_of(unit);
 
-  /// Talks until there are so many exchanges; what a collision has made unreadable is left out.
+  /// Runs commands until `exchanges` exchanges are recorded; those with collisions are left out.
   void talk(const sim::FaultRates& rates, std::size_t exchanges, std::uint64_t seed) {
     Talker talker(unit, options, rates, seed);
     while (truth.expected.size() < exchanges) {
@@ -332,7 +333,8 @@ TEST_P(Characters, EveryExchangeWithoutFaults) {
   expect_same(annotate(settings_of(unit)), truth.expected);
 }
 
-// Whether one reply of noise in 64 or more passes the check: then what is damaged cannot be told from what is good.
+// Returns whether random replies pass the check with a probability of 1/64 or more: damaged replies then cannot be told
+// from good ones.
 bool has_weak_check(const Unit& unit, const Options& options) {
   NoFields nowhere;
   sim::Random random(1);
@@ -358,7 +360,7 @@ TEST_P(Characters, EveryErrorWhereItWas) {
   EXPECT_GT(errors[Error::none], 2000);
 }
 
-// The same when the adapter's own wire, or only one of two, was recorded.
+// A recording of the adapter's transmit wire only, or of only one of two pairs.
 TEST_P(Characters, OnlyWhatTheEncoderSays) {
   talk({}, 500, 3);
   if (unit.link != LinkKind::full_duplex) return;
@@ -374,7 +376,7 @@ TEST_P(Characters, OnlyWhatTheEncoderSays) {
   EXPECT_GE(positions, expected);
 }
 
-// A wrong stop bit makes an exchange bad, and nothing else.
+// A wrong stop bit makes its exchange bad and affects no other.
 TEST_P(Characters, DamagedCharacters) {
   if (has_weak_check(unit, options)) GTEST_SKIP() << "its check is too weak";
   talk({}, 1000, 4);
@@ -397,7 +399,7 @@ TEST_P(Characters, DamagedCharacters) {
   expect_same(annotate(settings_of(unit)), expected);
 }
 
-// Wherever a capture begins, no frame is found that was not there, and soon all are.
+// Wherever a capture begins, no false frame is found, and soon all frames are.
 TEST_P(Characters, BeginsAnywhere) {
   talk({}, 300, 5);
   const std::vector<Character> all = characters;
@@ -427,7 +429,7 @@ TEST_P(Characters, BeginsAnywhere) {
 
 INSTANTIATE_TEST_SUITE_P(Units, Characters, ::testing::ValuesIn(units_with(true)), name_of);
 
-// ---- Links that clock
+// ---- SPI and clocked links
 
 class Bursts : public ::testing::TestWithParam<const Unit*> {};
 

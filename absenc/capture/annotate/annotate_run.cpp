@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Runs to frames: what of a run is a request, what a reply, and how far what is neither goes.
+// Splits runs into frames: finds requests, replies, and the extent of bytes that are neither.
 #include <algorithm>
 
 #include "absenc/capture/annotate/annotate.hpp"
@@ -8,20 +8,20 @@ namespace absenc::capture {
 
 namespace {
 
-// So many characters must lie ahead on a line that does not pause: two of the longest frames.
+// Number of characters that must follow on a line that does not pause: two of the longest frames.
 constexpr std::size_t lookahead = 160;
 
 }  // namespace
 
-// ---- Looking, without taking
+// ---- Checks, which consume nothing
 
 Piece Annotator::piece(std::size_t size) const {
   const Run& run = channel_->run;
   return {rest(at_).first(size), run.begin(at_), run.end(at_ + size - 1)};
 }
 
-// The size of a good reply, or 0. The pause is the best of all ends, then the size of those before (0: not known):
-// where only a checksum tells the size, a shorter one may be an accident.
+// Returns the size of a good reply, or 0. The end at a pause is preferred, then the usual size (0: not known): where
+// only a checksum gives the size, a shorter match may be an accident.
 std::size_t Annotator::reply_at(Bytes request, std::size_t from, std::size_t usual) {
   const Bytes bytes = rest(from);
   const auto is_good = [&](std::size_t size) {
@@ -31,7 +31,7 @@ std::size_t Annotator::reply_at(Bytes request, std::size_t from, std::size_t usu
   if (bytes.empty()) return 0;
   if (whole_ && bytes.size() <= lookahead && is_good(bytes.size())) return bytes.size();
   if (usual != 0 && usual <= bytes.size() && is_good(usual)) return usual;
-  // The rest of it may still come.
+  // The rest of the reply may still arrive.
   if (settings_.by_arrival && !whole_ && usual > bytes.size()) return 0;
   const std::size_t size = judge_.frame_size(Direction::reply, bytes);
   return size != 0 && size <= bytes.size() && is_good(size) ? size : 0;
@@ -44,7 +44,7 @@ std::size_t Annotator::request_at(std::size_t from) {
   return size != 0 && channel_->run.clean(from, size) ? size : 0;
 }
 
-// Whether good frames stand there that belong behind each other: three, or two at the end of the run. One alone, or two
+// Returns whether plausible consecutive good frames begin there: three, or two at the end of the run. One frame, or two
 // with weak checksums, may be an accident.
 bool Annotator::good_from(std::size_t from) {
   const std::size_t end = channel_->run.size();
@@ -67,13 +67,13 @@ bool Annotator::good_from(std::size_t from) {
   return second != 0 && (is_end(third) || reply_at({}, third) != 0);
 }
 
-// Whether another may begin to speak there: it takes him some of the time that the document gives him.
+// Returns whether another sender may begin there: it needs a part of the turnaround time in the document.
 bool Annotator::may_turn(std::size_t at) const {
   const Run& run = channel_->run;
   return at < run.size() && run.begin(at) - std::min(run.begin(at), run.end(at - 1)) >= settings_.ticks.turnaround / 4;
 }
 
-// ---- Taking
+// ---- Parsing, which consumes characters
 
 std::size_t Annotator::next_frame() {
   if (!whole_ && channel_->run.size() - at_ <= lookahead) return settings_.by_arrival ? whole_frame() : 0;
@@ -91,7 +91,7 @@ std::size_t Annotator::next_frame() {
   return taken != 0 ? taken : bad_here();
 }
 
-// The newest request that was complete: whoever asks again has given the others up.
+// Returns the newest request that was complete: a host that sends another request no longer expects earlier replies.
 std::optional<std::size_t> Annotator::asked_before(Tick begin) const {
   const auto waiting = exchanges_.waiting();
   for (std::size_t i = waiting.size(); i-- > 0;) {
@@ -107,7 +107,7 @@ std::size_t Annotator::answer_here() {
   const Exchanges::Asked& asked = exchanges_.waiting()[*which];
   const bool overdue = exchanges_.overdue(asked, begin);
   if (asked.error != Error::none) {
-    // What was asked is not known, but an encoder answered it.
+    // The request is damaged, but an encoder answered it.
     const std::size_t size = overdue ? 0 : reply_at({}, at_);
     if (size != 0) exchanges_.answer(*which, piece(size), asked.error, asked.remark, {});
     return size;
@@ -116,27 +116,27 @@ std::size_t Annotator::answer_here() {
   const std::size_t size = reply_at(asked.bytes(), at_, usual);
   const bool leaves_rest = whole_ && size < rest(at_).size();
   if (size == 0 || leaves_rest) {
-    // What leaves a rest may be good by accident; the request again, with its reply behind it that leaves none, is not.
-    // Some replies are the same as their requests, and one may come twice.
+    // A reply that leaves a rest may match by accident; an echo of the request with a reply that leaves no rest is no
+    // accident. Some replies equal their requests, and a reply may be sent twice.
     const bool may_be_accident = size == 0 || size > asked.bytes().size();
-    // Later than an encoder answers, it is the host that asks again.
+    // Later than the turnaround limit, the host has repeated its request.
     const bool is_late = settings_.ticks.turnaround != 0 && begin > asked.end + 2 * settings_.ticks.turnaround;
-    // Between host and encoder there is no echo: the host asks again.
+    // Between host and encoder no echo occurs: equal bytes are a repeated request.
     const bool may_be_echo = !is_late && !settings_.by_arrival;
     const std::size_t echoed = may_be_accident && may_be_echo ? echoed_answer_size(asked.bytes(), at_) : 0;
     if (echoed != 0 && (size == 0 || echoed == rest(at_).size())) return echoed_answer_here(*which, echoed);
     if (size == 0) return 0;
   }
-  // Some replies are the same as their requests, which nobody answered and which now come again.
+  // Some replies equal their requests: overdue, these bytes are the repeated request.
   if (overdue && channel_->carries == Carries::both && request_at(at_) == size) return 0;
   if (leaves_rest && usual != 0 && size != usual && !goes_on(size)) return 0;
   last_reply_at_ = at_;
   last_reply_size_ = usual = size;
   if (settings_.by_arrival) {
     channel_->in_step = true;
-    channel_->last_size = 0;  // someone asks
+    channel_->last_size = 0;  // a request was sent
   }
-  // What was looked at meanwhile says something else.
+  // Lookahead has changed the judge's contents: decode this reply again.
   if (leaves_rest || overdue) {
     static_cast<void>(judge_.decode({.bytes = asked.bytes()}, {.bytes = rest(at_).first(size)}));
   }
@@ -144,7 +144,7 @@ std::size_t Annotator::answer_here() {
   return size;
 }
 
-// Whether behind a good reply there is something good: then it is no accident that it is shorter than others.
+// Returns whether a good frame follows the good reply: then its unusual size is no accident.
 bool Annotator::goes_on(std::size_t size) {
   const Bytes behind = rest(at_ + size);
   const Bytes reply = rest(at_).first(size);
@@ -152,7 +152,8 @@ bool Annotator::goes_on(std::size_t size) {
          (behind.size() >= size && std::equal(reply.begin(), reply.end(), behind.begin()));
 }
 
-// An adapter, or an encoder, sends the request back. The size of both, or 0.
+// Returns the size of an echo of the request together with the good reply behind it, or 0. Adapters and some encoders
+// send echoes.
 std::size_t Annotator::echoed_answer_size(Bytes request, std::size_t from) {
   const Bytes bytes = rest(from);
   if (bytes.size() <= request.size() || !std::equal(request.begin(), request.end(), bytes.begin())) return 0;
@@ -174,7 +175,7 @@ std::size_t Annotator::repeated_here() {
   const Bytes before = channel_->run.bytes().subspan(last_reply_at_, size);
   if (!std::equal(before.begin(), before.end(), rest(at_).begin())) return 0;
   if (judge_.streams()) return 0;
-  // Behind the reply to a request that is its own echo there may stand the same request again.
+  // A request that equals its own echo may follow directly behind its reply.
   if (channel_->carries == Carries::both && may_turn(at_ + size) && reply_at(rest(at_).first(size), at_ + size) != 0) {
     return 0;
   }
@@ -186,14 +187,15 @@ std::size_t Annotator::request_here() {
   const std::size_t size = request_at(at_);
   if (size == 0 || !is_request(size)) return 0;
   if (channel_->carries == Carries::both) exchanges_.give_up(exchanges_.waiting().size());
-  // Some replies are the same as their requests, and this one's may lie before the capture.
+  // Some replies equal their requests, and the request of this reply may lie before the capture.
   const bool may_be_reply = is_first_ && channel_->carries == Carries::both && reply_at({}, at_) == size;
   exchanges_.ask(piece(size), Error::none, may_be_reply ? Remark::cut : Remark::none, true);
   last_reply_size_ = 0;
   return size;
 }
 
-// Whether a good request of this size at `at_` is one. On a line of both directions it may also begin a reply.
+// Returns whether the good request of this size at `at_` is a request. On a line with both directions it may also be
+// the beginning of a reply.
 bool Annotator::is_request(std::size_t size) {
   const Channel& channel = *channel_;
   const bool is_rest = whole_ && size == rest(at_).size();
@@ -201,11 +203,11 @@ bool Annotator::is_request(std::size_t size) {
   if (is_rest) {
     const auto waiting = exchanges_.waiting();
     if (waiting.empty() || at_ != 0) return channel.in_step;
-    // No host asks again so soon: this is what is left of the reply.
+    // No host repeats a request so soon: this is the rest of the reply.
     const Tick silence = channel.run.begin(at_) - std::min(channel.run.begin(at_), waiting.back().end);
     return settings_.ticks.turnaround == 0 || silence > 2 * settings_.ticks.turnaround;
   }
-  // Behind an exchange the host speaks, whatever else the frame could be.
+  // After an exchange the host sends next, whatever else the frame could be.
   const bool is_turn_of_host = settings_.by_arrival && channel.in_step && channel.last_size == 0 &&
                                exchanges_.has_asked() && exchanges_.waiting().empty() && !judge_.streams();
   if (is_turn_of_host) return true;
@@ -224,7 +226,7 @@ bool Annotator::is_request(std::size_t size) {
 
 std::size_t Annotator::unsolicited_here() {
   const bool streams = judge_.streams();
-  // A good reply, but to something else.
+  // A good reply, but to another request.
   if (!streams && asked_before(channel_->run.begin(at_))) return 0;
   const std::size_t size = reply_at({}, at_, channel_->last_size);
   if (size == 0) return 0;
@@ -234,7 +236,7 @@ std::size_t Annotator::unsolicited_here() {
   channel_->last_size = channel_->stream_size = size;
   last_reply_size_ = 0;
   const bool good = streams || !exchanges_.has_asked();
-  static_cast<void>(judge_.decode({}, {.bytes = rest(at_).first(size)}));  // the look ahead has other contents
+  static_cast<void>(judge_.decode({}, {.bytes = rest(at_).first(size)}));  // lookahead has changed the judge's contents
   exchanges_.alone(Annotation::Kind::reply, piece(size), good ? Error::none : Error::unexpected_reply,
                    good ? Remark::none : Remark::unsolicited, good ? judge_.contents() : Contents{});
   return size;
@@ -244,24 +246,24 @@ std::size_t Annotator::bad_here() {
   const std::size_t size = bad_size();
   tell_bad(size);
   last_reply_size_ = 0;
-  channel_->in_step = true;  // what comes next was found to be good
+  channel_->in_step = true;  // the following bytes were found to be good
   if (!whole_ && !good_from(at_ + size)) channel_->in_step = false;
   return size;
 }
 
-// Up to where good frames go on; to the end of the run when they do not. What is left over is bad as a whole, unless a
-// frame of the usual size and something good behind it say otherwise: garbage before a good reply makes the exchange
-// bad, as it does live.
+// Returns the size of the bad bytes at `at_`: up to the next good frames, or to the end of the run. The rest of a run
+// is bad as a whole unless a frame of the usual size and a good frame behind it are found: garbage before a good reply
+// makes the exchange bad, like in live reading.
 std::size_t Annotator::bad_size() {
   const std::size_t left = rest(at_).size();
-  // In a stream the next frame stands where it would stand if this one were good.
+  // In a stream the next frame is one frame size ahead.
   const std::size_t period = channel_->last_size;
   if (channel_->in_step && period != 0 && period < left && reply_at({}, at_ + period) != 0) return period;
-  // A frame that nobody asked for may end with the run: the disturbance came before it.
+  // An unsolicited frame may end with the run: the disturbance is before it.
   const std::size_t last = channel_->stream_size;
   if (judge_.streams() && whole_ && last != 0 && last < left && reply_at({}, at_ + left - last) == last)
     return left - last;
-  // The next request may stand right behind it.
+  // The next request may follow directly.
   const auto ends_before_request = [&](std::size_t size) {
     return size != 0 && size < left && request_at(at_ + size) == left - size;
   };
@@ -272,7 +274,7 @@ std::size_t Annotator::bad_size() {
     const std::size_t size = judge_.frame_size(Direction::reply, rest(at_));
     if (ends_before_request(size)) return size;
   }
-  // Damaged, but of its length.
+  // The reply is damaged but has its usual length.
   if (const auto asked = asked_before(channel_->run.begin(at_)); settings_.by_arrival && asked) {
     const std::size_t usual = reply_sizes_[exchanges_.waiting()[*asked].storage[0]];
     for (const std::size_t size : {usual, judge_.frame_size(Direction::reply, rest(at_))}) {

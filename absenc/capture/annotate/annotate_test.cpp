@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What conversations do not show by themselves: lines that never pause, bytes without times, wires nobody named, CAN.
+// Tests cases that simulated conversations do not contain: lines that never pause, bytes without times, unnamed wires,
+// CAN.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -87,9 +88,9 @@ std::vector<const Unit*> units_of_characters() {
   return units;
 }
 
-constexpr Tick length = 100;  // of a character
+constexpr Tick length = 100;  // duration of a character
 
-// An encoder that sends position after position without a pause, seen from anywhere on.
+// An encoder that sends positions without a pause; the capture begins anywhere.
 TEST_P(OfUnit, ALineThatNeverPauses) {
   std::vector<Character> characters;
   std::vector<Tick> begins;
@@ -141,7 +142,7 @@ TEST_P(OfUnit, ALineThatNeverPauses) {
   }
 }
 
-// As a terminal program or a dump has them: one byte behind the other, both sides in one.
+// Bytes without times, as from a terminal program or a dump: both directions in one sequence.
 TEST_P(OfUnit, BytesWithoutTimes) {
   std::vector<Character> characters;
   std::vector<Said> said = talk(1200, 2);
@@ -198,7 +199,7 @@ TEST_P(OfUnit, WhichWireIsWhose) {
   }
 }
 
-// What a plug or a motor puts on the line between two exchanges is told, and harms neither of them.
+// Noise from a plug or a motor between two exchanges is reported and affects neither of them.
 TEST_P(OfUnit, NoiseBetweenExchanges) {
   const auto begins_nothing = [&](std::uint8_t byte) {
     for (const Direction direction : {Direction::request, Direction::reply}) {
@@ -262,8 +263,8 @@ TEST_P(OfUnit, NoiseBetweenExchanges) {
 
 INSTANTIATE_TEST_SUITE_P(Units, OfUnit, ::testing::ValuesIn(units_of_characters()), name_of);
 
-// ---- CAN: a toy whose node n is asked on 0x200 + n and answers, or speaks unsolicited, on 0x100 + n with the same
-// data
+// ---- CAN: a toy protocol. Node n gets requests on 0x200 + n, and sends replies with the same data and unsolicited
+// frames on 0x100 + n.
 
 Error decode_toy(const Options&, Frame request, Frame reply, FieldSink& sink) {
   if (reply.can == nullptr) return (request.can->id & 0x700) == 0x200 ? Error::none : Error::unexpected_reply;
@@ -298,7 +299,7 @@ TEST(Can, NodesAnswerInAnyOrder) {
   CanAnnotator annotator(unit, {}, {.limit = 1000}, finder);
   annotator.put(record(0, 0x201, 7));
   annotator.put(record(10, 0x202, 8));
-  annotator.put(record(20, 0x102, 9));  // not the answer: what node 2 says by itself
+  annotator.put(record(20, 0x102, 9));  // an unsolicited frame of node 2, not the reply
   annotator.put(record(30, 0x102, 8));
   annotator.put(record(40, 0x101, 7));
   annotator.put(record(50, 0x333, 0));
@@ -327,8 +328,8 @@ TEST(Can, NodesAnswerInAnyOrder) {
   EXPECT_EQ(finder.ids, (std::vector<std::uint32_t>{0x102, 0x202, 0x102, 0x201, 0x101, 0x333, 4, 0x203, 0x204}));
 }
 
-// A toy whose replies with bit 0 report its one alarm, and hold then; those without need an earlier one of the same
-// node.
+// A toy whose replies with bit 0 report its only alarm and are valid then; replies without it depend on an earlier one
+// of the same node.
 TEST(Remembering, CompletesAReadingByWhatTheSameEncoderReported) {
   static constexpr std::array<FieldInfo, 1> fields{
       {{.name = "node", .kind = FieldInfo::Kind::number, .unit = "", .meaning = "", .role = Role::encoder}}};
@@ -363,7 +364,8 @@ TEST(Remembering, CompletesAReadingByWhatTheSameEncoderReported) {
   EXPECT_TRUE(is_known_after(1, 0));
 }
 
-// An ID 3 reply with counter_overflow, resets of all errors, and an ID 0 reply, which does not carry that alarm.
+// The capture has an ID 3 reply with counter_overflow, resets of all errors, and an ID 0 reply, which does not carry
+// that alarm.
 TEST(Remembering, ForgetsAlarmsThatWereCleared) {
   const Unit& unit = *find_unit("tformat");
   const Options options = testing::options_of(unit);
@@ -397,7 +399,7 @@ TEST(Remembering, ForgetsAlarmsThatWereCleared) {
   EXPECT_EQ(cleared.alarms_reported & counter_overflow, 0u) << "not reported by any reply since";
 }
 
-// Who asks again has given the others up, and what answers badly has answered.
+// A new request ends the wait for earlier replies, and a bad reply also answers its request.
 TEST(Can, EachReplyBelongsToTheNewestRequest) {
   const Unit& unit = *find_unit("raa38-can");
   Options options;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What was said on a line: a request with its reply, or one of them alone, decoded by the protocol's unit.
+// An annotation: a request with its reply, or one of them alone, decoded by the protocol's unit.
 #pragma once
 
 #include <cstddef>
@@ -15,50 +15,50 @@
 
 namespace absenc::capture {
 
-/// What of an exchange its frames do not tell.
+/// Information about an exchange that its frames do not contain.
 enum class Remark : std::uint8_t {
   none,
-  unanswered,    // nothing came behind the request
-  unsolicited,   // nothing was asked before the reply
-  repeated,      // the reply came once more
-  echo,          // the request came back before the reply
-  late,          // the reply came after every host has given up
+  unanswered,    // no reply followed the request
+  unsolicited,   // the reply had no request
+  repeated,      // the previous reply was sent once more
+  echo,          // the request was received again before the reply
+  late,          // the reply arrived after the timeout of every host
   damaged,       // a character had a wrong parity or stop bit
-  undocumented,  // no document says what the reply to this request is
-  cut,           // by the beginning or the end of the capture
+  undocumented,  // no document states the reply to this request
+  cut,           // incomplete, because the capture begins or ends here
 };
 
-/// A sentence without its end; "" for none.
+/// Returns the remark as a clause without a full stop; "" for none.
 [[nodiscard]] std::string_view text_of(Remark remark);
 
-/// What a good frame says.
+/// Decoded content of a good frame.
 struct Contents {
-  std::span<const FieldValue> fields{};  // in the order in which the unit puts them
-  const Reading* reading = nullptr;      // the position, when it carries one
+  std::span<const FieldValue> fields{};  // in the order in which the unit outputs them
+  const Reading* reading = nullptr;      // the position, if the frame carries one
 };
 
 struct Annotation {
   enum class Kind : std::uint8_t {
     exchange,  // a request and its reply
-    request,   // alone
-    reply,     // alone
-    noise,     // neither; its bytes stand in `reply`
+    request,   // a request without its reply
+    reply,     // a reply without its request
+    noise,     // neither; its bytes are in `reply`
   };
 
   Kind kind = Kind::noise;
   Remark remark = Remark::none;
-  Error error = Error::none;  // of the whole; with one, nothing of it is to be used
-  bool composed = false;      // several exchanges carried a byte of it each
+  Error error = Error::none;  // error of the whole annotation; with an error no value in it may be used
+  bool composed = false;      // a frame of which several exchanges carried one byte each
   Tick begin = 0;
   Tick end = 0;
-  // These are valid during the call only.
+  // The members below are valid during the call only.
   Frame request{};
   Frame reply{};
-  Contents contents{};               // of what is good and was decoded
-  std::optional<Tick> turnaround{};  // from the end of the request to the begin of its reply
+  Contents contents{};               // decoded content of good frames
+  std::optional<Tick> turnaround{};  // time from the end of the request to the beginning of its reply
 };
 
-/// Receives annotations in the order in which they ended.
+/// Receives annotations in the order of their end times.
 struct AnnotationSink {
   virtual void put(const Annotation& annotation) = 0;
 

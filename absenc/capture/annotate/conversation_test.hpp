@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// For tests: random conversations of a unit's own host and virtual encoder in virtual time, as they would be captured,
-// and who said what in them.
+// Test helper: random conversations of a unit's own host and virtual encoder in virtual time, captured together with
+// the true sender of each byte.
 #pragma once
 
 #include <algorithm>
@@ -27,10 +27,10 @@ inline Options options_of(const Unit& unit, const std::vector<OptionText>& setti
   return options;
 }
 
-/// Of a unit whose document states no rate, some rate.
+/// Returns the unit's line settings; with a default rate if its document states none.
 inline LineSettings line_of(const Unit& unit) { return unit.line.with_some_rate(); }
 
-/// What one side sent without a pause.
+/// Bytes that one side sent without a pause.
 struct Said {
   sim::Role by;
   std::vector<std::uint8_t> bytes;
@@ -45,7 +45,7 @@ struct Talk {
   bool collided = false;
 };
 
-/// Ticks are nanoseconds.
+/// Runs conversations between host and virtual encoder. Ticks are nanoseconds.
 class Talker {
  public:
   Talker(const Unit& unit, const Options& options, const sim::FaultRates& rates, std::uint64_t seed)
@@ -72,7 +72,7 @@ class Talker {
     }
   }
 
-  /// One command, up to its end and a pause behind it.
+  /// Runs one command to its end, with a pause behind it.
   Talk talk() {
     talk_ = {};
     shaft_.put(static_cast<std::int64_t>(random_.below(60'000)), static_cast<std::int64_t>(random_.below(4096)));
@@ -99,7 +99,7 @@ class Talker {
     return std::move(talk_);
   }
 
-  /// From now on, everything is drawn there too.
+  /// Draws all further traffic to `waveform` too.
   void draw(sim::Waveform& waveform) { waveform_ = &waveform; }
 
   [[nodiscard]] Tick now() const { return static_cast<Tick>(line_.now().count()); }
@@ -127,7 +127,7 @@ class Talker {
   void hear(const sim::Line<std::uint8_t>::Transfer& transfer) {
     std::size_t idle = unit_.link == LinkKind::clocked ? unit_.line.idle_clocks : 0;
     const bool held_low = transfer.held_low != never;
-    if (held_low) {  // the edge with which the clock rises again takes a bit of the idle line
+    if (held_low) {  // the edge with which the clock rises again samples a bit of the idle line
       ++idle;
       if (!talk_.bursts.empty()) talk_.bursts.back().low_after = true;
     }

@@ -17,7 +17,7 @@ namespace absenc::capture {
 
 namespace {
 
-// Numbers take as many bytes as they need, 7 bits each: most changes follow the one before closely.
+// Writes a number in 7-bit groups with as few bytes as possible: most changes follow the previous one closely.
 void put_number(std::FILE* file, std::uint64_t number) {
   for (; number > 0x7F; number >>= 7) std::putc(static_cast<int>(number & 0x7F) | 0x80, file);
   std::putc(static_cast<int>(number), file);
@@ -46,7 +46,7 @@ void begin_reading(std::FILE* file) {
   if (std::fflush(file) != 0 || std::fseek(file, 0, SEEK_SET) != 0) fail_scratch(std::strerror(errno));
 }
 
-/// The levels of all wires from one change to the next.
+/// The levels of all wires while going through the changes of a drawing.
 class Levels {
  public:
   explicit Levels(Drawing& drawing) : drawing_(drawing) {
@@ -56,9 +56,9 @@ class Levels {
     advance(0);
   }
 
-  /// The time of the next change, or the end of the drawing.
+  /// Returns the time of the next change, or the end of the drawing.
   [[nodiscard]] Tick next_change() const { return std::min(next_, drawing_.end()); }
-  /// Everything that changes up to and including `time`.
+  /// Applies all changes up to and including `time`.
   void advance(Tick time) {
     constexpr unsigned now_and_then = 4096;
     for (; next_ <= time && next_ != none; take()) {
@@ -82,7 +82,7 @@ class Levels {
   std::uint64_t taken_ = 0;
 };
 
-// Printable characters from '!' on, more than one where there are many traces.
+// Returns an identifier of printable characters from '!' on; more than one character for large numbers of traces.
 std::string identifier(std::size_t trace) {
   constexpr std::size_t digits = 94;
   std::string text(1, static_cast<char>('!' + trace % digits));
@@ -97,7 +97,7 @@ std::string seconds(Tick time) {
   return std::to_string(time / nanoseconds_a_second) + '.' + fraction;
 }
 
-/// The samples of a drawing, made while the archive asks for them: a part at a time, as sigrok itself writes them.
+/// The samples of a drawing, computed while the archive requests them, in parts of the size that sigrok itself uses.
 class Samples {
  public:
   Samples(Drawing& drawing, std::uint64_t rate)
@@ -107,7 +107,7 @@ class Samples {
         levels_(drawing),
         rate_(rate) {}
 
-  /// As many whole samples as fit. Returns the number of bytes.
+  /// Writes as many whole samples as fit. Returns the number of bytes.
   std::size_t fill(std::uint8_t* bytes, std::size_t room) {
     drawing_.look();
     const std::size_t wanted = room / size;
@@ -126,17 +126,17 @@ class Samples {
     return wanted * size;
   }
 
-  const std::size_t size;  // bytes of one sample
+  const std::size_t size;  // bytes per sample
   const std::uint64_t count;
-  std::exception_ptr trouble{};  // what ended it
+  std::exception_ptr trouble{};  // exception that ended the computation
 
  private:
-  // The first sample that is not before the time.
+  // Returns the index of the first sample that is not before `time`.
   static std::uint64_t sample_at(Tick time, std::uint64_t rate) {
     const std::uint64_t whole = time / nanoseconds_a_second * rate;
     return whole + (time % nanoseconds_a_second * rate + nanoseconds_a_second - 1) / nanoseconds_a_second;
   }
-  // What is past at this sample, and when the next change shows.
+  // Applies all changes before the present sample, and finds the sample at which the next change shows.
   void take_change() {
     while (true) {
       const Tick next = levels_.next_change();
@@ -158,14 +158,14 @@ class Samples {
   std::uint8_t packed_[8]{};
 };
 
-/// One part of the samples as a file of the archive.
+/// One part of the samples, which is a file of the archive.
 struct Part {
   Samples* samples;
   std::uint64_t size;  // bytes
   std::uint64_t given = 0;
 };
 
-// What libzip asks of whoever provides a file while it compresses.
+// Callback of libzip that provides the content of a file during compression.
 zip_int64_t provide(void* state, void* data, zip_uint64_t size, zip_source_cmd_t command) {
   Part& part = *static_cast<Part*>(state);
   switch (command) {
@@ -179,7 +179,7 @@ zip_int64_t provide(void* state, void* data, zip_uint64_t size, zip_source_cmd_t
         const std::size_t filled = part.samples->fill(static_cast<std::uint8_t*>(data), room);
         part.given += filled;
         return static_cast<zip_int64_t>(filled);
-      } catch (...) {  // not through libzip, which is C
+      } catch (...) {  // no exception may pass through libzip, which is C
         part.samples->trouble = std::current_exception();
         return -1;
       }
@@ -273,7 +273,7 @@ bool Drawing::next_label(Tick& at, std::string& words) {
 
 void write_vcd(std::ostream& out, Drawing& drawing) {
   out << "$version absenc $end\n$timescale 1 ns $end\n";
-  // Not among the changes, where the standard allows them too: sigrok's reader stops at the first.
+  // Comments come before the changes: the standard allows them among the changes too, but sigrok's reader stops there.
   drawing.rewind_labels();
   Tick labelled = 0;
   for (std::string words; drawing.next_label(labelled, words);) {
@@ -334,7 +334,7 @@ void write_sigrok(const std::string& path, Drawing& drawing, std::uint64_t rate)
     add(archive.get(), path, ("logic-1-" + std::to_string(parts.size())).c_str(),
         zip_source_function(archive.get(), provide, parts.back().get()));
   }
-  // Compresses everything, in the order of the files.
+  // Compresses all files, in their order.
   if (zip_close(archive.get()) != 0) {
     if (samples.trouble != nullptr) std::rethrow_exception(samples.trouble);
     fail(path, zip_strerror(archive.get()));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Levels written as the files that waveform viewers and logic analysers' programs open.
+// Writes level changes to files that waveform viewers and logic analyser programs open.
 #pragma once
 
 #include <algorithm>
@@ -21,32 +21,32 @@ namespace absenc::capture {
 struct CloseFile {
   void operator()(std::FILE* file) const { std::fclose(file); }
 };
-/// Open for writing and reading, and empty.
+/// An empty file, open for writing and reading.
 using ScratchFile = std::unique_ptr<std::FILE, CloseFile>;
 
-/// Where the system has such files; it is gone with the process. Null when there can be none.
+/// Creates a temporary file, which disappears with the process. Returns null on failure.
 [[nodiscard]] inline ScratchFile temporary_file() { return ScratchFile(std::tmpfile()); }
 
-/// Levels of wires and what they mean, of any length: on the disk, a few bytes a change, until it is known which wires
-/// there are and when it ends. The memory it takes does not depend on its length. Ticks are nanoseconds.
+/// Level changes of wires and labels for them, of any length. They are stored on disk, with a few bytes per change,
+/// until all wires and the end are known, so memory does not grow with the length. Ticks are nanoseconds.
 class Drawing {
  public:
   struct Wire {
     std::string name;
-    bool before;  // the level before the first change
+    bool before;  // level before the first change
   };
 
-  /// `title` is one word. Throws std::runtime_error when a file is null.
+  /// `title` must be one word. Throws std::runtime_error if a file is null.
   explicit Drawing(std::string title, ScratchFile changes = temporary_file(), ScratchFile labels = temporary_file());
 
   void add_wire(std::string name, bool before) { wires_.push_back({std::move(name), before}); }
-  /// Inverts the level of a wire, which may be added later. In the order of time. Throws std::runtime_error when the
+  /// Inverts the level of a wire, which may be added later. Times must not decrease. Throws std::runtime_error if the
   /// disk is full.
   void change(Tick at, std::size_t wire);
-  /// What the levels mean. In the order of time. Throws as `change` does.
+  /// Adds a text about the levels. Times must not decrease. Throws as `change` does.
   void label(Tick at, std::string_view words);
   void set_end(Tick end) { end_ = end; }
-  /// Called now and then while it is written; what it throws ends that.
+  /// Sets a function that is called regularly while the drawing is written; an exception from it ends the writing.
   void watch(std::function<void()> look) { look_ = std::move(look); }
 
   [[nodiscard]] const std::string& title() const { return title_; }
@@ -56,9 +56,9 @@ class Drawing {
     if (look_) look_();
   }
 
-  /// From the first on; one at a time.
+  /// Restarts the iteration over the changes at the first one.
   void rewind_changes();
-  /// False: there are no more.
+  /// Returns the next change; false at the end.
   [[nodiscard]] bool next_change(Tick& at, std::size_t& wire);
   void rewind_labels();
   [[nodiscard]] bool next_label(Tick& at, std::string& words);
@@ -74,8 +74,8 @@ class Drawing {
   std::function<void()> look_;
 };
 
-/// Takes what sim::Waveform, or whatever else has wires, changes and comments like it, hands over, `lead` later: a line
-/// that is idle before its first item.
+/// Stores the changes and comments of a sim::Waveform, or of a class with the same interface, in a drawing, shifted by
+/// `lead`: the time for which the line is idle before its first item.
 template <class Waveform>
 class WaveformSink final : public Waveform::Sink {
  public:
@@ -84,8 +84,8 @@ class WaveformSink final : public Waveform::Sink {
   void change(Time at, std::size_t wire) override { drawing_->change(tick(at), wire); }
   void comment(Time at, std::string_view words) override { drawing_->label(tick(at), words); }
 
-  /// Behind the last item there is `margin`, for decoders that wait for the line to be idle; the end is not before
-  /// `least`, until when a host waited in vain.
+  /// Ends the drawing `margin` after the last item, for decoders that wait for an idle line, but not before `least`,
+  /// the end of a host's wait without a reply.
   void finish(Waveform& waveform, Time margin, Time least = {}) {
     waveform.finish();
     for (const auto& wire : waveform.wires()) drawing_->add_wire(std::string(wire.name), wire.idle);
@@ -99,14 +99,16 @@ class WaveformSink final : public Waveform::Sink {
   Time lead_;
 };
 
-/// A value change dump (IEEE 1364, clause 18), exact to the nanosecond; the labels are comments before the changes.
+/// Writes a value change dump (IEEE 1364, clause 18), exact to the nanosecond; the labels are comments before the
+/// changes.
 void write_vcd(std::ostream& out, Drawing& drawing);
 
-/// As Saleae Logic 2 exports digital channels: a line for each time at which one changes, exact to the nanosecond.
+/// Writes digital channels like the CSV export of Saleae Logic 2: one line per time with changes, exact to the
+/// nanosecond.
 void write_saleae_csv(std::ostream& out, Drawing& drawing);
 
-/// A sigrok session of samples at `rate` a second (at most 1 GHz). Replaces the file. Throws std::runtime_error with a
-/// sentence when it cannot be written.
+/// Writes a sigrok session with `rate` samples per second (at most 1 GHz). Replaces the file. Throws std::runtime_error
+/// with a sentence if it cannot be written.
 void write_sigrok(const std::string& path, Drawing& drawing, std::uint64_t rate);
 
 }  // namespace absenc::capture

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What is written, as text and as sigrok-cli reads it.
+// Tests the written files as text, and as sigrok-cli reads them.
 #include "absenc/capture/annotate/drawing.hpp"
 
 #include <gmock/gmock-matchers.h>
@@ -106,7 +106,7 @@ TEST_F(SigrokSession, SaysWhyItCannotBeWritten) {
   }
 }
 
-// What it throws while libzip asks for samples comes out, and nothing stays behind.
+// An exception thrown while libzip requests samples is passed on, and no file is left.
 TEST_F(SigrokSession, CanBeBrokenOff) {
   Drawing drawing = three_wires();
   drawing.set_end(100'000'000);
@@ -132,7 +132,7 @@ TEST(Drawing, IsWrittenTwiceTheSame) {
   EXPECT_THAT(first.str(), ::testing::HasSubstr("$comment #1152921504606846976 xxx"));
 }
 
-// ENOSPC must not become a shorter waveform.
+// A full disk (ENOSPC) must be an error, not a shorter waveform.
 TEST(Drawing, SaysThatTheDiskIsFull) {
   Drawing drawing("full", ScratchFile(std::fopen("/dev/full", "w+")));
   EXPECT_THROW(for (Tick at = 0; at < 100'000; ++at) drawing.change(at, 0);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Requests that wait for their replies, and the annotations they become together.
+// Outstanding requests, and the annotations that they form together with their replies.
 #pragma once
 
 #include <array>
@@ -13,17 +13,17 @@
 
 namespace absenc::capture {
 
-/// The times of a line, in ticks of its capture.
+/// Times of a line, in ticks of its capture.
 struct LineTicks {
-  static constexpr Tick never = UINT64_MAX / 4;  // leaves room to add to
+  static constexpr Tick never = UINT64_MAX / 4;  // leaves room for additions
 
-  Tick pause = 1;       // a line silent for so long has ended the frame
-  Tick character = 1;   // no character has its line silent for so long
-  Tick turnaround = 0;  // as the document has it; 0: not known
-  Tick limit = never;   // later, no host expects a reply
+  Tick pause = 1;       // a silence of this length ends a frame
+  Tick character = 1;   // no silence within a character is that long
+  Tick turnaround = 0;  // longest turnaround by the document; 0: not known
+  Tick limit = never;   // after this time no host expects a reply
 };
 
-/// Bytes with the time in which they were on the line.
+/// Bytes and the time during which they were on the line.
 struct Piece {
   Bytes bytes{};
   Tick begin = 0;
@@ -32,40 +32,41 @@ struct Piece {
 
 class Exchanges {
  public:
-  /// A request without its reply so far.
+  /// A request whose reply has not been found yet.
   struct Asked {
-    static constexpr std::size_t capacity = 272;  // longer ones are cut: they are bad anyhow
+    static constexpr std::size_t capacity = 272;  // longer requests are cut: they are bad in any case
     std::array<std::uint8_t, capacity> storage{};
     std::size_t size = 0;
     Tick begin = 0;
     Tick end = 0;
     Error error = Error::none;
     Remark remark = Remark::none;
-    bool is_request = true;  // false: what came alone on a line of both directions and is no frame
+    bool is_request = true;  // false: bytes on a line with both directions that are no frame
 
     [[nodiscard]] Bytes bytes() const { return {storage.data(), size}; }
   };
 
-  /// `judge` is its own: another keeps what the reply says.
+  /// `judge` is a separate one: another judge holds the contents of the reply.
   Exchanges(Judge judge, const LineTicks& ticks, AnnotationSink& sink)
       : judge_(std::move(judge)), ticks_(ticks), sink_(sink) {}
 
   [[nodiscard]] std::span<const Asked> waiting() const { return {asked_.data(), waiting_}; }
-  /// Whether there was a good request so far.
+  /// Returns whether a good request was found so far.
   [[nodiscard]] bool has_asked() const { return has_asked_; }
-  /// Whether this request had no reply for so long that none will come.
+  /// Returns whether the request has had no reply for so long that none will follow.
   [[nodiscard]] bool overdue(const Asked& asked, Tick now) const { return now > asked.end + ticks_.limit; }
 
-  /// The oldest gives up when there is no more room.
+  /// Adds a request. If the list is full, the oldest is reported as unanswered.
   void ask(const Piece& request, Error error, Remark remark, bool is_request);
-  /// The reply to `waiting()[which]`; those before it had none. `contents` only without an error. A damaged reply has
-  /// answered, too. Behind the limit it is paired all the same, but as a timeout: no host would have taken it.
+  /// Reports the reply to `waiting()[which]`, and the requests before it as unanswered. `contents` must be empty with
+  /// an error. A damaged reply counts as a reply. A reply after the limit is paired too, but with the error timeout: no
+  /// host would accept it.
   void answer(std::size_t which, const Piece& reply, Error error, Remark remark, const Contents& contents);
-  /// The first `count` had no reply.
+  /// Reports the first `count` requests as unanswered.
   void give_up(std::size_t count);
-  /// What belongs to no request.
+  /// Reports bytes that belong to no request.
   void alone(Annotation::Kind kind, const Piece& piece, Error error, Remark remark, const Contents& contents = {});
-  /// The capture ends here: what still waits may have been answered behind.
+  /// Ends the capture: outstanding requests may have been answered after it.
   void finish(Tick end);
 
  private:

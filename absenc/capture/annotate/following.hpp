@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Frames of which several exchanges carry a byte each, as annotations of their own.
+// Composes frames of which several exchanges carry one byte each, and annotates them.
 #pragma once
 
 #include <cstddef>
@@ -12,11 +12,11 @@
 
 namespace absenc::capture {
 
-/// Hands annotations on, and before the one with which such a frame ends that of the frame: what it says is known
-/// from then on.
+/// Passes annotations on. Before the annotation with which a composed frame ends, it inserts an annotation of that
+/// frame, whose content is known from then on.
 class Following final : public AnnotationSink {
  public:
-  /// `unit` and `sink` must outlive it.
+  /// `unit` and `sink` must outlive this object.
   Following(const Unit& unit, const Options& options, AnnotationSink& sink)
       : judge_(unit, options), sink_(sink), storage_(std::make_unique<std::byte[]>(unit.follower_storage)) {
     if (unit.follower != nullptr) follower_ = unit.follower(options, {storage_.get(), unit.follower_storage});
@@ -28,7 +28,7 @@ class Following final : public AnnotationSink {
   }
 
  private:
-  // More exchanges than any frame is spread over.
+  // More exchanges than any composed frame spans.
   static constexpr std::size_t most_begins = 4096;
 
   void follow(const Annotation& annotation) {
@@ -61,7 +61,7 @@ class Following final : public AnnotationSink {
   AnnotationSink& sink_;
   std::unique_ptr<std::byte[]> storage_;
   Follower* follower_ = nullptr;
-  std::deque<Tick> begins_;  // of the last exchanges
+  std::deque<Tick> begins_;  // begin times of the last exchanges
   std::uint64_t count_ = 0;
 };
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Asks a unit about bytes of a capture: whether they are a frame, and what it says.
+// Checks with a unit whether captured bytes are a frame, and decodes them.
 #pragma once
 
 #include <cstddef>
@@ -18,31 +18,31 @@ namespace absenc::capture {
 
 class Judge {
  public:
-  /// `unit` must outlive it.
+  /// `unit` must outlive the judge.
   Judge(const Unit& unit, const Options& options) : unit_(&unit), options_(options), kept_(options.has_word()) {}
 
   [[nodiscard]] const Unit& unit() const { return *unit_; }
 
-  /// As the unit decodes it; `contents` then tells what it says.
+  /// Decodes a frame with the unit; `contents` returns its content.
   Error decode(const Frame& request, const Frame& reply) {
     kept_.clear();
     const Error error = unit_->decode(options_, request, reply, kept_);
     if (error != Error::none) kept_.clear();
     return error;
   }
-  /// Of what was decoded last, nothing of what was bad. Valid until the next is decoded.
+  /// Returns the content of the last decoded frame, empty if it was bad. Valid until the next call of `decode`.
   [[nodiscard]] Contents contents() const { return {kept_.fields, kept_.has_reading ? &kept_.reading : nullptr}; }
 
-  /// The size of the frame that the first byte begins, or 0.
+  /// Returns the size of the frame that begins with the first byte, or 0.
   [[nodiscard]] std::size_t frame_size(Direction direction, Bytes bytes) const {
     const FrameEnd end = unit_->frame_end(options_, direction, bytes);
     return end.kind == FrameEnd::Kind::complete && end.size <= bytes.size() ? end.size : 0;
   }
-  /// Whether more bytes are needed to make a frame of these.
+  /// Returns whether the bytes are an incomplete frame.
   [[nodiscard]] bool is_incomplete(Direction direction, Bytes bytes) const {
     return unit_->frame_end(options_, direction, bytes).kind == FrameEnd::Kind::incomplete;
   }
-  /// The size of the good request that the first byte begins, or 0.
+  /// Returns the size of the good request that begins with the first byte, or 0.
   [[nodiscard]] std::size_t request_size(Bytes bytes) {
     const std::size_t size = frame_size(Direction::request, bytes);
     return size != 0 && decode({.bytes = bytes.first(size)}, {}) == Error::none ? size : 0;
@@ -77,7 +77,8 @@ class Judge {
       reading = one;
       has_reading = true;
     }
-    // Of the newest field: they are valid during the call only. All of them move when there is no more room.
+    // Copies the bytes of the newest field, which are valid during the call only. All views are set again, because the
+    // storage may have moved.
     void keep_bytes() {
       const Bytes added = fields.back().bytes;
       bytes.insert(bytes.end(), added.begin(), added.end());
@@ -87,7 +88,7 @@ class Judge {
         at += field.bytes.size();
       }
     }
-    // The fields of a word that the user described are there during the call only.
+    // Copies the description of the newest field, which for a word described by the user is valid during the call only.
     void keep_info() {
       made.push_back({std::string(fields.back().info->name), *fields.back().info});
       made.back().info.name = made.back().name;
@@ -98,7 +99,7 @@ class Judge {
       std::string name;
       FieldInfo info;
     };
-    bool is_described;  // a word by the user
+    bool is_described;  // the word was described by the user
     std::vector<FieldValue> fields;
     std::vector<std::uint8_t> bytes;
     std::deque<Made> made;

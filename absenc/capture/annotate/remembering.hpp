@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Completes each reading of a capture by what earlier replies of the same encoder reported, as a host that reads live
-// does.
+// Completes each reading of a capture with the alarms that earlier replies of the same encoder reported, like a host
+// that reads live.
 #pragma once
 
 #include <algorithm>
@@ -14,14 +14,15 @@
 
 namespace absenc::capture {
 
-/// Hands annotations on. Behind the annotators, where replies are in their order whoever decoded them.
+/// Passes annotations on with completed readings. It comes behind the annotators, so that replies are in order
+/// whichever annotator decoded them.
 ///
-/// An encoder that is switched off and on says so in no frame, but does not answer meanwhile: a request that nobody
-/// answers ends what is known. So does, for its encoder, a request that clears alarms, from the reply behind it on.
-/// Else the encoder is taken to stay on.
+/// No frame reports that an encoder was switched off and on, but it sends no replies meanwhile: an unanswered request
+/// clears the stored alarms. A request that clears alarms does the same for its encoder, after its reply. Otherwise the
+/// encoder is assumed to have stayed on.
 class Remembering final : public AnnotationSink {
  public:
-  /// `unit` and `sink` must outlive it.
+  /// `unit` and `sink` must outlive this object.
   Remembering(const Unit& unit, const Options& options, AnnotationSink& sink) : unit_(&unit), sink_(&sink) {
     if (unit.remembered == nullptr) return;
     for (const Command& command : unit.commands) {
@@ -63,8 +64,8 @@ class Remembering final : public AnnotationSink {
 
   const Unit* unit_;
   AnnotationSink* sink_;
-  std::vector<std::vector<std::uint8_t>> clearing_;  // requests
-  std::map<std::int64_t, Reading> last_;             // by the address of the encoder
+  std::vector<std::vector<std::uint8_t>> clearing_;  // requests that clear alarms
+  std::map<std::int64_t, Reading> last_;             // last completed reading by the encoder's address
 };
 
 }  // namespace absenc::capture

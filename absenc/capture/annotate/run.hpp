@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Characters of one channel without a pause between them, apart by what they are used for.
+// Characters of one channel without a pause between them, in separate arrays for values and times.
 #pragma once
 
 #include <algorithm>
@@ -14,7 +14,7 @@ namespace absenc::capture {
 
 class Run {
  public:
-  /// Much more than any frame: a line that is never silent fills it.
+  /// Much longer than any frame: only a line that is never silent fills the run.
   static constexpr std::size_t capacity = 512;
 
   void push(const Character& character) {
@@ -27,7 +27,7 @@ class Run {
     ++size_;
   }
 
-  /// Forgets the first `count`.
+  /// Removes the first `count` characters.
   void drop(std::size_t count) {
     const auto keep = [&](auto& items) {
       std::copy(items.begin() + static_cast<std::ptrdiff_t>(count), items.begin() + static_cast<std::ptrdiff_t>(size_),
@@ -53,7 +53,7 @@ class Run {
   [[nodiscard]] Tick end(std::size_t index) const { return ends_[index]; }
   [[nodiscard]] Tick end() const { return ends_[size_ - 1]; }
 
-  /// Whether no character of these had a wrong parity or stop bit.
+  /// Returns whether none of these characters had a wrong parity or stop bit.
   [[nodiscard]] bool clean(std::size_t first, std::size_t count) const {
     if (damages_ == 0) return true;
     const auto from = damaged_.begin() + static_cast<std::ptrdiff_t>(first);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// From the wires to the annotations: conversations of every unit drawn as a waveform, read, decoded to characters or
-// bursts, and annotated as if nobody had drawn them.
+// Tests the whole path from wires to annotations: conversations of every unit are drawn as a waveform, read back,
+// decoded to characters or bursts, and annotated like an unknown capture.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -25,7 +25,7 @@ namespace {
 using testing::Talk;
 using testing::Talker;
 
-/// What an annotation says, and its time apart: a waveform rounds it.
+/// Annotations as text lines. Their times are separate, because a waveform rounds them.
 struct Lines final : AnnotationSink {
   void put(const Annotation& one) override {
     std::string line = std::to_string(static_cast<int>(one.kind)) + " " + std::string(text_of(one.error).name) + " ";
@@ -110,7 +110,7 @@ class WholeWay : public ::testing::TestWithParam<const Unit*> {
     return memory_source({written.begin(), written.end()});
   }
 
-  // Every frame with its fields and errors, at its time.
+  // Requires every frame with its fields and errors, at its time.
   void expect_same(Reader& reader, const Lines& expected) {
     const double ticks_per_ns = static_cast<double>(reader.layout().ticks_per_second) / 1e9;
     const LineTicks in_ns = settings.ticks;
@@ -131,7 +131,7 @@ class WholeWay : public ::testing::TestWithParam<const Unit*> {
 
 TEST_P(WholeWay, IsTheShortWay) {
   sim::FaultRates faults = sim::testing::damaged_replies(0.02);
-  faults[sim::FaultKind::delay] = faults[sim::FaultKind::repeat] = 0;  // these make two speak at once
+  faults[sim::FaultKind::delay] = faults[sim::FaultKind::repeat] = 0;  // these faults make both sides send at once
   Talker talker(unit, options, faults, 7);
   Drawing drawing("capture");
   WaveformSink<sim::Waveform> wires(drawing);
@@ -139,11 +139,12 @@ TEST_P(WholeWay, IsTheShortWay) {
   Lines expected;
   BurstAnnotator bursts(unit, options, expected);
   const auto characters = std::make_unique<Annotator>(unit, options, settings, expected);
-  static_cast<void>(talker.talk());  // so that the waveform begins with a silent line
+  static_cast<void>(talker.talk());  // the waveform must begin with a silent line
   talker.draw(waveform);
   std::vector<Character> all;
   const unsigned least = test_cases(300);
-  for (unsigned i = 0; i < least || (expected.lines.empty() && all.size() < 1200); ++i) {  // some send nothing
+  // Some units send no bytes in some conversations.
+  for (unsigned i = 0; i < least || (expected.lines.empty() && all.size() < 1200); ++i) {
     const Talk talk = talker.talk();
     ASSERT_FALSE(talk.collided);
     for (const Burst& burst : talk.bursts) bursts.put(burst);
