@@ -6,7 +6,7 @@
 namespace absenc::protocol_name {
 namespace {
 
-// The kit (tests/kit) tests what every unit has; here stands what only this document says.
+// The kit (tests/kit) tests the behaviour that all units share; add tests here for the contents of this document.
 TEST(ProtocolName, IsNoLongerTheInventedOne) {
   EXPECT_NE(unit.document, "title of the document") << "put the document's own frames in place of the invented ones";
 }

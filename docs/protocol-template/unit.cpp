@@ -19,13 +19,13 @@ constexpr Request request(const Format& format, Arguments = {}) {
   return {ask, format.address};
 }
 
-// ---- Procedures: each reads like its paragraph
+// ---- Procedures: each reads like its paragraph of the document
 
 Procedure set_zero(Dialog& dialog, Found& found) {
   const Request position = request<Ask::position>(dialog.format());
   co_await may_set_zero(dialog, found, position);
   co_await dialog.ask(request<Ask::zero>(dialog.format())).or_say("whether the encoder obeyed is not known");
-  co_await dialog.rest(20ms);  // it writes its memory
+  co_await dialog.rest(20ms);  // the encoder writes its memory
   const std::uint64_t now = co_await look(dialog, found, position);
   if (!is_near(now, 0, 16))
     co_return {Error::cross_check_failed, "the position is still not zero",
@@ -33,9 +33,9 @@ Procedure set_zero(Dialog& dialog, Found& found) {
   co_return done;
 }
 
-// ---- The virtual encoder: what it answers
+// ---- The virtual encoder
 
-class Encoder final : public BusDevice<Protocol, Encoder, 4> {  // memory: its zero
+class Encoder final : public BusDevice<Protocol, Encoder, 4> {  // its memory is its zero
  public:
   using BusDevice::BusDevice;
   [[nodiscard]] bool is_mine(const Request& asked) const { return asked.address == format().address; }
@@ -45,7 +45,7 @@ class Encoder final : public BusDevice<Protocol, Encoder, 4> {  // memory: its z
   }
 };
 
-// ---- What is declared
+// ---- Options, fields, commands and declaration
 
 struct Values {
   std::optional<std::uint16_t> singleturn{};

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Maker and encoder: its frames. README.md draws them. What stands here is an invented encoder: put the document's own
-// in its place.
+// Maker and encoder: its frames. README.md draws them. This is an invented encoder: replace it by the encoder of your
+// document.
 #pragma once
 
 #include <cstdint>
@@ -14,7 +14,7 @@ using namespace std::chrono_literals;
 
 inline constexpr Time answer_limit = 100us;
 
-/// What the options make of the frames.
+/// Properties of the frames that the options select.
 struct Format {
   std::uint8_t address = 1;
 
@@ -42,7 +42,7 @@ struct Protocol {
   static constexpr author::HostTimes host_times(const Format&) {
     return {.answer_limit = answer_limit, .gap_limit = 50us};
   }
-  /// What changes the encoder is never sent twice.
+  /// Requests that change the encoder are never repeated.
   static constexpr author::Manner manner(const Format&, const Request& request) {
     return {.repeats = request.ask == Ask::position ? 2u : 0u};
   }
@@ -63,10 +63,10 @@ struct Protocol {
     return Request{static_cast<Ask>(bytes[0]), bytes[1]};
   }
 
-  // Reply: position high byte first, then the sum of all bytes with the address.
+  // Reply: position, high byte first, then the sum of all bytes and the address.
   static constexpr std::size_t reply_size(const Format&, const Request&) { return longest_reply; }
   static constexpr std::size_t expected(const Format&, const Request&, Bytes) { return longest_reply; }
-  static constexpr bool is_whole(const Format&, Error) { return false; }  // after an error more may be coming
+  static constexpr bool is_whole(const Format&, Error) { return false; }  // after an error more bytes may follow
   static constexpr std::uint8_t sum(std::uint8_t address, std::uint8_t high, std::uint8_t low) {
     return static_cast<std::uint8_t>(address + high + low);
   }
@@ -77,7 +77,8 @@ struct Protocol {
     for (const std::uint8_t byte : {high, low, sum(request.address, high, low)}) bytes.push_back(byte);
     return bytes;
   }
-  /// Checks in this order: length, checksum, echo or address, refusal, fixed bits, range, cross checks.
+  /// Decodes a reply. Checks in this order: length, checksum, echo or address, refusal, fixed bits, range, cross
+  /// checks.
   static constexpr Result<Reply> decode(const Format&, const Request& request, Bytes bytes) {
     if (bytes.empty()) return Error::timeout;
     if (bytes.size() != longest_reply) return Error::wrong_length;
@@ -87,7 +88,8 @@ struct Protocol {
   static constexpr Reading reading(const Format&, const Request&, const Reply& reply) {
     return author::position_reading(reply.singleturn, 16);
   }
-  static constexpr Time latched(const Format&, Time sent_at) { return sent_at; }  // the document does not say when
+  // The document does not state when the position is taken.
+  static constexpr Time latched(const Format&, Time sent_at) { return sent_at; }
 
   static constexpr author::DeviceTimes device_times(const Format& format) {
     return {.character = format.line().character(), .answer_time = 10us, .start_time = 100ms};

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the document demands of the encoder, with the place that says so.
+// Requirements of the document on the encoder and on the host, each with its paragraph.
 #pragma once
 
 #include <array>

@@ -28,7 +28,7 @@ constexpr Request request(const Format& format, Arguments = {}) {
 constexpr Request request_to(std::size_t node) { return {Ask::position, static_cast<std::uint8_t>(4 * node)}; }
 constexpr std::size_t addresses = 64;
 
-// Position and turns are asked for one after the other: between two positions on the same side of zero the turns hold.
+// Reads position, turns and position. If both positions are on the same side of zero, the turns belong to them.
 Procedure read_both(Dialog& dialog, Found& found) {
   const Format format = dialog.format();
   std::uint64_t before = co_await look(dialog, found, request<Ask::position>(format));
@@ -69,7 +69,7 @@ Procedure restart(Dialog& dialog, Found& found, Ask act) {
 
 // ---- The virtual encoder
 
-class Encoder final : public BusDevice<Protocol, Encoder, 4> {  // memory: its zero
+class Encoder final : public BusDevice<Protocol, Encoder, 4> {  // its memory is its zero
  public:
   using BusDevice::BusDevice;
   [[nodiscard]] bool is_mine(const Request& asked) const { return asked.address == format().address; }
@@ -96,10 +96,10 @@ class Encoder final : public BusDevice<Protocol, Encoder, 4> {  // memory: its z
   [[nodiscard]] std::uint64_t turns(Time at) const { return static_cast<std::uint64_t>(counts(at, 0, 0)); }
 
   bool battery_ = true;
-  std::uint64_t lost_ = 0;  // turns before the last start without a battery
+  std::uint64_t lost_ = 0;  // turns at the last start without a battery, which are lost
 };
 
-// ---- What is declared
+// ---- Options and fields
 
 struct Values {
   std::uint8_t encoder_address = 0;
@@ -136,7 +136,7 @@ constexpr auto fields = fields_of<Values>(
     field<&Values::clash>("clash", "", "what came was damaged: two encoders of one address, or a bad line",
                           Role::clash));
 
-// ---- What is shown
+// ---- Reported fields
 
 constexpr Values values_of_request(const Format&, const Request& asked) {
   constexpr std::array<std::string_view, 2> answered{"position", "turns"};
@@ -216,7 +216,7 @@ constexpr auto vectors = std::array{
     VectorText{"amt21-10", "a reset has no reply", document, "", "5675", "3492", "wrong_length"},
 };
 
-// ---- What is declared
+// ---- Declaration
 
 constexpr Result<Request> guess_request(const Format& format, Bytes) { return request<Ask::position>(format); }
 constexpr auto conditions = std::array{Condition{"battery", "", "keeps the turns while the power is off", 0, 1, 1}};
@@ -241,7 +241,8 @@ constexpr Declaration<Protocol, Encoder> declaration{
     .bits = place_of,
     .conditions = conditions,
     .timing = {.turnaround = turn_around[0],
-               .turnaround_limit = Protocol::host_times({.rate = rates.size() - 1}).answer_limit},  // of the slowest
+               // of the slowest rate
+               .turnaround_limit = Protocol::host_times({.rate = rates.size() - 1}).answer_limit},
 };
 
 }  // namespace

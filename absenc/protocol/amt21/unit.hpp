@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// CUI AMT21: one byte asks, two answer. README.md draws them.
+// CUI AMT21: a request of one byte, a reply of two. README.md draws them.
 #pragma once
 
 #include <array>
@@ -15,7 +15,7 @@ namespace absenc::amt21 {
 using namespace std::chrono_literals;
 
 inline constexpr std::array<std::uint32_t, 5> rates{2'000'000, 115'200, 38'400, 19'200, 9'600};
-/// From the end of a request to its reply, at each rate.
+/// Time from the end of a request to its reply, at each rate.
 inline constexpr std::array<Time, 5> turn_around{3us, 10'800ns, 30us, 56us, 110us};
 inline constexpr Time restart_time = 200ms;
 inline constexpr unsigned turns_bits = 14;
@@ -24,30 +24,31 @@ struct Format {
   std::uint8_t singleturn_bits = 14;
   std::uint8_t multiturn_bits = 0;
   std::uint8_t address = 0x54;
-  std::uint8_t rate = 0;        // index into rates
-  bool drops_low_bits = false;  // of an encoder of 14 bits read as one of 12
+  std::uint8_t rate = 0;        // index into `rates`
+  bool drops_low_bits = false;  // reads an encoder of 14 bits as one of 12
 
   [[nodiscard]] constexpr LineSettings line() const { return {.rate = rates[rate]}; }
   [[nodiscard]] constexpr Resolution resolution() const { return {singleturn_bits, multiturn_bits, 0, true}; }
 };
 
-/// What is added to the address; of zero and reset, which add 2, the byte behind it.
+/// Kind of request: the number that is added to the address. For zero and reset, which add 2, it is the second byte.
 enum class Ask : std::uint8_t { position, turns, zero = 0x5E, reset = 0x75 };
 
 struct Request {
   Ask ask = Ask::position;
   std::uint8_t address = 0x54;
 
-  /// The other two the encoder obeys without a word, and restarts.
+  /// Returns whether the request has a reply. The encoder executes the other two without a reply, and restarts.
   [[nodiscard]] constexpr bool is_answered() const { return ask == Ask::position || ask == Ask::turns; }
 };
 
-/// Of a position counts; of turns revolutions, -8192 to 8191.
+/// Value of a reply: position in counts, or turns from -8192 to 8191.
 struct Reply {
   std::int32_t value = 0;
 };
 
-/// K1 and K0 make the number of ones among the odd and among the even bits odd.
+/// Returns whether the parity bits are right: K1 and K0 make the number of ones odd among the odd and among the even
+/// bits.
 [[nodiscard]] constexpr bool checks(std::uint16_t word) {
   return odd_parity(word & 0xAAAA) && odd_parity(word & 0x5555);
 }
@@ -62,7 +63,7 @@ struct Protocol {
     const Time character = format.line().character();
     return {.answer_limit = 2 * turn_around[format.rate] + 2 * character, .gap_limit = 2 * character};
   }
-  /// One wrong reply in four passes the two parity bits: it must be one of two bytes, with silence behind it.
+  /// One wrong reply in four passes the two parity bits, so a reply must have exactly two bytes and end with silence.
   static constexpr author::Manner manner(const Format&, const Request& request) {
     return {
         .repeats = request.is_answered() ? 2u : 0u, .expects_reply = request.is_answered(), .ends_by_silence = true};
@@ -79,7 +80,7 @@ struct Protocol {
   }
   static constexpr Result<Request> decode_request(const Format& format, Bytes bytes) {
     if (bytes.empty()) return Error::wrong_length;
-    if ((bytes[0] & 3) == 3) return Error::unexpected_reply;  // reserved
+    if ((bytes[0] & 3) == 3) return Error::unexpected_reply;  // reserved code
     if (bytes.size() != request_size(format, bytes)) return Error::wrong_length;
     const Request request{static_cast<Ask>(bytes.size() == 1 ? bytes[0] & 3 : bytes[1]),
                           static_cast<std::uint8_t>(bytes[0] & 0xFC)};

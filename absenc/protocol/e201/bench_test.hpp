@@ -14,11 +14,11 @@ using author::testing::Told;
 using Fields = std::map<std::string, std::int64_t>;
 
 constexpr std::int64_t turn = std::int64_t{1} << 32;
-constexpr std::int64_t count = std::int64_t{1} << 13;  // of 19 bits
+constexpr std::int64_t count = std::int64_t{1} << 13;  // one count of 19 bits, in 2^-32 revolution
 
 inline bool says(const std::string& text, const std::string& words) { return text.find(words) != std::string::npos; }
 
-/// What comes in place of the interface's answer: each so long after what was before it.
+/// A text that a test sends instead of the interface's reply, `after` the event before it.
 struct Said {
   std::string text;
   Time after = 1ms;
@@ -29,7 +29,7 @@ inline Tamper answering(char letter, const std::vector<Said>& answer) {
   return [=](char asked) { return asked == letter ? std::optional(answer) : std::nullopt; };
 }
 
-/// Passes on what the interface does, but for commands that `tamper` answers itself.
+/// Passes the bytes of the interface on, except for commands that `tamper` answers itself.
 class Answering final : public Machine<std::uint8_t> {
  public:
   explicit Answering(Device<std::uint8_t>& device) : device_(device) {}
@@ -69,7 +69,7 @@ class Answering final : public Machine<std::uint8_t> {
             .out = {reinterpret_cast<const std::uint8_t*>(out_.text.data()), out_.text.size()},
             .at = now + out_.after};
   }
-  /// The letters of all commands so far.
+  /// Returns the letters of all commands received so far.
   [[nodiscard]] std::string asked() const {
     std::string letters;
     for (const auto& [letter, at] : log) letters += letter;
@@ -83,13 +83,13 @@ class Answering final : public Machine<std::uint8_t> {
   Device<std::uint8_t>& device_;
   std::vector<Said> due_;
   Said out_;
-  unsigned rest_ = 0;  // bytes of this command that are still to come
+  unsigned rest_ = 0;  // remaining bytes of this command
   bool swallowed_ = false;
-  bool busy_ = false;    // something is being sent
-  bool saying_ = false;  // and it is not the device's
+  bool busy_ = false;    // a transmission is in progress
+  bool saying_ = false;  // the transmission in progress is a text of `tamper`
 };
 
-/// How a command ended, by the error's name.
+/// Result of a command with the name of its error.
 struct Ended : Told {
   Ended(const Told& told)
       : Told(told), error(told.finished ? text_of(told.error).name : "hangs"), fields(told.numbers) {}
@@ -104,7 +104,7 @@ struct Bench : author::testing::UnitBench<19> {
   Ended run(std::string_view name, const std::vector<std::int64_t>& arguments = {}, const OnEmit& on_emit = {}) {
     return UnitBench::run(name, arguments, on_emit);
   }
-  /// The same with answers of `tamper`; `asked` is what it was asked.
+  /// Runs a command with replies made by `tamper`; `answering.log` has the received commands.
   Ended run_tampered(const Tamper& tamper, std::string_view name, const std::vector<std::int64_t>& arguments = {}) {
     answering.tamper = tamper;
     answering.log.clear();

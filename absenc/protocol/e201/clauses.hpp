@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the document demands of the encoder, with the place that says so.
+// Requirements of the document on the encoder and on the host, each with its paragraph.
 #pragma once
 
 #include <array>
@@ -31,7 +31,7 @@ inline constexpr std::array<Clause, 5> clauses{{
      .other = 4},
 }};
 
-// ---- What hosts do that break a clause
+// ---- Requests that break a clause
 
 namespace script {
 inline constexpr std::array no_number{HostStep{{}, "4d 0d"}};

@@ -23,7 +23,7 @@ void append_number(ByteBuffer<64>& reply, std::uint64_t number) {
   append_text(reply, {digits.data() + first, digits.size() - first});
 }
 
-// As many digits as the width needs.
+// Appends a number with as many digits as `width` bits need.
 void append_hexadecimal(ByteBuffer<64>& reply, std::uint64_t number, unsigned width) {
   for (unsigned digit = (width + 3) / 4; digit-- > 0;) {
     reply.push_back(static_cast<std::uint8_t>("0123456789ABCDEF"[number >> (4 * digit) & 0xF]));
@@ -44,7 +44,8 @@ void VirtualInterface::stopped(Time) {
   zero_ = 0;
 }
 
-// Whether `M` needs its CR is not known, and a CR behind any other command does no harm.
+// Returns the bytes of a request without its CR. Whether `M` needs its CR is unknown, and a CR after any other command
+// does no harm.
 std::size_t VirtualInterface::request_size(Bytes begin) const {
   return begin[0] == letter::set_clock ? 2 : begin[0] == letter::set_width ? 3 : 1;
 }
@@ -82,7 +83,7 @@ author::Responder::Answer VirtualInterface::respond(Bytes bytes, Time at, ByteBu
     case letter::hexadecimal:
       append_hexadecimal(reply, (counts(at) - zero_) & low_mask(width_), width_);
       break;
-    default: {  // the position, of a stream the first, with a sign where there is a zero
+    default: {  // `?`, and the first position of a stream: signed if a zero is set
       const std::uint64_t number = counts(at) - zero_;
       const bool negative = zero_ != 0 && static_cast<std::int64_t>(number) < 0;
       append_text(reply, negative ? "-" : "");
@@ -93,7 +94,7 @@ author::Responder::Answer VirtualInterface::respond(Bytes bytes, Time at, ByteBu
   return Answer::sent;
 }
 
-// What has no reply. False for a question.
+// Executes a command without a reply. Returns false for a command with a reply.
 bool VirtualInterface::change(const Request& request, Time at) {
   switch (request.letter) {
     case letter::supply_on:
@@ -113,7 +114,7 @@ bool VirtualInterface::change(const Request& request, Time at) {
       width_ = request.width;
       return true;
     default:
-      return request.letter == letter::stream_off;  // nobody has begun one
+      return request.letter == letter::stream_off;  // the virtual interface never streams, so `stream_off` does nothing
   }
 }
 
@@ -142,7 +143,7 @@ std::uint64_t VirtualInterface::samples(Time at, Time period) {
   return samples.view().load(0, sample_bits);
 }
 
-// Turns and position as one number of `width_` bits; without supply the line is 0.
+// Returns turns and position as one number of `width_` bits. Without supply the line is 0.
 std::uint64_t VirtualInterface::counts(Time at) const {
   if (!encoder_.is_powered()) return 0;
   const Word now = word_of(format_.word, shaft_->at(at), 0);

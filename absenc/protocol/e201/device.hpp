@@ -10,7 +10,7 @@ namespace absenc::e201 {
 
 class VirtualInterface final : public author::Responder {
  public:
-  /// Switched off until `power_on`. `shaft` must outlive it.
+  /// Creates an interface that is off until `power_on`. `shaft` must outlive it.
   VirtualInterface(const Format& format, const Shaft& shaft);
 
   [[nodiscard]] MutableBytes memory() override { return {}; }
@@ -29,9 +29,9 @@ class VirtualInterface final : public author::Responder {
 
   Format format_;
   const Shaft* shaft_;
-  biss::Encoder encoder_;  // with SSI only its supply
-  unsigned clock_ = 4;     // 280 kHz
-  unsigned width_;         // of what `?` gives
+  biss::Encoder encoder_;  // with an SSI encoder only its supply is used
+  unsigned clock_ = 4;     // number of the MA clock; 4 is 280 kHz
+  unsigned width_;         // bits of the number that `?` returns
   std::uint64_t zero_ = 0;
 };
 

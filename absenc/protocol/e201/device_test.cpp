@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The virtual E201-9S, asked by hand.
+// The virtual E201-9S, tested with raw commands.
 #include <gtest/gtest.h>
 
 #include "absenc/protocol/biss/frame.hpp"
@@ -34,7 +34,7 @@ TEST(E201Device, AnswersEveryCommand) {
   expect("b", "35\r");
   expect("?", "1048581\r");
   expect(">", "000100005\r");
-  expect("1", "1048581\r");  // the first of a stream
+  expect("1", "1048581\r");  // first position of a stream
   expect("B20\r", "");
   expect("b", "20\r");
   expect(">", "00005\r");
@@ -45,7 +45,7 @@ TEST(E201Device, AnswersEveryCommand) {
   bench.device.power_off(bench.line.now());
   expect("?", "");
   bench.device.power_on(bench.line.now(), Device<std::uint8_t>::PowerOn::real);
-  expect("?", "1048580\r");  // the zero is lost without power
+  expect("?", "1048580\r");  // the zero is lost at power off
   expect("za?", "1048580\r");
   expect("0", "");
   expect("f", "");
@@ -87,14 +87,15 @@ TEST(E201Device, AckFollowsTheClock) {
   }
 }
 
-// 64 clocks, and the time of USB.
+// A reading takes 64 clocks and the time of USB.
 TEST(E201Device, TakesItsTime) {
   Bench bench;
   bench.raw("M1");
   const Time slow = bench.run("position").took;
   bench.raw("M4");
   EXPECT_EQ(slow - bench.run("position").took, 64 * (clock_period(1) - clock_period(4)));
-  const Time characters = slow - bench.run("clock").took - 64 * clock_period(1);  // 15 less
+  // The clock command transfers 15 characters less.
+  const Time characters = slow - bench.run("clock").took - 64 * clock_period(1);
   EXPECT_LT(std::chrono::abs(characters - line_settings.bits(150)), 1us);
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// RLS E201-9S USB interface: one-letter commands and the ASCII that answers them. README.md lists them and says where
-// each comes from. What no document describes is read as leniently as possible: text.hpp.
+// Commands of the RLS E201-9S USB interface, one letter each, and its ASCII replies. README.md lists them with their
+// sources. Replies that no document describes are read as leniently as possible: text.hpp.
 #pragma once
 
 #include <array>
@@ -46,33 +46,33 @@ inline constexpr std::string_view answered_by_a_line = "vse?>mb";
 }  // namespace letter
 
 inline constexpr std::size_t sample_bits = 64;
-inline constexpr std::size_t samples_length = 17;  // 16 hexadecimal digits and CR
+inline constexpr std::size_t samples_length = 17;  // length of the reply to `4`: 16 hexadecimal digits and CR
 
-// ---- Times. No document gives any: the interface clocks 64 bits and answers as fast as USB does.
+// ---- Times. No document gives any: the interface clocks 64 bits and replies as fast as USB does.
 
-/// A virtual COM port: the rate means nothing to the interface.
+/// Line of a virtual COM port; its rate has no effect on the interface.
 inline constexpr LineSettings line_settings{.rate = 115'200};
 
-inline constexpr Time answer_limit = 50ms;  // 64 clocks at 35 kHz are 1.8 ms
-inline constexpr Time gap_limit = 20ms;     // within a reply
-inline constexpr Time reply_limit = 100ms;  // a reply is over then, whatever still comes
-inline constexpr Time silent_limit = 10ms;  // a command that may have no reply has none
-inline constexpr Time supply_time = 200ms;  // until the encoder is up, or the supply down, after `n` and `f`
+inline constexpr Time answer_limit = 50ms;  // timeout of a reply; 64 clocks at 35 kHz take 1.8 ms
+inline constexpr Time gap_limit = 20ms;     // timeout between two characters of a reply
+inline constexpr Time reply_limit = 100ms;  // longest time of a reply, even if characters still arrive
+inline constexpr Time silent_limit = 10ms;  // timeout of a command that may have no reply
+inline constexpr Time supply_time = 200ms;  // time after `n` and `f` until the encoder is ready or the supply is down
 
-/// One period of MA at clock 1 to 8.
+/// Returns the period of MA at clock 1 to 8.
 [[nodiscard]] constexpr Time clock_period(unsigned clock) {
   return LineSettings{.rate = clocks_khz[clock - 1] * 1000u}.bits(1);
 }
 
-// ---- What the samples carry
+// ---- Content of the samples
 
-/// What is behind the interface.
+/// Protocol of the encoder behind the interface.
 enum class Carries : std::uint8_t { biss, ssi };
 
-/// Encoders of which their maker says how they want to be clocked behind this interface.
+/// Encoders for which the maker recommends certain clocks of this interface.
 enum class Kind : std::uint8_t { other, resolute };
-inline constexpr unsigned resolute_slowest = 4;  // clocks that are recommended for Renishaw Resolute: 280 kHz
-inline constexpr unsigned resolute_fastest = 5;  // 560 kHz
+inline constexpr unsigned resolute_slowest = 4;  // slowest clock recommended for a Renishaw Resolute: 280 kHz
+inline constexpr unsigned resolute_fastest = 5;  // fastest clock recommended for a Renishaw Resolute: 560 kHz
 
 struct Format {
   WordFormat word = biss::Format{}.word;
@@ -89,7 +89,7 @@ struct Format {
   [[nodiscard]] constexpr ssi::Format ssi() const { return {.word = word, .after_word = after_word, .scale = scale}; }
 };
 
-/// Whether the word fits into the samples: of BiSS with the shortest ACK.
+/// Returns whether the word fits into the samples; for BiSS with the shortest ACK.
 [[nodiscard]] constexpr bool fits(const Format& format) {
   const bool is_biss = format.carries == Carries::biss;
   return is_usable(format.word) &&
@@ -97,14 +97,14 @@ struct Format {
 }
 
 struct Position {
-  unsigned ack_bits = 0;  // BiSS
-  std::uint16_t crc = 0;  // BiSS
+  unsigned ack_bits = 0;  // BiSS: clocks until the encoder was ready
+  std::uint16_t crc = 0;  // BiSS: CRC as sent
   Word word{};
 };
 
-/// Errors: invalid_argument (the word does not fit), line_stuck (all samples alike), bad_framing (not 110 at the
-/// beginning, no start bit, CDS is 1), truncated (the frame goes on behind the samples), bad_checksum; of SSI
-/// bad_framing (the line is not idle before the word) and those of ssi::decode_clocked_on.
+/// Decodes the samples. Errors: invalid_argument (the word does not fit), line_stuck (all samples alike), bad_framing
+/// (the samples do not begin with 110, no start bit, CDS is 1), truncated (the frame is longer than the samples),
+/// bad_checksum; for SSI bad_framing (the line is not idle before the word) and those of ssi::decode_clocked_on.
 [[nodiscard]] constexpr Result<Position> decode_position(const Format& format, std::uint64_t samples) {
   if (!fits(format)) return Error::invalid_argument;
   if (samples == 0 || samples == ~std::uint64_t{0}) return Error::line_stuck;
@@ -112,7 +112,8 @@ struct Position {
   store_big_endian(bytes, samples);
   const BitView bits{bytes, sample_bits};
   if (format.carries == Carries::ssi) {
-    // The first sample is before the first rising edge, which shifts out the MSB; the encoder is clocked on.
+    // The first sample is taken before the first rising edge, which shifts out the MSB. The interface clocks on after
+    // the word.
     if (!bits[0]) return Error::bad_framing;
     const Result<Word> word = ssi::decode_clocked_on(format.ssi(), bits, 1);
     return word ? Result(Position{.word = *word}) : word.error();
@@ -126,19 +127,19 @@ struct Position {
 
 struct Request {
   std::uint8_t letter = letter::samples;
-  unsigned clock = 0;  // set_clock: 1 to 8
-  unsigned width = 0;  // set_width: 1 to 64
+  unsigned clock = 0;  // set_clock: the clock, 1 to 8
+  unsigned width = 0;  // set_width: the width in bits, 1 to 64
 };
 
 struct Reply {
   std::uint64_t samples = 0;
-  std::int64_t number = 0;  // ? > m b
-  Text text{};              // of a line, without what is around it
+  std::int64_t number = 0;  // number in the reply to ? > m b
+  Text text{};              // text of a reply line, trimmed
 };
 
-inline constexpr unsigned widest = 64;  // of a position in bits
+inline constexpr unsigned widest = 64;  // largest width of a position in bits
 
-/// Errors: wrong_length (not 16 characters and CR), bad_framing (not hexadecimal).
+/// Decodes the reply to `4`. Errors: wrong_length (not 16 characters and CR), bad_framing (not hexadecimal).
 [[nodiscard]] constexpr Result<std::uint64_t> decode_samples(Bytes reply) {
   if (reply.size() != samples_length || reply[samples_length - 1] != end_of_line) return Error::wrong_length;
   std::uint64_t samples = 0;
@@ -150,7 +151,8 @@ inline constexpr unsigned widest = 64;  // of a position in bits
   return samples;
 }
 
-/// A reply of one line. Errors: wrong_length (no such line, or more), bad_framing (no answer to that command).
+/// Decodes a reply line. Errors: wrong_length (no complete line, or more than one), bad_framing (not a reply to the
+/// command `asked`).
 [[nodiscard]] constexpr Result<Reply> decode_line(std::uint8_t asked, Bytes bytes) {
   const std::size_t end = end_of_first_line(bytes);
   const Bytes text = trimmed(bytes.first(end));
@@ -169,12 +171,13 @@ inline constexpr unsigned widest = 64;  // of a position in bits
   return reply;
 }
 
-/// author/dialog.hpp says what each of these is.
+/// The interface's commands for the engine; author/dialog.hpp explains each member.
 struct Protocol {
   using Format = e201::Format;
   using Request = e201::Request;
   using Reply = e201::Reply;
-  static constexpr std::size_t longest_reply = 32;  // nobody says how long a line may be: three times that is kept
+  // No document gives the longest line; the engine stores up to three times this length.
+  static constexpr std::size_t longest_reply = 32;
 
   static constexpr author::HostTimes host_times(const Format&) {
     return {.answer_limit = answer_limit, .gap_limit = gap_limit, .patience = reply_limit};
@@ -183,7 +186,7 @@ struct Protocol {
     if (request.letter == letter::samples || letter::is_in(letter::answered_by_a_line, request.letter)) return {};
     return {.any_reply = true, .answer_limit = silent_limit};
   }
-  /// Nothing of a clock or a width that there is not.
+  /// Returns the bytes of a request; empty if its clock or width is out of range.
   static constexpr ByteBuffer<4> encode(const Format&, const Request& request) {
     ByteBuffer<4> text;
     const bool is_clock = request.letter == letter::set_clock;
@@ -201,7 +204,7 @@ struct Protocol {
     if (!letter::is_in(letter::all, begin[0])) return 0;
     return begin[0] == letter::set_clock ? 3 : begin[0] == letter::set_width ? 4 : 1;
   }
-  /// With its CR or without. Errors: unsupported (no such letter, clock or width), wrong_length.
+  /// Decodes a request, with its CR or without. Errors: unsupported (unknown letter, clock or width), wrong_length.
   static constexpr Result<Request> decode_request(const Format&, Bytes bytes) {
     const Bytes text = trimmed(bytes);
     if (text.empty()) return Error::wrong_length;
@@ -222,10 +225,10 @@ struct Protocol {
     if (request.letter == letter::samples) return samples_length;
     return letter::is_in(letter::answered_by_a_line, request.letter) ? end_of_first_line(reply) : 0;
   }
-  /// What has its CR where it belongs is whole, whatever it says.
+  /// A reply with a CR at its end is complete, whatever its content.
   static constexpr bool is_whole(const Format&, Error error) { return error != Error::wrong_length; }
-  /// Errors: those of decode_samples and decode_position, or of decode_line; unsupported (no document says
-  /// what this one answers).
+  /// Decodes a reply. Errors: those of decode_samples and decode_position, or of decode_line; unsupported (no document
+  /// describes the reply to this command).
   static constexpr Result<Reply> decode(const Format& format, const Request& request, Bytes bytes) {
     if (letter::is_in(letter::answered_by_a_line, request.letter)) return decode_line(request.letter, bytes);
     if (request.letter != letter::samples) return Error::unsupported;

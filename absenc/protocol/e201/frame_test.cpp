@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Frames and texts that no vector has.
+// Cases of frames and texts that the vectors do not cover.
 #include "absenc/protocol/e201/frame.hpp"
 
 #include <gtest/gtest.h>
@@ -26,14 +26,14 @@ WordFormat position_of(unsigned bits) { return biss::word_with_status({.position
 
 TEST(E201Frame, FailuresAreToldApart) {
   for (const auto& [reply, error] : std::to_array<std::pair<std::string_view, Error>>({
-           {"c0014328ff300000\n", Error::wrong_length},    // LF for CR
-           {"c0014328ff3000000\r", Error::wrong_length},   // one more
-           {"c0014328ff300000\r\n", Error::wrong_length},  // one behind
-           {"c0014328ff3000\r0\r", Error::bad_framing},    // a CR among the digits
-           {"80014328ff300000\r", Error::bad_framing},     // 100
-           {"c000000000000002\r", Error::truncated},       // the CDS is the last sample
-           {"c000000000000003\r", Error::bad_framing},     // CDS, and truncated
-           {"c0014328ff310000\r", Error::none},            // behind the CRC
+           {"c0014328ff300000\n", Error::wrong_length},    // LF instead of CR
+           {"c0014328ff3000000\r", Error::wrong_length},   // one digit too many
+           {"c0014328ff300000\r\n", Error::wrong_length},  // LF after the CR
+           {"c0014328ff3000\r0\r", Error::bad_framing},    // CR among the digits
+           {"80014328ff300000\r", Error::bad_framing},     // begins with 100
+           {"c000000000000002\r", Error::truncated},       // the CDS bit is the last sample
+           {"c000000000000003\r", Error::bad_framing},     // CDS is 1, and the frame is truncated
+           {"c0014328ff310000\r", Error::none},            // changed after the CRC
            {"c0014328fe300000\r", Error::bad_checksum},
        })) {
     EXPECT_EQ(name(decode('4', reply).error()), name(error)) << reply;
@@ -91,7 +91,7 @@ TEST(E201Frame, RequestsAreWhatTheInterfaceReads) {
     EXPECT_EQ(decoded->letter, request.letter);
     EXPECT_EQ(decoded->clock, request.clock);
   }
-  EXPECT_EQ(Protocol::decode_request({}, bytes("M5")).value().clock, 5u);  // its CR may be missing
+  EXPECT_EQ(Protocol::decode_request({}, bytes("M5")).value().clock, 5u);  // the CR may be missing
   for (const auto& [text, error] :
        std::to_array<std::pair<std::string_view, std::string_view>>({{"", "wrong_length"},
                                                                      {"q", "unsupported"},
@@ -119,7 +119,7 @@ TEST(E201Frame, RepliesOfOneLine) {
   const std::string longest(64, 'x');
   for (const auto& [letter, reply, error] : std::to_array<std::tuple<char, std::string, std::string_view>>(
            {{'v', "anything 1\r", "none"},
-            {'s', "\n anything ~\r\n", "none"},  // a LF of the line before, one of its own
+            {'s', "\n anything ~\r\n", "none"},  // LF of the line before, and its own
             {'e', longest + "\r", "none"},
             {'e', longest + "x\r", "wrong_length"},
             {'v', "anything 1", "wrong_length"},
@@ -167,7 +167,7 @@ TEST(E201Frame, NumbersInTextsThatNobodyDescribes) {
            {{"5", 5}, {"M3", 3}, {"1", 1}, {"8", 8}, {"1100 kHz", 6}, {"35", 1}, {"4400", 8}, {"9", 0}, {"0", 0}})) {
     EXPECT_EQ(find_clock(bytes(words)).value_or(0), clock) << words;
   }
-  EXPECT_EQ(find_number(bytes("B1234567890")).value(), 123'456'789);  // nine digits are enough for anything
+  EXPECT_EQ(find_number(bytes("B1234567890")).value(), 123'456'789);  // only nine digits are used
   EXPECT_EQ(decode_number(bytes("-17")).value(), -17);
   EXPECT_EQ(decode_number(bytes("+17")).value(), 17);
   EXPECT_EQ(decode_number(bytes("-9223372036854775808")).value(), std::numeric_limits<std::int64_t>::min());

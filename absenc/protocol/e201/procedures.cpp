@@ -14,7 +14,7 @@ using author::Procedure;
 
 namespace {
 
-constexpr unsigned supplied_above = 1000;  // mV
+constexpr unsigned supplied_above = 1000;  // voltage in mV above which the encoder's supply counts as on
 
 constexpr std::string_view check_firmware = "`absenc info` shows which firmware it has";
 constexpr std::string_view check_clocks =
@@ -43,12 +43,13 @@ Procedure read(Dialog& dialog, Found& found) {
   if (!reply) co_return {reply.error()};
   found.samples = reply->samples;
   found.reading = Protocol::reading(dialog.format(), {letter::samples}, *reply);
-  found.reading.latched = dialog.sent_at();  // clocking begins when the command is there
+  found.reading.latched = dialog.sent_at();  // the interface starts to clock when it has received the command
   found.reading.received = dialog.received_at();
   co_return done;
 }
 
-// Nothing in a text tells which question it answers: one that comes twice must not be there for the next.
+// A text does not show which command it answers. A reply that is sent twice must not be taken for the next one, so the
+// procedure waits for silence.
 Procedure inform(Dialog& dialog, Found& found) {
   static constexpr auto letters = std::array{letter::version, letter::serial, letter::supply, letter::clock};
   for (const std::uint8_t asked : letters) {
@@ -60,11 +61,12 @@ Procedure inform(Dialog& dialog, Found& found) {
   co_return done;
 }
 
-// ---- What is set is read back
+// ---- Settings, each read back
 
 namespace {
 
-// `none`, why that could not be done or read back, or cross_check_failed: it is another one.
+// Sets the clock and reads it back. Returns none, the error of an exchange, or cross_check_failed (another clock is
+// set).
 Part<Error> switch_clock(Dialog& dialog, unsigned clock) {
   const Result<Reply> told = co_await dialog.attempt({letter::set_clock, clock}).changes();
   if (!told) co_return told.error();
@@ -98,7 +100,7 @@ Procedure switch_supply(Dialog& dialog, Found& found, bool on) {
 
 namespace {
 
-// `?` counts turns too, so nothing is wrapped.
+// Returns whether two numbers of `?` are near each other. They include the turns, so the difference does not wrap.
 bool is_near(const Dialog& dialog, std::int64_t counts, std::int64_t other) {
   const unsigned bits = dialog.format().word.bits_of(Meaning::position);
   const auto to = static_cast<std::uint64_t>(counts);
@@ -109,7 +111,7 @@ bool is_near(const Dialog& dialog, std::int64_t counts, std::int64_t other) {
 }  // namespace
 
 Procedure set_zero(Dialog& dialog, Found& found) {
-  // `?` says nothing of errors. An interface that has no `4` yet cannot be asked for more.
+  // `?` does not report errors, so `4` is read too. An interface that does not know `4` cannot report more.
   const Result<Reply> samples = co_await dialog.attempt({letter::samples});
   if (samples) {
     const Reading look = Protocol::reading(dialog.format(), {letter::samples}, *samples);
@@ -148,16 +150,16 @@ unsigned Found::recommended() const {
 
 namespace {
 
-// The last exchange in words, for when others have followed.
+// Explains the last exchange now, because others follow before the procedure ends.
 Outcome failure(const Dialog& dialog, Error error) {
   const Explanation what = explain(dialog.format(), error, dialog.exchange().sent, dialog.reply());
   return {error, dialog.is_noisy() ? endless_noise.detail : what.detail,
           what.advice.empty() ? text_of(error).advice : what.advice};
 }
 
-// Ends early when the sweep is aborted, or cannot go on.
+// Reads frames at each clock. Ends early if the sweep is aborted or cannot continue.
 Part<Outcome> try_clocks(Dialog& dialog, Found& found) {
-  Outcome bad = done;  // the last frame that was
+  Outcome bad = done;  // outcome of the last bad frame
   if (dialog.is_aborted()) co_return done;
   for (unsigned clock = 1; clock <= clocks_khz.size(); ++clock) {
     found.left = clock;
@@ -203,7 +205,7 @@ Procedure sweep_clocks(Dialog& dialog, Found& found, Arguments arguments) {
   co_return outcome;
 }
 
-// ---- In words
+// ---- Explanations
 
 namespace {
 
@@ -235,7 +237,7 @@ constexpr auto of_lines = std::to_array<Words>({
     {Error::bad_framing, {"this is no answer to that command", check_model}},
 });
 
-// Which of the checks of decode_position it was.
+// Explains bad_framing by the check of decode_position that failed.
 Explanation explain_framing(const Format& format, Bytes reply) {
   const Result<std::uint64_t> samples = decode_samples(reply);
   if (!samples) return {"the interface answers with hexadecimal digits", check_model};

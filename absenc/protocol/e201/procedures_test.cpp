@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The unit's commands against the virtual E201-9S, and against interfaces that answer otherwise.
+// The unit's commands against the virtual E201-9S, and against interfaces with other replies.
 #include <gtest/gtest.h>
 
 #include "absenc/protocol/e201/bench_test.hpp"
@@ -59,7 +59,7 @@ TEST(E201Read, OptionsThatContradictIt) {
     EXPECT_EQ(made(settings, "position"), readable) << settings;
     EXPECT_EQ(made(settings, "clock-sweep"), readable);
     EXPECT_TRUE(made(settings, "info"));
-    EXPECT_FALSE(made(settings, "set-clock"));  // 20 is none
+    EXPECT_FALSE(made(settings, "set-clock"));  // 20 is not a clock
     EXPECT_EQ(unit.device(author::testing::options_of(unit, settings), shaft, device_storage).bytes != nullptr, usable);
   }
 }
@@ -105,7 +105,7 @@ TEST(E201Read, WhatFails) {
   EXPECT_EQ(bench.run_tampered(once, "position").error, "none");
 }
 
-// No document gives these times: what is slower is no reply, and nothing waits for longer.
+// No document gives these times: a slower reply counts as missing, and the host waits no longer.
 TEST(E201Read, ItsTimes) {
   Bench bench("singleturn_bits=19");
   const std::string good = "c0014328ff300000\r";
@@ -124,7 +124,7 @@ TEST(E201Read, ItsTimes) {
   EXPECT_TRUE(says(noisy.advice, "stream-off")) << noisy.advice;
   EXPECT_GT(noisy.took, 100ms);
   EXPECT_LT(noisy.took, 130ms);
-  EXPECT_EQ(bench.answering.asked(), "4");  // asking more would not help
+  EXPECT_EQ(bench.answering.asked(), "4");  // more requests would not help
 }
 
 TEST(E201Info, KeepsWhatItCannotRead) {
@@ -140,7 +140,7 @@ TEST(E201Info, KeepsWhatItCannotRead) {
   EXPECT_EQ(partly.fields, (Fields{{"version", 0}, {"serial", 0}, {"supply", 0}, {"clock", 4}, {"clock_khz", 280}}));
   EXPECT_EQ(bench.run_tampered(answering('e', {}), "info").fields,
             (Fields{{"version", 0}, {"serial", 0}, {"clock", 4}, {"clock_khz", 280}}));
-  // A text that comes twice is no answer to the next question.
+  // A text that is sent twice is not a reply to the next command.
   EXPECT_EQ(bench.run_tampered(answering('v', {{"E201-9S V1.16\r"}, {"E201-9S V1.16\r"}}), "info").error,
             "wrong_length");
   EXPECT_EQ(
@@ -164,7 +164,7 @@ TEST(E201Set, IsReadBack) {
   EXPECT_EQ(refused.error, "cross_check_failed");
   EXPECT_TRUE(says(refused.detail, "another setting")) << refused.detail;
   EXPECT_EQ(bench.raw("M2\rm"), "2\r");
-  // A reply that nobody describes does not disturb it, but one that does not end.
+  // An undocumented reply is ignored, but one that does not end is an error.
   EXPECT_EQ(bench.run_tampered(answering('M', {{"M2 ok\r\n"}, {"more", 15ms}}), "set-clock", {2}).error, "none");
   const Tamper stream = answering('M', std::vector<Said>(40, {"1", 10ms}));
   EXPECT_EQ(bench.run_tampered(stream, "set-clock", {2}).error, "wrong_length");
@@ -172,7 +172,7 @@ TEST(E201Set, IsReadBack) {
   EXPECT_EQ(bench.run_tampered(answering('m', {}), "set-clock", {2}).error, "timeout");
 }
 
-// A command that may have no reply is waited for 10 ms.
+// The host waits 10 ms for the reply of a command that may have none.
 TEST(E201Set, WaitsForAReplyThatMayNotCome) {
   Bench bench;
   const auto tell = [&](Time after) {
@@ -231,7 +231,7 @@ TEST(E201Zero, NeedsAnEncoderThatStandsStill) {
                                            {"19", {"129", "100", "-29"}, "none"},
                                            {"19", {"100", "130"}, "not_still"},
                                            {"19", {"130", "100"}, "not_still"},
-                                           {"19", {"100", "524388"}, "not_still"},  // a turn
+                                           {"19", {"100", "524388"}, "not_still"},  // a turn further
                                            {"19", {"100", "100", "30"}, "cross_check_failed"},
                                            {"19", {"100", "100", "524288"}, "cross_check_failed"},
                                            {"12", {"-1", "0", "1"}, "none"},
@@ -255,7 +255,7 @@ TEST(E201Zero, NeedsAnEncoderThatStandsStill) {
   }
 }
 
-// `?` does not show the encoder's error bit.
+// `?` does not report the encoder's error bit.
 TEST(E201Zero, NeedsAPositionThatHolds) {
   Bench bench;
   bench.device.raise_alarms(word_error);

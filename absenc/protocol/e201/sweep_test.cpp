@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// clock-sweep: what it counts, that it sets the clock back whatever happens, and what it says when it cannot.
+// clock-sweep: its counts, that it restores the clock in every case, and its errors.
 #include <gtest/gtest.h>
 
 #include "absenc/protocol/e201/bench_test.hpp"
@@ -46,7 +46,7 @@ TEST(E201Sweep, CountsRecommendsAndRestores) {
 }
 
 TEST(E201Sweep, LineDelayMovesTheRecommendation) {
-  // Two bits late at 4400 kHz, one at 2200, and 900 ns are the period at 1100: nothing fast is stable.
+  // The line is two bits late at 4400 kHz and one at 2200; 900 ns are the period at 1100: no fast clock is stable.
   Bench bench("singleturn_bits=19 latency_us=0 line_delay_ns=905");
   const Fields fields = bench.run("clock-sweep", {20}).fields;
   EXPECT_LT(fields.at("valid_1100_khz"), 20);
@@ -87,7 +87,7 @@ TEST(E201Sweep, AbortRestoresTheClockAtAnyStep) {
   }
 }
 
-// What was found until then is told, and nothing recommended.
+// An aborted sweep reports its results so far, and recommends nothing.
 TEST(E201Sweep, AnAbortedSweepRecommendsNothing) {
   Bench bench;
   unsigned emits = 0;
@@ -127,7 +127,7 @@ TEST(E201Sweep, WhatIsLeftIsTheClockThatWasSetLast) {
 
 TEST(E201Sweep, WhatFails) {
   struct Case {
-    char letter;  // this command is answered so, the `nth` time and, when `always`, ever after
+    char letter;  // the command that is answered with `answer` the `nth` time; if `always`, every time from then on
     int nth;
     bool always;
     std::vector<Said> answer;
@@ -164,7 +164,7 @@ TEST(E201Sweep, WhatFails) {
   }
 }
 
-// Some bad frames are what a sweep is for.
+// Single bad frames are a normal result of a sweep.
 TEST(E201Sweep, GoesOnAfterABadFrame) {
   Bench bench;
   int asked = 0;

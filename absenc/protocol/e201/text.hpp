@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Texts that no document describes: the numbers in them, wherever they stand.
+// Finds numbers and versions in texts that no document describes.
 #pragma once
 
 #include <array>
@@ -13,13 +13,13 @@
 
 namespace absenc::e201 {
 
-/// What M1 to M8 make MA, kHz.
+/// Frequencies of MA for M1 to M8, in kHz.
 inline constexpr std::array<std::uint16_t, 8> clocks_khz{35, 70, 140, 280, 560, 1100, 2200, 4400};
 
 inline constexpr char end_of_line = '\r';
 using Text = ByteBuffer<64>;
 
-/// Behind the first CR; 0: there is none.
+/// Returns the index after the first CR; 0 if there is none.
 [[nodiscard]] constexpr std::size_t end_of_first_line(Bytes text) {
   for (std::size_t i = 0; i < text.size(); ++i) {
     if (text[i] == end_of_line) return i + 1;
@@ -27,7 +27,7 @@ using Text = ByteBuffer<64>;
   return 0;
 }
 
-/// Without the CR, spaces and LF around it.
+/// Returns the text without CR, LF, tabs and spaces around it.
 [[nodiscard]] constexpr Bytes trimmed(Bytes text) {
   const auto blank = [](std::uint8_t c) { return c == ' ' || c == '\r' || c == '\n' || c == '\t'; };
   while (!text.empty() && blank(text.front())) text = text.subspan(1);
@@ -39,7 +39,7 @@ using Text = ByteBuffer<64>;
 
 namespace detail {
 
-// Digits from `at` on, at most 9 of them; `at` is moved behind.
+// Returns the number at `at`, of at most 9 digits, and moves `at` behind it.
 constexpr unsigned number_at(Bytes text, std::size_t& at) {
   unsigned number = 0;
   for (unsigned digits = 0; at < text.size() && is_digit(text[at]) && digits < 9; ++at, ++digits) {
@@ -60,12 +60,12 @@ struct Version {
   unsigned minor;
 };
 
-/// `4` exists since then (E201-9S document).
+/// Returns whether this firmware has the command `4` (E201-9S document: since 1.16).
 [[nodiscard]] constexpr bool has_samples(Version version) {
   return version.major > 1 || (version.major == 1 && version.minor >= 16);
 }
 
-/// The first two numbers with a point between them.
+/// Returns the first two numbers with a point between them.
 [[nodiscard]] constexpr std::optional<Version> find_version(Bytes text) {
   for (std::size_t at = 0; detail::skip_to_digit(text, at);) {
     const unsigned major = detail::number_at(text, at);
@@ -75,14 +75,14 @@ struct Version {
   return std::nullopt;
 }
 
-/// The first whole number. Error: bad_framing.
+/// Returns the first whole number. Error: bad_framing.
 [[nodiscard]] constexpr Result<std::int64_t> find_number(Bytes text) {
   std::size_t at = 0;
   if (!detail::skip_to_digit(text, at)) return Error::bad_framing;
   return detail::number_at(text, at);
 }
 
-/// 1 to 8 of that, or of a clock in kHz; 0: there is no such clock.
+/// Returns the clock, 1 to 8, for its number or its frequency in kHz; 0 if there is none.
 [[nodiscard]] constexpr unsigned clock_of(std::int64_t number) {
   for (unsigned i = 0; i < clocks_khz.size(); ++i) {
     if (number == i + 1 || number == clocks_khz[i]) return i + 1;
@@ -90,13 +90,13 @@ struct Version {
   return 0;
 }
 
-/// The reply to `m`: the clock, 1 to 8. Error: bad_framing.
+/// Decodes the reply to `m`: the clock, 1 to 8. Error: bad_framing.
 [[nodiscard]] constexpr Result<std::int64_t> find_clock(Bytes text) {
   const unsigned clock = clock_of(find_number(text).value_or(0));
   return clock != 0 ? Result(std::int64_t{clock}) : Error::bad_framing;
 }
 
-/// The reply to `?`: the digits of the text, with a sign. Error: bad_framing.
+/// Decodes the reply to `?`: digits with an optional sign. Error: bad_framing.
 [[nodiscard]] constexpr Result<std::int64_t> decode_number(Bytes text) {
   const bool negative = !text.empty() && text[0] == '-';
   if (!text.empty() && (text[0] == '-' || text[0] == '+')) text = text.subspan(1);
@@ -111,12 +111,13 @@ struct Version {
   return static_cast<std::int64_t>(negative ? 0 - number : number);
 }
 
-/// Thousandths of the first number that is followed by `symbol` (V or A) or by m and `symbol`.
+/// Returns the first number that is followed by `symbol` (V or A), or by m and `symbol`, in thousandths of the unit.
 [[nodiscard]] constexpr std::optional<unsigned> find_milli(Bytes text, std::uint8_t symbol) {
   for (std::size_t at = 0; detail::skip_to_digit(text, at);) {
     std::uint64_t milli = std::uint64_t{detail::number_at(text, at)} * 1000;
     const bool has_point = at < text.size() && text[at] == '.';
-    const bool has_comma = at + 1 < text.size() && text[at] == ',' && is_digit(text[at + 1]);  // of another locale
+    // decimal comma of another locale
+    const bool has_comma = at + 1 < text.size() && text[at] == ',' && is_digit(text[at + 1]);
     if (has_point || has_comma) {
       unsigned weight = 100;
       for (++at; at < text.size() && is_digit(text[at]); ++at, weight /= 10) {
@@ -132,7 +133,7 @@ struct Version {
   return std::nullopt;
 }
 
-/// What `>` gives. Error: bad_framing.
+/// Decodes the reply to `>`. Error: bad_framing.
 [[nodiscard]] constexpr Result<std::int64_t> decode_hexadecimal(Bytes text) {
   if (text.empty() || text.size() > 16) return Error::bad_framing;
   std::uint64_t number = 0;

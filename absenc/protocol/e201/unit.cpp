@@ -19,7 +19,7 @@ using namespace author;
 
 // ---- Options
 
-/// As they are given.
+/// Values of the options.
 struct Settings {
   std::uint8_t singleturn_bits = 0;
   std::uint8_t multiturn_bits = 0;
@@ -32,7 +32,7 @@ struct Settings {
   Kind kind = Kind::other;
   std::int64_t latency_ns = 10'000;
   std::int64_t line_delay_ns = 0;
-  unsigned firmware = 116;  // hundredths
+  unsigned firmware = 116;  // version in hundredths
 };
 
 constexpr std::array<std::string_view, 2> carries_choices{"biss", "ssi"};
@@ -65,7 +65,7 @@ constexpr WordFormat word_of(const Settings& given) {
 
 constexpr Format format_of(const Settings& given, const WordFormat* word) {
   return {.word = word != nullptr ? *word : word_of(given),
-          // A word is linear when there is a unit.
+          // A word given by the user is linear if the user gives a unit.
           .scale = {.linear = (word != nullptr ? given.unit_pm : given.position_bits) != 0,
                     .unit_um = static_cast<double>(given.unit_pm) / 1e6},
           .carries = given.carries,
@@ -76,7 +76,7 @@ constexpr Format format_of(const Settings& given, const WordFormat* word) {
           .line_delay = Time(given.line_delay_ns)};
 }
 
-// A length alone is no Resolute: the one without it comes first.
+// The length alone does not prove a Resolute, so the models without one come first.
 constexpr auto resolute_models = std::array{
     ModelText{"rotary-26", "single-turn, 26 bits", 0,
               "singleturn_bits=26 multiturn_bits=0 position_bits=0 encoder=other"},
@@ -157,7 +157,7 @@ constexpr auto own_fields = fields_of<Found>(
     field<khz<recommended>>({"recommended_khz", number, "kHz", "that clock"}),
     field<restored>({"restored_clock", number, "", "what it was before and is again"}),
     field<aborted>({"aborted", boolean, "", "the sweep was ended early: not all clocks were tried"}));
-// Of a sweep that is broken off.
+// Fields of a sweep that was interrupted.
 constexpr auto left_fields =
     fields_of<Found>(field<left>({"left_clock", number, "", "the clock that the sweep set last"}),
                      field<khz<left>>({"left_khz", number, "kHz", "that clock"}),
@@ -174,7 +174,7 @@ constexpr void put_samples(FieldSink& sink, const Format& format, std::uint64_t 
   if (is_biss) sink.put({&biss::own_fields[biss::field_crc], position.crc});
 }
 
-// ---- What is shown
+// ---- Reported fields
 
 constexpr void put_request(FieldSink& sink, const Format& format, const Request& request) {
   Found found;
@@ -206,7 +206,8 @@ constexpr Finding<Format, Found> found{.put = put_found, .put_left = put_left};
 
 // ---- Commands
 
-// Readings can be told from angles only when a linear encoder has its unit.
+// Returns whether positions can be read. A linear encoder needs its unit, so that its readings are not taken for
+// angles.
 constexpr bool is_readable(const Format& format) { return fits(format) && absenc::is_usable(format.scale); }
 
 template <std::uint8_t one>
@@ -247,7 +248,7 @@ constexpr auto commands = std::array{
         .only_if(is_readable),
 };
 
-// ---- What is declared
+// ---- Declaration
 
 constexpr Format format_by(const Options& values) {
   return format_of(options.format(values), values.has_word() ? &values.word : nullptr);
@@ -260,7 +261,8 @@ constexpr std::size_t size_of_reply(const Format&, Bytes begin) {
 }
 constexpr Result<Request> guess_request(const Format&, Bytes) { return Request{letter::samples}; }
 
-// What follows the CRC is ignored, capitals are the same digits, and neither SSI nor text has a checksum.
+// Returns whether a wrong bit is detected. Bits after the CRC are ignored, capital letters are the same digits, and
+// neither SSI nor text has a checksum.
 bool is_checked(const Options& values, Frame, Frame reply, std::size_t bit) {
   const Format f = format_by(values);
   const Result<std::uint64_t> samples = decode_samples(reply.bytes);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The E201-9S as the neutral layers see it.
+// The E201-9S as a unit.
 #pragma once
 
 #include "absenc/protocol/unit.hpp"

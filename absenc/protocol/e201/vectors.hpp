@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What an E201-9S answers, with its source. Each is decoded at compile time: a broken frame does not build.
+// Replies of an E201-9S with their source. Each is decoded at compile time: a wrong frame breaks the build.
 #pragma once
 
 #include <array>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Modbus RTU frames: address, function, data, CRC. What a server refuses is in words here.
-// Sources: MODBUS over Serial Line V1.02 (S), MODBUS Application Protocol V1.1b3 (A).
+// Modbus RTU frames: address, function, data, CRC; and explanations of a server's refusals. Sources: MODBUS over Serial
+// Line V1.02 (S), MODBUS Application Protocol V1.1b3 (A).
 #pragma once
 
 #include <array>
@@ -14,22 +14,22 @@
 
 namespace absenc::modbus {
 
-inline constexpr CrcParameters crc_parameters{16, 0x8005, 0xFFFF, true, true, 0x0000};  // S 6.2.2
+inline constexpr CrcParameters crc_parameters{16, 0x8005, 0xFFFF, true, true, 0x0000};  // CRC of Modbus RTU (S 6.2.2)
 
-inline constexpr std::size_t frame_capacity = 256;  // S 2.5.1
-inline constexpr std::size_t shortest_frame = 4;    // address, function, CRC
+inline constexpr std::size_t frame_capacity = 256;  // longest frame in bytes (S 2.5.1)
+inline constexpr std::size_t shortest_frame = 4;    // bytes of the shortest frame: address, function, CRC
 inline constexpr std::size_t crc_size = 2;
 using FrameBytes = ByteBuffer<frame_capacity>;
 
-inline constexpr std::uint8_t first_address = 1;  // 0 is broadcast and never answered
-inline constexpr std::uint8_t last_address = 247;  // S 2.2
+inline constexpr std::uint8_t first_address = 1;   // lowest address of a server; 0 is broadcast and never answered
+inline constexpr std::uint8_t last_address = 247;  // highest address of a server (S 2.2)
 
 inline constexpr std::uint8_t read_holding_registers = 0x03;
-inline constexpr std::uint16_t most_registers = 125;  // A 6.3
-/// Of the function code of a refusal; functions of the standard are below.
+inline constexpr std::uint16_t most_registers = 125;  // most registers of one read request (A 6.3)
+/// Bit that a refusal sets in the function code; functions of the standard are below it.
 inline constexpr std::uint8_t refusal_bit = 0x80;
 
-/// In which order the two bytes of a CRC came. A CRC of two equal bytes counts as `low_first`, which is Modbus.
+/// Byte order of a received CRC. Two equal bytes count as `low_first`, the order of Modbus.
 enum class CrcOrder : std::uint8_t { low_first, high_first, wrong };
 
 [[nodiscard]] constexpr CrcOrder crc_order(Bytes frame) {
@@ -49,7 +49,7 @@ constexpr void append_crc(ByteBuffer<Capacity>& frame, CrcOrder order = CrcOrder
   frame.push_back(static_cast<std::uint8_t>(low_first ? crc >> 8 : crc));
 }
 
-/// Why a server refuses (A 7).
+/// Codes of a server's refusal (A 7).
 enum class Exception : std::uint8_t {
   none = 0,
   illegal_function = 1,
@@ -57,13 +57,13 @@ enum class Exception : std::uint8_t {
   illegal_data_value = 3,
 };
 
-/// The code of a refusal of `function`; none when this is no refusal. The CRC is not looked at.
+/// Returns the code of a refusal of `function`; nothing if the frame is none. Does not check the CRC.
 [[nodiscard]] constexpr std::optional<std::uint8_t> refusal_code(Bytes frame, std::uint8_t function) {
   if (frame.size() != shortest_frame + 1 || frame[1] != (function | refusal_bit)) return std::nullopt;
   return frame[2];
 }
 
-/// The words for a code (A 7).
+/// Explains the code of a refusal (A 7).
 [[nodiscard]] constexpr Explanation explain_refusal(std::uint8_t code) {
   switch (code) {
     case 0x01:

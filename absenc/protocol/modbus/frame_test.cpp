@@ -26,11 +26,11 @@ TEST(ModbusFrame, CrcIsAppendedLowByteFirst) {
 TEST(ModbusFrame, CrcOfTheOtherOrderIsTold) {
   EXPECT_EQ(crc_order(hex<"0103000000010a84">), CrcOrder::high_first);
   EXPECT_EQ(crc_order(hex<"0103000000010a85">), CrcOrder::wrong);
-  EXPECT_EQ(crc_order(hex<"ffff">), CrcOrder::wrong);  // the CRC of nothing is no frame
+  EXPECT_EQ(crc_order(hex<"ffff">), CrcOrder::wrong);  // a CRC without a frame is invalid
   EXPECT_EQ(crc_order({}), CrcOrder::wrong);
 }
 
-// S 6.2.2: what the checksum must notice at these lengths.
+// S 6.2.2: errors that the checksum must detect at these lengths.
 TEST(ModbusFrame, AnyTwoWrongBitsAreSeen) {
   const std::vector<std::uint8_t> good(hex<"010304001fabcd7550">.begin(), hex<"010304001fabcd7550">.end());
   for (std::size_t one = 0; one < good.size() * 8; ++one) {

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A client with this folder's times and its server on one line in virtual time: silence, damage, changes of the rate.
+// A client with the times of this folder and its server on one line in virtual time: silence, damage, change of the
+// rate.
 #include <gtest/gtest.h>
 
 #include <array>
@@ -19,7 +20,7 @@ using Wire = std::vector<std::uint8_t>;
 constexpr LineSettings line_settings{.rate = 19'200};
 const Time character = line_settings.character();
 
-/// Answers function 03 of address 7 with two fixed bytes, refuses 04, and changes its rate after function 41.
+/// A server at address 7: answers function 03 with two fixed bytes, refuses 04, and changes its rate after function 41.
 class ToyServer final : public Server {
  public:
   ToyServer() : Server(line_settings) {}
@@ -42,7 +43,7 @@ class ToyServer final : public Server {
   }
 };
 
-/// Sends one frame, as often as told.
+/// A client that sends the same frame `count` times.
 class ToyClient final : public author::Engine {
  public:
   explicit ToyClient(Bytes body, unsigned count = 1, std::uint32_t rate = line_settings.rate)
@@ -100,7 +101,7 @@ struct Bench {
     sim::testing::RawHost raw_host(std::move(bytes), answer, gap, line.now() + pause);
     return run(raw_host).reply;
   }
-  /// The one rule that was broken so far.
+  /// Returns the rule that was broken; empty unless exactly one was.
   [[nodiscard]] std::string_view broken() const {
     return server.violation_count() == 1 ? server.violations()[0].rule : std::string_view{};
   }
@@ -109,7 +110,7 @@ struct Bench {
   sim::Line<std::uint8_t> line{LinkKind::half_duplex, line_settings};
   std::optional<std::size_t> host;
   Wire taken;                  // the last reply to `ask`
-  std::vector<Time> silences;  // longer than a character
+  std::vector<Time> silences;  // silences longer than a character
   Time last_end{};
 };
 
@@ -158,7 +159,7 @@ TEST(ModbusLine, TheServerAnswersWhatStandsAloneOnly) {
   EXPECT_EQ(bench.server.violation_count(), 0u);
 }
 
-/// Sends characters with a pause before one of them, and keeps what comes.
+/// Sends characters with a pause before one of them and records the reply.
 class Halting final : public Machine<std::uint8_t> {
  public:
   Halting(const Wire& bytes, std::ptrdiff_t before, Time pause)
@@ -190,7 +191,7 @@ class Halting final : public Machine<std::uint8_t> {
 
 TEST(ModbusLine, GapsInsideAFrameAreTold) {
   const std::tuple<int, Wire, std::string_view> rows[]{
-      {1, good_reply, ""}, {2, good_reply, "1.5 characters"}, {4, {}, ""}};  // of two frames none is one
+      {1, good_reply, ""}, {2, good_reply, "1.5 characters"}, {4, {}, ""}};  // the pause makes two frames, both invalid
   for (const auto& [characters, reply, rule] : rows) {
     Bench bench;
     Halting halting(good_request, 4, character * characters);
@@ -203,13 +204,13 @@ TEST(ModbusLine, GapsInsideAFrameAreTold) {
 TEST(ModbusLine, ARequestThatComesTooSoonIsTold) {
   Bench bench;
   bench.raw(good_request);
-  bench.raw(good_request, {}, 50ms, 1us);  // ends as soon as the reply is there
+  bench.raw(good_request, {}, 50ms, 1us);  // ends as soon as the reply is complete
   EXPECT_EQ(bench.server.violation_count(), 0u) << "the one before waited 3 ms";
   EXPECT_EQ(bench.raw(good_request, character), good_reply);
   EXPECT_TRUE(says(bench.broken(), "3.5 characters"));
 }
 
-// Where silence is told by a program that may not be let run, a client that has given up is not to be blamed.
+// A server that was scheduled late cannot tell whether the client waited long enough, so it reports no broken rule.
 TEST(ModbusLine, WhoAnswersLateBlamesNobodyForNotWaiting) {
   using Kind = Event<std::uint8_t>::Kind;
   for (const auto& [late, rules] : {std::pair(Time(1ms), 1u), {Time(50ms), 0u}}) {
@@ -219,7 +220,7 @@ TEST(ModbusLine, WhoAnswersLateBlamesNobodyForNotWaiting) {
       server.feed({.kind = Kind::received, .at = 50ms, .items = good_request});
       Time now = 50ms + frame_silence(line_settings) + late;
       server.feed({.kind = Kind::silence, .at = now});
-      static_cast<void>(server.next(now));  // configure
+      static_cast<void>(server.next(now));  // takes the configure step
       ASSERT_EQ(server.answer_count(), 1u);
       if (replied) server.feed({.kind = Kind::sent, .at = now});
       server.feed({.kind = Kind::received, .at = now + 100us, .items = good_request});
@@ -245,7 +246,7 @@ TEST(ModbusLine, ARateIsChangedAfterTheReply) {
   EXPECT_EQ(bench.server.violation_count(), 0u);
 }
 
-// A line on which something sends without a pause is given up, whatever comes.
+// The client stops when something sends without a pause, whatever the bytes are.
 TEST(ModbusLine, NoiseWithoutEnd) {
   ToyClient client(request_body);
   Time now{};

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Any bytes with pauses to the server: it ends, and takes nothing with a wrong CRC.
+// Sends any bytes with pauses to the server: it must not hang, and must not accept a wrong CRC.
 #include <cstddef>
 #include <cstdint>
 #include <cstdlib>
@@ -34,7 +34,7 @@ class Echoing final : public Server {
   }
 };
 
-// 0xF0 to 0xFF after an odd byte stand for a pause.
+// Feeds the input to a server. Bytes 0xF0 to 0xFF after an odd byte are pauses.
 void ask_server(Bytes input) {
   Echoing server;
   server.power_on(Time{}, Device<std::uint8_t>::PowerOn::skip);

@@ -5,8 +5,10 @@ namespace absenc::modbus {
 
 namespace {
 
-constexpr Time answer_time = 200us;  // behind the silence that ends a request; the standard gives none
-constexpr Time late = 20ms;          // behind that silence: a client may have given up, and asked again
+// Time between the silence that ends a request and the reply; the standard gives none.
+constexpr Time answer_time = 200us;
+// Delay of that silence after which the client may have timed out and sent the next request.
+constexpr Time late = 20ms;
 constexpr std::string_view turn_rule = "something was sent during the encoder's transmission";
 
 }  // namespace
@@ -38,7 +40,8 @@ ByteStep Server::next(Time) {
   }
   ByteStep step{.at = never};
   if (!frame_.empty() || damaged_) step.gap = frame_silence(line_);
-  if (!frame_.empty() && crc_order(frame_) != CrcOrder::low_first) step.expect = 1;  // or more: not yet a whole one
+  // The frame is not complete yet, so at least one more byte is expected.
+  if (!frame_.empty() && crc_order(frame_) != CrcOrder::low_first) step.expect = 1;
   return step;
 }
 
@@ -67,12 +70,12 @@ void Server::feed(const ByteEvent& event) {
 
 void Server::hear(const ByteEvent& event) {
   if (transmitting_) {
-    // A request is one broken rule, not each of its bytes.
+    // A request during a transmission breaks the rule once, not with each of its bytes.
     if (!company_ && !interrupted_ && !late_) expect(false, turn_rule, event.at);
     interrupted_ = true;
     return;
   }
-  // A pseudo-terminal brings whole frames in no time.
+  // A pseudo-terminal delivers whole frames at once, so their duration is unknown.
   const Time begun = event.items.size() == 1 ? event.at - line_.character() : event.at;
   const Time idle = begun - quiet_since_;
   if (frame_.empty()) {
@@ -87,7 +90,7 @@ void Server::hear(const ByteEvent& event) {
 }
 
 void Server::frame_ended(Time at) {
-  // On a line of bits the silence is told when it has come; elsewhere whenever this program is let run.
+  // On a real line the silence is reported in time; otherwise whenever this program is scheduled.
   late_ = at - quiet_since_ > frame_silence(line_) + late;
   if (!damaged_ && crc_order(frame_) == CrcOrder::low_first) {
     reply_.clear();

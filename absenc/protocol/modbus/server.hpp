@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Server side of a Modbus RTU line: finds frames by their silence, answers in time, and lists the rules of the line
-// that its client breaks. What the frames say is the subclass's.
+// Server side of a Modbus RTU line: finds frames by silence, replies in time, and checks the client's timing. A
+// subclass decodes the frames.
 #pragma once
 
 #include <cstdint>
@@ -29,21 +29,21 @@ class Server : public Device<std::uint8_t> {
   explicit Server(const LineSettings& line) : line_(line) {}
   ~Server() = default;
 
-  /// Power has come: `set_rate` says at which rate it listens.
+  /// Called at power on; must call `set_rate`.
   virtual void started() = 0;
-  /// A frame with a good CRC, which `body` no longer has, came for whomever. Appends the reply without its CRC, or
-  /// nothing. `heed_line` tells that the frame was meant for this server.
+  /// Called for a frame with a valid CRC and any address; `body` is without the CRC. Appends the reply without its CRC,
+  /// or nothing. Must call `heed_line` if the frame is for this server.
   virtual void request(Bytes body, Time at, FrameBytes& reply) = 0;
 
-  /// Once what is being sent has left.
+  /// Changes the rate after the present transmission.
   void set_rate(std::uint32_t rate);
-  /// The host did what a rule of the document is about: whether it kept it, which is returned.
+  /// Records whether the host kept a rule of the document; returns `kept`.
   bool expect(bool kept, std::string_view rule, Time at) { return rules_.expect(kept, rule, at); }
-  /// The rules of the line, of this frame: of frames for others they say nothing.
+  /// Checks the line timing of this frame. Frames for other servers are not checked.
   void heed_line(Time at);
-  /// The request that is being answered may be answered by others at the same time.
+  /// Announces that other servers may answer this request at the same time.
   void expect_company() { company_ = true; }
-  /// Of the reply to this request: low_first, if this is not called, or high_first.
+  /// Sets the CRC byte order of this reply; default is low_first.
   void order_crc(CrcOrder order) { crc_order_ = order; }
   /// Appends a refusal.
   static void refuse(FrameBytes& reply, std::uint8_t address, std::uint8_t function, Exception exception);
@@ -59,19 +59,19 @@ class Server : public Device<std::uint8_t> {
   std::uint32_t next_rate_ = 0;
 
   FrameBytes frame_;
-  bool damaged_ = false;  // a wrong character, or too many
-  bool follows_ = false;  // something was before it
-  bool early_ = false;    // it began too soon after that
-  bool gappy_ = false;    // too much time between two of its characters
-  bool heard_ = false;    // anything, since power on
-  bool late_ = false;     // it ended so long ago that its client need not wait for the reply any more
+  bool damaged_ = false;  // the frame has a damaged character, or too many characters
+  bool follows_ = false;  // something was received or sent before this frame
+  bool early_ = false;    // the frame began too soon after it
+  bool gappy_ = false;    // two characters of the frame were too far apart
+  bool heard_ = false;    // anything was received or sent since power on
+  bool late_ = false;     // the frame ended so long ago that its client may have timed out
   bool company_ = false;
   Time quiet_since_{};
   FrameBytes reply_;
   CrcOrder crc_order_ = CrcOrder::low_first;
   bool reply_pending_ = false;
   bool transmitting_ = false;
-  bool interrupted_ = false;  // something came while it was
+  bool interrupted_ = false;  // something was received during the transmission
   Time reply_at_{};
   HostRules rules_;
   std::uint64_t answer_count_ = 0;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A virtual SSI encoder: a shift register that is loaded when its pause is over.
+// A virtual SSI encoder: a shift register that is loaded when the pause is over.
 #pragma once
 
 #include <algorithm>
@@ -12,7 +12,7 @@ namespace absenc::ssi {
 
 class VirtualEncoder final : public author::ClockedDevice {
  public:
-  /// Switched off until `power_on`. `shaft` must outlive the encoder.
+  /// Creates an encoder that is off until `power_on`. `shaft` must outlive it.
   VirtualEncoder(const Format& format, const Shaft& shaft) : format_(format), shaft_(&shaft) {}
 
  private:
@@ -27,7 +27,7 @@ class VirtualEncoder final : public author::ClockedDevice {
   const Shaft* shaft_;
   Word latched_{};
   std::size_t shifted_ = 0;  // bits of `latched_` that were clocked out
-  Time free_at_{};           // when the pause after the last clock is over
+  Time free_at_{};           // end of the pause after the last clock
 };
 
 }  // namespace absenc::ssi

@@ -16,39 +16,43 @@ namespace absenc::ssi {
 using namespace std::chrono_literals;
 
 inline constexpr LineSettings line_settings{.rate = 200'000, .spi_mode = 3, .idle_clocks = 1};
-inline constexpr Time pause_margin = 10us;  // what the host leaves on top of Tm
+inline constexpr Time pause_margin = 10us;  // time that the host adds to the pause
 
-/// What the encoder sends when it is clocked on.
+/// Bits that the encoder sends if the clock continues after the word.
 enum class AfterWord : std::uint8_t {
   repeat,
   zero,
   one,
-  separated,  // a zero, and the word again
+  separated,  // a zero, then the word again
 };
 
 struct Format {
   WordFormat word = "position:12"_word;
   AfterWord after_word = AfterWord::repeat;
-  unsigned extra_clocks = 0;  // behind the word, to be compared; as many as the word has bits read it twice
+  // Clocks after the word, for comparison; with as many as the word has bits, the word is read twice.
+  unsigned extra_clocks = 0;
   Scale scale{};
-  bool error_parity = false;      // the last bit is a parity that the encoder inverts when its position is wrong
-  bool padded = false;            // what the word skips is filled with zeros
-  std::uint32_t confirm_rpm = 0;  // the word is read once more: so fast can the shaft have moved; 0: read once
-  // What varies by product (RAA38S6 3.5, note).
-  Time pause = 50us;  // more than the encoder's monoflop time Tm between two words, or the old one goes on
+  bool error_parity = false;  // the last bit is a parity that the encoder inverts if its position is wrong
+  bool padded = false;        // skipped bits of the word must be zero
+  // The word is read once more, and the shaft may have moved with this speed; 0: read once.
+  std::uint32_t confirm_rpm = 0;
+  // Values that vary by product (RAA38S6 3.5, note).
+  // Pause between two words; it must exceed the encoder's monoflop time Tm, or the old word continues.
+  Time pause = 50us;
   std::uint32_t clock_khz = 200;
-  Time monoflop = 20us;  // Tm of the virtual encoder, at most `pause`; 0: that. Others have 9 to 41 us
-  // Of the virtual encoder: the clock that it allows. 250 kHz is also what Tcs says.
+  // Tm of the virtual encoder, at most `pause`; 0: equal to `pause`. Other encoders have 9 to 41 us.
+  Time monoflop = 20us;
+  // Clock range of the virtual encoder. Tcs in the document also gives 250 kHz.
   std::uint32_t slowest_khz = 100;
   std::uint32_t fastest_khz = 250;
 };
 
 inline constexpr std::size_t frame_capacity = 2 * WordFormat::maximum_bits;
 
-/// Clocks of one reading.
+/// Returns the clocks of one reading.
 [[nodiscard]] constexpr unsigned clocks(const Format& format) { return format.word.bits() + format.extra_clocks; }
 
-/// The bit at `index` (from 0) of a word that begins at `first` and is clocked on.
+/// Returns bit `index` (from 0) of a clock sequence that continues after the word. The word begins at `first`.
 [[nodiscard]] constexpr bool bit_behind(const Format& format, BitView word, std::size_t index, std::size_t first = 0) {
   const std::size_t bits = format.word.bits();
   if (index < bits || format.after_word == AfterWord::repeat) return word[first + index % bits];
@@ -66,7 +70,7 @@ namespace detail {
   const std::size_t both = 2 * word + (format.after_word == AfterWord::separated ? 1 : 0);
   const bool twice = format.extra_clocks == 0 && bits.size == both;
   if (bits.size == clocks(format) || twice) return Error::none;
-  // More clocks than the word has bits: read as one number, it is larger than any position.
+  // More clocks than the word has bits: taken as one number, the bits exceed any position.
   for (std::size_t i = 0; i + word < bits.size; ++i) {
     if (bits[i]) return Error::out_of_range;
   }
@@ -114,27 +118,28 @@ constexpr Result<typename Source::Word> decode_by(const Source& source, BitView 
 
 }  // namespace detail
 
-/// The word in `bits` from `first` on, of which all that follow must be what the encoder sends behind it. Errors:
-/// line_stuck (all bits are alike, and behind the word they should not be), bad_checksum (parity), cross_check_failed
-/// (what follows the word is not what it should be).
+/// Decodes the word in `bits` from `first` on; all further bits must be those that the encoder sends after it. Errors:
+/// line_stuck (all bits alike although the bits after the word must differ), bad_checksum (parity), cross_check_failed
+/// (wrong bits after the word).
 [[nodiscard]] constexpr Result<Word> decode_clocked_on(const Format& format, BitView bits, std::size_t first = 0) {
   return detail::decode_clocked_on(Given<Format>{format, format.word}, bits, first);
 }
 
-/// A reading of `clocks(format)` bits, or of the word twice where no extra clocks are asked for. Errors: wrong_length;
-/// out_of_range (too many clocks, and what was read is no position); those of decode_clocked_on.
+/// Decodes a reading of `clocks(format)` bits, or the word twice if the format has no extra clocks. Errors:
+/// wrong_length, out_of_range (too many clocks, and their bits as one number exceed any position), those of
+/// decode_clocked_on.
 [[nodiscard]] constexpr Result<Word> decode(const Format& format, BitView bits) {
   return detail::decode_by(Given<Format>{format, format.word}, bits);
 }
 
-/// The same of a format that is known when the program is written, at the cost of what a hand would write for it. The
-/// word has `values` only where the format has some.
+/// Decodes a word whose format is known at compile time, as fast as code written for it by hand. The result has
+/// `values` only if the format has some.
 template <const Format& format>
 [[nodiscard]] constexpr Result<typename Known<format>::Word> decode(BitView bits) {
   return detail::decode_by(Known<format>{}, bits);
 }
 
-/// The word; where its parity tells an error, with that.
+/// Encodes the word. With `error_parity`, an error inverts the parity bit.
 template <std::size_t Capacity>
 constexpr bool encode_whole(const Format& format, const Word& word, BitBuffer<Capacity>& out) {
   BitBuffer<Capacity> right;
@@ -146,7 +151,7 @@ constexpr bool encode_whole(const Format& format, const Word& word, BitBuffer<Ca
   return true;
 }
 
-/// Appends the word and what follows it, `count` bits in all. False when `out` is too small.
+/// Appends the word and the bits after it, `count` bits in all. Returns false if `out` is too small.
 template <std::size_t Capacity>
 constexpr bool encode(const Format& format, const Word& word, std::size_t count, BitBuffer<Capacity>& out) {
   BitBuffer<WordFormat::maximum_bits> coded;
@@ -157,8 +162,8 @@ constexpr bool encode(const Format& format, const Word& word, std::size_t count,
 
 enum class ErrorBit : std::uint8_t { none, active_high, active_low };
 
-/// The tree format, where turns and position meet at a fixed clock: before the turns and behind the position zeros fill
-/// `turns` and `steps` bits up.
+/// Returns the tree format, in which turns and position meet at a fixed clock: zeros before the turns and after the
+/// position fill up `turns` and `steps` bits.
 [[nodiscard]] constexpr WordFormat tree_format(const PositionBits& bits, unsigned turns, unsigned steps) {
   WordFormat word;
   const auto fill = [&word](unsigned count) {
@@ -172,7 +177,8 @@ enum class ErrorBit : std::uint8_t { none, active_high, active_low };
   return word;
 }
 
-/// The usual words: counts, Gray-coded or not, an error bit and a parity bit over all bits before it, where wanted.
+/// Returns the usual words: counts, optionally Gray-coded, then an error bit and a parity bit over all bits before it
+/// if wanted.
 [[nodiscard]] constexpr WordFormat word_with(WordFormat word, bool gray, ErrorBit error, Parity parity) {
   if (gray) word.set_gray();
   if (error != ErrorBit::none) word.add({"error", Meaning::error, 1, error == ErrorBit::active_low});

@@ -18,7 +18,8 @@ BitBuffer<256> bits(std::string_view text) {
 
 Result<Word> decode(const Format& format, std::string_view text) { return ssi::decode(format, bits(text).view()); }
 
-// 3.5: 8 clocks of 12 bits, converted with the formula for 12, are at most 22.4121 degrees: never shown.
+// Paragraph 3.5: 8 clocks of 12 bits, converted with the formula for 12, are at most 22.4121 degrees. They must give no
+// position.
 TEST(SsiFrame, TooFewClocksGiveNoPosition) {
   EXPECT_NEAR(degrees(255, 12), 22.4121, 0.0001);
   for (std::size_t size = 0; size < 12; ++size) {
@@ -26,7 +27,7 @@ TEST(SsiFrame, TooFewClocksGiveNoPosition) {
   }
 }
 
-// 3.5: 14 clocks of 12 bits, read as one number, are thousands of degrees.
+// Paragraph 3.5: 14 clocks of 12 bits, read as one number, are thousands of degrees.
 TEST(SsiFrame, TooManyClocksGiveNoPosition) {
   for (std::uint64_t position = 0; position < 4096; ++position) {
     BitBuffer<64> read;
@@ -38,7 +39,8 @@ TEST(SsiFrame, TooManyClocksGiveNoPosition) {
 
 TEST(SsiFrame, TheWordTwiceFindsAnyWrongBit) {
   const Format format{.extra_clocks = 12};
-  EXPECT_EQ(decode({}, "000111101111000111101111")->position, 495u);  // also where nobody asked for it
+  // the word twice is accepted without extra clocks too
+  EXPECT_EQ(decode({}, "000111101111000111101111")->position, 495u);
   std::string text = "000111101111000111101111";
   for (char& c : text) {
     c ^= 1;
@@ -48,7 +50,7 @@ TEST(SsiFrame, TheWordTwiceFindsAnyWrongBit) {
   EXPECT_EQ(decode(format, text.substr(0, 12)).error(), Error::wrong_length);
 }
 
-// A reader with one bit too few or too many sees it in what follows.
+// A reader with one bit too few or too many finds the error in the bits after the word.
 TEST(SsiFrame, ExtraClocksFindAWrongNumberOfBits) {
   unsigned missed = 0;
   for (std::uint64_t position = 0; position < 4096; ++position) {
@@ -59,7 +61,7 @@ TEST(SsiFrame, ExtraClocksFindAWrongNumberOfBits) {
       if (ssi::decode({.word = word, .extra_clocks = wrong}, read.view())) ++missed;
     }
   }
-  EXPECT_EQ(missed, 4u);  // all bits alike: 0 and 4095
+  EXPECT_EQ(missed, 4u);  // positions 0 and 4095, whose bits are all alike
 }
 
 TEST(SsiFrame, AfterTheWord) {
@@ -83,7 +85,8 @@ TEST(SsiFrame, WhatHasNoRoomIsNotEncoded) {
   EXPECT_EQ(room.size(), 64u);
 }
 
-// Good words, damaged and cut ones: a format known at compile time says the same as at run time.
+// Decodes valid, damaged and cut words: a format known at compile time must give the same results as one known at run
+// time.
 template <const Format& format>
 void agree() {
   sim::Random random(1);
@@ -100,7 +103,7 @@ void agree() {
     ASSERT_EQ(known.error(), given.error());
     if (!given) continue;
     ++good;
-    // What is accepted is the word that its fields make, with what follows it.
+    // An accepted word must equal the word that its fields encode, with the bits after it.
     BitBuffer<frame_capacity> again;
     EXPECT_TRUE(encode(format, *given, read.size(), again));
     for (std::size_t k = 0; k < again.size(); ++k) ASSERT_EQ(again.view()[k], (BitView{copy, read.size()}[k])) << k;

@@ -9,7 +9,7 @@
 
 namespace absenc::ssi {
 
-/// SSI as the engine uses it. The port has the rate of the clock already.
+/// SSI for the engine. The port is set to the clock rate already.
 struct Protocol {
   using Format = ssi::Format;
   using Request = author::NoRequest;
@@ -28,23 +28,23 @@ struct Protocol {
   }
 };
 
-/// Whether a shaft that turns so fast at most can have gone from one word to the next in this time; or back.
+/// Returns whether a shaft with at most `confirm_rpm` can have moved between the two words, in either direction.
 [[nodiscard]] constexpr bool can_follow(const Format& format, const Word& before, const Word& after, Time between) {
   const unsigned bits = format.word.bits_of(Meaning::position);
   const unsigned turns = format.word.bits_of(Meaning::multiturn);
   const std::uint64_t mask = low_mask(bits + turns);
   const std::uint64_t way = ((after.multiturn << bits | after.position) - (before.multiturn << bits | before.position));
   const std::uint64_t counts = std::min(way & mask, (~way + 1) & mask);
-  // Of a turn, in parts of 2^32: a second has 60 times fewer of them than a minute.
+  // In 2^-32 of a turn: at 60 rpm, which is one turn per second, the shaft moves 4295 per microsecond.
   const auto moved = static_cast<std::uint64_t>(between.count()) / 1000 * format.confirm_rpm / 60 * 4295 + 1;
   const std::uint64_t reach = bits >= 32 ? moved << (bits - 32) : moved >> (32 - bits);
   return counts <= reach + 1;
 }
 
-/// One word, and the bits behind it that `format.extra_clocks` asks for.
+/// Reads one word, with the bits after it that `format.extra_clocks` requests.
 using ReadPosition = author::ReadClocked<Protocol>;
 
-/// Two words, of which the second counts: one that the shaft cannot have reached is none (cross_check_failed).
+/// Reads two words and takes the second. Error also: cross_check_failed (the shaft cannot have moved that far).
 class ConfirmPosition : public author::ClockedHostOf<Protocol> {
  public:
   explicit ConfirmPosition(const Format& format) : ClockedHostOf(format) {}

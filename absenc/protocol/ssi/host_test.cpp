@@ -15,7 +15,7 @@
 namespace absenc::ssi {
 namespace {
 
-/// 12 bits at 495, as the manual's example.
+/// An encoder of 12 bits at 495, the example of the manual.
 struct Bench : biss::testing::ClockedBench<VirtualEncoder> {
   explicit Bench(const Format& format = {}) : ClockedBench(line_settings, format) {
     shaft.state.position = std::int64_t{495} << 20;
@@ -104,7 +104,7 @@ TEST(SsiHost, AWordReadOnceMoreMustBeNear) {
   EXPECT_NE(read.reading(), nullptr);
   EXPECT_EQ(bench.encoder.answer_count(), 2u);
 
-  // Half a turn between the two words, as of a line that is noisy.
+  // The shaft moves half a turn between the two words, as on a noisy line.
   bench.line.observe_transfers([&](const auto&) { bench.shaft.state.position += std::int64_t{1} << 31; });
   ConfirmPosition jumped(format);
   EXPECT_EQ(bench.run(jumped).error(), Error::cross_check_failed);
@@ -123,7 +123,7 @@ TEST(SsiHost, SaysWhatToDo) {
   EXPECT_THAT(said(Error::bad_checksum, {}), HasSubstr("parity"));
   EXPECT_THAT(said(Error::out_of_range, {{"tree_turns", "12"}, {"tree_steps", "13"}}), HasSubstr("fills the word up"));
   EXPECT_THAT(said(Error::out_of_range, {}), HasSubstr("more clocks than the word has bits"));
-  // SSI knows nothing more about these.
+  // The unit has no explanation of its own for these errors.
   for (const Error error : {Error::line_stuck, Error::wrong_length}) EXPECT_EQ(said(error, {}), "");
 }
 
@@ -140,7 +140,7 @@ TEST(SsiHost, AnErrorThatTheParityTellsIsNoPosition) {
   EXPECT_EQ(alarmed.reading()->alarms, word_error);
 }
 
-// ---- The virtual encoder, clocked by hand
+// ---- The virtual encoder with raw clocks
 
 TEST(SsiDevice, RepeatsItsWordOrSendsZerosOrOnes) {
   for (const auto& [after, wanted] :

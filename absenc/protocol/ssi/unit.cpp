@@ -15,7 +15,7 @@ namespace {
 
 using namespace author;
 
-// `error`: an even one that is inverted when the position is wrong.
+// `error`: an even parity that is inverted if the position is wrong.
 enum class WordParity : std::uint8_t { none, odd, even, error };
 
 struct Settings : WordSettings<Format> {
@@ -88,7 +88,7 @@ constexpr bool is_possible(const Format& format) {
   return absenc::is_usable(format.word) && clocks(format) <= frame_capacity;
 }
 
-// ---- What is shown
+// ---- Reported fields
 
 constexpr void put_reply(FieldSink& sink, const Format& format, const NoRequest&, const Word& word) {
   put_word(sink, format.word, word, format.scale);
@@ -110,7 +110,7 @@ Explanation explain(const Format& format, Error error, Bytes, Bytes) {
 
 constexpr Report<Protocol> report{.put_reply = put_reply, .explain = explain};
 
-// ---- What is declared
+// ---- Declaration
 
 constexpr auto commands = std::array{
     clocked_reading<report>({"position", Verb::read, 0, "position and turns"})
@@ -119,7 +119,7 @@ constexpr auto commands = std::array{
         .only_if(is_possible),
 };
 
-// SSI has no checksum.
+// SSI has no checksum, so no wrong bit is detected for certain.
 bool is_checked(const Options&, Frame, Frame, std::size_t) { return false; }
 BitRanges bits_in(const Options& values, Frame, Frame, const FieldInfo& field) {
   return place_in_word(format_by(values).word, field, 0);

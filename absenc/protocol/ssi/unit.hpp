@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// SSI as the neutral layers see it.
+// SSI as a unit.
 #pragma once
 
 #include "absenc/protocol/unit.hpp"

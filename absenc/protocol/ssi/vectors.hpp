@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// SSI words with their source.
+// SSI test words with their source.
 #pragma once
 
 #include <array>
