@@ -1,8 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Every command of absenc that a text of the sources names exists, and is written in one form.
-
-tests/kit/advice.cpp carries out what alarms and errors advise; this test reads all other texts: doctor's, the page's,
-help, notes."""
+"""Checks that every command of absenc which a text in the sources names exists and is written in the same form.
+tests/kit/advice.cpp follows the advice for alarms and errors; this test covers all other texts: doctor, the page, help
+and notes."""
 
 import os
 import re
@@ -17,7 +16,7 @@ TWO_WORDS = {"config", "memory", "crc"}
 
 
 def literals(source):
-    """The texts of a source; those that the compiler joins as one."""
+    """Returns the string literals of a source; adjacent literals are joined as by the compiler."""
     text = source.read_text(encoding="utf-8")
     text = re.sub(r"(?m)^\s*//.*$", "", text)
     text = re.sub(r'"\s*\n\s*"', "", text)
@@ -31,7 +30,7 @@ def sources():
 
 
 def named_commands():
-    """(source, "absenc scan") of each command in backquotes."""
+    """Yields (source, "absenc scan") for each command in backquotes."""
     for source in sources():
         for text in literals(source):
             for quoted in re.findall(r"`([^`]*)`", text):
@@ -39,7 +38,7 @@ def named_commands():
 
 
 class NamedCommands(unittest.TestCase):
-    def test_each_exists(self):
+    def test_named_commands_exist(self):
         verbs = {}
         for source, quoted in named_commands():
             words = quoted.split()
@@ -47,7 +46,7 @@ class NamedCommands(unittest.TestCase):
                 continue
             verb = tuple(words[1:3] if words[1] in TWO_WORDS else words[1:2])
             if not re.fullmatch(r"[a-z-]+", verb[0]) or verb[0].startswith("-"):
-                continue  # a place for a verb, or an option
+                continue  # a placeholder for a verb, or an option
             verbs.setdefault(verb, f"{source}: `{quoted}`")
         self.assertGreater(len(verbs), 15)
         for verb, where in verbs.items():
@@ -55,7 +54,7 @@ class NamedCommands(unittest.TestCase):
                 result = subprocess.run([ABSENC, *verb, "--help"], capture_output=True, text=True, timeout=30, check=False)
                 self.assertEqual(result.returncode, 0, result.stderr)
 
-    def test_each_is_written_with_the_name_of_the_tool(self):
+    def test_commands_begin_with_tool_name(self):
         refusal = subprocess.run([ABSENC, "no-verb"], capture_output=True, text=True, timeout=30, check=False).stderr
         verbs = set(re.search(r"known are: (.*)", refusal)[1].split(", "))
         self.assertIn("clear-alarms", verbs)
@@ -63,8 +62,8 @@ class NamedCommands(unittest.TestCase):
             with self.subTest(f"{source}: `{quoted}`"):
                 self.assertNotIn(quoted.split(" ")[0], verbs)
 
-    def test_what_is_typed_stands_in_backquotes(self):
-        """`sudo ...` and the like, which people copy."""
+    def test_shell_commands_stand_in_backquotes(self):
+        """Covers `sudo ...` and similar commands, which users copy."""
         for source in sources():
             for text in literals(source):
                 rest = re.sub(r"`[^`]*(`|$)", "", text)

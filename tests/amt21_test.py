@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""amt21: turns have a sign wherever they are shown, and a scan finds the encoder."""
+"""Tests amt21: turns have a sign in every output, and a scan finds the encoder."""
 import csv
 import io
 import unittest
@@ -10,7 +10,7 @@ BACKWARDS = "sim:amt21?model=AMT21xD&multiturn=-3"
 
 
 class Turns(Case):
-    def test_read_shows_what_turns_shows(self):
+    def test_read_and_turns_agree(self):
         for address in (BACKWARDS, "sim:amt21?model=AMT21xD&multiturn=16381"):
             with self.subTest(address):
                 self.assertRegex(absenc("read", address).stdout, r"\D-3 turns")
@@ -20,13 +20,13 @@ class Turns(Case):
                 self.assertEqual(row["multiturn"], "-3")
                 self.assertIn("-3 revolutions", absenc("run", address, "turns").stdout)
 
-    def test_captures(self):
+    def test_capture_shows_negative_turns(self):
         file = self.file("wave.vcd")
         absenc("wave", BACKWARDS.removeprefix("sim:"), file, "--command", "turns")
         row, = json_lines(absenc("decode", "amt21", file, "--json", "--option", "multiturn_bits=14").stdout)
         self.assertEqual(row["fields"]["multiturn"], -3)
 
-    def test_recordings(self):
+    def test_recording_has_negative_turns(self):
         file = self.file("turns.csv")
         absenc("record", BACKWARDS, "--output", file, "--count", "2")
         with open(file, encoding="utf-8") as lines:
@@ -34,7 +34,7 @@ class Turns(Case):
         self.assertEqual([row["multiturn"] for row in rows], ["-3", "-3"])
         self.assertEqual(int(rows[0]["position"]), -3 * 16384 + int(rows[0]["singleturn"]))
 
-    def test_what_cannot_be_is_refused(self):
+    def test_refuses_turns_out_of_range(self):
         for turns in (-8193, 16384):
             refused = absenc("read", f"sim:amt21?model=AMT21xD&multiturn={turns}")
             self.assertEqual(refused.returncode, 2)

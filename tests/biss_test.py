@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""BiSS of the command: frames of many encoders, safety words, chains, control frames, and registers."""
+"""Tests BiSS with the command: frames of several encoders, safety words, chains, control frames and registers."""
 import bisect
 import json
 import os
@@ -28,7 +28,7 @@ def numbers(text):
 
 
 class Vectors(Case):
-    """What a vector calls a list the command shows as text; a channel, or a safety word, by its prefix."""
+    """The command prints a list of a vector as text. Fields of a channel or of a safety word have a prefix."""
 
     def check(self, vector, answer, fields):
         if "error" in vector:
@@ -70,7 +70,7 @@ class Vectors(Case):
                 self.assertEqual(numbers(answer["fields"].get(name, "")), fields.pop(name), (vector["id"], name))
         self.check(vector, answer, fields)
 
-    def test_all_of_them(self):
+    def test_decodes_all_vectors(self):
         seen = set()
         for vector in vectors():
             with self.subTest(vector["id"]):
@@ -83,7 +83,7 @@ class Vectors(Case):
 
 
 def crc6(bits):
-    """x^6 + x + 1, inverted."""
+    """Returns the CRC of polynomial x^6 + x + 1, inverted."""
     rest = 0
     for bit in bits + "000000":
         rest = rest << 1 | int(bit)
@@ -92,7 +92,7 @@ def crc6(bits):
 
 
 class LongChains(Case):
-    def test_eight_words_are_decoded(self):
+    def test_decodes_eight_words(self):
         places = [(12 + index, 0x5A5A5A * (index + 1) % (1 << 12 + index)) for index in range(8)]
         words = [f"{place:0{bits}b}" + ("10" if bits == 14 else "11") for bits, place in places]
         frame = "11000010" + "".join(word + crc6(word) for word in words)
@@ -107,7 +107,7 @@ class LongChains(Case):
         self.assertEqual(damaged["error"], "bad_checksum")
 
 
-    def test_a_word_is_that_of_all_of_them(self):
+    def test_word_option_applies_to_every_slave(self):
         chain = "sim:biss-chain?slaves=5&word=skip:3 position:24 temperature=value:8 error:1! warning:1!"
         for slave in (0, 4):
             result = absenc("read", f"{chain}&slave={slave}&unit_um=0.05", "--json")
@@ -132,7 +132,7 @@ class Registers(Case):
         self.assertEqual(result.returncode, 0, result.stderr)
         return json_lines(result.stdout)[0]["answers"]["info"]["fields"]
 
-    def test_a_register_is_read_and_written(self):
+    def test_reads_and_writes_register(self):
         info = self.info("sim:biss")
         self.assertEqual(info["serial_number"], 1)
         self.assertEqual(info["slaves"], 1)
@@ -142,18 +142,18 @@ class Registers(Case):
         written = absenc("memory", "write", "sim:biss", "3", "0x5A", "--yes", "--json")
         self.assertEqual(written.returncode, 0, written.stderr)
 
-    def test_an_id_that_nobody_has(self):
+    def test_unused_slave_id_is_reported(self):
         result = absenc("memory", "read", "sim:biss?slave=3", "0")
         self.assertEqual(result.returncode, 1)
         self.assertIn("no encoder answers", result.stderr)
 
-    def test_every_encoder_of_a_chain_has_its_own(self):
+    def test_each_encoder_of_chain_has_own_registers(self):
         for slave in (0, 1, 2):
             info = self.info(f"sim:biss-chain?slaves=3&slave={slave}")
             self.assertEqual((info["slave_id"], info["serial_number"], info["slaves"]), (slave, slave + 1, 3))
 
-    def test_eight_encoders_are_read_emulated_and_decoded(self):
-        """As many as a frame can have: each with a word of its own."""
+    def test_reads_emulates_and_decodes_eight_encoders(self):
+        """Eight is the maximum in a frame. Each encoder has a different word length."""
         bits = {index: 12 + index for index in range(8)}
         chain = "slaves=8&" + "&".join(f"channel{index}_singleturn_bits={count}" for index, count in bits.items())
         for slave in (0, 4, 7):
@@ -175,10 +175,10 @@ class Registers(Case):
         asked = [row["fields"] for row in rows if row["kind"] == "exchange"]
         self.assertEqual([(one["slaves"], one["data"]) for one in asked], [(8, "00000001")])
 
-    def test_an_encoder_that_has_safety_words_has_registers_too(self):
+    def test_safety_encoder_has_registers(self):
         self.assertEqual(self.info("sim:biss-safety")["slaves"], 2)
 
-    def test_a_capture_shows_them_beside_the_positions(self):
+    def test_capture_shows_register_access_beside_positions(self):
         with tempfile.TemporaryDirectory() as directory:
             path = os.path.join(directory, "drive.vcd")
             result = absenc("wave", "biss?motion=rpm=600", path, "--command", "memory-read 68 0 4",
@@ -197,13 +197,15 @@ class Registers(Case):
         self.assertEqual((control[-1]["operation"], control[-1]["address"], control[-1]["data"]), ("read", 3, "5a"))
 
 
-    def test_sigrok_sees_the_same_positions(self):
-        """Its SPI decoder takes the bits, and a motor controller's way the frame apart: the position frame is the old one."""
+    def test_sigrok_decodes_same_positions(self):
+        """sigrok's SPI decoder reads the bits. The frame is split as by a motor controller that only knows position
+        frames."""
         with tempfile.TemporaryDirectory() as directory:
             path = os.path.join(directory, "drive.vcd")
             self.assert_good(absenc("wave", "biss?motion=rpm=600", path, "--command", "memory-read 68 0 4"))
             rows = json_lines(absenc("decode", "biss", path, "--json").stdout)
-            # "146500-146500 spi-1: 01": one bit, and when; each frame has its own, and then the clock rests for 40 us.
+            # A line such as "146500-146500 spi-1: 01" is one bit with its time. The clock pauses for 40 us after each
+            # frame.
             seen = subprocess.run(["sigrok-cli", "-I", "vcd", "-i", path, "--protocol-decoder-samplenum", "-P",
                                    "spi:clk=clock:miso=data:cpol=1:cpha=1:wordsize=1", "-A", "spi=miso-data"],
                                   capture_output=True, text=True, timeout=60, check=True).stdout.splitlines()
@@ -225,7 +227,7 @@ class Registers(Case):
 
 
 class Settings(Case):
-    def test_the_timeout_is_that_of_both_sides(self):
+    def test_timeout_applies_to_host_and_encoder(self):
         for timeout in ("timeout_us=12.5", "timeout_us=40", "adaptive_timeout=true"):
             for unit in ("biss", "biss-safety", "biss-chain"):
                 with self.subTest(timeout=timeout, unit=unit):
@@ -254,7 +256,7 @@ class Settings(Case):
         self.assert_wrong_usage(absenc("memory", "read", page, "0", "--page", "256"), "page 1 to 255: 0x00 to 0x3F")
         self.assertIn("page 1 to 255: 0x00 to 0x3F", absenc("list", "biss").stdout)
 
-    def test_turns_of_24_bits_have_models(self):
+    def test_models_with_24_turn_bits(self):
         for model, bits in (("RLM", 16), ("RLH", 24)):
             reading, = json_lines(absenc("read", f"sim:biss-safety?model={model}&multiturn=16777215", "--json").stdout)
             self.assertEqual((reading["multiturn"], reading["multiturn_bits"], reading["singleturn_bits"]),
@@ -262,7 +264,7 @@ class Settings(Case):
 
 
 def crc(bits, polynomial, width):
-    """Of a text of bits, inverted, as BiSS has it: written from the document alone."""
+    """Returns the inverted CRC of a text of bits, implemented from the BiSS document alone."""
     remainder = 0
     for bit in bits:
         top = (remainder >> (width - 1) & 1) != int(bit)
@@ -271,7 +273,7 @@ def crc(bits, polynomial, width):
 
 
 def safety_words(position, counter):
-    """CPW of 24 bits and SPW of 16 bits of one position."""
+    """Returns the CPW (24 bits) and SPW (16 bits) of one position."""
     cpw = format(position, "024b") + "11"
     spw = format(position >> 8, "016b") + "11" + format(counter, "06b")
     return cpw + crc(cpw, 0x03, 6) + spw + crc(spw, 0x90D9, 16)
@@ -287,7 +289,8 @@ def control_crc(bits):
 
 
 def register_frame(slave, address, data, write=False, delays=None):
-    """CDM and CDS of one control frame, frame by frame, as D2 draws them. `delays`: frames until each start bit."""
+    """Returns the CDM and CDS bits of one control frame, one bit per frame, as in drawing D2. `delays`: frames before
+    each start bit."""
     delays = delays or [0] * len(data)
     header = "1" + format(slave, "03b") + format(address, "07b")
     cdm = "0" * 14 + "1" + header + control_crc(header) + ("011" if write else "101")
@@ -300,7 +303,7 @@ def register_frame(slave, address, data, write=False, delays=None):
 
 
 def command_frame(slaves, command):
-    """The same of a command, which all that it addresses acknowledge."""
+    """Returns the CDM and CDS bits of a command, which every addressed encoder acknowledges."""
     header = "0" + "".join("1" if slaves >> i & 1 else "0" for i in range(8)) + format(command, "02b")
     there = max(slaves.bit_length(), 1)
     cdm = "0" * 14 + "1" + header + control_crc(header) + "1"
@@ -321,7 +324,8 @@ def plain_word(position):
 
 
 def draw_frames(words, cdm="", cds=""):
-    """A VCD of frames at 1 MHz with 20 us of timeout, edge by edge; bit by bit with what is said in control frames."""
+    """Returns a VCD of frames at 1 MHz with a timeout of 20 us. `cdm` and `cds` are the bits of control frames, one per
+    frame."""
     lines = ["$timescale 1 ns $end", "$var wire 1 c clock $end", "$var wire 1 d data $end", "$enddefinitions $end",
              "#0", "1c", "1d"]
     now = 100_000
@@ -339,7 +343,7 @@ def draw_frames(words, cdm="", cds=""):
 
 
 def wires_of(path):
-    """When clock and data change in a VCD of `wave`, in nanoseconds: (time, level) of each."""
+    """Returns the changes of clock and data in a VCD of `wave`, each as (time in nanoseconds, level)."""
     wires = {'!': [], '"': []}
     now = 0
     with open(path, encoding="utf-8") as file:
@@ -352,13 +356,14 @@ def wires_of(path):
 
 
 def level_at(wire, time):
-    """The level just before `time`."""
+    """Returns the level just before `time`."""
     return wire[bisect.bisect_left(wire, (time, "")) - 1][1]
 
 
 def read_frames(path):
-    """The frames on two wires, from the document alone: position, CDM and CDS of each. MA's rising edges take what SLO
-    was; a frame ends where SLO rises while MA has no edge, and the level of MA there is CDM, inverted."""
+    """Decodes the frames on the two wires as the document describes them: position, CDM and CDS of each. SLO is sampled
+    at the rising edges of MA. A frame ends where SLO rises without an edge of MA; the inverted level of MA there is the
+    CDM bit."""
     clock, data = wires_of(path)
     ends = [at for at, level in data[1:] if level == "1"]
     edges = [at for at, level in clock[1:] if level == "1"]
@@ -379,7 +384,7 @@ def read_frames(path):
 
 
 def registers_in(frames):
-    """The control frames of registers: (slave, address, bytes, whether they were written)."""
+    """Returns the register accesses: (slave, address, bytes, whether they were written)."""
     cdm, cds = ("".join(frame[which] for frame in frames) for which in (1, 2))
     found, at = [], cdm.find("0" * 14 + "1")
     while at >= 0:
@@ -410,7 +415,7 @@ class LifeCounter(Case):
         path = self.file("frames.vcd", draw_frames(words))
         return [row.get("error") for row in json_lines(absenc("decode", unit, path, "--json", *options).stdout)]
 
-    def test_a_capture_whose_counter_stands_or_jumps_says_so(self):
+    def test_capture_reports_stuck_or_jumping_life_counter(self):
         wrong = "sequence_mismatch"
         for unit, word in (("biss", counted_word), ("biss-safety", safety_words)):
             with self.subTest(unit):
@@ -419,12 +424,12 @@ class LifeCounter(Case):
                 self.assertEqual(self.errors(unit, of([62, 63, 0, 1])), [None] * 4)
                 self.assertEqual(self.errors(unit, of([7] * 24)), [None] + [wrong] * 23)
                 self.assertEqual(self.errors(unit, of([1, 2, 5, 6, 6, 7])), [None, None, wrong, None, wrong, None])
-                # Behind a damaged frame it may be any number, but not the same.
+                # After a damaged frame the counter may have any value except the last one.
                 damaged = of([1, 2, 3, 5])
                 damaged[2] = damaged[2][:3] + ("0" if damaged[2][3] == "1" else "1") + damaged[2][4:]
                 self.assertEqual(self.errors(unit, damaged), [None, None, "bad_checksum", None])
 
-    def test_both_words_show_the_same_place(self):
+    def test_reports_different_positions_in_both_words(self):
         words = [safety_words(5000, 1), safety_words(5000, 2)]
         other = safety_words(5000 + (3 << 11), 2)
         mixed = words[1][:32] + other[32:]
@@ -432,13 +437,13 @@ class LifeCounter(Case):
         self.assertEqual(self.errors("biss-safety", [words[0], mixed]), [None, "cross_check_failed"])
 
 
-class Wires(Case):
+class Waveforms(Case):
     def changes(self, encoder):
         path = self.file("wires.vcd")
         self.assert_good(absenc("wave", encoder, path, "--force"))
         return wires_of(path)
 
-    def test_the_timeout_and_the_monoflop_are_drawn(self):
+    def test_draws_timeout_and_monoflop(self):
         for encoder, low in (("biss", 20_000), ("biss?timeout_us=12.5", 12_500), ("biss?timeout_us=40", 40_000),
                              ("biss?adaptive_timeout=true", 1500), ("biss?adaptive_timeout=true&ma_khz=100", 15_000),
                              ("biss-chain?slaves=8", 20_000), ("biss-safety", 20_000),
@@ -448,8 +453,8 @@ class Wires(Case):
                 last_edge = clock[-1][0]
                 self.assertEqual((clock[-1][1], data[-1]), ("1", (last_edge + low, "1")))
 
-    def test_slo_is_low_behind_the_crc(self):
-        """A line whose delay is found by many clocks more than the frame has."""
+    def test_slo_is_low_after_crc(self):
+        """Uses a line delay that needs many clocks more than the frame has."""
         path = self.file("wires.vcd")
         self.assert_good(absenc("wave", "biss?line_delay_ns=4300&singleturn=275087", path))
         rows = json_lines(absenc("decode", "biss", path, "--json").stdout)
@@ -459,7 +464,7 @@ class Wires(Case):
                              ("111111" + "0" * 10 + "10" + plain_word(275087).rstrip("0"), {"0"}), row)
             self.assertGreater(len(samples), 100)
 
-    def test_each_slave_of_a_chain_takes_one_clock(self):
+    def test_each_slave_of_chain_uses_one_clock(self):
         for slaves in (1, 2, 8):
             answer, = json_lines(absenc("read", f"sim:biss-chain?slaves={slaves}", "--json").stdout)
             self.assertTrue(answer["singleturn_valid"])
@@ -469,28 +474,28 @@ class Wires(Case):
             self.assertEqual(row["fields"]["ack_bits"], 10 + slaves - 1)
 
 
-class Start(Case):
-    def test_an_encoder_that_waits_for_its_start_is_started(self):
+class StartSequence(Case):
+    def test_starts_encoder_that_waits_for_start(self):
         for encoder in ("sim:biss?start_sequence=true", "sim:biss-safety?start_sequence=true",
                         "sim:biss-chain?slaves=8&start_sequence=true"):
             with self.subTest(encoder):
                 self.assert_good(absenc("read", encoder, "--count", "3", "--json"))
                 self.assert_good(absenc("config", "get", encoder, "serial-number"))
 
-    def test_a_capture_shows_two_pulses_and_then_frames(self):
+    def test_capture_shows_two_pulses_before_frames(self):
         with tempfile.TemporaryDirectory() as directory:
             path = os.path.join(directory, "start.vcd")
             self.assert_good(absenc("wave", "biss?start_sequence=true", path, "--count", "2"))
             rows = json_lines(absenc("decode", "biss", path, "--json").stdout)
         self.assertEqual([(len(row["reply"]), row["ok"]) for row in rows],
                          [(41, False), (2, False), (41, True), (41, True)])
-        # 40 us before the pulses, and behind them: SLO is sampled at the end of half a clock.
+        # The gap before and after the pulses is 40 us. SLO is sampled half a clock later.
         for before, after in zip(rows[:2], rows[1:]):
             self.assertAlmostEqual(after["time_s"] - before["end_s"], 40.5e-6, delta=0.1e-6)
 
 
 class ChangedRegisters(Case):
-    def test_a_dump_is_loaded_and_verified(self):
+    def test_loads_and_verifies_dump(self):
         with tempfile.TemporaryDirectory(prefix="absenc-test-") as folder:
             dump = os.path.join(folder, "bank.dump")
             self.assert_good(absenc("memory", "dump", "sim:biss", "--output", dump))
@@ -508,11 +513,11 @@ class ChangedRegisters(Case):
             self.assert_good(loaded)
             self.assertIn("1 byte written and read back", loaded.stdout)
 
-    def test_the_bank_is_a_setting(self):
+    def test_bank_is_a_setting(self):
         answer = json.loads(absenc("config", "set", "sim:biss", "bank", "2", "--yes", "--json").stdout)
         self.assertEqual((answer["old"]["bank"], answer["new"]["bank"]), (0, 2))
 
-    def test_registers_that_have_a_name_are_settings(self):
+    def test_named_registers_are_settings(self):
         for chain, slave in (("sim:biss", 0), ("sim:biss-chain?slaves=3&slave=2", 2), ("sim:biss-safety?slave=1", 1)):
             result = absenc("config", "get", chain, "--json")
             self.assert_good(result)
@@ -522,12 +527,12 @@ class ChangedRegisters(Case):
                               "device-id": b"Absenc".hex(), "manufacturer": "ve"})
             self.assertEqual({fields["slave_id"] for fields in settings.values()}, {slave})
 
-    def test_those_that_say_who_it_is_can_only_be_read(self):
+    def test_identity_registers_are_read_only(self):
         for name in ("eds-bank", "profile", "serial-number", "device-id", "manufacturer"):
             refused = absenc("config", "set", "sim:biss", name, "1", "--yes")
             self.assert_wrong_usage(refused, f"{name} of biss can only be read")
 
-    def test_info_shows_them_once(self):
+    def test_info_shows_each_register_once(self):
         shown = absenc("info", "sim:biss", "--all").stdout
         for name in ("serial_number", "eds_bank", "device_id", "manufacturer", "profile"):
             self.assertEqual(shown.count(f"  {name} "), 1, shown)
@@ -537,14 +542,14 @@ class ChangedRegisters(Case):
         self.assertEqual((silent.returncode, silent.stdout.count("FAILED")), (1, 2), silent.stdout)
         self.assertIn("say slave=N", silent.stderr)
 
-    def test_a_command_is_acknowledged(self):
+    def test_command_is_acknowledged(self):
         answer = json.loads(absenc("run", "sim:biss", "control-command", "1", "0", "--yes", "--json").stdout)
         self.assertEqual((answer["fields"]["acknowledged"], answer["fields"]["executed"]), ("0", True), answer)
 
 
 
 class Requests(Case):
-    def test_a_control_request_is_encoded_and_decoded(self):
+    def test_encodes_and_decodes_control_request(self):
         for unit in ("biss", "biss-safety", "biss-chain"):
             cdm = absenc("encode", unit, "memory-write", "5", "0x42").stdout.strip()
             self.assertEqual(set(cdm), {"0", "1", " "})
@@ -553,12 +558,12 @@ class Requests(Case):
 
 
 class ControlFrames(Case):
-    """Control frames that are written here from the document alone, against those of the command."""
+    """Compares the command with control frames that this test builds from the document alone."""
 
     def control(self, cdm, cds):
         return decode("biss", "--request", cdm, "--hex", cds)
 
-    def test_what_is_asked_is_the_same(self):
+    def test_encodes_documented_request(self):
         for slave, address, value in ((0, 5, 0x42), (7, 127, 0xFF), (3, 64, 0)):
             unit = ["biss", "--option", f"slave={slave}"]
             written, _ = register_frame(slave, address, [value], write=True)
@@ -569,10 +574,10 @@ class ControlFrames(Case):
                 if address + count > 128:
                     continue
                 read, _ = register_frame(slave, address, [0] * count)
-                told = absenc("encode", unit[0], "memory-read", str(address), "0", str(count), *unit[1:]).stdout
-                self.assertEqual(told.replace(" ", "").strip(), read, (slave, address, count))
+                reported = absenc("encode", unit[0], "memory-read", str(address), "0", str(count), *unit[1:]).stdout
+                self.assertEqual(reported.replace(" ", "").strip(), read, (slave, address, count))
 
-    def test_what_is_answered_is_understood(self):
+    def test_decodes_documented_reply(self):
         chosen = random.Random(7)
         for _ in range(60):
             count = chosen.choice((1, 1, 2, 5, 64))
@@ -587,8 +592,8 @@ class ControlFrames(Case):
             fields = answer["fields"]
             self.assertEqual((fields["operation"], fields["slave_id"], fields["address"], fields["data"]),
                              ("write" if write else "read", slave, address, data.hex()))
-            told = numbers(fields["start_delay"])  # has room for 48 of them at least
-            self.assertEqual(told, delays[:max(48, len(told))])
+            reported = numbers(fields["start_delay"])  # the field has room for at least 48 of them
+            self.assertEqual(reported, delays[:max(48, len(reported))])
             self.assertTrue(fields["next_address_accepted"])
         for slaves, command in ((0, 0), (0, 1), (1, 0), (0b101, 1), (0xFF, 3)):
             fields = self.control(*command_frame(slaves, command))["fields"]
@@ -596,7 +601,7 @@ class ControlFrames(Case):
                              ("command", command, slaves == 0, True))
             self.assertEqual(numbers(fields.get("acknowledged", "")), [i for i in range(8) if slaves >> i & 1])
 
-    def test_those_that_wave_draws_are_as_the_document_has_them(self):
+    def test_wave_draws_documented_control_frames(self):
         for settings in ("", "&timeout_us=12.5", "&timeout_us=40&ma_khz=250", "&adaptive_timeout=true",
                          "&adaptive_timeout=true&ma_khz=100", "&register_delay_us=700"):
             with self.subTest(settings):
@@ -613,7 +618,7 @@ class ControlFrames(Case):
                 self.assertIn((0, 3, [0x5A], True), written)
                 self.assertEqual(written[-1], (0, 3, [0x5A], False))
 
-    def test_on_the_wires_they_are_rows_beside_the_positions(self):
+    def test_capture_shows_control_frames_beside_positions(self):
         cdm, cds = register_frame(0, 68, [1, 2, 0xFE], delays=[0, 4, 0])
         path = self.file("control.vcd", draw_frames([plain_word(100 + i) for i in range(len(cdm))], cdm, cds))
         rows = json_lines(absenc("decode", "biss", path, "--json").stdout)

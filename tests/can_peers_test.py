@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Against python-can, which others wrote: it reads our virtual node, we read a node that it plays, it reads our log."""
+"""Tests against python-can, an independent implementation: it reads a virtual node, absenc reads a node that it plays,
+and it reads absenc's log."""
 import os
 import sys
 import threading
 import unittest
 
-SYSTEM_PYTHON = "/usr/bin/python3"  # the one that Debian's python3-can is for
+SYSTEM_PYTHON = "/usr/bin/python3"  # the interpreter that has Debian's python3-can
 
 try:
     import can
@@ -33,7 +34,7 @@ def message(identifier, *data, **settings):
 
 
 class Reader(Case):
-    """python-can at the host's end."""
+    """python-can is the host of a virtual node."""
 
     def setUp(self):
         super().setUp()
@@ -59,17 +60,17 @@ class Reader(Case):
             if received.arbitration_id == identifier:
                 return received
 
-    def test_asks(self):
+    def test_polls_position(self):
         self.bus.send(message(0x220, 0x80, 0x20))
         answer = self.wait_for(0x120)
         self.assertEqual(bytes(answer.data), bytes([0x47, 0x26, 0, 0, 0, 0, 0, 0]))
         self.assertFalse(answer.is_extended_id or answer.is_remote_frame)
 
-    def test_listens(self):
+    def test_receives_cyclic_positions(self):
         for _ in range(3):
             self.assertEqual(bytes(self.wait_for(0x121).data), (77).to_bytes(8, "little"))
 
-    def test_configures(self):
+    def test_configures_node(self):
         self.bus.send(message(0x221, 0x31, 0x21, 0))
         while bytes(self.wait_for(0x121).data) != bytes([0x31]).ljust(8, b"\0"):
             pass
@@ -78,10 +79,10 @@ class Reader(Case):
         self.bus.send(message(0x221, 0x80, 0x21))
         self.assertEqual(bytes(self.wait_for(0x121).data), bytes(8))
 
-    def test_extended_and_remote_frames_are_not_for_us(self):
+    def test_node_ignores_extended_and_remote_frames(self):
         self.bus.send(message(0x220, 0x80, 0x20, is_extended_id=True))
         self.bus.send(can.Message(arbitration_id=0x220, is_remote_frame=True, dlc=8, is_extended_id=False))
-        self.bus.send(message(0x221, 0x80, 0x21))  # later than both
+        self.bus.send(message(0x221, 0x80, 0x21))  # sent after both of them
         while True:
             received = self.bus.recv(PATIENCE)
             self.assertIsNotNone(received)
@@ -90,11 +91,11 @@ class Reader(Case):
                 break
         self.assertIn("a frame without its 8 bytes of data", self.summary())
 
-    def test_version(self):
+    def test_adapter_has_version(self):
         version, _ = self.bus.get_version(PATIENCE)
         self.assertEqual(version, 10)
 
-    def test_another_bit_rate(self):
+    def test_receives_nothing_at_another_bit_rate(self):
         self.close()
         self.bus = open_bus(self.emulator.path, 500000)
         self.bus.send(message(0x220, 0x80, 0x20))
@@ -103,7 +104,7 @@ class Reader(Case):
 
 
 class Node(threading.Thread):
-    """An RAA38S6 written from its manual, on python-can; in front of it the answers of an adapter."""
+    """An RAA38S6 implemented from its manual with python-can, behind an emulated slcan adapter."""
 
     def __init__(self):
         super().__init__()
@@ -121,7 +122,7 @@ class Node(threading.Thread):
         self.crossing = threading.Thread(target=self.cross)
 
     def cross(self):
-        """What one program writes to its adapter the other one reads; commands are accepted, frames acknowledged."""
+        """Forwards the frames of each program to the other one; accepts adapter commands and acknowledges frames."""
         import select
         rest = {self.master: b"", self.inner: b""}
         while not self.ended.is_set():
@@ -164,9 +165,9 @@ class Node(threading.Thread):
 
 
 class Reads(Case):
-    """python-can at the encoder's end."""
+    """python-can is the encoder that absenc reads."""
 
-    def test_a_node_that_others_wrote(self):
+    def test_reads_node_of_python_can(self):
         with Node() as node:
             address = f"raa38-can:slcan:{node.path}?latency=300"
             result = absenc("read", address, "--count", "3", "--json")
@@ -181,7 +182,7 @@ class Reads(Case):
             self.assert_good(scan)
             self.assertEqual([one["node"] for one in json.loads(scan.stdout)["encoders"]], [0x20])
 
-    def test_its_log_is_read(self):
+    def test_python_can_reads_log(self):
         log = self.file("can.log")
         with Node() as node:
             self.assert_good(absenc("read", f"raa38-can:slcan:{node.path}?latency=300&log={log}"))

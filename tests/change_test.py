@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What changes an encoder says what became of the change, in words and as one word."""
+"""Tests that a command which changes an encoder reports the result of the change, in text and as one word."""
 import json
 import os
 import shlex
@@ -11,14 +11,14 @@ from serve_support import Server
 STATES = ("not_sent", "confirmed", "refused", "unknown")
 
 
-class States(Case):
+class ChangeStates(Case):
     def both(self, *arguments):
-        text, told = absenc(*arguments), absenc(*arguments, "--json")
-        answer = json.loads(told.stdout)
-        self.assertEqual(answer["ok"], told.returncode == 0, answer)
+        text, json_result = absenc(*arguments), absenc(*arguments, "--json")
+        answer = json.loads(json_result.stdout)
+        self.assertEqual(answer["ok"], json_result.returncode == 0, answer)
         return text, answer
 
-    def test_good(self):
+    def test_success_is_confirmed(self):
         for verb in (["zero", "sim:tformat"], ["config", "set", "sim:tformat", "overheat-threshold", "80"],
                      ["run", "sim:tformat", "memory-write", "5", "0x42"], ["memory", "write", "sim:tformat", "5", "0x42"]):
             with self.subTest(verb):
@@ -26,13 +26,13 @@ class States(Case):
                 self.assert_good(text)
                 self.assertEqual(answer["change"], "confirmed")
 
-    def test_nothing_to_do(self):
+    def test_unchanged_value_is_not_sent(self):
         _, answer = self.both("memory", "write", "sim:tformat", "5", "0")
         self.assertEqual(answer["change"], "not_sent")
         _, answer = self.both("config", "set", "sim:raa38-modbus", "baud", "19200")
         self.assertEqual(answer["change"], "not_sent")
 
-    def test_not_sent(self):
+    def test_failure_before_request_is_not_sent(self):
         for verb in (["zero", "sim:tformat?fault=silence=1"], ["zero", "sim:tformat?motion=rpm=60"],
                      ["config", "set", "sim:tformat?fault=silence=1", "overheat-threshold", "80"],
                      ["memory", "write", "sim:tformat?fault=silence=1", "5", "0x42"],
@@ -43,13 +43,13 @@ class States(Case):
                 if verb[0] != "memory":
                     self.assert_failed(text, "Change: not sent")
 
-    def test_a_reading_says_nothing_of_changes(self):
+    def test_reading_reports_no_change(self):
         self.assertNotIn("Change:", absenc("read", "sim:tformat?fault=silence=1").stderr)
         self.assertNotIn("change", json.loads(absenc("read", "sim:tformat?fault=silence=1", "--json").stdout))
         self.assertNotIn("change", json.loads(absenc("run", "sim:tformat", "temperature", "--json").stdout))
 
-    def test_every_change_on_a_bad_line_is_named(self):
-        """Also where only reading it again fails, after the encoder has moved to another baud rate."""
+    def test_every_change_on_bad_line_has_state(self):
+        """Includes changes whose read-back fails after the encoder has moved to another baud rate."""
         seen = set()
         for seed in range(100, 124):
             with Emulator(self.directory, "--fault", "truncate=0.4", "--seed", str(seed), protocol="raa38-modbus",
@@ -64,7 +64,7 @@ class States(Case):
 
 
 class Journal(Case):
-    """In $XDG_STATE_HOME, as it is for who sets nothing else."""
+    """The journal is in $XDG_STATE_HOME, the default if nothing else is set."""
 
     def setUp(self):
         super().setUp()
@@ -84,14 +84,14 @@ class Journal(Case):
     def put_back(self, entry):
         return self.absenc(*shlex.split(entry["put_back"])[1:], "--yes")
 
-    def test_nothing_yet(self):
+    def test_empty_journal_is_reported(self):
         result = self.absenc("changes")
         self.assert_good(result)
         self.assertIn("no changes are in " + self.journal, result.stdout)
-        self.assert_good(self.absenc("zero", "sim:tformat"))  # gone with its encoder
+        self.assert_good(self.absenc("zero", "sim:tformat"))  # a virtual encoder's change is not recorded
         self.assertEqual(self.changes(), [])
 
-    def test_every_way_and_back(self):
+    def test_every_kind_of_change_can_be_put_back(self):
         with Emulator(self.directory) as encoder:
             address = f"tformat:{encoder.path}?latency=300"
             self.assert_good(self.absenc("config", "set", address, "overheat-threshold", "80", "--yes"))
@@ -116,7 +116,7 @@ class Journal(Case):
             self.assertIn("absenc config set", text)
             self.assertRegex(text, r"overheat-threshold +90 +80 +confirmed")
 
-    def test_a_rate_is_put_back_at_the_new_rate(self):
+    def test_baud_rate_is_put_back_at_new_rate(self):
         with Emulator(self.directory, protocol="raa38-modbus") as encoder:
             address = f"raa38-modbus:{encoder.path}?latency=300"
             self.assert_good(self.absenc("config", "set", address, "baud", "57600", "--yes"))
@@ -125,17 +125,17 @@ class Journal(Case):
             self.assert_good(self.put_back(entry))
             self.assert_good(self.absenc("read", address))
 
-    def test_a_result_that_is_not_known(self):
+    def test_unknown_result_is_recorded(self):
         for seed in range(1, 60):
             with Emulator(self.directory, "--fault", "silence=0.3", "--seed", str(seed), name=f"line{seed}") as encoder:
-                told = json.loads(self.absenc("run", f"tformat:{encoder.path}", "memory-write", "5", str(seed), "--yes",
+                json_result = json.loads(self.absenc("run", f"tformat:{encoder.path}", "memory-write", "5", str(seed), "--yes",
                                               "--json").stdout)
-            if told["change"] == "unknown":
+            if json_result["change"] == "unknown":
                 break
         self.assertEqual(self.changes()[-1]["change"], "unknown")
         self.assertEqual(self.changes()[-1]["after"], f"0x{seed:02X}")
 
-    def test_serve(self):
+    def test_serve_records_changes(self):
         tokens = self.file("tokens", "anna a-secret-of-hers-0123456789\n")
         os.chmod(tokens, 0o600)
         with Emulator(self.directory) as encoder:
@@ -149,21 +149,21 @@ class Journal(Case):
             self.assertEqual((entry["encoder"], entry["what"], entry["before"], entry["after"]),
                              (address, "memory write 0x05", "0x00", "0x42"))
 
-    def test_a_full_disk_does_not_lose_the_result(self):
+    def test_full_disk_does_not_hide_result(self):
         with Emulator(self.directory) as encoder:
             for journal in ("/dev/full", self.file("no")):
                 if journal != "/dev/full":
-                    os.mkdir(journal)  # no file can be there
+                    os.mkdir(journal)  # a directory, so that no file can have this name
                 result = self.absenc("zero", f"tformat:{encoder.path}?latency=300", "--yes", ABSENC_CHANGES=journal)
                 self.assertEqual(result.returncode, 0)
                 self.assertIn("singleturn", result.stdout)
                 self.assertIn(f"note: the change is not in the journal {journal}: ", result.stderr)
-                told = json.loads(self.absenc("zero", f"tformat:{encoder.path}?latency=300", "--yes", "--json",
+                json_result = json.loads(self.absenc("zero", f"tformat:{encoder.path}?latency=300", "--yes", "--json",
                                               ABSENC_CHANGES=journal).stdout)
-                self.assertEqual((told["ok"], told["change"]), (True, "confirmed"))
-                self.assertIn("is not in the journal", told["change_note"])
+                self.assertEqual((json_result["ok"], json_result["change"]), (True, "confirmed"))
+                self.assertIn("is not in the journal", json_result["change_note"])
 
-    def test_a_cut_line_takes_no_other_with_it(self):
+    def test_truncated_line_does_not_damage_next_one(self):
         os.makedirs(os.path.dirname(self.journal))
         with open(self.journal, "w", encoding="utf-8") as file:
             file.write("2026-01-01T00:00:00.000Z\ttformat:/dev/x\tmemory wr")

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Encoders that are clocked: the virtual ones behind sim:, and how they are named behind an SPI controller."""
+"""Tests encoders on clocked links: virtual ones (`sim:`), and addresses of real ones on an SPI controller."""
 import csv
 import json
 import os
@@ -12,13 +12,13 @@ BISS = "sim:biss?singleturn_bits=19&multiturn_bits=16&singleturn=275087&multitur
 SSI = "sim:ssi?bits=13&multiturn_bits=12&gray=true&singleturn=4660&multiturn=3"
 
 
-class Virtual(Case):
+class VirtualClockedEncoder(Case):
     def run_json(self, verb, *arguments):
         result = absenc(verb, *arguments, "--json")
         self.assert_good(result)
         return json_lines(result.stdout)
 
-    def test_read(self):
+    def test_read_reports_position(self):
         for encoder, singleturn, multiturn, bits in [(BISS, 275087, 7, 19), (SSI, 4660, 3, 13)]:
             with self.subTest(encoder):
                 readings = self.run_json("read", encoder, "--count", "3")
@@ -27,21 +27,22 @@ class Virtual(Case):
                 self.assertAlmostEqual(readings[0]["angle_deg"], 360 * singleturn / 2**bits, 4)
                 self.assertTrue(readings[0]["singleturn_valid"])
 
-    def test_monitor(self):
+    def test_monitor_shows_position(self):
         live = self.watch(BISS, SSI, until=lambda live: len(live) == 2)
         self.assertEqual({encoder: reading["singleturn"] for encoder, reading in live.items()}, {BISS: 275087, SSI: 4660})
 
-    def test_record(self):
+    def test_record_writes_positions(self):
         for encoder, singleturn in [(BISS, 275087), (SSI, 4660)]:
             with self.subTest(encoder):
                 file = self.file(f"{singleturn}.csv")
                 self.assert_good(absenc("record", encoder, "--output", file, "--count", "5"))
                 with open(file, encoding="utf-8") as rows:
                     lines = [line for line in rows if not line.startswith("#")]
-                taken = [row["singleturn"] for row in csv.DictReader(lines) if row["event"] != "gap"]  # of a busy machine
+                # a busy machine may cause gaps
+                taken = [row["singleturn"] for row in csv.DictReader(lines) if row["event"] != "gap"]
                 self.assertEqual(taken, [str(singleturn)] * 5)
 
-    def test_info(self):
+    def test_info_states_clock(self):
         for encoder, line in [(BISS, "clocked bits, 1 Mbit/s"), (SSI, "clocked bits, 200 kbit/s")]:
             with self.subTest(encoder):
                 result = absenc("info", encoder)
@@ -49,7 +50,7 @@ class Virtual(Case):
                 self.assertIn(line, result.stdout)
                 self.assertIn("12 bits of turns" if encoder == SSI else "16 bits of turns", result.stdout)
 
-    def test_alarms(self):
+    def test_alarms_are_reported(self):
         for encoder in (BISS, SSI + "&error_bit=active_high"):
             with self.subTest(encoder):
                 self.assertIn("no alarms", absenc("alarms", encoder).stdout)
@@ -59,7 +60,7 @@ class Virtual(Case):
                 reading, = self.run_json("read", encoder + "&alarm=error")
                 self.assertEqual((reading["alarms"], reading["singleturn_valid"]), (["error"], False))
 
-    def test_a_long_line_needs_a_longer_latency(self):
+    def test_long_line_needs_longer_latency(self):
         for delay_ns in (400, 1100, 20_300):
             with self.subTest(delay_ns):
                 encoder = f"{BISS}&line_delay_ns={delay_ns}"
@@ -70,7 +71,7 @@ class Virtual(Case):
         self.assert_good(absenc("read", f"{BISS}&latency_us=10&ready_us=12"))
         self.assert_failed(absenc("read", f"{BISS}&latency_us=10&ready_us=95"), "truncated", "latency_us", "raise it")
 
-    def test_clock_and_pause_of_ssi_vary_by_product(self):
+    def test_ssi_clock_and_pause_are_options(self):
         reading, = self.run_json("read", f"{SSI}&clock_khz=125&pause_us=2000")
         self.assertEqual(reading["singleturn"], 4660)
         self.assertIn("clocked bits, 125 kbit/s", absenc("info", f"{SSI}&clock_khz=125").stdout)
@@ -78,7 +79,7 @@ class Virtual(Case):
         self.assertEqual([one["singleturn"] for one in readings], [4660] * 5)
         self.assertGreaterEqual(readings[-1]["time_s"] - readings[0]["time_s"], 4 * 0.02)
 
-    def test_trouble_shows_what_the_clocks_brought(self):
+    def test_error_shows_received_bits(self):
         result = absenc("read", "sim:biss?singleturn_bits=19&fault=silence=1")
         self.assert_failed(result, "line_stuck", "121 clocks to the virtual encoder; received 1111 1111 1111 1111 ",
                            "check the wiring")
@@ -87,8 +88,8 @@ class Virtual(Case):
         self.assertEqual(line["received"].replace(" ", ""), "1" * 121)
 
 
-class Places(Case):
-    def test_the_wrong_one(self):
+class SpiAddress(Case):
+    def test_refuses_wrong_link(self):
         for encoder, words in [("ssi:/dev/ttyUSB0", ["does not go over a serial port", "write ssi:spi:/dev/spidev"]),
                                ("biss:tcp:host:4001", ["does not go over TCP", "write biss:spi:/dev/spidev"]),
                                ("tformat:spi:/dev/spidev0.0", ["does not go over an SPI controller", "write tformat:/"]),
@@ -105,13 +106,13 @@ class Places(Case):
             with self.subTest(encoder):
                 self.assert_wrong_usage(absenc("read", encoder), *words)
 
-    def test_what_is_no_spi_device(self):
+    def test_refuses_file_that_is_no_spi_device(self):
         self.assert_failed(absenc("read", "ssi:spi:/dev/spidev255.255?speed=100000&spi_mode=2"),
                            "there is no SPI device /dev/spidev255.255")
         self.assert_failed(absenc("read", "encolink:spi:/dev/spidev255.255"), "there is no SPI device")
         self.assert_failed(absenc("read", "biss:spi:/dev/null"), "/dev/null is not an SPI device", "/dev/spidevB.C")
 
-    def test_what_is_emulated_behind_an_spi_controller(self):
+    def test_emulate_refuses_wrong_link(self):
         for arguments, words in [(["ssi"], ["does not go over a serial line: use --spidev NAME, or sim:ssi"]),
                                  (["encolink-spi"], ["use --spidev NAME, or sim:encolink-spi"]),
                                  (["tformat", "--spidev", "spidev9.0"], ["does not go over an SPI controller: use --pty"]),
@@ -123,7 +124,7 @@ class Places(Case):
         self.assert_failed(absenc("emulate", "ssi", "--spidev", "a/b", "--for", "1"), "is no name for a device")
         self.assert_failed(absenc("emulate", "ssi", "--spidev", "null", "--for", "1"), "/dev/null exists")
 
-    def test_named_in_absenc_toml(self):
+    def test_device_in_absenc_toml(self):
         config = self.file("absenc.toml", '[encoder.drum]\nprotocol = "ssi"\nport = "spi:/dev/spidev255.255"\n'
                                           'speed = 150000\nspi_mode = 2\nbits = 13\n')
         environment = {**os.environ, "ABSENC_CONFIG": config}
@@ -132,11 +133,11 @@ class Places(Case):
         self.assertEqual(json.loads(names.stdout)["encoder"], "ssi:spi:/dev/spidev255.255")
         self.assert_failed(absenc("read", "drum", env=environment), "there is no SPI device /dev/spidev255.255")
 
-    def test_monitor_knows_the_same_device(self):
+    def test_monitor_refuses_same_device_twice(self):
         self.assert_wrong_usage(absenc("monitor", "ssi:spi:/dev/spidev0.0", "biss:spi:/dev/spidev0.0", "--json"),
                                 "are the same SPI device")
 
-    def test_help(self):
+    def test_help_names_options(self):
         self.assertIn("ssi:spi:/dev/spidev0.0", absenc("--help").stdout)
         listed = absenc("list", "ssi").stdout
         self.assertRegex(listed, r"speed=HZ +spi ")
@@ -144,8 +145,8 @@ class Places(Case):
 
 
 
-class Texts(Case):
-    def test_an_alarm_that_the_word_cannot_carry_is_refused(self):
+class Messages(Case):
+    def test_refuses_alarm_that_word_cannot_carry(self):
         refused = absenc("read", "sim:ssi?alarm=error")
         self.assertEqual(refused.returncode, 2)
         self.assertIn("the alarm error cannot be shown", refused.stderr)
@@ -153,23 +154,23 @@ class Texts(Case):
         self.assertEqual(json.loads(shown.stdout)["alarms"], ["error"])
         self.assertEqual(absenc("read", "sim:ssi?alarm=warning&error_bit=active_high").returncode, 2)
 
-    def test_too_many_clocks_are_called_that(self):
+    def test_reports_too_many_clocks(self):
         refused = absenc("decode", "ssi", "--hex", "000111101111000000")
         self.assertIn("more clocks than the word has bits", refused.stderr)
         self.assertNotIn("bits that must be zero", refused.stderr)
 
-    def test_ranges_name_their_step(self):
+    def test_range_states_step(self):
         refused = absenc("read", "sim:amt21?address=85")
         self.assertIn("must be 0 to 252 in steps of 4", refused.stderr)
         self.assertIn("must be 12 to 14 in steps of 2", absenc("read", "sim:amt21?singleturn_bits=13").stderr)
         self.assertIn("0 to 252 in steps of 4", absenc("list", "amt21").stdout)
 
-    def test_a_long_line_is_read_without_being_told(self):
+    def test_reads_long_line_without_option(self):
         for slow in ("line_delay_ns=39500", "ma_khz=10000&latency_us=1&line_delay_ns=5050"):
             reading, = json_lines(absenc("read", f"sim:biss?singleturn=275087&{slow}", "--json").stdout)
             self.assertEqual((reading["singleturn"], reading["singleturn_valid"]), (275087, True))
 
-    def test_a_maker_is_two_letters(self):
+    def test_manufacturer_is_two_letters(self):
         self.assertRegex(absenc("run", "sim:biss", "manufacturer").stdout, r"manufacturer +ve ")
 
 

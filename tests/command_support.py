@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the end-to-end tests share: the command, an emulator that runs beside it, and a line with a fake encoder."""
+"""Shared by the end-to-end tests: the command, an emulator process, and pseudo-terminals with a fake encoder."""
 import contextlib
 import itertools
 import json
@@ -17,20 +17,20 @@ import tty
 import unittest
 
 ABSENC = os.path.abspath(os.environ.get("ABSENC", "build/release/bin/absenc"))
-os.environ.setdefault("ABSENC_CHANGES", "none")  # tests leave nothing in the journal of who runs them
-# Seconds after which a test gives up; nothing takes that long unless it hangs. A virtual machine is slower.
+os.environ.setdefault("ABSENC_CHANGES", "none")  # tests leave the user's journal of changes alone
+# Time limit of every wait, in seconds. Only a hang takes that long. A virtual machine sets a longer one.
 PATIENCE = float(os.environ.get("ABSENC_PATIENCE", "60"))
 
 
 def absenc(*arguments, **settings):
-    """Runs the command to its end."""
+    """Runs the command and returns its result."""
     settings.setdefault("stdin", subprocess.DEVNULL)
     settings.setdefault("timeout", PATIENCE)
     return subprocess.run([ABSENC, *arguments], capture_output=True, text=True, **settings)
 
 
 def read_line(stream, deadline):
-    """One line of an unbuffered binary stream, or None when the deadline comes or the stream ends first."""
+    """Returns one line of an unbuffered binary stream, or None at the deadline or at the end of the stream."""
     line = b""
     while not line.endswith(b"\n"):
         left = deadline - time.monotonic()
@@ -44,7 +44,7 @@ def read_line(stream, deadline):
 
 
 def end(process, number=signal.SIGTERM):
-    """Sends the signal and returns what the process leaves: status, standard output, standard error."""
+    """Sends the signal and returns the exit status, standard output and standard error of the process."""
     if process.poll() is None:
         process.send_signal(number)
     out, err = process.communicate(timeout=PATIENCE)
@@ -52,7 +52,7 @@ def end(process, number=signal.SIGTERM):
 
 
 def wait_for_handler(process):
-    """Until it catches SIGINT, which would kill it before."""
+    """Waits until the process catches SIGINT, which would kill it before."""
     deadline = time.monotonic() + PATIENCE
     while time.monotonic() < deadline:
         with open(f"/proc/{process.pid}/status", encoding="ascii") as file:
@@ -63,13 +63,13 @@ def wait_for_handler(process):
 
 
 def character_units():
-    """What `absenc list --json` says of each unit whose line carries characters, by name."""
+    """Returns the entry of `absenc list --json` of each unit with a character link, by name."""
     return {unit["protocol"]: unit for unit in json_lines(absenc("list", "--json").stdout)
             if unit["link"] in ("half_duplex", "full_duplex")}
 
 
 class Busy:
-    """Processes that use all the time that they get."""
+    """Processes that use all the processor time that they get."""
 
     def __init__(self, count):
         self.processes = [subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range(count)]
@@ -84,7 +84,7 @@ class Busy:
 
 
 class Emulator:
-    """`absenc emulate`, ready to be opened."""
+    """An `absenc emulate` process whose port can be opened."""
 
     def __init__(self, directory, *arguments, protocol="tformat", name="encoder", line="--pty",
                  stdin=subprocess.DEVNULL):
@@ -102,7 +102,8 @@ class Emulator:
         return end(self.process, number)
 
     def kill(self):
-        """As kill -9 does, but for its link, which would lead to the terminal of the next test that gets the same number."""
+        """Kills it as kill -9 does, and removes its link. A later test may get the same terminal number, and the link
+        would lead there."""
         os.unlink(self.path)
         self.process.kill()
 
@@ -114,7 +115,7 @@ class Emulator:
 
 
 class FakeLine:
-    """A pseudo-terminal whose far end is a thread here: `serve` runs until `wake` can be read."""
+    """A pseudo-terminal whose far end is a thread of the test: `serve` runs until `wake` can be read."""
 
     def __init__(self):
         self.master, self.slave = os.openpty()
@@ -135,7 +136,7 @@ class FakeLine:
 
 
 class FakeEncoder(FakeLine):
-    """Answers requests by their first byte, always the same; `replies` alone: to 1A."""
+    """Sends a fixed reply for the first byte of a request. `replies` is a dictionary, or the reply to 1A alone."""
 
     def __init__(self, replies=b""):
         super().__init__()
@@ -153,8 +154,8 @@ class FakeEncoder(FakeLine):
 
 
 class BabblingLine(FakeLine):
-    """A line that is never silent: one of `pieces` every `period` seconds, over and over, whoever asks what.
-    With a period of 0 as much as the line takes. What nobody reads is lost."""
+    """A line that is never silent: sends one of `pieces` every `period` seconds, in turn, whatever the host requests.
+    With a period of 0 it sends as fast as the line allows. Bytes that no program reads are lost."""
 
     def __init__(self, period=0.005, pieces=(b"\x55",)):
         super().__init__()
@@ -165,7 +166,7 @@ class BabblingLine(FakeLine):
     def serve(self):
         due = time.monotonic()
         for piece in itertools.cycle(self.pieces):
-            # Whoever was held up goes on from now.
+            # After a delay the schedule starts again from now.
             due = max(due + self.period, time.monotonic())
             writable = [self.master] if self.period == 0 else []
             timeout = None if self.period == 0 else max(due - time.monotonic(), 0)
@@ -177,7 +178,7 @@ class BabblingLine(FakeLine):
 
 
 class Case(unittest.TestCase):
-    """A test with a directory of its own that anybody may look into."""
+    """A test with a temporary directory that every user may read."""
 
     def setUp(self):
         self.directory = tempfile.mkdtemp(prefix="absenc-test-")
@@ -192,8 +193,8 @@ class Case(unittest.TestCase):
         return path
 
     def watch(self, *arguments, until, **settings):
-        """What `monitor --json` says until what is wanted stands in it: `until` of the last reading of each encoder that is
-        live, by its name. How long that takes is the machine's affair."""
+        """Runs `monitor --json` until `until` is true, and returns its argument: the last live reading of each encoder,
+        by name. The only time limit is PATIENCE."""
         process = subprocess.Popen([ABSENC, "monitor", *arguments, "--json", "--interval", "0.1"], bufsize=0,
                                    stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE, **settings)
         self.addCleanup(lambda: end(process, signal.SIGKILL) if process.poll() is None else None)
@@ -214,7 +215,7 @@ class Case(unittest.TestCase):
         self.assertEqual(result.returncode, 0, f"{result.stdout}\n{result.stderr}")
 
     def assert_wrong_usage(self, result, *words):
-        """Exit status 2, a sentence with these words, and nothing on standard output."""
+        """Expects exit status 2, an error message with these words, and an empty standard output."""
         self.assertEqual(result.returncode, 2, f"{result.stdout}\n{result.stderr}")
         self.assertEqual(result.stdout, "")
         self.assert_sentence(result.stderr, *words)
@@ -230,7 +231,7 @@ class Case(unittest.TestCase):
 
 
 class EncoderCase(Case):
-    """A test with emulators, and commands that run beside it."""
+    """A test with emulators and with commands that run in the background."""
 
     def emulator(self, *arguments):
         emulator = Emulator(self.directory, *arguments)
@@ -238,7 +239,7 @@ class EncoderCase(Case):
         return emulator
 
     def encoder(self, *arguments, latency=300, more=""):
-        """The address of an emulator, with patience for a machine that is busy with other tests."""
+        """Returns the address of an emulator, with a latency that a busy machine needs."""
         return f"tformat:{self.emulator(*arguments).path}?latency={latency}{more}"
 
     def start(self, *arguments, **settings):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The command without an encoder: decode, encode, list, vectors, help and wrong usage."""
+"""Tests the command without an encoder: decode, encode, list, vectors, help and wrong usage."""
 import json
 import os
 import subprocess
@@ -58,7 +58,7 @@ class Decode(Case):
             self.assert_fields(vector["fields"], decoded["fields"])
             self.assertEqual(result.returncode, 0)
 
-    def test_reference_vectors(self):
+    def test_decodes_reference_vectors(self):
         known = {unit["protocol"] for unit in json_lines(absenc("list", "--json").stdout)}
         self.assertIn("tformat", known)
         checked = 0
@@ -69,44 +69,44 @@ class Decode(Case):
                     checked += 1
         self.assertGreaterEqual(checked, 29)
 
-    def test_own_vectors(self):
+    def test_decodes_own_vectors(self):
         vectors = json_lines(absenc("vectors", "--json").stdout)
         self.assertTrue(vectors)
         for vector in vectors:
             with self.subTest(vector["id"]):
                 self.check_vector(vector)
 
-    def test_fields_come_in_the_order_of_the_wire(self):
+    def test_fields_are_in_wire_order(self):
         result = absenc("decode", "tformat", "--request", "1A", "--hex", GOOD_REPLY, "--json")
         names = [name for name, _ in json.loads(result.stdout, object_pairs_hook=list)[2][1]]
         self.assertEqual(names, ["data_id", "status", "singleturn", "encoder_id", "multiturn", "alarms"])
 
-    def test_ways_to_write_a_frame(self):
+    def test_accepts_all_notations_of_bytes(self):
         wanted = absenc("decode", "tformat", "--hex", "0200cdab0165", "--json").stdout
         for written in ["02 00 cd ab 01 65", "0x02 0x00 0xCD 0xAB 0x01 0x65", "0x0200CDAB0165", "02,00,cd,AB,01,65",
                         " 02, 00,\tCDAB  0165 "]:
             with self.subTest(written):
                 self.assertEqual(absenc("decode", "tformat", "--hex", written, "--json").stdout, wanted)
 
-    def test_bad_hexadecimal(self):
+    def test_refuses_bad_hexadecimal(self):
         for written, words in [("1A 0G", ["'G'", "position 5"]), ("1A 0", ["position 4", "one digit"]),
                                ("1A-00", ["'-'", "position 3"]), ("1A 0x", ["0x", "position 4"]),
                                ("0x0x1A", ["'x'", "position 4"])]:
             with self.subTest(written):
                 self.assert_wrong_usage(absenc("decode", "tformat", "--hex", written), "--hex", *words)
 
-    def test_words(self):
+    def test_text_output(self):
         result = absenc("decode", "tformat", "--request", "1a", "--hex", "1a2000000011000000103b")
         self.assert_good(result)
         for word in ["singleturn", "counts", "over_heat", "let it cool, then `absenc clear-alarms`"]:
             self.assertIn(word, result.stdout)
 
-    def test_bad_frame_in_words(self):
+    def test_reports_bad_frame(self):
         result = absenc("decode", "tformat", "--request", "1a", "--hex", "1a0055230111341200004a")
         self.assert_failed(result, "bad_checksum", "the checksum of the reply is wrong")
         self.assertEqual(result.stdout, "")
 
-    def test_what_a_bad_frame_turns_out_to_be(self):
+    def test_explains_bad_frame(self):
         too_long = absenc("decode", "tformat", "--request", "1A", "--hex", GOOD_REPLY + " 00", "--json")
         self.assertIn("the first 11 bytes are a good reply, but 1 byte more came", too_long.stdout)
         echoed = absenc("decode", "tformat", "--request", "1A", "--hex", "1A " + GOOD_REPLY, "--json")
@@ -118,7 +118,7 @@ class Decode(Case):
         strict = absenc("decode", "tformat", "--request", "02", "--hex", "020100000003", "--json")
         self.assertIn("strict=false", strict.stdout)
 
-    def test_model(self):
+    def test_model_option(self):
         frame = ["decode", "tformat", "--request", "92", "--hex", "92001785", "--json"]
         self.assertEqual(absenc(*frame, "--model", "23-bit").returncode, 0)
         self.assertEqual(absenc(*frame, "--option", "model=23-bit").returncode, 0)
@@ -126,14 +126,14 @@ class Decode(Case):
         self.assert_wrong_usage(absenc(*frame, "--model", "24-bit"), "no model", "did you mean 23-bit?")
         self.assert_wrong_usage(absenc(*frame, "--model", "TS5700N8500", "--option", "model=23-bit"), "two models")
 
-    def test_options(self):
+    def test_refuses_wrong_options(self):
         frame = ["decode", "tformat", "--hex", "020000000002"]
         self.assert_wrong_usage(absenc(*frame, "--option", "single_turn_bits=17"), "did you mean singleturn_bits?")
         self.assert_wrong_usage(absenc(*frame, "--option", "singleturn_bits=99"), "1 to 24", '"99"')
         self.assert_wrong_usage(absenc(*frame, "--option", "strict=maybe"), "false or true")
         self.assert_wrong_usage(absenc(*frame, "--option", "strict"), "NAME=VALUE")
 
-    def test_nothing_to_decode(self):
+    def test_refuses_empty_input(self):
         self.assert_wrong_usage(absenc("decode", "tformat"), "nothing to decode", "--hex")
         for empty in ("", " ", ","):
             with self.subTest(empty):
@@ -141,7 +141,7 @@ class Decode(Case):
 
 
 class Encode(Case):
-    def test_requests(self):
+    def test_encodes_requests(self):
         for arguments, wanted in [(["position"], "1A"), (["singleturn"], "02"), (["zero"], "C2"),
                                   (["memory-read", "1"], "EA 01 EB"), (["memory-write", "0x01", "0x5a"], "32 01 5A 69"),
                                   (["memory-write", "1", "90"], "32 01 5A 69")]:
@@ -150,12 +150,12 @@ class Encode(Case):
                 self.assert_good(result)
                 self.assertEqual(result.stdout, wanted + "\n")
 
-    def test_json(self):
+    def test_json_output(self):
         result = absenc("encode", "tformat", "memory-write", "1", "90", "--json")
         self.assertEqual(json.loads(result.stdout),
                          {"protocol": "tformat", "command": "memory-write", "request": "32 01 5A 69"})
 
-    def test_wrong_arguments(self):
+    def test_refuses_wrong_arguments(self):
         for arguments, words in [(["memory-write", "1", "256"], ["value", "0 to 255"]),
                                  (["memory-write", "1"], ["value", "needs"]),
                                  (["memory-write", "1", "ten"], ["value", '"ten"']),
@@ -166,19 +166,19 @@ class Encode(Case):
 
 
 class ListAndVectors(Case):
-    def test_table(self):
+    def test_list_shows_table(self):
         result = absenc("list")
         self.assert_good(result)
         for word in ["tformat", "TS5700N8500", "23-bit", "RS-485 half duplex, 2.5 Mbit/s"]:
             self.assertIn(word, result.stdout)
 
-    def test_details(self):
+    def test_list_shows_details_of_unit(self):
         result = absenc("list", "tformat")
         self.assert_good(result)
         for word in ["singleturn_bits", "memory-write <address> <value> [page]", "battery_error", "changes the encoder"]:
             self.assertIn(word, result.stdout)
 
-    def test_json(self):
+    def test_list_json(self):
         units = json_lines(absenc("list", "--json").stdout)
         unit = next(unit for unit in units if unit["protocol"] == "tformat")
         self.assertEqual(unit["link"], "half_duplex")
@@ -197,7 +197,7 @@ class ListAndVectors(Case):
         self.assertEqual(unit["memory"][-1]["writable"], False)
         self.assertEqual(json_lines(absenc("list", "tformat", "--json").stdout), [unit])
 
-    def test_vectors_agree_with_the_reference(self):
+    def test_own_vectors_equal_reference(self):
         own = {vector["id"]: vector for vector in json_lines(absenc("vectors", "tformat", "--json").stdout)}
         for vector in reference_vectors():
             if vector["protocol"] != "tformat":
@@ -208,7 +208,7 @@ class ListAndVectors(Case):
                 for name in ("request", "response", "fields", "error"):
                     self.assertEqual(same.get(name), vector.get(name))
 
-    def test_vectors_are_decoded_on_the_spot(self):
+    def test_vectors_reports_decoding_result(self):
         result = absenc("vectors")
         self.assert_good(result)
         self.assertNotIn("WRONG", result.stdout)
@@ -216,7 +216,7 @@ class ListAndVectors(Case):
 
 
 class Usage(Case):
-    def test_help(self):
+    def test_help_lists_verbs(self):
         result = absenc("--help")
         self.assert_good(result)
         for verb in VERBS:
@@ -229,7 +229,7 @@ class Usage(Case):
                 self.assertGreaterEqual(verb_help.stdout.count(f"  absenc {verb}"), 2)
                 self.assertTrue(all(len(line) <= 120 for line in verb_help.stdout.splitlines()), verb_help.stdout)
 
-    def test_help_of_verbs_of_two_words(self):
+    def test_help_of_two_word_verbs(self):
         result = absenc("memory", "--help")
         self.assert_good(result)
         for word in ["Usage: absenc memory <verb>", "\n  memory read ", "\n  memory verify "]:
@@ -238,12 +238,12 @@ class Usage(Case):
         self.assertIn("Try: absenc memory --help", absenc("memory", "raed").stderr)
         self.assertIn("Try: absenc memory read --help", absenc("memory", "read").stderr)
 
-    def test_version(self):
+    def test_version_has_three_numbers(self):
         result = absenc("--version")
         self.assert_good(result)
         self.assertRegex(result.stdout, r"^absenc \d+\.\d+\.\d+\n$")
 
-    def test_wrong_usage(self):
+    def test_refuses_wrong_usage(self):
         for arguments, words in [(["raed"], ["did you mean read?"]),
                                  (["--versoin"], ["did you mean --version?"]),
                                  (["read", "sim:tformat", "--cuont", "3"], ["did you mean --count?"]),
@@ -275,7 +275,7 @@ class Usage(Case):
             with self.subTest(arguments):
                 self.assert_wrong_usage(absenc(*arguments), *words)
 
-    def test_encoders_that_do_not_exist(self):
+    def test_refuses_wrong_addresses(self):
         for encoder, words in [("/dev/ttyUSB0", ["which protocol", "tformat:/dev/ttyUSB0"]),
                                ("tformat", ["where the encoder is", "tformat:tcp:HOST:PORT"]),
                                ("tformat:", ["where the encoder is"]),
@@ -296,14 +296,14 @@ class Usage(Case):
             with self.subTest(encoder):
                 self.assert_wrong_usage(absenc("read", encoder), *words)
 
-    def test_output_that_cannot_be_written(self):
+    def test_reports_unwritable_output(self):
         closed = subprocess.run(["sh", "-c", '"$0" list >&-', ABSENC], capture_output=True, text=True, check=False)
         self.assert_failed(closed, "standard output cannot be written")
         full = subprocess.run(["sh", "-c", '"$0" list >/dev/full', ABSENC], capture_output=True, text=True, check=False)
         self.assert_failed(full, "standard output cannot be written", "No space left")
 
-    def test_a_file_that_reaches_its_limit_is_a_full_disk(self):
-        """`ulimit -f`: four blocks of 1024 bytes, or 512 in some shells."""
+    def test_file_size_limit_is_reported_as_full_disk(self):
+        """`ulimit -f 4` is four blocks of 1024 bytes, or of 512 in some shells."""
         def limited(*arguments, output=None):
             with open(output or os.devnull, "w", encoding="utf-8") as file:
                 return subprocess.run(["sh", "-c", 'ulimit -f 4; exec "$0" "$@"', ABSENC, *arguments], stdout=file,
@@ -335,7 +335,7 @@ class Usage(Case):
             self.assertFalse(os.path.exists(dump))
             self.assertEqual(sorted(os.listdir(folder)), ["log.csv", "log.jsonl", "read.csv"])
 
-    def test_messages_that_cannot_be_written(self):
+    def test_unwritable_messages_keep_exit_status(self):
         for where in ("2>/dev/full", "2>&-"):
             with self.subTest(where):
                 result = subprocess.run(["sh", "-c", f'"$0" raed {where}', ABSENC], check=False)

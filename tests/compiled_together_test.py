@@ -1,9 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Sources of a folder are compiled together: no two of them may have a function of one name for themselves.
-
-With other parameters the compiler would take it silently, and a call might go to the other file's.
-"""
+"""Sources of a folder are compiled as one file, so no two of them may define a local function of the same name. With
+other parameters the compiler would accept it as an overload, and a call might reach the wrong file's function."""
 
 import re
 import unittest
@@ -24,7 +22,7 @@ def own_functions(text):
 
 
 def shared_names():
-    """"folder: name in one.cpp, other.cpp" of each that two sources have."""
+    """Returns "folder: name in one.cpp, other.cpp" for each name that two sources define."""
     found = []
     folders = defaultdict(list)
     for top in ("absenc", "python/src", "tools/absenc"):
@@ -45,10 +43,10 @@ def shared_names():
 
 
 class CompiledTogether(unittest.TestCase):
-    def test_names_of_a_folder_are_one(self):
+    def test_local_functions_have_unique_names(self):
         self.assertEqual(shared_names(), [])
 
-    def test_functions_are_found(self):
+    def test_finds_functions(self):
         text = "namespace {\n\nint one(int a) {\n  call(a);\n}\nstd::optional<int> two() { return 0; }\n\n}  // namespace\n"
         self.assertEqual(own_functions(text + "void three() {}\n"), {"one", "two"})
 

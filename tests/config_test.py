@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""absenc.toml: encoders by name, where the file is looked for, what overrides what, and what is wrong with a file."""
+"""Tests absenc.toml: encoders by name, where the file is searched, which setting overrides which, and errors in the
+file."""
 import json
 import os
 import resource
@@ -14,7 +15,7 @@ SIM = ELBOW + 'port = "sim"\n'
 
 
 class ConfigCase(Case):
-    """Commands run in an empty directory of a user without any configuration."""
+    """Runs the command in an empty directory as a user without any configuration."""
 
     def setUp(self):
         super().setUp()
@@ -24,9 +25,9 @@ class ConfigCase(Case):
             os.mkdir(directory)
 
     def absenc(self, *arguments, **environment):
-        kept = {name: value for name, value in os.environ.items()
+        environ = {name: value for name, value in os.environ.items()
                 if name not in ("ABSENC_CONFIG", "XDG_CONFIG_HOME")}
-        return absenc(*arguments, cwd=self.work, env={**kept, "HOME": self.home, **environment})
+        return absenc(*arguments, cwd=self.work, env={**environ, "HOME": self.home, **environment})
 
     def write(self, path, text):
         os.makedirs(os.path.dirname(self.file(path)), exist_ok=True)
@@ -42,7 +43,7 @@ class ConfigCase(Case):
 
 
 class Names(ConfigCase):
-    def test_every_verb(self):
+    def test_every_verb_accepts_name(self):
         with Emulator(self.directory, "--singleturn", "1000", "--multiturn", "7") as emulator:
             self.config(f'{ELBOW}port = "{emulator.path}"\nlatency = 300\n')
             reading = self.json("read", "elbow")
@@ -55,7 +56,7 @@ class Names(ConfigCase):
             self.assert_good(self.absenc("zero", "elbow", "--yes"))
             self.assertEqual(self.json("read", "elbow")["singleturn"], 0)
 
-    def test_encoders_of_one_bus(self):
+    def test_encoders_share_bus(self):
         with Emulator(self.directory, "--model", "23-bit", "--tcp", "0") as emulator:
             port = emulator.line().strip().rsplit(":", 1)[1]
             self.config(f'[bus.arm]\nport = "tcp:127.0.0.1:{port}"\nlatency = 300\n'
@@ -65,14 +66,14 @@ class Names(ConfigCase):
             wrist = self.absenc("read", "wrist")
             self.assert_failed(wrist, "set model=23-bit", "127.0.0.1")
 
-    def test_settings_of_a_virtual_encoder(self):
+    def test_settings_of_virtual_encoder(self):
         self.config(SIM + 'singleturn = 8000000\nmultiturn = 3\nmodel = "23-bit"\nstrict = false\n'
                     'alarm = ["over_heat", "battery_alarm"]\n')
         reading = self.json("read", "elbow")
         self.assertEqual((reading["singleturn"], reading["multiturn"]), (8000000, 3))
         self.assertEqual(reading["alarms"], ["over_heat", "battery_alarm"])
 
-    def test_a_protocol_with_a_port_needs_no_file(self):
+    def test_protocol_with_port_needs_no_file(self):
         self.config("this is no TOML")
         self.assert_good(self.absenc("read", "sim:tformat"))
         self.assert_wrong_usage(self.absenc("read", "tformat"), "where the encoder is")
@@ -80,45 +81,45 @@ class Names(ConfigCase):
 
 
 class Overriding(ConfigCase):
-    def test_the_nearer_wins(self):
+    def test_encoder_overrides_bus_and_defaults(self):
         self.config('[defaults]\nsingleturn = 1\nmultiturn = 1\nseed = 1\nalarm = "over_heat"\n'
                     f'[bus.b]\nport = "sim"\nmultiturn = 2\n{ELBOW}bus = "b"\nalarm = "battery_alarm"\n')
         reading = self.json("read", "elbow")
         self.assertEqual((reading["singleturn"], reading["multiturn"]), (1, 2))
         self.assertEqual(reading["alarms"], ["battery_alarm"])
 
-    def test_behind_the_name_and_beside_it(self):
+    def test_address_and_option_override_file(self):
         self.config(SIM + 'singleturn = 1\nmultiturn = 1\nmodel = "23-bit"\nalarm = "over_heat"\n')
         reading = self.json("read", "elbow?singleturn=5&model=TS5700N8500", "--option", "multiturn=6",
                             "--option", "alarm=battery_alarm")
         self.assertEqual((reading["singleturn"], reading["multiturn"], reading["singleturn_bits"]), (5, 6, 17))
         self.assertEqual(reading["alarms"], ["battery_alarm"])
 
-    def test_an_empty_list_overrides(self):
+    def test_empty_list_overrides(self):
         self.config('[defaults]\nalarm = "over_heat"\n' + SIM + "alarm = []\n")
         self.assertEqual(self.json("read", "elbow")["alarms"], [])
 
-    def test_defaults_only_where_they_fit(self):
+    def test_defaults_apply_only_where_valid(self):
         self.config('[defaults]\nlatency = 5\nbaud = 9600\necho = "auto"\nmultiturn = 4\nstrict = false\n' + SIM)
         self.assertEqual(self.json("read", "elbow")["multiturn"], 4)
         self.assertEqual(self.json("info", "elbow")["options"]["strict"], False)
-        # A bus or an encoder is told what it is told.
+        # A setting of a bus or of an encoder must be valid, unlike one in [defaults].
         self.config(SIM + "latency = 5\n")
         self.assert_wrong_usage(self.absenc("read", "elbow"), "absenc.toml:4:1: latency cannot be set here", "tcp")
 
-    def test_wrong_settings_behind_the_name(self):
+    def test_refuses_wrong_settings_in_address(self):
         self.config(SIM)
         self.assert_wrong_usage(self.absenc("read", "elbow?sigleturn=5"), "did you mean singleturn?")
         self.assert_wrong_usage(self.absenc("read", "elbow", "--option", "latency=5"), "cannot be set here")
 
 
-class WhereTheFileIs(ConfigCase):
+class FileSearch(ConfigCase):
     def multiturn(self, **environment):
         result = self.absenc("read", "elbow", "--json", **environment)
         self.assert_good(result)
         return json.loads(result.stdout)["multiturn"]
 
-    def test_order(self):
+    def test_search_order(self):
         self.write("home/.config/absenc/absenc.toml", SIM + "multiturn = 1\n")
         self.assertEqual(self.multiturn(), 1)
         self.write("xdg/absenc/absenc.toml", SIM + "multiturn = 2\n")
@@ -128,18 +129,18 @@ class WhereTheFileIs(ConfigCase):
         mine = self.file("mine.toml", SIM + "multiturn = 4\n")
         self.assertEqual(self.multiturn(ABSENC_CONFIG=mine), 4)
 
-    def test_no_file(self):
+    def test_missing_file_is_reported_with_example(self):
         for arguments in (["read", "elbow"], ["list", "--names"]):
             self.assert_wrong_usage(self.absenc(*arguments), "looked for absenc.toml and ",
                                     f"{self.home}/.config/absenc/absenc.toml",
                                     '[encoder.elbow]\n  protocol = "tformat"')
 
-    def test_the_example_of_that_message_is_a_file(self):
+    def test_example_of_message_is_valid(self):
         message = self.absenc("read", "elbow").stderr
         self.config("\n".join(line for line in message.splitlines() if line.startswith("  ")))
         self.assertIn("elbow  tformat:/dev/ttyUSB0", self.absenc("list", "--names").stdout)
 
-    def test_a_file_that_is_not_there(self):
+    def test_refuses_missing_file_of_environment(self):
         self.config(SIM)
         path = self.file("nothing.toml")
         self.assert_wrong_usage(self.absenc("read", "elbow", ABSENC_CONFIG=path), path, "ABSENC_CONFIG")
@@ -157,11 +158,11 @@ class ManyEncoders(ConfigCase):
         after = resource.getrusage(resource.RUSAGE_CHILDREN)
         return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
 
-    def test_the_file_is_parsed_once(self):
-        """Ten times the encoders take ten times as long, not a hundred times."""
+    def test_file_is_parsed_once(self):
+        """The processor time must grow in proportion to the number of encoders, not with its square."""
         self.assertLess(self.processor_time(2000), 30 * max(self.processor_time(200), 0.01))
 
-    def test_serve_ends_by_a_signal_whatever_it_does(self):
+    def test_serve_with_many_encoders_ends_by_signal(self):
         self.many(1000)
         environment = {**os.environ, "HOME": self.home, "XDG_STATE_HOME": self.home}
         environment.pop("ABSENC_CONFIG", None)
@@ -178,7 +179,7 @@ class ManyEncoders(ConfigCase):
 
 
 class WrongFiles(ConfigCase):
-    def test_a_link_that_leads_nowhere_is_not_passed_over(self):
+    def test_refuses_dangling_link(self):
         self.write("home/.config/absenc/absenc.toml", SIM)
         self.assert_good(self.absenc("read", "elbow"))
         for target in ("nowhere.toml", "absenc.toml"):
@@ -186,21 +187,21 @@ class WrongFiles(ConfigCase):
             self.assert_wrong_usage(self.absenc("read", "elbow"), "absenc.toml", "leads to no file")
             os.unlink(os.path.join(self.work, "absenc.toml"))
 
-    def test_a_fifo_is_refused(self):
+    def test_refuses_fifo(self):
         os.mkfifo(os.path.join(self.work, "absenc.toml"))
         self.assert_wrong_usage(self.absenc("read", "elbow"), "no regular file")
 
-    def test_an_option_that_is_given_twice(self):
+    def test_refuses_repeated_option(self):
         for encoder in ("sim:tformat?seed=1&seed=2", "sim:tformat?singleturn=1&singleturn=1",
                         "sim:tformat?model=TS5700N8500&model=TS5667N120"):
             self.assert_wrong_usage(self.absenc("read", encoder), "is given twice")
         self.assert_wrong_usage(self.absenc("info", "sim:tformat?seed=1", "--option", "seed=2"), "is given twice")
         self.assert_good(self.absenc("read", "sim:tformat?alarm=over_heat&alarm=battery_alarm"))
 
-    def test_a_number_too_small_is_not_zero(self):
+    def test_refuses_number_below_range_of_double(self):
         self.assert_wrong_usage(self.absenc("read", "sim:tformat", "--count", "1", "--rate", "1e-400"), "1e-400", "from 0")
 
-    def test_what_is_nested_too_deep_is_told(self):
+    def test_reports_too_deep_nesting(self):
         deep = 50_000
         for text, place in [(".".join(["a"] * deep) + " = 1\n", "1:34:"),
                             (SIM + "[" + ".".join(["a"] * deep) + "]\n", "4:35:"),
@@ -212,16 +213,16 @@ class WrongFiles(ConfigCase):
                 self.config(text)
                 self.assert_wrong_usage(self.absenc("read", "elbow"), "absenc.toml:" + place, "nested")
 
-    def test_dots_and_brackets_in_texts_and_comments_nest_nothing(self):
+    def test_ignores_brackets_in_texts_and_comments(self):
         dots = "." * 100 + "[" * 100
         self.config(f"# {dots} it's\n[encoder.elbow] # {dots}\nprotocol = 'tformat'\nport = \"sim\"\n"
                     f'alarm = ["over_heat"]\n[encoder.other]\nprotocol = "tformat"\nport = "/dev/{dots}\\"{dots}"\n')
         self.assert_good(self.absenc("read", "elbow"))
 
-    def test_a_file_that_never_ends(self):
+    def test_refuses_endless_file(self):
         self.assert_wrong_usage(self.absenc("read", "elbow", ABSENC_CONFIG="/dev/zero"), "/dev/zero", "16 MiB")
 
-    def test_the_place_comes_first(self):
+    def test_error_begins_with_line_and_column(self):
         for text, words in [("[encoder.elbow\n", ["1:15: this is no TOML"]),
                             (SIM + 'modle = "23-bit"\n', ["4:1:", "did you mean model?"]),
                             (ELBOW + 'port = "/dev/x"\nlatency = 2.5\n', ["4:1:", '"2.5"', "a whole number"]),
@@ -242,7 +243,7 @@ class WrongFiles(ConfigCase):
                 place, *rest = words
                 self.assert_wrong_usage(self.absenc("read", "elbow"), "absenc: absenc.toml:" + place, *rest)
 
-    def test_a_slip_anywhere_is_told_a_value_only_where_it_is_used(self):
+    def test_checks_names_everywhere_but_values_only_if_used(self):
         self.config(SIM + '[encoder.wrist]\nprotocol = "tformat"\nport = "sim"\nmodle = "23-bit"\n')
         self.assert_wrong_usage(self.absenc("read", "elbow"), "absenc.toml:7:1:")
         self.config(SIM + '[encoder.wrist]\nprotocol = "tformat"\nport = "sim"\nmotion = "file=nothing.csv"\n')
@@ -250,14 +251,14 @@ class WrongFiles(ConfigCase):
         for arguments in (["read", "wrist"], ["list", "--names"], ["list", "--names", "--json"]):
             self.assert_wrong_usage(self.absenc(*arguments), "absenc.toml:7:1:", "nothing.csv")
 
-    def test_names_that_do_not_exist(self):
+    def test_refuses_unknown_names(self):
         self.config(SIM)
         self.assert_wrong_usage(self.absenc("read", "elbwo"), '"elbwo" in absenc.toml', "did you mean elbow?")
         self.assert_wrong_usage(self.absenc("read", "shoulder?latency=5"), "known are: elbow")
 
 
 class List(ConfigCase):
-    def test_names(self):
+    def test_list_shows_names(self):
         self.config(ELBOW + 'port = "/dev/ttyUSB0"\nmodel = "23-bit"\nlatency = 5\n'
                     '[encoder.arm]\nprotocol = "tformat"\nport = "tcp:host:4001"\nsingleturn_bits = 20\n')
         result = self.absenc("list", "--names")
@@ -273,7 +274,7 @@ class List(ConfigCase):
                                              "strict": True, "battery": True}})
         self.assertEqual((arm["name"], arm["model"]), ("arm", None))
 
-    def test_no_protocol_beside_names(self):
+    def test_refuses_protocol_together_with_names(self):
         self.config(SIM)
         self.assert_wrong_usage(self.absenc("list", "tformat", "--names"), "--names")
 

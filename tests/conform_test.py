@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""`absenc conform` and `absenc conform-host` as a user sees them. Every clause with its mutants: client/conform tests."""
+"""Tests the output of `absenc conform` and `absenc conform-host`. Each clause and its mutants are tested in
+client/conform."""
 import json
 import pathlib
 import re
@@ -23,8 +24,9 @@ def content(path):
 
 
 class Documentation(unittest.TestCase):
-    def test_its_page_counts_the_clauses(self):
-        """Of each protocol: those that are tested by reading, those that --changes adds, those of its host."""
+    def test_page_has_numbers_of_clauses(self):
+        """Per protocol the page states three numbers: clauses tested by reading, clauses added by --changes, and
+        clauses for hosts."""
         page = content(ROOT / "docs/test-a-drive.md")
         listed = re.findall(r"Listed\{&(\w+)::(\w+),.*?(\w+)::(\w+)\}", content(ROOT / "absenc/protocol/all.cpp"))
         self.assertGreater(len(listed), 10)
@@ -41,18 +43,18 @@ class Documentation(unittest.TestCase):
 
 
 class Conform(EncoderCase):
-    def test_a_good_encoder_holds_all(self):
+    def test_virtual_encoder_keeps_all_clauses(self):
         result = absenc("conform", "sim:tformat", "--json")
         self.assertEqual(result.returncode, 0, result.stderr)
         answer = json.loads(result.stdout)
         self.assertEqual((answer["ok"], answer["protocol"], answer["left"]), (True, "tformat", []))
         for clause in answer["clauses"]:
-            # The reply may come before the port has changed its rate back: conform then does not judge.
+            # The reply may arrive before the port is back at its rate; conform then reports the clause as untested.
             expected = "untested" if clause["id"] == "bad-delimiter" else "kept"
             self.assertEqual(clause["verdict"], expected, clause)
             self.assertTrue(clause["document"] and clause["paragraph"] and clause["evidence"], clause)
 
-    def test_tap_and_junit_say_the_same(self):
+    def test_tap_and_junit_agree(self):
         path = self.file("conform.xml")
         result = absenc("conform", "sim:tformat?fault=drop=1", "--tap", "--junit", path, "--readings", "3")
         self.assertEqual(result.returncode, 1, result.stderr)
@@ -66,16 +68,16 @@ class Conform(EncoderCase):
         self.assertGreater(failed, 0)
         self.assertEqual(int(suite.get("skipped")), sum("# SKIP" in line for line in tests))
 
-    def test_usage(self):
+    def test_refuses_wrong_usage(self):
         for arguments in (("sim:tformat", "--readings", "0"), ("sim:nothing",), ()):
             self.assert_wrong_usage(absenc("conform", *arguments))
 
-    def test_what_changes_asks_first(self):
+    def test_changes_need_consent(self):
         self.assert_wrong_usage(absenc("conform", self.encoder(), "--changes"), "--yes")
         self.assertNotIn("eeprom-write", absenc("conform", "sim:tformat").stdout)
         self.assertIn("kept: eeprom-write", absenc("conform", "sim:tformat", "--changes").stdout)
 
-    def test_what_was_changed_is_put_back(self):
+    def test_changes_are_put_back(self):
         memory = self.file("memory.txt")
         encoder = self.encoder("--memory", memory)
         before = content(memory)
@@ -83,7 +85,7 @@ class Conform(EncoderCase):
         self.assertIn("kept: eeprom-write", result.stdout, result.stderr)
         self.assertEqual(content(memory), before)
 
-    def test_what_was_changed_is_put_back_after_ctrl_c(self):
+    def test_changes_are_put_back_after_interrupt(self):
         memory = self.file("memory.txt")
         encoder = self.encoder("--memory", memory)
         before = content(memory)
@@ -102,7 +104,7 @@ class Conform(EncoderCase):
         reading = json_lines(absenc("read", encoder, "--json").stdout)[0]
         return reading["singleturn"], reading["multiturn"]
 
-    def test_a_zero_and_turns_are_lost_only_when_asked(self):
+    def test_zero_and_turns_are_lost_only_with_resets(self):
         encoder = self.encoder("--singleturn", "1000", "--multiturn", "7")
         before = self.place(encoder)
         self.assertTrue(all(before), before)
@@ -116,7 +118,7 @@ class Conform(EncoderCase):
                          {"zero": "kept", "reset-multiturn": "kept"}, lost)
         self.assertEqual(self.place(encoder), (0, 0))
 
-    def test_resets_ask_first_and_say_what_is_lost(self):
+    def test_resets_need_consent(self):
         encoder = self.encoder("--singleturn", "1000", "--multiturn", "7")
         self.assert_wrong_usage(absenc("conform", encoder, "--resets"), "--changes", "give both")
         self.assert_wrong_usage(absenc("conform", encoder, "--changes", "--resets"), "--yes", "its turns and its alarms are")
@@ -124,7 +126,7 @@ class Conform(EncoderCase):
 
 
 class ConformHost(EncoderCase):
-    def test_our_host_holds_all(self):
+    def test_monitor_keeps_all_clauses(self):
         path = self.file("encoder")
         judge = self.start("conform-host", "tformat", "--pty", path, "--answers", "10", "--patience", "60", "--json")
         self.assertIn("ready: ", read_line(judge.stderr, time.monotonic() + PATIENCE))
@@ -133,13 +135,13 @@ class ConformHost(EncoderCase):
         end(host, signal.SIGTERM)
         answer = json.loads(out)
         verdicts = {one["id"]: one["verdict"] for one in answer["clauses"]}
-        # One that reads positions sends no reset, and leaves the memory alone.
+        # A host that only reads positions sends no reset and no memory request.
         read = {"asks", "silence", "damage", "turn", "refusal"}
         self.assertEqual(verdicts, {name: "kept" if name in read else "untested" for name in verdicts}, err)
         self.assertEqual((judge.returncode, answer["ok"]), (0, True))
 
-    def judged(self, host):
-        """What is said of a host that uses the line so, and then falls silent."""
+    def verdicts_of(self, host):
+        """Returns the verdicts about a host that runs `host` on the line and then sends nothing more."""
         path = self.file("encoder")
         judge = self.start("conform-host", "tformat", "--pty", path, "--answers", "2", "--patience", "1", "--json")
         self.assertIn("ready: ", read_line(judge.stderr, time.monotonic() + PATIENCE))
@@ -150,29 +152,29 @@ class ConformHost(EncoderCase):
         answer = json.loads(out)
         return judge.returncode, answer, {one["id"]: one["verdict"] for one in answer["clauses"]}
 
-    def test_a_host_that_gives_up_is_told(self):
+    def test_reports_host_that_stops_after_lost_reply(self):
         def ask_while_answered(line):
             line.write(b"\x1a")
             while select.select([line], [], [], 0.5)[0]:
                 line.read(64)
                 line.write(b"\x1a")
-        status, answer, verdicts = self.judged(ask_while_answered)
+        status, answer, verdicts = self.verdicts_of(ask_while_answered)
         self.assertEqual((status, answer["ok"], answer["verdict"]), (1, False, "broken"), answer)
         self.assertEqual(verdicts["silence"], "broken", answer)
 
-    def test_what_is_no_request_breaks_one(self):
+    def test_reports_invalid_request(self):
         for sent in ((b"\x9a",) * 8, (b"\x1a", b"\x9a") * 8, (b"\x1a\x1a",)):
             def send(line, sent=sent):
                 for one in sent:
                     line.write(one)
                     select.select([line], [], [], 0.1)
             with self.subTest(sent[:2]):
-                status, answer, verdicts = self.judged(send)
+                status, answer, verdicts = self.verdicts_of(send)
                 self.assertEqual((status, answer["ok"]), (1, False), answer)
                 self.assertEqual(verdicts["asks"], "broken", answer)
                 self.assertNotIn("kept", verdicts.values())
 
-    def test_ends_by_ctrl_c_and_knows_its_protocols(self):
+    def test_ends_by_interrupt_and_refuses_spi_without_device(self):
         judge = self.start("conform-host", "tformat", "--pty", self.file("encoder"))
         self.assertIn("ready: ", read_line(judge.stderr, time.monotonic() + PATIENCE))
         self.assertEqual(end(judge, signal.SIGINT)[:2], (1, ""))

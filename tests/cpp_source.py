@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The tokens of a C++ source that clang-format has formatted, and where its operands and statements begin and end."""
+"""Tokens of a C++ source formatted by clang-format, and the bounds of its operands and statements."""
 
 import bisect
 import re
@@ -28,7 +28,7 @@ class Token(NamedTuple):
 
 
 class Source:
-    """Tokens without comments and directives, and which brackets belong together."""
+    """Tokens of a source without comments and directives, and the pairs of matching brackets."""
 
     def __init__(self, text):
         self.text = text
@@ -72,15 +72,15 @@ class Source:
         return bisect.bisect_right(self.lines, position)
 
     def tokens_of_lines(self, first, last):
-        """Which tokens stand in them: from where up to, without, where."""
+        """Returns the half-open range of indices of the tokens in these lines."""
         return bisect.bisect_left(self.line_of_token, first), bisect.bisect_right(self.line_of_token, last)
 
     def span(self, first, last):
-        """The text of the tokens from `first` up to, without, `last`."""
+        """Returns the source text of the tokens from `first` to `last`, exclusive."""
         return self.text[self.tokens[first].start : self.tokens[last - 1].end]
 
     def left(self, index, stops):
-        """Where the operand begins that ends before `index`."""
+        """Returns the first index of the operand that ends before `index`."""
         while index > 0 and self[index - 1] not in stops:
             index -= 1
             if self[index] in OPENING:
@@ -96,13 +96,13 @@ class Source:
         return before < 0 or self[before] in (")", ";", "{", "}", "else", "do")
 
     def right(self, index, stops):
-        """Where the operand ends that begins at `index`."""
+        """Returns the index after the operand that begins at `index`."""
         while index < len(self.tokens) and self[index] not in stops and self[index] not in CLOSING:
             index = max(self.partner.get(index, index), index) + 1
         return index
 
     def statement(self, index):
-        """Where the statement ends that begins at `index`: behind its semicolon or brace."""
+        """Returns the index after the semicolon or brace of the statement that begins at `index`."""
         while index < len(self.tokens) and self[index] not in CLOSING:
             if self[index] == ";":
                 return index + 1

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`absenc decode` of whole captures, as a user types it: files of every kind made here from the same conversation."""
+"""Tests `absenc decode` with capture files of every format, all built from the same conversation."""
 import csv
 import functools
 import io
@@ -11,11 +11,11 @@ import unittest
 
 from command_support import ABSENC, PATIENCE, Case, absenc, json_lines
 
-BIT = 400  # ns, of 2.5 Mbit/s
+BIT = 400  # ns, at 2.5 Mbit/s
 
 
 def exchange(position, turns=0, alarms=0):
-    """Request and reply of tformat's ID 3."""
+    """Returns request and reply of tformat's data ID 3."""
     status = 0x20 if alarms & 0xF0 else 0
     reply = [0x1A, status, *position.to_bytes(3, "little"), 0x11, *turns.to_bytes(3, "little"), alarms]
     reply.append(functools.reduce(lambda a, b: a ^ b, reply))
@@ -23,7 +23,7 @@ def exchange(position, turns=0, alarms=0):
 
 
 class Wave:
-    """Wires with their changes; times are ns."""
+    """Wires with their level changes; times in nanoseconds."""
 
     def __init__(self, **idle):
         self.changes = {name: [(0, level)] for name, level in idle.items()}
@@ -34,14 +34,14 @@ class Wave:
             self.changes[wire].append((at, value))
 
     def send(self, wire, data, bit=BIT):
-        """Asynchronous characters from now on."""
+        """Appends asynchronous characters at the current time."""
         for byte in data:
             for level in [0, *((byte >> i) & 1 for i in range(8)), 1]:
                 self.level(wire, level, self.now)
                 self.now += bit
 
     def word(self, bits, half=2500):
-        """A clocked word: an edge that latches, then each rising edge brings a bit."""
+        """Appends a clocked word: one edge latches the position, then each rising edge shifts out a bit."""
         self.level("clock", 0, self.now)
         for bit in bits:
             self.now += half
@@ -73,7 +73,7 @@ class Wave:
         return text + f"#{self.now + 20_000}\n"
 
     def samples(self, wire, period):
-        """One byte a sample."""
+        """Returns the levels of a wire, one byte per sample."""
         changes = [*self.changes[wire], (self.now + 20_000, None)]
         return b"".join(bytes([level]) * (end // period - begin // period)
                         for (begin, level), (end, _) in zip(changes, changes[1:]))
@@ -104,7 +104,7 @@ class OwnWaveforms(Case):
         result = absenc("decode", encoder.partition("?")[0], path, "--json", *arguments)
         return result, json_lines(result.stdout)
 
-    def test_the_identity_tells_the_length_of_the_frames(self):
+    def test_identity_gives_frame_length(self):
         result, lines = self.decode("encolink-spi?motion=rpm=600&resolution=20", count=1000)
         self.assert_good(result)
         positions = [line["fields"] for line in lines if "singleturn" in line["fields"]]
@@ -114,7 +114,7 @@ class OwnWaveforms(Case):
             self.assertLess(moved, 2**20 // 50, f"{before} {after}")
             self.assertIn("multiturn", after)
 
-    def test_a_parity_is_found(self):
+    def test_detects_parity(self):
         for parity in ("odd", "even"):
             with self.subTest(parity):
                 result, lines = self.decode(f"raa38?parity={parity}&motion=rpm=60")
@@ -122,7 +122,7 @@ class OwnWaveforms(Case):
                 self.assertIn(f"parity {parity}", result.stderr)
                 self.assertGreater(sum("singleturn" in line.get("fields", {}) for line in lines), 45)
 
-    def test_a_parity_is_given(self):
+    def test_parity_option(self):
         result, _ = self.decode("raa38?parity=odd&motion=rpm=60", "--parity", "odd")
         self.assert_good(result)
         self.assertEqual(result.stderr, "")
@@ -137,12 +137,12 @@ class Invalid(Case):
         self.assert_good(absenc("wave", f"tformat?alarm={alarm}", path, "--count", "5", "--force"))
         return absenc("decode", "tformat", path, *arguments)
 
-    def test_the_other_way_round(self):
+    def test_reports_swapped_arguments(self):
         result = absenc("decode", "drive.sr", "tformat")
         self.assertEqual(result.returncode, 2)
         self.assertIn("the protocol comes first, then the capture: absenc decode tformat drive.sr", result.stderr)
 
-    def test_of_one_frame(self):
+    def test_shows_invalid_fields_of_one_frame(self):
         [line] = json_lines(self.alarm("full_absolute_status", "--json").stdout)[:1]
         frames = ["--request", line["request"], "--hex", line["reply"]]
         shown = absenc("decode", "tformat", *frames)
@@ -152,7 +152,7 @@ class Invalid(Case):
         self.assertFalse(one["singleturn_valid"])
         self.assertEqual(one["fields"]["singleturn"], 0)
 
-    def test_of_a_capture(self):
+    def test_shows_invalid_fields_of_capture(self):
         for alarm, fields in (("full_absolute_status", {"singleturn"}), ("over_speed", {"multiturn"})):
             with self.subTest(alarm):
                 line = json_lines(self.alarm(alarm, "--json").stdout)[0]
@@ -167,7 +167,7 @@ class Text(Case):
     def capture(self, *exchanges):
         return self.file("capture.txt", "".join(f"{hex_text(a)}\n{hex_text(b)}\n" for a, b in exchanges))
 
-    def test_each_exchange(self):
+    def test_prints_each_exchange(self):
         result = absenc("decode", "tformat", self.capture(exchange(74565, 4660), exchange(1, 2, 0x80)))
         self.assert_good(result)
         first, second = result.stdout.splitlines()
@@ -193,7 +193,7 @@ class Text(Case):
         self.assertEqual((bad["angle_deg"], bad["fields"], bad["error"]), ("", "", "bad_checksum"))
         self.assertIn("checksum", bad["message"])
 
-    def test_where_fields_stand(self):
+    def test_bit_positions_of_capture(self):
         capture = self.capture(exchange(74565, 4660))
         result = absenc("decode", "tformat", capture, "--bits")
         self.assert_good(result)
@@ -205,8 +205,8 @@ class Text(Case):
         self.assert_wrong_usage(absenc("decode", "tformat", capture, "--bits", "--stats"), "--bits")
         self.assert_wrong_usage(absenc("decode", "e201", capture, "--bits"), "does not say where")
 
-    def test_where_fields_of_one_frame_stand(self):
-        # Big endian: the low byte comes last.
+    def test_bit_positions_of_one_frame(self):
+        # The field is big-endian, so its low byte comes last.
         result = absenc("decode", "raa38", "--hex", "ff81017f00", "--bits", "--option", "bits=14")
         self.assert_good(result)
         self.assertRegex(result.stdout, r"singleturn +383 counts +bits 16-21 24-31")
@@ -214,7 +214,7 @@ class Text(Case):
                         "--bits", "--json")
         self.assert_good(result)
         self.assertEqual(json.loads(result.stdout)["bits"]["singleturn"], [{"first": 0, "count": 13}])
-        # What is active low says so; on CAN and over SPI bits count as in every byte.
+        # Active-low bits are marked as inverted. On CAN and SPI the bits count from the lowest of each byte.
         for arguments, field, places in (
             (["encolink", "--hex", "003e825200"], "warning", [{"first": 16, "count": 1, "inverted": True}]),
             (["raa38-modbus", "--hex", "0103021234B533"], "singleturn",
@@ -225,7 +225,7 @@ class Text(Case):
             self.assert_good(result)
             self.assertEqual(json.loads(result.stdout)["bits"][field], places)
 
-    def test_times_and_directions(self):
+    def test_log_with_times_and_directions(self):
         request, reply = exchange(7)
         text = f"12.000100 tx {hex_text(request)}\n12.000250 rx {hex_text(reply)}\n12.5 tx {hex_text(request)}\n"
         text += f"12.500300 rx {hex_text(request + reply)}\n"
@@ -236,7 +236,7 @@ class Text(Case):
         self.assertIn("the request came back", echoed["message"])
         self.assertEqual(echoed["reply"], bytes(reply).hex())
 
-    def test_a_slow_log_is_no_late_reply(self):
+    def test_slow_log_is_no_timeout(self):
         request, reply = exchange(7)
         text = f"1.0 tx {hex_text(request)}\n1.5 rx {hex_text(reply)}\n"
         self.assert_good(absenc("decode", "tformat", self.file("log.txt", text)))
@@ -248,7 +248,7 @@ class Text(Case):
         self.assert_good(result)
         self.assertEqual(json_lines(result.stdout)[0]["fields"]["singleturn"], 9)
 
-    def test_damaged_text(self):
+    def test_reports_damaged_text(self):
         path = self.capture(exchange(1), exchange(2))
         with open(path, "a", encoding="utf-8") as file:
             file.write("what is this?\n1A\n")
@@ -256,11 +256,11 @@ class Text(Case):
         self.assert_failed(result, "damaged at byte 72")
         self.assertEqual(len(json_lines(result.stdout)), 2)
 
-    def test_nothing_found(self):
+    def test_reports_capture_without_frames(self):
         result = absenc("decode", "tformat", self.file("noise.txt", "55 AA 55 AA 77 77 77\n"))
         self.assert_failed(result, "no good frame of tformat", "check the channel")
 
-    def test_what_an_encoder_says_that_cannot_be_asked(self):
+    def test_decodes_stream(self):
         frames = [bytes.fromhex("003e83c500")] * 20
         path = self.file("stream.txt", "".join(f"{hex_text(frame)}\n" for frame in frames))
         options = ["--option", "resolution=20", "--option", "multiturn_bits=0"]
@@ -275,7 +275,7 @@ class Levels(Case):
     def vcd(self, wave):
         return self.file("capture.vcd", wave.vcd())
 
-    def test_an_rs485_line(self):
+    def test_rs485_line(self):
         result = absenc("decode", "tformat", self.vcd(conversation()), "--json")
         self.assert_good(result)
         lines = json_lines(result.stdout)
@@ -285,7 +285,7 @@ class Levels(Case):
             self.assertAlmostEqual(line["turnaround_us"], 3, delta=0.05)
             self.assertAlmostEqual(line["time_s"], (20_000 + i * (12 * 10 * BIT + 23_000)) * 1e-9, delta=1e-7)
 
-    def test_another_baud_rate(self):
+    def test_detects_other_baud_rate(self):
         wave = Wave(D0=1)
         for i in range(20):
             request, reply = exchange(i)
@@ -297,7 +297,7 @@ class Levels(Case):
         self.assert_good(result)
         self.assertEqual([line["fields"]["singleturn"] for line in json_lines(result.stdout)], list(range(20)))
 
-    def test_errors_where_they_are(self):
+    def test_reports_errors_at_their_exchanges(self):
         result = absenc("decode", "tformat", self.vcd(conversation(bad={7}, silent={20})), "--json")
         self.assertEqual(result.returncode, 1)
         lines = json_lines(result.stdout)
@@ -319,7 +319,7 @@ class Levels(Case):
         self.assertAlmostEqual(statistics["turnaround_us"]["median"], 3, delta=0.1)
         self.assertEqual(statistics["first_errors"][0]["kind"], "exchange")
 
-    def test_another_file_of_the_same(self):
+    def test_all_file_formats_agree(self):
         wave = conversation()
         expected = [line["fields"] for line in json_lines(absenc("decode", "tformat", self.vcd(wave), "--json").stdout)]
         raw = self.file("capture.bin")
@@ -335,7 +335,7 @@ class Levels(Case):
         self.assert_good(result)
         self.assertEqual([line["fields"] for line in json_lines(result.stdout)], expected)
 
-    def test_two_pairs(self):
+    def test_two_wire_pairs(self):
         wave = Wave(A=1, B=1)
         for _ in range(30):
             wave.send("A", [0, 0], 1000)
@@ -351,7 +351,7 @@ class Levels(Case):
                              {("exchange", "0000", 1000 * 360 / 2**20)})
             self.assertEqual(len(lines), 30)
 
-    def test_a_clocked_word(self):
+    def test_clocked_word(self):
         wave = Wave(clock=1, data=1)
         for position in (495, 496, 4095):
             wave.word([position >> (11 - i) & 1 for i in range(12)])
@@ -359,7 +359,7 @@ class Levels(Case):
         self.assert_good(result)
         self.assertEqual([line["fields"]["singleturn"] for line in json_lines(result.stdout)], [495, 496, 4095])
 
-    def test_begins_within_a_frame(self):
+    def test_capture_that_begins_within_frame(self):
         wave = conversation(10)
         cut = 20_000 + 5 * 10 * BIT + 3000 + 700
         wave.changes["D0"] = [(0, 1), *((at - cut, level) for at, level in wave.changes["D0"] if at > cut)]
@@ -369,13 +369,13 @@ class Levels(Case):
         good = [line for line in json_lines(result.stdout) if line["kind"] == "exchange"]
         self.assertEqual([line["fields"]["singleturn"] for line in good], [100 * i for i in range(1, 10)])
 
-    def test_a_cut_file(self):
+    def test_decodes_truncated_file_up_to_damage(self):
         text = conversation().vcd()
         result = absenc("decode", "tformat", self.file("cut.vcd", text[:len(text) // 2] + "?!"), "--json")
         self.assert_failed(result, "the capture is damaged at byte")
         self.assertGreater(len(json_lines(result.stdout)), 20)
 
-    def test_a_reader_that_goes_away(self):
+    def test_closed_output_ends_quietly(self):
         path = self.vcd(conversation(2000))
         command = f"{ABSENC} decode tformat {path} --json | head -n 1"
         result = subprocess.run(["bash", "-c", f"set -o pipefail; {command}"], capture_output=True, text=True,
@@ -383,7 +383,7 @@ class Levels(Case):
         self.assertEqual((result.returncode, result.stderr), (0, ""))
         self.assertEqual(len(json_lines(result.stdout)), 1)
 
-    def test_memory_does_not_grow_with_the_file(self):
+    def test_memory_does_not_grow_with_file(self):
         wave = conversation(1000)
         samples = wave.samples("D0", 50)
 
@@ -407,7 +407,7 @@ class Levels(Case):
 
 
 class Usage(Case):
-    def test_what_does_not_fit_together(self):
+    def test_refuses_conflicting_options(self):
         text = self.file("capture.txt", "1A\n1A 00 45 23 01 11 34 12 00 00 4A\n")
         self.assert_wrong_usage(absenc("decode", "tformat", text, "--json", "--csv"), "--json and --csv")
         self.assert_wrong_usage(absenc("decode", "tformat", text, "--stats", "--csv"), "--stats")
@@ -419,12 +419,12 @@ class Usage(Case):
         can = self.file("can.log", "(1.000000) can0 121#0102030405060708\n")
         self.assert_wrong_usage(absenc("decode", "tformat", can), "CAN frames")
 
-    def test_standard_input_is_text(self):
+    def test_standard_input_must_be_text(self):
         raw = ["--raw-channels", "1", "--rate", "1000000"]
         self.assert_wrong_usage(absenc("decode", "tformat", "-", *raw, stdin=None, input="text"), "only text")
         self.assert_wrong_usage(absenc("decode", "tformat", "-", stdin=None, input="PK\3\4\0\0"), "only text")
 
-    def test_channels(self):
+    def test_refuses_wrong_channels(self):
         wave = Wave(D0=1, D1=1, D2=1)
         path = self.file("three.vcd", wave.vcd())
         self.assert_wrong_usage(absenc("decode", "tformat", path), "--channel line=NAME", "D0, D1, D2")
@@ -432,7 +432,7 @@ class Usage(Case):
         self.assert_wrong_usage(absenc("decode", "tformat", path, "--channel", "moon=D1"), "no wire \"moon\"", "line")
         self.assert_wrong_usage(absenc("decode", "tformat", path, "--channel", "D0,D1"), "one too many")
 
-    def test_files_that_are_none(self):
+    def test_reports_missing_or_invalid_files(self):
         self.assert_failed(absenc("decode", "tformat", self.file("missing")), "missing")
         self.assert_failed(absenc("decode", "tformat", self.file("empty", "")), "empty")
         self.assert_failed(absenc("decode", "tformat", self.file("what.bin", "\0\1\2\3")), "what.bin")

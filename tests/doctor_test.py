@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`absenc doctor`: each fault on a pseudo-terminal or in the system is named, and what healthy encoders give."""
+"""Tests `absenc doctor`: it names each fault that a pseudo-terminal or the system can have, and passes healthy
+encoders."""
 import fcntl
 import json
 import os
@@ -11,10 +12,10 @@ import unittest
 
 from command_support import ABSENC, BabblingLine, Emulator, EncoderCase, FakeEncoder, FakeLine, absenc, json_lines
 
-PATIENT = "latency=300"  # for a machine that is busy with other tests
+PATIENT = "latency=300"  # latency for a machine that is busy with other tests
 
 
-# To 1A: 17 bits and 16 of turns, both 0, no alarm.
+# Reply to 1A: 17 bits of position, 16 bits of turns, both 0, no alarm.
 GOOD_REPLY = bytes.fromhex("1a 00000000 11 000000 00 0b")
 
 
@@ -28,7 +29,7 @@ def ids(found):
 
 
 class TurnedRate(FakeLine):
-    """Answers well at one rate of the port, and at others with what garbles its frames."""
+    """Replies correctly at one baud rate of the port, and with random bytes at any other."""
 
     def __init__(self, rate, reply):
         super().__init__()
@@ -36,7 +37,7 @@ class TurnedRate(FakeLine):
         self.reply = reply
 
     def rate_of_port(self):
-        """From struct termios2, which alone has rates of any number."""
+        """Reads struct termios2, which holds arbitrary rates."""
         tcgets2 = 0x802C542A
         state = fcntl.ioctl(self.slave, tcgets2, bytes(44))
         return int.from_bytes(state[40:44], sys.byteorder)
@@ -53,7 +54,7 @@ class TurnedRate(FakeLine):
 
 
 class RefusingAdapter(FakeLine):
-    """An slcan adapter whose frames nobody acknowledges."""
+    """An slcan adapter on a bus where no node acknowledges frames."""
 
     def serve(self):
         line = b""
@@ -78,7 +79,7 @@ class Named(EncoderCase):
                 self.assertTrue(finding[part])
         return found
 
-    def test_a_healthy_encoder_is_good(self):
+    def test_healthy_encoder_is_good(self):
         emulator = self.emulator()
         found = self.assert_found(f"tformat:{emulator.path}?{PATIENT}", status=0)
         self.assertTrue(found["ok"])
@@ -87,13 +88,13 @@ class Named(EncoderCase):
         self.assert_good(text)
         self.assertRegex(text.stdout.splitlines()[-1], r"^good: \d+ of \d+ readings")
 
-    def test_a_healthy_encoder_of_every_unit_gives_no_finding(self):
+    def test_healthy_encoder_of_every_unit_has_no_finding(self):
         units = {unit["protocol"] for unit in json_lines(absenc("list", "--json").stdout)}
         for unit in sorted(units):
             with self.subTest(unit):
                 self.assert_found(f"sim:{unit}", status=0)
 
-    def test_the_last_line_is_the_first_thing_to_mend(self):
+    def test_last_line_names_first_repair(self):
         result = absenc("doctor", "sim:tformat?fault=corrupt=0.3&alarm=battery_alarm")
         self.assertEqual(result.returncode, 1)
         lines = result.stdout.splitlines()
@@ -101,13 +102,13 @@ class Named(EncoderCase):
         self.assertRegex(lines[-1], "^first: damaged_bits: ")
         self.assertIn("warning: alarm: the encoder reports battery_alarm", result.stdout)
 
-    def test_a_port_that_is_not_there(self):
+    def test_missing_port(self):
         self.assert_found(f"tformat:{self.file('nothing')}", "port_missing")
 
-    def test_a_file_is_no_port(self):
+    def test_file_is_no_port(self):
         self.assert_found(f"tformat:{self.file('text', 'hello')}", "port_unsuitable")
 
-    def test_a_port_that_another_program_has(self):
+    def test_port_in_use(self):
         line = FakeEncoder()
         with line:
             holder = subprocess.Popen(
@@ -121,7 +122,7 @@ class Named(EncoderCase):
             finally:
                 holder.communicate()
 
-    def test_a_port_without_permission(self):
+    def test_port_without_permission(self):
         line = FakeEncoder()
         with line:
             os.chmod(line.path, 0o000)
@@ -130,14 +131,14 @@ class Named(EncoderCase):
                 return
             setpriv = ["setpriv", "--reuid=65534", "--regid=65534", "--clear-groups"]
             command = [ABSENC, "doctor", f"tformat:{line.path}", "--json"]
-            # What others may not reach, they cannot run.
+            # Users without access to this directory cannot run the command either.
             probe = subprocess.run([*setpriv, ABSENC, "list"], capture_output=True, check=False)
             if probe.returncode != 0:
                 self.skipTest("another user cannot run the command here")
             result = subprocess.run([*setpriv, *command], capture_output=True, text=True, check=False)
             self.assertEqual(ids(json.loads(result.stdout)), ["port_forbidden"], result.stderr)
 
-    def test_only_the_own_echo(self):
+    def test_only_echo(self):
         class Echo(FakeEncoder):
             def answer(self, request):
                 return request
@@ -146,7 +147,7 @@ class Named(EncoderCase):
             found = self.assert_found(f"tformat:{line.path}", "only_echo")
             self.assertIn("1A", found["findings"][0]["evidence"])
 
-    def test_a_modem(self):
+    def test_modem(self):
         class Modem(FakeEncoder):
             def answer(self, request):
                 return request + b"\r\nERROR\r\n"
@@ -154,11 +155,11 @@ class Named(EncoderCase):
         with Modem() as line:
             self.assert_found(f"tformat:{line.path}", "modem_answers")
 
-    def test_nobody(self):
+    def test_no_reply(self):
         with FakeEncoder() as line:
             self.assert_found(f"tformat:{line.path}", "no_answer")
 
-    def test_an_inverted_line(self):
+    def test_inverted_line(self):
         class Inverted(FakeEncoder):
             def answer(self, request):
                 return bytes(9)
@@ -166,18 +167,18 @@ class Named(EncoderCase):
         with Inverted() as line:
             self.assert_found(f"tformat:{line.path}", "line_inverted")
 
-    def test_a_line_that_is_never_silent(self):
+    def test_line_that_is_never_silent(self):
         with BabblingLine(period=0.002, pieces=(b"\x55\x12",)) as line:
             self.assert_found(f"tformat:{line.path}", "never_silent")
 
-    def test_a_pseudo_terminal_has_no_rate_that_could_be_wrong(self):
-        for said, rate in ((2_000_000, 2_500_000), (2_500_000, 9_600)):
+    def test_pseudo_terminal_has_no_wrong_baud_rate(self):
+        for requested_rate, rate in ((2_000_000, 2_500_000), (2_500_000, 9_600)):
             with self.subTest(rate=rate), TurnedRate(rate, GOOD_REPLY) as line:
-                _, found = doctor(f"tformat:{line.path}?baud={said}&{PATIENT}")
+                _, found = doctor(f"tformat:{line.path}?baud={requested_rate}&{PATIENT}")
                 self.assertNotIn("wrong_baud", ids(found))
                 self.assertNotIn("good:", found["verdict"])
 
-    def test_another_model(self):
+    def test_other_model(self):
         emulator = self.emulator("--model", "23-bit", "--motion", "rpm=60")
         found = self.assert_found(f"tformat:{emulator.path}?{PATIENT}", "wrong_settings")
         self.assertEqual(found["findings"][0]["action"], "set model=23-bit")
@@ -185,38 +186,39 @@ class Named(EncoderCase):
             found = self.assert_found(f"tformat:{usual.path}?model=23-bit&{PATIENT}", "wrong_settings")
             self.assertEqual(found["findings"][0]["action"], "set model=TS5700N8500")
 
-    def test_another_address(self):
+    def test_other_address(self):
         with Emulator(self.directory, "--option", "address=3", protocol="esl", name="third") as third:
             found = self.assert_found(f"esl:{third.path}?latency=50", "wrong_address")
             self.assertEqual(found["findings"][0]["action"], "set address=3")
 
-    def test_another_protocol(self):
+    def test_other_protocol(self):
         emulator = self.emulator("--motion", "rpm=60")
         found = self.assert_found(f"esl:{emulator.path}?latency=50", "other_protocol")
         self.assertIn(f"absenc read \"tformat:{emulator.path}", found["findings"][0]["action"])
 
-    def test_two_encoders_with_one_address(self):
+    def test_two_encoders_with_same_address(self):
         with Emulator(self.directory, "--option", "address=3", "--also", "address=3&singleturn=1234567",
                       protocol="esl", name="both") as both:
             found = self.assert_found(f"esl:{both.path}?address=3&latency=50", "same_address")
             self.assertIn("3", found["findings"][0]["evidence"])
 
-    def test_a_can_bus_on_which_nobody_acknowledges(self):
+    def test_can_bus_without_acknowledge(self):
         with RefusingAdapter() as line:
             self.assert_found(f"raa38-can:slcan:{line.path}", "can_errors")
 
-    def test_another_bit_rate_of_a_can_bus(self):
+    def test_other_can_bit_rate(self):
         with Emulator(self.directory, "--option", "bitrate=500000", protocol="raa38-can", name="bus") as bus:
             found = self.assert_found(f"raa38-can:slcan:{bus.path}?{PATIENT}", "wrong_baud")
             self.assertEqual(found["findings"][0]["action"], "set bitrate=500000")
 
-    def test_a_flat_battery_in_the_words_of_the_document(self):
+    def test_flat_battery_has_advice_of_document(self):
         emulator = self.emulator("--alarm", "battery_alarm")
         found = self.assert_found(f"tformat:{emulator.path}?{PATIENT}", "alarm")
         self.assertIn("replace the battery", found["findings"][0]["action"])
 
-    def test_an_encoder_without_battery_is_not_ill(self):
-        """battery_error and battery_alarm are how it always is (paragraph 2 (1)); anything else is told."""
+    def test_encoder_without_battery_is_healthy(self):
+        """Without a battery, battery_error and battery_alarm are always set (paragraph 2 (1)); other alarms are still
+        reported."""
         result, found = doctor("sim:tformat?battery=false")
         self.assert_good(result)
         self.assertEqual((found["ok"], found["findings"]), (True, []))
@@ -226,13 +228,14 @@ class Named(EncoderCase):
         self.assertRegex(evidence[0], r"^the encoder reports over_heat in all \d+ readings$")
         self.assertIn("battery=false", doctor("sim:tformat?condition=battery=0")[1]["findings"][0]["action"])
 
-    def test_replies_that_come_late(self):
+    def test_late_replies(self):
         result, found = doctor("sim:tformat?fault=delay=1")
         self.assertEqual(result.returncode, 1)
         self.assertEqual(ids(found), ["reply_late"])
 
-    def test_nothing_is_written(self):
-        """Every request reads, those of other protocols too: none begins as one by which this encoder would be changed."""
+    def test_sends_no_changing_request(self):
+        """Doctor also tries requests of other protocols. None may begin like a request that changes a T-format
+        encoder."""
         requests = set()
 
         class Listening(FakeEncoder):
@@ -244,18 +247,18 @@ class Named(EncoderCase):
             doctor(f"tformat:{line.path}")
         self.assertTrue(requests)
         self.assertIn(b"\x1A", requests)
-        changing = {0xBA, 0xC2, 0x62, 0x32}  # reset of the alarms, of the position and of the turns; write to the EEPROM
+        changing = {0xBA, 0xC2, 0x62, 0x32}  # resets of alarms, position and turns; EEPROM write
         self.assertEqual({request[0] for request in requests} & changing, set())
 
-    def test_wrong_usage(self):
+    def test_refuses_wrong_usage(self):
         self.assert_wrong_usage(absenc("doctor", "tfromat:/dev/null"), "tformat")
         self.assert_wrong_usage(absenc("doctor", "sim:tformat", "--readings", "no"), "--readings")
 
 
-class InOneLine(EncoderCase):
-    """`read` and `monitor` name the same finding, and who says more."""
+class OneLineFinding(EncoderCase):
+    """`read` and `monitor` name the same finding as doctor, and refer to doctor."""
 
-    def test_read_and_monitor(self):
+    def test_read_and_monitor_name_finding(self):
         class Echo(FakeEncoder):
             def answer(self, request):
                 return request
@@ -271,7 +274,7 @@ class InOneLine(EncoderCase):
             self.assertIn("only_echo: ", seen.stderr)
             self.assertIn("absenc doctor", seen.stderr)
 
-    def test_what_is_no_reading_names_no_finding(self):
+    def test_good_reading_names_no_finding(self):
         result = absenc("read", "sim:tformat")
         self.assert_good(result)
         self.assertNotIn("doctor", result.stderr)

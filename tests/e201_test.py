@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""The E201-9S on a pseudo-terminal, read and set up by the command."""
+"""Tests the E201-9S interface on a pseudo-terminal, read and configured with the command."""
 import json
 import os
 import pty
@@ -14,7 +14,7 @@ import unittest
 from command_support import ABSENC, PATIENCE, Case, Emulator, FakeEncoder, absenc
 
 CR = b"\r"
-# What comes in reply to `4`; the error, what is found and what is advised.
+# Each row: reply to `4`, error, evidence in the message, advice.
 FRAMES = [
     (b"0" * 16 + CR, "line_stuck", "never changed", "supply-on"),
     (b"f" * 16 + CR, "line_stuck", "never changed", "supply-on"),
@@ -31,7 +31,7 @@ FRAMES = [
 
 
 class FakeInterface(FakeEncoder):
-    """Answers `4` and `v` with the same bytes each time."""
+    """Sends fixed replies to `4` and `v`."""
 
     def __init__(self, samples=b"", version=b"E201-9S V1.16" + CR):
         super().__init__()
@@ -56,19 +56,19 @@ class InterfaceCase(Case):
 
 
 class Interface(InterfaceCase):
-    def test_reads_a_biss_encoder(self):
+    def test_reads_biss_encoder(self):
         options = ["--option", "singleturn_bits=19", "--option", "multiturn_bits=16"]
         with self.emulator(*options, "--singleturn", "275096", "--multiturn", "1") as emulator:
             reading = self.run_json(emulator.path, "read", *options)
             self.assertEqual((reading["singleturn"], reading["multiturn"]), (275096, 1))
             self.assertTrue(reading["singleturn_valid"])
 
-    def test_reads_an_ssi_encoder(self):
+    def test_reads_ssi_encoder(self):
         options = ["--option", "carries=ssi", "--option", "singleturn_bits=13", "--option", "gray=true"]
         with self.emulator(*options, "--singleturn", "4660") as emulator:
             self.assertEqual(self.run_json(emulator.path, "read", *options)["singleturn"], 4660)
 
-    def test_clock_supply_and_info(self):
+    def test_sets_clock_and_supply(self):
         with self.emulator() as emulator:
             self.assertEqual(self.run_json(emulator.path, "run", "set-clock", "560", "--yes")["fields"]["clock"], 5)
             info = self.run_json(emulator.path, "run", "info")["fields"]
@@ -80,7 +80,7 @@ class Interface(InterfaceCase):
             self.assertGreater(on["supply_mv"], 4000)
             self.assert_good(absenc("read", f"e201:{emulator.path}"))
 
-    def test_info_tells_of_interface_and_encoder(self):
+    def test_info_shows_interface_and_encoder(self):
         with self.emulator("--singleturn", "1000", "--alarm", "warning") as emulator:
             info = self.run_json(emulator.path, "info")
             answers = info["answers"]
@@ -96,12 +96,12 @@ class Interface(InterfaceCase):
             self.assertRegex(result.stdout, "position +FAILED +line_stuck")
             self.assertIn("supply-on", result.stderr)
 
-    def test_zero(self):
+    def test_sets_own_zero(self):
         def counts(path):
             return self.run_json(path, "run", "decimal")["fields"]["counts"]
         with self.emulator("--singleturn", "1000") as emulator:
             self.assertEqual(counts(emulator.path), 1000)
-            # It is not the zero of what `read` shows, so it is no `zero`.
+            # This zero does not affect `read`, so the command is not named `zero`.
             self.assert_wrong_usage(absenc("zero", f"e201:{emulator.path}", "--yes"), "set-zero")
             self.assertEqual(counts(emulator.path), 1000)
             self.assert_good(absenc("run", f"e201:{emulator.path}", "set-zero", "--yes"))
@@ -112,7 +112,7 @@ class Interface(InterfaceCase):
         with self.emulator("--motion", "rpm=60") as emulator:
             self.assert_failed(absenc("run", f"e201:{emulator.path}", "set-zero", "--yes"), "not_still", "standing still")
 
-    def test_a_line_that_is_too_long(self):
+    def test_long_line_needs_lower_clock(self):
         with self.emulator("--option", "line_delay_ns=3600") as emulator:
             result = absenc("read", f"e201:{emulator.path}")
             self.assertEqual(result.returncode, 1)
@@ -121,7 +121,7 @@ class Interface(InterfaceCase):
 
 
 class Failures(InterfaceCase):
-    def test_read_says_what_came_and_what_to_do(self):
+    def test_read_reports_received_bytes_and_advice(self):
         for reply, error, found, advice in FRAMES:
             with self.subTest(reply), FakeInterface(reply) as interface:
                 result = absenc("read", f"e201:{interface.path}")
@@ -132,28 +132,28 @@ class Failures(InterfaceCase):
                 self.assertIn(found, trouble["message"])
                 self.assertIn(advice, trouble["advice"])
 
-    def test_decode_says_the_same(self):
+    def test_decode_reports_same_errors(self):
         for reply, error, found, advice in FRAMES:
             with self.subTest(reply):
                 result = absenc("decode", "e201", "--request", "34", "--hex", reply.hex())
                 self.assert_failed(result, error, found, advice)
 
-    def test_other_replies_are_judged_by_what_was_asked(self):
+    def test_error_depends_on_request(self):
         self.assert_failed(absenc("decode", "e201", "--request", "6d", "--hex", "39390d"), "bad_framing", "that command")
         self.assert_failed(absenc("decode", "e201", "--request", "76", "--hex", "4142"), "wrong_length", "a line that ends")
 
-    def test_another_encoder_is_recognized(self):
+    def test_recognizes_other_model(self):
         with FakeInterface(b"c0014328ff300000" + CR) as interface:
             result = absenc("read", f"e201:{interface.path}?model=linear-26-1um")
             self.assert_failed(result, "bad_checksum", "set model=rotary-19")
 
-    def test_silence(self):
+    def test_reports_silence(self):
         with FakeInterface() as interface:
             self.assert_failed(absenc("read", f"e201:{interface.path}"), "timeout", "`v` but not `4`", "`absenc info`")
         with FakeInterface(version=b"") as interface:
             self.assert_failed(absenc("read", f"e201:{interface.path}"), "timeout", "is silent", "it is an E201-9S")
 
-    def test_old_firmware(self):
+    def test_refuses_old_firmware(self):
         with self.emulator("--option", "firmware=1.15") as emulator:
             for arguments in (["read"], ["run", "clock-sweep"]):
                 result = absenc(arguments[0], f"e201:{emulator.path}", *arguments[1:])
@@ -161,19 +161,19 @@ class Failures(InterfaceCase):
         with FakeInterface(b"?" + CR, b"V0.9" + CR) as interface:
             self.assert_failed(absenc("read", f"e201:{interface.path}"), "unsupported", "1.16")
 
-    def test_an_ssi_encoder_with_other_bits(self):
+    def test_detects_wrong_number_of_ssi_bits(self):
         with self.emulator("--option", "carries=ssi", "--option", "singleturn_bits=13", "--singleturn", "4660") as emulator:
             result = absenc("read", f"e201:{emulator.path}", "--option", "carries=ssi", "--option", "singleturn_bits=12")
             self.assert_failed(result, "cross_check_failed", "after_word", "number of bits")
 
-    def test_a_word_that_does_not_fit(self):
+    def test_refuses_word_that_is_too_long(self):
         self.assert_wrong_usage(absenc("read", "sim:e201?word=position:60"), "e201")
         self.assert_failed(absenc("decode", "e201", "--hex", FRAMES[0][0].hex(), "--option", "word=position:60"), "64 bits")
 
 
 class ClockSweep(InterfaceCase):
     def start(self, path, frames):
-        """The sweep with a terminal for its messages: its process and our end of the terminal."""
+        """Starts the sweep with a terminal for its messages. Returns the process and the test's end of the terminal."""
         ours, terminal = pty.openpty()
         self.addCleanup(os.close, ours)
         process = subprocess.Popen([ABSENC, "run", f"e201:{path}", "clock-sweep", str(frames)],
@@ -182,7 +182,7 @@ class ClockSweep(InterfaceCase):
         return process, ours
 
     def read_until(self, descriptor, words=None):
-        """What is shown up to these words; without words, until it is closed."""
+        """Returns the terminal's text up to `words`, or until it is closed if `words` is None."""
         deadline = time.monotonic() + PATIENCE
         text = ""
         while words is None or words not in text:
@@ -190,25 +190,25 @@ class ClockSweep(InterfaceCase):
                 raise AssertionError(f"in vain waited for {words}: {text}")
             try:
                 text += os.read(descriptor, 4096).decode()
-            except OSError:  # nobody has the other end any more
+            except OSError:  # no program has the other end open any more
                 if words is None:
                     return text
                 raise AssertionError(f"{words} never came: {text}") from None
         return text
 
     def leave(self, process):
-        """Status and standard output of a process that ends by itself."""
+        """Returns the exit status and standard output of a process that ends by itself."""
         out, _ = process.communicate(timeout=PATIENCE)
         return process.returncode, out.decode()
 
-    def test_counts_and_recommends(self):
+    def test_counts_valid_replies_and_recommends_clock(self):
         with self.emulator() as emulator:
             fields = self.run_json(emulator.path, "run", "clock-sweep", "3")["fields"]
             self.assertEqual((fields["valid_35_khz"], fields["valid_4400_khz"]), (3, 0))
             self.assertEqual((fields["recommended_khz"], fields["restored_clock"]), (280, 4))
             self.assertFalse(fields["aborted"])
 
-    def test_clocks_of_resolute_are_named_when_another_is_set(self):
+    def test_warns_of_clocks_outside_resolute_range(self):
         self.assertRegex(absenc("list", "e201").stdout, r"resolute-26 +Renishaw Resolute, 26 bits: MA at 280 or 560 kHz")
         with self.emulator("--model", "resolute-26") as emulator:
             for encoder, clock, advised in (("resolute", "2200", True), ("resolute", "560", False), ("other", "2200", False)):
@@ -219,7 +219,7 @@ class ClockSweep(InterfaceCase):
             plain = absenc("info", f"e201:{emulator.path}?singleturn_bits=26", "--json")
             self.assertNotIn("advice", json.loads(plain.stdout))
 
-    def test_a_long_line_fails_at_high_clocks(self):
+    def test_long_line_fails_at_high_clocks(self):
         with self.emulator("--option", "line_delay_ns=905", "--option", "latency_us=0") as emulator:
             self.assert_good(absenc("config", "set", f"e201:{emulator.path}", "clock", "6", "--yes"))
             fields = self.run_json(emulator.path, "run", "clock-sweep", "20")["fields"]
@@ -232,14 +232,14 @@ class ClockSweep(InterfaceCase):
             self.assertEqual(self.clock(emulator.path), fields["recommended_clock"])
             self.assert_good(absenc("read", f"e201:{emulator.path}", "--count", "20", "--rate", "0"))
 
-    def test_nothing_is_good(self):
+    def test_fails_without_valid_reply(self):
         with self.emulator() as emulator:
             absenc("run", f"e201:{emulator.path}", "supply-off", "--yes")
             result = absenc("run", f"e201:{emulator.path}", "clock-sweep", "2")
             self.assert_failed(result, "line_stuck", "no MA clock", "supply-on")
             self.assertEqual(self.clock(emulator.path), 4)
 
-    def test_an_interrupt_restores_the_clock(self):
+    def test_interrupt_restores_clock(self):
         for number in (signal.SIGINT, signal.SIGTERM):
             with self.subTest(number), self.emulator() as emulator:
                 process, terminal = self.start(emulator.path, 300)
@@ -255,7 +255,7 @@ class ClockSweep(InterfaceCase):
                 self.assertNotIn("valid_4400_khz", out)
                 self.assertEqual(self.clock(emulator.path), 4)
 
-    def test_a_port_that_goes_away_leaves_a_clock(self):
+    def test_unplugged_port_keeps_last_clock(self):
         with self.emulator() as emulator:
             process, terminal = self.start(emulator.path, 300)
             self.read_until(terminal, "clock-sweep: valid_35_khz: 300")
@@ -271,7 +271,7 @@ class ClockSweep(InterfaceCase):
 
 
 class Decode(Case):
-    def test_a_linear_encoder(self):
+    def test_decodes_linear_encoder(self):
         arguments = ["decode", "e201", "--request", "34", "--hex", "633030343030333033323066666163300d", "--json"]
         fields = json.loads(absenc(*arguments, "--model", "linear-32-0.05um").stdout)["fields"]
         self.assertEqual(fields["position"], 1579271)
@@ -279,20 +279,20 @@ class Decode(Case):
         options = ["--option", "position_bits=32", "--option", "unit_um=0.05"]
         self.assertEqual(json.loads(absenc(*arguments, *options).stdout)["fields"], fields)
 
-    def test_units_have_six_decimals(self):
+    def test_unit_has_six_decimals(self):
         arguments = ["decode", "biss", "--hex", "0101"]
         self.assert_wrong_usage(absenc(*arguments, "--option", "unit_um=0.0000001"), "0.0 to 1000000.0")
         self.assert_wrong_usage(absenc(*arguments, "--option", "unit_um=-1"), "unit_um")
 
-    def test_sixty_four_bits(self):
+    def test_decodes_64_bits(self):
         vectors = [json.loads(line) for line in absenc("vectors", "biss", "--json").stdout.splitlines()]
         widest = next(vector for vector in vectors if vector["id"] == "biss-009")
         self.assertEqual(widest["fields"]["position"], 2**64 - 1)
 
 
 
-class Commands(Case):
-    def test_decode_names_the_commands_of_scripts(self):
+class ScriptCommands(Case):
+    def test_decode_names_script_commands(self):
         for command in (">", "1", "B26"):
             shown = absenc("decode", "e201", "--request", command.encode().hex(), "--json")
             self.assertEqual(json.loads(shown.stdout)["fields"]["command"], command)

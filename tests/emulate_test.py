@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`absenc emulate tformat` against a T-format client that shares no code with it."""
+"""Tests `absenc emulate tformat` with an independent T-format client."""
 import fcntl
 import itertools
 import json
@@ -23,11 +23,11 @@ from command_support import ABSENC, PATIENCE, Case, Emulator, absenc, end, read_
 REPLY_LENGTH = {0x0: 6, 0x1: 6, 0x2: 4, 0x3: 11, 0x6: 4, 0x7: 6, 0x8: 6, 0xC: 6, 0xD: 4}
 ALARMS = ["over_speed", "full_absolute_status", "counting_error", "counter_overflow", "over_heat", "multiturn_error",
           "battery_error", "battery_alarm"]
-COUNTING_ERROR, ALARM = 0x10, 0x20  # in SF
+COUNTING_ERROR, ALARM = 0x10, 0x20  # bits of the status field SF
 
 
 def rate_of(terminal):
-    """Bits a second, of a struct termios2 (<asm-generic/ioctls.h>)."""
+    """Returns the baud rate from struct termios2 (<asm-generic/ioctls.h>)."""
     tcgets2 = 0x802C542A
     return struct.unpack("IIIIB19sII", fcntl.ioctl(terminal, tcgets2, bytes(44)))[-1]
 
@@ -38,7 +38,7 @@ def control_field(data_id):
 
 
 def crc(data):
-    """X^8 + 1, least significant bit first."""
+    """Returns the CRC with polynomial X^8 + 1, least significant bit first."""
     register = 0
     for byte in data:
         for bit in range(8):
@@ -48,7 +48,7 @@ def crc(data):
 
 
 class Client:
-    """The host's end of the line: `exchange` sends a request and returns as many bytes as came."""
+    """The host's end of the line. `exchange` sends a request and returns the received bytes."""
 
     def __init__(self, descriptor):
         self.descriptor = descriptor
@@ -76,7 +76,7 @@ class Client:
                 break
             try:
                 part = os.read(self.descriptor, 256)
-            except OSError:  # the emulator has gone
+            except OSError:  # the emulator has ended
                 break
             if not part:
                 break
@@ -91,7 +91,7 @@ class Client:
         return self.receive(length or REPLY_LENGTH[data_id])
 
     def read_memory(self, address):
-        """(busy, value)"""
+        """Returns (busy, value)."""
         reply = self.exchange(0xD, address)
         assert len(reply) == 4 and crc(reply[:3]) == reply[3] and reply[0] == 0xEA, reply
         assert reply[1] & 0x7F == address, reply
@@ -101,7 +101,7 @@ class Client:
         return self.exchange(0x6, address, value)
 
     def wait_until_written(self, address):
-        """Polls the busy bit; returns whether it was seen, and the value at the address then."""
+        """Polls the busy bit. Returns whether it was ever set, and the value of the last reply."""
         deadline = time.monotonic() + PATIENCE
         was_busy = False
         while time.monotonic() < deadline:
@@ -137,23 +137,24 @@ class Gap(EmulateCase):
     """The pause that ends a request."""
 
     def trickle(self, client, request, pause):
-        """Writes byte by byte and returns what comes back until PATIENCE or for as many bytes as were sent."""
+        """Writes byte by byte, and returns as many received bytes as were sent, or fewer after PATIENCE."""
         for byte in request:
             client.send([byte])
             select.select([], [], [], pause)
         return client.receive(len(request))
 
-    def test_a_host_that_is_slow_with_its_bytes(self):
-        page_select = bytes.fromhex("327f004d")  # 5 ms between two bytes: by default four broken requests
+    def test_slow_host_needs_longer_gap(self):
+        # 5 ms between two bytes: with the default gap these are four incomplete requests
+        page_select = bytes.fromhex("327f004d")
         client = self.client("--gap", "2000")
         self.assertEqual(self.trickle(client, page_select, 0.005), page_select)
 
-    def test_somebody_absent_is_asked_in_between(self):
+    def test_request_to_absent_encoder_does_not_disturb_next(self):
         absent = {"esl": "0bd5", "raa38-modbus": "0903000000018542"}
         present = {"esl": ("0875", 18), "raa38-modbus": ("010300000001840a", 7)}
         for protocol, gap in itertools.product(absent, ("2", "10000")):
             with self.subTest(protocol=protocol, gap=gap):
-                # Where the machine is busy, the emulator may see two requests as one, which only the gap ends.
+                # On a busy machine the emulator may receive two requests as one, which only the gap ends.
                 self.assertTrue(any(self.answers(protocol, gap, number, absent[protocol], *present[protocol])
                                     for number in range(10)))
 
@@ -166,7 +167,7 @@ class Gap(EmulateCase):
             client.send(bytes.fromhex(present))
             return client.receive(length, patience=2)[:1] == bytes.fromhex(present)[:1]
 
-    def test_where_it_means_nothing(self):
+    def test_refused_where_it_has_no_effect(self):
         for arguments in (["tformat", "--port", "/dev/null"], ["raa38-can"], ["encolink", "--spidev", "spidev9.9"]):
             self.assert_wrong_usage(absenc("emulate", *arguments, "--gap", "5"), "--gap", "latency=MS")
         self.assert_wrong_usage(absenc("emulate", "tformat", "--gap", "0"), "--gap")
@@ -186,7 +187,7 @@ class DataIds(EmulateCase):
         self.assert_reply(client.exchange(3), 3, 0, [0xFF, 0xFF, 0x7F, 0x17, 0xFF, 0xFF, 0x00, 0x00])
 
     def reset(self, client, data_id, times):
-        """Sends the request so often, 100 us apart; returns the last reply."""
+        """Sends the request `times` times, 100 us apart. Returns the last reply."""
         reply = b""
         for _ in range(times):
             reply = client.exchange(data_id)
@@ -195,11 +196,11 @@ class DataIds(EmulateCase):
                 pass
         return reply
 
-    def test_nine_resets_do_nothing(self):
+    def test_nine_resets_have_no_effect(self):
         client = self.client("--alarm", "over_speed", "--multiturn", "7")
         self.reset(client, 0x7, 9)
         self.assertEqual(client.exchange(3)[9], 0x01)
-        self.reset(client, 0x7, 9)  # the other request has started the count again
+        self.reset(client, 0x7, 9)  # another request has restarted the count
         self.assertEqual(client.exchange(3)[9], 0x01)
         self.reset(client, 0xC, 5)
         self.reset(client, 0x7, 5)
@@ -207,7 +208,7 @@ class DataIds(EmulateCase):
 
     def test_clear_alarms(self):
         client = self.client("--alarm", "multiturn_error", "--multiturn", "7")
-        self.assert_reply(self.reset(client, 0x7, 10), 0x7, ALARM, [0, 0, 0])  # the tenth still shows it
+        self.assert_reply(self.reset(client, 0x7, 10), 0x7, ALARM, [0, 0, 0])  # the tenth reply still shows the alarm
         self.assert_reply(client.exchange(3), 3, 0, [0, 0, 0, 0x11, 7, 0, 0, 0])
 
     def test_reset_multiturn(self):
@@ -233,12 +234,12 @@ class DataIds(EmulateCase):
         self.assertGreaterEqual(took, 0.018)
         self.assertEqual(client.read_memory(6), (False, 0))
 
-    def test_a_busy_encoder_does_not_write(self):
+    def test_busy_encoder_does_not_write(self):
         client = self.client()
         client.write_memory(5, 0x5A)
         reply = client.write_memory(6, 0x77)
         client.wait_until_written(5)
-        if reply[1] & 0x80:  # unless this machine took 18 ms for it
+        if reply[1] & 0x80:  # unless this machine needed more than 18 ms
             self.assertEqual(reply[2], 0)
             self.assertEqual(client.read_memory(6), (False, 0))
 
@@ -258,28 +259,28 @@ class DataIds(EmulateCase):
         client.select_page(7)
         self.assertEqual(client.read_memory(5), (False, 35))
         self.assertEqual(client.read_memory(4), (False, 0xDA))
-        client.write_memory(4, 0x80 + 20)  # it is 35 degC warm
+        client.write_memory(4, 0x80 + 20)  # the encoder's temperature is 35 degC
         client.wait_until_written(4)
         self.assertEqual(client.exchange(3)[9], 0x10)
 
-    def test_what_it_cannot_accept(self):
-        """Answered like ID 3, except a wrong sync code, which is not answered at all."""
+    def test_invalid_requests(self):
+        """Most invalid requests are answered like ID 3. A wrong sync code is not answered at all."""
         client = self.client()
         everything = client.exchange(3)
-        self.assertEqual(client.exchange(0x4, length=11), everything)                 # unknown id
-        client.send([0x9A])                                                           # wrong parity
+        self.assertEqual(client.exchange(0x4, length=11), everything)  # unknown id
+        client.send([0x9A])  # wrong parity
         self.assertEqual(client.receive(11)[:2], bytes([0x1A, 0x40]))
-        client.send([0xEA, 5, 0])                                                     # wrong CRC
+        client.send([0xEA, 5, 0])  # wrong CRC
         self.assertEqual(client.receive(11), everything)
-        self.assertEqual(client.exchange(0x6, 127, 6, length=11), everything)         # closed page
-        client.send([0xEA])                                                           # cut short
+        self.assertEqual(client.exchange(0x6, 127, 6, length=11), everything)  # closed page
+        client.send([0xEA])  # truncated
         self.assertEqual(client.receive(11), everything)
-        client.send([0x19, 0x1A])                                                     # no sync code, then a request
+        client.send([0x19, 0x1A])  # no sync code, then a request
         self.assertEqual(client.receive(12, patience=0.05), everything)
 
 
 class Behaviour(EmulateCase):
-    def test_alarms(self):
+    def test_each_alarm(self):
         for bit, name in enumerate(ALARMS):
             with self.subTest(name), Emulator(self.directory, "--alarm", name) as emulator:
                 with Client.open(emulator.path) as client:
@@ -292,30 +293,30 @@ class Behaviour(EmulateCase):
         client = self.client("--alarm", "battery_error", "--alarm", "battery_alarm")
         self.assertEqual(client.exchange(3)[9], 0xC0)
 
-    def test_corrupt(self):
+    def test_corrupt_fault(self):
         emulator = self.emulator("--fault", "corrupt=1")
         with Client.open(emulator.path) as client:
             replies = [client.exchange(3) for _ in range(20)]
         good = bytes([0x1A, 0, 0, 0, 0, 0x11, 0, 0, 0, 0, 0x0B])
         self.assertTrue(all(len(reply) == 11 and reply != good for reply in replies))
-        # Two flips in the same column pass this checksum.
+        # Two flipped bits in the same column cancel out in this checksum.
         self.assertGreater(sum(crc(reply[:-1]) != reply[-1] for reply in replies), 10)
         self.assertIn("faults injected: 20 corrupt\n  replies with faults: 20\n", emulator.end()[2])
 
-    def test_silence(self):
+    def test_silence_fault(self):
         emulator = self.emulator("--fault", "silence=1")
         with Client.open(emulator.path) as client:
             client.send([0x1A])
             self.assertEqual(client.receive(1, patience=0.1), b"")
         self.assertIn("faults injected: 1 silence", emulator.end()[2])
 
-    def test_delay(self):
+    def test_delay_fault(self):
         client = self.client("--fault", "delay=1")
         before = time.monotonic()
         self.assert_reply(client.exchange(2), 2, 0, [0x11])
         self.assertGreaterEqual(time.monotonic() - before, 0.05)
 
-    def test_seed(self):
+    def test_seed_repeats_faults(self):
         series = []
         for seed in ("7", "7", "8"):
             with Emulator(self.directory, "--fault", "corrupt=1", "--seed", seed) as emulator:
@@ -337,7 +338,7 @@ class Behaviour(EmulateCase):
             pass
         self.assertEqual(client.exchange(0)[2:5], bytes([0, 0x80, 0]))
 
-    def test_power_on_takes_its_time(self):
+    def test_power_on_takes_real_time(self):
         before = time.monotonic()
         client = self.client("--power-on", "real")
         reply = b""
@@ -354,7 +355,7 @@ class Behaviour(EmulateCase):
         port = int(line.rsplit(":", 1)[1])
         with socket.create_connection(("127.0.0.1", port), timeout=PATIENCE) as connection:
             ends = [Client(connection.fileno()), Client.open(emulator.path)]
-            for asking, listening in (ends, ends[::-1]):  # one line: both hear the reply
+            for asking, listening in (ends, ends[::-1]):  # clients share one line: both receive the reply
                 self.assert_reply(asking.exchange(0), 0, 0, [5, 0, 0])
                 self.assert_reply(listening.receive(6), 0, 0, [5, 0, 0])
             ends[1].__exit__()
@@ -363,16 +364,16 @@ class Behaviour(EmulateCase):
 
 
 class Console(EmulateCase):
-    """What is written on standard input while it runs."""
+    """Lines on the standard input of a running emulator."""
 
-    def told(self, *arguments, **settings):
-        """An emulator, and a way to tell it a line and get its answer."""
+    def console(self, *arguments, **settings):
+        """Returns an emulator, and a function that sends it a line and returns its answer."""
         emulator = self.emulator(*arguments, stdin=subprocess.PIPE, **settings)
 
-        def tell(line):
+        def send_line(line):
             emulator.process.stdin.write(f"{line}\n".encode())
             return emulator.line().rstrip("\n")
-        return emulator, tell
+        return emulator, send_line
 
     def run_json(self, *arguments):
         result = absenc(*arguments, "--json")
@@ -382,31 +383,31 @@ class Console(EmulateCase):
     def temperature(self, place):
         return self.run_json("run", place, "temperature")["fields"]["temperature_c"]
 
-    def test_a_condition(self):
-        emulator, tell = self.told()
+    def test_sets_condition(self):
+        emulator, send_line = self.console()
         place = f"tformat:{emulator.path}?latency=300"
-        self.assertEqual(tell("temperature"), "ok: temperature is 35 degC")
-        self.assertEqual(tell("  temperature = 85 "), "ok: temperature is 85 degC")
+        self.assertEqual(send_line("temperature"), "ok: temperature is 35 degC")
+        self.assertEqual(send_line("  temperature = 85 "), "ok: temperature is 85 degC")
         self.assertEqual(self.temperature(place), 85)
-        self.assertEqual(tell("temperature=-20"), "ok: temperature is -20 degC")
+        self.assertEqual(send_line("temperature=-20"), "ok: temperature is -20 degC")
         self.assertEqual(self.temperature(place), -20)
 
-    def test_an_alarm_that_nothing_reports_is_refused(self):
-        _, tell = self.told("--option", "carries=ssi", "--option", "singleturn_bits=13", protocol="e201")
-        self.assertIn("the alarm error cannot be shown", tell("alarm error"))
-        self.assertEqual(tell("clear error"), "ok: lowered error")
+    def test_refuses_alarm_that_nothing_reports(self):
+        _, send_line = self.console("--option", "carries=ssi", "--option", "singleturn_bits=13", protocol="e201")
+        self.assertIn("the alarm error cannot be shown", send_line("alarm error"))
+        self.assertEqual(send_line("clear error"), "ok: lowered error")
 
-    def test_power_without_a_battery(self):
-        emulator, tell = self.told("--multiturn", "7")
+    def test_power_cycle_without_battery_loses_turns(self):
+        emulator, send_line = self.console("--multiturn", "7")
         place = f"tformat:{emulator.path}?latency=300"
         self.assertEqual(self.run_json("read", place)["multiturn"], 7)
-        self.assertEqual(tell("battery=0"), "ok: battery is 0 mV")
-        self.assertEqual(tell("power on"), "ok: power is on already")
-        self.assertEqual(tell("power off"), "ok: power is off")
+        self.assertEqual(send_line("battery=0"), "ok: battery is 0 mV")
+        self.assertEqual(send_line("power on"), "ok: power is on already")
+        self.assertEqual(send_line("power off"), "ok: power is off")
         self.assertEqual(absenc("read", place).returncode, 1)
-        self.assertEqual(tell("power off"), "ok: power is off already")
+        self.assertEqual(send_line("power off"), "ok: power is off already")
         before = time.monotonic()
-        self.assertEqual(tell("power on"), "ok: power is on; it takes its time to start")
+        self.assertEqual(send_line("power on"), "ok: power is on; it takes its time to start")
         result = absenc("alarms", place, "--json")
         while result.returncode != 0 and time.monotonic() < before + PATIENCE:
             result = absenc("alarms", place, "--json")
@@ -414,76 +415,76 @@ class Console(EmulateCase):
         self.assertIn("battery_error", result.stdout)
         self.assertEqual(self.run_json("read", place)["multiturn"], 0)
 
-    def test_alarms(self):
-        emulator, tell = self.told()
+    def test_raises_and_clears_alarms(self):
+        emulator, send_line = self.console()
         with Client.open(emulator.path) as client:
-            self.assertEqual(tell("alarm over_heat battery_alarm"), "ok: raised over_heat, battery_alarm")
+            self.assertEqual(send_line("alarm over_heat battery_alarm"), "ok: raised over_heat, battery_alarm")
             self.assertEqual(client.exchange(3)[9], 0x90)
-            self.assertEqual(tell("clear over_heat"), "ok: lowered over_heat")
+            self.assertEqual(send_line("clear over_heat"), "ok: lowered over_heat")
             self.assertEqual(client.exchange(3)[9], 0x80)
 
-    def test_faults(self):
-        emulator, tell = self.told()
+    def test_sets_faults(self):
+        emulator, send_line = self.console()
         with Client.open(emulator.path) as client:
-            self.assertEqual(tell("fault"), "ok: no faults")
+            self.assertEqual(send_line("fault"), "ok: no faults")
             self.assertEqual(len(client.exchange(3)), 11)
-            self.assertEqual(tell("fault drop=1"), "ok: faults: drop=1")
+            self.assertEqual(send_line("fault drop=1"), "ok: faults: drop=1")
             self.assertEqual(len(client.exchange(3)), 10)
-            self.assertEqual(tell("fault drop=0 repeat=1 corrupt=0.01"), "ok: faults: corrupt=0.01, repeat=1")
+            self.assertEqual(send_line("fault drop=0 repeat=1 corrupt=0.01"), "ok: faults: corrupt=0.01, repeat=1")
             self.assertGreater(len(client.exchange(3)), 11)
-            self.assertEqual(tell("fault"), "ok: faults: corrupt=0.01, repeat=1")
-            self.assertEqual(tell("fault none"), "ok: no faults")
+            self.assertEqual(send_line("fault"), "ok: faults: corrupt=0.01, repeat=1")
+            self.assertEqual(send_line("fault none"), "ok: no faults")
             reply = client.exchange(3)
             self.assertEqual((len(reply), client.receive(1, patience=0.02)), (11, b""))
         self.assertRegex(emulator.end()[2], r"faults injected: 1 drop,.* 1 repeat\n")
 
-    def test_faults_from_the_start(self):
-        emulator, tell = self.told("--fault", "silence=1", protocol="raa38-can")
+    def test_faults_of_command_line_can_be_cleared(self):
+        emulator, send_line = self.console("--fault", "silence=1", protocol="raa38-can")
         place = f"raa38-can:slcan:{emulator.path}?latency=300"
         self.assertEqual(absenc("read", place).returncode, 1)
-        self.assertEqual(tell("fault none"), "ok: no faults")
+        self.assertEqual(send_line("fault none"), "ok: no faults")
         self.assert_good(absenc("read", place))
 
-    def test_no_word_of_faults_that_nobody_asked_for(self):
-        emulator, tell = self.told("--also", "address=3", protocol="esl")
-        self.assertEqual(tell("2: fault silence=1"), "ok: 2: faults: silence=1")
+    def test_summary_lists_only_encoders_with_faults(self):
+        emulator, send_line = self.console("--also", "address=3", protocol="esl")
+        self.assertEqual(send_line("2: fault silence=1"), "ok: 2: faults: silence=1")
         err = emulator.end()[2]
         self.assertEqual(err.count("faults injected"), 1, err)
 
-    def test_an_encoder_that_sends_by_itself_goes_on(self):
-        emulator, tell = self.told("--motion", "rpm=60", "--option", "refresh_hz=200", protocol="raa38")
+    def test_streaming_encoder_resumes_after_power_on(self):
+        emulator, send_line = self.console("--motion", "rpm=60", "--option", "refresh_hz=200", protocol="raa38")
         with Client.open(emulator.path) as client:
             self.assertTrue(client.receive(20))
-            self.assertEqual(tell("power off"), "ok: power is off")
+            self.assertEqual(send_line("power off"), "ok: power is off")
             deadline = time.monotonic() + PATIENCE
             while client.receive(20, patience=0.1) and time.monotonic() < deadline:
                 pass
             self.assertLess(time.monotonic(), deadline)
-            self.assertEqual(tell("power on"), "ok: power is on; it takes its time to start")
+            self.assertEqual(send_line("power on"), "ok: power is on; it takes its time to start")
             self.assertGreaterEqual(len(client.receive(20)), 20)
 
-    def test_several_encoders(self):
-        emulator, tell = self.told("--also", "address=3", protocol="esl")
+    def test_addresses_one_of_several_encoders(self):
+        emulator, send_line = self.console("--also", "address=3", protocol="esl")
 
         def answers():
             places = [f"esl:{emulator.path}?latency=300&address={address}" for address in (0, 3)]
             return [absenc("read", place).returncode == 0 for place in places]
         self.assertEqual(answers(), [True, True])
-        self.assertEqual(tell("2: power off"), "ok: 2: power is off")
+        self.assertEqual(send_line("2: power off"), "ok: 2: power is off")
         self.assertEqual(answers(), [True, False])
-        self.assertEqual(tell("power off"), "ok: 1: power is off; 2: power is off already")
+        self.assertEqual(send_line("power off"), "ok: 1: power is off; 2: power is off already")
         self.assertEqual(answers(), [False, False])
-        self.assertEqual(tell("3: help"), 'error: "3" is no encoder of this line: they are 1 to 2')
+        self.assertEqual(send_line("3: help"), 'error: "3" is no encoder of this line: they are 1 to 2')
 
-    def test_a_can_node(self):
-        emulator, tell = self.told(protocol="raa38-can")
+    def test_can_node(self):
+        emulator, send_line = self.console(protocol="raa38-can")
         place = f"raa38-can:slcan:{emulator.path}?latency=300"
         self.assert_good(absenc("read", place))
-        self.assertEqual(tell("power off"), "ok: power is off")
+        self.assertEqual(send_line("power off"), "ok: power is off")
         self.assertEqual(absenc("read", place).returncode, 1)
 
-    def test_what_it_does_not_know(self):
-        _, tell = self.told()
+    def test_reports_unknown_commands(self):
+        _, send_line = self.console()
         for line, words in [("temprature=85", ['"temprature"', "did you mean temperature?", "power, alarm, clear, fault, help"]),
                             ("x", ['"x"', "battery, temperature, power"]),
                             ("temperature=hot", ["-20 to 127 degC"]), ("temperature=128", ["-20 to 127 degC"]),
@@ -492,19 +493,19 @@ class Console(EmulateCase):
                             ("fault none corrupt=2", ["from 0 to 1"]), ("fault noise", ["unknown kind", "drop, corrupt"]),
                             ("alarm", ["which alarm?", "over_heat"]), ("alarm overheat", ["did you mean over_heat?"])]:
             with self.subTest(line):
-                answer = tell(line)
+                answer = send_line(line)
                 self.assertTrue(answer.startswith("error: "), answer)
                 for word in words:
                     self.assertIn(word, answer)
 
     def test_help(self):
-        _, tell = self.told()
+        _, send_line = self.console()
         for words in ("battery=0 to 4750 mV", "power off", "alarm NAME", "over_heat", "fault KIND=RATE, of drop corrupt"):
-            self.assertIn(words, tell("help"))
+            self.assertIn(words, send_line("help"))
 
-    def test_the_end_of_the_input_ends_nothing(self):
-        emulator, tell = self.told()
-        self.assertEqual(tell("temperature=50"), "ok: temperature is 50 degC")
+    def test_end_of_input_does_not_end_emulator(self):
+        emulator, send_line = self.console()
+        self.assertEqual(send_line("temperature=50"), "ok: temperature is 50 degC")
         emulator.process.stdin.write(b"\n\nbattery=100")
         emulator.process.stdin.close()
         self.assertEqual(emulator.line(), "ok: battery is 100 mV\n")
@@ -512,10 +513,10 @@ class Console(EmulateCase):
         emulator.process.stdin = None
         self.assertEqual(emulator.end()[0], 0)
 
-    def test_nobody_who_reads_the_answers(self):
-        emulator, _ = self.told()
+    def test_closed_output_does_not_end_emulator(self):
+        emulator, _ = self.console()
         emulator.process.stdout.close()
-        emulator.process.stdout = open(os.devnull, "rb")  # as `end` wants it
+        emulator.process.stdout = open(os.devnull, "rb")  # `end` reads it
         emulator.process.stdin.write(b"temperature=50\ntemperature=60\n")
         place = f"tformat:{emulator.path}?latency=300"
         deadline = time.monotonic() + PATIENCE
@@ -523,10 +524,10 @@ class Console(EmulateCase):
             pass
         self.assertIn(self.temperature(place), (50, 60))
 
-    def test_a_terminal_that_belongs_to_another_program(self):
+    def test_ignores_terminal_of_foreground_program(self):
         path = self.file("encoder")
         child, master = pty.fork()
-        if child == 0:  # the shell of the terminal; the emulator is in the background
+        if child == 0:  # plays the shell; the emulator runs in the background
             program = ("import os, signal, subprocess, sys\n"
                        "emulator = subprocess.Popen(sys.argv[1:], preexec_fn=os.setpgrp)\n"
                        "print('pid', emulator.pid, flush=True)\n"
@@ -547,14 +548,14 @@ class Console(EmulateCase):
             os.waitpid(child, 0)
             os.close(master)
 
-    def test_conditions_at_the_start(self):
+    def test_initial_conditions(self):
         emulator = self.emulator("--condition", "temperature=90", "--condition", "battery=0", "--multiturn", "7")
         place = f"tformat:{emulator.path}?latency=300"
         self.assertEqual(self.temperature(place), 90)
         self.assertEqual(self.run_json("read", place)["multiturn"], 0)
         self.assertEqual(self.temperature("sim:tformat?condition=temperature=90"), 90)
 
-    def test_wrong_conditions(self):
+    def test_refuses_wrong_conditions(self):
         for condition, words in [("temprature=1", ["did you mean temperature?"]), ("battery", ["NAME=VALUE"]),
                                  ("temperature=200", ["-20 to 127 degC"])]:
             with self.subTest(condition):
@@ -562,15 +563,15 @@ class Console(EmulateCase):
                 self.assert_wrong_usage(absenc("read", f"sim:tformat?condition={condition}"), *words)
         self.assert_wrong_usage(absenc("emulate", "raa38", "--condition", "battery=0"), "has no conditions")
 
-    def test_they_are_listed(self):
+    def test_list_shows_conditions(self):
         listed = self.run_json("list", "tformat")["conditions"]
         self.assertIn({"name": "temperature", "unit": "degC", "meaning": "of the board", "minimum": -20,
                        "maximum": 127, "normal": 35}, listed)
         self.assertIn("0 to 4750 mV", absenc("list", "tformat").stdout)
 
 
-class Port(EmulateCase):
-    """On a serial port that is there already; here it is one end of a pseudo-terminal."""
+class SerialPort(EmulateCase):
+    """Emulates on an existing serial port; here it is one end of a pseudo-terminal."""
 
     def port(self, settings="", *arguments):
         ours, terminal = os.openpty()
@@ -582,7 +583,7 @@ class Port(EmulateCase):
         self.assertEqual(emulator.ready, f"ready: {path}\n")
         return emulator, Client(ours), path
 
-    def test_serves_it(self):
+    def test_emulates_on_port(self):
         emulator, client, path = self.port("?baud=115200", "--singleturn", "1000", "--multiturn", "7")
         self.assert_reply(client.exchange(3), 3, 0, [0xE8, 0x03, 0, 0x11, 7, 0, 0, 0])
         result = absenc("emulate", "tformat", "--port", path, "--for", "60")
@@ -591,7 +592,7 @@ class Port(EmulateCase):
         self.assertEqual((status, out), (0, ""))
         self.assertRegex(err, r"^absenc: 1 requests answered in ")
 
-    def test_several_encoders_on_it(self):
+    def test_several_encoders_on_port(self):
         ours, terminal = os.openpty()
         self.addCleanup(os.close, ours)
         emulator = Emulator("/dev", "--also", "address=3&singleturn=1000", protocol="esl", name=os.ttyname(terminal),
@@ -600,28 +601,28 @@ class Port(EmulateCase):
         _, _, err = emulator.end()
         self.assertIn("address=3&singleturn=1000: 0 requests", err)
 
-    def test_an_adapter_that_hears_itself(self):
+    def test_adapter_with_echo(self):
         emulator, client, _ = self.port("?echo=on", "--singleturn", "1000")
         for _ in range(4):
             reply = client.exchange(0)
             self.assert_reply(reply, 0, 0, [0xE8, 0x03, 0])
-            client.send(reply)  # which begins as a request
+            client.send(reply)  # this reply begins like a request
         _, _, err = emulator.end()
         self.assertIn("4 requests answered", err)
         self.assertNotIn("rules", err)
 
-    def test_it_ends_by_itself(self):
+    def test_ends_after_given_time(self):
         ours, terminal = os.openpty()
         self.addCleanup(os.close, ours)
         self.addCleanup(os.close, terminal)
         result = absenc("emulate", "tformat", "--port", os.ttyname(terminal), "--for", "0.1")
         self.assert_good(result)
 
-    def test_one_that_goes_away_is_waited_for(self):
+    def test_waits_for_unplugged_port(self):
         link = os.path.join(self.directory, "port")
         ours, terminal = os.openpty()
         os.symlink(os.ttyname(terminal), link)
-        # The reply is late, so that the port goes away while it is due.
+        # The reply is delayed, so that the port disappears before it is sent.
         emulator = self.emulator("--fault", "delay=1", "--singleturn", "1000", name=link, line="--port")
         os.close(terminal)
         client = Client(ours)
@@ -640,7 +641,7 @@ class Port(EmulateCase):
         self.assert_reply(Client(ours).exchange(0), 0, 0, [0xE8, 0x03, 0])
         self.assertEqual(emulator.end()[0], 0)
 
-    def test_one_that_comes_back_has_the_rate_that_the_encoder_was_set_to(self):
+    def test_replugged_port_keeps_changed_baud_rate(self):
         link = os.path.join(self.directory, "port")
         ours, terminal = os.openpty()
         os.symlink(os.ttyname(terminal), link)
@@ -663,7 +664,7 @@ class Port(EmulateCase):
         self.assertEqual(rate_of(ours), 9600)
         self.assertEqual(emulator.end()[0], 0)
 
-    def test_wrong_usage(self):
+    def test_refuses_wrong_usage(self):
         for more, words in (
             (["--pty", "/tmp/x"], "--pty is a line of its own: not with --port"),
             (["--tcp", "0"], "--tcp is a line of its own: not with --port"),
@@ -679,13 +680,13 @@ class Port(EmulateCase):
         self.assert_failed(absenc("emulate", "tformat", "--port", "/dev/nothing"), "there is no port /dev/nothing")
 
 
-class Life(EmulateCase):
-    def test_ready_line(self):
+class Lifecycle(EmulateCase):
+    def test_prints_ready_line(self):
         emulator = self.emulator()
         self.assertEqual(emulator.ready, f"ready: {emulator.path}\n")
         self.assertTrue(stat.S_ISCHR(os.stat(emulator.path).st_mode))
 
-    def test_without_a_path(self):
+    def test_chooses_terminal_without_path(self):
         process = subprocess.Popen([ABSENC, "emulate", "tformat"], bufsize=0, stdout=subprocess.PIPE,
                                    stderr=subprocess.PIPE)
         try:
@@ -696,7 +697,7 @@ class Life(EmulateCase):
         finally:
             end(process)
 
-    def test_signals_end_it_with_a_summary(self):
+    def test_signal_ends_it_with_summary(self):
         for number in (signal.SIGTERM, signal.SIGINT):
             with self.subTest(number):
                 emulator = Emulator(self.directory)
@@ -708,8 +709,8 @@ class Life(EmulateCase):
                 self.assertRegex(err, r"^absenc: 3 requests answered in ")
                 self.assertFalse(os.path.lexists(emulator.path))
 
-    def test_a_refused_request_is_one_request(self):
-        """ID D with a wrong parity bit, in one write: refused once, when it has ended, and no rule is broken."""
+    def test_refused_request_counts_once(self):
+        """ID D with a wrong parity bit, written at once: it is refused once, after its end, and violates no rule."""
         emulator = self.emulator()
         with Client.open(emulator.path) as client:
             client.send([0x6A, 0x05, 0xEF])
@@ -719,16 +720,16 @@ class Life(EmulateCase):
         self.assertIn("1 requests answered", err)
         self.assertNotIn("rules", err)
 
-    def test_the_help_says_what_a_fault_is_counted_by(self):
+    def test_help_states_unit_of_fault_rate(self):
         words = " ".join(absenc("emulate", "--help").stdout.split())
         self.assertIn("request_corrupt: how often a byte (CAN: a frame) of the requests that it hears is", words)
         emulator = self.emulator("--fault", "request_corrupt=1")
         with Client.open(emulator.path) as client:
             client.send([0xEA, 0x05, 0xEF])
             client.receive(11, 0.2)
-        self.assertIn("3 request_corrupt", emulator.end()[2])  # each byte
+        self.assertIn("3 request_corrupt", emulator.end()[2])  # one per byte
 
-    def test_violations(self):
+    def test_reports_violations(self):
         emulator = self.emulator()
         with Client.open(emulator.path) as client:
             client.write_memory(127, 3)
@@ -736,8 +737,8 @@ class Life(EmulateCase):
         err = emulator.end()[2]
         self.assertRegex(err, r"rules that the host broke: 1\n    at \d+\.\d{6} s: memory access before the page is ready")
 
-    def test_a_host_that_does_not_wait_is_always_told(self):
-        """Three requests at once. A machine that is busy excuses two replies in a row at most."""
+    def test_reports_every_host_that_does_not_wait(self):
+        """Sends three requests at once. A delay of the machine excuses at most two replies in a row."""
         emulator = self.emulator()
         with Client.open(emulator.path) as client:
             for _ in range(5):
@@ -747,20 +748,20 @@ class Life(EmulateCase):
         self.assertIsNotNone(counted)
         self.assertGreaterEqual(int(counted[1]), 3)
 
-    def test_it_ends_by_itself(self):
+    def test_ends_after_given_time(self):
         before = time.monotonic()
         result = absenc("emulate", "tformat", "--for", "0.2")
         self.assert_good(result)
         self.assertGreaterEqual(time.monotonic() - before, 0.2)
         self.assertIn("0 requests answered", result.stderr)
 
-    def test_a_path_that_is_taken(self):
+    def test_refuses_existing_file_as_path(self):
         path = self.file("precious", "data")
         self.assert_failed(absenc("emulate", "tformat", "--pty", path, "--for", "60"), path, "remove it")
         with open(path, encoding="utf-8") as file:
             self.assertEqual(file.read(), "data")
 
-    def test_a_path_of_an_emulator_that_runs(self):
+    def test_refuses_path_of_running_emulator(self):
         with Emulator(self.directory, "--singleturn", "7") as first:
             for protocol in ("tformat", "raa38-can"):
                 result = absenc("emulate", protocol, "--pty", first.path, "--for", "60")
@@ -774,14 +775,14 @@ class Life(EmulateCase):
             self.assertEqual(json.loads(absenc("read", address, "--json").stdout)["singleturn"], 8)
         self.assertFalse(os.path.lexists(first.path))
 
-    def test_two_programs_beside_each_other(self):
+    def test_two_emulators_run_in_parallel(self):
         with Emulator(self.directory, "--singleturn", "1", name="one") as one, \
                 Emulator(self.directory, "--singleturn", "2", name="two") as two:
             with Client.open(one.path) as first, Client.open(two.path) as second:
                 self.assertEqual((first.exchange(0)[2], second.exchange(0)[2]), (1, 2))
 
 
-class Memory(EmulateCase):
+class MemoryFile(EmulateCase):
     def content(self):
         with open(self.file("memory"), "rb") as file:
             return file.read()
@@ -793,30 +794,30 @@ class Memory(EmulateCase):
                 client.wait_until_written(address)
             self.assertEqual(emulator.end()[0], 0)
 
-    def test_it_survives_a_restart(self):
+    def test_survives_restart(self):
         self.write_and_end(5, 0x5A)
         self.write_and_end(6, 0x77)
         client = self.client("--memory", self.file("memory"))
         self.assertEqual([client.read_memory(address)[1] for address in (4, 5, 6)], [0, 0x5A, 0x77])
 
-    def test_it_can_be_read_by_people(self):
+    def test_is_readable_text(self):
         self.write_and_end(17, 0x5A)
         text = self.content().decode()
         self.assertTrue(text.startswith("absenc memory 1\nprotocol: tformat\nmodel: TS5700N8500\nsize: "), text)
         self.assertIn("\n0010: 00 5A 00", text)
 
-    def test_it_is_made_before_the_encoder_is_ready(self):
+    def test_exists_before_encoder_is_ready(self):
         self.emulator("--memory", self.file("memory"))
         self.assertIn(b"size: ", self.content())
 
-    def test_it_is_saved_before_the_host_knows(self):
+    def test_is_saved_before_reply(self):
         client = self.client("--memory", self.file("memory"))
         for address in range(10):
             client.write_memory(address, 0xA0 + address)
             client.wait_until_written(address)
             self.assertIn(f"{0xA0 + address:02X}".encode(), self.content())
 
-    def test_what_was_acknowledged_survives_a_kill(self):
+    def test_acknowledged_writes_survive_kill(self):
         values = range(0x41, 0x4B)
         with Emulator(self.directory, "--memory", self.file("memory")) as emulator:
             written = absenc("memory", "write", f"tformat:{emulator.path}?latency=300", "0x10", *map(str, values), "--yes")
@@ -825,7 +826,7 @@ class Memory(EmulateCase):
         self.assertIn("10 bytes written and read back", written.stdout)
         self.assertIn(b"\n0010: 41 42 43 44 45 46 47 48 49 4A", self.content())
 
-    def test_one_file_is_kept_by_one_emulator(self):
+    def test_is_locked_by_one_emulator(self):
         os.symlink(self.file("memory"), self.file("another name"))
         self.emulator("--memory", self.file("memory"))
         for name in ("memory", "another name"):
@@ -833,7 +834,7 @@ class Memory(EmulateCase):
             self.assert_failed(result, self.file("memory"), "another emulator keeps its memory")
             self.assertEqual(result.stdout, "")
 
-    def test_the_lock_outlives_what_is_saved_and_ends_with_the_emulator(self):
+    def test_lock_survives_save_and_ends_with_emulator(self):
         with Emulator(self.directory, "--memory", self.file("memory")) as emulator:
             with Client.open(emulator.path) as client:
                 client.write_memory(0, 0xAB)  # replaces the file
@@ -844,7 +845,7 @@ class Memory(EmulateCase):
         self.write_and_end(1, 0xCD)
         self.assertIn(b"\n0000: AB CD", self.content())
 
-    def test_only_regular_files_are_kept(self):
+    def test_must_be_regular_file(self):
         os.mkfifo(self.file("fifo"))
         for path in ("/dev/full", "/dev/zero", "/dev/null", self.directory, self.file("fifo")):
             with self.subTest(path):
@@ -852,17 +853,17 @@ class Memory(EmulateCase):
                 self.assert_failed(result, path, "no regular file")
                 self.assertEqual(result.stdout, "")
 
-    def test_a_memory_that_cannot_be_saved_is_not_acknowledged(self):
+    def test_write_that_cannot_be_saved_is_not_acknowledged(self):
         os.mkdir(self.file("sub"))
         emulator = self.emulator("--memory", self.file("sub/memory"))
         with Client.open(emulator.path) as client:
             shutil.rmtree(self.file("sub"))
             client.send(bytes.fromhex("32 05 5a 6d"))
-            self.assertEqual(client.receive(4), b"")  # until the emulator has gone
+            self.assertEqual(client.receive(4), b"")  # until the emulator has ended
         self.assertEqual(emulator.process.wait(PATIENCE), 1)
         self.assert_sentence(emulator.end()[2], "memory file", "No such file")
 
-    def test_a_link_stays_a_link(self):
+    def test_symbolic_link_is_preserved(self):
         os.symlink(self.file("elsewhere"), self.file("memory"))
         self.write_and_end(0, 1)
         self.assertTrue(os.path.islink(self.file("memory")))
@@ -876,11 +877,11 @@ class Memory(EmulateCase):
         self.assertEqual(self.content(), before)
         self.assertEqual(os.listdir(self.directory), ["memory"])
 
-    def test_another_model_is_refused(self):
+    def test_refuses_memory_of_other_model(self):
         self.write_and_end(0, 1)
         self.assert_refused("model TS5700N8500", "23-bit", arguments=["--model", "23-bit"])
 
-    def test_damaged_files_are_refused(self):
+    def test_refuses_damaged_files(self):
         self.write_and_end(0, 1)
         good = self.content().decode()
         size = re.search(r"size: (\d+)", good).group(1)
@@ -896,7 +897,7 @@ class Memory(EmulateCase):
                 self.file("memory", damaged)
                 self.assert_refused(*words)
 
-    def test_a_file_that_cannot_be_made(self):
+    def test_reports_file_that_cannot_be_created(self):
         path = self.file("nowhere/memory")
         self.assert_failed(absenc("emulate", "tformat", "--memory", path, "--for", "60"), path, "No such file")
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The virtual AksIM-2 over a pseudo-terminal, read byte by byte by an EncoLink client that shares no code with it."""
+"""Tests the virtual AksIM-2 over a pseudo-terminal with an independent EncoLink client, byte by byte."""
 import os
 import select
 import tty
@@ -17,7 +17,7 @@ STATUSES = {OK, 0x26, 0x56, ACCESS_DENIED, 0xEE, LOCKED, BAD_WRITE_CRC, *BAD_REA
 
 
 def inverted_crc(data):
-    """x^8 + x^7 + x^4 + x^2 + x + 1, most significant bit first."""
+    """Returns the inverted CRC x^8 + x^7 + x^4 + x^2 + x + 1, most significant bit first."""
     register = 0
     for byte in data:
         register ^= byte
@@ -27,7 +27,7 @@ def inverted_crc(data):
 
 
 class Client:
-    """Frames, and the two channels inside of them."""
+    """Sends position frames, and decodes channels 2 and 3 from their bytes."""
 
     def __init__(self, case, path, turns):
         self.case = case
@@ -35,9 +35,9 @@ class Client:
         self.port = os.open(path, os.O_RDWR | os.O_NOCTTY)
         case.addCleanup(os.close, self.port)
         tty.setraw(self.port)
-        self.pending = b""  # of channel 3, to the encoder
-        self.cycle = None   # bytes of channel 2 since its begin
-        self.cycles = []    # (turns, position, status, channel 3)
+        self.pending = b""  # bytes of channel 3 that wait to be sent
+        self.cycle = None  # bytes of channel 2 since the start of its cycle
+        self.cycles = []  # (turns, position, status, channel 3)
 
     def read(self, size):
         data = b""
@@ -47,13 +47,13 @@ class Client:
         return data
 
     def frame(self, config=POSITION):
-        """Turns (or None), position of 22 bits, error, warning."""
+        """Returns turns (or None), the position of 22 bits, error and warning."""
         out, self.pending = self.pending[:1], self.pending[1:]
         os.write(self.port, bytes([config]) + (out or b"\0"))
         reply = self.read(self.size)
         position, turns = self.decode(reply[:-2], reply[-2])
         if config == RESET_CHANNELS:
-            self.cycle = b""  # this frame still belongs to what was before
+            self.cycle = b""  # the byte of this frame belongs to the previous cycle
         elif self.cycle is not None:
             self.channel2(reply[-1], position, turns)
         return turns, position >> 2, not position & 2, not position & 1
@@ -86,7 +86,7 @@ class Client:
         return self.next_cycle()[3]
 
     def access(self, kind, address, data=b"", size=0, spoil=False):
-        """Sends a register access and returns its status, and the data behind it."""
+        """Sends a register access. Returns its status and the data after it."""
         body = (size or len(data)).to_bytes(2, "big") + address.to_bytes(4, "big") + data
         self.pending = KEYS + bytes([kind]) + body + bytes([inverted_crc(body) ^ (1 if spoil else 0)])
         while self.pending:
@@ -154,7 +154,7 @@ class Encolink(Case):
         self.assertEqual(client.access(READ, 0x00, size=4), (OK, bytes([0, 0x10, 0, 0])))
         self.assertEqual(client.frame()[1], 2**20)
 
-    def test_every_register_of_the_vendors_map(self):
+    def test_every_register_of_vendor_map(self):
         client = self.client(*self.options(True))
         client.frame(RESET_CHANNELS)
         sizes = {0x00: 4, 0x04: 4, 0x08: 4, 0x0C: 4, 0x10: 4, 0x14: 4, 0x19: 2, 0x1B: 2, 0x1D: 2, 0x1F: 2, 0x2E: 1, 0x2F: 2,
@@ -165,14 +165,14 @@ class Encolink(Case):
                 status, data = client.access(READ, address, size=size)
                 self.assertEqual((status, len(data)), (OK, size))
 
-    def test_the_vendors_example_of_a_value_outside_the_range(self):
+    def test_vendor_example_of_value_out_of_range(self):
         client = self.client(*self.options(True))
         client.frame(RESET_CHANNELS)
         self.assertEqual(client.access(WRITE, 0x00, b"\xff\xff\xff\xff")[0], OUT_OF_RANGE)
         self.assertEqual(client.access(READ, 0x00, size=4), (OK, bytes(4)))
 
-    def test_an_identity_as_the_vendors_library_reads_it(self):
-        """It reads twenty bytes for the frame that asks for it, and twenty for the identity."""
+    def test_identity_as_vendor_library_reads_it(self):
+        """The vendor's library reads twenty bytes both for the identify frame and for the identity."""
         client = self.client(*self.options(True), "--option", "identity_bytes=20")
         for config in (IDENTIFY, POSITION):
             os.write(client.port, bytes([config, 0]))
@@ -187,7 +187,7 @@ class Encolink(Case):
         client.frame(RESET_CHANNELS)
         self.assertEqual(client.access(WRITE, 0x49, b"\x63")[0], NO_SUCH_REGISTER)
 
-    def test_what_is_refused(self):
+    def test_refuses_bad_access(self):
         client = self.client(*self.options(True))
         client.frame(RESET_CHANNELS)
         self.assertEqual(client.access(WRITE, 0x5C, bytes(8))[0], ACCESS_DENIED)
@@ -197,7 +197,7 @@ class Encolink(Case):
         self.assertEqual(client.access(WRITE, 0x00, bytes([1, 0, 0, 0]))[0], LOCKED)
         self.assertEqual(client.access(READ, 0x00, size=4), (OK, bytes(4)))
 
-    def test_a_key_that_is_not_complete_does_nothing(self):
+    def test_incomplete_key_has_no_effect(self):
         client = self.client(*self.options(True))
         client.frame(RESET_CHANNELS)
         client.pending = bytes([0x00, 0xCD, 0xEF, 0x88, 0xAB, READ, 0, 2])

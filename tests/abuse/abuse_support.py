@@ -1,15 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
-"""For the lists of abuse: the modules of tests/, and whether everything is wanted."""
+"""Shared by the abuse tests: the import path of tests/, and the choice between the short and the full test."""
 import os
 import pathlib
 import sys
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent))
-ALL = bool(os.environ.get("ABSENC_ABUSE_ALL"))  # run.py --all
+ALL = bool(os.environ.get("ABSENC_ABUSE_ALL"))  # set by run.py --all
 
 
 def often(short, everything):
-    """How often something is done: as a part of the tests, and with --all."""
+    """Returns the number of repetitions: `short` as a part of the normal tests, `everything` with --all."""
     return everything if ALL else short
 
 

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Brokers that hang up, say nothing, are away, are stopped and restarted, and servers that are killed with -9: no reading
-is missing, none comes twice with another id."""
+"""MQTT brokers that close connections, stop replying, are unreachable or restart, and servers that are killed with
+SIGKILL: no reading may be lost, and none may arrive twice with different ids."""
 from abuse_support import often
 
 import os
@@ -29,7 +29,7 @@ class Failures(MqttCase):
         for one in came:
             self.assertEqual(same.setdefault(one["id"], one), one, "an id is for one message")
 
-    def test_a_broker_that_fails_and_servers_that_are_killed(self):
+    def test_no_reading_is_lost_if_broker_fails_or_server_is_killed(self):
         random_ = random.Random(SEED)
         mute = threading.Event()
         broker = FakeBroker(lambda _broker, _connection, kind, _flags, _body, usual:
@@ -58,12 +58,13 @@ class Failures(MqttCase):
         self.check(lambda: broker.all(readings), wait_until(lambda: self.taken(server), "it goes on"))
         self.assertEqual(self.mqtt(server)["dropped"], 0)
 
-    def test_mosquitto_stopped_and_restarted(self):
+    def test_no_reading_is_lost_across_mosquitto_restart(self):
         folder = os.path.join(self.directory, "kept")
         os.mkdir(folder)
         os.chmod(folder, 0o777)
         broker = self.broker("allow_anonymous true", "persistence true", f"persistence_location {folder}/")
-        receiver = self.receiver(broker, version=paho.MQTTv311, client_id="keeps")  # of 5 it would end with its connection
+        # MQTT 5 would end the session with its connection
+        receiver = self.receiver(broker, version=paho.MQTTv311, client_id="keeps")
         server = self.sender(broker.url, ONE, "--rate", "200")
         for round_ in range(ROUNDS):
             with self.subTest(round=round_):

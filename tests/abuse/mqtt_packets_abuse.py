@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Conversations in which a broker breaks MQTT: no server ends, no reading is missing.
-
-ABSENC_ABUSE_SEED=N begins with that seed; conversation I of a run has the seed N + I."""
+"""Conversations in which a broker violates MQTT: no server may end, and no reading may be lost. ABSENC_ABUSE_SEED=N
+sets the first seed; conversation I of a run uses the seed N + I."""
 from abuse_support import often
 
 import os
@@ -19,20 +18,20 @@ ONE = "sim:tformat?motion=rpm=60"
 SEED = int(os.environ.get("ABSENC_ABUSE_SEED", "1"))
 CONVERSATIONS = often(150, 10_000)
 SERVERS = often(20, 60)  # each pauses for up to 5 s between two conversations
-NOBODYS = 60_000  # no message has this number: they count from 1 in each conversation
+NOBODYS = 60_000  # a number that no message has: they count from 1 in each conversation
 KNOWN = [bytes.fromhex(one) for one in ("20050000027f00", "4006000100027f00", "e00487027f00", "30050001615859")]
 KINDS = (CONNACK, PUBACK, 9, PUBLISH, DISCONNECT, PINGRESP, 15)  # 9: SUBACK, 15: AUTH
 
 
 def properties(random_):
-    """A list of properties: known ones, unknown ones, cut ones."""
+    """Returns a random list of MQTT 5 properties: known, unknown or truncated ones."""
     body = bytes(random_.choice((0x11, 0x12, 0x1F, 0x21, 0x26, 0x27, 0x7F, random_.randrange(256)))
                  for _ in range(random_.randrange(1, 4))) + random_.randbytes(random_.randrange(12))
     return bytes((random_.choice((len(body), random_.randrange(128))),)) + body
 
 
 def body(random_, kind, number):
-    """Of a packet that a broker may send, as it should be."""
+    """Returns a valid body of a packet that a broker may send."""
     if kind == CONNACK:
         return bytes((0, 0, 0))
     if kind in (PUBACK, 9):
@@ -52,15 +51,15 @@ def bad_packet(random_, kind, number):
     if way == 2:  # properties
         start = {CONNACK: b"\0\0", PUBACK: number.to_bytes(2, "big") + b"\0", PUBLISH: b"\0\1a", 9: b"\0\1"}
         return packet(kind, start.get(kind, b"\0") + properties(random_))
-    if way == 3:  # cut, and what follows is taken for its rest
+    if way == 3:  # truncated, so that the next packet is taken for its rest
         whole = packet(kind, good + properties(random_))
         return whole[:random_.randrange(1, len(whole))]
-    if way == 4:  # a size that is another: too large, 256 MB, five bytes long
+    if way == 4:  # a wrong size: too large, 256 MB, or five bytes long
         size = random_.choice((b"\x7f", b"\xff\xff\xff\x7f", b"\xff\xff\xff\xff\x7f", b"\0"))
         return bytes((kind << 4,)) + size + good
     if way == 5:  # flags
         return packet(kind, good, random_.randrange(16))
-    if way == 6:  # very often
+    if way == 6:  # many repetitions
         return packet(kind, good) * random_.randrange(2, 2000)
     mutated = bytearray(packet(kind, good + random_.choice((b"", properties(random_)))))
     for _ in range(random_.randrange(1, 4)):
@@ -69,7 +68,8 @@ def bad_packet(random_, kind, number):
 
 
 def acknowledged(stream):
-    """Returns the numbers of messages that `stream` acknowledges to a client, and the beginning of a packet at its end."""
+    """Returns the numbers of the messages that `stream` acknowledges to a client, and the incomplete packet at its
+    end."""
     found = []
     while True:
         sizes = next((stream[1:end] for end in range(2, 6) if end <= len(stream) and stream[end - 1] < 128), None)
@@ -87,18 +87,19 @@ def acknowledged(stream):
 class Conversation:
     def __init__(self, seed):
         self.random = random.Random(seed)
-        # Half of them in place of the CONNACK, or right after it.
+        # In half of the conversations the bad packet replaces the CONNACK, or follows it directly.
         self.good_packets = self.random.choice((0, 0, 0, 1, 2, 3, 5, 8))
         self.seen = 0
         self.ends = None
-        self.received = set()  # numbers of messages
-        self.rest = b""        # of what was sent: a packet that is not whole
+        self.received = set()  # numbers of received messages
+        self.rest = b""  # incomplete packet at the end of the sent bytes
 
     def numbers(self):
         return [*sorted(self.received), NOBODYS]
 
     def truthful(self, data):
-        """Returns `data`. Hangs up instead of acknowledging a message that did not come: no client could know of its loss."""
+        """Returns `data`. Closes the connection if `data` acknowledges a message that was not received, because no
+        client could detect that loss."""
         found, self.rest = acknowledged(self.rest + data)
         if any(number != NOBODYS and number not in self.received for number in found):
             raise Closed
@@ -117,28 +118,28 @@ class Packets(ServeCase):
             return usual
         if not hasattr(connection, "conversation"):
             connection.conversation = Conversation(SEED + connection.index)
-            connection.socket.settimeout(1)  # a client that has nothing to say ends it
-        talk = connection.conversation
+            connection.socket.settimeout(1)  # an idle client ends the conversation
+        conversation = connection.conversation
         if kind == PUBLISH and (number := published(flags, body_)[1]) is not None:
-            talk.received.add(number)
-        return talk.truthful(self.said(talk, kind, usual))
+            conversation.received.add(number)
+        return conversation.truthful(self.reply_in_conversation(conversation, kind, usual))
 
-    def said(self, talk, kind, usual):
-        if talk.ends is not None:
-            if time.monotonic() > talk.ends:
+    def reply_in_conversation(self, conversation, kind, usual):
+        if conversation.ends is not None:
+            if time.monotonic() > conversation.ends:
                 raise Closed
-            return b"" if talk.random.random() < 0.5 else usual
-        talk.seen += 1
-        if talk.seen <= talk.good_packets:
+            return b"" if conversation.random.random() < 0.5 else usual
+        conversation.seen += 1
+        if conversation.seen <= conversation.good_packets:
             return usual
-        talk.ends = time.monotonic() + 0.3
+        conversation.ends = time.monotonic() + 0.3
         expected = {CONNECT: CONNACK, PUBLISH: PUBACK}.get(kind, PINGRESP)
-        wrong = expected if talk.random.random() < 0.5 else talk.random.choice(KINDS)
-        bad = b"".join(bad_packet(talk.random, wrong, talk.random.choice(talk.numbers()))
-                       for _ in range(talk.random.choice((1, 1, 1, 2, 5))))
-        return talk.random.choice((bad, usual + bad))
+        wrong = expected if conversation.random.random() < 0.5 else conversation.random.choice(KINDS)
+        bad = b"".join(bad_packet(conversation.random, wrong, conversation.random.choice(conversation.numbers()))
+                       for _ in range(conversation.random.choice((1, 1, 1, 2, 5))))
+        return conversation.random.choice((bad, usual + bad))
 
-    def test_no_server_ends_and_no_reading_is_missing(self):
+    def test_no_server_ends_and_no_reading_is_lost(self):
         servers = [self.without_history(ONE, "--rate", "10", "--mqtt", self.broker.url, "--mqtt-prefix", f"plant/{index}",
                                         "--mqtt-spool", os.path.join(self.directory, f"spool{index}"))
                    for index in range(SERVERS)]
@@ -147,7 +148,7 @@ class Packets(ServeCase):
             self.assertLess(time.monotonic(), deadline, f"{self.broker.connections} conversations")
             for server in servers:
                 self.assertIsNone(server.process.poll(), f"a server ended; seeds {SEED} to {SEED + self.broker.connections}")
-            time.sleep(0.1)  # between two looks; nothing is expected of it
+            time.sleep(0.1)  # polling interval; the test depends on no time
         self.good = True
         conversations = self.broker.connections
         deaths = sum(server.json("/api/mqtt")["client_deaths"] for server in servers)
@@ -167,15 +168,15 @@ class Packets(ServeCase):
         print(f"{conversations} conversations, {deaths} ended a client, no server", flush=True)
 
     def wait_for(self, topic, goal, server):
-        """All messages of the topic, as soon as the reading of this number is among them."""
+        """Returns all messages of the topic as soon as the reading with this number is among them."""
         messages = []
         last = 0
         while last < goal:
-            # While messages come it takes as long as it takes; a topic that was refused is tried again after a minute.
+            # While messages arrive, the deadline moves. A client retries a refused topic after a minute.
             late = time.monotonic() + 90 + PATIENCE
             while not (new := self.broker.after(topic, len(messages))):
                 self.assertLess(time.monotonic(), late, f"reading {goal} comes after {last}: {server.json('/api/mqtt')}")
-                time.sleep(0.05)  # between two looks
+                time.sleep(0.05)  # polling interval
             messages += new
             last = max([last, *numbers(new, ONE)])
         return messages

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Files of the spool that are mutated, cut, overwritten, removed and replaced, while a server has them open and between two
-servers: each server runs, readings go on, and of what is missing the server has counted as much or has set it aside."""
+"""Spool files that are changed, truncated, overwritten, removed or replaced, while a server has them open and between
+two runs. Each server must run and publish readings. Every missing reading must be counted by the server or set aside in
+a file."""
 from abuse_support import often
 
 import os
@@ -20,7 +21,7 @@ SEED = int(os.environ.get("ABSENC_ABUSE_SEED", "1"))
 
 
 def harm(random_, path):
-    """One file, in one of many ways."""
+    """Damages one file in a random manner."""
     data = bytearray(path.read_bytes())
     way = random_.randrange(7)
     at = random_.randrange(max(1, len(data)))
@@ -37,7 +38,7 @@ def harm(random_, path):
     elif way == 5:
         return path.unlink()
     else:
-        data[at:] = bytes(len(data) - at)  # as a file system leaves it after a loss of power
+        data[at:] = bytes(len(data) - at)  # zeros, as a file system leaves them after a power failure
     with open(path, "r+b") as file:
         file.write(data)
         file.truncate()
@@ -45,7 +46,7 @@ def harm(random_, path):
 
 
 class Spool(MqttCase):
-    def test_each_round(self):
+    def test_survives_damaged_spool_files(self):
         for round_ in range(ROUNDS):
             with self.subTest(seed=SEED + round_):
                 self.one_round(random.Random(SEED + round_), round_)
@@ -78,7 +79,7 @@ class Spool(MqttCase):
         wait_until(lambda: (numbers(broker.all("/readings"), ONE) or [0])[-1] > first, "what is read comes")
         wait_until(lambda: self.mqtt(server)["waiting"] < 50, "the spool empties")
         found = numbers(broker.all("/readings"), ONE)
-        # A number may come again only where the file that had it was harmed: numbers begin anew then, with other ids.
+        # A reading's number may repeat only if its spool file was damaged: the numbers then restart with other ids.
         ids = [one["id"] for one in broker.all("/readings")]
         self.assertEqual(len(set(ids)), len(ids), "no id comes twice")
         self.assertGreater(len(found), 0)

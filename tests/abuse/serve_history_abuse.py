@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The history of a server that runs is moved, removed, replaced, cut off, overwritten, and the server killed: readings go
-on, a history is kept again within seconds, and no command that was answered is missing after kill -9."""
+"""The history file of a running server is moved, removed, replaced, truncated or overwritten, and the server is killed.
+Readings must continue, the history must be recorded again within seconds, and no acknowledged command may be lost after
+SIGKILL."""
 from abuse_support import often
 
 import contextlib
@@ -19,7 +20,7 @@ SEED = int(os.environ.get("ABSENC_ABUSE_SEED", "1"))
 
 
 def harm(random_, path):
-    """Returns what was done."""
+    """Damages the history file and returns the kind of damage."""
     way = random_.choice(("move", "move all", "remove", "remove all", "replace", "cut off", "overwrite"))
     size = os.path.getsize(path)
     if way.startswith("move"):
@@ -41,8 +42,8 @@ def harm(random_, path):
     return way
 
 
-class Harmed(ServeCase):
-    def test_readings_go_on_and_a_history_is_kept_again(self):
+class DamagedHistory(ServeCase):
+    def test_readings_continue_and_history_is_recorded_again(self):
         path = self.file("history.sqlite")
         server = self.server(NAME, "--history", path)
         random_ = random.Random(SEED)
@@ -60,8 +61,8 @@ class Harmed(ServeCase):
                 self.assertIsNone(server.process.poll())
 
 
-class Killed(ServeCase):
-    def test_no_answered_command_is_missing(self):
+class KilledServer(ServeCase):
+    def test_no_acknowledged_command_is_lost(self):
         path = self.file("history.sqlite")
         random_ = random.Random(SEED)
         tokens, answered = self.tokens(), 0

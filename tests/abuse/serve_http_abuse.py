@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Idle connections, streams that are never read, requests that come a byte at a time and requests that are mutated, from
-one address and in turn: another address is answered all the same, and the server lives."""
+"""Idle connections, streams that are never read, requests sent byte by byte, and mutated requests, from one address and
+from several. Clients of another address must still be served, and the server must survive."""
 from abuse_support import often
 
 import contextlib
@@ -40,7 +40,7 @@ class Http(ServeCase):
                 self.assertIn(b" 200 ", other.recv(100).split(b"\r\n")[0])
         self.assertIsNone(self.served.process.poll())
 
-    def test_connections(self):
+    def test_serves_others_despite_many_connections(self):
         random_ = random.Random(SEED)
         for i in range(ROUNDS):
             kind = random_.choice((b"", b"G", STREAM, STREAM[:-2]))
@@ -51,7 +51,7 @@ class Http(ServeCase):
                         connection.sendall(kind)
                 self.assert_others_are_answered()
 
-    def test_mutants(self):
+    def test_serves_others_despite_mutated_requests(self):
         random_ = random.Random(SEED)
         for i in range(MUTANTS):
             request = bytearray(random_.choice(SEEDS))
