@@ -12,19 +12,20 @@ namespace absenc::capture {
 namespace {
 
 constexpr Tick never = std::numeric_limits<Tick>::max();
-constexpr Tick characters_ahead = 12;   // looked at to find the first start bit
-constexpr std::size_t candidates = 16;  // start bits tried: more falling edges in a character are noise
-constexpr std::size_t step = 64;        // changes after which two decoders are compared
+constexpr Tick characters_ahead = 12;   // number of characters examined to find the first start bit
+constexpr std::size_t candidates = 16;  // number of falling edges tried as start bit: more of them within a character
+                                        // are noise
+constexpr std::size_t step = 64;        // number of changes after which the guess is compared with the true state
 
 }  // namespace
 
-// A falling edge, and the levels at the middles of the bits behind it, the start bit in bit 0.
+// A falling edge that may be a start bit, and the levels at the middles of the bits behind it, the start bit in bit 0.
 struct AsyncDecoder::Candidate {
   Tick begin;
   unsigned levels;
-  Tick last;      // change inside the character
-  unsigned bits;  // from its beginning to that change
-  Tick next;      // falling edge behind the middle of the stop bit
+  Tick last;      // last change within the character
+  unsigned bits;  // number of bits from `begin` to `last`
+  Tick next;      // first falling edge behind the middle of the stop bit
 };
 
 AsyncDecoder::Statistics& AsyncDecoder::Statistics::operator+=(const Statistics& other) {
@@ -50,7 +51,7 @@ AsyncDecoder::AsyncDecoder(const AsyncFormat& format, std::uint8_t channel, Star
       length_(static_cast<Tick>(std::llround(format.bit * (stop_ + format.stop_bits)))),
       per_tick_(1 / format.bit),
       start_(start) {
-  // An edge at tick t lies between t - 1 and t, so half a tick is rounded away for good.
+  // An edge at tick t lies between t - 1 and t, so half a tick may be rounded away.
   for (unsigned i = 0; i < middle_.size(); ++i) middle_[i] = static_cast<Tick>(format.bit * (i + 0.5));
 }
 
@@ -61,9 +62,9 @@ void AsyncDecoder::restart(Start start) {
   unsure_.reset();
 }
 
-// Characters from the falling edge `start` on, as long as `needed` ticks of each lie before `limit`. `visit` returns
-// false to stop before the one it was shown. Returns the index of the falling edge to go on from, which may be one
-// behind the edges that are known. `edges_` ends with `never`.
+// Visits characters from the falling edge `start` on, as long as `needed` ticks of each lie before `limit`. `visit`
+// returns false to stop before the character passed to it. Returns the index of the falling edge at which to continue,
+// which may be one behind the known edges. `edges_` ends with `never`.
 template <class Visit>
 std::size_t AsyncDecoder::walk(std::size_t start, Tick limit, Tick needed, Visit&& visit) const {
   const Tick* const edges = edges_.data();
@@ -115,7 +116,8 @@ std::uint64_t AsyncDecoder::faults_from(std::size_t start, Tick limit) const {
   return faults;
 }
 
-// Nothing: more must be seen. What is seen does not depend on how much more is known already.
+// Returns the index of the first start bit, or nothing if more changes are needed. The result does not depend on how
+// many further changes are known already.
 std::optional<std::size_t> AsyncDecoder::find_start(Tick limit, bool final) const {
   const std::size_t count = edges_.size() - 1;
   const std::size_t first = level_ ? 0 : 1;
@@ -241,7 +243,7 @@ void AsyncDecoder::join(const Changes& part, Tick first, Tick end, AsyncDecoder&
   const auto met = meet(part, first, end, guessed, characters);
   if (!met) return;
   characters.insert(characters.end(), guessed.begin() + static_cast<std::ptrdiff_t>(*met), guessed.end());
-  // What the other counted before they met was wrong: count that once more.
+  // The faults that `other` counted before the two met are wrong: they are computed again and subtracted.
   AsyncDecoder wrong(format_, channel_, Start::trust);
   std::vector<Character> ignored;
   wrong.meet(part, first, end, std::span(guessed).subspan(*met, 1), ignored);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Asynchronous characters from level changes. The samples are not looked at again: a character is computed from the few
+// Decodes asynchronous characters from level changes. It never reads samples: a character is computed from the few
 // changes inside it.
 #pragma once
 
@@ -13,27 +13,27 @@
 
 namespace absenc::capture {
 
-/// What is on a line: 8 data bits, LSB first.
+/// Settings of an asynchronous line with 8 data bits, LSB first.
 struct AsyncFormat {
-  double bit = 0;  // ticks, 2.5 at least; need not be a whole number
+  double bit = 0;  // duration of a bit in ticks, at least 2.5; need not be a whole number
   bool idle_high = true;
   Parity parity = Parity::none;
-  unsigned stop_bits = 1;  // 1 or 2. Only the first is looked at, as a receiver does
-  Tick glitch = 0;         // a level that lasts for less is taken for noise; 0: none is
+  unsigned stop_bits = 1;  // 1 or 2; only the first stop bit is checked, as in a receiver
+  Tick glitch = 0;         // a level shorter than this is noise; 0: no filter
 };
 
-/// Decodes part after part. A bit is the level at its middle, counted from the falling edge of the start bit; what is
-/// not low at the middle of its start bit is no character. After a wrong stop bit, the next falling edge begins a
-/// character.
+/// Decodes a capture part by part. A bit is the level at its middle, counted from the falling edge of the start bit; a
+/// pulse that is not low at the middle of its start bit is no character. After a wrong stop bit, the next falling edge
+/// begins a character.
 ///
-/// Between parts it keeps the changes from the first character on that is not complete; there is no state in the middle
-/// of one.
+/// Between parts it stores the changes from the first incomplete character on, and no state within a character.
 ///
-/// A capture may begin inside a character: of the falling edges within the first, that is taken which leads to the
-/// fewest errors in the next twelve characters.
+/// A capture may begin inside a character: of the falling edges within the first character, the one with the fewest
+/// errors in the next twelve characters is the start bit.
 class AsyncDecoder {
  public:
-  /// Over all characters without an error, from the start bit to the last change: so that nothing adds up.
+  /// Sums over all characters without an error, from the start bit to the last change, so that rounding errors do not
+  /// add up.
   struct Statistics {
     std::uint64_t ticks = 0;
     std::uint64_t bits = 0;
@@ -43,24 +43,26 @@ class AsyncDecoder {
     Statistics& operator+=(const Statistics& other);
     Statistics& operator-=(const Statistics& other);
   };
-  /// Whether the first falling edge is looked for, or known to be a start bit.
+  /// Whether the first start bit must be searched, or is the first falling edge.
   enum class Start : std::uint8_t { look, trust };
 
-  /// `channel` is what the characters bear.
+  /// `channel` is stored in each character.
   explicit AsyncDecoder(const AsyncFormat& format, std::uint8_t channel = 0, Start start = Start::look);
 
-  /// Forgets everything but the statistics: what comes next does not follow what was.
+  /// Clears everything except the statistics: the next part does not follow the previous one.
   void restart(Start start = Start::look);
-  /// The next part, from `first` to `end`. Where `part.before` does not fit, the line changed at `first`.
+  /// Decodes the next part, from `first` to `end`. If `part.before` differs from the last level, the line changed at
+  /// `first`.
   void decode(const Changes& part, Tick first, Tick end, std::vector<Character>& characters);
-  /// As decode, where `other`, just restarted with `Start::trust`, has decoded the same part into `guessed`: what is
-  /// right of it is taken over together with its state. The outcome is that of decode, to the bit.
+  /// Works like `decode` with the result of `other`, which has decoded the same part into `guessed` after a restart
+  /// with `Start::trust`. The correct part of the guess is taken over with its state. The result equals that of
+  /// `decode` exactly.
   void join(const Changes& part, Tick first, Tick end, AsyncDecoder& other, std::vector<Character>& guessed,
             std::vector<Character>& characters);
-  /// Nothing follows: also characters of which the stop bit has begun.
+  /// Ends the capture; also returns characters whose stop bit has begun.
   void finish(std::vector<Character>& characters);
 
-  /// No character that is yet to come begins before.
+  /// Returns a time before which no further character begins.
   [[nodiscard]] Tick settled() const;
   [[nodiscard]] const Statistics& statistics() const { return statistics_; }
   [[nodiscard]] const AsyncFormat& format() const { return format_; }
@@ -74,7 +76,7 @@ class AsyncDecoder {
   [[nodiscard]] std::optional<std::size_t> find_start(Tick limit, bool final) const;
   [[nodiscard]] std::uint64_t faults_from(std::size_t start, Tick limit) const;
 
-  // The first of `targets` at which a character begins too; before that one it stops.
+  // Decodes until a character begins at the same time as one of `targets`; returns its index and stops before it.
   std::optional<std::size_t> meet(const Changes& part, Tick first, Tick end, std::span<const Character> targets,
                                   std::vector<Character>& characters);
   void begin_part(const Changes& part, Tick first);
@@ -84,19 +86,19 @@ class AsyncDecoder {
 
   AsyncFormat format_;
   std::uint8_t channel_;
-  unsigned stop_;                  // index of the bit
-  std::array<Tick, 11> middle_{};  // of each bit, from the falling edge
-  Tick length_;                    // of a character
-  double per_tick_;                // bits
+  unsigned stop_;                  // index of the stop bit
+  std::array<Tick, 11> middle_{};  // middle of each bit in ticks, from the falling edge
+  Tick length_;                    // duration of a character in ticks
+  double per_tick_;                // bits per tick
 
   Start start_;
   bool begun_ = false;
-  Tick origin_ = 0;             // where the first part began
-  Tick end_ = 0;                // where the last one ended
-  bool line_ = true;            // behind all that was fed; high is idle from here on
-  bool level_ = true;           // before edges_
-  std::vector<Tick> edges_;     // from the character on that is not complete
-  std::optional<Tick> unsure_;  // a change that may be a glitch
+  Tick origin_ = 0;             // beginning of the first part
+  Tick end_ = 0;                // end of the last part
+  bool line_ = true;            // level behind all changes fed so far; from here on, idle is high
+  bool level_ = true;           // level before the first of `edges_`
+  std::vector<Tick> edges_;     // changes from the first incomplete character on
+  std::optional<Tick> unsure_;  // a change that may be part of a glitch
   Statistics statistics_;
 };
 

@@ -9,15 +9,15 @@ namespace absenc::capture {
 
 namespace {
 
-constexpr double shortest_bit = 2.5;       // ticks
-constexpr std::size_t fewest_changes = 4;  // two pulses, the least from which a bit could be told
+constexpr double shortest_bit = 2.5;       // in ticks
+constexpr std::size_t fewest_changes = 4;  // two pulses, the least from which a bit time can be found
 constexpr std::size_t tried_changes = 4096;
 constexpr std::size_t most_clusters = 8;
-constexpr int most_bits = 4;    // of the shortest pulse
-constexpr double worst = 0.5;   // errors a character
-constexpr double alike = 0.01;  // errors a character that do not tell two bit times apart
+constexpr int most_bits = 4;    // the shortest pulse may have up to this number of bits
+constexpr double worst = 0.5;   // errors per character above which a format is refused
+constexpr double alike = 0.01;  // formats whose errors per character differ by less count as equal
 
-// Pulses between changes, without glitches, the shortest first.
+// Returns the lengths of the pulses between changes, without glitches, the shortest first.
 std::vector<Tick> pulses(const Changes& changes, Tick glitch) {
   std::vector<Tick> lengths;
   for (std::size_t i = 1; i < changes.at.size(); ++i) {
@@ -28,7 +28,7 @@ std::vector<Tick> pulses(const Changes& changes, Tick glitch) {
   return lengths;
 }
 
-// The bit as the mean over pulses of up to `most` bits that are nearly a multiple of it.
+// Returns the bit time as the mean over pulses that have up to `most` bits and are nearly a multiple of `bit`.
 double fitted(const std::vector<Tick>& lengths, double bit, double most) {
   double ticks = 0;
   double bits = 0;
@@ -43,7 +43,7 @@ double fitted(const std::vector<Tick>& lengths, double bit, double most) {
   return bits == 0 ? bit : ticks / bits;
 }
 
-// Means of pulses of about the same length, the shortest first; what is rare is noise.
+// Returns the mean lengths of groups of similar pulses, the shortest first. Rare lengths are noise and are left out.
 std::vector<double> clusters(const std::vector<Tick>& lengths) {
   const std::size_t rare = lengths.size() < 50 ? 1 : std::max<std::size_t>(2, lengths.size() / 200);
   std::vector<double> means;
@@ -87,8 +87,8 @@ AsyncDecoder::Statistics decoded(const Stretch& part, const AsyncFormat& format)
   return decoder.statistics();
 }
 
-// Errors a character. Pulses that are clearly shorter than a bit are some too: of a bit that is too long nothing else
-// may be seen in a short capture.
+// Returns the errors per character. Pulses that are clearly shorter than a bit count as errors too: in a short capture,
+// a bit time that is too long may cause no others.
 double faults(const AsyncDecoder::Statistics& statistics, const std::vector<Tick>& lengths, double bit) {
   if (statistics.characters == 0) return 1;
   const auto shorter = std::find_if(lengths.begin(), lengths.end(),
@@ -97,7 +97,7 @@ double faults(const AsyncDecoder::Statistics& statistics, const std::vector<Tick
          static_cast<double>(statistics.characters);
 }
 
-// The level that lasted longest without a change: a pause, or nothing but a pause.
+// Returns the level that lasted longest without a change, which is probably a pause.
 bool longest_level(const Stretch& part) {
   Tick longest = 0;
   Tick since = part.first;

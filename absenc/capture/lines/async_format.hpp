@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What is not known of an asynchronous line, found from its level changes: the baud rate and the idle level.
+// Finds the baud rate and the idle level of an asynchronous line from its level changes.
 #pragma once
 
 #include <optional>
@@ -10,19 +10,20 @@ namespace absenc::capture {
 
 enum class Idle : std::uint8_t { automatic, low, high };
 
-/// What the user knows of a line.
+/// Settings of a line that the user knows.
 struct AsyncSettings {
-  double baud = 0;  // 0: found from the changes
+  double baud = 0;  // 0: detected from the changes
   Parity parity = Parity::none;
   unsigned stop_bits = 1;
   Idle idle = Idle::automatic;  // low: an inverted line
-  Tick glitch = 0;              // a level that lasts for less is taken for noise; 0: none is
+  Tick glitch = 0;              // a level shorter than this is noise, in ticks; 0: no filter
 };
 
-/// From the first changes of a line, which was seen from `first` to `end`. Each bit time that its pulses could be
-/// multiples of is tried, with each idle level, and that is taken which leads to the fewest errors; of equal ones the
-/// longest bit. It is then measured from start bit to last change. Nothing: too few changes to find the baud rate, or
-/// every second character would be wrong. `ticks_per_second` is needed when the baud rate is given.
+/// Finds the format from the first changes of a line between `first` and `end`. It tries each bit time of which the
+/// pulses could be multiples, with each idle level, and takes the one with the fewest errors; of equal ones the longest
+/// bit. The bit time is then measured from start bit to last change. Returns nothing if there are too few changes to
+/// find the baud rate, or if every second character would be wrong. `ticks_per_second` is needed when the baud rate is
+/// given.
 std::optional<AsyncFormat> find_format(const Changes& changes, Tick first, Tick end, const AsyncSettings& settings,
                                        std::uint64_t ticks_per_second);
 

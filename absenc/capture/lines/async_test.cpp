@@ -164,7 +164,7 @@ TEST(Async, WhatLiesBehindAHoleIsDecodedAfresh) {
   for (const unsigned threads : {1u, 3u}) {
     for (const Content content : {Content::samples, Content::changes}) {
       MemoryReader reader(wires, content, 100, 1);
-      // In the middle of character 10 until the pause before 20.
+      // The hole is from the middle of character 10 to the pause before character 20.
       reader.leave_out(160 + 10 * 168 + 30, 160 + 20 * 168 - 85);
       std::vector<std::uint8_t> wanted;
       for (unsigned i = 0; i < 30; ++i) {
@@ -186,11 +186,11 @@ TEST(Async, ASilentLineTakesTheBaudRateOfAnother) {
   EXPECT_EQ(all.characters.size(), 200u);
   EXPECT_EQ(all.characters.front().channel, 1);
   EXPECT_NEAR(all.outcome.formats[0].bit, 10.5, 0.05);
-  EXPECT_NEAR(all.outcome.measured_baud[1], 100'000, 500);  // each character is rounded alike
+  EXPECT_NEAR(all.outcome.measured_baud[1], 100'000, 500);  // the rounding is the same in each character
   EXPECT_EQ(all.outcome.measured_baud[0], 0);
 }
 
-// More changes than are looked at, of a sender whose clock drifts by 1 %.
+// A sender whose clock drifts by 1 %, with more changes than the detection uses.
 TEST(Async, WhatIsFoundDoesNotDependOnTheBlocks) {
   Wires wires{{{}}};
   for (const double bit : {5.0, 5.05}) {
@@ -269,7 +269,8 @@ TEST(Async, WhatTheReaderThrowsArrives) {
   }
 }
 
-// Of text, to claim a block is to parse it: who does that must not keep the others from decoding what came before.
+// A reader that claims slowly, as for text formats that are parsed in `claim`: a claiming thread must not keep the
+// others from decoding earlier blocks.
 class Slow final : public Reader {
  public:
   explicit Slow(Reader& reader) : reader_(reader) {}
@@ -277,7 +278,7 @@ class Slow final : public Reader {
   [[nodiscard]] const Layout& layout() const override { return reader_.layout(); }
   [[nodiscard]] const std::vector<Damage>& damages() const override { return reader_.damages(); }
 
-  // Another thread than the one that joins is not done before all that was claimed has arrived.
+  // Threads other than the joining one wait here until all claimed blocks have been delivered.
   [[nodiscard]] bool claim(Block& block) override {
     std::unique_lock lock(mutex_);
     if (!is_joining() && claimed_ != arrived_) {
@@ -289,7 +290,7 @@ class Slow final : public Reader {
     claimed_ += more ? 1 : 0;
     return more;
   }
-  // The one that joins has something that was claimed while another thread claims.
+  // The joining thread waits until another thread claims while claimed blocks are outstanding.
   void fill(Block& block) override {
     std::unique_lock lock(mutex_);
     if (is_joining()) wait(lock, [this] { return overlaps_; });

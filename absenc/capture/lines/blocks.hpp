@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Blocks of a reader on their way through several threads: expanded and decoded by guess in any order, joined in
-// theirs.
+// Moves blocks of a reader through several threads: they are expanded and decoded by guess in any order, and joined in
+// the order of the capture.
 #pragma once
 
 #include <algorithm>
@@ -17,26 +17,26 @@
 
 namespace absenc::capture {
 
-/// A part of a capture as level changes, in the order of the channels that were asked for.
+/// A part of a capture as level changes of the requested channels, in their order.
 struct Levels {
   Tick first = 0;
   Tick end = 0;
   std::vector<Changes> changes;
 };
 
-/// Chosen channels of a reader, whatever it reads.
+/// Reads selected channels as level changes from a reader of any content.
 class LevelReader {
  public:
   LevelReader(Reader& reader, std::vector<unsigned> channels) : reader_(reader), channels_(std::move(channels)) {}
 
-  /// Why it cannot be read as levels: a sentence, or "".
+  /// Returns why the capture cannot be read as levels, as a sentence; "" if it can.
   [[nodiscard]] std::string problem() const;
   [[nodiscard]] std::string name(unsigned channel) const;
   [[nodiscard]] const Layout& layout() const { return reader_.layout(); }
 
-  /// One caller at a time.
+  /// Claims the next block; only one thread may call this at a time.
   [[nodiscard]] bool claim(Block& block) { return reader_.claim(block); }
-  /// Any number of callers, each with a block of its own that was claimed.
+  /// Expands a claimed block to level changes. Several threads may call it, each with its own block.
   void expand(Block& block, Levels& levels) const;
 
  private:
@@ -44,8 +44,8 @@ class LevelReader {
   std::vector<unsigned> channels_;
 };
 
-/// Reads parts into `parts` until `enough(levels)` is true, which sees each in turn, or the capture ends. What is
-/// silent takes no room, however long it is.
+/// Reads parts into `parts` until `enough(levels)`, which is called for each part in order, returns true, or the
+/// capture ends. Consecutive silent parts are merged, so silence of any length takes no memory.
 template <class Enough>
 void look_ahead(LevelReader& reader, std::vector<Levels>& parts, Enough&& enough) {
   Block block;
@@ -69,16 +69,17 @@ void look_ahead(LevelReader& reader, std::vector<Levels>& parts, Enough&& enough
   }
 }
 
-/// Decodes all that is left of the reader. `Decoding` has
-/// - `bool decode(const Levels&)`: the next part, in order; false: no more is wanted
-/// - `Guess`, and `void guess(const Levels&, Guess&) const`: from any thread, a part whose beginning is not known
-/// - `bool join(const Levels&, Guess&)`: as decode, with what was guessed
-/// A guess takes a character or word to begin with the first change. The true state runs into the block until it begins
-/// one where the guess did too: from there on both depend on nothing but what follows, and the guess is right. Where
-/// they never meet the block is decoded twice, and still right.
+/// Decodes the rest of the reader with several threads. `Decoding` must have
+/// - `bool decode(const Levels&)`: decodes the next part, in order; returns false to end the run
+/// - `Guess`, and `void guess(const Levels&, Guess&) const`: decodes in any thread a part whose first state is
+///   unknown
+/// - `bool join(const Levels&, Guess&)`: works like `decode`, with the result of `guess`
+/// A guess assumes that the first change begins a character or word. The true state runs into the block until it begins
+/// one at the same time as the guess. From there on both depend only on later changes, so the guess is correct. If they
+/// never meet, the block is decoded twice, and the result is still correct.
 ///
-/// decode and join are called by the calling thread. Blocks in flight: two for each thread. What a reader or the
-/// decoding throws is thrown here.
+/// The calling thread calls `decode` and `join`. Each thread has two blocks in progress. Exceptions of the reader or
+/// the decoding are thrown here.
 template <class Decoding>
 class BlockRun {
  public:
@@ -87,13 +88,13 @@ class BlockRun {
     for (Job& job : jobs_) free_.push_back(&job);
   }
 
-  /// False: no more was wanted.
+  /// Decodes all blocks. Returns false if `decode` or `join` ended the run.
   bool run() {
     if (threads_ < 2) return run_alone();
     bool wanted = true;
     {
       std::vector<std::jthread> workers;
-      const Stop stop{*this};  // before the workers are waited for
+      const Stop stop{*this};  // destroyed before the workers, which wait for it
       for (unsigned i = 1; i < threads_; ++i) workers.emplace_back([this, i] { work(i); });
       wanted = join_all();
       stop.now();
@@ -108,7 +109,7 @@ class BlockRun {
     Block block;
     Levels levels;
     typename Decoding::Guess guess;
-    unsigned thread = 0;  // in whose cache it is
+    unsigned thread = 0;  // thread whose cache holds the block
     bool ready = false;
   };
   struct Stop {
@@ -132,10 +133,10 @@ class BlockRun {
 
   [[nodiscard]] bool can_claim() const { return !exhausted_ && !stopped_ && !claiming_ && !free_.empty(); }
 
-  // Takes a block and prepares it; the lock is held before and after. One thread claims, which of text is most of the
-  // work, while the others decode what was claimed before.
+  // Claims a block and prepares it; the lock is held before and after the call. Only one thread claims at a time, which
+  // for text is most of the work, while the others decode earlier blocks.
   void prepare(std::unique_lock<std::mutex>& lock, unsigned thread) {
-    // The last that this thread had is still in its cache.
+    // The block that this thread used last is still in its cache.
     const auto last = std::find_if(free_.rbegin(), free_.rend(), [&](const Job* job) { return job->thread == thread; });
     const auto own = last == free_.rend() ? free_.begin() : last.base() - 1;
     Job& job = **own;
@@ -203,7 +204,7 @@ class BlockRun {
   std::mutex mutex_;
   std::condition_variable changed_;
   std::vector<Job*> free_;
-  std::deque<Job*> flying_;  // in the order of the capture
+  std::deque<Job*> flying_;  // claimed jobs in the order of the capture
   bool claiming_ = false;
   bool exhausted_ = false;
   bool stopped_ = false;

@@ -8,8 +8,8 @@ namespace absenc::capture {
 
 namespace {
 
-constexpr unsigned integration_bits = 11;  // recessive in a row: the bus is idle
-constexpr unsigned most_equal = 5;         // the sixth bit is of the other kind
+constexpr unsigned integration_bits = 11;  // number of consecutive recessive bits that mean an idle bus
+constexpr unsigned most_equal = 5;         // after this number of equal bits follows a stuff bit of the other level
 constexpr std::size_t crc_bits = 15;
 constexpr std::uint32_t protocol_error = 0x08, nobody_acknowledged = 0x20;
 constexpr std::uint32_t bus_off = 0x40, arbitration_lost = 0x02, controller = 0x04;
@@ -63,10 +63,11 @@ void CanDecoder::change(Tick at, std::vector<CanRecord>& frames) {
 void CanDecoder::finish(std::vector<CanRecord>& frames) {
   if (end_ > since_) level_for(level_, since_, end_, frames);
   since_ = end_;
-  if (doing_ == Doing::stuffed || doing_ == Doing::tail) doing_ = Doing::waiting;  // cut off: no error of the bus
+  // The frame is cut off by the end: no bus error.
+  if (doing_ == Doing::stuffed || doing_ == Doing::tail) doing_ = Doing::waiting;
 }
 
-// As many bits as fit the time best; of the idle bus no more than matter.
+// Takes the number of bits that fits the time best; of an idle bus only as many as matter.
 void CanDecoder::level_for(bool level, Tick from, Tick to, std::vector<CanRecord>& frames) {
   constexpr double enough = 32;
   const double bits = std::min(static_cast<double>(to - from) / bit_, enough);
@@ -113,7 +114,8 @@ void CanDecoder::take_stuffed(bool bit, std::vector<CanRecord>& frames) {
   tail_ = 0;
 }
 
-// CRC delimiter, acknowledge, its delimiter, seven bits of the end. The last one may be cut short by the next frame.
+// Handles the bits behind the CRC: CRC delimiter, acknowledge slot, acknowledge delimiter, seven bits of the end. The
+// next frame may cut the last one short.
 void CanDecoder::take_tail(bool bit, std::vector<CanRecord>& frames) {
   constexpr unsigned acknowledge = 1, last = 8;
   if (tail_ == acknowledge) {
@@ -127,7 +129,7 @@ void CanDecoder::take_tail(bool bit, std::vector<CanRecord>& frames) {
   if (tail_++ < last) return;
   frames.push_back(record_);
   doing_ = Doing::waiting;
-  recessive_ = last;  // with what follows of the end and the intermission, the bus is idle
+  recessive_ = last;  // the rest of the end and the intermission complete the idle time
 }
 
 std::uint32_t CanDecoder::field(std::size_t first, std::size_t count) const {
@@ -136,7 +138,8 @@ std::uint32_t CanDecoder::field(std::size_t first, std::size_t count) const {
   return value;
 }
 
-// Start, 11 identifier bits, RTR or SRR, IDE; then r0 and DLC, or 18 identifier bits, RTR, r1, r0 and DLC.
+// Decodes the header: start, 11 identifier bits, RTR or SRR, IDE; then r0 and DLC, or 18 identifier bits, RTR, r1, r0
+// and DLC.
 void CanDecoder::interpret() {
   if (length_ != 0 || bits_.size() < 19) return;
   const bool extended = bits_[13];

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Classic CAN frames from the level changes of a bus (ISO 11898-1): recessive is high.
+// Decodes classic CAN frames from the level changes of a bus (ISO 11898-1): recessive is high.
 #pragma once
 
 #include <optional>
@@ -10,21 +10,22 @@
 
 namespace absenc::capture {
 
-/// What an error frame tells, in words without an end; for frames of controllers too.
+/// Returns the meaning of an error frame as words without a full stop; also for error frames reported by controllers.
 [[nodiscard]] std::string_view text_of_error(const CanFrame& error);
 
-/// Decodes part after part. Each falling edge sets the clock anew, as in a receiver. What breaks the rules becomes an
-/// error frame as the kernel would report it (linux/can/error.h): its identifier says what (0x08 protocol, 0x20 nobody
-/// acknowledged), of a protocol error data[2] says how (0x04 bit stuffing, 0x02 form) and data[3] where (0x08 CRC).
-/// After that, eleven recessive bits are waited for.
+/// Decodes a capture part by part. Each falling edge synchronises the bit clock, as in a receiver. A violation of the
+/// protocol is reported as an error frame like that of the kernel (linux/can/error.h): the identifier gives the class
+/// (0x08 protocol error, 0x20 not acknowledged); for a protocol error data[2] gives the kind (0x04 bit stuffing, 0x02
+/// form) and data[3] the place (0x08 CRC). After an error the decoder waits for eleven recessive bits.
 class CanDecoder {
  public:
-  /// `bit` in ticks, 3 at least; need not be a whole number.
+  /// `bit` is the bit time in ticks, at least 3; need not be a whole number.
   explicit CanDecoder(double bit) : bit_(bit) {}
 
-  /// The next part, from `first` to `end`. Where it does not follow the one before, the bus is waited for anew.
+  /// Decodes the next part, from `first` to `end`. If it does not follow the previous part, the decoder waits for an
+  /// idle bus.
   void decode(const Changes& part, Tick first, Tick end, std::vector<CanRecord>& frames);
-  /// Nothing follows.
+  /// Ends the capture.
   void finish(std::vector<CanRecord>& frames);
 
  private:
@@ -41,16 +42,16 @@ class CanDecoder {
 
   double bit_;
   bool level_ = true;
-  Tick since_ = 0;  // of the level
+  Tick since_ = 0;  // time of the last level change
   Tick end_ = 0;
-  std::size_t told_ = 0;  // bits of the present level that were taken already
+  std::size_t told_ = 0;  // number of bits of the present level that were handled already
 
   Doing doing_ = Doing::waiting;
-  unsigned recessive_ = 0;  // bits in a row
-  unsigned run_ = 0;        // equal stuffed bits in a row
+  unsigned recessive_ = 0;  // number of consecutive recessive bits
+  unsigned run_ = 0;        // number of consecutive equal bits in the stuffed part
   bool before_ = true;
-  std::vector<bool> bits_;  // without stuff bits, from the start of the frame on
-  std::size_t length_ = 0;  // of them, CRC included; 0: not known yet
+  std::vector<bool> bits_;  // bits without stuff bits, from the start of the frame on
+  std::size_t length_ = 0;  // number of bits up to the end of the CRC; 0: not known yet
   unsigned tail_ = 0;
   CanRecord record_{};
 };

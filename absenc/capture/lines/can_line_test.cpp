@@ -13,7 +13,7 @@
 namespace absenc::capture {
 namespace {
 
-/// A bus as samples would show it: bits of any length, edges at whole ticks.
+/// A bus as a capture shows it: bits of any duration, with edges at whole ticks.
 struct Bus {
   explicit Bus(double one_bit) : bit(one_bit) { pass(12); }
 
@@ -52,7 +52,7 @@ CanFrame any_frame(std::mt19937& random) {
   frame.id = static_cast<std::uint32_t>(random()) & (frame.extended ? 0x1FFFFFFF : 0x7FF);
   frame.remote = random() % 8 == 0;
   frame.size = static_cast<std::uint8_t>(random() % 9);
-  const bool constant = random() % 4 == 0;  // many stuff bits
+  const bool constant = random() % 4 == 0;  // gives many stuff bits
   for (std::size_t i = 0; i < frame.size && !frame.remote; ++i) {
     frame.data[i] = static_cast<std::uint8_t>(constant ? 0 : random());
   }
@@ -100,7 +100,7 @@ RC_GTEST_PROP(CanDecoderProperty, PartsMakeNoDifference, (std::uint32_t seed)) {
   for (std::size_t i = 0; i < whole.size(); ++i) RC_ASSERT(frames[i].frame == whole[i].frame);
 }
 
-// A flipped bit is an error, or makes two frames of one; never a frame that was not sent.
+// A flipped bit gives an error or splits the frame in two, but never a frame that was not sent.
 RC_GTEST_PROP(CanDecoderProperty, AFlippedBitIsNoFrame, (std::uint32_t seed)) {
   std::mt19937 random(seed);
   Bus bus(10);
@@ -133,7 +133,7 @@ TEST(CanDecoder, NobodyAcknowledged) {
 TEST(CanDecoder, SaysWhereAFrameIsWrong) {
   Bus bus(10);
   std::vector<bool> bits = sim::can_bits({.id = 0x555, .size = 1, .data = {0x55}});
-  bits[26] = !bits[26];  // in the CRC, among bits that alternate
+  bits[26] = !bits[26];  // a bit of the CRC, where bits alternate
   bus.add(bits);
   bus.pass(20);
   const std::vector<CanRecord> frames = bus.decoded();

@@ -36,7 +36,7 @@ std::optional<ClockRests> find_rests(const Changes& clock) {
   for (std::size_t i = 1; i < rests.size() && found.pauses.size() <= most_lengths; ++i) {
     const Tick shorter = rests[i - 1];
     const Tick longer = rests[i];
-    // A seventh apart, and by more than two changes that were sampled can seem to be.
+    // Two lengths differ clearly: by a seventh, and by more than the sampling error of two changes.
     if (longer <= found.half_period || longer - shorter <= std::max<Tick>(2, shorter / 7)) continue;
     found.pauses.push_back(std::min(shorter + (longer - shorter) / 2, 2 * shorter));
   }
@@ -88,7 +88,7 @@ void ClockedDecoder::begin_part(const ClockedPart& part) {
   if (format_.has_select && select_.level == format_.select_high) open(part.first, true, nullptr);
 }
 
-// True: it met one of the targets.
+// Begins a burst. Returns true if it begins together with one of the targets.
 bool ClockedDecoder::open(Tick at, bool cut, Targets* targets) {
   if (targets != nullptr && !cut) {
     while (targets->next < targets->bursts.size() && targets->bursts[targets->next].begin < at) ++targets->next;
@@ -128,14 +128,15 @@ void ClockedDecoder::take(Tick at, std::vector<Burst>& bursts) {
   ++burst_.bits;
 }
 
-// The bit behind the last change. A part may have ended before it stood there.
+// Stores the level behind the last clock change. A previous part may have ended too early for that.
 void ClockedDecoder::look_behind() {
   if (format_.settle == 0 || burst_.has_last || !has_in_) return;
   burst_.last = in_.before(last_ + format_.settle);
   burst_.has_last = true;
 }
 
-// A data line that changes together with the clock at `until` was sampled too coarsely to tell which was first.
+// Detects a change of the data line during a rest, until `until`. A data line that changes together with the clock was
+// sampled too coarsely to tell which changed first.
 void ClockedDecoder::look_for_change(Tick until) {
   if (format_.change_pause == 0 || !has_in_ || until - last_ <= format_.settle) return;
   if (open_) look_behind();
@@ -175,7 +176,7 @@ bool ClockedDecoder::select_changes(Tick at, Targets* targets, std::vector<Burst
   return false;
 }
 
-// A clock that changes together with chip select still belongs to what was before.
+// Decodes a part. A clock change at the same time as a chip select change belongs to the earlier burst.
 bool ClockedDecoder::run(const ClockedPart& part, Targets* targets, std::vector<Burst>& bursts) {
   begin_part(part);
   for (;;) {
@@ -186,7 +187,7 @@ bool ClockedDecoder::run(const ClockedPart& part, Targets* targets, std::vector<
   }
   if (!format_.has_select && open_ && part.end - last_ > format_.settle) look_behind();
   look_for_change(part.end);
-  // What the data did behind the last clock counts for the next part.
+  // Data changes behind the last clock change count for the next part.
   in_.before(no_change);
   out_.before(no_change);
   if (!format_.has_select && open_ && is_over(part.end - last_)) {

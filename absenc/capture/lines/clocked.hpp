@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Bursts of clocked bits from level changes: SSI, BiSS, SPI with or without chip select.
+// Decodes bursts of clocked bits from level changes: SSI, BiSS, SPI with or without chip select.
 #pragma once
 
 #include <optional>
@@ -10,29 +10,31 @@
 
 namespace absenc::capture {
 
-/// The level a clock idles at makes no difference: a word is a run of its changes.
+/// Settings of a clocked line. The idle level of the clock does not matter: a word is a sequence of its changes.
 struct ClockedFormat {
-  bool rising = false;       // the change of the clock that takes a bit; the bit is the level just before it
-  bool has_select = false;   // words end with chip select; its clocks may pause
+  bool rising = false;       // the clock edge that samples a bit; the bit is the level just before it
+  bool has_select = false;   // words end with chip select; the clock may pause within them
   bool select_high = false;  // chip select is active high
-  Tick pause = 0;            // without chip select: a clock that rests for longer ends a word
-  Tick settle = 0;           // then: so long behind the last change its bit stands on the line; 0: not looked at
-  Tick change_pause = 0;     // then: a clock that rests for longer ends a word, too, if the data line changes in the
-                             // rest, behind `settle`: a timeout or a monoflop is over; 0: it does not
+  Tick pause = 0;            // without chip select: a clock that rests longer than this ends a word
+  Tick settle = 0;        // without chip select: the last bit is sampled this long behind the last clock change; 0: not
+                          // sampled
+  Tick change_pause = 0;  // without chip select: a clock that rests longer than this also ends a word if the data line
+                          // changes during the rest, later than `settle` (end of a timeout or a monoflop); 0: it does
+                          // not
 };
 
-/// The pauses of a clock, as its first changes show them.
+/// Lengths of the rests of a clock, measured from its first changes.
 struct ClockRests {
   Tick half_period = 0;
   Tick longest = 0;
-  std::vector<Tick> pauses;  // a clock that rests for longer ends a word: first three periods, then one between each
-                             // two lengths of its rests that differ clearly, the shortest first
+  std::vector<Tick> pauses;  // possible word limits (a longer rest ends a word): three periods, then one value between
+                             // each two clearly different lengths of rests, the shortest first
 };
 
-/// Nothing: too few changes.
+/// Measures the rests of a clock; returns nothing if it has too few changes.
 std::optional<ClockRests> find_rests(const Changes& clock);
 
-/// A part of the capture. `in`, `out` and `select` may be missing.
+/// A part of the capture. `in`, `out` and `select` may be null.
 struct ClockedPart {
   const Changes* clock;
   const Changes* in = nullptr;
@@ -42,40 +44,40 @@ struct ClockedPart {
   Tick end = 0;
 };
 
-/// Decodes part after part. A burst whose beginning or end was not seen is marked as cut. A lone change of the clock
-/// between two pauses is none: a host holds the clock low, or lets it rise again.
+/// Decodes a capture part by part. A burst whose beginning or end is not in the capture is marked as cut. A single
+/// clock change between two pauses is no burst: the host holds the clock low, or lets it rise again.
 class ClockedDecoder {
  public:
-  static constexpr std::size_t most_bits = 65536;  // of a burst; a longer one is cut
+  static constexpr std::size_t most_bits = 65536;  // longest burst; a longer one is cut
 
   explicit ClockedDecoder(const ClockedFormat& format) : format_(format) {}
 
-  /// What comes next does not follow what was.
+  /// Clears the state: the next part does not follow the previous one.
   void restart() { *this = ClockedDecoder(format_); }
   void decode(const ClockedPart& part, std::vector<Burst>& bursts);
-  /// As decode, where `other`, just restarted, has decoded the same part into `guessed`: what is right of it is taken
-  /// over together with its state. The outcome is that of decode, to the bit.
+  /// Works like `decode` with the result of `other`, which has decoded the same part into `guessed` after a restart.
+  /// The correct part of the guess is taken over with its state. The result equals that of `decode` exactly.
   void join(const ClockedPart& part, ClockedDecoder& other, std::vector<Burst>& guessed, std::vector<Burst>& bursts);
-  /// Nothing follows.
+  /// Ends the capture.
   void finish(std::vector<Burst>& bursts);
-  /// No burst that is yet to come begins before, where `end` is that of the last part.
+  /// Returns a time before which no further burst begins; `end` is the end of the last part.
   [[nodiscard]] Tick settled(Tick end) const { return open_ ? burst_.begin : end; }
 
  private:
-  // A wire within a part.
+  // The changes of one wire within a part.
   struct Wire {
     bool level = false;
-    std::span<const Tick> left{};  // changes to come
-    std::optional<Tick> border{};  // one before them, where two parts do not fit
+    std::span<const Tick> left{};  // changes not yet handled
+    std::optional<Tick> border{};  // additional change at the border of two parts with different levels
 
     void begin(const Changes* changes, Tick first, bool known);
     [[nodiscard]] Tick next() const;
     void step();
-    bool before(Tick at);  // level just before
+    bool before(Tick at);  // returns the level just before `at`
   };
   struct Targets {
     std::span<const Burst> bursts;
-    const Burst* open;  // not complete yet
+    const Burst* open;  // burst that is not complete yet
     std::size_t next = 0;
     bool met = false;
   };
@@ -99,12 +101,12 @@ class ClockedDecoder {
   Wire in_;
   Wire out_;
   Wire select_;
-  Tick last_ = 0;  // change of the clock, or where the capture began
+  Tick last_ = 0;  // time of the last clock change, or the beginning of the capture
   bool seen_pause_ = false;
   bool open_ = false;
-  bool lone_ = false;     // the clock has changed once in this burst
-  bool fell_ = false;     // since the last word the clock has changed once, and rested low
-  bool changed_ = false;  // the data line, in this rest
+  bool lone_ = false;     // the clock has changed only once in this burst
+  bool fell_ = false;     // since the last word the clock has changed once and rested low
+  bool changed_ = false;  // the data line has changed during this rest
   Burst burst_;
 };
 

@@ -11,16 +11,16 @@
 namespace absenc::capture {
 namespace {
 
-// A clock with data, and chip select where it is wanted; 4 ticks a period.
+// Draws a clock with data and optional chip select, with 4 ticks per period.
 struct Drawing {
-  Wires wires{std::vector<Drawn>(4)};  // clock, in, out, select
+  Wires wires{std::vector<Drawn>(4)};  // wires in the order clock, in, out, select
 
   void hold(bool clock, bool in, bool out, bool select, std::size_t ticks) {
     const std::array levels{clock, in, out, select};
     for (std::size_t i = 0; i < 4; ++i) wires.levels[i].insert(wires.levels[i].end(), ticks, levels[i]);
   }
   void idle(std::size_t ticks, bool clock = true, bool select = true) { hold(clock, true, true, select, ticks); }
-  // As SSI: a falling edge latches, each rising edge brings the next bit.
+  // Draws an SSI word: a falling edge latches, each rising edge brings the next bit.
   void ssi(std::uint32_t word, unsigned bits) {
     hold(false, true, true, true, 2);
     for (unsigned i = bits; i-- > 0;) {
@@ -30,7 +30,7 @@ struct Drawing {
     }
     hold(true, false, true, true, 1);
   }
-  // SPI mode 0 or 3 by `idle_clock`.
+  // Draws a byte in SPI mode 0 or 3, depending on the idle level of the clock.
   void spi(std::uint8_t out, std::uint8_t in) {
     for (unsigned i = 8; i-- > 0;) {
       hold(false, (in >> i & 1) != 0, (out >> i & 1) != 0, false, 2);
@@ -65,7 +65,7 @@ TEST(Clocked, SsiWordsEndAtPauses) {
   EXPECT_EQ(all.outcome.problem, "");
   EXPECT_EQ(all.outcome.pause, 12u);
   ASSERT_EQ(all.bursts.size(), 3u);
-  // The first falling edge takes the idle line.
+  // The first falling edge samples the idle line.
   EXPECT_EQ(all.bursts[0].bits, 13u);
   EXPECT_EQ(all.bursts[0].in, (std::vector<std::uint8_t>{0x8F, 0x78}));
   EXPECT_EQ(all.bursts[1].in, (std::vector<std::uint8_t>{0xD2, 0xD0}));

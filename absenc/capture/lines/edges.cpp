@@ -7,11 +7,11 @@
 #include <cstdint>
 #include <cstring>
 
-// Compiled once for each instruction set (hwy/foreach_target.h).
+// This file is compiled once for each instruction set (hwy/foreach_target.h).
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "absenc/capture/lines/edges.cpp"
 #include <hwy/foreach_target.h>
-// Behind it, as Highway asks.
+// Highway requires this include behind foreach_target.h.
 #include <hwy/highway.h>
 
 HWY_BEFORE_NAMESPACE();
@@ -20,11 +20,11 @@ namespace {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
-constexpr std::size_t word = 64;  // samples whose changes are the bits of one integer
-// Samples that stay in the nearest cache while channel after channel is looked at.
+constexpr std::size_t word = 64;  // number of samples whose changes are collected as bits of one integer
+// Number of samples per piece: they stay in the L1 cache while one channel after the other is searched.
 constexpr std::size_t piece = 64 * word;
 
-// Bit i: the level of the channel in sample i.
+// Returns the levels of a channel in 64 samples: bit i is that of sample i.
 template <class T>
 HWY_INLINE std::uint64_t levels(const std::uint8_t* HWY_RESTRICT samples, T channel_bit) {
   std::uint64_t bits = 0;
@@ -48,8 +48,8 @@ HWY_INLINE std::uint64_t levels(const std::uint8_t* HWY_RESTRICT samples, T chan
   return bits;
 }
 
-// Writes the places of the bits, and up to 8 more values behind them: most words have few, and no branch depends on how
-// many of these there are.
+// Writes the positions of the set bits, and up to 8 further values behind them: most words have few bits, so this
+// avoids a branch on their number.
 HWY_INLINE Tick* put(std::uint64_t toggles, Tick base, Tick* out) {
   const auto count = static_cast<std::size_t>(std::popcount(toggles));
   for (std::size_t i = 0; i < count; i += 8) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Samples to level changes, with the widest vectors of the processor.
+// Converts samples to level changes, with the widest vector instructions of the processor.
 #pragma once
 
 #include <cstddef>
@@ -9,24 +9,24 @@
 
 namespace absenc::capture {
 
-/// Samples that a block holds; a last one that is not whole does not count.
+/// Returns the number of whole samples in a block.
 [[nodiscard]] inline std::size_t sample_count(const Block& block) {
   return block.samples.size() / block.bytes_per_sample;
 }
 
-/// Level of a channel, below 8 * bytes_per_sample, in the sample at `index`, which must exist.
+/// Returns the level of `channel` (below 8 * bytes_per_sample) in the sample at `index`, which must exist.
 [[nodiscard]] inline bool level_at(const Block& block, std::size_t index, unsigned channel) {
   return (block.samples[index * block.bytes_per_sample + channel / 8] >> channel % 8 & 1) != 0;
 }
 
 /// Replaces `changes[i].at` by the changes of `channels[i]` in a block of samples. `changes[i].before` must be the
-/// level before the block: to carry on from block to block, that after the last change of the one before.
+/// level before the block: for consecutive blocks, the level after the last change of the previous block.
 void find_changes(const Block& block, std::span<const unsigned> channels, std::span<Changes> changes);
 
-/// The level after the last of them.
+/// Returns the level after the last change.
 [[nodiscard]] inline bool level_after(const Changes& changes) { return changes.before != (changes.at.size() % 2 != 0); }
 
-/// Appends `next`, which counts from `first`. Where its level does not fit, the line changed at `first`.
+/// Appends `next`, a part that begins at `first`. If its level differs from the last one, the line changed at `first`.
 void append(Changes& changes, const Changes& next, Tick first);
 
 }  // namespace absenc::capture

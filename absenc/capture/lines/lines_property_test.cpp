@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// One thread, many threads and decoders that look at one sample after the other must agree on any capture, in blocks of
+// One thread, many threads and simple sample-by-sample decoders must give the same result for any capture, in blocks of
 // any size, as samples and as changes.
 #include <gtest/gtest.h>
 #include <hwy/targets.h>
@@ -35,7 +35,7 @@ struct Line {
   Drawn levels;
 };
 
-// Characters with pauses, breaks, wrong bits and noise, from anywhere on.
+// Draws characters with pauses, breaks, wrong bits and noise; the capture may begin anywhere.
 Line any_line(Random& random, std::uint64_t ticks_per_second) {
   Line line;
   const double bit = below(random, 2) == 0 ? 3.0 + static_cast<double>(below(random, 1000)) / 100
@@ -79,7 +79,7 @@ constexpr std::array ways{Way{1, Content::samples}, Way{1, Content::changes}, Wa
                           Way{3, Content::changes}, Way{5, Content::samples}};
 
 std::size_t any_block_size(Random& random, std::size_t ticks) {
-  const std::size_t least = ticks / 200 + 1;  // else a case takes a second
+  const std::size_t least = ticks / 200 + 1;  // with smaller blocks a test case would take a second
   return least + below(random, below(random, 2) == 0 ? 8 : ticks);
 }
 
@@ -145,7 +145,7 @@ RC_GTEST_PROP(LinesProperty, AsynchronousIsTheSameHoweverItIsDecoded, (std::uint
   }
 }
 
-// What nobody told is found the same way too, whatever the blocks; and what was sent comes out.
+// Baud rate and idle level are detected independently of the blocks, and the sent bytes are decoded.
 RC_GTEST_PROP(LinesProperty, BaudAndIdleLevelAreFound, (std::uint64_t seed)) {
   Random random(seed);
   const double bit = 3.0 + static_cast<double>(below(random, below(random, 2) == 0 ? 3000 : 200'000)) / 1000;
@@ -174,8 +174,7 @@ RC_GTEST_PROP(LinesProperty, BaudAndIdleLevelAreFound, (std::uint64_t seed)) {
       std::vector<std::uint8_t> bytes;
       for (const Character& c : decoded(reader, lines, threads, outcome)) bytes.push_back(c.value);
       RC_ASSERT(outcome.formats[0].idle_high == idle_high);
-      // Characters that follow each other at whole samples show the same rounding again and again: half a sample in 8
-      // bits.
+      // Characters that follow each other at whole samples all have the same rounding error: half a sample in 8 bits.
       RC_ASSERT(std::abs(outcome.formats[0].bit - bit) < 0.01 * bit + 1.0 / 8);
       RC_ASSERT(bytes == sent);
       if (first.formats.empty()) first = outcome;
@@ -247,9 +246,9 @@ RC_GTEST_PROP(LinesProperty, ClockedIsTheSameHoweverItIsDecoded, (std::uint64_t 
   }
 }
 
-// ---- Samples to changes
+// ---- Conversion of samples to changes
 
-// All that this processor has, and none.
+// Returns all instruction sets of this processor, and 0 for none.
 std::vector<std::int64_t> instruction_sets() {
   hwy::GetChosenTarget().DeInit();
   std::vector<std::int64_t> sets = hwy::SupportedAndGeneratedTargets();

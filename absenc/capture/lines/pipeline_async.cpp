@@ -10,9 +10,9 @@ namespace absenc::capture {
 
 namespace {
 
-constexpr std::size_t enough_changes = 16384;     // to find what is not known of a line
-constexpr std::size_t most_changes = 64 * 16384;  // of one line, while another has not enough
-constexpr double fewest_ticks = 2.5;              // of a bit
+constexpr std::size_t enough_changes = 16384;     // number of changes of a line that suffice to detect its settings
+constexpr std::size_t most_changes = 64 * 16384;  // limit for one line while another has too few changes
+constexpr double fewest_ticks = 2.5;              // shortest bit time
 
 class AsyncDecoding {
  public:
@@ -68,7 +68,7 @@ class AsyncDecoding {
   [[nodiscard]] AsyncDecoder::Statistics statistics(std::size_t line) const { return decoders_[line].statistics(); }
 
  private:
-  // What lies between two parts nobody knows.
+  // After a gap between two parts, characters in progress end.
   void begin(const Levels& levels) {
     if (begun_ && levels.first != end_) finish_lines();
     begun_ = true;
@@ -83,7 +83,7 @@ class AsyncDecoding {
     return least;
   }
 
-  // Characters of several lines are handed out when none of the others can come before them any more.
+  // Characters of several lines are delivered when no earlier character of another line can follow.
   bool deliver(Tick until) {
     const Tick end = std::min(until, end_);
     if (characters_.size() == 1) {
@@ -114,7 +114,7 @@ class AsyncDecoding {
 
 bool unknown(const AsyncSettings& settings) { return settings.baud == 0 || settings.idle == Idle::automatic; }
 
-// The first changes of the lines, and what was read for them.
+// The first changes of the lines, and the parts that were read for them.
 class FirstChanges {
  public:
   FirstChanges(LevelReader& reader, std::span<const AsyncLine> lines) : lines_(lines), changes_(lines.size()) {
@@ -149,7 +149,7 @@ class FirstChanges {
     return all || any;
   }
 
-  // What is left does not depend on how the capture was parted.
+  // Limits the changes, so that the rest does not depend on the sizes of the parts.
   void cut() {
     for (const Changes& line : changes_) {
       if (line.at.size() > most_changes) end_ = std::min(end_, line.at[most_changes]);
@@ -189,7 +189,7 @@ std::string settings_problem(const LevelReader& reader, std::span<const AsyncLin
   return {};
 }
 
-// "": the formats of all lines are known.
+// Finds the formats of all lines. Returns the problem as a sentence, or "".
 std::string find_formats(const LevelReader& reader, std::span<const AsyncLine> lines, const FirstChanges& first,
                          std::vector<AsyncFormat>& formats) {
   const std::uint64_t ticks_per_second = reader.layout().ticks_per_second;

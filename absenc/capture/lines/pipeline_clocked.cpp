@@ -10,10 +10,10 @@ namespace absenc::capture {
 
 namespace {
 
-constexpr std::size_t enough_clocks = 8194;    // of the clock, to find its period
-constexpr std::size_t most_data = 64 * 16384;  // of the data, while the clock has not enough
+constexpr std::size_t enough_clocks = 8194;    // number of clock changes that suffice to find the period
+constexpr std::size_t most_data = 64 * 16384;  // limit for data changes while the clock has too few
 
-// Where the wires stand among the channels.
+// Indices of the wires among the channels.
 struct Wires {
   explicit Wires(const ClockedLine& line) : channels{line.clock} {
     const auto add = [this](const std::optional<unsigned>& channel) -> std::optional<std::size_t> {
@@ -72,7 +72,7 @@ class ClockedDecoding {
   [[nodiscard]] bool selected() const { return selected_; }
 
  private:
-  // What lies between two parts nobody knows.
+  // After a gap between two parts, the burst in progress ends.
   void begin(const Levels& levels) {
     if (begun_ && levels.first != end_) decoder_.finish(bursts_);
     const Changes& clock = levels.changes[0];
@@ -108,7 +108,7 @@ std::string no_clock(const std::string& name) {
   return name + " never changes its level, so there is no clock: is it the right channel, and was it connected?";
 }
 
-// The first changes of each wire, up to the change of the clock at `last`.
+// Returns the bursts in the first parts, up to the clock change at `last`.
 std::vector<Burst> bursts_until(Tick last, const std::vector<Levels>& parts, const Wires& wires,
                                 const ClockedFormat& format) {
   std::vector<Burst> bursts;
@@ -129,7 +129,7 @@ std::vector<Burst> bursts_until(Tick last, const std::vector<Levels>& parts, con
   return bursts;
 }
 
-// Whether the data line changed in each rest between two of these words, which no edge of the clock brought about.
+// Returns whether the data line changed in each rest between two of these words, independently of clock edges.
 bool changes_in_rests(const std::vector<Burst>& bursts, const std::vector<Levels>& parts, const Wires& wires,
                       Tick settle) {
   if (!wires.in || bursts.size() < 2) return false;
@@ -145,7 +145,7 @@ bool changes_in_rests(const std::vector<Burst>& bursts, const std::vector<Levels
   return true;
 }
 
-// "": `format` has its times.
+// Finds the times of `format`. Returns the problem as a sentence, or "".
 std::string look_for_pause(LevelReader& reader, const Wires& wires, const ClockedLine& line, std::vector<Levels>& parts,
                            ClockedFormat& format) {
   Changes clock;
@@ -174,10 +174,10 @@ std::string look_for_pause(LevelReader& reader, const Wires& wires, const Clocke
     ways.push_back(format);
     ways.back().pause = pause;
   }
-  // Rests in words and between them may be of all lengths, but only between them a timeout or a monoflop ends.
+  // Rests in words and between them may be of any length, but a timeout or a monoflop ends only between words.
   if (wires.in) {
     ways.push_back(ways.back());
-    // A silent encoder changes nothing: rests that are half as long as the longest end its words.
+    // An encoder that does not drive the line changes nothing: rests of at least half the longest length end its words.
     ways.back().pause = std::max(rests->longest / 2, *std::max_element(rests->pauses.begin(), rests->pauses.end()));
     ways.back().change_pause = 2 * rests->half_period;
   }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Decoders that look at one sample after the other: what the fast ones are held against.
+// Simple decoders that process one sample after the other: the reference for the fast ones.
 #pragma once
 
 #include <algorithm>
@@ -57,7 +57,7 @@ class SlowDecoder {
     return std::nullopt;
   }
 
-  // Returns the faults; `from` is a falling edge.
+  // Decodes from the falling edge `from` on. Returns the number of faults.
   std::size_t run(std::size_t from, std::size_t limit, std::vector<Character>* found) const {
     std::size_t faults = 0;
     for (std::optional<std::size_t> start = from; start && *start + middle(stop_) < limit;) {
@@ -114,7 +114,7 @@ class SlowDecoder {
 };
 
 struct SlowClocked {
-  const std::vector<Drawn>& levels;  // clock, in, out, select
+  const std::vector<Drawn>& levels;  // wires in the order clock, in, out, select
   ClockedFormat format;
   std::vector<Burst> found{};
   Burst burst{};
@@ -152,7 +152,7 @@ struct SlowClocked {
     add(burst.out, levels[2][i - 1] != 0);
     ++burst.bits;
   }
-  // Whether the data line changes behind the clock's change at `last`, up to `until`.
+  // Returns whether the data line changes behind the clock change at `last`, up to `until`.
   bool changes(Tick last, Tick until) const {
     for (Tick i = std::max<Tick>(last + format.settle, 1); i <= until && i < levels[1].size(); ++i) {
       if (levels[1][i] != levels[1][i - 1]) return true;

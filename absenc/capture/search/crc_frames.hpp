@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Captured frames as the search for their check looks at them.
+// Captured frames in the form that the search for their checksum uses.
 #pragma once
 
 #include <algorithm>
@@ -15,9 +15,9 @@
 
 namespace absenc::capture {
 
-/// What of a frame is covered, where the check stands and how it is written there.
+/// Layout of a frame with a checksum: the covered part, the place of the checksum and its byte and bit order.
 struct Shape {
-  unsigned width = 0;  // 0: a sum
+  unsigned width = 0;  // width of the CRC in bits; 0: a sum
   bool refin = false;
   bool refout = false;
   bool low_first = false;
@@ -26,7 +26,7 @@ struct Shape {
   std::size_t trailing = 0;
 };
 
-/// Frames without those that stand there twice, and how to look at them.
+/// Frames without duplicates, grouped by length.
 class Frames {
  public:
   explicit Frames(std::span<const CheckedFrame> frames) {
@@ -41,7 +41,7 @@ class Frames {
     of_bits = !all.empty() && all.front()->bits != 0;
   }
 
-  /// In bytes or bits.
+  /// Returns the size of a frame in bytes, or in bits for frames of bits.
   [[nodiscard]] static std::size_t size(const CheckedFrame& frame) {
     return frame.bits != 0 ? frame.bits : frame.bytes.size();
   }
@@ -54,7 +54,7 @@ class Frames {
 
 inline bool bit_of(const CheckedFrame& frame, std::size_t i) { return (frame.bytes[i / 8] >> (7 - i % 8) & 1) != 0; }
 
-/// The check as the encoder counts it; none when bits above its width are not 0.
+/// Returns the checksum as the encoder computes it; nothing if bits above its width are not 0.
 inline std::optional<std::uint32_t> check_of(const CheckedFrame& frame, const Shape& shape) {
   const std::size_t at = Frames::size(frame) - shape.trailing - shape.check_size;
   std::uint32_t value = 0;
@@ -69,7 +69,8 @@ inline std::optional<std::uint32_t> check_of(const CheckedFrame& frame, const Sh
   return value;
 }
 
-/// Calls `take` for each covered bit from `first` on, in the order in which they enter the register. Returns how many.
+/// Calls `take` for each covered bit from `first` on, in the order in which they enter the register. Returns the number
+/// of bits.
 template <class Take>
 std::size_t covered_bits(const CheckedFrame& frame, const Shape& shape, std::size_t first, const Take& take) {
   const std::size_t end = Frames::size(frame) - shape.trailing - shape.check_size;
@@ -88,7 +89,8 @@ inline std::uint32_t reflected_if(bool reflected, std::uint32_t value, unsigned 
   return reflected ? reflect(value, width) : value;
 }
 
-/// A multiple of the polynomial when the frame is good and init and xorout are right.
+/// Returns the frame as a polynomial, which is a multiple of the CRC polynomial if the frame is good and init and
+/// xorout are right.
 inline Polynomial codeword(const CheckedFrame& frame, const Shape& shape, std::size_t first, std::uint32_t check,
                            std::uint32_t init, std::uint32_t xorout) {
   Polynomial word;
@@ -103,7 +105,7 @@ inline Polynomial codeword(const CheckedFrame& frame, const Shape& shape, std::s
   return word;
 }
 
-/// The register behind the covered bits, as it would be written without xorout.
+/// Returns the register behind the covered bits, as it would be written without xorout.
 inline std::uint32_t crc_of(const CheckedFrame& frame, const Shape& shape, std::size_t first, std::uint32_t poly,
                             std::uint32_t init) {
   const auto mask = static_cast<std::uint32_t>(low_mask(shape.width));

@@ -13,8 +13,9 @@ namespace absenc::capture {
 
 namespace {
 
-constexpr double settled_log2 = -20;    // one in a million
-constexpr int most_common_degree = 63;  // of a common divisor that is taken apart; a longer one says too little
+constexpr double settled_log2 = -20;    // log2 of a chance of one in a million
+constexpr int most_common_degree = 63;  // highest degree of a common divisor that is factorised; a higher one has too
+                                        // many factors
 constexpr unsigned widest = 16;
 
 class CrcSearch {
@@ -43,7 +44,7 @@ class CrcSearch {
     bool init_open;
     auto operator<=>(const Key&) const = default;
   };
-  using Firsts = std::map<std::uint32_t, std::map<Key, std::vector<std::size_t>>>;  // by polynomial
+  using Firsts = std::map<std::uint32_t, std::map<Key, std::vector<std::size_t>>>;  // solutions by polynomial
 
   void each_order(Shape shape) {
     const unsigned orders = frames_.of_bits ? 1 : 2;
@@ -84,13 +85,14 @@ class CrcSearch {
     });
   }
 
-  // What the frames fix, in checks: each length fixes one, and each difference that is no combination of others.
+  // Returns how many checksums the frames determine: one for each length, and one for each linearly independent
+  // difference of frames.
   [[nodiscard]] double known_checks(const Shape& shape, std::size_t first) {
     Shape plain;
     plain.trailing = shape.trailing;
     const auto [known, is_new] = known_.try_emplace({plain.trailing, first});
     if (!is_new) return known->second;
-    std::vector<Polynomial> basis;  // each of another degree
+    std::vector<Polynomial> basis;  // each with a different degree
     for (const auto& [length, frames] : frames_.lengths) {
       const Polynomial base = content(*frames.front(), plain, first);
       for (const CheckedFrame* frame : frames) {
@@ -108,14 +110,14 @@ class CrcSearch {
     return known->second = static_cast<double>(basis.size() + frames_.lengths.size());
   }
 
-  // The covered bits and the check as they stand there.
+  // Returns the covered bits and the checksum as they are in the frame.
   static Polynomial content(const CheckedFrame& frame, const Shape& plain, std::size_t first) {
     Polynomial word;
     covered_bits(frame, plain, first, [&word](bool bit) { word.append(bit); });
     return word;
   }
 
-  // False: some frame has no such check there.
+  // Reads the checksums of all frames. Returns false if a frame has no valid checksum of this layout.
   bool take_checks(const Shape& shape) {
     checks_.clear();
     for (const auto& [length, frames] : frames_.lengths) {
@@ -146,7 +148,8 @@ class CrcSearch {
     return {{{0, 0}, {ones, 0}, {0, ones}, {ones, ones}}};
   }
 
-  // Without the highest power. `start`: init and xorout; without them only differences of frames are looked at.
+  // Returns the possible polynomials without the highest power. With `start` (init and xorout) whole frames are used,
+  // otherwise only differences of frames.
   std::vector<std::uint32_t> polynomials(const Shape& shape, std::size_t first,
                                          std::optional<std::pair<std::uint32_t, std::uint32_t>> start) {
     Polynomial common;
@@ -177,7 +180,7 @@ class CrcSearch {
     return found;
   }
 
-  // The init and xorout that go with a polynomial: the usual ones, or the first that fit.
+  // Finds init and xorout for a polynomial: the usual values, or the first that fit.
   void fit(const Shape& shape, std::size_t first, std::uint32_t poly, Firsts& solutions) {
     bool is_usual = false;
     for (const auto& [init, xorout] : usual(shape)) {
@@ -195,7 +198,7 @@ class CrcSearch {
     }
   }
 
-  // The one that explains the first frame of every length, and so all of them.
+  // Returns the xorout that explains the first frame of every length, and so all frames.
   std::optional<std::uint32_t> xorout_for(const Shape& shape, std::size_t first, std::uint32_t poly,
                                           std::uint32_t init) {
     std::optional<std::uint32_t> xorout;
@@ -208,7 +211,8 @@ class CrcSearch {
     return xorout;
   }
 
-  // Unusual values of init and xorout only where no usual ones explain the frames, and with the most covered.
+  // Stores the solutions of a polynomial. Unusual values of init and xorout are stored only if no usual ones explain
+  // the frames, and only with the longest covered part.
   void keep(const Shape& shape, std::uint32_t poly, const std::map<Key, std::vector<std::size_t>>& keys) {
     const auto is_usual = [&](const Key& key) {
       const auto all = usual(shape);
@@ -225,7 +229,8 @@ class CrcSearch {
     add(shape, poly, widest_cover->first, {widest_cover->second.front()}, free_bits);
   }
 
-  // Each frame fixes `width` bits; the polynomial and `free_bits` of init and xorout are chosen to fit.
+  // Adds a solution with its probability of chance: each frame determines `width` bits; the polynomial and `free_bits`
+  // of init and xorout were chosen to fit.
   void add(const Shape& shape, std::uint32_t poly, const Key& key, std::vector<std::size_t> firsts, double free_bits) {
     CheckSolution solution;
     solution.parameters = {
@@ -238,7 +243,7 @@ class CrcSearch {
     solution.check_size = shape.check_size;
     solution.trailing = shape.trailing;
     solution.chance_log2 = shape.width - 1 + free_bits - known_checks(shape, solution.first.front()) * shape.width;
-    // The same as an exclusive or, unless its bits are the other way round.
+    // This CRC equals an exclusive or, unless its bits are reversed.
     if (!frames_.of_bits && shape.width == 8 && poly == 1 && shape.refin == shape.refout) return;
     found_.solutions.push_back(std::move(solution));
   }
@@ -250,14 +255,14 @@ class CrcSearch {
     for (shape.trailing = 0; shape.trailing + 1 < frames_.shortest; ++shape.trailing) {
       const bool is_check = !never_changes(shape);
       for (const CheckKind kind : {CheckKind::sum, CheckKind::difference, CheckKind::exclusive_or}) {
-        std::map<std::uint8_t, std::vector<std::size_t>> firsts;  // by the constant
+        std::map<std::uint8_t, std::vector<std::size_t>> firsts;  // covered beginnings by the constant
         for (std::size_t first = 0; first < frames_.shortest - shape.trailing - 1; ++first) {
           ++shapes_;
           const std::optional<std::uint8_t> constant =
               is_check ? sum_constant(kind, shape, first) : std::optional<std::uint8_t>();
           if (constant) firsts[*constant].push_back(first);
         }
-        // 00 and FF (the complement) are usual; another constant only where they do not fit.
+        // 00 and FF (the complement) are usual; another constant is used only if they do not fit.
         const bool any_usual = firsts.contains(0) || firsts.contains(0xFF);
         for (auto& [constant, first] : firsts) {
           const bool is_usual = constant == 0 || constant == 0xFF;
@@ -296,8 +301,8 @@ class CrcSearch {
 
   Frames frames_;
   std::map<const CheckedFrame*, std::uint32_t> checks_;
-  std::map<std::pair<std::size_t, std::size_t>, double>
-      known_;  // by what stands behind the check and the first covered
+  // Results of `known_checks`, by the bytes behind the checksum and the first covered byte.
+  std::map<std::pair<std::size_t, std::size_t>, double> known_;
   std::size_t shapes_ = 0;
   CheckSearch found_;
 };

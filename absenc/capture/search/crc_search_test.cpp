@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Frames are made with the CRC of core, which shares nothing with the search.
+// The test frames use the CRC of core, which shares no code with the search.
 #include "absenc/capture/search/crc_search.hpp"
 
 #include <gtest/gtest.h>
@@ -17,9 +17,9 @@ struct Made {
   CrcParameters parameters{};
   bool low_first = true;
   bool padded = false;
-  std::size_t first = 0;     // bytes before what is covered
-  std::size_t covered = 8;   // bytes
-  std::size_t trailing = 0;  // bytes behind the check
+  std::size_t first = 0;     // number of bytes before the covered part
+  std::size_t covered = 8;   // number of covered bytes
+  std::size_t trailing = 0;  // number of bytes behind the checksum
 };
 
 CheckedFrame frame_of(const Made& made, std::mt19937& random, std::size_t longer = 0) {
@@ -43,7 +43,7 @@ std::vector<CheckedFrame> frames_of(const Made& made, std::size_t count, std::mt
   return frames;
 }
 
-// With the polynomial x^8 + 1 it is told as what it is.
+// A CRC with the polynomial x^8 + 1 is an exclusive or and is reported as such.
 bool is_exclusive_or(const CrcParameters& crc) { return crc.width == 8 && crc.poly == 1 && crc.refin == crc.refout; }
 
 bool says(const CheckSolution& solution, const Made& made) {
@@ -83,7 +83,7 @@ TEST(CrcSearch, FourWordsTellTheCheckOfBiss) {
   constexpr CrcParameters biss{6, 0x03, 0, false, false, 0x3F};
   std::mt19937 random(2);
   std::vector<CheckedFrame> frames;
-  for (int i = 0; i < 4; ++i) {  // 32 bits of position, error and warning, and 6 of the check
+  for (int i = 0; i < 4; ++i) {  // 32 bits of position, error and warning, and a 6-bit CRC
     CheckedFrame frame;
     for (int k = 0; k < 4; ++k) frame.bytes.push_back(static_cast<std::uint8_t>(random()));
     frame.bytes.push_back(static_cast<std::uint8_t>(crc_bitwise(biss, frame.bytes) << 2));
@@ -99,7 +99,7 @@ TEST(CrcSearch, FourWordsTellTheCheckOfBiss) {
 TEST(CrcSearch, AConstantAddressMayBeCoveredOrNot) {
   std::mt19937 random(3);
   std::vector<CheckedFrame> frames = frames_of({.parameters = esl_8, .first = 1}, 6, random);
-  for (CheckedFrame& frame : frames) frame.bytes.front() = 0;  // a zero before init 0 changes nothing
+  for (CheckedFrame& frame : frames) frame.bytes.front() = 0;  // a zero byte does not change a CRC with init 0
   const CheckSearch search = find_checks(frames);
   ASSERT_FALSE(search.solutions.empty());
   EXPECT_EQ(search.solutions.front().parameters, esl_8);
@@ -146,7 +146,7 @@ TEST(CrcSearch, FindsASum) {
   EXPECT_EQ(search.solutions.front().first.front(), 0u);
 }
 
-// Frames as HIPERFACE has them, read while the shaft turns a little: most bytes hardly change, the last is the
+// Returns frames like those of HIPERFACE, read while the shaft turns slowly: most bytes hardly change, the last is the
 // exclusive or of all.
 std::vector<CheckedFrame> slow_positions(std::uint8_t check_from) {
   std::vector<CheckedFrame> frames;
@@ -194,7 +194,7 @@ TEST(CrcSearch, TheCrcThatIsAnExclusiveOrIsFoundWhicheverWayItsBitsGo) {
   }
 }
 
-// Eight frames that differ in one bit only are two frames.
+// Eight frames that differ only in the same bit count as two frames.
 TEST(CrcSearch, FramesThatDifferInOneWayOnlyCountOnce) {
   std::mt19937 random(9);
   const Made made{.parameters = esl_8};
@@ -240,7 +240,7 @@ RC_GTEST_PROP(CrcSearchProperty, FindsEveryCheckOf3To16Bits, (std::uint32_t seed
   RC_ASSERT(found(find_checks(frames_of(made, 3 + 16 / width, random)), made));
 }
 
-// Against trial of every polynomial of the degree.
+// Compares with a trial of every polynomial of the degree.
 RC_GTEST_PROP(PolynomialProperty, ListsAllDivisorsOnce, (std::uint64_t value)) {
   const unsigned degree = *rc::gen::inRange<unsigned>(1, 11);
   value |= 1;

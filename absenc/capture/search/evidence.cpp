@@ -12,10 +12,10 @@ namespace absenc::capture {
 
 namespace {
 
-constexpr unsigned many_attempts = 1u << 20;  // where only one or two frames have to tell
-constexpr unsigned enough_accepted = 256;     // to know a rate to some percent
+constexpr unsigned many_attempts = 1u << 20;  // used when there are only one or two frames
+constexpr unsigned enough_accepted = 256;     // gives a rate with an error of some percent
 
-/// The position of a good reply.
+/// Stores the position of a good reply.
 struct PositionSink final : FieldSink {
   void put(const FieldValue&) override {}
   void put_reading(const Reading& reading) override {
@@ -24,7 +24,7 @@ struct PositionSink final : FieldSink {
   std::optional<Reading> position;
 };
 
-// How many bytes at its beginning a reply has in common with its request.
+// Returns how many bytes at its beginning a reply has in common with its request.
 std::size_t repeated(const ObservedExchange& exchange) {
   const auto& request = exchange.request.bytes;
   const auto& reply = exchange.reply.bytes;
@@ -36,15 +36,15 @@ std::size_t repeated(const ObservedExchange& exchange) {
 
 double position_of(const Reading& reading) { return static_cast<double>(reading.singleturn); }
 
-// The shortest way between two positions, as a part of all that there are.
+// Returns the shortest distance between two positions, as a fraction of the whole range.
 double way(const Reading& from, const Reading& to) {
   const double all = std::ldexp(1.0, static_cast<int>(from.singleturn_bits));
   const double difference = std::abs(position_of(to) - position_of(from));
   return (from.unit_um > 0 ? difference : std::min(difference, all - difference)) / all;
 }
 
-// Of random positions, each step is as short as the longest of these with the probability of twice its length; one step
-// is spent on choosing that length.
+// Returns log10 of the chance that random positions move so little. A random step is no longer than the longest of
+// these steps with a probability of twice its length; one step is not counted, because it determined that length.
 std::optional<double> weigh_motion(std::span<const Reading> positions) {
   double longest = 0;
   std::size_t steps = 0;
@@ -59,7 +59,7 @@ std::optional<double> weigh_motion(std::span<const Reading> positions) {
   return static_cast<double>(steps - 1) * std::log10(std::min(1.0, 2 * longest + least));
 }
 
-/// The good ones, each once, and what chance makes of them.
+/// The distinct good exchanges, and the probability that random replies would be good.
 class Distinct {
  public:
   Distinct(const Unit& unit, const Options& options) : unit_(unit), options_(options) {}
@@ -70,7 +70,7 @@ class Distinct {
     all_.push_back(&exchange);
   }
   [[nodiscard]] std::size_t count() const { return all_.size(); }
-  /// The geometric mean.
+  /// Returns the geometric mean of the probabilities.
   [[nodiscard]] double each() {
     if (all_.empty()) return 1;
     double sum = 0;
@@ -107,7 +107,7 @@ class Distinct {
 double Evidence::chance() const { return motion && explains_all() ? frames + *motion : frames; }
 
 double acceptance(const Unit& unit, const Options& options, const ObservedExchange& good, unsigned attempts) {
-  std::mt19937_64 random(good.reply.bytes.size());  // the same answer each time
+  std::mt19937_64 random(good.reply.bytes.size());  // fixed seed: the same result each time
   ObservedExchange noise = good;
   const std::size_t kept = repeated(good);
   unsigned accepted = 0;
@@ -158,7 +158,7 @@ Evidence weigh(const Unit& unit, const Options& options, std::span<const Observe
 double tail(std::size_t good, std::size_t all, double each) {
   if (good == 0 || each >= 1) return 0;
   const auto n = static_cast<double>(all);
-  double sum = 0;  // in units of the first term, which is the largest that matters
+  double sum = 0;  // in units of the first term, the largest one that matters
   double first = 0;
   for (std::size_t k = good; k <= all; ++k) {
     const auto at = static_cast<double>(k);

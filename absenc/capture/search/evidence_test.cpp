@@ -14,7 +14,7 @@
 namespace absenc::capture {
 namespace {
 
-/// Two bytes: the request's first, and a number below a limit that is an option.
+/// A toy unit whose reply has two bytes: the first byte of the request, and a number below a limit that is an option.
 struct Toy {
   static constexpr std::array<std::string_view, 2> order_choices{"up", "down"};
   static constexpr std::array<Option, 2> options{{
@@ -59,7 +59,7 @@ Options with_bits(std::int64_t bits) {
 TEST(Evidence, AcceptanceIsThatOfNoiseBehindWhatTheRequestFixes) {
   EXPECT_NEAR(acceptance(Toy::unit(), with_bits(4), heard(1)), 16.0 / 256, 0.01);
   EXPECT_DOUBLE_EQ(acceptance(Toy::unit(), with_bits(8), heard(1)), 1);
-  // Nothing of the reply is fixed when nobody asked.
+  // Without a request no byte of the reply is fixed.
   const ObservedExchange unsolicited{.reply = {.bytes = {7, 1}}};
   EXPECT_NEAR(acceptance(Toy::unit(), with_bits(4), unsolicited), 16.0 / 256, 0.01);
 }
@@ -116,7 +116,7 @@ TEST(Evidence, OfFramesThatSayNothingTheMotionTells) {
   EXPECT_GT(motion_of({0, 130, 20, 190, 60, 180}).chance(), -0.7);
 }
 
-// Whatever length, no stream of random bytes is any encoder's.
+// A stream of random bytes of any length is attributed to no unit.
 class RandomStream : public ::testing::TestWithParam<unsigned> {};
 
 TEST_P(RandomStream, IsNobodys) {
@@ -134,7 +134,7 @@ TEST_P(RandomStream, IsNobodys) {
   }
 }
 
-// Sanitizers see the first series only.
+// Builds with sanitizers run only the first series.
 INSTANTIATE_TEST_SUITE_P(Seeds, RandomStream, ::testing::Range(0u, 40u, 4u));
 
 TEST(Hypotheses, WhatMeansTheSameIsListedOnce) {
@@ -148,7 +148,7 @@ TEST(Hypotheses, WhatMeansTheSameIsListedOnce) {
   for (const Hypothesis& one : found) EXPECT_EQ(one.options[2], 0);
 }
 
-// What takes every word for good sees the words of a checked protocol move as well.
+// A unit that accepts every word also sees the words of a checked protocol move like a position.
 TEST(Hypotheses, FramesThatProveThemselvesGoFirst) {
   Hypothesis checked{.evidence = {.tried = 20, .explained = 20, .distinct = 20, .frames = -36}};
   Hypothesis moving{.evidence = {.tried = 20, .explained = 20, .distinct = 20, .frames = 0, .motion = -114}};
@@ -189,7 +189,8 @@ TEST(Hypotheses, NothingWhereNothingIsExplained) {
 
 TEST(Hypotheses, EveryVectorOfEveryUnitIsFoundByItsUnit) {
   for (const Unit* unit : all_units()) {
-    if (unit->link == LinkKind::clocked || unit->link == LinkKind::can) continue;  // theirs are texts
+    // Vectors of these units are not bytes.
+    if (unit->link == LinkKind::clocked || unit->link == LinkKind::can) continue;
     unsigned left = test_cases(static_cast<unsigned>(unit->vectors.size()));
     for (const Vector& vector : unit->vectors) {
       if (left == 0 || vector.error != Error::none || vector.reply.empty() || !vector.options.empty()) continue;

@@ -11,7 +11,7 @@ namespace absenc::capture {
 namespace {
 
 constexpr std::int64_t most_bits = 64;
-constexpr std::size_t telling = 32;  // exchanges: what explains none of so many explains nothing
+constexpr std::size_t telling = 32;  // number of exchanges: options that explain none of these explain nothing
 
 struct NoEvidence final : EvidenceSink {
   void put(const OptionEvidence&) override {}
@@ -23,13 +23,13 @@ bool same_resolution(const Resolution& one, const Resolution& other) {
 
 bool is_number_of_bits(const Option& option) { return option.choices.empty() && option.maximum <= most_bits; }
 
-/// Whoever stands first among the options with equal values.
+/// Returns whether the options of a hypothesis equal `options`.
 bool contains(std::span<const Hypothesis> all, const Options& options) {
   return std::any_of(all.begin(), all.end(),
                      [&](const Hypothesis& one) { return one.options.values == options.values; });
 }
 
-/// What frames mean, as a number.
+/// Hash of the decoded content of frames.
 class Meaning final : public FieldSink {
  public:
   void put(const FieldValue& value) override {
@@ -55,7 +55,7 @@ class HypothesisSearch {
   HypothesisSearch(const Unit& unit, std::span<const ObservedExchange> exchanges)
       : unit_(unit), exchanges_(exchanges) {}
 
-  /// Weighs it, when it explains as much as the best so far.
+  /// Computes the evidence of the options if they explain as much as the best so far.
   void add(const Options& options, bool at_least = false) {
     if (contains(best_, options)) return;
     ++tried_;
@@ -66,14 +66,14 @@ class HypothesisSearch {
       meanings_.clear();
     }
     most_ = count;
-    // What says the same of all frames explains them no other way.
+    // Options that decode all frames to the same content are no other explanation.
     const std::uint64_t meaning = meaning_of(options);
     if (std::find(meanings_.begin(), meanings_.end(), meaning) != meanings_.end()) return;
     meanings_.push_back(meaning);
     best_.push_back({options, weigh(unit_, options, exchanges_), tried_, at_least});
   }
 
-  /// What frames say of what the document leaves open.
+  /// Adds the options that the unit derives from the frames where the document leaves them open.
   void probe(Options options) {
     if (unit_.probe == nullptr) return;
     NoEvidence nowhere;
@@ -84,7 +84,7 @@ class HypothesisSearch {
     add(options);
   }
 
-  /// Every single choice, and with each every number of bits: where the models do not explain all.
+  /// Adds every single choice, and with each every number of bits, for the case that the models do not explain all.
   void vary(const Options& base) {
     vary_bits(base);
     for (std::size_t i = 0; i < unit_.options.size(); ++i) {
@@ -100,7 +100,7 @@ class HypothesisSearch {
     }
   }
 
-  /// Single choices by which the position moves less: for frames that say nothing by themselves.
+  /// Adds single choices with which the position moves less, for frames that prove nothing by themselves.
   void vary_motion(const Options& base) {
     for (std::size_t i = 0; i < unit_.options.size(); ++i) {
       const auto count = static_cast<std::int64_t>(unit_.options[i].choices.size());
@@ -141,7 +141,7 @@ class HypothesisSearch {
     return count;
   }
 
-  // The fewest bits that explain most: of those with more, the frames cannot tell.
+  // Adds the fewest bits that explain most exchanges: the frames cannot prove more bits.
   void vary_bits(const Options& base) {
     const std::vector<std::size_t> bits = resolution_options(unit_);
     std::optional<Options> fewest;
@@ -184,7 +184,7 @@ class HypothesisSearch {
   const Unit& unit_;
   std::span<const ObservedExchange> exchanges_;
   std::vector<Hypothesis> best_;
-  std::vector<std::uint64_t> meanings_;  // of each of them
+  std::vector<std::uint64_t> meanings_;  // decoded content of each of `best_`
   std::size_t most_ = 0;
   std::size_t tried_ = 0;
 };

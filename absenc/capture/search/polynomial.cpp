@@ -7,10 +7,10 @@ namespace {
 
 constexpr unsigned highest_degree = 16;
 
-// The degree and one more; 0 of 0. (The type that std::bit_width returns differs between libraries.)
+// Returns the degree plus 1; 0 for the polynomial 0. (The type that std::bit_width returns differs between libraries.)
 unsigned width_of(std::uint64_t value) { return static_cast<unsigned>(std::bit_width(value)); }
 
-/// Irreducible polynomials of degree 1 to 16, x aside, in rising order.
+/// Returns the irreducible polynomials of degree 1 to 16, without x, in rising order.
 const std::vector<std::uint32_t>& irreducible_polynomials() {
   static const std::vector<std::uint32_t> all = [] {
     constexpr std::uint32_t limit = 1u << (highest_degree + 1);
@@ -66,7 +66,7 @@ std::vector<std::uint32_t> divisors_of_degree(std::uint64_t value, unsigned degr
   };
   for (const std::uint32_t factor : irreducible_polynomials()) {
     if (width_of(factor) > degree + 1) break;
-    if (2 * (width_of(factor) - 1) > width_of(value) - 1) break;  // what is left is irreducible
+    if (2 * (width_of(factor) - 1) > width_of(value) - 1) break;  // the rest is irreducible
     unsigned power = 0;
     for (std::uint64_t rest = value, quotient = divide(rest, factor); rest == 0; quotient = divide(rest, factor)) {
       ++power;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Polynomials over GF(2) as long as a frame: a frame with a good CRC is a multiple of the CRC's polynomial.
+// Polynomials over GF(2), long enough for a frame: a frame with a good CRC is a multiple of the CRC's polynomial.
 #pragma once
 
 #include <array>
@@ -11,7 +11,7 @@
 
 namespace absenc::capture {
 
-/// Its bits are its coefficients. Of a degree below `capacity`.
+/// A polynomial whose coefficients are bits, of a degree below `capacity`.
 class Polynomial {
  public:
   static constexpr std::size_t capacity = 640;
@@ -19,7 +19,7 @@ class Polynomial {
   constexpr Polynomial() = default;
   constexpr explicit Polynomial(std::uint64_t low) : words_{low} {}
 
-  /// Times x, plus `bit`: the next bit of a frame.
+  /// Multiplies by x and adds `bit`, the next bit of a frame.
   constexpr void append(bool bit) {
     std::uint64_t carry = bit ? 1 : 0;
     for (std::uint64_t& word : words_) {
@@ -29,7 +29,7 @@ class Polynomial {
     }
   }
 
-  /// -1: the polynomial 0.
+  /// Returns the degree; -1 for the polynomial 0.
   [[nodiscard]] constexpr int degree() const {
     for (std::size_t i = words_.size(); i-- > 0;) {
       if (words_[i] != 0) return static_cast<int>(64 * i) + 63 - std::countl_zero(words_[i]);
@@ -46,7 +46,7 @@ class Polynomial {
     return *this;
   }
 
-  /// Leaves the remainder and returns the quotient. `divisor` is not 0.
+  /// Divides, leaves the remainder and returns the quotient. `divisor` must not be 0.
   constexpr Polynomial divide(const Polynomial& divisor) {
     Polynomial quotient;
     const int step = divisor.degree();
@@ -72,7 +72,7 @@ class Polynomial {
   std::array<std::uint64_t, capacity / 64> words_{};
 };
 
-/// Of 0 and a polynomial: that polynomial.
+/// Returns the greatest common divisor; for 0 and a polynomial, that polynomial.
 [[nodiscard]] constexpr Polynomial greatest_common_divisor(Polynomial a, Polynomial b) {
   while (b.degree() >= 0) {
     static_cast<void>(a.divide(b));
@@ -81,7 +81,8 @@ class Polynomial {
   return a;
 }
 
-/// The divisors of this degree, 1 to 16, whose constant term is 1, each once. `value` holds the coefficients; not 0.
+/// Returns each divisor of degree `degree`, 1 to 16, whose constant term is 1. `value` holds the coefficients and must
+/// not be 0.
 [[nodiscard]] std::vector<std::uint32_t> divisors_of_degree(std::uint64_t value, unsigned degree);
 
 }  // namespace absenc::capture

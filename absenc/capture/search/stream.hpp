@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Which models and options of a unit explain bytes that came without being asked for.
+// Finds the models and options of a unit that explain a stream of bytes without requests.
 #pragma once
 
 #include <vector>
@@ -10,12 +10,12 @@
 
 namespace absenc::capture {
 
-/// Cuts a stream into replies, as far as the unit takes them for good. Every byte that belongs to none is an exchange
-/// of its own: it was a chance for a good one. Only what may be a reply that the beginning or the end cuts is left out.
+/// Splits a stream into replies that the unit accepts. Each byte outside a reply is an exchange of its own, because a
+/// reply might have begun there. Only bytes that may belong to a reply cut by the beginning or the end are left out.
 [[nodiscard]] std::vector<ObservedExchange> split_stream(const Unit& unit, const Options& options, Bytes bytes);
 
-/// As `find_hypotheses`. The options then say that the encoder sends by itself, and how often when they can: as often
-/// as in the time in which the bytes came.
+/// Works like `find_hypotheses`. The options then state that the encoder sends unsolicited frames, and if possible how
+/// often, computed from `duration`, the time of the recording.
 [[nodiscard]] std::vector<Hypothesis> find_stream_hypotheses(const Unit& unit, Bytes bytes, Time duration);
 
 }  // namespace absenc::capture
