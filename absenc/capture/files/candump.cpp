@@ -35,7 +35,8 @@ bool append_byte(std::string_view digits, CanFrame& frame) {
   return true;
 }
 
-// Behind '#': "R", "R4", "1122", "11.22", each perhaps with the raw length code of newer logs ("_9").
+// Parses the data behind '#': "R", "R4", "1122", "11.22", each optionally with the raw length code of newer logs
+// ("_9").
 bool parse_compact(std::string_view data, CanFrame& frame) {
   if (data.size() >= 2 && data[data.size() - 2] == '_' && hex_digit(data.back()) > 8) data.remove_suffix(2);
   if (data.starts_with('R')) {
@@ -60,10 +61,11 @@ bool parse_log(std::string_view identifier, std::string_view data, CandumpLine& 
   return parse_identifier(identifier, parsed.record) && parse_compact(data, parsed.record.frame);
 }
 
-// Behind the identifier: "[3]  11 22 33", "[0]  remote request"; then what -a and error frames add.
+// Parses the text behind the identifier: "[3]  11 22 33", "[0]  remote request", followed by output of -a or of error
+// frames.
 bool parse_screen(std::string_view rest, CandumpLine& parsed) {
   const std::string_view length = take_word(rest);
-  if (length.size() == 4 && length.front() == '[') {  // "[08]": CAN FD
+  if (length.size() == 4 && length.front() == '[') {  // "[08]" is CAN FD
     parsed.kind = CandumpLine::Kind::other_can;
     return true;
   }
@@ -108,13 +110,13 @@ class CandumpReader final : public ParsedReader {
         break;
       }
     }
-    // The next frame may have the time of the last.
+    // The next frame may have the same time as the last one.
     block.end = at_ + (timed_ && done_ ? 1 : 0);
     return true;
   }
 
  private:
-  // Which interfaces there are, whether there are times, and of what kind.
+  // Finds the interfaces, whether lines have times, and of what kind these are.
   void look_ahead(std::string_view name) {
     TextLines lines(*source_);
     std::string_view line;
@@ -129,7 +131,7 @@ class CandumpReader final : public ParsedReader {
       if (find(parsed.channel) == layout_.channels.size() && layout_.channels.size() < 255) {
         layout_.channels.emplace_back(parsed.channel);
       }
-      // Two frames of one bus cannot begin at once.
+      // Two frames of one bus cannot begin at the same time.
       const bool zero = parsed.at.seconds == 0 && parsed.at.picoseconds == 0;
       constexpr std::int64_t day = 86400;
       if (last && !zero && parsed.at.seconds < day) {
@@ -224,7 +226,7 @@ bool parse_candump(std::string_view line, CandumpLine& parsed) {
   std::string_view word = take_word(line);
   if (const std::size_t hash = word.find('#'); hash != std::string_view::npos) {
     line = trim(line);
-    if (!line.empty() && line != "R" && line != "T") return false;  // newer logs tell the direction
+    if (!line.empty() && line != "R" && line != "T") return false;  // newer logs contain the direction
     return parse_log(word.substr(0, hash), word.substr(hash + 1), parsed);
   }
   while (is_flag(word)) word = take_word(line);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Any bytes as a log of candump, and good ones with some of their bytes changed.
+// Reads any bytes as a candump log, and valid logs with some bytes changed.
 #include "absenc/capture/files/candump.hpp"
 
 #include "absenc/capture/files/test_files.hpp"

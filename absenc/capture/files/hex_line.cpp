@@ -23,7 +23,7 @@ std::optional<Number> number_in(std::string_view text, int base) {
   return value;
 }
 
-// A group of digits, after its prefix.
+// Appends the bytes of a group of digits; removes its prefix.
 bool append_digits(std::string_view group, std::vector<std::uint8_t>& bytes) {
   bool prefixed = true;
   if (group.starts_with("0x") || group.starts_with("0X") || group.starts_with("\\x")) {
@@ -58,7 +58,7 @@ bool append_groups(std::string_view text, std::vector<std::uint8_t>& bytes) {
   }
 }
 
-// "00000010  48 65 6c  |Hel|"
+// Parses a line like "00000010  48 65 6c  |Hel|".
 bool parse_dump(std::string_view line, HexLine& parsed) {
   if (line == "*") {
     parsed.trouble = "'*' stands for lines that the dump left out: write it with hexdump -v -C or od -v";
@@ -77,7 +77,7 @@ bool parse_dump(std::string_view line, HexLine& parsed) {
   return true;
 }
 
-// "00000010: 4865 6c6c 6f0a            Hello." The text stands behind two blanks.
+// Parses a line like "00000010: 4865 6c6c 6f0a            Hello." The text begins behind two blanks.
 bool parse_xxd(std::string_view line, HexLine& parsed) {
   if (line == "*") {
     parsed.trouble = "'*' stands for lines that the dump left out: write it without -a";
@@ -90,7 +90,7 @@ bool parse_xxd(std::string_view line, HexLine& parsed) {
   return parsed.offset && append_groups(line.substr(0, line.find("  ")), parsed.bytes);
 }
 
-// "210-290 uart-1: rx-data: 1A"
+// Parses a line like "210-290 uart-1: rx-data: 1A".
 bool parse_sigrok(std::string_view line, HexLine& parsed) {
   std::string_view rest = line;
   const std::string_view range = take_word(rest);
@@ -107,13 +107,13 @@ bool parse_sigrok(std::string_view line, HexLine& parsed) {
   const std::string_view kind = take_word(rest);
   const bool classed = kind.ends_with(':');
   if (classed) {
-    if (kind != "rx-data:" && kind != "tx-data:") return true;  // an annotation of something else
+    if (kind != "rx-data:" && kind != "tx-data:") return true;  // an annotation of another class
     parsed.channel = kind == "tx-data:" ? 0 : 1;
     line = rest;
   }
   const std::string_view value = trim(line);
   if (value.size() == 2 && all_hex(value)) return append_group(value, parsed.bytes);
-  return !classed && !value.empty();  // "Start bit", "1" ...
+  return !classed && !value.empty();  // other annotations: "Start bit", "1" ...
 }
 
 bool is_offset(std::string_view word, std::string_view line) {

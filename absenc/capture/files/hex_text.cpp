@@ -16,7 +16,7 @@ namespace {
 
 constexpr std::size_t bytes_at_once = 1 << 16;
 
-// Comments are for what people write; the text beside a dump may hold any character.
+// Comments are removed only in plain text: the text beside a dump may contain any character.
 std::string_view content_of(std::string_view line, std::optional<HexForm> form) {
   if (form == HexForm::dump || form == HexForm::xxd) return trim(line);
   return strip_comment(line);
@@ -39,7 +39,7 @@ class HexTextReader final : public ParsedReader {
     const std::optional<HexForm> form = first_form(line);
     if (!form) throw OpenError(std::string(name) + " holds no bytes as text");
     form_ = *form;
-    // The first line with bytes tells what there is: a decoder may have said other things before.
+    // The first line with bytes decides what lines contain: a decoder may print other annotations before.
     constexpr std::uint64_t far_enough = 1 << 16;
     do {
       if (!parse_hex_line(form_, content_of(line, form_), line_)) break;
@@ -62,7 +62,7 @@ class HexTextReader final : public ParsedReader {
         break;
       }
     }
-    // The next line may begin when the last one does.
+    // The next line may begin at the same time as the last one.
     block.end = done_ || clock_ == Clock::none ? at_ : last_;
     return true;
   }
@@ -145,8 +145,8 @@ class HexTextReader final : public ParsedReader {
   HexLine line_;
   std::optional<std::uint64_t> next_offset_;
   std::uint64_t index_ = 0;
-  Tick at_ = 0;    // the latest end
-  Tick last_ = 0;  // begin of the line before
+  Tick at_ = 0;    // latest end of a byte
+  Tick last_ = 0;  // begin time of the previous line
 };
 
 }  // namespace
@@ -166,7 +166,7 @@ bool is_hex_text(std::string_view head) {
   while (!head.empty()) {
     const std::string_view line = head.substr(0, head.find('\n'));
     if (!strip_comment(line).empty()) {
-      if (line.size() == head.size() && head.size() > 4096) {  // one long line, cut off anywhere
+      if (line.size() == head.size() && head.size() > 4096) {  // a single long line, cut off at any place
         return first_form(head.substr(0, head.find_last_of(" ,;"))).has_value() ||
                first_form(head.substr(0, head.size() / 2 * 2)).has_value();
       }

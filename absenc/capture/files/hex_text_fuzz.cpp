@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Any bytes as bytes in text, and good texts with some of their bytes changed.
+// Reads any bytes as hexadecimal text, and valid texts with some bytes changed.
 #include "absenc/capture/files/hex_text.hpp"
 
 #include "absenc/capture/files/test_files.hpp"

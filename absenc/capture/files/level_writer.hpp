@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Levels as a file tells them, one channel and time after the other, into the level changes of a block.
+// Converts levels that a file lists by channel and time to the level changes of a block.
 #pragma once
 
 #include <cstddef>
@@ -21,13 +21,13 @@ class LevelWriter {
     for (std::size_t i = 0; i < levels_.size(); ++i) block.changes[i].before = levels_[i] != 0;
   }
 
-  /// Before the first change: the level the channel begins with.
+  /// Sets the initial level of a channel; call it before its first change.
   void start(std::size_t channel, bool level) {
     levels_[channel] = level ? 1 : 0;
     block_->changes[channel].before = level;
   }
 
-  /// Times must not fall; what goes back to its level at the same time did not change.
+  /// Sets a level. Times must not decrease; a level that returns to its value at the same time counts as no change.
   void set(std::size_t channel, bool level, Tick at) {
     if ((levels_[channel] != 0) == level) return;
     levels_[channel] = level ? 1 : 0;
@@ -40,7 +40,7 @@ class LevelWriter {
     }
   }
 
-  /// Of the present block.
+  /// Returns the number of changes in the present block.
   [[nodiscard]] std::size_t changes() const { return changes_; }
 
  private:

@@ -31,7 +31,7 @@ std::string quoted(std::string_view text) {
 
 // ---- Bytes
 
-// "1A:00:35", "1A-00-35"
+// Appends joined bytes like "1A:00:35" or "1A-00-35".
 bool append_joined(std::string_view group, std::vector<std::uint8_t>& bytes) {
   const std::size_t before = bytes.size();
   if (group.size() < 5 || (group[2] != ':' && group[2] != '-')) return false;
@@ -53,12 +53,12 @@ bool is_bytes(std::string_view word) {
   return append_any(word, bytes);
 }
 
-// Whether that is what a terminal shows beside these bytes; the end of it may have been taken for a comment.
+// Returns whether `text` is what a terminal shows for these bytes; its end may have been removed as a comment.
 bool is_text_of(std::string_view text, Bytes bytes) {
   std::string letters;
   for (const char c : text) {
     const auto byte = static_cast<unsigned char>(c);
-    if ((byte & 0xC0) != 0x80) letters += byte < 0x80 ? c : '.';  // UTF-8 as one each
+    if ((byte & 0xC0) != 0x80) letters += byte < 0x80 ? c : '.';  // a UTF-8 sequence is one character
   }
   if (letters.empty() || letters.size() > bytes.size()) return false;
   for (std::size_t i = 0; i < letters.size(); ++i) {
@@ -80,11 +80,11 @@ bool is_column(std::string_view text, Bytes bytes) {
     text.remove_prefix(1);
   }
   if (is_text_of(text, bytes)) return true;
-  while (!bytes.empty() && bytes[0] == ' ') bytes = bytes.subspan(1);  // blanks like those around it
+  while (!bytes.empty() && bytes[0] == ' ') bytes = bytes.subspan(1);  // blanks of the text look like those around it
   return trim(text).empty() || is_text_of(trim(text), bytes);
 }
 
-// All that is left of the line.
+// Parses the rest of the line as bytes.
 bool take_bytes(std::string_view text, HexLine& parsed) {
   constexpr std::string_view between = " \t,;";
   for (;;) {
@@ -112,21 +112,22 @@ bool take_bytes(std::string_view text, HexLine& parsed) {
 
 struct Taken {
   std::optional<Instant> at;
-  std::size_t size = 0;  // of the text
+  std::size_t size = 0;  // number of characters
 };
 
-// How much of the text is a clock: "17:55:24.123", "17:55:24,123", "17:55:24:123", "5:55:24".
+// Returns the length of a clock time at the beginning: "17:55:24.123", "17:55:24,123", "17:55:24:123", "5:55:24".
 std::size_t clock_size(std::string_view text) {
   std::size_t size = std::min(text.find_first_not_of("0123456789:."), text.size());
   const bool seconds = size > 3 && text[size - 3] == ':' && std::count(text.begin(), text.begin() + size, ':') == 2;
-  if (seconds && text.substr(size).starts_with(',')) {  // digits of a second are three or six, or it is another field
+  // A comma begins a fraction only with three or six digits, otherwise another field.
+  if (seconds && text.substr(size).starts_with(',')) {
     const std::string_view behind = text.substr(size + 1);
     const std::size_t digits = std::min(behind.find_first_not_of("0123456789"), behind.size());
     const bool ends =
         digits == behind.size() || std::string_view(" \t])|;").find(behind[digits]) != std::string_view::npos;
     if (ends && (digits == 3 || digits == 6)) size += 1 + digits;
   }
-  while (size > 0 && !is_digit(text[size - 1])) --size;  // "17:55:24:"
+  while (size > 0 && !is_digit(text[size - 1])) --size;  // as in "17:55:24:"
   return size;
 }
 
@@ -150,7 +151,8 @@ Taken match_clock(std::string_view text, const std::string& date) {
   return {parse_clock(date.empty() ? clock : date + ' ' + clock), size};
 }
 
-// "2026-11-21", "2026/11/21", "21.11.2026", "11/21/2026" as the first; "" when it is none.
+// Returns the date at the beginning in the form of the first example: "2026-11-21", "2026/11/21", "21.11.2026",
+// "11/21/2026"; "" if there is none.
 std::string match_date(std::string_view text) {
   if (text.size() < 10) return "";
   text = text.substr(0, 10);
@@ -170,7 +172,7 @@ std::string match_date(std::string_view text) {
   return part(6, 4) + "-" + (month_first ? part(0, 2) : part(3, 2)) + "-" + (month_first ? part(3, 2) : part(0, 2));
 }
 
-// "12.000250", "250us"
+// Parses a time like "12.000250" or "250us".
 std::optional<Instant> parse_count(std::string_view word) {
   struct Unit {
     std::string_view suffix;
@@ -213,7 +215,7 @@ constexpr std::array<std::array<std::string_view, 4>, 2> arrows = {
 
 int direction_of(std::string_view word) {
   std::string lower = lower_case(word);
-  if (lower.starts_with("tx") || lower.starts_with("rx")) {  // "RX1"
+  if (lower.starts_with("tx") || lower.starts_with("rx")) {  // such as "RX1"
     while (lower.size() > 2 && is_digit(lower.back())) lower.pop_back();
   }
   for (std::size_t i = 0; i < directions.size(); ++i) {
@@ -232,7 +234,7 @@ bool is_port(std::string_view word) {
   return false;
 }
 
-// What says how much or the how manieth it is, or nothing.
+// Returns whether the word is ignored: a line number, a length, or a word like "data".
 bool is_filler(std::string_view word) {
   const std::string lower = lower_case(word);
   if (all_digits(lower)) return true;
@@ -243,7 +245,7 @@ bool is_filler(std::string_view word) {
   return lower == "byte" || lower == "bytes" || lower == "data" || lower == "hex" || lower == "-";
 }
 
-/// Takes what stands before the bytes off a line.
+/// Parses and removes the part of a line before the bytes.
 class Prefix {
  public:
   Prefix(std::string_view text, HexLine& parsed) : text_(text), parsed_(parsed) {}
@@ -330,7 +332,7 @@ class Prefix {
     parsed_.source += name;
   }
 
-  // "RX", "COM3:", "COM3>"
+  // Handles a word like "RX", "COM3:", "COM3>".
   bool take_word_of_prefix(std::string_view word) {
     text_.remove_prefix(word.size());
     const bool label = word.ends_with(':') || word.ends_with('=');
@@ -341,7 +343,7 @@ class Prefix {
     const std::string_view name = word.substr(0, arrow + 1);
     if (name.size() < word.size() && (is_port(name) || direction_of(name) >= 0)) {
       if (is_port(name)) add_source(name);
-      const bool rather = direction_of(name) >= 0;  // in "RX>" the arrow is none
+      const bool rather = direction_of(name) >= 0;  // in "RX>" the arrow is part of the word
       return set_direction(rather ? direction_of(name) : word.back() == '>' ? 0 : 1);
     }
     if (is_port(word) || label) {
@@ -352,7 +354,7 @@ class Prefix {
     return false;
   }
 
-  // True: the bytes stood in it. What is said in it counts as if it stood without.
+  // Handles text in brackets, which counts as if it had none. Returns true if the brackets contain the bytes.
   bool take_bracket() {
     const char closing = text_[0] == '[' ? ']' : ')';
     const std::size_t end = text_.find(closing);
@@ -371,7 +373,7 @@ class Prefix {
     }
     HexLine said;
     Prefix inside(inner, said);
-    if (!inside.read() || !said.bytes.empty()) {  // "[main loop]"
+    if (!inside.read() || !said.bytes.empty()) {  // as in "[main loop]"
       if (!is_filler(inner) && inner.find("byte") == std::string_view::npos) add_source(inner);
       return false;
     }
@@ -381,12 +383,12 @@ class Prefix {
     return false;
   }
 
-  // "11 bytes"
+  // Returns whether the word is a count, as in "11 bytes".
   [[nodiscard]] bool counts(std::string_view word) const {
     return lower_case(trim(text_.substr(word.size()))).starts_with("byte");
   }
 
-  // With bytes, so that it is one itself.
+  // Returns whether bytes follow the word, so that the word is a byte itself.
   [[nodiscard]] bool goes_on(std::string_view word) const {
     std::string_view rest = text_.substr(word.size());
     rest.remove_prefix(std::min(rest.find_first_not_of(separators), rest.size()));

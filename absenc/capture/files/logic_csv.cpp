@@ -38,7 +38,7 @@ const Unit* find_unit(std::string_view name) {
 }
 
 std::string_view take_field(std::string_view& row) {
-  const std::size_t comma = row.size() > 1 && row[1] == ',' ? 1 : row.find(',');  // most fields are a level
+  const std::size_t comma = row.size() > 1 && row[1] == ',' ? 1 : row.find(',');  // most fields are a single digit
   const std::string_view field = row.substr(0, comma);
   row.remove_prefix(comma == std::string_view::npos ? row.size() : comma + 1);
   return field;
@@ -53,7 +53,7 @@ bool names_kinds(std::string_view line) {
   return first == "logic" || (first != line && (find_unit(first) != nullptr || first == "samples"));
 }
 
-// How rows tell their time.
+// Kinds of time in a row.
 enum class Clock : std::uint8_t { seconds, counts, rows };
 
 class LogicCsv final : public ParsedReader {
@@ -84,7 +84,7 @@ class LogicCsv final : public ParsedReader {
     levels_->begin(block);
     const std::uint64_t begin = lines_.offset();
     const Tick first = at_;
-    // A block ends before a row with a later time, so that a time never stands in two.
+    // A block ends before a row with a later time, so that all changes of one time are in one block.
     Tick last = first;
     do {
       if (at_ != last && lines_.offset() - begin >= text_at_once) {
@@ -167,7 +167,7 @@ class LogicCsv final : public ParsedReader {
     return false;
   }
 
-  // Reads the next row and its time. False: the end, or damaged from here on.
+  // Reads the next row and its time. Returns false at the end or if the file is damaged from here on.
   bool next_row() {
     std::string_view row;
     do {
@@ -241,12 +241,12 @@ class LogicCsv final : public ParsedReader {
   TextLines lines_;
   std::uint64_t rate_;
   std::vector<std::string> names_;
-  std::vector<char> columns_;  // of a channel, the column of time aside
+  std::vector<char> columns_;  // kind of each column, without the time column
   Clock clock_ = Clock::seconds;
   bool skip_first_ = false;
   bool first_row_ = true;
   bool started_ = false;
-  bool pending_ = false;  // a row was read that belongs to the next block
+  bool pending_ = false;  // the last row read belongs to the next block
   bool done_ = false;
   bool finished_ = false;
   std::uint64_t index_ = 0;

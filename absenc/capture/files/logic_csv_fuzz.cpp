@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Any bytes as CSV of a logic analyser, and good ones with some of their bytes changed.
+// Reads any bytes as CSV of a logic analyser, and valid files with some bytes changed.
 #include "absenc/capture/files/logic_csv.hpp"
 
 #include "absenc/capture/files/test_files.hpp"

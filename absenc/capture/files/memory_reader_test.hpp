@@ -19,14 +19,14 @@ inline std::uint64_t below(Random& random, std::uint64_t limit) {
   return std::uniform_int_distribution<std::uint64_t>(0, limit - 1)(random);
 }
 
-/// One level for each tick, 0 or 1: std::vector<bool> is slow where nothing is optimised.
+/// One level per tick, 0 or 1. No std::vector<bool>, which is slow without optimisation.
 using Drawn = std::vector<std::uint8_t>;
 
 inline void invert(Drawn& levels) {
   for (std::uint8_t& level : levels) level ^= 1;
 }
 
-/// One for each channel.
+/// Levels of several channels.
 struct Wires {
   std::vector<Drawn> levels;
   std::uint64_t ticks_per_second = 1'000'000'000;
@@ -34,7 +34,7 @@ struct Wires {
   [[nodiscard]] std::size_t ticks() const { return levels.front().size(); }
 };
 
-/// The plain way: looks at each sample.
+/// Finds the level changes by comparing each sample with the previous one.
 inline Changes changes_of(const Drawn& levels, bool before, std::size_t first, std::size_t end) {
   Changes found{before, {}};
   bool level = before;
@@ -47,7 +47,7 @@ inline Changes changes_of(const Drawn& levels, bool before, std::size_t first, s
 
 class MemoryReader final : public Reader {
  public:
-  /// Blocks of 1 to `most` ticks, by chance. What lies in a hole is not handed out.
+  /// Reads blocks of random sizes from 1 to `most` ticks. Ticks set by `leave_out` are skipped.
   MemoryReader(const Wires& wires, Content content, std::size_t most, std::uint64_t seed)
       : wires_(wires), most_(most), random_(seed) {
     layout_.content = content;
@@ -110,7 +110,7 @@ class MemoryReader final : public Reader {
   std::vector<Damage> damages_;
 };
 
-/// Draws an asynchronous line, level by level: an idle line is high.
+/// Draws an asynchronous line, level by level; an idle line is high.
 class Pen {
  public:
   Pen(double bit, Parity parity, unsigned stop_bits) : bit_(bit), parity_(parity), stop_bits_(stop_bits) {}

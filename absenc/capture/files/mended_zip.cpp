@@ -14,15 +14,15 @@ namespace absenc::capture {
 
 namespace {
 
-// PKWARE's APPNOTE 6.3.10, 4.3.7 to 4.3.16 and 4.5.3.
+// Signatures and sizes of PKWARE's APPNOTE 6.3.10, 4.3.7 to 4.3.16 and 4.5.3.
 constexpr std::uint64_t local_signature = 0x04034B50;
 constexpr std::uint64_t directory_signature = 0x02014B50;
 constexpr std::uint64_t zip64_end_signature = 0x06064B50;
 constexpr std::uint64_t zip64_locator_signature = 0x07064B50;
 constexpr std::uint64_t end_signature = 0x06054B50;
 constexpr std::size_t local_bytes = 30;
-constexpr std::uint64_t size_behind = 1 << 3;   // flag: the sizes stand behind the entry
-constexpr std::uint64_t in_zip64 = 0xFFFFFFFF;  // in place of a size: it is in the extra field of zip64
+constexpr std::uint64_t size_behind = 1 << 3;   // flag: the sizes follow the entry
+constexpr std::uint64_t in_zip64 = 0xFFFFFFFF;  // in place of a size: the size is in the zip64 extra field
 constexpr std::uint64_t zip64_version = 45;
 constexpr std::size_t largest_directory = 1 << 26;
 
@@ -44,7 +44,7 @@ struct Directory {
   }
 };
 
-// What stands in front of an entry.
+// The local header before an entry.
 struct Header {
   std::vector<std::uint8_t> bytes;
   std::uint64_t size = 0;
@@ -53,7 +53,7 @@ struct Header {
   [[nodiscard]] Bytes name() const { return Bytes(bytes).subspan(local_bytes, number(bytes, 26, 2)); }
   [[nodiscard]] Bytes extra() const { return Bytes(bytes).last(number(bytes, 28, 2)); }
 
-  // False: there is none.
+  // Reads the header at `at`. Returns false if there is none.
   [[nodiscard]] bool read(Source& source, std::uint64_t at) {
     bytes.resize(local_bytes);
     if (source.read(at, bytes) != local_bytes || number(bytes, 0, 4) != local_signature) return false;
@@ -82,8 +82,8 @@ struct Header {
 void add_entry(Directory& directory, const Header& header, std::uint64_t at, std::uint64_t packed) {
   directory.put(directory_signature, 4).put(zip64_version, 2);
   directory.put(Bytes(header.bytes).subspan(4, 14)).put(in_zip64, 4).put(in_zip64, 4);
-  directory.put(header.name().size(), 2).put(28, 2);  // the name, and an extra field
-  directory.put(0, 10).put(in_zip64, 4);              // comment, disk, attributes; where it stands
+  directory.put(header.name().size(), 2).put(28, 2);  // length of the name, and of the extra field
+  directory.put(0, 10).put(in_zip64, 4);              // comment, disk, attributes; then the offset
   directory.put(header.name()).put(1, 2).put(24, 2).put(header.size, 8).put(packed, 8).put(at, 8);
 }
 
@@ -95,7 +95,7 @@ void add_end(Directory& directory, std::uint64_t at, std::uint64_t entries) {
   directory.put(end_signature, 4).put(0, 4).put(0xFFFF, 2).put(0xFFFF, 2).put(in_zip64, 4).put(in_zip64, 4).put(0, 2);
 }
 
-// The first `end` bytes of a source, and another one behind them.
+// The first `end` bytes of a source, followed by another source.
 class TwoSources final : public Source {
  public:
   TwoSources(std::unique_ptr<Source> front, std::uint64_t end, std::unique_ptr<Source> behind)

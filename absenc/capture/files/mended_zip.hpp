@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A zip archive that has lost the directory at its end, because the file is cut off.
+// Repairs a zip archive that lost the directory at its end, because the file is cut off.
 #pragma once
 
 #include <cstdint>
@@ -11,15 +11,15 @@
 namespace absenc::capture {
 
 struct MendedZip {
-  std::unique_ptr<Source> archive;         // what is there of it, and behind that a directory
-  std::uint64_t end = 0;                   // where the last entry ends that is there
-  bool complete = false;                   // the lost directory begins there: no entry is missing
-  std::optional<std::uint64_t> cut_entry;  // index of the last one, when the file ends within it
+  std::unique_ptr<Source> archive;         // the remaining part of the archive, followed by a new directory
+  std::uint64_t end = 0;                   // end of the last complete entry
+  bool complete = false;                   // the lost directory begins at `end`: no entry is missing
+  std::optional<std::uint64_t> cut_entry;  // index of the last entry, if the file ends within it
 };
 
-/// Makes a directory of the headers in front of the entries. It ends before an entry whose size stands behind it, which
-/// no writer of sessions does. Memory grows with the number of entries, up to 64 MiB (700'000 pieces of a session);
-/// what is behind them counts as missing.
+/// Builds a directory from the local headers of the entries. It ends before an entry whose size follows its data; no
+/// program that writes sessions does that. Memory grows with the number of entries, up to 64 MiB (700'000 pieces of a
+/// session); later entries count as missing.
 [[nodiscard]] MendedZip mend_zip(std::unique_ptr<Source> source);
 
 }  // namespace absenc::capture

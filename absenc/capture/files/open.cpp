@@ -30,7 +30,7 @@ bool is_candump(std::string_view head) {
   return parse_candump(head.substr(first, head.find('\n', first) - first), line);
 }
 
-// Its first line, at least.
+// Returns whether at least the first line is text.
 bool is_text(std::string_view head) {
   const std::string_view line = head.substr(0, head.find_first_of("\r\n"));
   return std::all_of(line.begin(), line.end(), [](char c) {
@@ -39,7 +39,7 @@ bool is_text(std::string_view head) {
   });
 }
 
-// What names its channels by itself; nullptr: none of them.
+// Opens a file of a format with channel names; returns nullptr if it is none of them.
 std::unique_ptr<Reader> open_logic(std::unique_ptr<Source>& source, std::string_view head, std::string_view name,
                                    const OpenChoices& choices) {
   if (is_zip(head)) return read_sigrok(std::move(source), name, choices.samples_per_second);
@@ -62,7 +62,7 @@ std::unique_ptr<Reader> checked(std::unique_ptr<Reader> reader, std::string_view
   return reader;
 }
 
-// Logic 2 exports a folder of digital_0.bin, digital_1.bin ...; in the order of their numbers.
+// Opens a folder exported by Logic 2 with digital_0.bin, digital_1.bin ..., in the order of the numbers.
 std::unique_ptr<Reader> open_folder(const std::filesystem::path& folder, const OpenChoices& choices) {
   std::vector<std::pair<unsigned, std::filesystem::path>> files;
   std::error_code error;

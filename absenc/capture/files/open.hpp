@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Opens a capture file by what it holds, whatever its name.
+// Opens a capture file of any known format, detected from its content, not its name.
 #pragma once
 
 #include <cstdint>
@@ -12,20 +12,20 @@
 
 namespace absenc::capture {
 
-/// What a file does not tell by itself.
+/// Information about a file that it may not contain itself.
 struct OpenChoices {
-  unsigned channels = 0;                 // raw samples: 1 to 64, needed; of another file: must be what it holds
-  std::uint64_t samples_per_second = 0;  // raw samples: needed; else used where the file has no rate
+  unsigned channels = 0;                 // raw samples: 1 to 64, required; other files: must match the content
+  std::uint64_t samples_per_second = 0;  // raw samples: required; other files: used if the file has no rate
 };
 
-/// Knows, each described in its own header: sessions of sigrok (sigrok.hpp), value change dumps (vcd.hpp), CSV of logic
-/// analysers (logic_csv.hpp), Saleae's binary export, a file or a folder of them (saleae.hpp), logs of candump
-/// (candump.hpp), bytes as text (hex_text.hpp); and with `channels`, what is none of the first four is raw samples
-/// (raw.hpp). Throws OpenError when the file cannot be opened, is none of them, or is not understood from its
-/// beginning.
+/// Opens a file. The formats are described in their own headers: sessions of sigrok (sigrok.hpp), value change dumps
+/// (vcd.hpp), CSV of logic analysers (logic_csv.hpp), Saleae's binary export, as a file or a folder (saleae.hpp),
+/// candump logs (candump.hpp), bytes as text (hex_text.hpp); with `channels` set, a file of none of the first four
+/// formats is raw samples (raw.hpp). Throws OpenError if the file cannot be opened, has an unknown format, or its
+/// beginning is invalid.
 [[nodiscard]] std::unique_ptr<Reader> open_capture(const std::filesystem::path& path, const OpenChoices& choices);
 
-/// The same for bytes that are no file; `name` is for messages and for the channel of a binary export.
+/// Opens bytes from any source; `name` is used in messages and as the channel name of a binary export.
 [[nodiscard]] std::unique_ptr<Reader> open_capture(std::unique_ptr<Source> source, std::string_view name,
                                                    const OpenChoices& choices);
 

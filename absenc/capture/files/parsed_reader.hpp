@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What readers share: their layout, and what was wrong. Text is parsed when it is claimed, because each part depends on
-// the one before.
+// Common parts of the readers: their layout, and the list of damages. Text is parsed in `claim`, because each part
+// depends on the previous one.
 #pragma once
 
 #include <algorithm>
@@ -13,7 +13,7 @@
 
 namespace absenc::capture {
 
-/// Damages in the order of the file; several threads may add to them.
+/// Damages in the order of the file. Several threads may add to the list.
 class Damages {
  public:
   void add(Damage damage) {
@@ -29,7 +29,7 @@ class Damages {
   std::vector<Damage> list_;
 };
 
-/// A thing that may happen often and is reported once, with the place of the first.
+/// An event that may occur often and is reported only once, with its count and the place of the first one.
 struct Occurrences {
   std::uint64_t count = 0;
   std::uint64_t offset = 0;
@@ -46,9 +46,10 @@ struct Occurrences {
   }
 };
 
-/// A reader whose `claim` does it all, in one thread. Of the processor time of `decode --stats`, parsing is 63 to 78 %
-/// for dumps, 66 to 97 % for CSV: decoding beside it hides the rest. Several parsers would have to settle levels, times
-/// and damages between their parts in order; a faster one brought more than a second core could.
+/// A reader that does all its work in `claim`, in one thread. Parsing takes 63 to 78 % of the processor time of `decode
+/// --stats` for dumps, 66 to 97 % for CSV; decoding in other threads hides the rest. Several parser threads would have
+/// to pass levels, times and damages from part to part in order; making the parser itself faster gained more than a
+/// second core could.
 class ParsedReader : public Reader {
  public:
   [[nodiscard]] const Layout& layout() const override { return layout_; }
@@ -60,7 +61,7 @@ class ParsedReader : public Reader {
   Damages damages_;
 };
 
-/// Empties a block for what its next part holds, but for samples, whose storage is to be used again as it is.
+/// Clears a block for its next part, except the samples, whose storage is reused as it is.
 inline void begin_block(Block& block, std::uint64_t index, Tick first) {
   block.index = index;
   block.first = first;

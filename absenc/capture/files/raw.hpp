@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Raw samples: nothing but 1, 2, 4 or 8 bytes for each, little endian, channel 0 in bit 0; the fewest that hold all
-// channels.
+// Reader for raw samples without a header: 1, 2, 4 or 8 bytes each, the fewest that hold all channels, little endian,
+// channel 0 in bit 0.
 #pragma once
 
 #include <cstdint>
@@ -12,13 +12,12 @@
 
 namespace absenc::capture {
 
-/// 1, 2, 4 or 8 for 1 to 64 channels.
+/// Returns the number of bytes per sample, 1, 2, 4 or 8, for 1 to 64 channels.
 [[nodiscard]] constexpr unsigned bytes_per_sample(unsigned channels) {
   return channels <= 8 ? 1 : channels <= 16 ? 2 : channels <= 32 ? 4 : 8;
 }
 
-/// Throws OpenError when `channels` is not 1 to 64 or there is no rate. Bytes at the end that make no whole sample are
-/// a damage.
+/// Throws OpenError if `channels` is not 1 to 64 or the rate is 0. An incomplete sample at the end is a damage.
 [[nodiscard]] std::unique_ptr<Reader> read_raw(std::unique_ptr<Source> source, std::string_view name, unsigned channels,
                                                std::uint64_t samples_per_second);
 

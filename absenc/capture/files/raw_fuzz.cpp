@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Any bytes as raw samples of any number of channels.
+// Reads any bytes as raw samples of any number of channels.
 #include "absenc/capture/files/raw.hpp"
 
 #include "absenc/capture/files/test_files.hpp"

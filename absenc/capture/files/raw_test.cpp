@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Raw samples, and what all readers have in common when they are opened.
+// Tests raw samples, and the checks that all readers share when they are opened.
 #include "absenc/capture/files/raw.hpp"
 
 #include <gtest/gtest.h>
@@ -76,7 +76,7 @@ TEST(Raw, ASourceThatFailsCutsItsBlockShort) {
   EXPECT_EQ(contents.samples.size(), (2u << 20) + 3000);
 }
 
-// Files, from here on.
+// ---- Tests with files
 class Folder : public testing::Test {
  protected:
   Folder() : path_(std::filesystem::temp_directory_path() / ("absenc-raw-" + std::to_string(std::random_device()()))) {

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Layouts: Saleae, "Binary Export Format - Version 0" and "Binary and CSV Export Formats - 2025 Update" (version 1).
+// Layouts as in Saleae's "Binary Export Format - Version 0" and "Binary and CSV Export Formats - 2025 Update" (version
+// 1).
 #include "absenc/capture/files/saleae.hpp"
 
 #include <algorithm>
@@ -21,7 +22,7 @@ namespace {
 
 constexpr std::string_view magic = "<SALEAE>";
 constexpr double ticks_per_second = 1e12;
-constexpr double longest_seconds = 8e6;  // 92 days; below what 64 bits of ticks and a sign hold
+constexpr double longest_seconds = 8e6;  // 92 days; less than 64-bit ticks with a sign can hold
 constexpr std::size_t transitions_at_once = 1 << 13;
 
 template <class Unsigned>
@@ -35,10 +36,10 @@ double load_double(const std::uint8_t* bytes) { return std::bit_cast<double>(loa
 
 bool is_time(double seconds) { return std::isfinite(seconds) && std::abs(seconds) < longest_seconds; }
 
-// Picoseconds, which may be negative; to the nearest, because a double is rarely exact.
+// Converts seconds, which may be negative, to picoseconds, rounded because a double is rarely exact.
 std::int64_t to_picoseconds(double seconds) { return std::llround(seconds * ticks_per_second); }
 
-/// The transitions of one file, some of them read ahead.
+/// The transitions of one file, some of which are read ahead.
 class Stream {
  public:
   Stream(SaleaeChannel channel, Damages& damages)
@@ -75,13 +76,13 @@ class Stream {
   [[nodiscard]] std::int64_t end() const { return end_; }
   [[nodiscard]] bool exhausted() const { return remaining_ == 0 && chunks_ == 0; }
   [[nodiscard]] bool damaged() const { return !damage_.what.empty(); }
-  /// The last good time before the damage.
+  /// Returns the last good time before the damage.
   [[nodiscard]] std::int64_t last() const { return last_; }
   [[nodiscard]] Damage damage() const { return damage_; }
-  /// Later than all that was read ahead, unless exhausted: the time up to which all transitions are known.
+  /// Returns the time up to which all transitions are known: that of the last transition read ahead, unless exhausted.
   [[nodiscard]] std::int64_t known() const { return last_; }
 
-  /// Reads ahead until something before `known` stands there, or there is no more.
+  /// Reads ahead until a transition before `known` is available or the file ends.
   void refill(std::int64_t origin) {
     times_.erase(times_.begin(), times_.begin() + static_cast<std::ptrdiff_t>(next_));
     next_ = 0;
@@ -98,7 +99,7 @@ class Stream {
     }
   }
 
-  /// Hands out what comes before `limit`, in ticks from `origin` on.
+  /// Appends the transitions before `limit`, in ticks from `origin`.
   void take(std::int64_t limit, std::int64_t origin, std::vector<Tick>& at) {
     for (; next_ < times_.size() && times_[next_] < limit; ++next_) {
       at.push_back(static_cast<Tick>(times_[next_]) - static_cast<Tick>(origin));
@@ -137,7 +138,7 @@ class Stream {
     return true;
   }
 
-  // What goes back within a picosecond did not change.
+  // Adds a change. Two changes within a picosecond cancel each other.
   void toggle_at(std::int64_t time) {
     if (!times_.empty() && times_.back() == time) {
       times_.pop_back();
@@ -170,13 +171,13 @@ class Stream {
   Damages* damages_;
   std::uint32_t version_ = 0;
   std::uint64_t position_ = 0;
-  std::uint64_t chunks_ = 0;     // still to come
-  std::uint64_t remaining_ = 0;  // transitions of the present chunk still to be read
+  std::uint64_t chunks_ = 0;     // chunks still to read
+  std::uint64_t remaining_ = 0;  // transitions of the present chunk still to read
   std::int64_t begin_ = 0;
   std::int64_t end_ = std::numeric_limits<std::int64_t>::min();
   std::int64_t last_ = 0;
-  bool state_ = false;   // behind what was read
-  bool before_ = false;  // behind what was handed out
+  bool state_ = false;   // level behind the transitions read so far
+  bool before_ = false;  // level behind the transitions returned so far
   std::vector<std::int64_t> times_;
   std::size_t next_ = 0;
   Damage damage_;
@@ -203,7 +204,7 @@ class SaleaeReader final : public ParsedReader {
     if (done_) return false;
     begin_block(block, index_++, first_);
     block.changes.resize(streams_.size());
-    // All transitions before `limit` are known of every channel.
+    // All transitions of every channel before `limit` are known.
     std::optional<std::int64_t> limit;
     std::optional<std::int64_t> damaged;
     for (Stream& stream : streams_) {

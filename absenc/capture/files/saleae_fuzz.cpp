@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Any bytes as a binary export, and good ones of both versions with some of their bytes changed.
+// Reads any bytes as a binary export, and valid ones of both versions with some bytes changed.
 #include "absenc/capture/files/saleae.hpp"
 
 #include "absenc/capture/files/test_files.hpp"
@@ -16,14 +16,14 @@ FileBytes version_one() {
   return file.bytes;
 }
 
-// Beside a channel that is good.
+// Reads `bytes` as one channel, together with a good channel.
 void read_with(const FileBytes& good, FileBytes bytes) {
   std::vector<SaleaeChannel> channels;
   channels.push_back({"good", memory_source(good)});
   channels.push_back({"other", memory_source(std::move(bytes))});
   try {
     static_cast<void>(read_all(*read_saleae(std::move(channels))));
-  } catch (const OpenError&) {  // said why
+  } catch (const OpenError&) {  // the reader has reported the reason
   }
 }
 

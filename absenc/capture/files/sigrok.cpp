@@ -23,12 +23,13 @@ namespace absenc::capture {
 
 namespace {
 
-// A piece takes memory in each thread, and libdeflate, which expands it at once, knows no parts: larger ones are left
-// to libzip.
+// A piece takes memory in each thread, and libdeflate can expand it only as a whole: larger pieces are expanded by
+// libzip.
 constexpr std::uint64_t largest_piece = 1 << 24;  // sigrok-cli writes 4 MiB, PulseView 10 MiB
 constexpr std::uint64_t streamed_bytes = 1 << 22;
 constexpr std::uint64_t longest_metadata = 1 << 20;
-constexpr std::uint64_t believable = std::uint64_t{1} << 60;  // bytes of a capture
+constexpr std::uint64_t believable = std::uint64_t{1} << 60;  // limit for the bytes of a capture; larger sizes are
+                                                              // errors
 constexpr const char* copy_again = "copy the file again from where it came";
 
 struct Metadata {
@@ -37,7 +38,7 @@ struct Metadata {
   unsigned channels = 0;
   unsigned analog = 0;
   std::uint64_t samples_per_second = 0;
-  std::map<unsigned, std::string> names;  // by number, from 1
+  std::map<unsigned, std::string> names;  // channel names by number, from 1
 };
 
 unsigned to_number(std::string_view text) {
@@ -46,7 +47,7 @@ unsigned to_number(std::string_view text) {
   return error == std::errc() && end == text.data() + text.size() ? value : 0;
 }
 
-// The first device with samples.
+// Parses the first device with samples.
 Metadata parse_metadata(std::string_view text) {
   Metadata found;
   bool in_device = false;
@@ -73,7 +74,7 @@ Metadata parse_metadata(std::string_view text) {
   return found;
 }
 
-// Spreads samples of 3, 5, 6 or 7 bytes, which stand at the beginning, in place.
+// Widens samples of 3, 5, 6 or 7 bytes, which are packed at the beginning, in place.
 void widen(std::vector<std::uint8_t>& samples, std::size_t count, std::size_t from, std::size_t to) {
   for (std::size_t i = count; i-- > 0;) {
     std::memmove(&samples[i * to], &samples[i * from], from);
@@ -119,7 +120,7 @@ class SigrokReader final : public Reader {
   }
 
   void fill(Block& block) override {
-    if (block.file_size == 0) return;  // streamed
+    if (block.file_size == 0) return;  // a part of a streamed piece, which `claim` has read
     const auto index = static_cast<std::size_t>(block.file_offset);
     const Piece& piece = pieces_[index];
     const auto size = static_cast<std::size_t>(piece.entry.size);
@@ -137,7 +138,7 @@ class SigrokReader final : public Reader {
     if (whole) {
       count += read_tail(*archive, index, into.subspan(size, piece.tail));
     } else if (!ends_at_cut(piece, archive.get())) {
-      count = 0;  // some of it is wrong, and nobody knows what
+      count = 0;  // a wrong checksum does not show which samples are wrong
       report(piece, block.first, archive.get());
     }
     count -= std::min<std::size_t>(count, piece.skip);
@@ -152,12 +153,12 @@ class SigrokReader final : public Reader {
     std::string name;
     ZipArchive::Entry entry{};
     Tick first = 0;
-    // sigrok cuts samples of 3 bytes in two at the ends of pieces.
-    unsigned skip = 0;  // bytes at the beginning that belong to a sample of the piece before
-    unsigned tail = 0;  // bytes of its last sample that stand in the next piece
+    // Number of bytes at the borders of pieces: sigrok splits samples of 3 bytes there.
+    unsigned skip = 0;  // bytes at the beginning that belong to a sample of the previous piece
+    unsigned tail = 0;  // bytes of the last sample that are in the next piece
   };
 
-  // A file without a directory at its end gets one.
+  // Opens the archive; a file without a directory at its end gets a new one.
   void open_archive(std::string_view name) {
     std::unique_ptr<ZipArchive> archive = take();
     if (archive == nullptr) {
@@ -213,7 +214,7 @@ class SigrokReader final : public Reader {
     }
   }
 
-  // N of all NAME-N, rising.
+  // Returns N of all entries NAME-N, in rising order.
   static std::vector<unsigned> numbers_of_pieces(const ZipArchive& archive, const std::string& name) {
     std::vector<unsigned> numbers;
     for (const std::string& entry : archive.names()) {
@@ -226,8 +227,8 @@ class SigrokReader final : public Reader {
     return numbers;
   }
 
-  // Pieces that are missing in the middle. sigrok writes all but the last of them equally long, so that the time of
-  // what comes behind is known. Returns how many bytes there are before `next`.
+  // Leaves a gap for missing pieces. sigrok writes all pieces but the last with equal length, so the time of later
+  // pieces is known. Returns the number of bytes before `next`.
   std::uint64_t leave_gap(ZipArchive& archive, const std::string& name, const std::string& next,
                           std::pair<unsigned, unsigned> missing_numbers, std::uint64_t before) {
     ZipArchive::Entry neighbour;
@@ -280,7 +281,7 @@ class SigrokReader final : public Reader {
     if (has_lost_entries()) {
       last.tail = 0;
       if (std::any_of(pieces_.begin(), pieces_.end(), [&](const Piece& piece) { return is_cut(piece); })) {
-        layout_.ticks = 0;  // shows when it is read
+        layout_.ticks = 0;  // known only after reading
       } else {
         damages_.add({.offset = cut_->end,
                       .tick = layout_.ticks,
@@ -302,17 +303,18 @@ class SigrokReader final : public Reader {
 
   [[nodiscard]] bool is_cut(const Piece& piece) const { return cut_ && cut_->cut_entry == piece.entry.index; }
 
-  // After it was read: whether all that is wrong with it is that the rest is missing.
+  // Returns whether a piece that was read is correct except for its missing end.
   [[nodiscard]] bool ends_at_cut(const Piece& piece, const ZipArchive* archive) const {
     return is_cut(piece) && archive != nullptr && archive->ran_out();
   }
 
-  // How many bytes there are from here to the beginning of a sample.
+  // Returns the number of bytes from here to the beginning of the next sample.
   [[nodiscard]] unsigned missing(std::uint64_t bytes) const {
     return static_cast<unsigned>((unit_size_ - bytes % unit_size_) % unit_size_);
   }
 
-  // What the sample at the end of a piece has in the next one; less when that is damaged, which it reports itself.
+  // Reads the part of a piece's last sample that is in the next piece; less if that piece is damaged, which is reported
+  // there.
   [[nodiscard]] std::size_t read_tail(ZipArchive& archive, std::size_t index, std::span<std::uint8_t> into) const {
     return into.empty() || !archive.open(pieces_[index + 1].entry) ? 0 : archive.read(into);
   }
@@ -323,7 +325,7 @@ class SigrokReader final : public Reader {
     block.end = first + count;
   }
 
-  // After `count` samples of the file's size stand in the block.
+  // Completes a block with `count` samples in the file's sample size.
   void finish(Block& block, std::size_t count) const {
     if (unit_size_ != bytes_per_sample_) {
       block.samples.resize(std::max(block.samples.size(), count * bytes_per_sample_));
@@ -345,7 +347,7 @@ class SigrokReader final : public Reader {
     give_back(std::move(stream_));
   }
 
-  // The next part of a large piece.
+  // Reads the next part of a large piece.
   void claim_streamed(Block& block) {
     const Piece& piece = pieces_[next_ - 1];
     const auto wanted = static_cast<std::size_t>(std::min(stream_left_, streamed_bytes / unit_size_ * unit_size_));
@@ -377,8 +379,7 @@ class SigrokReader final : public Reader {
                           ", is damaged: " + why});
   }
 
-  // What stands before the cut is as it was written: a disk that lost other parts leaves whole pieces with wrong
-  // checksums.
+  // Data before the cut is as it was written: a disk that lost other parts leaves complete pieces with wrong checksums.
   void report_cut(const Piece& piece, Tick at, bool checked) {
     damages_.add({.offset = cut_->end,
                   .tick = at,
@@ -387,7 +388,7 @@ class SigrokReader final : public Reader {
                           copy_again});
   }
 
-  // A handle of libzip is for one thread at a time.
+  // Takes an unused libzip handle, which only one thread may use at a time.
   std::unique_ptr<ZipArchive> take() {
     {
       const std::lock_guard lock(mutex_);
@@ -419,7 +420,7 @@ class SigrokReader final : public Reader {
   unsigned bytes_per_sample_ = 1;
   std::size_t next_ = 0;
   std::uint64_t index_ = 0;
-  std::unique_ptr<ZipArchive> stream_;  // a large piece, being read
+  std::unique_ptr<ZipArchive> stream_;  // the large piece being read
   Tick stream_tick_ = 0;
   std::uint64_t stream_left_ = 0;
   Layout layout_;

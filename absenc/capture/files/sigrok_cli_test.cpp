@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What sigrok-cli writes from raw samples, in each of its formats, is what the readers make of the raw samples.
+// Files that sigrok-cli writes from raw samples, in each of its formats, must be read as the same samples.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -23,7 +23,7 @@ class SigrokCli : public testing::Test {
   }
   ~SigrokCli() override { std::filesystem::remove_all(folder_); }
 
-  // Lines that change now and then; `channels` of them, in as many bytes as sigrok takes.
+  // Returns samples of `channels` lines that change rarely, in as many bytes as sigrok needs.
   FileBytes make_samples(unsigned channels, std::size_t count) {
     std::mt19937_64 random(channels);
     const unsigned bytes = (channels + 7) / 8;
@@ -43,7 +43,7 @@ class SigrokCli : public testing::Test {
     ASSERT_EQ(std::system(command.c_str()), 0) << command;
   }
 
-  // From raw samples to a session, and from that to anything else.
+  // Converts raw samples to a session, from which sigrok-cli writes the other formats.
   void write_session(unsigned channels) {
     run("-I binary:numchannels=" + std::to_string(channels) + ":samplerate=12500000 -i samples -o session");
   }
@@ -51,7 +51,7 @@ class SigrokCli : public testing::Test {
   std::filesystem::path folder_;
 };
 
-// The level changes of one channel in samples of `bytes` bytes.
+// Returns the level changes of one channel in samples of `bytes` bytes.
 Changes changes_of(const FileBytes& samples, unsigned bytes, unsigned channel) {
   Changes changes;
   bool level = false;
@@ -85,7 +85,7 @@ TEST_F(SigrokCli, Sessions) {
   }
 }
 
-// What two writers of sessions leave when a copy of them breaks off.
+// Sessions of two writers, cut off as by an interrupted copy.
 TEST_F(SigrokCli, CutSessions) {
   make_samples(8, 9'000'000);
   ASSERT_NO_FATAL_FAILURE(write_session(8));
@@ -98,7 +98,7 @@ TEST_F(SigrokCli, CutSessions) {
   for (const char* name : {"session", "drawn"}) {
     const Contents whole = read_all(*open_capture(folder_ / name, {}));
     ASSERT_EQ(whole.end, 9'000'000u);
-    ASSERT_EQ(whole.blocks, 3u);  // of 4 MiB
+    ASSERT_EQ(whole.blocks, 3u);  // blocks of 4 MiB
     const std::uintmax_t size = std::filesystem::file_size(folder_ / name);
     for (const std::uintmax_t percent : {90u, 60u, 20u}) {
       std::filesystem::resize_file(folder_ / name, size * percent / 100);

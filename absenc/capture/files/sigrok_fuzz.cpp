@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Any bytes as a session, a good one and one that is cut off with some of their bytes changed, and any metadata.
+// Reads any bytes as a session, a complete and a cut one with some bytes changed, and any metadata.
 #include "absenc/capture/files/sigrok.hpp"
 
 #include <algorithm>
@@ -16,7 +16,7 @@ FileBytes session(const FileBytes& metadata, const FileBytes& samples, bool defl
                   deflate);
 }
 
-// Ends within the last piece.
+// Cuts the file within the last piece.
 FileBytes cut_off(FileBytes file) {
   constexpr std::string_view directory = "PK\x01\x02";
   file.erase(std::search(file.begin(), file.end(), directory.begin(), directory.end()) - 5, file.end());

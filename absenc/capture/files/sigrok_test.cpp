@@ -12,7 +12,7 @@
 namespace absenc::capture {
 namespace {
 
-// Samples like those of a line: long runs, and something that does not compress.
+// Returns samples like those of a line: long runs, and a part that does not compress.
 FileBytes wave(std::size_t size) {
   std::mt19937 random(11);
   FileBytes bytes(size);
@@ -79,7 +79,7 @@ TEST(Sigrok, OnePieceThatIsLargeComesInParts) {
 }
 
 TEST(Sigrok, SamplesOfThreeBytesAreSpread) {
-  for (const std::size_t count : {std::size_t{1000}, std::size_t{6'000'000}}) {  // as a piece, and in parts
+  for (const std::size_t count : {std::size_t{1000}, std::size_t{6'000'000}}) {  // as one piece, and in parts
     const FileBytes samples = wave(3 * count);
     const auto reader = open_bytes(session(sigrok_metadata("1 MHz", 24, 3), {{"logic-1-1", samples}}));
     const Contents contents = read_all(*reader);
@@ -133,7 +133,7 @@ TEST(Sigrok, ADamagedPieceIsCutShortAndTheOthersCount) {
   const FileBytes samples = wave(300'000);
   const FileBytes good =
       session(sigrok_metadata("1 MHz", 8, 1), {{"logic-1-1", samples}, {"logic-1-2", samples}, {"logic-1-3", samples}});
-  // The second of the three, by its name in the local header; behind it, what was deflated.
+  // Changes bytes of the second of three pieces; its deflated data follows its name in the local header.
   const std::string_view name = "logic-1-2";
   const auto local = std::search(good.begin(), good.end(), name.begin(), name.end());
   const auto begin = static_cast<std::size_t>(local - good.begin());
@@ -182,9 +182,9 @@ TEST(Sigrok, APieceWithAWrongChecksumIsLeftOutAndTheOthersCount) {
     std::vector<std::pair<std::string, FileBytes>> pieces;
     for (int i = 1; i <= 12; ++i) pieces.emplace_back("logic-1-" + std::to_string(i), samples);
     FileBytes file = session(sigrok_metadata("1 MHz", 8, 1), pieces, "2", deflate);
-    constexpr std::string_view name = "logic-1-7";  // it stands in front of the piece, and in the directory
+    constexpr std::string_view name = "logic-1-7";  // the name is in front of the piece and in the directory
     const auto in_directory = std::find_end(file.begin(), file.end(), name.begin(), name.end());
-    *(in_directory - 30) ^= 1;  // of the checksum
+    *(in_directory - 30) ^= 1;  // a byte of the checksum
     const auto reader = open_bytes(file);
     FileBytes expected;
     for (int i = 0; i < 11; ++i) expected.insert(expected.end(), samples.begin(), samples.end());
@@ -238,14 +238,14 @@ TEST(Sigrok, WhatStandsBeforeACutIsRead) {
   for (const bool deflate : {true, false}) {
     const FileBytes good = session(sigrok_metadata("1 MHz", 8, 1), pieces, "2", deflate);
     const std::size_t metadata = place_of(good, "metadata");
-    const std::size_t first = place_of(good, "logic-1-1") - 30;  // the header before the name
+    const std::size_t first = place_of(good, "logic-1-1") - 30;  // beginning of the local header before the name
     const std::size_t directory = place_of(good, "PK\x01\x02");
     for (std::size_t size = 4; size < good.size(); ++size) {
       SCOPED_TRACE(size);
       const FileBytes file = cut_at(good, size);
-      if (size < first + 39) {  // nothing of the first piece
+      if (size < first + 39) {  // the first piece is missing completely
         const std::string why = trouble(file);
-        const std::size_t seen = size + (deflate ? 1 : 0);  // the last byte only says that it was the last
+        const std::size_t seen = size + (deflate ? 1 : 0);  // the last byte of deflated data only marks the end
         EXPECT_NE(why.find("cut off at byte "), std::string::npos) << why;
         EXPECT_NE(why.find(seen < metadata - 30 ? "version:"
                            : seen < first       ? "metadata:"
@@ -261,11 +261,12 @@ TEST(Sigrok, WhatStandsBeforeACutIsRead) {
       const Damage& damage = reader->damages()[0];
       EXPECT_EQ(damage.tick, contents.samples.size());
       EXPECT_LE(damage.offset, size);
-      EXPECT_GE(damage.offset + 39, std::min(size, directory));  // at the most, before what is left of a header
+      EXPECT_GE(damage.offset + 39, std::min(size, directory));  // the damage may be reported at the beginning of an
+                                                                 // incomplete header
       EXPECT_EQ(damage.note, size >= directory + 4);
       EXPECT_NE(damage.what.find("cut off"), std::string::npos);
       if (deflate) continue;
-      std::size_t expected = 0;  // what stands as it is can be counted
+      std::size_t expected = 0;  // the size of stored data is known exactly
       for (const auto& [name, bytes] : pieces) {
         const std::size_t begin = place_of(good, name) + name.size();
         expected += std::min(std::max(size, begin) - begin, bytes.size());
@@ -292,7 +293,7 @@ TEST(Sigrok, ACutPieceGivesWhatExpandsOfIt) {
   EXPECT_EQ(reader->damages()[0].tick, seen.size());
   EXPECT_NE(reader->damages()[0].what.find("within logic-1-2, and the checksum"), std::string::npos);
 
-  // What does not expand is wrong somewhere before, too.
+  // Data that cannot be expanded is wrong at an earlier place too.
   std::mt19937 random(5);
   std::generate(cut.begin() + static_cast<std::ptrdiff_t>(begin) + 1000, cut.end(),
                 [&] { return static_cast<std::uint8_t>(random()); });
@@ -343,7 +344,7 @@ TEST(Sigrok, SamplesOfThreeBytesMayBeCut) {
   EXPECT_EQ(count(second + 5), 335u);
 }
 
-// As libzip writes what may exceed 4 GiB.
+// libzip writes zip64 sizes for files that may exceed 4 GiB.
 TEST(Sigrok, ACutArchiveMayHaveSizesOf64Bits) {
   const FileBytes samples = wave(1000);
   FileBytes file =
@@ -372,7 +373,7 @@ TEST(Sigrok, ACutArchiveEndsBeforeAnEntryOfUnknownSize) {
   FileBytes file = session(sigrok_metadata("1 MHz", 8, 1), {{"logic-1-1", samples}, {"logic-1-2", samples}});
   file.resize(place_of(file, "PK\x01\x02"));
   const std::size_t header = place_of(file, "logic-1-2") - 30;
-  file[header + 6] |= 1 << 3;  // the size stands behind it
+  file[header + 6] |= 1 << 3;  // flag: the size follows the data
   const auto reader = open_bytes(file);
   EXPECT_EQ(read_all(*reader).samples, samples);
   ASSERT_EQ(reader->damages().size(), 1u);

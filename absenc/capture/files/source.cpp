@@ -15,7 +15,7 @@ namespace {
 
 using Handle = std::unique_ptr<std::filebuf>;
 
-// Without a buffer of its own: what is asked for goes from the system to where it is wanted.
+// Opens a file without a buffer of its own: reads go directly to the caller's memory.
 Handle open_handle(const std::filesystem::path& path) {
   auto handle = std::make_unique<std::filebuf>();
   handle->pubsetbuf(nullptr, 0);
@@ -23,7 +23,7 @@ Handle open_handle(const std::filesystem::path& path) {
   return handle;
 }
 
-// A handle has one position, so that each reading thread takes one of its own.
+// A file. A handle has only one position, so each reading thread takes its own handle.
 class FileSource final : public Source {
  public:
   FileSource(std::filesystem::path path, std::uint64_t size, Handle first) : path_(std::move(path)), size_(size) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the tests and fuzzers of the readers share: files in memory, and a look at all blocks of one.
+// Helpers shared by the tests and fuzzers of the readers: files in memory, and reading of all blocks.
 #pragma once
 
 #include <zip.h>
@@ -32,7 +32,7 @@ inline std::unique_ptr<Reader> open_text(std::string_view text, const OpenChoice
   return open_bytes(to_bytes(text), choices);
 }
 
-/// All blocks of a capture in a row.
+/// The joined content of all blocks of a capture.
 struct Contents {
   std::vector<std::uint8_t> samples;
   std::vector<Changes> changes;
@@ -47,7 +47,7 @@ inline void require_that(bool condition) {
   if (!condition) std::abort();
 }
 
-/// Reads it to its end, into one block that is used again, and aborts where a block breaks what signal.hpp promises.
+/// Reads a capture to its end, into one reused block, and aborts if a block violates the rules in signal.hpp.
 inline Contents read_all(Reader& reader) {
   Contents all;
   Block block;
@@ -88,7 +88,7 @@ inline Contents read_all(Reader& reader) {
   return all;
 }
 
-/// The samples of a capture that several threads fill at once.
+/// Returns the samples of a capture that four threads fill at once.
 inline FileBytes read_in_threads(Reader& reader) {
   std::mutex mutex;
   std::vector<FileBytes> parts;
@@ -113,7 +113,7 @@ inline FileBytes read_in_threads(Reader& reader) {
   return all;
 }
 
-/// A zip archive, as libzip writes it, with its method of packing.
+/// Returns a zip archive written by libzip with this compression method.
 inline FileBytes make_zip(const std::vector<std::pair<std::string, FileBytes>>& entries, zip_int32_t method) {
   zip_source_t* target = zip_source_buffer_create(nullptr, 0, 0, nullptr);
   zip_source_keep(target);
@@ -135,7 +135,7 @@ inline FileBytes make_zip(const std::vector<std::pair<std::string, FileBytes>>& 
   return made;
 }
 
-/// Entries are deflated, or stored as they are.
+/// Returns a zip archive with deflated or stored entries.
 inline FileBytes make_zip(const std::vector<std::pair<std::string, FileBytes>>& entries, bool deflate = true) {
   return make_zip(entries, deflate ? zip_int32_t{ZIP_CM_DEFLATE} : zip_int32_t{ZIP_CM_STORE});
 }
@@ -147,7 +147,7 @@ inline std::string sigrok_metadata(std::string_view rate, unsigned channels, uns
   return text + "unitsize=" + std::to_string(unit_size) + "\n";
 }
 
-/// Little endian numbers for binary exports.
+/// Writes little endian numbers for binary exports.
 struct BinaryWriter {
   FileBytes bytes;
 
@@ -177,8 +177,8 @@ inline FileBytes saleae_file(bool level, double begin, double end, const std::ve
   return writer.bytes;
 }
 
-/// What a fuzzer feeds a reader: its input as a file, and a good file that the input changes. Each three bytes of it
-/// are a place and what to put there; a last odd byte cuts the file off.
+/// Feeds a reader with the fuzzer's input as a file, and with a good file changed by the input: each three bytes give a
+/// position and a new value; a single remaining byte cuts the file off.
 template <class Read>
 void fuzz_file(const std::uint8_t* data, std::size_t size, const FileBytes& good, Read read) {
   read(FileBytes(data, data + size));
@@ -191,7 +191,7 @@ void fuzz_file(const std::uint8_t* data, std::size_t size, const FileBytes& good
   read(std::move(changed));
 }
 
-/// Whatever the bytes are: the reader says why it cannot open them, or reads them to an end.
+/// Requires for any bytes that the reader reports why it cannot open them, or reads them to the end.
 inline void read_or_refuse(FileBytes bytes, const OpenChoices& choices = {}) {
   std::unique_ptr<Reader> reader;
   try {

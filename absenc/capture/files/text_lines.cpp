@@ -16,7 +16,7 @@ namespace {
 
 constexpr std::size_t read_at_once = 1 << 18;
 
-// A whole number of at most `most` digits, all of `text`.
+// Parses a whole number of at most `most` digits that is all of `text`.
 template <class Number>
 std::optional<Number> whole(std::string_view text, std::size_t most) {
   Number value = 0;
@@ -26,7 +26,7 @@ std::optional<Number> whole(std::string_view text, std::size_t most) {
   return value;
 }
 
-// The digits of a decimal number, and how many of them stand before the point.
+// The digits of a decimal number; `point` is the number of digits before the point.
 struct Decimal {
   std::array<char, 64> digits{};
   std::size_t count = 0;
@@ -53,7 +53,7 @@ std::optional<Decimal> parse_decimal(std::string_view text) {
     } else if (is_digit(c) && decimal.count < decimal.digits.size()) {
       decimal.digits[decimal.count++] = c;
       if (!point) ++before;
-    } else if (!is_digit(c) || !point) {  // digits behind the point may be as many as they like
+    } else if (!is_digit(c) || !point) {  // the number of digits behind the point is not limited
       return std::nullopt;
     }
   }
@@ -62,7 +62,8 @@ std::optional<Decimal> parse_decimal(std::string_view text) {
   return decimal;
 }
 
-// `count` digits of the number from `first` on, counted from the first that was written; there are zeros around them.
+// Returns `count` digits of the number from index `first` on, where index 0 is the first written digit; digits outside
+// are 0.
 std::int64_t digits_at(const Decimal& decimal, std::int64_t first, std::int64_t count) {
   std::int64_t value = 0;
   for (std::int64_t i = first; i < first + count; ++i) {
@@ -72,8 +73,8 @@ std::int64_t digits_at(const Decimal& decimal, std::int64_t first, std::int64_t 
   return value;
 }
 
-// As programs write seconds, "12.000125", into a positive instant; false: it may be written another way. A million rows
-// have a million of them.
+// Parses seconds in the usual form, "12.000125", to a positive instant; returns false for other forms. Fast, because
+// files may have a million rows.
 bool read_plain_seconds(std::string_view text, Instant& instant) {
   constexpr std::ptrdiff_t most_digits = 18;
   constexpr std::array<std::int64_t, 13> picoseconds = {
@@ -93,7 +94,7 @@ bool read_plain_seconds(std::string_view text, Instant& instant) {
   return at == end;
 }
 
-// However decimal numbers are written.
+// Parses seconds in any decimal form.
 bool read_seconds(std::string_view text, Instant& instant) {
   const std::optional<Decimal> decimal = parse_decimal(text);
   if (!decimal || decimal->point > 18) return false;
@@ -102,7 +103,7 @@ bool read_seconds(std::string_view text, Instant& instant) {
   return true;
 }
 
-// "2026-11-21": days since 1970.
+// Returns the days since 1970 for "2026-11-21".
 std::optional<std::int64_t> parse_day(std::string_view text) {
   if (text.size() != 10 || text[4] != '-' || text[7] != '-') return std::nullopt;
   const auto year = whole<int>(text.substr(0, 4), 4);
@@ -114,7 +115,7 @@ std::optional<std::int64_t> parse_day(std::string_view text) {
   return std::chrono::sys_days(date).time_since_epoch().count();
 }
 
-// "+01:00", "-0330", "Z": seconds east of Greenwich.
+// Returns the seconds east of Greenwich for "+01:00", "-0330", "Z".
 std::optional<std::int64_t> parse_zone(std::string_view text) {
   if (text.empty() || text == "Z") return 0;
   const std::string_view minutes =

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A text file word by word, whatever blanks and line ends stand between them.
+// Reads a text file word by word; words are separated by any blanks and line ends.
 #pragma once
 
 #include <algorithm>
@@ -20,7 +20,7 @@ class TextWords {
   explicit TextWords(Source& source)
       : source_(source), buffer_(static_cast<std::size_t>(std::min<std::uint64_t>(source.size(), capacity))) {}
 
-  /// The next word, until the next call; "" at the end of the file, or where a word is longer than 64 KiB.
+  /// Returns the next word, valid until the next call; "" at the end of the file, or if a word is longer than 64 KiB.
   [[nodiscard]] std::string_view next() {
     while (begin_ != end_ && is_blank(buffer_[begin_])) ++begin_;
     std::size_t end = begin_;
@@ -42,7 +42,7 @@ class TextWords {
     return too_long_ ? std::string_view{} : word;
   }
 
-  /// Bytes from the beginning of the file to the word that `next` gave last.
+  /// Returns the offset in the file of the word that `next` returned last.
   [[nodiscard]] std::uint64_t offset() const { return offset_; }
   [[nodiscard]] bool too_long() const { return too_long_; }
 
@@ -52,7 +52,7 @@ class TextWords {
 
   static bool is_blank(std::uint8_t c) { return c <= ' ' && (c == ' ' || (c >= '\t' && c <= '\r')); }
 
-  // Eight bytes at a time, up to the first that may be a blank.
+  // Skips eight bytes at a time, up to the first that may be a blank.
   [[nodiscard]] std::size_t skip_word(std::size_t at) const {
     constexpr std::uint64_t each = 0x0101010101010101;
     while (std::endian::native == std::endian::little && end_ - at >= 8) {

@@ -20,7 +20,7 @@ namespace absenc::capture {
 namespace {
 
 constexpr std::uint64_t block_text = 1 << 20;
-constexpr std::size_t block_changes = 1 << 20;  // one identifier may drive many channels
+constexpr std::size_t block_changes = 1 << 20;  // separate limit, because one identifier may drive many channels
 
 enum class Value : std::uint8_t { low, high, unknown, none };
 
@@ -96,7 +96,7 @@ class VcdReader final : public ParsedReader {
       }
     }
     done_ = true;
-    // A time at the end without a change is the end; else the last change is in the capture.
+    // A time without changes at the end of the file is the end; otherwise the last change is still in the capture.
     block.end = std::max(block.first, now_ + (last_changed_ ? 1 : 0));
     unknown_.report(damages_, "values are x or z: taken as the level before");
     return true;
@@ -120,7 +120,7 @@ class VcdReader final : public ParsedReader {
     return true;
   }
 
-  // A value change or a section.
+  // Handles a value change or a section.
   bool take(std::string_view word) {
     if (word[0] == '$') return take_section(word);
     started_ = true;
@@ -170,7 +170,7 @@ class VcdReader final : public ParsedReader {
     return true;
   }
 
-  // Bits that are not written are 0 where the first one is 0 or 1, else like the first one.
+  // Missing upper bits of a vector are 0 if its first bit is 0 or 1, otherwise equal to the first bit.
   bool change_vector(const VcdVariable& variable, std::string_view bits, std::uint64_t offset) {
     const Value extension = to_value(bits[0]) == Value::unknown ? Value::unknown : Value::low;
     for (std::size_t i = 0; i < std::max(variable.width, bits.size()); ++i) {
@@ -200,9 +200,9 @@ class VcdReader final : public ParsedReader {
   std::string vector_;
   std::uint64_t index_ = 0;
   Tick now_ = 0;
-  bool started_ = false;  // a time or a value was seen
-  bool valued_ = false;   // a value was seen
-  bool initial_ = true;   // at the first time
+  bool started_ = false;  // a time or a value was read
+  bool valued_ = false;   // a value was read
+  bool initial_ = true;   // the present time is the first one
   bool last_changed_ = false;
   bool done_ = false;
   Occurrences unknown_;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Value change dumps (IEEE 1364, clause 18), as simulators and sigrok write them.
+// Reader for value change dumps (IEEE 1364, clause 18), as simulators and sigrok write them.
 #pragma once
 
 #include <memory>
@@ -10,17 +10,19 @@
 
 namespace absenc::capture {
 
-/// True when a file that begins so is meant for `read_vcd`: its first word is one that opens a section of the header.
+/// Returns true if a file with this beginning is meant for `read_vcd`: its first word opens a section of the header.
 [[nodiscard]] bool is_vcd(std::string_view head);
 
+/// Reads a value change dump. Throws OpenError if the header is invalid.
+///
 /// - Each bit of a net or register is a channel; those of a vector are NAME[INDEX], from its right to its left. A name
-///   that stands in several scopes is qualified by them, with points. Two names for one identifier are two channels.
+///   that occurs in several scopes is qualified by them, with points. Two names for one identifier are two channels.
 ///   Variables of other types (real, integer, event, string ...) are left out, with a note.
-/// - Ticks are the file's times in units of $timescale. Values at its first time are the levels to begin with; without
-///   such a value a channel begins low.
-/// - x and z (and u, w, - of VHDL) keep the level before, with a note; h and l are 1 and 0.
-/// - Time that runs backwards, an identifier nobody declared and what is no value change are damages: what precedes
-///   counts. Throws OpenError when the header makes no sense.
+/// - Ticks are the file's times in units of $timescale. Values at the first time are the initial levels; without such a
+///   value a channel begins low.
+/// - x and z (and u, w, - of VHDL) leave the level unchanged, with a note; h and l are 1 and 0.
+/// - A time that runs backwards, an undeclared identifier and an invalid value change are damages: the changes before
+///   them are valid.
 [[nodiscard]] std::unique_ptr<Reader> read_vcd(std::unique_ptr<Source> source, std::string_view name);
 
 }  // namespace absenc::capture

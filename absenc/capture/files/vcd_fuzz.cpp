@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Any bytes as a value change dump, and a good one with some of its bytes changed.
+// Reads any bytes as a value change dump, and a valid one with some bytes changed.
 #include "absenc/capture/files/vcd.hpp"
 
 #include "absenc/capture/files/test_files.hpp"

@@ -14,10 +14,10 @@
 
 namespace absenc::capture {
 
-/// `width` channels, of which `first` is the rightmost bit.
+/// The channels of one variable: `width` channels, of which `first` is the rightmost bit.
 struct VcdVariable {
   std::size_t first = 0;
-  std::size_t width = 0;  // 0: left out
+  std::size_t width = 0;  // 0: a variable that is left out
 };
 
 class VcdHeader {
@@ -25,7 +25,7 @@ class VcdHeader {
   /// Reads up to $enddefinitions. Throws OpenError.
   VcdHeader(TextWords& words, std::string_view name);
 
-  /// All variables of an identifier; nullptr: it was not declared.
+  /// Returns all variables of an identifier; nullptr if it was not declared.
   [[nodiscard]] const std::vector<VcdVariable>* find(std::string_view identifier) const {
     const std::size_t code = short_code(identifier);
     if (code < short_.size()) return short_[code] < 0 ? nullptr : &variables_[static_cast<std::size_t>(short_[code])];
@@ -38,7 +38,7 @@ class VcdHeader {
   [[nodiscard]] std::size_t left_out() const { return left_out_; }
 
  private:
-  // Identifiers are printable; those of one and two characters, of which there are 9024, need no search.
+  // Identifiers of one or two printable characters, 9024 in all, are looked up in an array.
   static constexpr std::size_t short_codes = 95 * 95;
   static std::size_t short_code(std::string_view identifier) {
     std::size_t code = 0;
@@ -52,7 +52,7 @@ class VcdHeader {
   struct Name {
     std::string scope;
     std::string name;
-    std::string suffix;  // "[3]"
+    std::string suffix;  // index of a bit in a vector, "[3]"
   };
 
   void read_section(std::string_view keyword);
@@ -75,7 +75,7 @@ class VcdHeader {
   std::unordered_map<std::string, std::size_t> long_;
   std::uint64_t ticks_per_second_ = 0;
   std::size_t left_out_ = 0;
-  std::uint64_t comments_ = 0;  // bytes of them: a file may have any number, nothing of them is kept
+  std::uint64_t comments_ = 0;  // bytes of comments; their number is not limited and they are not stored
 };
 
 }  // namespace absenc::capture

@@ -15,7 +15,7 @@ namespace absenc::capture {
 
 namespace {
 
-// What libzip reads from: a window on the source. libzip asks for 8 KiB at a time, the system is asked for more.
+// The source as libzip reads it, with a buffer: libzip requests 8 KiB at a time, the system is asked for more.
 struct Window {
   Source* source = nullptr;
   std::uint64_t position = 0;
@@ -96,7 +96,8 @@ struct Close {
   void operator()(libdeflate_decompressor* inflater) const { libdeflate_free_decompressor(inflater); }
 };
 
-// Deflate adds 5 bytes to 64 KiB that it cannot make smaller; what is larger than that by far wastes memory.
+// Limit for the packed size: deflate adds 5 bytes to 64 KiB of incompressible data; a much larger entry would waste
+// memory.
 constexpr std::size_t most_packed(std::size_t size) { return size + size / 64 + 1024; }
 
 }  // namespace
@@ -104,7 +105,7 @@ constexpr std::size_t most_packed(std::size_t size) { return size + size / 64 + 
 struct ZipArchive::State {
   Window window;
   std::unique_ptr<zip_t, Close> archive;
-  std::unique_ptr<zip_file_t, Close> file;  // closed before its archive
+  std::unique_ptr<zip_file_t, Close> file;  // must be closed before its archive
   std::unique_ptr<libdeflate_decompressor, Close> inflater;
   std::vector<std::uint8_t> packed;
   std::string trouble;
@@ -114,7 +115,7 @@ struct ZipArchive::State {
     if (packed.size() < size) packed.resize(size);
     return std::span(packed).first(size);
   }
-  // True: `into` is full, and that is all there is.
+  // Expands a deflated entry. Returns true if the data fills `into` exactly.
   bool inflate(std::span<const std::uint8_t> from, std::span<std::uint8_t> into) {
     if (inflater == nullptr) inflater.reset(libdeflate_alloc_decompressor());
     return inflater != nullptr && libdeflate_deflate_decompress(inflater.get(), from.data(), from.size(), into.data(),
@@ -194,7 +195,7 @@ std::size_t ZipArchive::read(std::span<std::uint8_t> into) {
   while (done < into.size()) {
     const zip_int64_t got = zip_fread(state_->file.get(), into.data() + done, into.size() - done);
     if (got <= 0) {
-      // At its end libzip looks at the checksum and the size of what it was.
+      // At the end of an entry libzip checks its checksum and size.
       const int code = zip_error_code_zip(zip_file_get_error(state_->file.get()));
       state_->ran_out = got == 0 || code == ZIP_ER_CRC || code == ZIP_ER_INCONS;
       state_->trouble = got == 0 ? "it ends early" : zip_error_strerror(zip_file_get_error(state_->file.get()));

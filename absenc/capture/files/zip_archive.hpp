@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A zip archive of which one thread at a time reads entries; open it once for each thread.
+// A zip archive whose entries only one thread at a time may read; open it once for each thread.
 #pragma once
 
 #include <cstddef>
@@ -15,7 +15,7 @@ namespace absenc::capture {
 
 class ZipArchive {
  public:
-  /// `source` must outlive it. Throws OpenError, with what libzip says.
+  /// `source` must outlive the archive. Throws OpenError with libzip's message.
   explicit ZipArchive(Source& source);
   ~ZipArchive();
   ZipArchive(const ZipArchive&) = delete;
@@ -23,31 +23,31 @@ class ZipArchive {
 
   struct Entry {
     std::uint64_t index = 0;
-    std::uint64_t size = 0;  // as the archive says: to be believed only when it was read
+    std::uint64_t size = 0;  // size in the directory, which is reliable only after the entry was read
   };
-  /// False: there is none of that name.
+  /// Finds an entry by its name. Returns false if there is none.
   [[nodiscard]] bool find(const std::string& name, Entry& entry) const;
 
-  /// All entries, in the order of the archive.
+  /// Returns the names of all entries, in the order of the archive.
   [[nodiscard]] std::vector<std::string> names() const;
 
-  /// Expands a whole deflated entry into `into`, which has its size, in a quarter of the time that `open` and `read`
-  /// take. True only when all of it is there and its checksum is right; else those read it as far as can be, and say
-  /// what is wrong.
+  /// Expands a whole deflated entry into `into`, which must have its size, four times as fast as `open` and `read`.
+  /// Returns true only if the entry is complete and its checksum is right; otherwise `open` and `read` return as much
+  /// as possible and report the error.
   [[nodiscard]] bool expand(const Entry& entry, std::span<std::uint8_t> into);
 
-  /// Begins to read an entry; the one before is closed. False: see `trouble`.
+  /// Begins to read an entry and closes the previous one. Returns false on error, see `trouble`.
   [[nodiscard]] bool open(const Entry& entry);
-  /// Expands what comes next straight into `into`; fewer bytes: see `trouble`.
+  /// Expands the next bytes into `into` and returns their number; fewer on error or at the end, see `trouble`.
   [[nodiscard]] std::size_t read(std::span<std::uint8_t> into);
-  /// Whether `read` gave fewer bytes because there are no more of them, rather than wrong ones.
+  /// Returns whether `read` returned fewer bytes because the data ended, not because it is damaged.
   [[nodiscard]] bool ran_out() const;
-  /// After the whole entry was read: whether it ends there, and its checksum is right.
+  /// Returns, after the whole entry was read, whether it ends there and its checksum is right.
   [[nodiscard]] bool at_good_end();
 
-  /// What went wrong, in libzip's words.
+  /// Returns libzip's message about the last error.
   [[nodiscard]] std::string trouble() const;
-  /// Where the present entry stands in the file.
+  /// Returns the offset of the present entry in the file.
   [[nodiscard]] std::uint64_t offset() const;
 
  private:

@@ -12,7 +12,7 @@
 namespace absenc::capture {
 namespace {
 
-// Half of it can be made smaller.
+// Returns bytes of which half can be compressed.
 FileBytes mixed(std::size_t size) {
   std::mt19937 random(7);
   FileBytes bytes(size);
@@ -22,7 +22,7 @@ FileBytes mixed(std::size_t size) {
 
 const FileBytes content = mixed(100'000);
 
-// Where a number of the entry stands in the directory, counted from its signature.
+// Returns the byte at offset `at` of an entry in the directory, counted from its signature.
 std::uint8_t& in_directory(FileBytes& file, std::size_t at) {
   constexpr std::string_view signature = "PK\x01\x02";
   const auto found = std::search(file.begin(), file.end(), signature.begin(), signature.end());
@@ -34,7 +34,7 @@ constexpr std::size_t unpacked_size = 24;
 struct Expanded {
   bool whole = false;
   FileBytes bytes;
-  bool found_by_reading = false;  // open, read, and what they say of the end
+  bool found_by_reading = false;  // result of `open`, `read` and the checks at the end
   std::string trouble;
 };
 
@@ -70,7 +70,7 @@ TEST(ZipArchive, WhatIsWrongIsToldByReading) {
     EXPECT_EQ(result.trouble, "CRC error");
 
     file = good;
-    file[200] ^= 0x10;  // within the entry
+    file[200] ^= 0x10;  // a byte within the entry
     result = expanded(file);
     EXPECT_FALSE(result.whole || result.found_by_reading);
     EXPECT_NE(result.trouble, "");
@@ -83,7 +83,7 @@ TEST(ZipArchive, WhatIsWrongIsToldByReading) {
   }
 }
 
-// Stored, too: libzip looks at the checksum of that whether it is asked to or not.
+// Includes stored entries: libzip always checks their checksum.
 TEST(ZipArchive, WhatIsPackedAnotherWayIsReadOnly) {
   for (const zip_int32_t method : {ZIP_CM_STORE, ZIP_CM_BZIP2}) {
     if (zip_compression_method_supported(method, 1) == 0) continue;
