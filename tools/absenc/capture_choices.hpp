@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the options of decode, identify and crc find say of a capture.
+// Reads the options that describe a capture, for the verbs decode, identify and crc find.
 #pragma once
 
 #include <string_view>
@@ -10,7 +10,7 @@
 
 namespace absenc::tool {
 
-/// From --channel, --raw-channels, --rate, --baud and --parity. Throws UsageError.
+/// Returns the values of --channel, --raw-channels, --rate, --baud and --parity. Throws UsageError.
 [[nodiscard]] CaptureChoices capture_choices(const Invocation& invocation, std::string_view path);
 
 }  // namespace absenc::tool

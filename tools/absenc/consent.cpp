@@ -38,7 +38,7 @@ bool says_yes(const std::string& question) {
   return is_yes(answer);
 }
 
-// Nobody else is on the line of sim:, and its encoder is gone afterwards.
+// A sim: encoder is alone on its line and disappears afterwards, so its commands disturb nothing.
 bool disturbs(const EncoderAddress& uri, const Command& command) {
   return !command.disturbs.empty() && uri.place != Place::sim;
 }
@@ -47,7 +47,7 @@ bool disturbs(const EncoderAddress& uri, const Command& command) {
 
 bool must_ask(const Invocation& invocation, const EncoderAddress& uri, std::string_view what,
               std::string_view meaning) {
-  // The virtual encoder of sim: is gone afterwards anyway.
+  // A sim: encoder disappears afterwards, so there is nothing to confirm.
   if (uri.place == Place::sim || invocation.has("--yes")) return false;
   if (can_ask()) return true;
   throw UsageError(

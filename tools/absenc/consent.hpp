@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What changes an encoder asks first; scripts say --yes.
+// Asks the user before a command changes an encoder or disturbs a bus; --yes answers for scripts.
 #pragma once
 
 #include <string_view>
@@ -11,18 +11,19 @@ namespace absenc::tool {
 
 using namespace client;
 
-/// Whether the user is to be asked before `what`, which means `meaning`. Throws UsageError when nobody is there.
+/// Returns whether the user must be asked before the action `what`, explained by `meaning`. Throws UsageError without a
+/// terminal.
 [[nodiscard]] bool must_ask(const Invocation& invocation, const EncoderAddress& uri, std::string_view what,
                             std::string_view meaning);
 
-/// Asks; only y and yes go on, in upper or lower case. Throws os::Interrupted.
+/// Asks the user and returns true for y and yes, in upper or lower case. Throws os::Interrupted.
 [[nodiscard]] bool confirmed(const EncoderAddress& uri, std::string_view meaning);
 
-/// Prints what the command's requests may do to other devices on the line, if anything.
+/// Prints how the command's requests may disturb other devices on the line, if they may.
 void tell_disturbance(const EncoderAddress& uri, const Command& command);
 
-/// Of a command that changes no encoder: tells what it disturbs, if anything, and asks. False: it is not to be sent.
-/// Throws as the above.
+/// For a command that changes no encoder: prints how it may disturb other devices and asks. Returns false if the user
+/// refuses. Throws as must_ask and confirmed do.
 [[nodiscard]] bool may_disturb(const Invocation& invocation, const EncoderAddress& uri, const Command& command);
 
 }  // namespace absenc::tool

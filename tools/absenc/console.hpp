@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What is written on standard input while virtual encoders run: their conditions, power, alarms and faults.
+// Executes lines of standard input while virtual encoders run: conditions, power, alarms and faults.
 #pragma once
 
 #include <string>
@@ -16,15 +16,15 @@ using namespace client;
 
 class Console {
  public:
-  /// All must outlive it. The encoders are of one unit, and are told apart by their number, from 1 on.
+  /// All arguments must outlive the console. The encoders are of one unit and have numbers from 1.
   Console(const Unit& unit, std::vector<VirtualDevice*> devices) : unit_(unit), devices_(std::move(devices)) {}
 
-  /// Carries out the lines that are there, and answers each by one line on standard output.
+  /// Executes the waiting lines and prints one line to standard output for each.
   void look(Time now);
-  /// Nothing comes any more.
+  /// Returns whether standard input has ended.
   [[nodiscard]] bool ended() const { return lines_.ended() || unheard_; }
 
-  /// What is so afterwards. Throws UsageError, which says what is possible.
+  /// Executes `line` and returns the new state in words. Throws UsageError, which lists the possible words.
   [[nodiscard]] std::string carry_out(std::string_view line, Time now);
 
  private:
@@ -37,7 +37,7 @@ class Console {
   const Unit& unit_;
   std::vector<VirtualDevice*> devices_;
   os::InputLines lines_;
-  bool unheard_ = false;  // nobody reads the answers
+  bool unheard_ = false;  // standard output is closed
 };
 
 }  // namespace absenc::tool

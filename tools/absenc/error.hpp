@@ -1,19 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
-// How the command ends.
+// The exit statuses of the command.
 #pragma once
 
 #include "absenc/client/error.hpp"
 
 namespace absenc::tool {
 
-using namespace client;  // the command is written in the words of the library
+using namespace client;  // the command uses the library's names without a prefix
 
 inline constexpr int exit_good = 0;
-inline constexpr int exit_failed = 1;  // the encoder, the line or the system
+inline constexpr int exit_failed = 1;  // the encoder, the line or the system failed
 inline constexpr int exit_usage = 2;
-inline constexpr int exit_nothing_judged = 3;  // nothing was seen of which a verdict could be given
+inline constexpr int exit_nothing_judged = 3;  // nothing was observed that a verdict could be based on
 
-/// Nobody reads standard output any more, as after `| head`.
+/// Thrown when standard output is closed, as after `| head`.
 struct OutputClosed {};
 
 }  // namespace absenc::tool

@@ -12,7 +12,7 @@ namespace {
 
 constexpr std::size_t text_width = 100;
 
-// Words from column `indent` on, broken before the text gets too wide.
+// Wraps `text` into lines that begin at column `indent`.
 std::string wrapped(std::string_view text, std::size_t indent) {
   std::string lines;
   std::size_t column = indent;

@@ -43,23 +43,23 @@ inline constexpr std::array<Example, 6> environment{{
     {"NO_COLOR", "if not empty, `absenc monitor` does without colours"},
 }};
 
-/// By the number of the exit status.
+/// Descriptions of the exit statuses, indexed by the status.
 inline constexpr std::array<std::string_view, 4> exit_statuses{
     "good", "the encoder or the line failed", "wrong usage",
     "nothing was seen that could be judged (conform, conform-host)"};
 
-/// Of the whole command.
+/// Returns the help text of the whole command.
 [[nodiscard]] std::string help();
 [[nodiscard]] std::string help(const Subcommand& subcommand);
-/// Of the verbs that begin with this word.
+/// Returns the help text of the verbs whose first word is `group`.
 [[nodiscard]] std::string help(std::string_view first_word_of_two);
 
-/// "absenc read <encoder> [options]"
+/// Returns the usage line of a verb: "absenc read <encoder> [options]".
 [[nodiscard]] std::string usage(const Subcommand& subcommand);
 
-/// "<encoder>", "--count N"
+/// Returns a parameter as help shows it: "<encoder>", "--count N".
 [[nodiscard]] std::string title(const Parameter& parameter);
-/// Its meaning, how often it may be given and its default.
+/// Returns a parameter's meaning, how often it may be given and its default.
 [[nodiscard]] std::string words(const Parameter& parameter);
 
 }  // namespace absenc::tool

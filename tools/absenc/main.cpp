@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The command line: verbs, and what stands behind them, from their tables.
+// Parses the command line by the tables of the verbs and runs the verb.
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
@@ -31,7 +31,7 @@ namespace {
 
 bool asks_for_help(std::string_view word) { return word == "--help" || word == "-h"; }
 
-/// What is written behind a verb. A wrong name is reported before what is missing because of it.
+/// Parses the words after a verb. It reports a wrong name before a parameter that is missing because of it.
 class Parser {
  public:
   explicit Parser(const Subcommand& subcommand) : subcommand_(&subcommand) {
@@ -40,7 +40,7 @@ class Parser {
     }
   }
 
-  /// Nothing when help was asked for. Throws UsageError.
+  /// Returns the parsed parameters; nothing if help was requested. Throws UsageError.
   [[nodiscard]] std::optional<Invocation> parse(std::span<char* const> words) {
     while (!words.empty()) {
       const std::string_view word = words.front();
@@ -53,13 +53,13 @@ class Parser {
         take_argument(word);
       }
     }
-    for (const std::string_view word : words) take_argument(word);  // behind "--" nothing is an option
+    for (const std::string_view word : words) take_argument(word);  // after "--" every word is an argument
     refuse_numbers();
     return std::move(invocation_);
   }
 
  private:
-  // "-5" is a value.
+  // "-5" is a negative number, not an option.
   static bool is_name(std::string_view word) {
     return word.size() > 1 && word[0] == '-' && word[1] != '.' && (word[1] < '0' || word[1] > '9');
   }
@@ -94,8 +94,8 @@ class Parser {
     if (!parameter.repeatable) ++taken_;
   }
 
-  // "tformat?model=23-bit&motion=rpm=60", as behind sim: in other verbs: each setting is the option of its name, if the
-  // verb has it, or else one of the protocol.
+  // Splits "tformat?model=23-bit&motion=rpm=60", the spelling of sim: addresses: a setting becomes the verb's option of
+  // that name, or else an option of the protocol.
   void take_protocol(std::string_view word) {
     constexpr std::string_view sim = "sim:";
     if (word.starts_with(sim)) word.remove_prefix(sim.size());
@@ -140,7 +140,7 @@ class Parser {
     throw UsageError(fmt::format("{} has no option {}{}", subcommand_->name, name, suggestion(name, names)));
   }
 
-  // Too many, too few, a value too many.
+  // Throws UsageError for too many or too few arguments, and for an option that was given twice.
   void refuse_numbers() const {
     if (extra_) {
       throw UsageError(fmt::format("\"{}\" is too much: usage is {}", *extra_, usage(*subcommand_)));
@@ -167,7 +167,7 @@ class Parser {
   Invocation invocation_;
 };
 
-// No verb begins with these words; `group` is the first of two, or "".
+// Reports that no verb begins with these words. `group` is the first word of a two-word verb, or "".
 [[noreturn]] void refuse_verb(std::string_view group, std::span<char*> words) {
   const std::vector<std::string_view> verbs = words_after(group);
   if (words.empty()) {
@@ -193,15 +193,15 @@ class Parser {
                                suggestion(name, std::span(options).first(group.empty() ? 2 : 1))));
 }
 
-// --help and --version in the place of a verb stand alone.
+// --help and --version without a verb must be the only word.
 void require_last(std::span<char*> words) {
   if (words.size() == 1) return;
   throw UsageError(fmt::format("\"{}\" is too much behind {}", words[1], words[0]));
 }
 
-/// The verb at the beginning of `words`, which are then those from its last word on; null when it was help or the
-/// version that was asked for, and is done. `understood` is as much of the verb as was found, also when this throws:
-/// whatever is no verb must not be passed over, because the next word may be one that changes an encoder.
+/// Returns the verb at the beginning of `words` and removes all of its words but the last; null if help or the version
+/// was requested and printed. `understood` is the recognised part of the verb, also when this throws. An unknown word
+/// is an error and is not skipped, because the next word may be a verb that changes an encoder.
 const Subcommand* find_verb(std::span<char*>& words, std::string& understood) {
   for (;;) {
     if (words.empty()) refuse_verb(understood, words);
@@ -243,7 +243,7 @@ Json failure(std::string_view name, const std::exception& failed) {
   return json;
 }
 
-// Whoever reads JSON gets the end in JSON, too.
+// With --json the failure is printed as JSON too.
 int run(const Subcommand& subcommand, const Invocation& invocation) {
   const bool json = invocation.has("--json");
   try {
@@ -261,14 +261,14 @@ int run(const Subcommand& subcommand, const Invocation& invocation) {
   return exit_failed;
 }
 
-// Somebody who types nothing has just plugged something in.
+// Without any word the command lists the ports: the user has probably just connected an adapter.
 int welcome() {
   const int status = ports_subcommand.run({});
   print_line("\n`absenc --help` shows all that absenc does, `absenc list` all encoders.");
   return status;
 }
 
-/// `understood` is the verb as far as it was found, also when this throws.
+/// `understood` receives the recognised part of the verb, also when this throws.
 int run_command_line(std::span<char*> words, std::string& understood) {
   if (words.empty()) return welcome();
   const Subcommand* subcommand = find_verb(words, understood);
@@ -287,10 +287,10 @@ int main(int argument_count, char** arguments) {
   using namespace absenc::tool;
   std::string understood;
   std::vector<char*> words(arguments, arguments + argument_count);
-  words.erase(words.begin(), words.begin() + std::min(argument_count, 1));  // POSIX allows none at all
+  words.erase(words.begin(), words.begin() + std::min(argument_count, 1));  // POSIX allows argc to be 0
   if (words.size() == 1 && words.front() == absenc::serve::mqtt_process_verb) return absenc::serve::run_mqtt_process();
   std::string help_option = "--help", version_option = "--version";
-  // `absenc help read` is `absenc read --help`: people type both.
+  // `absenc help read` prints the same as `absenc read --help`.
   if (!words.empty() && std::string_view(words.front()) == "help") {
     words.erase(words.begin());
     words.push_back(help_option.data());

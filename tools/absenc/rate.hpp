@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What everybody who reads again and again is told: --rate, --command.
+// The options --rate and --command of verbs that read repeatedly.
 #pragma once
 
 #include <string>
@@ -9,11 +9,11 @@
 
 namespace absenc::tool {
 
-/// Readings a second; 0: as fast as can be. Notes when --for ends before the second reading. Throws UsageError, also
-/// for a rate at which hardly anybody would live to see that.
+/// Returns the value of --rate in readings a second; 0 means as fast as possible. Prints a note if --for ends before
+/// the second reading. Throws UsageError, also for a rate so low that the second reading would come after decades.
 [[nodiscard]] double readings_a_second(const Invocation& invocation, double fallback);
 
-/// The settings of --option, with that of --command.
+/// Returns the settings of --option and, if given, that of --command.
 [[nodiscard]] std::vector<std::string> reading_settings(const Invocation& invocation);
 
 }  // namespace absenc::tool

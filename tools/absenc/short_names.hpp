@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Long names in little room: what tells them apart is not what is cut.
+// Shortens long names to fit a column and keeps the parts in which they differ.
 #pragma once
 
 #include <cstddef>
@@ -9,8 +9,8 @@
 
 namespace absenc::tool {
 
-/// Each name in at most `width` (8 or more) bytes, in the same order; ".." stands for what was left out of a longer
-/// one. Names that differ also do so afterwards.
+/// Returns each name in at most `width` (8 or more) bytes, in the same order; ".." replaces the part that was cut.
+/// Different names remain different.
 [[nodiscard]] std::vector<std::string> short_names(std::span<const std::string> names, std::size_t width);
 
 }  // namespace absenc::tool

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A subcommand as data: main.cpp makes the command line and the help text of it.
+// Describes a subcommand as data, from which main.cpp parses the command line and help.cpp prints help.
 #pragma once
 
 #include <cstdint>
@@ -13,11 +13,11 @@ namespace absenc::tool {
 
 struct Parameter {
   std::string_view name;   // "unit": an argument; "--count": an option
-  std::string_view value;  // stands for its value in help; "": a flag
+  std::string_view value;  // placeholder of its value in help; "": a flag without a value
   std::string_view meaning;
-  std::string_view fallback{};  // the default, in words; "": none
+  std::string_view fallback{};  // the default in words, for help; "": none
   bool required = false;
-  bool repeatable = false;  // an argument that takes all that follow, or an option that may come often
+  bool repeatable = false;  // an argument that takes all following words, or an option that may be given several times
 
   [[nodiscard]] constexpr bool is_option() const { return name.starts_with("--"); }
 };
@@ -27,16 +27,16 @@ struct Example {
   std::string_view meaning;
 };
 
-/// What the user wrote, by the names of the parameters.
+/// The values that the user wrote, by parameter name.
 class Invocation {
  public:
   void add(std::string_view name, std::string value) { values_[name].push_back(std::move(value)); }
 
   [[nodiscard]] bool has(std::string_view name) const { return values_.contains(name); }
-  /// The last value, or `fallback`.
+  /// Returns the last value of the parameter, or `fallback` if there is none.
   [[nodiscard]] std::string_view text(std::string_view name, std::string_view fallback = {}) const;
   [[nodiscard]] std::span<const std::string> texts(std::string_view name) const;
-  /// Decimal or 0x. Throws UsageError for what is no number or outside the range.
+  /// Returns the value as a number, decimal or with 0x. Throws UsageError if it is no number or out of range.
   [[nodiscard]] std::int64_t number(std::string_view name, std::int64_t fallback, std::int64_t minimum,
                                     std::int64_t maximum) const;
   [[nodiscard]] double real(std::string_view name, double fallback, double minimum, double maximum) const;
@@ -47,21 +47,21 @@ class Invocation {
 
 struct Subcommand {
   std::string_view name;         // one word, or two as in "memory read"
-  std::string_view summary;      // one line
-  std::string_view description;  // more, for the help text; lines end where they should
+  std::string_view summary;      // one line of help
+  std::string_view description;  // further help text, with its line ends
   std::span<const Parameter> parameters;
   std::span<const Example> examples;
   int (*run)(const Invocation& invocation);  // returns the exit status
 };
 
-/// In the order in which help shows them; those that share their first word stand together.
+/// All subcommands in the order of help; those with the same first word are adjacent.
 [[nodiscard]] std::span<const Subcommand* const> all_subcommands();
 
-/// "memory" of "memory read"; "" of one word.
+/// Returns "memory" for "memory read"; "" for a verb of one word.
 [[nodiscard]] std::string_view first_word(const Subcommand& subcommand);
-/// "read" of "memory read" and of "read"
+/// Returns "read" for "memory read" and for "read".
 [[nodiscard]] std::string_view last_word(const Subcommand& subcommand);
-/// The words that may come after `first`, or, when that is "", those that a verb may begin with.
+/// Returns the words that may follow `first`; if `first` is "", the words with which a verb may begin.
 [[nodiscard]] std::vector<std::string_view> words_after(std::string_view first);
 
 extern const Subcommand ports_subcommand;

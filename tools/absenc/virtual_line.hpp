@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// All virtual encoders that `emulate` puts on one line: the one of its own options, and those of --also.
+// The virtual encoders of `emulate` on one line: one from the verb's options, one for each --also.
 #pragma once
 
 #include <memory>
@@ -15,12 +15,12 @@ namespace absenc::tool {
 
 using namespace client;
 
-/// As the options of the verb say. Throws UsageError.
+/// Makes the encoders from the options of the verb. Throws UsageError.
 [[nodiscard]] DeviceSettings device_settings(const Invocation& invocation);
-/// What stands behind sim: for one more encoder of the line. Throws UsageError.
+/// Returns the sim: address for one more encoder of the line. Throws UsageError.
 [[nodiscard]] EncoderAddress further_encoder(const Unit& unit, const Invocation& invocation, const std::string& further,
                                              const DeviceSettings& settings);
-/// Requests, faults and broken rules of one device since `start`.
+/// Counts of requests, faults and broken rules of one device since `start`.
 void print_summary(const VirtualDevice& device, std::string_view name, Time start);
 
 template <class Item>
@@ -47,7 +47,7 @@ class VirtualLine {
     }
   }
 
-  /// The memory of this one can be kept.
+  /// The encoder whose memory --memory stores in a file.
   [[nodiscard]] Device<Item>& first() {
     if constexpr (is_can) {
       return *devices_.front()->device().frames;

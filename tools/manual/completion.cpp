@@ -12,8 +12,8 @@ namespace absenc::tool {
 
 namespace {
 
-// Bash splits words at : and = too. `word` is put together again as the user wrote it, and what stands before the last
-// of these is taken from the replies: bash replaces only the rest. Between quotes it does not split.
+// Bash also splits words at : and =. The script joins `word` again as the user wrote it, and removes the part before
+// the last : or = from its replies, because bash replaces only the rest. Bash does not split inside quotes.
 constexpr std::string_view functions = R"bash(
 _absenc_file() {
   compopt -o filenames
@@ -195,12 +195,12 @@ complete -F _absenc absenc
 
 std::string_view first_word(std::string_view name) { return name.substr(0, name.find(' ')); }
 
-// What stands behind the first word: "read" of "memory read".
+// Returns the second word of a verb: "read" of "memory read".
 std::string_view second_word(std::string_view name) {
   return name.substr(std::min(first_word(name).size() + 1, name.size()));
 }
 
-// What is to be completed: what help calls the value, unless that is said of too much.
+// Returns the kind of value to complete: help's placeholder of the value, unless that is too general.
 std::string_view kind_of(const Subcommand& subcommand, const Parameter& parameter) {
   if (parameter.name == "--model") return "model";
   if (parameter.name == "name" && first_word(subcommand.name) == "config") return "setting";
@@ -223,7 +223,7 @@ std::string description(const Subcommand& subcommand) {
                      subcommand.name, fmt::join(arguments, " "), fmt::join(options, " "), repeats);
 }
 
-// "declare -gA _absenc_models=(['tformat']='TS5700N8500 23-bit' ...)": it may be read within a function.
+// Writes "declare -gA _absenc_models=(['tformat']='TS5700N8500 23-bit' ...)". -g, because a function may source it.
 template <class Names>
 std::string by_protocol(std::string_view name, std::span<const Unit* const> units, const Names& names) {
   std::string text = fmt::format("declare -gA _absenc_{}=(\n", name);
@@ -243,7 +243,7 @@ std::vector<std::string_view> command_names(const Unit& unit) {
   return names;
 }
 
-// Names of makers, families and models, each once; a name of two words would be completed as two.
+// Returns names of makers, families and models, each once, without names of two words, which bash would split.
 std::set<std::string_view> known_names(std::span<const Unit* const> units) {
   std::set<std::string_view> names;
   for (const Unit* unit : units) {
@@ -255,7 +255,7 @@ std::set<std::string_view> known_names(std::span<const Unit* const> units) {
   return names;
 }
 
-// As `config get` and `config set` know them.
+// Returns the settings that `config get` and `config set` accept.
 std::vector<std::string_view> setting_names(const Unit& unit) {
   std::vector<std::string_view> names;
   for (const Command& command : unit.commands) {

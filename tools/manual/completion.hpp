@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The completion of the command in bash, made from the same data as its help.
+// Makes the bash completion of the command from the data of its help.
 #pragma once
 
 #include <span>
@@ -10,7 +10,7 @@
 
 namespace absenc::tool {
 
-/// A script for bash 4 or later; it needs nothing of the package bash-completion.
+/// Returns a script for bash 4 or later, independent of the package bash-completion.
 [[nodiscard]] std::string bash_completion(std::span<const Subcommand* const> subcommands,
                                           std::span<const Unit* const> units);
 

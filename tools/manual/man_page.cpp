@@ -65,8 +65,9 @@ std::string to_roff(std::string_view text) {
   bool bold = false;
   bool line_begins = true;
   for (const char c : text) {
-    if (line_begins && (c == '.' || c == '\'')) roff += "\\&";  // no request
-    if (line_begins && c == '\n') roff += ".PP";                // no empty line
+    if (line_begins && (c == '.' || c == '\''))
+      roff += "\\&";  // otherwise roff takes . or ' at the beginning of a line for a request
+    if (line_begins && c == '\n') roff += ".PP";  // roff would print an empty line as more space than a paragraph
     line_begins = c == '\n';
     switch (c) {
       case '\\':

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The man page of the command, made from the same data as its help.
+// Makes the man page of the command from the data of its help.
 #pragma once
 
 #include <span>
@@ -11,11 +11,11 @@
 
 namespace absenc::tool {
 
-/// roff for the man macros.
+/// Returns the page as roff for the man macros.
 [[nodiscard]] std::string man_page(std::string_view version, std::span<const Subcommand* const> subcommands,
                                    std::span<const Unit* const> units);
 
-/// Text as roff shows it unchanged; what stands between backquotes is bold.
+/// Returns `text` escaped for roff; text between backquotes becomes bold.
 [[nodiscard]] std::string to_roff(std::string_view text);
 
 }  // namespace absenc::tool

@@ -40,7 +40,7 @@ bool has_position(const Snapshot& snapshot) {
   return is_live(snapshot) && reading.ready && reading.singleturn_valid();
 }
 
-// Names the age of a reading that is older than a tenth of a second: " (0.3 s old)".
+// Returns " (0.3 s old)" for a reading older than a tenth of a second, otherwise "".
 std::string age(const Snapshot& snapshot) {
   if (snapshot.age < std::chrono::milliseconds(100)) return {};
   return fmt::format("   ({:.1f} s old)", std::chrono::duration<double>(snapshot.age).count());
@@ -51,7 +51,7 @@ double unit_um(const Shown& shown) {
   return uri.unit->resolution(uri.options).unit_um;
 }
 
-// With fewer decimals, where it would not fit into a column of the list.
+// Returns the speed with fewer decimals if it would not fit into its column of the list.
 std::string short_text(double value, int decimals, std::size_t width = 9) {
   while (decimals > 0 && fmt::formatted_size("{:.{}f}", value, decimals) > width) --decimals;
   std::string text = fmt::format("{:.{}f}", value, decimals);
@@ -80,7 +80,7 @@ std::string speed_text(const Snapshot& snapshot) {
   return text.size() <= 9 ? text : short_text(snapshot.last.speed, 1);
 }
 
-// `sign` between the two. The screen draws bytes, so there it is "+/-".
+// Returns speed and uncertainty with `sign` between them: "+/-" for the screen, which only draws ASCII.
 std::string measured_speed_text(const Snapshot& snapshot, std::string_view sign) {
   const Sample& last = snapshot.last;
   const std::string value =
@@ -88,7 +88,7 @@ std::string measured_speed_text(const Snapshot& snapshot, std::string_view sign)
   return fmt::format("{} {}", value, speed_unit(last.reading));
 }
 
-// An alarm, or a flag of the status about which something must be done, where not all alarms are reported.
+// Returns whether an alarm is raised. If not all alarms are reported, a status flag with advice counts too.
 bool has_alarm(const Shown& shown) {
   const Unit& unit = *shown.watch->uri().unit;
   const Reading& reading = shown.snapshot.last.reading;
@@ -111,7 +111,7 @@ std::uint64_t failures(const Snapshot& snapshot) { return snapshot.counters.bad(
 
 constexpr std::size_t turns_width = 7;
 constexpr std::size_t failures_width = 6;
-constexpr int values_width = 43;  // of all columns behind the state
+constexpr int values_width = 43;  // width of all columns after the state
 
 std::vector<std::string> names_in(const View& view, int width) {
   std::vector<std::string> names;
@@ -119,7 +119,7 @@ std::vector<std::string> names_in(const View& view, int width) {
   return short_names(names, static_cast<std::size_t>(std::max(width, 8)));
 }
 
-// What a mark of alarms behind the values leaves.
+// Returns the width of the name column, next to the values and the mark of alarms.
 int name_width(const Screen& screen) { return std::clamp(screen.columns() - values_width - 13, 8, 40); }
 
 void draw_list_line(Screen& screen, int row, const Shown& shown, const std::string& name, bool selected) {
@@ -138,7 +138,7 @@ void draw_list_line(Screen& screen, int row, const Shown& shown, const std::stri
   }
 }
 
-// What the columns of position and speed hold.
+// Returns the texts of the columns position and speed.
 std::array<std::string_view, 2> units_of(const View& view) {
   const auto linear =
       std::count_if(view.encoders.begin(), view.encoders.end(), [](const Shown& one) { return unit_um(one) > 0; });
@@ -147,7 +147,7 @@ std::array<std::string_view, 2> units_of(const View& view) {
   return {"mm", "mm/s"};
 }
 
-// The rows of the list around the selected encoder; returns the row behind it.
+// Draws the rows of the list around the selected encoder; returns the row after the last.
 int draw_list(Screen& screen, int row, const View& view) {
   const std::size_t most = std::max<std::size_t>(1, static_cast<std::size_t>(screen.rows() - 14));
   const std::size_t count = std::min(view.encoders.size(), most);
@@ -169,7 +169,7 @@ int draw_list(Screen& screen, int row, const View& view) {
 
 // ---- One encoder
 
-// What the bar is long: the turn, or all that a linear encoder can count.
+// Returns the range of the bar: one turn, or the whole range of a linear encoder.
 std::string range_text(const Shown& shown) {
   const EncoderAddress& uri = shown.watch->uri();
   const Resolution resolution = uri.unit->resolution(uri.options);
@@ -195,7 +195,8 @@ void draw_position(Screen& screen, int row, const Shown& shown) {
   const Snapshot& snapshot = shown.snapshot;
   const Unit& unit = *shown.watch->uri().unit;
   if (is_live(snapshot)) {
-    const bool has_room = unit.second_status == nullptr && unit.second_alarms == nullptr;  // or else they are below
+    const bool has_room =
+        unit.second_status == nullptr && unit.second_alarms == nullptr;  // the status of two channels is drawn below
     const Reading& reading = snapshot.last.reading;
     const Doubt doubt = doubt_of(snapshot.last);
     const std::string text =
@@ -232,7 +233,7 @@ std::string statistics_line(const Snapshot& snapshot) {
                      to_text(snapshot.percentile_99), to_text(snapshot.longest));
 }
 
-// Words in as many rows as they need but not beyond `end`; returns the row behind them.
+// Draws words, wrapped, in the rows before `end`; returns the row after the last.
 int draw_words(Screen& screen, int row, int end, std::string_view text, Style style) {
   constexpr int indent = 2;
   const auto width = static_cast<std::size_t>(screen.columns() - indent);
@@ -262,13 +263,13 @@ int draw_alarms(Screen& screen, int row, int end, const Shown& shown) {
   return row;
 }
 
-// In columns, of which a long field takes several; returns the row behind them. The last two rows are left to what
-// comes below.
+// Draws fields in columns; a long field takes several. Returns the row after the last. Leaves the last two rows free
+// for the section below.
 int draw_fields(Screen& screen, int row, int end, const Snapshot& snapshot) {
   if (!is_live(snapshot)) return row;
   constexpr int between = 3;
   const int room = screen.columns() - 2 + between;
-  int width = 1;  // of a column: every field that has room beside another one fits
+  int width = 1;  // width of a column: the longest field that fits beside another
   for (const std::string& field : snapshot.fields) {
     const int needed = static_cast<int>(field.size()) + between;
     if (needed <= room / 2) width = std::max(width, needed);
@@ -296,7 +297,7 @@ void draw_trace(Screen& screen, int row, int end, const Snapshot& snapshot) {
   }
 }
 
-// The last bad exchanges: what was sent and what came, repeated attempts included.
+// Draws the last bad exchanges with sent and received bytes, repeated attempts included.
 void draw_errors(Screen& screen, int row, int end, const Shown& shown) {
   if (shown.snapshot.bad.empty()) return screen.put(row, 2, "no exchange has failed");
   for (const BadExchangeText& bad : shown.snapshot.bad) {
@@ -349,7 +350,7 @@ void draw_help(Screen& screen, int row, int end) {
       Style::plain);
 }
 
-// Of whom: never cut off.
+// Returns the question with the encoder's name, which is never cut off.
 std::string question_in(const View& view, int columns) {
   const std::string name = names_in(view, columns - static_cast<int>(view.question.size()) - 5)[view.selected];
   const std::string who = fmt::format("  ({})", name);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What `absenc monitor` shows: the list of all encoders, and everything about one of them.
+// Draws the screen of `absenc monitor`: the list of all encoders and the details of the selected one.
 #pragma once
 
 #include <span>
@@ -22,16 +22,17 @@ struct View {
   std::size_t selected = 0;
   bool paused = false;
   enum class Below : std::uint8_t { trace, errors, help } below = Below::trace;
-  std::string question{};  // about the selected one, to be answered with y; "" when nothing is asked
+  std::string question{};  // question about the selected encoder, to be answered with y; "": no question
 };
 
 inline constexpr int least_rows = 16;
 inline constexpr int least_columns = 64;
 
-/// Draws all of it; on a smaller screen than the least, only that it is too small.
+/// Draws the whole screen; if the screen is smaller than the minimum, only a message that it is too small.
 void draw(Screen& screen, const View& view);
 
-/// "elbow: 123.456 deg ..." for where there is no screen. What is not live is never shown as a value.
+/// Returns "elbow: 123.456 deg ..." for output without a screen. A reading that is not live is never printed as a
+/// value.
 [[nodiscard]] std::string to_line(const Shown& shown);
 [[nodiscard]] Json to_json(const Shown& shown);
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tools/absenc/monitor/screen.hpp"
 
-#define NCURSES_NOMACROS  // erase, timeout and others as functions
+#define NCURSES_NOMACROS  // makes erase, timeout and others functions instead of macros
 #include <curses.h>
 
 #include <algorithm>
@@ -22,10 +22,10 @@ namespace {
 
 struct Look {
   attr_t attributes;
-  short colour;  // of the pair too; 0: none
+  short colour;  // of the colour pair, which has the same number; 0: none
 };
 
-// By the enumerators of Style. Without colours the attributes must do.
+// Indexed by Style. Terminals without colours only show the attributes.
 constexpr std::array<Look, 7> looks{{{A_NORMAL, 0},
                                      {A_DIM, 0},
                                      {A_BOLD, 0},
@@ -95,7 +95,7 @@ std::unique_ptr<Screen> Screen::open() {
   ::set_escdelay(25);
   terminal->screen = ::newterm(nullptr, stdout, stdin);
   if (terminal->screen == nullptr) return nullptr;
-  if (::tigetstr("cup") == nullptr) {  // it cannot put anything anywhere, as TERM=dumb
+  if (::tigetstr("cup") == nullptr) {  // the terminal cannot move the cursor, as TERM=dumb
     ::endwin();
     ::delscreen(terminal->screen);
     return nullptr;

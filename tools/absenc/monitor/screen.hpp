@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A terminal that is drawn on as a whole. The library behind it is seen by screen.cpp alone: its macros are many.
+// A terminal as a screen. Only screen.cpp includes ncurses, because its header defines many macros.
 #pragma once
 
 #include <cstdint>
@@ -29,9 +29,9 @@ enum class Key : std::uint8_t {
 
 class Screen {
  public:
-  /// Takes the terminal of standard input and output. Null when it is none that can be drawn on.
+  /// Takes over the terminal of standard input and output. Returns null if it cannot be used as a screen.
   [[nodiscard]] static std::unique_ptr<Screen> open();
-  /// Gives the terminal back as it was.
+  /// Restores the terminal.
   ~Screen();
   Screen(const Screen&) = delete;
   Screen& operator=(const Screen&) = delete;
@@ -40,13 +40,13 @@ class Screen {
   [[nodiscard]] int columns() const;
 
   void clear();
-  /// What lies outside the screen is cut off. Bytes that cannot be shown become '?'.
+  /// Draws `text`; cuts it at the edge of the screen and draws '?' for bytes that are not ASCII.
   void put(int row, int column, std::string_view text, Style style = Style::plain);
-  /// The rest of the row too gets the style.
+  /// Draws `text` and gives the whole row the style.
   void fill(int row, std::string_view text, Style style);
   void show();
 
-  /// Waits for a key no longer than `limit`.
+  /// Returns the next key; waits for it at most `limit`.
   [[nodiscard]] Key key(Time limit);
 
  private:

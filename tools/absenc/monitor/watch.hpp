@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// One encoder read again and again by a thread of its own; others look at what is known of it.
+// Reads one encoder repeatedly in a thread of its own and hands out copies of its state.
 #pragma once
 
 #include <condition_variable>
@@ -18,56 +18,57 @@ namespace absenc::tool {
 
 using namespace client;
 
-/// What is known of an encoder at a moment.
+/// The state of an encoder at one moment.
 struct Snapshot {
   enum class State : std::uint8_t {
-    opening,  // its port was not there yet
-    live,     // the reading is new
-    silent,   // none has come for a while
+    opening,  // the port could not be opened yet
+    live,     // the reading is recent
+    silent,   // no reading has arrived for a while
     failing,  // the last attempt failed
-    lost,     // the port has gone away
-    paused,   // it is not being read
-    ended,    // it cannot be read at all: `message` says why
+    lost,     // the port was open and was lost
+    paused,   // readings are paused
+    ended,    // the encoder cannot be read; `message` has the reason
   };
 
   State state = State::opening;
-  Time age{};  // of the reading, or of what is known instead
+  Time age{};  // age of the reading, or of the present state if there is none
   bool has_reading = false;
-  Sample last{};          // the last reading, if there was one; only to be shown as the present one while `live`
-  std::string message{};  // failing, lost, opening, ended: why
-  std::string notice{};   // how the last command ended, and whether it still runs
+  Sample last{};          // the last reading, if there was one; it is the present one only while `live`
+  std::string message{};  // the reason of failing, lost, opening or ended
+  std::string notice{};   // result of the last command, or that it still runs
   host::Counters counters{};
   std::uint64_t readings = 0;
   std::uint64_t losses = 0;
-  std::uint64_t restarts = 0;  // of the position, as Encoder::restarts
+  std::uint64_t restarts = 0;  // number of restarts of the position, as Encoder::restarts
   double rate = 0;             // readings a second
-  Time median{};               // of the latencies
+  Time median{};               // median latency
   Time percentile_99{};
   Time longest{};
-  std::vector<std::string> trace{};    // only with details; the newest last
-  std::vector<BadExchangeText> bad{};  // only with details; the newest first
-  std::vector<std::string> fields{};   // only with details: "name value", of the last reply what the reading lacks
+  std::vector<std::string> trace{};    // printed readings; only with details; the newest last
+  std::vector<BadExchangeText> bad{};  // bad exchanges; only with details; the newest first
+  std::vector<std::string>
+      fields{};  // only with details: "name value" of the last reply's fields that the reading lacks
 };
 
 [[nodiscard]] std::string_view name_of(Snapshot::State state);
 
-/// Ports block, which keeps them simple, and 64 threads cost less processor time a reading than one
-/// (docs/benchmarks.md). What is known is handed out as a copy, so that the screen never waits for a line.
+/// A thread of its own for each encoder: ports block, which keeps them simple, and 64 threads cost less processor time
+/// per reading than one (docs/benchmarks.md). The screen gets copies, so that it never waits for a line.
 class Watch {
  public:
-  /// `name` as the user wrote it. The first reading comes `offset` after the start.
+  /// `name` is as the user wrote it. The first reading is `offset` after the start.
   Watch(std::string name, const EncoderAddress& uri, double rate, Time offset);
   Watch(const Watch&) = delete;
   Watch& operator=(const Watch&) = delete;
 
-  /// Ends the thread, within the time that one reading may take; the destructor does it too.
+  /// Ends the thread within the time of one reading; the destructor does the same.
   void stop();
 
   [[nodiscard]] Snapshot snapshot(bool details) const;
   void pause(bool paused);
-  /// Runs a command without arguments between two readings; the notice tells how it ended.
+  /// Runs a command without arguments between two readings; `notice` then has its result.
   void run(const Command& command);
-  /// Shows the text in place of how the last command ended.
+  /// Sets `notice` to this text.
   void notify(std::string text);
 
   [[nodiscard]] const std::string& name() const { return name_; }
@@ -89,23 +90,23 @@ class Watch {
   Time offset_;
   Time start_;
 
-  mutable std::mutex mutex_;  // guards what follows
+  mutable std::mutex mutex_;  // guards the members down to command_
   std::condition_variable_any changed_;
   Snapshot known_;
-  Time known_at_{};  // of the last reading, or of the last change of state
+  Time known_at_{};  // time of the last reading, or of the last change of state
   std::deque<std::string> lines_;
   bool paused_ = false;
   std::optional<Command> command_;
 
-  // Of the thread alone.
+  // Used by the thread only:
   Time next_summary_{};
   Time next_line_{};
   std::uint32_t alarms_ = 0;
   std::uint32_t alarms_reported_ = 0;
-  bool restarted_ = false;     // by the reading before
-  bool command_runs_ = false;  // it is not broken off
+  bool restarted_ = false;     // the previous reading restarted the position
+  bool command_runs_ = false;  // a command runs and must not be aborted
 
-  std::jthread thread_;  // last: it uses all of the others
+  std::jthread thread_;  // last member: it uses all others
 };
 
 }  // namespace absenc::tool

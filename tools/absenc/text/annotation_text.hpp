@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Annotations of a capture for people, as JSON and as CSV, one a line.
+// Prints annotations of a capture as text, JSON or CSV, one per line.
 #pragma once
 
 #include <cstdint>
@@ -16,21 +16,21 @@ namespace absenc::tool {
 using namespace client;
 
 enum class AnnotationFormat : std::uint8_t { text, json, csv };
-enum class ShowBits : std::uint8_t { no, yes };  // where in the reply its fields stand
+enum class ShowBits : std::uint8_t { no, yes };  // whether to print the bits of each field in the reply
 
-enum class MarkAlarms : std::uint8_t { no, yes };  // an error, or an alarm that is raised, by ! before the time
+enum class MarkAlarms : std::uint8_t { no, yes };  // whether to mark an error or a raised alarm by ! before the time
 
-/// Whether its reply reports an alarm that is raised.
+/// Returns whether the annotated reply reports a raised alarm.
 [[nodiscard]] bool raises_alarm(const capture::Annotation& annotation);
 
-/// Prints each annotation as it comes; many at a time where nobody waits for them.
+/// Prints annotations, each at once or many at a time if standard output is no terminal.
 class AnnotationPrinter final : public capture::AnnotationSink {
  public:
   AnnotationPrinter(const Unit& unit, const Options& options, const TickClock& clock, AnnotationFormat format,
                     ShowBits bits = ShowBits::no, MarkAlarms marks = MarkAlarms::no);
 
   void put(const capture::Annotation& annotation) override;
-  /// Prints what is still kept. Throws OutputClosed, Failure.
+  /// Prints the annotations that are still buffered. Throws OutputClosed, Failure.
   void flush();
 
  private:
@@ -44,7 +44,7 @@ class AnnotationPrinter final : public capture::AnnotationSink {
   AnnotationFormat format_;
   ShowBits bits_;
   MarkAlarms marks_;
-  // Of CSV.
+  // Only used for CSV.
   std::string time_format_;
   ReadingColumns reading_;
   std::vector<Column> columns_;

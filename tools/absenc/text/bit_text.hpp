@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Where in a frame its fields stand, for people and for programs.
+// Prints the bits that each field occupies in a frame, as text or JSON.
 #pragma once
 
 #include <string>
@@ -13,20 +13,20 @@
 
 namespace absenc::tool {
 
-/// "16-32", "7", "24-31 16-23": from the most significant on.
+/// Returns the bits as text, the most significant first: "16-32", "7", "24-31 16-23".
 [[nodiscard]] std::string ranges_text(const BitRanges& ranges);
 
-/// The fields of a good reply of which its unit says where they stand, in order.
+/// Returns the fields of a good reply whose bits the unit declares, in order.
 class FieldPlaces {
  public:
   FieldPlaces(const Unit& unit, const Options& options, const Frame& request, const Frame& reply,
               const capture::Contents& contents);
 
-  /// "singleturn 16-32, multiturn 48-63"; "" when nothing is told.
+  /// Returns "singleturn 16-32, multiturn 48-63"; "" if the unit declares no bits.
   [[nodiscard]] std::string text() const;
-  /// {"singleturn":[{"first":16,"count":17}]}, the least significant part first.
+  /// Returns {"singleturn":[{"first":16,"count":17}]}, the least significant part first.
   [[nodiscard]] Json json() const;
-  /// Puts a column behind the value of each field.
+  /// Adds a column with the bits after the value of each field.
   void add_to(std::vector<std::vector<std::string>>& rows) const;
 
  private:

@@ -71,7 +71,7 @@ void CaptureStatistics::put(const Annotation& annotation) {
   }
   if (annotation.error != Error::none) return put_error(annotation);
   row_.count = 0;
-  // The position of a composed frame was there before, with the first exchange that carried a byte of it.
+  // The position of a composed frame was known from the first exchange that carried a byte of it.
   if (annotation.contents.reading != nullptr && !annotation.composed)
     trace_.add(annotation.begin, *annotation.contents.reading);
 }

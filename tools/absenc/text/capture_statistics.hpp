@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a capture comes to: how much of what, which errors, turn-around times, the way of the position. Memory is fixed.
+// Statistics of a capture: counts, errors, response times, movement of the position. The memory use is constant.
 #pragma once
 
 #include <array>
@@ -22,7 +22,7 @@ namespace absenc::tool {
 
 using namespace client;
 
-/// Times in quarters of a power of two.
+/// A histogram of times with four bins for each power of two.
 class TimeHistogram {
  public:
   struct Bar {
@@ -37,7 +37,7 @@ class TimeHistogram {
     const auto quarter = static_cast<unsigned>(top >= 2 ? value >> (top - 2) & 3 : value << (2 - top) & 3);
     ++counts_[4 * top + quarter];
   }
-  /// From the first that is not empty to the last, at most so many: neighbours are joined.
+  /// Returns the bins from the first to the last that is not empty, joined to at most `most` bins.
   [[nodiscard]] std::vector<Bar> bars(std::size_t most) const;
 
  private:
@@ -52,7 +52,7 @@ class CaptureStatistics final : public capture::AnnotationSink {
 
   [[nodiscard]] std::uint64_t count() const { return count_; }
   [[nodiscard]] std::uint64_t errors() const { return errors_; }
-  /// Frames that were good.
+  /// Returns the number of good frames.
   [[nodiscard]] std::uint64_t good() const { return count_ - errors_ - cut_; }
 
   [[nodiscard]] std::string text(const CaptureOutcome& outcome) const;
@@ -62,7 +62,7 @@ class CaptureStatistics final : public capture::AnnotationSink {
   static constexpr std::size_t most_kept = 8;
   static constexpr std::size_t error_kinds = error_texts.size();
 
-  // An error as it was; what is longer is cut.
+  // Beginning of the frame with an error, cut to a fixed length.
   struct Kept {
     capture::Annotation annotation{};
     ByteBuffer<32> request{};
@@ -93,8 +93,8 @@ class CaptureStatistics final : public capture::AnnotationSink {
   std::uint64_t count_ = 0;
   std::uint64_t errors_ = 0;
   std::uint64_t cut_ = 0;
-  std::uint64_t composed_ = 0;            // of which exchanges carried parts
-  std::array<std::uint64_t, 4> kinds_{};  // of the others
+  std::uint64_t composed_ = 0;            // number of composed frames, whose parts exchanges carried
+  std::array<std::uint64_t, 4> kinds_{};  // number of other annotations, by kind
   std::array<std::uint64_t, error_kinds> by_error_{};
   std::uint64_t echoes_ = 0;
   std::uint64_t repeated_ = 0;

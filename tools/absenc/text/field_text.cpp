@@ -34,7 +34,7 @@ void JsonFields::put_reading(const Reading& reading) {
 
 namespace {
 
-// Its meaning and what to do.
+// Returns the flag's meaning and what to do.
 std::string in_words(const FlagInfo& flag, bool beside_alarms) {
   const std::string_view action = action_of(flag, beside_alarms);
   return action.empty() ? std::string(flag.meaning) : fmt::format("{}: {}", flag.meaning, action);
@@ -51,7 +51,7 @@ void FieldTable::put(const FieldValue& value) {
   if (info.kind == FieldInfo::Kind::flags) put_flags(info, static_cast<std::uint64_t>(value.number));
 }
 
-// Alarms may stand behind the status that sums them up.
+// Alarms may follow the status flag that summarises them.
 void FieldTable::put_flags(const FieldInfo& field, std::uint64_t bits) {
   const auto sums_up = [](const FlagInfo& flag) { return flag.action == read_the_alarms; };
   if (bits != 0 && std::none_of(field.flags.begin(), field.flags.end(), sums_up)) {
@@ -83,7 +83,7 @@ void FieldTable::put_reading(const Reading& reading) {
   std::erase_if(judged_, [&](const Judged& judged) {
     if (holds(*judged.info, reading)) return false;
     rows[judged.row][1] = marked(*judged.info, rows[judged.row][1], reading);
-    return true;  // once
+    return true;  // point to the alarms only once
   });
 }
 

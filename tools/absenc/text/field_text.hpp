@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Options and fields as JSON and as the rows of a table.
+// Prints options and fields as JSON or as rows of a table.
 #pragma once
 
 #include <cstdint>
@@ -15,11 +15,11 @@ namespace absenc::tool {
 
 using namespace client;
 
-/// {"singleturn_bits":17,...}
+/// Returns the options as {"singleturn_bits":17,...}.
 [[nodiscard]] Json options_to_json(const Unit& unit, const Options& options);
 
-/// Puts fields into a JSON object; with a reading, behind what does not hold `singleturn_valid` and the like: false, or
-/// null where nobody has reported whether it holds. What has no such field holds.
+/// Puts fields into a JSON object. After a value of a reading that is invalid or of unknown validity follows
+/// `singleturn_valid` or the like: false, or null if no reply reports validity. A value without such a key is valid.
 struct JsonFields final : FieldSink {
   void put(const FieldValue& value) override;
   void put_reading(const Reading& reading) override;
@@ -33,10 +33,10 @@ struct JsonFields final : FieldSink {
   std::vector<Judged> judged_;
 };
 
-/// For `table`: name, value, unit or meaning; a row for each flag that is set.
+/// Returns rows for `table`: name, value, unit or meaning; one row for each flag that is set.
 [[nodiscard]] std::vector<std::vector<std::string>> to_table(const Row& row);
 
-/// Puts fields into the rows of a table: name, value, unit or meaning; a row for each flag that is set.
+/// Makes a row of each field: name, value, unit or meaning; one row for each flag that is set.
 struct FieldTable final : FieldSink {
   void put(const FieldValue& value) override;
   void put_reading(const Reading& reading) override;
@@ -50,7 +50,8 @@ struct FieldTable final : FieldSink {
   void put_flags(const FieldInfo& field, std::uint64_t bits);
 
   std::vector<Judged> judged_;
-  std::vector<std::pair<std::size_t, const FlagInfo*>> sends_to_alarms_;  // rows of flags whose action that is
+  std::vector<std::pair<std::size_t, const FlagInfo*>>
+      sends_to_alarms_;  // rows of the flags whose advice is to look at the alarms
   bool shows_alarms_ = false;
 };
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Data goes to standard output, messages to standard error; what cannot be written is noticed at once.
+// Writes data to standard output and messages to standard error; notices at once when writing fails.
 #pragma once
 
 #include <span>
@@ -11,20 +11,20 @@
 
 namespace absenc::tool {
 
-/// Writes `text`, with one line end behind it, to standard output at once. Throws OutputClosed, Failure.
+/// Writes `text` and one line end to standard output, unbuffered. Throws OutputClosed, Failure.
 void print_line(std::string_view text);
 
 /// Writes "absenc: <text>" to standard error.
 void print_message(std::string_view text);
 /// Writes `text` and a line end to standard error.
 void print_note(std::string_view text);
-/// Writes `text` to standard error and leaves the cursor behind it.
+/// Writes `text` without a line end to standard error.
 void print_prompt(std::string_view text);
 
-/// Whether somebody sits in front of standard input and standard error.
+/// Returns whether standard input and standard error are a terminal, so that a user can be asked.
 [[nodiscard]] bool can_ask();
 
-/// Rows in aligned columns, each line with its end. No trailing spaces.
+/// Returns rows as lines with aligned columns, without trailing spaces.
 [[nodiscard]] std::string table(std::span<const std::vector<std::string>> rows);
 
 }  // namespace absenc::tool

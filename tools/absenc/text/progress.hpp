@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What long work has come to, on the last line of the terminal; nothing where there is none.
+// Shows the progress of long work on the last line of the terminal; does nothing without a terminal.
 #pragma once
 
 #include <string_view>
@@ -17,7 +17,7 @@ class Progress {
   Progress& operator=(const Progress&) = delete;
 
   [[nodiscard]] bool visible() const { return visible_; }
-  /// In the place of what was shown before. Nothing else may be printed until `clear`.
+  /// Replaces the shown text. Nothing else may be printed until `clear`.
   void show(std::string_view text) {
     if (!visible_) return;
     print_prompt("\r\033[K");

@@ -20,12 +20,12 @@ using namespace client;
 
 namespace {
 
-// As many as it takes to tell neighbouring positions apart.
+// Returns the decimals of degrees at which neighbouring counts differ.
 int decimals(unsigned bits) {
   return std::max(0, static_cast<int>(std::ceil(std::log10(std::ldexp(1.0, static_cast<int>(bits)) / 360))));
 }
 
-// As many as a count has; options have up to six behind the micrometre.
+// Returns the decimals of one count; options allow up to six decimals of a micrometre.
 int linear_decimals(double unit_um) {
   int decimals = 9;
   for (auto nanometres_e3 = std::llround(unit_um * 1e6); decimals > 0 && nanometres_e3 % 10 == 0; --decimals) {
@@ -34,7 +34,7 @@ int linear_decimals(double unit_um) {
   return decimals;
 }
 
-// The digits of the largest number of so many bits.
+// Returns the number of digits of the largest number of `bits` bits.
 int digits(unsigned bits) { return static_cast<int>(fmt::formatted_size("{}", low_mask(bits))); }
 
 std::string linear_text(const Reading& reading) {
@@ -71,7 +71,7 @@ std::string turns_text(const Reading& reading, Doubt doubt) {
   return fmt::format("{:>{}} turns", reading.turns(), digits(reading.multiturn_bits));
 }
 
-// The alarms, and the status where they do not say all; of two channels both.
+// Returns the alarms, and the status if the alarms do not cover it; of both channels if there are two.
 std::vector<Flags> flags_in_line(const Unit& unit, const Reading& reading) {
   if (unit.second_status != nullptr || unit.second_alarms != nullptr) return flags_of(unit, reading);
   const std::vector<Flags> alarms = alarms_of(unit, reading);
@@ -79,7 +79,7 @@ std::vector<Flags> flags_in_line(const Unit& unit, const Reading& reading) {
   return flags_of(unit, reading);
 }
 
-// Two channels of which each reports all and neither an ailment: they are named where they differ.
+// If both channels report all alarms and none is raised, one text serves both; otherwise each channel is named.
 bool both_channels_are_well(const Unit& unit, const Reading& reading) {
   if (unit.second_status == nullptr || unit.second_alarms == nullptr || !reading.ready) return false;
   const std::vector<Flags> all = flags_of(unit, reading);

@@ -20,7 +20,7 @@ namespace absenc::tool {
 namespace {
 
 struct Measurement {
-  std::vector<Time> latencies;  // of good readings, sorted
+  std::vector<Time> latencies;  // of all good readings, sorted
   std::uint64_t failed = 0;
   Time duration{};
   Time processor{};
@@ -29,7 +29,7 @@ struct Measurement {
 
 Measurement measure(Connection& encoder, double seconds) {
   Measurement measurement;
-  encoder.read();  // the first one is read twice, and echo is found out
+  encoder.read();  // not measured: the first position is read twice, and echo is detected
   const Time start = os::now();
   const Time end = start + Time(static_cast<std::int64_t>(seconds * 1e9));
   const Time processor_before = os::processor_time();
@@ -46,7 +46,7 @@ Measurement measure(Connection& encoder, double seconds) {
       }
       before = after;
     }
-  } catch (const os::Interrupted&) {  // what was measured until then counts
+  } catch (const os::Interrupted&) {  // Ctrl-C ends the measurement; its readings so far count
   }
   measurement.duration = before - start;
   measurement.processor = os::processor_time() - processor_before;
@@ -55,7 +55,7 @@ Measurement measure(Connection& encoder, double seconds) {
   return measurement;
 }
 
-// The smallest latency that `share` of the readings do not exceed.
+// Returns the latency that a fraction `share` of the readings does not exceed.
 Time percentile(const std::vector<Time>& sorted, double share) {
   const auto rank = static_cast<std::size_t>(share * static_cast<double>(sorted.size()));
   return sorted[std::min(rank, sorted.size() - 1)];
@@ -67,7 +67,7 @@ struct Percentile {
 };
 constexpr std::array<Percentile, 4> percentiles{{{"50", 0.5}, {"90", 0.9}, {"99", 0.99}, {"99.9", 0.999}}};
 
-// How much of the time characters were on the line; 0 when the line has no rate, or carries no characters.
+// Returns the fraction of the time in which characters were on the line; 0 for a line without a rate or characters.
 double line_share(const Connection& encoder, const Measurement& measurement) {
   const LineSettings& line = encoder.uri().line;
   const LinkKind link = encoder.unit().link;

@@ -44,7 +44,7 @@ Json campaign_json(const CampaignResult& result) {
   return json.set("check", check.set("taken", worth.taken).set("taken_deviation", worth.taken_deviation));
 }
 
-// "88 bits, 8 of them a check: errors of 1 bit are seen, 440 of 2 bits are not"
+// Returns "88 bits, 8 of them a check: errors of 1 bit are seen, 440 of 2 bits are not".
 std::string worth_text(const CheckWorth& worth) {
   if (worth.check_bits == 0) return fmt::format("{} bits without a checksum", worth.frame_bits);
   const std::string size = fmt::format("{} bits with a checksum of {}", worth.frame_bits, worth.check_bits);

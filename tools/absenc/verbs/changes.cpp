@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// `changes`: the journal of what was changed in encoders.
+// The verb `changes`: prints the journal of changes of encoders.
 #include <fmt/format.h>
 
 #include <array>
@@ -15,7 +15,7 @@ namespace absenc::tool {
 
 namespace {
 
-// With settings or without.
+// Returns whether the entry is of `encoder`, given with or without its settings.
 bool is_of(const JournalEntry& entry, std::string_view encoder) {
   const std::string_view written = entry.encoder;
   return written == encoder || written.substr(0, written.find('?')) == encoder;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Verbs that run the one command which a protocol has for them, whatever its name there.
+// Verbs such as `zero`, which run the protocol's command for that purpose, whatever its name.
 #include <fmt/format.h>
 
 #include <array>
@@ -13,7 +13,7 @@ namespace absenc::tool {
 
 namespace {
 
-// Of commands that have to do with it, but are not what the verb promises: "set-zero" for "zero".
+// Names commands that are related to the verb but do something else: "set-zero" for "zero".
 std::string related(const Unit& unit, std::string_view word) {
   std::string names;
   for (const Command& command : unit.commands) {

@@ -37,10 +37,10 @@ std::vector<CheckedFrame> frames_of(const Invocation& invocation) {
 
 std::string hex(std::uint32_t value, unsigned width) { return fmt::format("0x{:0{}X}", value, (width + 3) / 4); }
 
-// All powers but the last: what some documents print in place of the normal notation.
+// Returns the polynomial without its last power (Koopman's notation), which some documents print.
 std::string koopman(const CrcParameters& crc) { return hex((1u << crc.width | crc.poly) >> 1, crc.width); }
 
-/// "bytes 0 to 7"; where the lengths differ, positions before the check have no number.
+/// Returns the covered bytes as "bytes 0 to 7". If the frames differ in length, the end is given relative to the check.
 std::string covered_text(const FoundCheck& check, const CheckFindings& findings, std::string_view unit) {
   const std::string end = findings.shortest == findings.longest
                               ? fmt::format("{}", findings.shortest - check.trailing - check.check_size - 1)
@@ -93,7 +93,7 @@ void show_checks(const CheckFindings& findings, std::size_t most, std::string_vi
   if (left != 0) print_note(fmt::format("{} more, each likelier to be chance: --all shows them", left));
 }
 
-// How what decodes words is told of the best of them.
+// Prints the options by which units that decode words use the best check.
 void show_options(const CheckFindings& findings, LinkKind link) {
   for (const CheckOptions& one : options_for(findings.checks.front(), findings.shortest, link)) {
     const std::string options =

@@ -85,7 +85,7 @@ int decode_one(const Invocation& invocation, const Unit& unit, const Options& op
 constexpr std::array<std::string_view, 7> capture_options{"--channel", "--baud", "--parity", "--raw-channels",
                                                           "--rate",    "--csv",  "--stats"};
 
-// Counts, and hands on what is to be printed.
+// Counts annotations and forwards them to the printer, if there is one.
 struct Counted final : capture::AnnotationSink {
   Counted(CaptureStatistics& all, AnnotationPrinter* some) : statistics(all), printer(some) {}
   void put(const capture::Annotation& annotation) override {
@@ -96,7 +96,7 @@ struct Counted final : capture::AnnotationSink {
   AnnotationPrinter* printer;
 };
 
-// Returns whether anything is missing because of them.
+// Prints the damages of the capture. Returns whether data is missing because of them.
 bool tell_damages(const CaptureOutcome& outcome, const TickClock& clock) {
   bool damaged = false;
   for (const capture::Damage& damage : outcome.damages) {
@@ -148,7 +148,7 @@ int decode_capture(const Invocation& invocation, const Unit& unit, const Options
   return damaged || statistics.errors() != 0 ? exit_failed : exit_good;
 }
 
-// A capture without its protocol is a mistake, but who made it wants to know whose frames these are.
+// The user gave a capture without its protocol: identify it, and say which protocol to give.
 int identify_instead(std::string_view file) {
   print_message(fmt::format("the protocol is missing before {}: it is looked for", file));
   Invocation search;

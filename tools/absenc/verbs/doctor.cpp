@@ -25,7 +25,7 @@ std::string finding_text(const Finding& one) {
                      one.action);
 }
 
-// The likeliest encoder behind a port of which nothing else is known.
+// Identifies the encoder behind a bare port and returns the likeliest.
 std::string identified(const std::string& port, Progress& progress) {
   LineSearch search = parse_search(port);
   search.limit = std::chrono::seconds(60);

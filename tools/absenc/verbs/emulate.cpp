@@ -58,7 +58,7 @@ void print_rules(const Device<Item>& encoder, const VirtualDevice& device, std::
   if (encoder.violation_count() > encoder.violations().size()) print_note("    ...");
 }
 
-// Until a signal or the end of the time.
+// Runs `machine` on `port` until a signal or the end of the time.
 template <class Item>
 void serve(Machine<Item>& machine, Port<Item>& port) {
   try {
@@ -73,20 +73,20 @@ std::optional<std::uint16_t> tcp_port(const Invocation& invocation) {
   return static_cast<std::uint16_t>(invocation.number("--tcp", 0, 0, 65535));
 }
 
-// The unit of what --spidev asks for is that of the SPI controller.
+// Returns the unit to emulate; with --spidev its variant for SPI.
 const Unit& emulated_unit(const Invocation& invocation) {
   const Unit& unit = require_unit(invocation.text("protocol"));
   return invocation.has("--spidev") && unit.over_spi != nullptr ? *unit.over_spi : unit;
 }
 
-/// Where an encoder may be.
+/// An option that puts the encoder on a kind of line, and whether the unit fits it.
 struct Where {
   std::string_view option;
   std::string_view line;
   bool fits;
 };
 
-// What has no meaning where the encoder is.
+// Throws UsageError if --gap is given for a line on which it has no meaning.
 void check_gap(const Unit& unit, const Invocation& invocation) {
   if (!invocation.has("--gap")) return;
   const bool elsewhere = invocation.has("--port") || invocation.has("--spidev") || unit.link == LinkKind::can;
@@ -136,7 +136,7 @@ void check_line(const Unit& unit, const Options& options, const Invocation& invo
   if (invocation.has("--memory")) throw UsageError("--memory keeps the memory of one encoder: not with --also");
 }
 
-/// The line, its memory file and its time.
+/// The virtual line, its memory file and the end of its time.
 template <class Item>
 struct Emulation {
   Emulation(const Unit& unit, const Options& options, const Invocation& invocation)
@@ -148,7 +148,7 @@ struct Emulation {
     if (keeps_memory) file.load(line.first().memory());
   }
 
-  /// `serve(machine)` holds it on its line until a signal or the end, and returns what is to be noted of the line.
+  /// Calls `serve(machine)`, which runs the encoders until a signal or the end and returns notes about the line.
   template <class Serve>
   int run(const Serve& serve) {
     const Time start = os::now();
@@ -173,7 +173,7 @@ struct Emulation {
     return status;
   }
 
-  // `never`: at a signal.
+  // Returns the time of the end; `never` if only a signal ends it.
   [[nodiscard]] Time end() const {
     return seconds > 0 ? os::now() + Time(static_cast<std::int64_t>(seconds * 1e9)) : never;
   }
@@ -238,7 +238,7 @@ int emulate_bytes(const Unit& unit, const Options& options, const Invocation& in
   });
 }
 
-// Behind an adapter on a pseudo-terminal.
+// Emulates the encoder behind a slcan adapter on a pseudo-terminal.
 Notes serve_adapter(Machine<CanFrame>& machine, const LineSettings& line, const Invocation& invocation, Time end) {
   const auto bytes = std::make_shared<os::EmulatorPort>(std::string(invocation.text("--pty")), tcp_port(invocation));
   bytes->set_end(end);
@@ -345,7 +345,7 @@ DeviceSettings device_settings(const Invocation& invocation) {
 
 EncoderAddress further_encoder(const Unit& unit, const Invocation& invocation, const std::string& further,
                                const DeviceSettings& settings) {
-  // Settings of its own take the place of those of the first encoder.
+  // Settings of --also override those of the first encoder.
   std::string base = fmt::format("sim:{}?", unit.id);
   const auto add = [&](const std::string& setting) {
     const std::string assigned = setting.substr(0, setting.find('=')) + '=';

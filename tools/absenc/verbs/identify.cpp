@@ -69,7 +69,7 @@ int identify_frames(const Invocation& invocation) {
       for (capture::Hypothesis& one : capture::find_hypotheses(*unit, {}, exchanges)) {
         candidates.push_back({unit, std::move(one), {}, false, line_of(*unit)});
       }
-    } catch (const UsageError& error) {  // of another kind of link, perhaps
+    } catch (const UsageError& error) {  // the request may be of another kind of link
       if (!unreadable) unreadable = error;
     }
   }
@@ -139,14 +139,14 @@ int identify_capture(const Invocation& invocation) {
   return status;
 }
 
-// A folder may be an export of a logic analyser.
+// A folder may be the export of a logic analyser.
 bool is_capture(std::string_view where) {
   std::error_code error;
   return std::filesystem::is_regular_file(where, error) || std::filesystem::is_directory(where, error);
 }
 
-// What is written like a file and is not there would be taken for a port. Interfaces of CAN have names like can0, and
-// ports of this machine are below /dev.
+// Reports a missing file: otherwise its name would be taken for a port. Interfaces of CAN have names like can0, ports
+// of this computer are below /dev.
 void refuse_missing_file(std::string_view where) {
   const std::filesystem::path path(where);
   std::error_code error;

@@ -28,7 +28,7 @@ namespace {
 
 using Rows = std::vector<std::vector<std::string>>;
 
-// Turns are shown as the encoder counts them: most count on from 0 backwards to their greatest number.
+// Describes the range of turns as the encoder counts them; backwards from 0 most continue at their greatest number.
 std::string turns_text(const Resolution& resolution) {
   const std::int64_t count = std::int64_t{1} << resolution.multiturn_bits;
   const std::int64_t least = resolution.multiturn_signed ? -count / 2 : 0;
@@ -84,7 +84,7 @@ Json identity_json(const EncoderAddress& uri, const Resolution& resolution) {
       .set("options", options_to_json(unit, uri.options));
 }
 
-/// A card has what tells one encoder from another, how it is reached, and its temperature.
+/// Returns whether the card shows a field: identity, connection and temperature.
 class CardRows final : public FieldSink {
  public:
   explicit CardRows(const Command& command) : command_(command) {}
@@ -106,10 +106,10 @@ class CardRows final : public FieldSink {
   const Command& command_;
 };
 
-/// Asks the encoder and keeps what it says, for people and for programs.
+/// Reads identity, settings and state of the encoder and collects them as rows and as JSON.
 class Survey {
  public:
-  /// `all`: every field and every setting; else a card.
+  /// `all`: collect every field and setting; otherwise a card.
   Survey(const EncoderAddress& uri, bool all)
       : encoder_(open_connection(uri)), resolution_(uri.unit->resolution(uri.options)), all_(all) {}
 
@@ -128,7 +128,7 @@ class Survey {
     FieldTable table;
     encoder_->report(table);
     for (std::vector<std::string>& row : table.rows) row.front().insert(0, "  ");
-    // A setting that the identity has shown already is not shown again.
+    // Skips a setting that the identity has already shown.
     const auto is_shown = [&](const auto& row) { return std::find(rows.begin(), rows.end(), row) != rows.end(); };
     if (command.verb == Verb::config_get && std::all_of(table.rows.begin(), table.rows.end(), is_shown)) return;
     add_heading(command);
@@ -163,16 +163,16 @@ class Survey {
     if (is_doubtful) add_line("  no two readings in a row agree as well as the fastest shaft allows");
   }
 
-  /// What the encoder's answers show; before them, what it was told to be.
+  /// Returns the resolution in the encoder's replies; before the first reply, that of the options.
   [[nodiscard]] const Resolution& resolution() const { return resolution_; }
 
   Json answers = Json::object();
   Rows rows;
-  std::string below;              // the rows: alarms in words, and why a position is doubtful
-  std::vector<Trouble> troubles;  // one of each kind
+  std::string below;              // printed below the rows: alarms in words, and why a position is doubtful
+  std::vector<Trouble> troubles;  // the first failure with each error
 
  private:
-  // Several commands may tell the same of the encoder.
+  // Adds rows that are not there yet: several commands may report the same value.
   void add_new(Rows more) {
     for (std::vector<std::string>& row : more) {
       if (std::find(rows.begin(), rows.end(), row) == rows.end()) rows.push_back(std::move(row));
@@ -193,7 +193,7 @@ class Survey {
     return a.singleturn_bits == b.singleturn_bits && a.multiturn_bits == b.multiturn_bits && a.unit_um == b.unit_um;
   }
 
-  // The first who says it, since he was asked who he is.
+  // Keeps the resolution of the first reply, which is the one to the identity command.
   void hear(const Resolution& resolution) {
     if (!heard_) resolution_ = resolution;
     heard_ = true;
@@ -209,7 +209,7 @@ class Survey {
   void fail(const Command& command, const Trouble& trouble) {
     answers.set(command.name, to_json(trouble));
     const std::string why = fmt::format("{}: {}", text_of(trouble.error).name, trouble.message);
-    // Nor is the same reason of one setting after the other.
+    // Reports only the first of several settings that fail for the same reason.
     if (command.verb == Verb::config_get && why == std::exchange(failed_setting_, why)) return;
     rows.push_back({std::string(command.name), "FAILED", why});
     const bool is_known = std::any_of(troubles.begin(), troubles.end(),
@@ -220,8 +220,8 @@ class Survey {
   std::unique_ptr<Connection> encoder_;
   Resolution resolution_;
   bool all_;
-  bool heard_ = false;          // from the encoder
-  std::string failed_setting_;  // why the last one was not told
+  bool heard_ = false;          // whether a reply has reported the resolution
+  std::string failed_setting_;  // reason of the last setting that failed
 };
 
 int run_info(const Invocation& invocation) {

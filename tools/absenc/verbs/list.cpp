@@ -37,17 +37,18 @@ std::string argument_names(const Command& command) {
   return text;
 }
 
-// Rows indented below their heading; nothing when there are none.
+// Returns rows indented below their heading; "" without rows.
 std::string section(std::string_view heading, Rows rows) {
   if (rows.empty()) return {};
   for (auto& row : rows) row.front().insert(0, "  ");
   return fmt::format("\n{}\n{}", heading, table(rows));
 }
 
-// As this model has it.
+// Returns the line of the unit with the options of this model.
 std::string line_of_model(const Unit& unit, const Model& model) {
   Options options;
-  static_cast<void>(resolve_options(unit, model.name, {}, options));  // a name of its own, and nothing else
+  static_cast<void>(resolve_options(unit, model.name, {},
+                                    options));  // cannot fail: the name is the unit's own, without further options
   return line_of(unit.link, line_settings(unit, options));
 }
 
@@ -79,7 +80,7 @@ Rows option_rows(const Unit& unit) {
   return rows;
 }
 
-// As in protocol/word_format.hpp.
+// Spelling of position words as in protocol/word_format.hpp.
 Rows word_rows(const Unit& unit) {
   if (!takes_word(unit)) return {};
   return {
@@ -201,7 +202,7 @@ Json models_json(const Unit& unit) {
   });
 }
 
-// Sets what it is to those who know no protocol, where it is anything.
+// Sets "role" if the field, option or argument has a role.
 Json with_role(Json json, Role role) {
   const std::string_view name = name_of(role);
   return name.empty() ? json : json.set("role", name);
@@ -325,7 +326,7 @@ Json name_json(std::string_view name, const EncoderAddress& uri) {
       .set("options", options_to_json(*uri.unit, uri.options));
 }
 
-// Nothing is shown when one of them is wrong.
+// Checks all names first, so that nothing is printed if one is wrong.
 int list_names(bool json) {
   const NamedEncoders names = require_names("the names are those of absenc.toml");
   Rows rows{{"NAME", "ENCODER", "MODEL"}};

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Brings bytes of an encoder's memory to what they should be: shows, asks, writes what differs, reads back.
+// Writes bytes to an encoder's memory: shows the differences, asks, writes them and reads them back.
 #pragma once
 
 #include "absenc/client/memory.hpp"
@@ -11,19 +11,19 @@ namespace absenc::tool {
 
 using namespace client;
 
-/// What --force makes of it.
+/// Returns the access: with --force also to protected memory.
 [[nodiscard]] inline Access write_access(const Invocation& invocation) {
   return invocation.has("--force") ? Access::force : Access::write;
 }
 
-/// Heeds --yes, --json and --dry-run; returns the exit status. When it ends too early it says which bytes were written
-/// and which were not. `wanted` must be open. Throws UsageError when nobody can be asked.
+/// Writes `wanted`, with --yes, --json and --dry-run; returns the exit status. If it ends early, it prints which bytes
+/// were written and which were not. All addresses of `wanted` must be writable. Throws UsageError without a terminal.
 int change_memory(const Invocation& invocation, const EncoderAddress& uri, const MemoryImage& wanted, Access access);
 
-/// What the encoder has at the addresses of `image`, with progress on a terminal.
+/// Returns the encoder's bytes at the addresses of `image`, with progress on a terminal.
 [[nodiscard]] MemoryImage read_memory(Memory& memory, const MemoryImage& image);
 
-/// WHERE, FILE, ENCODER: a row for up to 8 bytes that follow each other.
+/// Returns the columns WHERE, FILE and ENCODER, with one row for up to 8 consecutive bytes.
 [[nodiscard]] std::string difference_table(const Unit& unit, std::string_view wanted_name, const MemoryImage& differing,
                                            const MemoryImage& found);
 [[nodiscard]] Json differences_json(const MemoryImage& differing, const MemoryImage& found);

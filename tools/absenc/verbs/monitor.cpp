@@ -37,12 +37,12 @@ std::vector<Shown> look_at(const Watches& watches, std::size_t selected) {
 
 // ---- On a terminal
 
-/// Keys change what is shown, and ask before they change an encoder.
+/// The interactive screen. Keys that change an encoder ask first.
 class Controls {
  public:
   explicit Controls(Watches& watches) : watches_(&watches) {}
 
-  /// False to quit.
+  /// Handles a key; returns false to quit.
   bool take(Key key) {
     const bool answers = !view_.question.empty() && key != Key::none && key != Key::resized;
     if (answers) {
@@ -103,7 +103,7 @@ class Controls {
 
   Watches* watches_;
   View view_;
-  const Command* asked_ = nullptr;  // what the question is about
+  const Command* asked_ = nullptr;  // the command that the question is about
 };
 
 void run_on_screen(Screen& screen, Watches& watches, Time end) {
@@ -114,9 +114,9 @@ void run_on_screen(Screen& screen, Watches& watches, Time end) {
   }
 }
 
-// ---- Without
+// ---- Without a terminal
 
-/// Tells on standard error when an encoder's state changes.
+/// Prints to standard error when an encoder's state changes.
 class Changes {
  public:
   void tell(const std::vector<Shown>& encoders) {
@@ -137,7 +137,7 @@ class Changes {
 
 void print_lines(const Watches& watches, bool json, Time interval, Time end) {
   Changes changes;
-  Time next = os::now() + std::min<Time>(interval, 500ms);  // the first lines when there is something to tell
+  Time next = os::now() + std::min<Time>(interval, 500ms);  // the first lines once encoders had time to reply
   try {
     while (os::now() < end) {
       os::sleep_until(std::min({next, end, os::now() + refresh}));
@@ -152,7 +152,7 @@ void print_lines(const Watches& watches, bool json, Time interval, Time end) {
   }
 }
 
-// Returns whether each encoder was read, and none had ended.
+// Returns whether each encoder was read and none has ended.
 bool summarize(const Watches& watches, Time start, Time processor) {
   std::uint64_t readings = 0;
   bool all_read = true;
@@ -178,7 +178,7 @@ Watches make_watches(const Invocation& invocation, double rate) {
   require_different(uris, names);
   Watches watches;
   for (std::size_t i = 0; i < uris.size(); ++i) {
-    // Side by side and not all at once.
+    // Spreads the readings over the period, so that they do not coincide.
     const double share = rate > 0 ? static_cast<double>(i) / (rate * static_cast<double>(uris.size())) : 0;
     const Time offset(static_cast<std::int64_t>(1e9 * share));
     watches.push_back(std::make_unique<Watch>(names[i], uris[i], rate, offset));

@@ -22,7 +22,7 @@ namespace absenc::tool {
 
 namespace {
 
-/// Says once a second how far it is.
+/// Shows the progress of a recording once a second.
 class Report {
  public:
   void show(const Recording& recording, const Encoder& live) {
@@ -42,9 +42,9 @@ class Report {
   Time next_{};
 };
 
-// What comes between the readings is told; the file has it too.
+// Prints losses, returns and failures between readings; the file has them too.
 void tell(const Sample& sample, const Encoder& live, Report& report) {
-  if (sample.restarted && live.restarts() == 1) {  // the summary says how often
+  if (sample.restarted && live.restarts() == 1) {  // only the first time; the summary has the count
     report.clear();
     print_message(sample.message);
   }
@@ -73,7 +73,7 @@ RecordingSettings settings_of(const Invocation& invocation) {
   return settings;
 }
 
-// `whole`: what was written is in the files.
+// `whole`: the files were completed without an error.
 void summarize_recording(const Recording& recording, const Encoder& live, bool whole) {
   std::string text = fmt::format("{} readings and {} failures in {} {}", recording.counts().readings,
                                  recording.counts().failures, to_text(os::now() - recording.start()),

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What every verb that runs commands of a protocol does: ask, run, show the result or the failure.
+// Runs a command of a protocol for any verb: asks, runs, prints the result or the failure.
 #pragma once
 
 #include "absenc/client/encoder/connection.hpp"
@@ -9,11 +9,11 @@ namespace absenc::tool {
 
 using namespace client;
 
-/// One command with everything around it. Heeds --yes and --json; returns the exit status. Throws UsageError when
-/// nobody can be asked, EncoderFailure.
+/// Asks, runs one command and prints its result, with --yes and --json; returns the exit status. Throws UsageError
+/// without a terminal, EncoderFailure.
 int run_command(const Invocation& invocation, const EncoderAddress& uri, const Command& command, Arguments arguments);
 
-/// A command of Verb::scan, whose report is a list.
+/// Runs a command of Verb::scan, whose result is a list.
 int run_scan_command(const Invocation& invocation, const EncoderAddress& uri, const Command& command,
                      Arguments arguments);
 

@@ -20,7 +20,7 @@ namespace absenc::tool {
 
 namespace {
 
-/// Who was found: each record begins with whom it is of.
+/// The encoders found: each record begins with the address field of one encoder.
 struct Records final : FieldSink {
   struct Record {
     bool clash = false;
@@ -59,7 +59,7 @@ struct Records final : FieldSink {
     return table(rows);
   }
 
-  std::vector<const FieldInfo*> fields;  // in the order in which they came first
+  std::vector<const FieldInfo*> fields;  // in the order of their first appearance
   std::vector<Record> all;
 };
 

@@ -19,9 +19,9 @@ namespace {
 constexpr std::string_view usual_host = "127.0.0.1";
 constexpr std::uint16_t usual_port = 8420;
 constexpr std::string_view no_history = "none";
-constexpr Time between_looks = std::chrono::milliseconds(100);  // another thread may have taken the signal
+constexpr Time between_looks = std::chrono::milliseconds(100);  // polled, because another thread may receive the signal
 
-// "HOST:PORT", "HOST", ":PORT"
+// Parses "HOST:PORT", "HOST" or ":PORT".
 void set_place(serve::Choices& choices, std::string_view written) {
   const std::size_t bracket = written.rfind(']');
   const std::size_t colon = written.find(':', bracket == std::string_view::npos ? 0 : bracket);
@@ -36,9 +36,9 @@ void set_place(serve::Choices& choices, std::string_view written) {
   choices.port = static_cast<std::uint16_t>(*port);
 }
 
-constexpr std::string_view home_assistant = "--home-assistant";  // a flag
+constexpr std::string_view home_assistant = "--home-assistant";  // the only one of these options without a value
 
-// Options that say the same as absenc.toml.
+// Options that set the same as settings of absenc.toml.
 struct OutletParameter {
   std::string_view option;
   std::string_view section;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A virtual encoder on a port that is there already: a serial one of a cable to another computer or of a USB gadget, or
-// a CAN interface.
+// Runs a virtual encoder on an existing port: a serial port with a cable to another computer, a USB gadget, or a CAN
+// interface.
 #pragma once
 
 #include <cstdint>
@@ -15,14 +15,14 @@ namespace absenc::tool {
 
 using namespace client;
 
-/// "/dev/ttyUSB1", with settings of the port behind it as behind an encoder. Throws UsageError.
+/// Parses "/dev/ttyUSB1" with settings of the port behind `?`, as in an address. Throws UsageError.
 [[nodiscard]] EncoderAddress parse_served_port(const Unit& unit, std::string_view text);
 
-/// Says that it is ready, and serves until a signal or `end`. A port that goes away is waited for: whoever plugs it in
-/// again finds the encoder as it was. A transfer due within `send_slack` is sent at once.
-/// Throws os::Failure when it cannot be opened at first.
+/// Prints that it is ready, and runs until a signal or `end`. It waits for a port that was lost; the encoder then
+/// continues unchanged. A transfer due within `send_slack` is sent at once.
+/// Throws os::Failure if the port cannot be opened at the start.
 void serve_port(Machine<std::uint8_t>& device, const EncoderAddress& uri, Time end);
-/// The same on a CAN interface, as "vcan0".
+/// Does the same on a CAN interface such as "vcan0".
 void serve_interface(Machine<CanFrame>& device, const std::string& interface, const LineSettings& line, Time end);
 
 }  // namespace absenc::tool

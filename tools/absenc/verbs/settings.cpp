@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// `config get` and `config set`: the settings that a protocol has commands for.
+// The verbs `config get` and `config set`, for the settings of a protocol.
 #include <fmt/format.h>
 
 #include <array>
@@ -45,7 +45,7 @@ int run_get(const Invocation& invocation) {
   return exit_good;
 }
 
-// "-" where it is not told.
+// Returns the value as text; "-" if the encoder did not report it.
 std::string text_of_field(const Answer& answer, std::string_view field) {
   for (std::size_t i = 0; i < answer.columns.size(); ++i) {
     if (answer.columns[i].name == field) return to_text(answer.columns[i], answer.values[i]);
@@ -67,7 +67,7 @@ void show_change(std::string_view name, const Answer& old, const Answer& now) {
   print_line(table(rows));
 }
 
-// With --force the setter's argument of that role is 1.
+// With --force, sets the setter's argument of role `force` to 1.
 std::vector<std::int64_t> setter_arguments(const Invocation& invocation, const Unit& unit, const Command& setter) {
   std::vector<std::int64_t> values = require_arguments(setter, invocation.texts("values"));
   if (!invocation.has("--force")) return values;
