@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Which view is shown, and what the stream of events says to it.
+// Selects the view from the address and passes the server's events to it.
 import {askToken} from "./dialog.js";
 import {setText} from "./dom.js";
 import {One} from "./encoder.js";
@@ -18,9 +18,9 @@ const tokenButton = document.getElementById("token");
 
 let view;
 let events;
-let shown;  // the encoder whose page it is; null: all
+let shown;  // name of the encoder that is shown; null: all encoders
 
-/** `refused`: the server is there and says why it sends nothing. */
+/** Shows that no events arrive. `refused`: the server responds but refuses the stream; `why` is its reason. */
 function lose(why, refused = false) {
   if (connection.hidden && !refused) notifyLoss(why);
   connection.hidden = false;
@@ -29,7 +29,7 @@ function lose(why, refused = false) {
   view.lose(refused ? why : undefined);
 }
 
-// A token that the server wants even to look.
+// Also offers the token dialog, because the server may require a token for reading.
 function explain(why, refused) {
   lose(why, refused);
   tokenButton.hidden = false;
@@ -44,7 +44,7 @@ function take(event, data) {
     historyTrouble.hidden = trouble === "";
     setText(historyTrouble, trouble === "" ? "" : `The history is not being written: ${trouble}. Rows lost so far: ${data.history.lost}.`);
     view.show(data);
-    if (view.isServed === false) {  // since absenc.toml was read again
+    if (view.isServed === false) {  // the encoder was removed from absenc.toml, and the server has reloaded it
       connection.hidden = false;
       setText(connection, `${shown} is not served any more: absenc.toml was read again, without it. Nothing on this page is live.`);
     }
@@ -56,7 +56,7 @@ function take(event, data) {
   view.take(event, data);
 }
 
-// What is not written as an address writes it is what it says: nobody has an encoder of that name.
+// Returns invalid percent-encoding unchanged: no encoder has that name, so the page reports it as unknown.
 function decoded(text) {
   try {
     return decodeURIComponent(text);
@@ -65,7 +65,7 @@ function decoded(text) {
   }
 }
 
-/** {encoder, tab, range, unit} of the address: a link to it can be shared. */
+/** Returns {encoder, tab, range, unit} from the fragment of the address, so that links to a view can be shared. */
 function place() {
   const values = new URLSearchParams();
   for (const part of location.hash.slice(1).split("&")) {
@@ -92,7 +92,7 @@ async function greet() {
   try {
     tokenButton.hidden = !(await tokenInfo()).tokens;
   } catch {
-    // the stream says that the server is away
+    // the event stream reports that the server is unreachable
   }
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Questions: the token, and whether an encoder is to be changed.
+// Dialogs: token, confirmation of commands, acknowledgement of alarms.
 import {element, terms} from "./dom.js";
 import {plain, forPeople} from "./words.js";
 import {forgetToken, tokenInfo, tryToken} from "./server.js";
@@ -10,9 +10,9 @@ const body = document.getElementById("dialog-body");
 const wrong = document.getElementById("dialog-wrong");
 const yes = document.getElementById("dialog-yes");
 const no = document.getElementById("dialog-no");
-const WRITING_MS = 300;  // after a key, before the encoder is asked
+const WRITING_MS = 300;  // after a key, before the encoder is polled
 
-/** Shows `nodes`; `agree` answers "" when all is well, else what is wrong. Resolves to whether it was agreed. */
+/** Shows a dialog with `nodes`. `agree` returns "" to close it, else an error text. Resolves to true after consent. */
 function ask(words, button, nodes, agree) {
   title.textContent = words;
   body.replaceChildren(...nodes);
@@ -44,7 +44,7 @@ function ask(words, button, nodes, agree) {
 const tokenField = () => element("input", {type: "password", autocomplete: "off", id: "dialog-token"});
 const tokenLabel = (input) => element("label", {class: "field"}, "Your token, from the server's token file. It is forgotten when this tab is closed.", input);
 
-/** The button of the bar. */
+/** Dialog of the token button in the bar: enters or forgets the token of this tab. */
 export async function askToken() {
   const {name} = await tokenInfo();
   if (name !== null) {
@@ -55,7 +55,7 @@ export async function askToken() {
   await ask("Token", "Use it", [tokenLabel(input)], () => tryToken(input.value.trim()));
 }
 
-/** Whether the alarm is to be acknowledged, by the token of this tab or one that is given now. */
+/** Asks for consent to acknowledge an alarm, and for a token if this tab has none. Returns whether it was given. */
 export async function askAcknowledge(name, alarm) {
   const {name: who} = await tokenInfo();
   const token = tokenField();
@@ -65,8 +65,8 @@ export async function askAcknowledge(name, alarm) {
 }
 
 /**
- * Whether `command` is to be run. `now(values)`: what is so now, or "" where that says nothing; `then(values)`: what
- * will be. Returns the arguments, or null.
+ * Asks for the arguments of `command` and for consent. `now(values)` returns the current value, "" to show none;
+ * `then(values)` returns the value after the command. Returns the arguments, or null without consent.
  */
 export async function askCommand(name, command, now, then) {
   const {name: who} = await tokenInfo();
@@ -89,7 +89,7 @@ export async function askCommand(name, command, now, then) {
     } catch (error) {
       text = `not known: ${error.message}`;
     }
-    if (question !== asked) return;  // another was asked meanwhile
+    if (question !== asked) return;  // a newer request has replaced this one
     before.replaceChildren(text);
     before.closest("dl > div")?.toggleAttribute("hidden", text === "");
   };

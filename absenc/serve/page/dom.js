@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Elements, drawings and tables. Texts of the server are put in as text, never as markup.
+// Creates elements, drawings and tables. Texts from the server are inserted as text, never as markup.
 
-/** element("p", {class: "why"}, "text", child) */
+/** Creates an element: element("p", {class: "why"}, "text", child). */
 export function element(name, attributes = {}, ...children) {
   const made = document.createElement(name);
   for (const [key, value] of Object.entries(attributes)) {
@@ -12,7 +12,7 @@ export function element(name, attributes = {}, ...children) {
   return made;
 }
 
-/** Changes the text only if it is another, so that screen readers and selections are not disturbed. */
+/** Sets the text only if it differs, so that screen readers and selections are not disturbed. */
 export function setText(node, text) {
   const only = node.firstChild;
   if (only === null || only !== node.lastChild || only.nodeType !== Node.TEXT_NODE) {
@@ -22,7 +22,7 @@ export function setText(node, text) {
   }
 }
 
-/** Sets a property or an attribute only if it is another: each write has the browser compute styles anew. */
+/** These functions write only a changed value, because each write makes the browser compute styles again. */
 export function setClass(node, name) {
   if (node.className !== name) node.className = name;
 }
@@ -33,7 +33,7 @@ export function setHidden(node, on) {
   if (node.hasAttribute("hidden") !== on) node.toggleAttribute("hidden", on);
 }
 
-/** Replaces the children only if they would be others, and keeps the focus on the region of the same name. */
+/** Replaces the children only if they differ, and keeps the focus on the region with the same label. */
 export function setChildren(node, ...children) {
   const made = element("div", {}, ...children);
   if (node.innerHTML === made.innerHTML) return;
@@ -51,20 +51,20 @@ function drawing(name, attributes = {}, ...children) {
   return made;
 }
 
-/** A name that may be broken behind its separators, and nowhere else. */
+/** Allows line breaks in a name after its separators only. */
 export function breakable(text) {
   const parts = text.split(/(?<=[?&=:/_,])/);
   return parts.flatMap((part, i) => (i === 0 ? [part] : [element("wbr"), part]));
 }
 
-/** A sentence in which `this` is a command line. */
+/** Converts a text in which `backquotes` mark command lines. */
 export const rich = (text) => text.split("`").map((part, i) => (i % 2 === 1 ? element("code", {}, part) : part));
 
-/** A dial. `turn` sets its needle in degrees clockwise from the top; null hides it. */
+/** Creates a dial. `turn` sets the needle in degrees clockwise from the top; null hides it. */
 export function dial() {
   const needle = drawing("line", {class: "needle", y1: 0, y2: -36});
   const ticks = Array.from({length: 12}, (_, i) => drawing("line", {class: "tick", y1: -46, y2: -40, transform: `rotate(${30 * i})`}));
-  const node = drawing("svg", {viewBox: "-50 -50 100 100", class: "dial off", "aria-hidden": "true"},  // the number stands beside it
+  const node = drawing("svg", {viewBox: "-50 -50 100 100", class: "dial off", "aria-hidden": "true"},  // screen readers get the number beside it
                        drawing("circle", {r: 46}), ...ticks, needle, drawing("circle", {class: "hub", r: 5}));
   let shown;
   return {
@@ -78,7 +78,7 @@ export function dial() {
   };
 }
 
-/** A scale from 0 to its end. `move` sets its mark as a share from 0 to 1; null hides it. */
+/** Creates a scale for linear encoders. `move` sets the mark, from 0 to 1 of the length; null hides it. */
 export function scale() {
   const filled = element("span", {class: "filled"});
   const mark = element("span", {class: "mark"});
@@ -99,16 +99,16 @@ export function scale() {
 }
 
 const SPARK_S = 60;
-const SPARK_LOST_S = 15;  // so much of the width is left for the time without readings
+const SPARK_LOST_S = 15;  // width of the area that marks the time without readings
 
-/** The line of a minute. */
+/** Creates the small plot of the last minute. */
 export function spark() {
   const line = drawing("path", {class: "line"});
   const gap = drawing("rect", {class: "gap", y: 0, height: 100, width: 0});
   const node = drawing("svg", {viewBox: "0 0 600 100", preserveAspectRatio: "none", class: "spark", "aria-hidden": "true"}, gap, line);
   return {
     node,
-    /** `points`: [seconds, value]; `least`: the smallest range that fills the height; `live`: false marks the end. */
+    /** `points`: [seconds, value]; `least`: smallest range of the y axis; `live`: false marks the time after the last point. */
     draw(points, now, least, live) {
       const last = points.at(-1)?.[0] ?? now;
       const end = live ? now : Math.min(now, last + SPARK_LOST_S);
@@ -133,7 +133,7 @@ export function spark() {
   };
 }
 
-/** `cells` makes the texts or elements of a row. */
+/** Creates a table; `cells` returns the texts or elements of a row. */
 function narrowTable(head, list, cells, caption) {
   const line = (one) => element("tr", {}, ...cells(one).map((cell) => element("td", {}, cell)));
   return element("table", {"aria-label": caption},
@@ -141,12 +141,12 @@ function narrowTable(head, list, cells, caption) {
                  element("tbody", {}, ...list.map(line)));
 }
 
-/** A table that may be wider than the page. */
+/** Creates a table that scrolls if it is wider than the page. */
 export function table(head, list, cells, caption) {
   return element("div", {class: "scroll", tabindex: 0, role: "region", "aria-label": caption}, narrowTable(head, list, cells, caption));
 }
 
-/** A table of [name, count], with bars beside the counts. */
+/** Creates a table of [name, count] with bars beside the counts. */
 export function histogram(head, list, caption) {
   const most = Math.max(1, ...list.map(([, count]) => count));
   const bar = (count) => element("span", {class: "bar", style: `width: ${100 * count / most}%`, "aria-hidden": "true"});
@@ -155,12 +155,12 @@ export function histogram(head, list, caption) {
   return made;
 }
 
-/** A list of [term, value]. */
+/** Creates a description list from [term, value] pairs. */
 export function terms(list) {
   return element("dl", {}, ...list.map(([term, value]) => element("div", {}, element("dt", {}, term), element("dd", {}, value))));
 }
 
-/** Buttons of which one is chosen. `list`: [[value, text], ...]. */
+/** Creates a group of buttons with one selected. `list`: [[value, text], ...]. */
 export function choice(label, list, chosen, onChoice) {
   const buttons = list.map(([value, text]) => element("button", {
     type: "button", "aria-pressed": String(value === chosen), "data-value": value,

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// One encoder: what it does, what is wrong, what can be done; the rest in tabs.
+// Page of one encoder: current position and plot, faults, commands, and tabs with details.
 import {askAcknowledge, askCommand} from "./dialog.js";
 import {breakable, choice, dial, element, histogram, rich, scale, setChildren, setText, table, terms} from "./dom.js";
 import {Examine} from "./examine.js";
@@ -8,18 +8,18 @@ import {Trace, isMarked, markText, quantities} from "./plots.js";
 import {download, pathOf, request, tokenInfo} from "./server.js";
 import {SHAPES, belowFigure, clock, condition, duration, fieldName, fieldText, figure, forPeople, happened, lastText, microseconds, numberText, plain, sentence, valueText, wrongs} from "./words.js";
 
-const LIVE_MS = 20000;      // as long as the server keeps points
-const LOST_SHARE = .15;     // of the trace of a lost encoder: the time without readings
+const LIVE_MS = 20000;      // the server stores points for this time
+const LOST_SHARE = .15;     // share of a lost encoder's plot that shows the time without readings
 const MOST_POINTS = 2500;
 const REFRESH_MS = 1000;
-const WRITTEN_MS = 1500;    // after that an event stands in the history
+const WRITTEN_MS = 1500;    // after this time an event is in the history
 const PAST_MS = 10000;
 const MOST_EVENTS = 100;
 const RANGES = {live: ["Live", 0], "10m": ["10 min", 600], "1h": ["1 h", 3600], "24h": ["24 h", 86400], "7d": ["7 days", 604800], all: ["All", 31 * 86400]};
 const TABS = {history: "History", exchanges: "Exchanges", settings: "Settings", memory: "Memory", doctor: "Doctor"};
 const AWAY = ["opening", "lost", "examined"];
 const SHOWN_COMMANDS = 3;
-const LEAST_MS = 12;      // between two points
+const LEAST_MS = 12;      // minimum distance of two points
 
 const byteText = (byte) => (Number.isNaN(byte) ? "?" : `0x${byte.toString(16).toUpperCase().padStart(2, "0")} (${byte})`);
 
@@ -28,7 +28,7 @@ function limitText(us) {
   return us >= 1e3 ? `${us / 1e3} ms` : `${us} µs`;
 }
 
-// From the first bucket with something in it to the last.
+// Returns the rows from the first to the last bucket that is not empty.
 function latencyRows(buckets) {
   const filled = buckets.map(({count}) => count !== 0);
   return buckets.slice(Math.max(0, filled.indexOf(true)), filled.lastIndexOf(true) + 1)
@@ -41,7 +41,7 @@ export class One {
     this.trace = name;
     this.points = [];     // [at_ms, position, speed]
     this.events = [];
-    this.loss = 0;        // counts losses of the server: an answer from before one is dropped
+    this.loss = 0;        // number of connection losses: a response from before a loss is ignored
     this.hasHistory = true;
     this.values = new Map(values);
     this.build(main, bar);
@@ -65,7 +65,7 @@ export class One {
     this.below = element("p", {class: "below"});
     this.ranges = element("div");
     this.units = element("div");
-    this.scale.node.hidden = true;  // until it is known to be linear
+    this.scale.node.hidden = true;  // until the encoder is known to be linear
     this.plot = element("div", {class: "plot", hidden: true, role: "img", "aria-label": "trace"});
     this.noTrace = element("p", {class: "faint"});
     this.wrong = element("div");
@@ -112,7 +112,7 @@ export class One {
     this.showTab();
   }
 
-  /** Left and right between the tabs, as in any list of tabs. */
+  /** Moves between tabs with the left and right keys. */
   step(event) {
     const move = {ArrowRight: 1, ArrowLeft: -1}[event.key];
     if (move === undefined) return;
@@ -122,7 +122,7 @@ export class One {
     this.tabs[next].focus();
   }
 
-  /** Into the address, so that it can be shared. */
+  /** Stores a value in the fragment of the address, so that the view can be shared as a link. */
   set(name, value) {
     this.values.set(name, value);
     const values = [...this.values].map(([key, text]) => `${key}=${encodeURIComponent(text)}`).join("&");
@@ -156,7 +156,7 @@ export class One {
     return key in RANGES && this.hasHistory ? key : "live";
   }
 
-  /** Range and unit, with the plot of that unit. */
+  /** Shows the buttons for range and unit, and restarts the plot if the selection has changed. */
   showChoices() {
     const all = quantities(this.one);
     const possible = Object.entries(all).filter(([, one]) => !one.past || this.range !== "live");
@@ -180,7 +180,7 @@ export class One {
     return document.querySelector(`.one ${selector}`);
   }
 
-  /** The last seconds that the server knows, of a lost encoder those before its loss. */
+  /** Loads the last 20 seconds of points from the server; for a lost encoder these are from before the loss. */
   async seed() {
     try {
       const {status, body} = await request(pathOf(this.name, "points"));
@@ -189,7 +189,7 @@ export class One {
       this.points.unshift(...body.points.filter(([at]) => at < first));
       this.changed = true;
     } catch {
-      // the stream says that the server is away
+      // the event stream reports that the server is unreachable
     }
   }
 
@@ -218,7 +218,7 @@ export class One {
     if (scaled) this.scale.move(one.position_mm === null ? null : one.position_mm / one.length_mm, `${numberText(one.length_mm)} mm`);
     const counts = one.counts === null ? [] : [`${numberText(one.counts)} ${one.counts_in_all === null ? "counts" : `of ${numberText(one.counts_in_all)} counts`}`];
     showParts(this.below, [...belowFigure(one, state.at_ms), ...counts]);
-    // A command could not reach it; doctor says why.
+    // No command can reach the encoder in these states; the doctor finds the reason.
     for (const button of this.commands.querySelectorAll("[data-command]")) button.disabled = AWAY.includes(one.state);
     this.showWrong();
     this.showChoices();
@@ -231,7 +231,7 @@ export class One {
     if (changed || one.state !== "live") this.changed = true;
   }
 
-  /** Who has seen an alarm is kept by the server; the alarm stays. */
+  /** Acknowledges an alarm: the server stores the user; the alarm stays raised. */
   async acknowledge(alarm) {
     try {
       if (!await askAcknowledge(this.name, alarm)) return;
@@ -296,10 +296,10 @@ export class One {
       if (point[0] - (this.points.at(-1)?.[0] ?? 0) >= LEAST_MS) this.points.push(point);
     }
     while (this.points.length > MOST_POINTS) this.points.shift();
-    if (this.range === "live") this.changed = true;  // the past is drawn anew with each look at the encoder
+    if (this.range === "live") this.changed = true;  // history plots are redrawn by refresh() only
   }
 
-  /** Rows of the plot from the points or the history, in the unit that is chosen. */
+  /** Returns the plot's rows, from the points or the history, in the selected unit. */
   rows() {
     const {of} = this.quantity;
     const row = (at, ...values) => [at, ...values.map((value) => value ?? null)];
@@ -342,7 +342,7 @@ export class One {
     const lostAt = isLive ? null : this.one.last_reading?.at_ms ?? newest;
     const from = this.range === "live" ? LIVE_MS : RANGES[this.range][1] * 1000;
     const now = this.at_ms;
-    // A loss must not lie beyond the end of the plot.
+    // The plot of a lost encoder ends after the loss, so that the loss is visible.
     const to = this.range !== "live" ? now : isLive ? newest : Math.min(now, newest + LOST_SHARE * LIVE_MS);
     const width = this.range === "all" ? Math.max(60000, to - rows[0][0]) : isLive || this.range !== "live" ? from : to - rows[0][0] + 1;
     const marks = this.range === "live" ? [] : this.events.filter(isMarked).reverse();
@@ -358,7 +358,7 @@ export class One {
     try {
       answer = await request(pathOf(this.name));
     } catch {
-      return;  // the stream says that the server is away
+      return;  // the event stream reports that the server is unreachable
     }
     if (this.closed || this.loss !== loss || answer.status !== 200) return;
     const one = answer.body;
@@ -394,7 +394,7 @@ export class One {
     ]));
   }
 
-  /** Buttons of the commands; those that changes an encoder first. */
+  /** Creates the command buttons. Commands that change the encoder come first. */
   async offer(one) {
     if (this.offered !== undefined) return;
     this.offered = one.commands;
@@ -432,7 +432,7 @@ export class One {
     return alarms || (this.one.alarms === null ? "alarms not reported" : "no alarms");
   }
 
-  /** Returns the value that the command changes; the encoder is asked for a setting or a byte. "": nothing to show. */
+  /** Returns the current value that the command would change; "" if there is none. Reads settings and memory bytes. */
   async now(command, values) {
     if (command.verb === "zero") {
       const {text, unit} = figure(this.one);
@@ -508,7 +508,7 @@ export class One {
       }
       this.changed = true;
     } catch {
-      // the stream says that the server is away
+      // the event stream reports that the server is unreachable
     } finally {
       this.loading = false;
     }

@@ -1,17 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
-// Examination, settings and memory: each is asked of the encoder when its button is pressed, and says of when it is.
+// Panels for examination, settings and memory. Each one reads when its button is pressed, and shows the time of reading.
 import {element, setText, table, terms} from "./dom.js";
 import {pathOf, request} from "./server.js";
 import {fieldName, plain, sentence, valueText, forPeople} from "./words.js";
 
 const inLine = () => (matchMedia("(max-width: 40rem)").matches ? 8 : 16);
-const GONE = new Set(["opening", "lost", "ended"]);  // another encoder may be there when the port comes back
+const GONE = new Set(["opening", "lost", "ended"]);  // the port may return with another encoder
 const THERE = new Set(["live", "examined"]);
 
 const hex = (number, digits) => number.toString(16).toUpperCase().padStart(digits, "0");
 const clock = () => new Date().toLocaleTimeString("en-GB");
 
-/** "00 5A", and what of it can be shown as characters. */
+/** Returns table rows of bytes, "00 5A", with their printable characters. */
 function dumpLines(part) {
   const bytes = part.data.match(/../g).map((pair) => parseInt(pair, 16));
   const lines = [];
@@ -29,7 +29,7 @@ function failures(failed) {
   return Object.entries(failed ?? {}).map(([name, why]) => element("p", {class: "why"}, `${name}: ${why}`));
 }
 
-/** A panel with a button, a line of status, and the answer. */
+/** A panel with a button, a status line, and the response. */
 class Asked {
   constructor(title, text, ...before) {
     this.button = element("button", {type: "button", onclick: () => this.run()}, text);
@@ -62,7 +62,7 @@ class Asked {
     setText(this.status, words);
   }
 
-  /** Removes a value that may no longer hold. */
+  /** Removes a result that may have become invalid. */
   wipe(why) {
     this.wiped = `what was read is no longer shown: ${why}`;
     if (this.result.childElementCount === 0) return;
@@ -149,10 +149,10 @@ export class Examine {
     this.doctor = new Doctor(name);
     this.settings = new Settings(name);
     this.memory = new Memory(name);
-    this.has = {settings: false, memory: false};  // until the server has said that there are some
+    this.has = {settings: false, memory: false};  // until `describe` is called
   }
 
-  /** Takes what of the encoder can be read. */
+  /** Sets which settings and memory the encoder has. */
   describe(readable) {
     if (this.described) return;
     this.described = true;

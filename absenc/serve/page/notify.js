@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// Notifications of the browser: of alarms and losses, where the user allows them.
+// Browser notifications of alarms and losses, if the user allows them.
 import {setText} from "./dom.js";
 import {happened, plain} from "./words.js";
 
 const button = document.getElementById("notify");
 const KINDS = ["alarm", "lost", "ended"];
-// A browser has them only for this computer's own pages and those behind TLS.
+// Browsers allow notifications only for pages of this computer or behind TLS.
 const isPossible = "Notification" in window && isSecureContext;
 
 const isWanted = () => isPossible && localStorage.getItem("notify") === "on" && Notification.permission === "granted";
@@ -36,7 +36,7 @@ function tell(title, body, tag, hash) {
   };
 }
 
-/** Of what happened: the first sentence is the title. */
+/** Notifies about an event; the name of the alarm or the kind of loss is the title. */
 export function notify({kind, encoder, text}) {
   if (!KINDS.includes(kind)) return;
   const [name, ...rest] = kind === "alarm" ? text.split(": ") : [happened(kind)[1], text];

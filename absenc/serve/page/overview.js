@@ -1,20 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
-// All encoders: a card for each, the ill first, and the bar above them.
+// Overview: a card for each encoder, faulty ones first, with filter and counts in the bar.
 import {breakable, dial, element, rich, scale, setClass, setHidden, setText, spark, toggleClass} from "./dom.js";
 import {request} from "./server.js";
 import {GROUPS, GROUP_WORDS, MORE_WORDS, SHAPES, belowFigure, condition, figure, numberText, wrongs} from "./words.js";
 
-const MANY = 30;           // beyond it cards are small
+const MANY = 30;           // with more encoders the cards are small
 const FEW = 3;
-const DRAW_MS = 5;         // for each encoder of many, between two drawings: so many more cost no more
-const ORDER_MS = 2000;     // cards change places no faster
+const DRAW_MS = 5;         // minimum time per encoder between two redraws, so that the load stays constant with many encoders
+const ORDER_MS = 2000;     // minimum time between two reorderings of the cards
 const MINUTE_S = 60;
 const MOST_WORDS = 2;
 
-/** The large figure with its unit; also used on the page of one. */
+/** Creates the large figure with its unit, for a card or the page of an encoder. */
 export function figureNode() {
   const digits = element("span", {class: "digits"});
-  const widest = element("span", {class: "widest", "aria-hidden": "true"});  // keeps the place of the widest value so far
+  const widest = element("span", {class: "widest", "aria-hidden": "true"});  // reserves the width of the widest value so far
   const unit = element("span", {class: "unit"});
   const node = element("p", {class: "figure"}, element("span", {class: "number"}, widest, digits), unit);
   let sizes;
@@ -36,7 +36,7 @@ export function figureNode() {
   };
 }
 
-/** Which of position and speed says more of the last minute: a position that turns on and on says nothing. */
+/** Selects position (1) or speed (2) for the small plot: speed if the position changed by more than two turns. */
 export function sparkColumn(points, linear) {
   if (linear) return 1;
   const places = points.map((row) => row[1]).filter((place) => place !== null);
@@ -44,7 +44,7 @@ export function sparkColumn(points, linear) {
   return turning ? 2 : 1;
 }
 
-/** Shows the parts, each on one line. */
+/** Shows texts in separate spans, none of which is broken across lines. */
 export function showParts(node, parts) {
   while (node.childElementCount > parts.length) node.lastChild.remove();
   while (node.childElementCount < parts.length) node.append(element("span"));
@@ -119,7 +119,7 @@ class Card {
     const text = JSON.stringify(shown);
     if (text === this.shownWords) return;
     this.shownWords = text;
-    // Of a long reason its first sentence; all of it stands on the page of the encoder.
+    // A long reason is reduced to its first sentence; the page of the encoder shows all of it.
     const first = (words) => /^.*?[.!?](?= [A-Z]|$)/.exec(words)?.[0] ?? words;
     this.words.replaceChildren(...shown.map(([kind, strong, words]) => element("p", {class: kind}, element("strong", {}, strong), element("span", {class: "more"}, strong && words ? " " : "", ...rich(strong ? words : first(words))))));
   }
@@ -132,7 +132,7 @@ class Card {
 
   drawTrace(now, live) {
     const column = sparkColumn(this.points, this.one.linear);
-    // Of an encoder without turns, so that the step from 360 to 0 degrees is none.
+    // Continues the position of a single-turn encoder across the step from 360 to 0 degrees.
     let turns = 0;
     const unwrapped = this.points.map((row, i) => {
       const step = i > 0 ? row[1] - this.points[i - 1][1] : 0;
@@ -162,7 +162,7 @@ export class Overview {
       element("p", {}, element("code", {}, "absenc serve \"sim:tformat?motion=rpm=60\" sim:esl")));
     this.noMatch = element("p", {class: "none", hidden: true}, "No encoder matches. ", element("button", {type: "button", onclick: () => this.clearFilter()}, "Show all"));
     main.replaceChildren(this.none, this.noMatch, this.list);
-    // They stay the same nodes, so that none loses the focus.
+    // The buttons are created once, so that none loses the focus.
     this.groups = new Map(GROUPS.map((group) => {
       const [shape, words, more] = [element("span", {"aria-hidden": "true"}), element("span"), element("span", {class: "where-wide"})];
       return [group, {shape, words, more, node: element("button", {type: "button", class: "pill", hidden: true, "data-group": group, onclick: () => this.choose(group)}, shape, words, more)}];
@@ -185,7 +185,7 @@ export class Overview {
       const {status, body} = await request("api/minute");
       if (status === 200) this.minutes = new Map(body.encoders.map((one) => [one.encoder, one.seconds]));
     } catch {
-      // the stream says that the server is away
+      // the event stream reports that the server is unreachable
     }
     for (const card of this.cards.values()) this.seedCard(card);
   }
@@ -197,7 +197,7 @@ export class Overview {
     card.seed(seconds);
   }
 
-  /** Many are drawn less often than the server may say something: nobody reads a hundred figures thirty times a second. */
+  /** Shows a state of the server. With many encoders it is redrawn less often than states arrive, to limit the load. */
   show(state) {
     const wait = state.encoders.length > MANY && this.cards.size > 0 ? this.drawn + DRAW_MS * state.encoders.length - performance.now() : 0;
     clearTimeout(this.later);
@@ -265,7 +265,7 @@ export class Overview {
     this.noMatch.toggleAttribute("hidden", shown.length > 0 || cards.length === 0);
     const nodes = shown.map((card) => card.node);
     if (nodes.length === this.list.childElementCount && nodes.every((node, i) => node === this.list.children[i])) return;
-    // The card with the focus stays where it is while the others are put around it: a node that is moved loses the focus.
+    // The card with the focus is not moved, because a moved node loses the focus; the others are placed around it.
     const kept = nodes.find((node) => node.contains(document.activeElement));
     for (const node of [...this.list.children]) {
       if (node !== kept) node.remove();
@@ -274,7 +274,7 @@ export class Overview {
     this.list.append(...nodes.slice(kept ? nodes.indexOf(kept) + 1 : 0));
   }
 
-  /** Nothing is known any more: no value is shown as the present one. */
+  /** Marks all encoders as unknown after the connection is lost, so that no old value is shown as current. */
   lose() {
     clearTimeout(this.later);
     for (const card of this.cards.values()) {

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-// The trace of one encoder: live, or of the history.
+// Plot of one encoder, from live points or the history.
 /* global Dygraph */
 import {happened, plain, clock} from "./words.js";
 
 const style = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
-// Sizes in the canvas and of its labels, from those of a page with letters of 16 pixels.
+// Scales a size in pixels, given for the usual font size of 16 pixels, to the font size of the page.
 const scaled = (pixels) => pixels * parseFloat(getComputedStyle(document.documentElement).fontSize) / 16;
 const NONE = [NaN, NaN, NaN];
 
-/** Returns the quantities that can be drawn: unit, value of [position, speed], smallest range. `past`: from the history alone. */
+/** Returns the quantities that can be plotted: unit, value of [position, speed], smallest range; `past`: history only. */
 export function quantities(one) {
   if (one.linear) {
     return {
@@ -28,7 +28,7 @@ export function quantities(one) {
   };
 }
 
-// Labels with as many decimals as tell one line of the grid from the next.
+// Creates grid labels with enough decimals to distinguish neighbours.
 function gridLines(quantity) {
   return (low, high, pixels, options, graph, values) => {
     if (quantity.turn === 360 && high - low > 300) {
@@ -36,7 +36,7 @@ function gridLines(quantity) {
       for (let at = 90 * Math.ceil(low / 90); at <= high; at += 90 * Math.max(1, Math.ceil((high - low) / 900))) lines.push({v: at, label: `${at}°`});
       return high - low < 400 ? lines : lines.filter((line) => line.v - low > .05 * (high - low));
     }
-    // A label at the lower end would stand on those of the time.
+    // A label at the lower end would overlap the labels of the time axis.
     const lines = Dygraph.numericTicks(low, high, pixels, options, graph, values).filter((line) => line.v - low > .05 * (high - low));
     if (lines.length < 2) return lines;
     const decimals = Math.min(9, Math.max(0, Math.ceil(-Math.log10(Math.abs(lines[1].v - lines[0].v)) - 1e-9)));
@@ -44,13 +44,13 @@ function gridLines(quantity) {
   };
 }
 
-// Words that would stand on others are left out: the tab of the history has them all.
+// Draws events as marks. A label that would overlap others is omitted; the history tab lists all events.
 const MARKED = ["alarm", "lost", "silent", "ended", "restarted"];
 export const isMarked = (event) => MARKED.includes(event.kind);
 export const markText = (event) => (event.kind === "alarm" ? plain(event.text.split(":")[0]) : happened(event.kind)[1]);
 
 function drawMarks(canvas, area, graph, marks) {
-  const free = [area.x, area.x, area.x];  // where each of three lines of words ends
+  const free = [area.x, area.x, area.x];  // right end of the labels in each of three lines
   for (const event of marks) {
     const x = Math.round(graph.toDomXCoord(event.at_ms)) + .5;
     if (x < area.x || x > area.x + area.w) continue;
@@ -107,7 +107,7 @@ export class Trace {
     canvas.restore();
   }
 
-  /** `rows`: [at_ms, least, mean, greatest], of which a null is a gap. `window`: [from, to] in ms. */
+  /** Draws rows of [at_ms, least, mean, greatest]; null values are a gap. `window`: [from, to] in ms. */
   draw(rows, window, {marks = [], lostAt = null} = {}) {
     this.marks = marks;
     this.lostAt = lostAt;
@@ -116,7 +116,7 @@ export class Trace {
     let low = Infinity;
     let high = -Infinity;
     let before = null;
-    // A turn is drawn from its start wherever a row lies within one.
+    // Positions are drawn within one turn if no row, and no step between rows, covers half a turn or more.
     const fits = within && rows.every((row, i) => row[2] === null ||
       (row[3] - row[1] < turn / 2 && (i === 0 || rows[i - 1][2] === null || this.quantity.wraps || Math.abs(row[2] - rows[i - 1][2]) < turn / 2)));
     for (const [at, ...values] of rows) {

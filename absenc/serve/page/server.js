@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Requests to the server with the token, and its stream of events, which says at once when it is lost.
+// Requests to the server, with the token, and its event stream, which reports a lost connection at once.
 
 let token = sessionStorage.getItem("token") ?? "";
 
@@ -11,10 +11,10 @@ export const forgetToken = () => setToken("");
 
 const headers = () => (token === "" ? {} : {Authorization: `Bearer ${token}`});
 
-/** The path of an encoder, or of a part of it. */
+/** Returns the API path of an encoder, or of one of its parts. */
 export const pathOf = (name, part = "") => `api/encoders/${encodeURIComponent(name)}${part && `/${part}`}`;
 
-/** JSON, also of an answer that is an error: {status, body}. */
+/** Sends a request and returns {status, body} with the parsed JSON body, also for an error status. */
 export async function request(path, values = {}, method = "GET") {
   const query = new URLSearchParams();
   for (const [name, value] of Object.entries(values)) {
@@ -24,7 +24,7 @@ export async function request(path, values = {}, method = "GET") {
   return {status: answer.status, body: await answer.json()};
 }
 
-/** {tokens, name}: whether the server has tokens, and whose this one is. A token that is wrong is forgotten. */
+/** Returns {tokens, name}: whether the server has tokens, and the name of this tab's token. Forgets a wrong token. */
 export async function tokenInfo() {
   const {status, body} = await request("api/token");
   if (status === 200) return body;
@@ -32,7 +32,7 @@ export async function tokenInfo() {
   return {tokens: true, name: null};
 }
 
-/** "" when the token is good and kept, else what is wrong with it. */
+/** Checks a token. Returns "" and stores it if it is valid, else returns the error. */
 export async function tryToken(text) {
   if (text === "") return "Commands need a token.";
   const before = token;
@@ -48,7 +48,7 @@ export async function tryToken(text) {
   }
 }
 
-/** For a file: a link cannot carry the token. */
+/** Saves a response as a file. A plain link could not send the token. */
 export async function download(path, values, name) {
   const answer = await fetch(`${path}?${new URLSearchParams(values)}`, {headers: headers(), cache: "no-store"});
   if (!answer.ok) throw new Error((await answer.json()).error);
@@ -60,8 +60,8 @@ export async function download(path, values, name) {
 }
 
 /**
- * The events of the server, for ever: it is opened again when it ends, or says nothing for `PATIENCE`. Server-sent
- * events are read here and not by EventSource, which has no way to give a token.
+ * The server's event stream. It is opened again when it ends, or when nothing arrives for `PATIENCE` ms. This class
+ * parses server-sent events itself, because EventSource cannot send a token.
  */
 const PATIENCE = 1500;
 const PAUSE = 500;

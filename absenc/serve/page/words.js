@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// How values and conditions read.
+// Texts of values and conditions.
 
 export const NOTHING = "—";
 const MINUS = "−";
-const THIN = " ";  // narrow, and no line is broken there
+const THIN = " ";  // narrow no-break space
 
-/** "−1 204.55" */
+/** Formats a number with groups of three digits: "−1 204.55". */
 export function numberText(value, decimals = 0) {
   const [whole, part] = Math.abs(value).toFixed(decimals).split(".");
   const grouped = whole.replace(/\B(?=(\d{3})+$)/g, THIN);
@@ -23,7 +23,7 @@ export function duration(seconds) {
 
 export const microseconds = (us) => (us >= 1e6 ? `${numberText(us / 1e6, 2)} s` : us >= 1e3 ? `${numberText(us / 1e3, 2)} ms` : `${numberText(us, 1)} µs`);
 
-/** The time of day, with the date if it is not today's. */
+/** Returns the time of day, with the date if it is not today. */
 export function clock(at_ms) {
   const at = new Date(at_ms);
   const time = at.toLocaleTimeString("en-GB");
@@ -31,20 +31,20 @@ export function clock(at_ms) {
   return `${at.toLocaleDateString("en-GB", {day: "numeric", month: "short", year: "numeric"})}, ${time}`;
 }
 
-/** "battery_alarm" as "battery alarm", "ch1_status" as "channel 1 status" */
+/** Converts names to words: "battery_alarm" to "battery alarm", "ch1_status" to "channel 1 status". */
 export const plain = (name) => name.replace(/[_-]/g, " ").replace(/\bch(?=\d)/, "channel ");
-/** "°C" for "degC", "over heat" for "over_heat" */
+/** Converts texts of the API for people: "degC" to "°C", "over_heat" to "over heat". */
 export const forPeople = (text) => text.replace(/\bdegC\b/g, "°C").replace(/\b[a-z0-9]+(_[a-z0-9]+)+\b/g, plain);
-/** "temperature" of "temperature_c": the value has its unit. */
+/** Removes the unit from a field name, "temperature_c" to "temperature", because the value shows it. */
 export const fieldName = (field) => plain(field.replace(/_(c|mv|ma|v|us|ms|s|hz|khz|deg|mm|rpm)$/, ""));
-/** "80 °C" of "80 degC", "battery alarm, over heat" of flags; a value that does not hold is `missing`. */
+/** Converts a value for people: "80 degC" to "80 °C"; null becomes `missing`. */
 export const valueText = (value, missing = "INVALID") => (value === null ? missing : forPeople(value).replace(/ deg$/, "°").replace(/ us$/, " µs").replace(/ revolutions$/, " turns"));
 export const sentence = (text) => {
   const whole = text.charAt(0).toUpperCase() + text.slice(1);
   return /[.!?]$/.test(whole) ? whole : whole + ".";
 };
 
-/** The large figure: {text, unit, width}; `width` is that of the greatest value in digits, so that nothing moves. */
+/** Returns the large figure as {text, unit, width}; `width` is the digits of the greatest value, so the layout is stable. */
 export function figure(one) {
   const whole = one.length_mm === null ? 6 : numberText(one.length_mm).length;
   const width = one.linear ? whole + 5 : 7;
@@ -54,7 +54,7 @@ export function figure(one) {
   return {text: one.singleturn_valid === null ? "unknown" : "INVALID", unit: "", width};
 }
 
-/** Returns "12.0 ± 0.3": as many digits as the uncertainty leaves, and the uncertainty rounded up. */
+/** Returns "12.0 ± 0.3": digits as the uncertainty permits, and the uncertainty rounded up. */
 export function measuredText(value, uncertainty) {
   const decimals = uncertainty > 0 ? Math.min(4, Math.max(0, -Math.floor(Math.log10(uncertainty)))) : 4;
   const scale = 10 ** decimals;
@@ -68,8 +68,8 @@ export function lastText(last) {
   return last.position_mm !== null ? `${numberText(last.position_mm, 4)} mm` : "";
 }
 
-/** Returns the line below the large figure, in parts that are not broken. `isSmall`: a card that has room for turns and
- *  speed alone; the page of the encoder shows the rest. */
+/** Returns the texts below the large figure. `isSmall`: a card with room for turns and speed only; the page of the
+ *  encoder shows the rest. */
 export function belowFigure(one, now, isSmall = false) {
   if (one.state !== "live") {
     if (one.last_reading === null) return ["no reading yet"];
@@ -98,8 +98,9 @@ export function belowFigure(one, now, isSmall = false) {
 const GONE = {lost: "lost", silent: "no reply", failing: "no reply", ended: "stopped", unknown: "not known"};
 export const SHAPES = {bad: "▲", warn: "◆", good: "●", plain: "○"};
 
-/** {group, kind, word}: groups in the order in which they are shown, the ill first. */
+/** Groups of encoders in display order, faulty ones first. */
 export const GROUPS = ["unknown", "lost", "alarm", "errors", "waiting", "live", "good"];
+/** Returns {group, kind, word} for the state and alarms of an encoder; `kind` selects color and shape. */
 export function condition(one) {
   const age = one.state === "unknown" ? "" : ` ${duration(one.age_s)}`;
   if (one.state in GONE) return {group: one.state === "unknown" ? "unknown" : "lost", kind: "bad", word: GONE[one.state] + age};
@@ -114,16 +115,16 @@ export function condition(one) {
   return one.alarms === null ? {group: "live", kind: "plain", word: "live"} : {group: "good", kind: "good", word: "good"};
 }
 
-/** The words of the bar: how many of a group. */
+/** Texts of the bar for the number of encoders in a group. */
 export const GROUP_WORDS = {
   unknown: (count) => `${count} not known`, lost: (count) => `${count} lost`, alarm: (count) => (count === 1 ? "1 alarm" : `${count} with alarms`), errors: (count) => `${count} with errors`,
   waiting: (count) => `${count} waiting`, live: (count) => `${count} live`, good: (count) => `${count} good`,
 };
 
-/** Goes on behind them where there is room. */
+/** Text after the number, on wide screens only. */
 export const MORE_WORDS = {live: ", alarms not reported"};
 
-/** [kind, strong, text] of each line that says what is wrong. */
+/** Returns [kind, bold text, text] for each line that describes a fault. */
 export function wrongs(one) {
   const list = [];
   for (const alarm of one.alarms ?? []) {
@@ -139,13 +140,13 @@ export function wrongs(one) {
   return list;
 }
 
-/** A value of an answer: flags are a list of names, and null where it does not hold. */
+/** Formats a field of a response; flags are a list of names, null is an invalid value. */
 export function fieldText(value, missing = "INVALID") {
   if (value === null) return missing;
   return Array.isArray(value) ? value.map(plain).join(", ") || "none" : String(value);
 }
 
-/** Kinds of events, as [kind, words]. */
+/** Severity and text of each kind of event. */
 const HAPPENED = {
   alarm: ["bad", "alarm raised"], alarm_over: ["good", "alarm over"], acknowledged: ["plain", "acknowledged"], lost: ["bad", "lost"], silent: ["warn", "no reply"],
   failing: ["warn", "replies fail"], back: ["good", "back"], restarted: ["warn", "position restarted"], ended: ["bad", "stopped"],
