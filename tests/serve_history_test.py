@@ -117,12 +117,12 @@ class Disturbed(ServeCase):
         other = self.file("other", "")
         with open(other, "wb") as file:
             file.write(GARBAGE)
-        self.begins_anew_after(lambda: os.replace(other, self.path), "it is kept as")
+        self.begins_anew_after(lambda: os.replace(other, self.path), "it was renamed to")
         with open(self.kept_as(), "rb") as file:
             self.assertEqual(file.read(), GARBAGE)
 
     def test_truncated(self):
-        self.begins_anew_after(lambda: os.truncate(self.path, 0), "it is kept as")
+        self.begins_anew_after(lambda: os.truncate(self.path, 0), "it was renamed to")
         self.assertTrue(self.kept_as())
 
     def test_cut_off(self):
@@ -130,7 +130,7 @@ class Disturbed(ServeCase):
         size = os.path.getsize(self.path)
         with open(self.path, "rb") as file:
             half = file.read(size // 2)
-        self.begins_anew_after(lambda: os.truncate(self.path, size // 2), "it is kept as")
+        self.begins_anew_after(lambda: os.truncate(self.path, size // 2), "it was renamed to")
         with open(self.kept_as(), "rb") as file:
             self.assertEqual(file.read(), half)
 
@@ -153,7 +153,7 @@ class Disturbed(ServeCase):
         def overwrite():
             with open(self.path, "r+b") as file:
                 file.write(GARBAGE)
-        self.begins_anew_after(overwrite, "it is kept as")
+        self.begins_anew_after(overwrite, "it was renamed to")
         with open(self.kept_as(), "rb") as file:
             self.assertEqual(file.read()[:len(GARBAGE)], GARBAGE)
 

@@ -136,11 +136,11 @@ class Values(ServeCase):
                              ("doctor", "POST"), ("command", "POST"), ("events", "GET")):
             with self.subTest(part=part):
                 status, body = server.ask(f"/api/{part}", method, good, encoder="sim:tformat")
-                self.assertEqual((status, json.loads(body)["error"]), (404, f"this is at /api/encoders/NAME/{part} now"))
+                self.assertEqual((status, json.loads(body)["error"]), (404, f"this path is now /api/encoders/NAME/{part}"))
         status, body = server.ask("/api/encoder", name="sim:tformat")
-        self.assertEqual((status, json.loads(body)["error"]), (404, "this is at /api/encoders/NAME now"))
+        self.assertEqual((status, json.loads(body)["error"]), (404, "this path is now /api/encoders/NAME"))
         status, body = server.ask("/api/stream", trace="sim:tformat")
-        self.assertEqual((status, json.loads(body)["error"]), (404, "this is at /api/encoders/NAME/stream now"))
+        self.assertEqual((status, json.loads(body)["error"]), (404, "this path is now /api/encoders/NAME/stream"))
 
     def test_a_name_with_slashes_and_a_question_mark(self):
         name = "tformat:" + self.file("nothing") + "?latency=300"
@@ -566,7 +566,7 @@ class WhoMayWhat(ServeCase):
             return [event for event in server.json("/api/events")["events"] if event["kind"] == "access"]
         told = wait_until(lambda: len(events()) >= 2 and events(), "both are told")
         self.assertEqual(len(told), 2)
-        self.assertIn("a wrong token came", told[1]["text"])
+        self.assertIn("a request had a wrong token", told[1]["text"])
         self.assertIn("10", told[0]["text"])
         self.assertEqual({event["who"] for event in told}, {"127.0.0.1"})
 
@@ -810,7 +810,7 @@ class Inside(ServeCase):
             client.join()
             if number == signal.SIGHUP:
                 self.assertEqual(answers[0][0], 502, answers)
-                self.assertIn("broken off", answers[0][1]["error"])
+                self.assertIn("interrupted", answers[0][1]["error"])
             else:
                 self.assertEqual(server.process.returncode, 0)
 

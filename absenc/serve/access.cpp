@@ -84,7 +84,7 @@ Access::Access(const Choices& choices, ServerEvents& server_events)
       server_events_(&server_events) {
   if (token_file_.empty()) {
     if (on_loopback_) return;
-    throw UsageError("whoever can reach this address could read the encoders: give --token-file too");
+    throw UsageError("anyone who can reach this address could read the encoders: add --token-file FILE");
   }
   tokens_ = read_secrets("token", token_file_, least_token);
 }
@@ -111,12 +111,13 @@ bool Access::may_guess_on(const std::string& peer) const {
   if (guesses_.size() >= most_addresses && !guesses_.contains(peer)) return false;
   Guesses& guesses = guesses_.try_emplace(peer, Guesses{now, 0}).first->second;
   ++guesses.count;
-  if (guesses.count == 1) server_events_->add({calendar_ms(), "", "access", "a wrong token came", peer});
+  if (guesses.count == 1) server_events_->add({calendar_ms(), "", "access", "a request had a wrong token", peer});
   if (guesses.count == most_guesses + 1) {
     server_events_->add(
         {calendar_ms(), "", "access",
-         fmt::format("more than {} wrong tokens came within a minute: the rest of it refuses them with 429",
-                     most_guesses),
+         fmt::format(
+             "more than {} wrong tokens within a minute: further ones are refused with 429 until the minute is over",
+             most_guesses),
          peer});
   }
   return guesses.count <= most_guesses;
@@ -169,19 +170,19 @@ std::optional<Response> Access::refusal(const Request& request, To what) const {
   if (on_loopback_ && !names_us(request.host)) {
     return error_response(
         403, public_origin_.empty()
-                 ? "this server answers to localhost, 127.0.0.1 and [::1] only: the name of a proxy is given by "
-                   "--public-url"
-                 : fmt::format("this server answers to localhost, 127.0.0.1, [::1] and the name in {} only",
+                 ? "this server accepts requests to localhost, 127.0.0.1 and [::1] only: behind a proxy, start it "
+                   "with --public-url"
+                 : fmt::format("this server accepts requests to localhost, 127.0.0.1, [::1] and the name in {} only",
                                public_origin_));
   }
   if (what >= To::ask && !is_from_own_page(request)) {
     return error_response(403,
-                          "no other site may change anything here, or have an encoder asked: where a proxy shows the "
-                          "page to others, --public-url names it");
+                          "requests from other sites may not change or poll an encoder: if a proxy shows this page, "
+                          "start the server with --public-url");
   }
   if (!needs_token(request, what)) return {};
   if (token_file_.empty()) {
-    return error_response(403, "nothing can be changed here: the server was started without --token-file");
+    return error_response(403, "this server changes nothing: it was started without --token-file");
   }
   if (!who(request).empty()) return {};
   return refuse_token(request);
@@ -189,7 +190,7 @@ std::optional<Response> Access::refusal(const Request& request, To what) const {
 
 Response Access::refuse_token(const Request& request) const {
   if (!request.authorization.empty() && !may_guess_on(request.peer)) {
-    Response response = error_response(429, "too many wrong tokens came from this address: try again in a minute");
+    Response response = error_response(429, "too many wrong tokens from this address: try again in a minute");
     response.headers.emplace_back("Retry-After", "60");
     return response;
   }

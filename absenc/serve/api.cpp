@@ -100,12 +100,12 @@ std::string unknown_path(const Request& request) {
   const std::string_view path = request.path;
   if (path.starts_with(api)) {
     const std::string_view last = path.substr(api.size());
-    if (last == "encoder") return "this is at /api/encoders/NAME now";
+    if (last == "encoder") return "this path is now /api/encoders/NAME";
     if (std::find(parts_of_encoder.begin(), parts_of_encoder.end(), last) != parts_of_encoder.end()) {
-      return fmt::format("this is at {}NAME/{} now", encoders_path, last);
+      return fmt::format("this path is now {}NAME/{}", encoders_path, last);
     }
   }
-  return "there is nothing at this path: /openapi.json describes what there is";
+  return "this path is unknown: /openapi.json describes all paths";
 }
 
 std::vector<std::int64_t> arguments_in(const Request& request, const Command& command) {
@@ -142,7 +142,7 @@ void Api::answer(Request request, const Reply& reply) {
   try {
     if (request.method == "GET" || request.method == "HEAD") return get(request, reply);
     if (request.method == "POST") return post(request, reply);
-    Response response = error_response(405, "only GET and POST are known here");
+    Response response = error_response(405, "only GET and POST are supported");
     response.headers.emplace_back("Allow", "GET, HEAD, POST");
     reply.send(response);
   } catch (const NotFound& error) {
@@ -191,7 +191,7 @@ void Api::get_of(const std::shared_ptr<Watch>& watch, std::string_view part, con
   const bool needs_post = part == "command" || part == "doctor" || part == "acknowledge";
   if (needs_post || request.method == "HEAD") {
     const std::string_view method = needs_post ? "POST" : "GET";
-    Response response = error_response(405, fmt::format("{} is asked for with {}", part, method));
+    Response response = error_response(405, fmt::format("{} needs the method {}", part, method));
     response.headers.emplace_back("Allow", method);
     return reply.send(response);
   }
@@ -211,7 +211,7 @@ void Api::post(const Request& request, const Reply& reply) {
   if (target.part == "doctor") return doctor(*watch, request, reply);
   if (target.part == "command") return command(*watch, request, reply);
   if (target.part == "acknowledge") return acknowledge(*watch, request, reply);
-  Response response = error_response(405, "only command, doctor and acknowledge are asked for with POST");
+  Response response = error_response(405, "only command, doctor and acknowledge take the method POST");
   response.headers.emplace_back("Allow", "GET, HEAD");
   reply.send(response);
 }
@@ -252,7 +252,7 @@ void Api::stream(const std::string& trace, const Request& request, const Reply& 
 
 void Api::command(Watch& watch, const Request& request, const Reply& reply) {
   const Command& wanted = require_command(*watch.address().unit, request.value("command"));
-  if (wanted.verb == Verb::scan) throw BadRequest("a scan is for a line without encoders that are being read");
+  if (wanted.verb == Verb::scan) throw BadRequest("a scan needs a line without encoders that this server reads");
   Order order;
   order.command = &wanted;
   order.arguments = arguments_in(request, wanted);
@@ -309,7 +309,7 @@ void Api::give(Watch& watch, Order order, const Request& request, const Reply& r
 }
 
 void Api::past(const std::string& encoder, bool events, const Request& request, const Reply& reply) {
-  if (chronicler_ == nullptr) return reply.send(error_response(404, "no history is kept: see --history"));
+  if (chronicler_ == nullptr) return reply.send(error_response(404, "the server stores no history: see --history"));
   const Range range = range_in(request);
   const std::int64_t rows = number_in(request, "rows", 1000, 1, most_rows);
   const auto job = [reader = &chronicler_->reader(), range, rows, encoder, events, reply] {
@@ -320,11 +320,11 @@ void Api::past(const std::string& encoder, bool events, const Request& request, 
       reply.send(error_response(503, error.what()));
     }
   };
-  if (!worker_->add(job)) reply.send(error_response(503, "too many others ask for history"));
+  if (!worker_->add(job)) reply.send(error_response(503, "too many requests for history are waiting: try again later"));
 }
 
 void Api::past_as_csv(const std::string& encoder, const Request& request, const Reply& reply) {
-  if (chronicler_ == nullptr) return reply.send(error_response(404, "no history is kept: see --history"));
+  if (chronicler_ == nullptr) return reply.send(error_response(404, "the server stores no history: see --history"));
   struct Rest {
     std::string encoder;
     Range range;

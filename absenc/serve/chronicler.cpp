@@ -97,9 +97,10 @@ void Chronicler::look_at_clock() {
   const std::int64_t at_ms = calendar_ms();
   const std::int64_t jump = clock_.look(at_ms, os::now());
   if (jump == 0) return;
-  told_->add({at_ms, "", "history",
-              fmt::format("the clock went {} by {}: nothing is deleted for its age before a day was recorded by it",
-                          jump > 0 ? "forward" : "back", rough_words(std::abs(jump)))});
+  told_->add(
+      {at_ms, "", "history",
+       fmt::format("the clock jumped {} by {}: rows are deleted by age only after a day of rows with the new time",
+                   jump > 0 ? "forward" : "back", rough_words(std::abs(jump)))});
 }
 
 void Chronicler::write() {

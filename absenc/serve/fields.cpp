@@ -14,7 +14,7 @@ void append_number(std::string& bytes, Number number) {
   bytes.append(reinterpret_cast<const char*>(&number), sizeof number);
 }
 
-[[noreturn]] void refuse_fields() { throw client::Failure("a field is cut, or one too many"); }
+[[noreturn]] void refuse_fields() { throw client::Failure("a field is truncated, or bytes follow the last one"); }
 
 }  // namespace
 

@@ -80,8 +80,8 @@ void HistoryWriter::open() {
     if (!was_open_) {
       throw Failure(fmt::format("{}: move it away, and within a second a new history begins there", damaged.what()));
     }
-    notes_.push_back(
-        fmt::format("{}: it is kept as {}, and a new history begins", damaged.what(), HistoryFile::set_aside(path_)));
+    notes_.push_back(fmt::format("{}: it was renamed to {}, and a new history begins", damaged.what(),
+                                 HistoryFile::set_aside(path_)));
     file_.emplace(path_);
   }
   was_open_ = true;
@@ -103,9 +103,10 @@ void HistoryWriter::require_file() {
 }
 
 void HistoryWriter::leave(HistoryFile::State state) {
-  const std::string_view what = state == HistoryFile::State::changed ? "was changed by another program: it goes on"
-                                : state == HistoryFile::State::gone  ? "was moved or removed: a new one begins"
-                                                                     : "was replaced by another file: it goes on there";
+  const std::string_view what = state == HistoryFile::State::changed ? "was changed by another program: it is continued"
+                                : state == HistoryFile::State::gone
+                                    ? "was moved or removed: a new one begins"
+                                    : "was replaced by another file: it is continued there";
   notes_.push_back(fmt::format("the history {} {}", path_, what));
   reader_.refuse(notes_.back());
   state == HistoryFile::State::changed ? file_->close() : file_->leave();
@@ -115,7 +116,7 @@ void HistoryWriter::leave(HistoryFile::State state) {
 void HistoryWriter::set_aside(std::string_view why) {
   reader_.refuse(fmt::format("the history {} {}", path_, why));
   notes_.push_back(
-      fmt::format("the history {} {}: it is kept as {}, and a new one begins", path_, why, file_->set_aside()));
+      fmt::format("the history {} {}: it was renamed to {}, and a new one begins", path_, why, file_->set_aside()));
   file_.reset();
 }
 

@@ -298,11 +298,11 @@ struct HttpServer::Daemon {
             nullptr);
       }
       exchanges.emplace(exchange.get(), exchange);
-      if (ending) return exchange->answer(Response{503, "text/plain", "the server ends\n"}, nullptr);
+      if (ending) return exchange->answer(Response{503, "text/plain", "the server is shutting down\n"}, nullptr);
     }
     // The last copy of `reply` calls this deleter. If no copy has answered by then, the client gets this response.
     const Reply reply(std::shared_ptr<Exchange>(exchange.get(), [exchange](Exchange*) {
-      exchange->answer(Response{500, "text/plain", "nobody answered\n"}, nullptr);
+      exchange->answer(Response{500, "text/plain", "the request got no answer\n"}, nullptr);
     }));
     try {
       handler(request_of(connection, path, method), reply);
@@ -336,7 +336,9 @@ struct HttpServer::Daemon {
     return daemon.respond(connection, *exchange);
   }
 
-  static Response too_large() { return {MHD_HTTP_CONTENT_TOO_LARGE, "text/plain", "nothing here takes a body\n"}; }
+  static Response too_large() {
+    return {MHD_HTTP_CONTENT_TOO_LARGE, "text/plain", "no request to this server has a body\n"};
+  }
 
   static void completed(void* self, MHD_Connection* connection, void** context, MHD_RequestTerminationCode) {
     auto& daemon = *static_cast<Daemon*>(self);
@@ -386,7 +388,7 @@ struct HttpServer::Daemon {
       for (const auto& one : streams) streaming.push_back(one.second.lock());
     }
     for (const auto& one : waiting) {
-      if (one) one->answer(Response{503, "text/plain", "the server ends\n"}, nullptr);
+      if (one) one->answer(Response{503, "text/plain", "the server is shutting down\n"}, nullptr);
     }
     for (const auto& one : streaming) {
       if (one) one->end();

@@ -85,36 +85,37 @@ std::string metrics(const Fleet::Watches& watches, const ServerFigures& figures)
     page.metric(name, kind, help);
     for (const Seen& seen : all) page.line(name, seen.label, value(seen.snapshot));
   };
-  each("absenc_up", "gauge", "1 while readings come", [](const Snapshot& s) { return s.state == State::live ? 1 : 0; });
+  each("absenc_up", "gauge", "1 while readings arrive",
+       [](const Snapshot& s) { return s.state == State::live ? 1 : 0; });
   each("absenc_readings_total", "counter", "good readings", [](const Snapshot& s) { return s.readings; });
-  each("absenc_losses_total", "counter", "how often the port went away", [](const Snapshot& s) { return s.losses; });
-  each("absenc_repeated_total", "counter", "requests that were sent again",
-       [](const Snapshot& s) { return s.counters.repeated; });
-  each("absenc_age_seconds", "gauge", "age of the last reading, or of what is known instead",
+  each("absenc_losses_total", "counter", "number of port losses", [](const Snapshot& s) { return s.losses; });
+  each("absenc_repeated_total", "counter", "repeated requests", [](const Snapshot& s) { return s.counters.repeated; });
+  each("absenc_age_seconds", "gauge", "age of the last reading, or of the last change of state",
        [](const Snapshot& s) { return seconds_of(s.age); });
-  each("absenc_rate_hertz", "gauge", "good readings a second", [](const Snapshot& s) { return s.rate; });
-  page.metric("absenc_errors_total", "counter", "failed attempts by kind, repeated ones too");
+  each("absenc_rate_hertz", "gauge", "good readings per second", [](const Snapshot& s) { return s.rate; });
+  page.metric("absenc_errors_total", "counter", "failed attempts by kind, including repetitions");
   for (const Seen& seen : all) {
     for (std::size_t i = 1; i < error_texts.size(); ++i) {
       page.line("absenc_errors_total", fmt::format("{},error=\"{}\"", seen.label, error_texts[i].name),
                 seen.snapshot.counters.errors[i]);
     }
   }
-  page.metric("absenc_latency_seconds", "histogram", "from the end of a request to the end of its reply");
+  page.metric("absenc_latency_seconds", "histogram", "time from the end of a request to the end of its reply");
   for (const Seen& seen : all) add_latencies(page, seen);
-  each("absenc_latency_longest_seconds", "gauge", "the longest of them",
+  each("absenc_latency_longest_seconds", "gauge", "longest latency",
        [](const Snapshot& s) { return seconds_of(s.latency.longest); });
-  page.metric("absenc_alarm", "gauge",
-              "1 while the encoder reports this alarm, 0 while it reports it clear; none while it reports neither, or "
-              "is not live");
+  page.metric(
+      "absenc_alarm", "gauge",
+      "1 while the encoder reports this alarm, 0 while it reports it clear; absent while it reports neither, or "
+      "is not live");
   for (const Seen& seen : all) add_alarms(page, seen);
   page.metric("absenc_streams", "gauge", "open event streams");
   page.line("absenc_streams", "", figures.streams);
-  page.metric("absenc_stream_dropped_total", "counter", "messages that readers of streams were too slow for");
+  page.metric("absenc_stream_dropped_total", "counter", "messages lost by slow clients");
   page.line("absenc_stream_dropped_total", "", figures.stream_drops);
   page.metric("absenc_history_lost_total", "counter", "rows of history that could not be written");
   page.line("absenc_history_lost_total", "", figures.history_lost);
-  page.metric("absenc_wrong_tokens_total", "counter", "requests that came with a wrong token");
+  page.metric("absenc_wrong_tokens_total", "counter", "requests with a wrong token");
   page.line("absenc_wrong_tokens_total", "", figures.wrong_tokens);
   return page.text;
 }

@@ -39,13 +39,12 @@ std::string MqttHealth::metrics() const {
   const auto add = [&](std::string_view name, std::string_view kind, std::string_view help, auto value) {
     fmt::format_to(std::back_inserter(text), "# HELP {0} {1}\n# TYPE {0} {2}\n{0}{{}} {3}\n", name, help, kind, value);
   };
-  add("absenc_mqtt_connected", "gauge", "1 while the broker is there", connected ? 1 : 0);
+  add("absenc_mqtt_connected", "gauge", "1 while the broker is connected", connected ? 1 : 0);
   add("absenc_mqtt_waiting", "gauge", "messages in the spool", waiting);
   add("absenc_mqtt_waiting_bytes", "gauge", "bytes of messages in the spool", waiting_bytes);
-  add("absenc_mqtt_sent_total", "counter", "messages that the broker has taken", sent);
-  add("absenc_mqtt_dropped_total", "counter", "readings that the spool had no room for", dropped);
-  add("absenc_mqtt_client_deaths_total", "counter", "how often a packet of the broker ended the MQTT client's process",
-      client_deaths);
+  add("absenc_mqtt_sent_total", "counter", "messages that the broker has acknowledged", sent);
+  add("absenc_mqtt_dropped_total", "counter", "readings that the spool could not store", dropped);
+  add("absenc_mqtt_client_deaths_total", "counter", "unexpected ends of the MQTT client process", client_deaths);
   return text;
 }
 

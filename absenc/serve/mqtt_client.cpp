@@ -64,7 +64,7 @@ MqttClient::State MqttClient::work(Time longest) {
   if (state_ != State::lost && !process_.channel().send(outgoing_)) note_end();
   if (state_ == State::connected && os::now() - heard_ > longest_silence) {
     process_.end({});
-    lose("the process of the MQTT client does not answer");
+    lose("the process of the MQTT client does not respond");
   }
   return state_;
 }
@@ -101,7 +101,7 @@ void MqttClient::take(WireFields frame) {
     case Wire::acknowledged: {
       const std::uint32_t number = frame.number();
       if (number == 0 || number > static_cast<std::uint32_t>(last_number_)) {
-        throw Failure("the process of the MQTT client acknowledges a message that it never had");
+        throw Failure("the process of the MQTT client acknowledges an unknown message");
       }
       acknowledgements_.push_back({static_cast<int>(number), printable(frame.text())});
       break;

@@ -223,7 +223,8 @@ class MqttProcess {
   static void on_disconnect(mosquitto*, void* self, int reason, const mosquitto_property*) {
     const bool told = reason >= 128;
     static_cast<MqttProcess*>(self)->lose(
-        told ? fmt::format("the broker ended it: {}", ::mosquitto_reason_string(reason)) : "the connection was lost");
+        told ? fmt::format("the broker ended the connection: {}", ::mosquitto_reason_string(reason))
+             : "the connection was lost");
   }
   static void on_publish(mosquitto*, void* self, int given, int reason, const mosquitto_property*) {
     auto& process = *static_cast<MqttProcess*>(self);

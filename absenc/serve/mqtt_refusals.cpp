@@ -13,7 +13,7 @@ using namespace std::chrono_literals;
 
 constexpr Time first_refusal_pause = 2s;
 constexpr Time longest_refusal_pause = 60s;
-constexpr const char* connection_ends = "the broker ends the connection at it";
+constexpr const char* connection_ends = "the broker closes the connection at this message";
 
 }  // namespace
 
@@ -83,8 +83,8 @@ std::string MqttRefusals::text() const {
   if (refused_.empty()) return {};
   const auto& [topic, refused] = *refused_.begin();
   const std::string others = refused_.size() == 1 ? "" : fmt::format(", and {} other topics", refused_.size() - 1);
-  return fmt::format("the broker refuses a message: {} ({}){}; it stays in the spool, the others go on", refused.why,
-                     topic, others);
+  return fmt::format("the broker refuses a message: {} ({}){}; it stays in the spool, other topics are sent",
+                     refused.why, topic, others);
 }
 
 }  // namespace absenc::serve

@@ -109,7 +109,7 @@ void MqttSender::attend(const std::stop_token& stop) {
       return deliver(client, stop);
     }
     note_death(client);
-    why = state == MqttClient::State::lost ? client.trouble() : "it does not answer";
+    why = state == MqttClient::State::lost ? client.trouble() : "it does not respond";
   }
   throw Failure(why);
 }
@@ -143,7 +143,7 @@ void MqttSender::tell_connected() {
   told_lost_.clear();
   const bool old = version_ == MqttVersion::v3_1_1;
   tell(fmt::format("connected to {}{}", settings_->broker.text(),
-                   old ? ", which knows MQTT 3.1.1 only: it does not say when it refuses a message" : ""));
+                   old ? ", which supports MQTT 3.1.1 only and cannot report a refused message" : ""));
 }
 
 void MqttSender::deliver(MqttClient& client, const std::stop_token& stop) {
@@ -179,7 +179,7 @@ void MqttSender::note_lost_connection() {
   for (const auto& [number, sent] : outstanding_) topics.insert(sent.topic);
   const bool soon = os::now() - connected_at_ < time_to_hold;
   const std::string refused = refusals_.end_connection(topics, soon, os::now());
-  if (!refused.empty()) tell(fmt::format("the broker refuses {}: it ends the connection there", refused));
+  if (!refused.empty()) tell(fmt::format("the broker refuses {}: it closes the connection at this message", refused));
 }
 
 void MqttSender::note_death(const MqttClient& client) {
@@ -303,7 +303,7 @@ void MqttSender::settle_taken(const Outstanding& sent) {
     const std::lock_guard lock(mutex_);
     figures_.trouble = refusals_.text();
   }
-  tell(fmt::format("the broker takes {} again", sent.topic));
+  tell(fmt::format("the broker accepts {} again", sent.topic));
 }
 
 void MqttSender::become_lost(const std::string& why) {
@@ -313,7 +313,7 @@ void MqttSender::become_lost(const std::string& why) {
     figures_.trouble = refusals_.text().empty() ? why : refusals_.text();
   }
   if (!told_lost_.insert(why).second) return;
-  tell(fmt::format("nothing reaches {}: {}; what it shall have waits on disk", settings_->broker.text(), why));
+  tell(fmt::format("{} is not reachable: {}; messages wait on disk", settings_->broker.text(), why));
 }
 
 void MqttSender::tell(const std::string& text) { server_events_->add({calendar_ms(), "", "mqtt", text}); }

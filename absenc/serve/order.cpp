@@ -37,7 +37,7 @@ Done do_command(Encoder& live, const Order& order) {
   }
   const std::string_view setting = command.reads_back.empty() ? command.name : command.reads_back;
   const SettingChange change = live.settings().set(setting, order.arguments);
-  return done_well(command, change.now, change.was_so ? "it was so already" : change.note, change.state);
+  return done_well(command, change.now, change.was_so ? "it had this value already" : change.note, change.state);
 }
 
 // Sends one request after the other. A question that the encoder refuses, or that its options exclude, is reported with
@@ -201,7 +201,7 @@ Json shown_values(const Answer& answer) {
 
 Order settings_order(const Unit& unit, std::string_view setting) {
   const std::vector<const Command*> all = questions(unit);
-  if (all.empty()) throw UsageError(fmt::format("{} has no settings and does not say what it is", unit.id));
+  if (all.empty()) throw UsageError(fmt::format("{} has no settings and no identification", unit.id));
   Order order;
   if (!setting.empty()) {
     const auto found = std::find_if(all.begin(), all.end(), [&](const Command* one) { return one->name == setting; });
@@ -230,7 +230,7 @@ Order memory_order(const Unit& unit, std::int64_t page) {
   }
   if (order.addresses.empty()) throw UsageError(fmt::format("the memory of {} has no page {}", unit.id, page));
   if (order.addresses.size() > most_bytes) {
-    throw UsageError(fmt::format("these are {} bytes, but at most {} are read at once: take a page of them",
+    throw UsageError(fmt::format("{} bytes are too many, at most {} are read at once: select one page",
                                  order.addresses.size(), most_bytes));
   }
   return order;

@@ -65,14 +65,14 @@ void Spool::load_part(std::int64_t number) {
     if (part.damaged) {
       const std::lock_guard lock(shown_mutex_);
       notes_.push_back(
-          fmt::format("{} of the spool cannot be read from byte {} of {} on: what is before it is sent, then "
-                      "the file is set aside",
+          fmt::format("{} of the spool cannot be read from byte {} of {} on: the messages before it are sent, then "
+                      "the file is renamed",
                       path_of(number), offset, part.bytes));
     }
     parts_.push_back(part);
   } catch (const os::Failure& failure) {
     const std::lock_guard lock(shown_mutex_);
-    notes_.push_back(fmt::format("a file of the spool is left alone: {}", failure.what()));
+    notes_.push_back(fmt::format("a file of the spool is not used: {}", failure.what()));
   }
 }
 
@@ -93,7 +93,7 @@ void Spool::look_at_folder() {
     older_number_ = 0;
     folder_.reset();
     const std::lock_guard lock(shown_mutex_);
-    notes_.push_back(why + " or replaced: it is made anew");
+    notes_.push_back(why + " or replaced: it is created again");
   }
   open_folder();
   if (parts_.empty()) load();
@@ -211,8 +211,8 @@ void Spool::set_aside(const std::string& path) {
   for (int i = 2; fs::exists(to, error); ++i) to = fmt::format("{}.bad{}", path, i);
   fs::rename(path, to, error);
   const std::lock_guard lock(shown_mutex_);
-  notes_.push_back(error ? fmt::format("{} cannot be read, nor set aside: {}", path, error.message())
-                         : fmt::format("{} was no file of the spool, or damaged: it is now {}", path, to));
+  notes_.push_back(error ? fmt::format("{} cannot be read, nor renamed: {}", path, error.message())
+                         : fmt::format("{} was no file of the spool, or damaged: it was renamed to {}", path, to));
 }
 
 }  // namespace absenc::serve

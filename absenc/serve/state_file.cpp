@@ -19,7 +19,7 @@ std::string state_file(std::string_view name, std::string_view option) {
   fs::path folder = variable("STATE_DIRECTORY");
   if (folder.empty() && !variable("XDG_STATE_HOME").empty()) folder = fs::path(variable("XDG_STATE_HOME")) / "absenc";
   if (folder.empty() && !variable("HOME").empty()) folder = fs::path(variable("HOME")) / ".local/state/absenc";
-  if (folder.empty()) throw client::UsageError(fmt::format("where to keep {} is not known: give {}", name, option));
+  if (folder.empty()) throw client::UsageError(fmt::format("no folder for {} is known: set {}", name, option));
   std::error_code error;
   fs::create_directories(folder, error);
   if (error) {

@@ -72,7 +72,7 @@ void Watch::wait() {
     const std::lock_guard lock(mutex_);
     over_ = true;
   }
-  refuse_order("it was not done: the encoder is no longer watched");
+  refuse_order("it was not done: the server no longer reads this encoder");
 }
 
 void Watch::refuse_order(const std::string& why) {
@@ -161,9 +161,9 @@ std::string Watch::acknowledge(std::string_view alarm, const std::string& token,
 
 std::string_view Watch::give(Order order) {
   const std::lock_guard lock(mutex_);
-  if (over_) return "the encoder is no longer watched";
-  if (examines_) return "the encoder is being examined: ask again when that is over";
-  if (order_) return "something else waits for this encoder already: ask again when that is done";
+  if (over_) return "the server no longer reads this encoder";
+  if (examines_) return "the encoder is being examined: try again afterwards";
+  if (order_) return "another order for this encoder is waiting: try again when it is done";
   order_ = std::move(order);
   changed_.notify_all();
   return "";
@@ -239,7 +239,7 @@ void Watch::become(State state, const std::string& message) {
     next_told_ = os::now() + between_tellings;
   }
   if (state != State::live) return tell(name_of(state), message);
-  tell("back", "readings come");
+  tell("back", "readings arrive again");
 }
 
 void Watch::publish(const Encoder& live, const Sample& sample) {
@@ -383,7 +383,8 @@ void Watch::carry_out(Encoder& live, const Order& order, const std::function<voi
     order.done(done);
   };
   const auto end = [&](std::string_view advice) {
-    done.text = fmt::format("{} was broken off, because the server ends or lets go of this encoder{}", name, advice);
+    done.text = fmt::format("{} was interrupted, because the server is shutting down or no longer reads this encoder{}",
+                            name, advice);
     finish();
   };
   command_runs_ = order.kind == Order::Kind::command;
@@ -394,10 +395,10 @@ void Watch::carry_out(Encoder& live, const Order& order, const std::function<voi
     done = is_examination ? examine(live, stop) : serve::carry_out(live, order, between);
   } catch (const os::Failure& failure) {  // the next reading will find the port lost
     note(failure);
-    done.text = fmt::format("{} {}: {}", name, has_begun ? "was broken off" : "was not done", failure.what());
+    done.text = fmt::format("{} {}: {}", name, has_begun ? "was interrupted" : "was not done", failure.what());
   } catch (const os::Interrupted& interrupted) {
     note(interrupted);
-    end(command_runs_ ? ": read whether it was done" : "");
+    end(command_runs_ ? ": read back whether it was done" : "");
     throw;
   } catch (const os::Ended& ended) {
     note(ended);
@@ -415,7 +416,7 @@ void Watch::carry_out(Encoder& live, const Order& order, const std::function<voi
 // The examination opens the port itself, and tries other settings if no encoder replies. A virtual encoder would be a
 // new one if it were opened again, so it is examined as it is.
 Done Watch::examine(Encoder& live, const std::stop_token& stop) {
-  const std::string words = "it is examined, readings go on afterwards";
+  const std::string words = "the encoder is being examined, readings continue afterwards";
   become(State::examined, words);
   const EncoderAddress address = live.connection().uri();
   Surroundings surroundings;

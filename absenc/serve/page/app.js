@@ -46,7 +46,7 @@ function take(event, data) {
     view.show(data);
     if (view.isServed === false) {  // the encoder was removed from absenc.toml, and the server has reloaded it
       connection.hidden = false;
-      setText(connection, `${shown} is not served any more: absenc.toml was read again, without it. Nothing on this page is live.`);
+      setText(connection, `${shown} is no longer served: it was removed from absenc.toml. Nothing on this page is live.`);
     }
   }
   if (event === "happening") {

@@ -167,7 +167,7 @@ export class One {
     this.shownChoices = key;
     const focused = document.activeElement?.dataset?.value;
     const ranges = Object.entries(RANGES).map(([value, [text]]) => [value, text]);
-    this.ranges.replaceChildren(this.hasHistory ? choice("range", ranges, this.range, (value) => this.set("range", value)) : element("p", {class: "faint"}, "The latest readings. No history is kept: see --history."));
+    this.ranges.replaceChildren(this.hasHistory ? choice("range", ranges, this.range, (value) => this.set("range", value)) : element("p", {class: "faint"}, "The latest readings. The server stores no history: see --history."));
     this.units.replaceChildren(choice("unit", possible.map(([value, one]) => [value, one.text]), unit, (value) => this.set("unit", value)));
     if (focused) this.node(`[data-value="${focused}"]`)?.focus();
     this.quantity = all[unit];
@@ -196,7 +196,7 @@ export class One {
   show(state) {
     const one = state.encoders.find((other) => other.encoder === this.name);
     this.isServed = one !== undefined;
-    if (!this.isServed) return this.lose("this encoder is not served any more", "not served");
+    if (!this.isServed) return this.lose("this encoder is no longer served", "not served");
     const first = this.one === undefined || !this.known;
     const changed = this.one?.state !== one.state;
     this.one = one;
@@ -335,7 +335,7 @@ export class One {
     this.plot.toggleAttribute("hidden", none);
     if (none) {
       const never = this.one.last_reading === null && !isLive;
-      return setText(this.noTrace, this.range !== "live" ? "The history has nothing of this time." : never ? "There has been no reading since the server started." : "There is nothing to draw yet.");
+      return setText(this.noTrace, this.range !== "live" ? "The history has no data for this time." : never ? "There has been no reading since the server started." : "There is no data to plot yet.");
     }
     setText(this.noTrace, "");
     this.graph ??= new Trace(this.plot, this.quantity);
@@ -369,7 +369,7 @@ export class One {
     this.offer(one);
     this.changed = true;
     const missing = one.singleturn_valid === false || one.multiturn_valid === false ? "INVALID" : "unknown";
-    setChildren(this.fields, one.reply === null ? element("p", {class: "faint"}, "none is new") : table(["field", "value", "meaning"], one.reply,
+    setChildren(this.fields, one.reply === null ? element("p", {class: "faint"}, "no recent reply") : table(["field", "value", "meaning"], one.reply,
       ({field, value, meaning}) => [fieldName(field), element("strong", {}, valueText(value, missing)), forPeople(meaning)], "last reply"));
     const errors = Object.entries(one.errors).sort(([, a], [, b]) => b - a).map(([name, count]) => [plain(name), count]);
     const latencies = latencyRows(one.latency_us.buckets);
@@ -444,7 +444,7 @@ export class One {
       const {status, body} = await request(pathOf(this.name, "settings"), {setting: command.reads_back});
       return status === 200 ? body.rows.map((row) => `${fieldName(row.field)} ${valueText(row.value)}`).join(", ") : `not known: ${body.error}`;
     }
-    if (command.verb === "config_set") return "the encoder does not tell it";
+    if (command.verb === "config_set") return "the encoder does not report it";
     if (command.verb !== "memory_write") return "";
     const of = (role) => Number(values[command.arguments.findIndex((argument) => argument.role === role)] || NaN);
     const [address, page] = [of("address"), of("page")];
@@ -459,7 +459,7 @@ export class One {
     const then = (values) => {
       if (command.verb === "zero") return this.one.linear ? "0.0000 mm" : "0.000°";
       if (command.verb === "reset_multiturn") return "0 turns";
-      if (command.verb === "clear_alarms") return "alarms are clear whose cause is gone";
+      if (command.verb === "clear_alarms") return "alarms whose cause is gone are cleared";
       if (command.verb === "memory_write") return byteText(Number(values[command.arguments.findIndex((argument) => argument.role === "value")] || NaN));
       const written = command.arguments.map((argument, i) => [argument, values[i]]).filter(([argument, value]) => value !== String(argument.default))
         .map(([argument, value]) => `${plain(argument.name)} ${value || "?"}`).join(", ");
@@ -480,7 +480,7 @@ export class One {
       setText(this.outcome, sentence(body.error ?? (fields ? `${body.text}: ${fields}` : body.text)));
       this.outcome.className = `status ${status === 200 ? "good" : "bad"}`;
     } catch (error) {
-      setText(this.outcome, `No answer came; read whether it was done: ${error.message}`);
+      setText(this.outcome, `No response arrived; read whether it was done: ${error.message}`);
     }
   }
 
@@ -492,7 +492,7 @@ export class One {
   async loadPast() {
     if (this.closed || this.loading || this.one === undefined) return;
     this.csv.hidden = !this.hasHistory;
-    if (!this.hasHistory) return setText(this.past, "No history is kept: start the server without --history none.");
+    if (!this.hasHistory) return setText(this.past, "The server stores no history: start it without --history none.");
     this.loading = true;
     const {range} = this;
     try {
@@ -519,7 +519,7 @@ export class One {
     const text = JSON.stringify(this.events);
     if (text === this.shownEvents) return;
     this.shownEvents = text;
-    this.eventTable.replaceChildren(this.events.length === 0 ? element("p", {class: "faint"}, "Nothing happened in this time.") : table(
+    this.eventTable.replaceChildren(this.events.length === 0 ? element("p", {class: "faint"}, "No events in this time.") : table(
       ["when", "what", "details", "who"], this.events, (event) => {
         const [kind, words] = happened(event.kind);
         return [element("span", {class: "nowrap"}, clock(event.at_ms)), element("span", {class: `nowrap ${kind}`}, `${SHAPES[kind]} ${words}`), element("span", {}, ...rich(event.text.replace(/^\w+(?=:)/, plain))), event.who];

@@ -50,7 +50,7 @@ class Asked {
       else if (this.wiped !== null) this.tell(this.wiped);
       else this.take(body);
     } catch (error) {
-      this.tell(`no answer came: ${error.message}`);
+      this.tell(`no response arrived: ${error.message}`);
     } finally {
       this.button.disabled = false;
     }
@@ -64,7 +64,7 @@ class Asked {
 
   /** Removes a result that may have become invalid. */
   wipe(why) {
-    this.wiped = `what was read is no longer shown: ${why}`;
+    this.wiped = `the result is no longer shown: ${why}`;
     if (this.result.childElementCount === 0) return;
     this.result.replaceChildren();
     this.tell(this.wiped);
@@ -74,13 +74,13 @@ class Asked {
     if (GONE.has(state)) this.wipe(`the encoder is ${state}`);
     const old = !THERE.has(state) && this.result.childElementCount !== 0;
     this.result.classList.toggle("stale", old);
-    if (this.said) setText(this.status, old ? `${this.said}. It does not answer now: this is as it was then` : this.said);
+    if (this.said) setText(this.status, old ? `${this.said}. The encoder does not reply now: this is the old result` : this.said);
   }
 }
 
 class Doctor extends Asked {
   constructor(name) {
-    super("Doctor", "Examine", element("span", {}, "Looks for what is wrong with the encoder or its line. It takes some seconds without readings, and writes nothing. "));
+    super("Doctor", "Examine", element("span", {}, "Finds faults of the encoder or its line. It interrupts the readings for some seconds and writes nothing to the encoder. "));
     this.run = () => this.ask("the examination begins", pathOf(name, "doctor"), {}, "POST");
   }
 
@@ -129,7 +129,7 @@ class Memory extends Asked {
       }
     }
     const all = areas.filter((area) => area.in_dump).reduce((sum, area) => sum + area.count, 0);
-    this.part.replaceChildren(element("option", {value: ""}, registers > 0 ? `${registers} registers` : `all that a copy has: ${all} bytes`),
+    this.part.replaceChildren(element("option", {value: ""}, registers > 0 ? `${registers} registers` : `all of a dump: ${all} bytes`),
                               ...[...pages].map(([page, meanings]) => element("option", {value: page}, `page ${page}: ${meanings.join(", ")}`)));
   }
 

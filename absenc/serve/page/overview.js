@@ -158,7 +158,7 @@ export class Overview {
     this.cards = new Map();
     this.list = element("ul", {class: "cards", "aria-label": "encoders"});
     this.none = element("div", {class: "none", hidden: true}, element("h2", {}, "No encoder is served"),
-      element("p", {}, "Name encoders behind ", element("code", {}, "absenc serve"), ", or write them into absenc.toml and send the server SIGHUP. Without hardware, try:"),
+      element("p", {}, "Name encoders after ", element("code", {}, "absenc serve"), ", or write them into absenc.toml and send the server SIGHUP. Without hardware, try:"),
       element("p", {}, element("code", {}, "absenc serve \"sim:tformat?motion=rpm=60\" sim:esl")));
     this.noMatch = element("p", {class: "none", hidden: true}, "No encoder matches. ", element("button", {type: "button", onclick: () => this.clearFilter()}, "Show all"));
     main.replaceChildren(this.none, this.noMatch, this.list);

@@ -44,7 +44,7 @@ export async function tryToken(text) {
     return body.error;
   } catch (error) {
     setToken(before);
-    return `no answer came: ${error.message}`;
+    return `no response arrived: ${error.message}`;
   }
 }
 
@@ -83,7 +83,7 @@ export class Events {
   wait() {
     clearTimeout(this.timer);
     this.timer = setTimeout(() => {
-      this.onLost("no word from the server");
+      this.onLost("no data from the server");
       this.abort.abort();
     }, PATIENCE);
   }
@@ -94,7 +94,7 @@ export class Events {
       this.wait();
       try {
         await this.read();
-        if (!this.closed) this.onLost("the server has ended the connection");
+        if (!this.closed) this.onLost("the server closed the connection");
       } catch (error) {
         if (!this.closed && !this.abort.signal.aborted) this.onLost(error.message, error.refused);
       }

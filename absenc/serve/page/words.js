@@ -104,7 +104,7 @@ export const GROUPS = ["unknown", "lost", "alarm", "errors", "waiting", "live", 
 export function condition(one) {
   const age = one.state === "unknown" ? "" : ` ${duration(one.age_s)}`;
   if (one.state in GONE) return {group: one.state === "unknown" ? "unknown" : "lost", kind: "bad", word: GONE[one.state] + age};
-  if (one.state === "opening") return {group: "waiting", kind: "warn", word: "port not there"};
+  if (one.state === "opening") return {group: "waiting", kind: "warn", word: "port missing"};
   if (one.state === "examined") return {group: "waiting", kind: "warn", word: "examined"};
   const count = one.alarms?.length ?? 0;
   const isSeen = count > 0 && one.alarms.every((alarm) => alarm.acknowledged);
@@ -132,7 +132,7 @@ export function wrongs(one) {
     list.push(["bad", sentence(plain((alarm.channel ? alarm.channel + " " : "") + alarm.name)), `${seen}${sentence(alarm.meaning)}${alarm.action ? " " + sentence(alarm.action) : ""}`]);
   }
   if (one.state === "live") {
-    if (one.singleturn_valid === false && one.alarms?.length !== undefined) list.push(["bad", "Position invalid.", "The encoder says that its position does not hold."]);
+    if (one.singleturn_valid === false && one.alarms?.length !== undefined) list.push(["bad", "Position invalid.", "The encoder reports that its position is invalid."]);
     if (one.alarms === null && one.status?.length) list.push(["bad", `Status: ${one.status.map(plain).join(", ")}.`, ""]);
     if (one.alarms === null) list.push(["faint", "", "Alarms not reported."]);
   }
