@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Absolute encoders of servo motors: read them, emulate them, decode what was captured on their wires.
+"""Absolute encoders of servo motors: read them, emulate them, decode captures of their lines.
 
     import absenc
 
@@ -14,13 +14,13 @@
         virtual.set_fault("corrupt", 0.01)
 
     capture = absenc.decode("drive.sr", "tformat", channel="D0")
-    capture["angle_deg"].mean()                # NumPy, masked where nothing was told or it does not hold
-    recording = absenc.load("log.h5")          # also of `absenc record`: columns as of a capture
+    capture["angle_deg"].mean()                # NumPy, masked where missing or invalid
+    recording = absenc.load("log.h5")          # also files of `absenc record`; columns as in a capture
     recording["speed_rpm"][recording.good()]
 
-Encoders are written as for the command: "tformat:/dev/ttyUSB0?model=23-bit", "raa38-can:can0", "sim:esl", or a name of
-absenc.toml. Options may be given as keywords. A position that does not hold is None, or masked: never a number.
-Every wait releases the GIL and ends at Ctrl-C. What goes wrong is an exception of `absenc.errors`.
+Encoder addresses are those of the command: "tformat:/dev/ttyUSB0?model=23-bit", "raa38-can:can0", "sim:esl", or a name
+in absenc.toml. Options may be given as keywords. An invalid position is None, or masked: never a number. Every wait
+releases the GIL and ends at Ctrl-C. Errors are raised as exceptions of `absenc.errors`.
 """
 from __future__ import annotations
 

@@ -13,108 +13,108 @@ class Reading:
 
     @property
     def angle_deg(self) -> Optional[float]:
-        """Degrees, 0 to below 360; None: it does not hold, or the encoder is linear."""
+        """Position in degrees, 0 to below 360; None: invalid, or the encoder is linear."""
     @property
     def position_mm(self) -> Optional[float]:
-        """Of linear encoders, millimetres; None: it does not hold."""
+        """Position of a linear encoder in millimetres; None: invalid, or the encoder is rotary."""
     @property
     def singleturn(self) -> Optional[int]:
-        """Counts; None: it does not hold."""
+        """Single-turn position in counts; None: invalid."""
     @property
     def multiturn(self) -> Optional[int]:
-        """Revolutions; None: not told, or they do not hold."""
+        """Revolutions; None: not reported, or invalid."""
     @property
     def singleturn_bits(self) -> int: ...
     @property
     def singleturn_valid_bits(self) -> int:
-        """How many of the highest bits hold; some encoders give fewer while they turn fast."""
+        """Number of valid bits, from the highest; some encoders have fewer while they turn fast."""
     @property
     def multiturn_bits(self) -> int: ...
     @property
     def ready(self) -> bool:
-        """False while the encoder says that it is starting."""
+        """False while the encoder reports that it is starting."""
     @property
     def valid(self) -> bool:
-        """Whether the position is known to hold."""
+        """Whether the position is known to be valid."""
     @property
     def singleturn_valid(self) -> Optional[bool]:
-        """Whether the position holds; None: nobody has reported it."""
+        """Whether the position is valid; None: not reported."""
     @property
     def multiturn_valid(self) -> Optional[bool]:
-        """Whether the revolutions hold; None: nobody has reported it, or there are none."""
+        """Whether the revolutions are valid; None: not reported, or the encoder has none."""
     @property
     def alarms(self) -> Optional[list[str]]:
-        """The names of those that are raised; []: all are reported clear; None: not all are reported."""
+        """Names of the raised alarms; []: all are reported clear; None: not all are reported."""
     @property
     def status(self) -> Optional[list[str]]:
-        """The names of the status flags that are set; None: they are not reported."""
+        """Names of the status flags that are set; None: not reported."""
     @property
     def time_s(self) -> float:
-        """When it was latched, seconds of time.monotonic()."""
+        """Time at which the position was latched, in seconds of time.monotonic()."""
 
 class Sample:
-    """What one attempt to read has brought."""
+    """Result of one attempt to read."""
 
     @property
     def kind(self) -> str:
-        """ "reading"; "failed": see `error`; "lost": the port has just gone away, "absent", "back"."""
+        """ "reading"; "failed": see `error`; "lost": the port has just disappeared; "absent"; "back"."""
     @property
     def time_s(self) -> float:
-        """Seconds of time.monotonic(); of a reading when it was latched."""
+        """Seconds of time.monotonic(); for a reading, when its position was latched."""
     @property
     def reading(self) -> Optional[Reading]: ...
     @property
     def position(self) -> Optional[int]:
-        """Counts, continued past the end of the counter."""
+        """Position in counts, continued past the end of the counter."""
     @property
     def speed(self) -> Optional[float]:
-        """rpm, of linear encoders mm/s: `speed_rpm` or `speed_mm_s`."""
+        """Speed in rpm, for linear encoders mm/s: `speed_rpm` or `speed_mm_s`."""
     @property
     def speed_rpm(self) -> Optional[float]:
-        """The mean speed over a short window, as it was `speed_delay_s` before `time_s`; None: it is not known yet, or
-        the encoder is linear."""
+        """Mean speed over a short window, as it was `speed_delay_s` before `time_s`; None: not known yet, or the
+        encoder is linear."""
     @property
     def speed_uncertainty_rpm(self) -> Optional[float]:
-        """How far the true mean is from `speed_rpm` at most."""
+        """Greatest difference of the true mean speed from `speed_rpm`."""
     @property
     def speed_mm_s(self) -> Optional[float]:
-        """The same of a linear encoder; None of a rotary one."""
+        """Like `speed_rpm`, for a linear encoder; None for a rotary one."""
     @property
     def speed_uncertainty_mm_s(self) -> Optional[float]:
-        """How far the true mean is from `speed_mm_s` at most."""
+        """Greatest difference of the true mean speed from `speed_mm_s`."""
     @property
     def speed_delay_s(self) -> Optional[float]: ...
     @property
     def joint_deg(self) -> Optional[float]:
-        """Angle of the joint: direction * (degrees past the end of a turn - offset_deg) / gear; None: its address sets
-        none of them, it does not hold, or the turns are not known."""
+        """Angle of the joint: direction * (continued degrees - offset_deg) / gear; None: none of these is set, the
+        position is invalid, or the turns are unknown."""
     @property
     def joint_mm(self) -> Optional[float]:
-        """Of linear encoders: direction * (position - offset_mm)."""
+        """Position of the joint of a linear encoder: direction * (position - offset_mm)."""
     @property
     def joint_speed_rpm(self) -> Optional[float]:
-        """The speed at the joint."""
+        """Speed of the joint."""
     @property
     def joint_speed_uncertainty_rpm(self) -> Optional[float]:
-        """How far the true mean is from it at most."""
+        """Greatest difference of the true mean speed from the speed of the joint."""
     @property
     def joint_speed_mm_s(self) -> Optional[float]:
-        """The same of a linear encoder."""
+        """Speed of the joint of a linear encoder."""
     @property
     def joint_speed_uncertainty_mm_s(self) -> Optional[float]:
-        """How far the true mean is from it at most."""
+        """Greatest difference of the true mean speed from the speed of the joint."""
     @property
     def electrical_deg(self) -> Optional[float]:
-        """Electrical angle of the motor, 0 to below 360; None: no pole_pairs or pole_pair_mm, or it does not hold."""
+        """Electrical angle of the motor, 0 to below 360; None: invalid, or pole_pairs or pole_pair_mm is not set."""
     @property
     def confirmed(self) -> bool:
-        """Two readings in a row agreed."""
+        """Whether the position agrees with that of another reading, within the speed limit."""
     @property
     def restarted(self) -> bool:
-        """It jumped, or how far it went since the reading before is not known: `position` starts again."""
+        """The position jumped, or the travel since the last reading is unknown: `position` starts again."""
     @property
     def text(self) -> str:
-        """Why there is no reading, or what happened; "" of a reading that goes on."""
+        """Why the sample has no reading, or why `position` starts again; "" otherwise."""
     @property
     def error(self) -> Any:
         """The absenc.errors.EncoderError of a failed attempt, or None."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Captures as columns of NumPy."""
+"""Decodes captures to NumPy columns."""
 from __future__ import annotations
 
 import os
@@ -19,7 +19,7 @@ Masked = np.ma.MaskedArray[Any, np.dtype[Any]]
 
 
 class Column(NamedTuple):
-    """What stands in a column."""
+    """Description of a column."""
 
     name: str
     unit: str  #: "s", "deg", "us" ...; "": a plain number or text
@@ -28,17 +28,17 @@ class Column(NamedTuple):
 
 
 class Table:
-    """Columns by name, and `rows`, all of them as one structured masked array."""
+    """A table: columns by name, or all `rows` as one structured masked array."""
 
     def __init__(self, rows: Masked, columns: dict[str, Column]) -> None:
         self.rows = rows
-        self.columns = columns  #: by name, with units and meanings
+        self.columns = columns  #: descriptions of the columns, by name
 
     def __len__(self) -> int:
         return len(self.rows)
 
     def keys(self) -> list[str]:
-        """The names of the columns: `dict(recording)` has each with its values."""
+        """Returns the names of the columns, so that `dict(recording)` has the values of each."""
         return list(self.columns)
 
     def __getitem__(self, column: str) -> Masked:
@@ -50,7 +50,7 @@ class Table:
         return f"<absenc.{type(self).__name__} of {len(self)} rows: {', '.join(self.columns)}>"
 
     def to_pandas(self) -> pandas.DataFrame:
-        """A DataFrame of the columns; what is masked is NaN or <NA>. Needs pandas."""
+        """Returns the columns as a DataFrame; masked values become NaN or <NA>. Needs pandas."""
         import pandas
 
         nullable = {"i": "Int64", "u": "UInt64", "b": "boolean"}
@@ -66,19 +66,19 @@ class Table:
 
 
 class Capture(Table):
-    """What was said on a line, exchange by exchange: `capture["angle_deg"]` is a column, `rows` all of them as one
-    structured masked array. Where nothing was reported, or a position does not hold, it is masked (and NaN in floats).
+    """The exchanges on a line: `capture["angle_deg"]` is a column, `rows` has all columns as one structured masked
+    array. A value that is missing or invalid is masked (and NaN in floats).
 
-    Columns: `time_s`, `end_s`, `kind` ("exchange", "request", "reply", "noise"), `request` and `reply` (bytes; of CAN
-    and clocked links text), `turnaround_us`, `angle_deg` (of linear encoders `position_mm`), each field of the unit,
+    Columns: `time_s`, `end_s`, `kind` ("exchange", "request", "reply", "noise"), `request` and `reply` (bytes; for CAN
+    and clocked links text), `turnaround_us`, `angle_deg` (for linear encoders `position_mm`), each field of the unit,
     and `error` with `message`, "" in good rows. Flags are numbers: `Protocol.flag_names` names them."""
 
     def __init__(self, rows: Masked, columns: dict[str, Column], notes: list[str]) -> None:
         super().__init__(rows, columns)
-        self.notes = notes  #: what is damaged or missing in the file, and what was found out
+        self.notes = notes  #: damage of the file, and settings that were detected
 
     def good(self) -> npt.NDArray[np.bool_]:
-        """Which rows have no error. What such a row does not tell, or what does not hold, is masked in them too."""
+        """Returns which rows have no error. Missing and invalid values of these rows are masked, too."""
         return np.asarray(self.rows.data["error"] == "", np.bool_)
 
 
@@ -93,7 +93,7 @@ def _masked(chunks: list[list[tuple[Any, npt.NDArray[np.bool_]]]], columns: list
             rows[column.name][at:end] = values
             if column.dtype != "O":
                 missing[column.name][at:end] = absent
-        chunks[i] = []  # its memory is not needed twice
+        chunks[i] = []  # releases the memory of the chunk
         at = end
     return np.ma.MaskedArray(rows, mask=missing)  # type: ignore[no-untyped-call]
 
@@ -127,12 +127,12 @@ def decode(
     model: str = "",
     **options: Value,
 ) -> Capture:
-    """All of a capture: a session of sigrok, VCD, CSV or binary export of a logic analyser, a log of candump, or bytes
-    as text. What is left out is found in the capture, or is as the protocol has it.
+    """Decodes a whole capture: a sigrok session, VCD, CSV or binary export of a logic analyser, a candump log, or
+    bytes as text. Arguments that are not given are detected in the capture, or have the values of the protocol.
 
-    `channel` is "D0", "clock=D0", or several of them; `raw_channels` says that the file is raw samples of so many
-    channels at `rate` samples a second; `baud` and `parity` ("none", "odd", "even") of the line. Other keywords are
-    options of the unit. Raises UsageError, Failure."""
+    `channel` is "D0", "clock=D0", or several of these; `raw_channels` is the number of channels of a file with raw
+    samples, `rate` its samples per second; `baud` and `parity` ("none", "odd", "even") describe the line. Other
+    keywords are options of the unit. Raises UsageError, Failure."""
     source = _open(file, unit, channel, raw_channels, rate, baud, parity, model, options)
     columns = [Column(*column) for column in source.columns()]
     chunks = list(iter(lambda: source.take(65536), None))
@@ -153,7 +153,8 @@ def decode_batches(
     model: str = "",
     **options: Value,
 ) -> Iterator[Capture]:
-    """As `decode`, in captures of at most so many rows each, for files larger than memory. The last has the notes."""
+    """Decodes like `decode`, in captures of at most `rows` rows, for files larger than memory. The last has the
+    notes."""
     most = natural("rows", rows, least=1)
     return _batches(_open(file, unit, channel, raw_channels, rate, baud, parity, model, options), most)
 

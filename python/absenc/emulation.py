@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Virtual encoders that whoever opens them finds as real ones."""
+"""Virtual encoders at ports that programs open like those of real ones."""
 from __future__ import annotations
 
 from collections.abc import Mapping
@@ -12,17 +12,17 @@ from .protocols import Protocol, protocol
 
 
 class Emulation:
-    """A virtual encoder that serves in a thread of its own, as `emulate` makes it: a context manager. What is done to
-    it is so when the call returns."""
+    """A virtual encoder that replies in its own thread: the context manager that `emulate` returns. Changes are
+    effective when the call returns."""
 
     def __init__(self, text: str, link: str, tcp: Optional[int]) -> None:
-        self._one: Optional[_absenc.Emulation] = _absenc.Emulation(text, link, tcp)
+        self._native: Optional[_absenc.Emulation] = _absenc.Emulation(text, link, tcp)
 
     @property
     def _emulation(self) -> _absenc.Emulation:
-        if self._one is None:
+        if self._native is None:
             raise RuntimeError("this virtual encoder has ended")
-        return self._one
+        return self._native
 
     def __enter__(self) -> Emulation:
         return self
@@ -33,70 +33,71 @@ class Emulation:
         self.close()
 
     def close(self) -> None:
-        """Nobody answers any more, and its port goes away."""
-        self._one = None
+        """Ends the virtual encoder and removes its port."""
+        self._native = None
 
     @property
     def path(self) -> str:
-        """The pseudo-terminal, or the link to it: of an encoder on a CAN bus that of an slcan adapter."""
+        """Path of the pseudo-terminal, or of the link to it; for an encoder on CAN that of an emulated slcan
+        adapter."""
         return self._emulation.path
 
     @property
     def tcp_port(self) -> int:
-        """On 127.0.0.1; 0 without."""
+        """TCP port on 127.0.0.1; 0 without `tcp`."""
         return self._emulation.tcp_port
 
     @property
     def address(self) -> str:
-        """What `absenc.open` takes: "tformat:/dev/pts/3"."""
+        """Address for `absenc.open`: "tformat:/dev/pts/3"."""
         return self._emulation.address
 
     @property
     def protocol(self) -> Protocol:
-        """The unit: the names of its alarms and conditions are there."""
+        """The protocol, with the names of alarms and conditions."""
         return protocol[self._emulation.unit]
 
     def power_off(self) -> None:
-        """It answers no more."""
+        """Switches the encoder off: it no longer replies."""
         self._emulation.power_off()
 
     def power_on(self, *, real: bool = False) -> None:
-        """`real`: with the document's start-up time."""
+        """Switches the encoder on. `real`: it needs the start-up time of the document."""
         self._emulation.power_on(real)
 
     def raise_alarm(self, name: str) -> None:
-        """One of `protocol.alarms`. Raises UsageError, which names the nearest."""
+        """Raises one of `protocol.alarms`. Raises UsageError for another name, with the most similar one."""
         self._emulation.raise_alarm(name)
 
     def lower_alarm(self, name: str) -> None:
-        """Its cause is over."""
+        """Ends the cause of an alarm."""
         self._emulation.lower_alarm(name)
 
     def set_condition(self, name: str, value: int) -> None:
-        """One of `protocol.conditions`, as "temperature" in degC or "battery", in the units of `absenc list`."""
+        """Sets one of `protocol.conditions`, such as "temperature" in degC, in the units of `absenc list`."""
         self._emulation.set_condition(name, value)
 
     def set_fault(self, kind: str, rate: float) -> None:
-        """How often replies are damaged from now on, 0 to 1: "corrupt", "drop" ... The other kinds stay."""
+        """Sets the share of replies, 0 to 1, with a kind of fault: "corrupt", "drop" ... Other kinds are unchanged."""
         self._emulation.set_fault(kind, rate)
 
     def clear_faults(self) -> None:
-        """None of any kind."""
+        """Ends faults of all kinds."""
         self._emulation.clear_faults()
 
     @property
     def answer_count(self) -> int:
-        """Requests that were answered."""
+        """Number of requests that the encoder replied to."""
         return self._emulation.answer_count()
 
     @property
     def violations(self) -> int:
-        """Rules of the document that the host broke."""
+        """Number of violations of the document by the host."""
         return self._emulation.violations()
 
     @property
     def first_violation(self) -> str:
-        """The first of them; "": none."""
+        """The first violation; "": none."""
         return self._emulation.first_violation()
 
 
@@ -110,11 +111,11 @@ def emulate(
     tcp: Optional[int] = None,
     **options: Value,
 ) -> Emulation:
-    """A virtual encoder of what goes over characters or CAN, on a pseudo-terminal.
+    """Starts a virtual encoder, of a protocol with characters or CAN frames, on a pseudo-terminal.
 
-    `motion` is "still", "rpm=R", "sine=DEGREES,HZ" or "file=CSV"; `conditions` as {"temperature": 80} and `faults` as
-    {"corrupt": 0.01} are there from the start; `link` is a path that shall lead to the pseudo-terminal; with `tcp` it
-    also listens on that port of 127.0.0.1, 0: a free one. Other keywords are options of the unit, `model` and
+    `motion` is "still", "rpm=R", "sine=DEGREES,HZ" or "file=CSV"; `conditions`, {"temperature": 80}, and `faults`,
+    {"corrupt": 0.01}, apply from the start; `link` is the path of a symbolic link to the pseudo-terminal; with `tcp` it
+    also listens on that port of 127.0.0.1, 0: any free port. Other keywords are options of the unit, `model` and
     `singleturn`, `multiturn`, `alarm`, `seed`, `echo`. Raises UsageError, PortError."""
     settings = [f"motion={motion}"]
     settings += [f"condition={name}={value}" for name, value in (conditions or {}).items()]

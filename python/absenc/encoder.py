@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""An encoder by its name."""
+"""Opens encoders by address or name."""
 from __future__ import annotations
 
 import asyncio
@@ -15,36 +15,36 @@ from ._values import Field, Value, natural, texts
 from .errors import EncoderError
 from .protocols import Command, Flag, Protocol, protocol
 
-#: What is set and what was said of it: the document's words.
+#: A raised alarm, with its meaning and action from the document.
 Alarm = Flag
 
 
 class Info(NamedTuple):
-    """Which encoder it is and what it tells of itself."""
+    """Identification of an encoder, and its replies to commands without arguments."""
 
     address: str  #: "tformat:/dev/ttyUSB0"
     unit: str  #: "tformat"
     name: str  #: maker and protocol, for people
-    model: Optional[str]  #: None: none with these options
+    model: Optional[str]  #: None: no model has these options
     options: list[str]  #: "name=value"
-    answers: dict[str, dict[str, Field]]  #: what it answered, by command
-    failures: dict[str, EncoderError]  #: which commands it did not answer
+    answers: dict[str, dict[str, Field]]  #: replies, by command
+    failures: dict[str, EncoderError]  #: errors of commands that failed, by command
 
 
 class Recorded(NamedTuple):
-    """What a recording wrote."""
+    """Summary of a recording."""
 
-    paths: list[str]  #: the file, or its parts in their order
+    paths: list[str]  #: the file, or its parts in order
     readings: int
-    failures: int  #: attempts to read
+    failures: int  #: failed attempts to read
     gaps: int
-    missed: int  #: readings that were due and not taken, in these gaps
+    missed: int  #: readings that were due but not taken, in all gaps
     bytes: int
 
 
 class Samples:
-    """Samples at equal distances, for `for` and `async for`; one that was missed is left out. It goes on when the port
-    is lost and comes back: look at `Sample.kind`."""
+    """Samples at equal intervals, for `for` and `async for`; a missed sample is omitted. The iteration continues when
+    the port is lost and returns: check `Sample.kind`."""
 
     def __init__(self, encoder: _absenc.Encoder, rate: float, count: int) -> None:
         self._encoder = encoder
@@ -73,7 +73,7 @@ class Samples:
         try:
             sample = await asyncio.get_running_loop().run_in_executor(self._thread, self._next)
         except asyncio.CancelledError:
-            self._encoder.stop(True)  # what waits in the thread ends
+            self._encoder.stop(True)  # ends the wait in the thread
             self._thread.shutdown(wait=True)
             self._encoder.stop(False)
             raise
@@ -84,51 +84,51 @@ class Samples:
 
 
 class Memory:
-    """The bytes of an encoder's memory. Whatever is written is read back."""
+    """Memory of an encoder. Written bytes are read back."""
 
     def __init__(self, encoder: _absenc.Encoder) -> None:
         self._encoder = encoder
 
     def read(self, address: int, count: int = 1, *, page: int = 0) -> bytes:
-        """`count` bytes from `address` on."""
+        """Reads `count` bytes from `address` on."""
         return self._encoder.memory_read(
             natural("address", address), natural("count", count), natural("page", page)
         )
 
     def write(self, address: int, data: bytes, *, page: int = 0, force: bool = False) -> int:
-        """Writes those bytes that differ, each read back, and all of them once more at the end; returns how many
-        differed. `force` writes also what is protected."""
+        """Writes the bytes that differ, reads back each, and reads all again at the end. Returns the number of bytes
+        that differed. `force` also writes protected bytes."""
         return self._encoder.memory_write(natural("address", address), data, natural("page", page), force)
 
     def dump(self) -> dict[tuple[int, int], int]:
-        """All that a copy of the memory has: (page, address) to value."""
+        """Reads all memory that belongs to a dump, and returns the values by (page, address)."""
         return {(page, address): value for page, address, value in self._encoder.memory_dump()}
 
 
 class Config:
-    """What an encoder is set to."""
+    """Settings of an encoder."""
 
     def __init__(self, encoder: _absenc.Encoder) -> None:
         self._encoder = encoder
 
     @property
     def names(self) -> list[str]:
-        """The settings that can be read."""
+        """Names of the settings that can be read."""
         return self._encoder.settings_names()
 
     def get(self, name: str) -> dict[str, Field]:
-        """The values of one setting."""
+        """Reads one setting and returns its values."""
         return self._encoder.settings_get(name)
 
     def set(self, name: str, *values: int, **named: int) -> dict[str, Field]:
-        """Writes it, unless it is so already, and returns what the encoder says when it is asked anew. Nobody is
-        asked. What reaches the encoder by this setting reaches it by the new one."""
+        """Writes a setting, unless it already has these values, and returns the values that are read back. It does not
+        ask for confirmation. After a change of the address or baud rate, later calls use the new value."""
         return self._encoder.settings_set(name, *values, **named)
 
 
 class Encoder:
-    """An open encoder, as `open` makes it: a context manager. Any thread may use it, one at a time; `close` ends what
-    waits in others."""
+    """An open encoder: the context manager that `open` returns. Threads may share it, and take turns; `close` ends the
+    waits of other threads."""
 
     def __init__(self, text: str, settings: list[str]) -> None:
         self._encoder = _absenc.Encoder(text, settings)
@@ -145,17 +145,17 @@ class Encoder:
         return f"<absenc.Encoder {self.address}>"
 
     def close(self) -> None:
-        """Closes the port. What waits in another thread ends with Cancelled."""
+        """Closes the port. Calls that wait in other threads raise Cancelled."""
         self._encoder.close()
 
     def read(self) -> Reading:
-        """The position with all alarms. One that no second reading confirmed is not valid: `Reading.angle_deg` is None.
-        Raises EncoderError, PortError."""
+        """Reads the position with all alarms. A position that no second reading confirms is invalid:
+        `Reading.angle_deg` is None. Raises EncoderError, PortError."""
         return self._encoder.read()
 
     def samples(self, *, rate: float = 0, count: int = 0) -> Samples:
-        """Readings with position beyond the end of the counter, and speed. `rate` in readings a second, 0: as fast as
-        can be; `count` 0: without end."""
+        """Returns readings with speed and a position continued past the end of the counter. `rate`: readings per
+        second, 0: as fast as possible; `count`: 0 without limit."""
         return Samples(self._encoder, rate, natural("count", count))
 
     def record(
@@ -169,11 +169,11 @@ class Encoder:
         part_bytes: Optional[int] = None,
         part_seconds: Optional[float] = None,
     ) -> Recorded:
-        """Writes readings to a new file for `load`: "log.csv", "log.jsonl" (JSON lines), "log.h5" (HDF5). `rate`
-        readings a second, 0: as fast as can be; of `every` so many one is written, and each with other alarms than the
-        one before. Ends after `count` of them or `seconds`, by `close` in another thread, or by Ctrl-C, which is raised
-        once all is on the disk. Losses of the port and readings that could not be taken are rows. After `part_bytes` or
-        `part_seconds` another file is begun: "log-0001.csv", "log-0002.csv". Raises UsageError, PortError."""
+        """Writes readings to a new file for `load`: "log.csv", "log.jsonl" (JSON lines), "log.h5" (HDF5). `rate`:
+        readings per second, 0: as fast as possible. Writes every `every`th reading, and each change of the alarms. Ends
+        after `count` readings or `seconds`, by `close` in another thread, or by Ctrl-C, which is raised when all rows
+        are on disk. Losses of the port and missed readings are rows, too. After `part_bytes` or `part_seconds` the next
+        file is started: "log-0001.csv", "log-0002.csv". Raises UsageError, PortError."""
         size = None if part_bytes is None else natural("part_bytes", part_bytes, most=2**63 - 1)
         recorded = self._encoder.record(
             os.fspath(path), rate, natural("every", every, least=1), natural("count", count), seconds, size, part_seconds
@@ -181,18 +181,18 @@ class Encoder:
         return Recorded(*recorded)
 
     def run(self, command: str, *values: int, **arguments: int) -> dict[str, Field]:
-        """A command of the unit (`commands`), what it told by field. Nobody is asked, even if it changes the encoder;
-        what is written is read back."""
+        """Runs a command of the unit (`commands`) and returns the fields of its reply. It does not ask for
+        confirmation, even if the command changes the encoder; written values are read back."""
         return self._encoder.run(command, *values, **arguments)
 
     def alarms(self) -> Optional[list[Alarm]]:
-        """The alarms that are raised now, each with what it means and what must be done; []: all are reported clear;
-        None: the encoder does not report them all."""
+        """Reads the raised alarms, with meaning and action; []: all are reported clear; None: the encoder does not
+        report all."""
         names = self._encoder.read_alarms().alarms
         return None if names is None else [flag for flag in self.protocol.alarms if flag.name in names]
 
     def info(self) -> Info:
-        """Asks all that can be asked without an argument: who it is, its temperature, its settings."""
+        """Runs all reading commands without arguments: identification, temperature, settings."""
         answers: dict[str, dict[str, Field]] = {}
         failures: dict[str, EncoderError] = {}
         for name in self._encoder.questions():
@@ -200,67 +200,67 @@ class Encoder:
                 answers[name] = self._encoder.run(name)
             except EncoderError as error:
                 failures[name] = error
-        one = self._encoder
-        return Info(one.address, one.unit, self.protocol.name, one.model, one.options, answers, failures)
+        native = self._encoder
+        return Info(native.address, native.unit, self.protocol.name, native.model, native.options, answers, failures)
 
     def scan(self) -> list[dict[str, Field]]:
-        """Who answers on the line of an encoder with addresses."""
+        """Polls all addresses on the line and returns the encoders that reply."""
         return self._encoder.scan()
 
     @property
     def commands(self) -> dict[str, Command]:
-        """What `run` takes, by name."""
+        """Commands for `run`, by name."""
         return self.protocol.commands
 
     @property
     def memory(self) -> Memory:
-        """Its bytes."""
+        """Access to the memory."""
         return Memory(self._encoder)
 
     @property
     def change(self) -> Optional[str]:
-        """The state of the last call that was to change the encoder: "not_sent", "confirmed", "refused", or "unknown":
-        it was sent, and nothing good came back. None: there was none. What such a call raises has it too."""
+        """State of the last call that changes the encoder: "not_sent", "confirmed", "refused", or "unknown" if it was
+        sent without a good reply. None: no such call. Exceptions of such a call have the same attribute."""
         return self._encoder.change or None
 
     @property
     def config(self) -> Config:
-        """What it is set to."""
+        """Access to the settings."""
         return Config(self._encoder)
 
     @property
     def protocol(self) -> Protocol:
-        """The unit."""
+        """The protocol of the encoder."""
         return protocol[self._encoder.unit]
 
     @property
     def address(self) -> str:
-        """Without the options: "tformat:/dev/ttyUSB0"."""
+        """Address without options: "tformat:/dev/ttyUSB0"."""
         return self._encoder.address
 
     @property
     def options(self) -> list[str]:
-        """ "name=value" of each that counts."""
+        """Options in effect, as "name=value"."""
         return self._encoder.options
 
     @property
     def notes(self) -> list[str]:
-        """What could be better about the port, a sentence each."""
+        """Recommendations for the port, one sentence each."""
         return self._encoder.notes
 
     @property
     def counters(self) -> dict[str, int]:
-        """Exchanges so far: "good", and errors by their names."""
+        """Number of exchanges so far: "good", and each error by its name."""
         return self._encoder.counters()
 
 
 def open(text: str, **options: Value) -> Encoder:
-    """Opens "tformat:/dev/ttyUSB0?model=23-bit", "sim:esl", or a name of absenc.toml; keywords count as if they stood
-    behind it. Raises PortError; UsageError, which names what is wrong and what is nearest."""
+    """Opens "tformat:/dev/ttyUSB0?model=23-bit", "sim:esl", or a name in absenc.toml. Keywords are options. Raises
+    PortError; UsageError, which names the mistake and the most similar valid name."""
     return Encoder(text, texts(options))
 
 
 def scan(text: str, **options: Value) -> list[dict[str, Field]]:
-    """Opens, asks every address who is there, and closes."""
+    """Opens a line, polls all addresses, closes it, and returns the encoders that reply."""
     with open(text, **options) as encoder:
         return encoder.scan()

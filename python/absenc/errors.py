@@ -1,33 +1,33 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What absenc raises. Everything is an AbsencError; what an encoder did wrong has a class for each kind."""
+"""Exceptions of absenc. All are AbsencErrors; EncoderError has a subclass for each kind of error."""
 from __future__ import annotations
 
 from typing import Optional
 
 
 class AbsencError(Exception):
-    """Anything that this package raises by itself."""
+    """Base class of the exceptions of this package."""
 
-    #: Of a call that changes the encoder: "not_sent", "confirmed" (but reading it again failed), "refused", or "unknown":
-    #: it was sent, and nothing good came back. None: the call changes nothing.
+    #: State of a call that changes the encoder: "not_sent", "confirmed" (but reading back failed), "refused", or
+    #: "unknown" if it was sent without a good reply. None: the call changes nothing.
     change: Optional[str] = None
 
 
 class UsageError(AbsencError, ValueError):
-    """What was asked for cannot be: a sentence that names what is wrong and, of names, the nearest."""
+    """An argument is invalid. The text names the mistake and, for a wrong name, the most similar valid one."""
 
 
 class Failure(AbsencError):
-    """A file, or an encoder that answered well, is not what was expected."""
+    """A file, or an encoder whose replies are valid, is not as expected."""
 
 
 class Cancelled(AbsencError):
-    """The encoder was closed while something waited for it."""
+    """The encoder was closed while this call waited."""
 
 
 class PortError(AbsencError, OSError):
-    """Trouble with a port. `kind` is "not_found", "no_permission", "in_use", "unsupported", "bad_rate", "lost" or
-    "system"."""
+    """A port cannot be opened or used. `kind` is "not_found", "no_permission", "in_use", "unsupported", "bad_rate",
+    "lost" or "system"."""
 
     def __init__(self, sentence: str, kind: str) -> None:
         super().__init__(sentence)
@@ -35,17 +35,17 @@ class PortError(AbsencError, OSError):
 
 
 class EncoderError(AbsencError):
-    """An encoder did not do what it was asked, or a frame is not good. The texts may be empty."""
+    """A request to an encoder failed, or a frame is invalid. The texts may be empty."""
 
-    name = ""  #: as the command and captures have it
+    name = ""  #: name in the command's output and in captures
 
     def __init__(self, text: str, message: str, exchange: str, advice: str, sent: str, received: str) -> None:
         super().__init__(text)
         self.message = message  #: what happened
-        self.exchange = exchange  #: what was sent, what came back and when, in words
+        self.exchange = exchange  #: sent and received bytes with their times, in words
         self.advice = advice  #: what to try
-        self.sent = sent  #: "1A"
-        self.received = received  #: "1A 00 45"
+        self.sent = sent  #: sent frame: "1A"
+        self.received = received  #: received bytes: "1A 00 45"
 
     def __reduce__(self) -> tuple[object, ...]:
         texts = (str(self), self.message, self.exchange, self.advice, self.sent, self.received)
@@ -53,25 +53,25 @@ class EncoderError(AbsencError):
 
 
 class InvalidArgument(EncoderError):
-    """This cannot be done as it was asked."""
+    """An argument of the command is invalid."""
 
     name = "invalid_argument"
 
 
 class Unsupported(EncoderError):
-    """This encoder or model does not have that."""
+    """This encoder or model does not support the command."""
 
     name = "unsupported"
 
 
 class BufferTooSmall(EncoderError):
-    """More came than fits."""
+    """The reply is larger than the buffer."""
 
     name = "buffer_too_small"
 
 
 class Timeout(EncoderError):
-    """The encoder did not answer."""
+    """The encoder did not reply."""
 
     name = "timeout"
 
@@ -83,13 +83,13 @@ class LineStuck(EncoderError):
 
 
 class BadFraming(EncoderError):
-    """What came is not a frame of this protocol."""
+    """The received bytes are no frame of this protocol."""
 
     name = "bad_framing"
 
 
 class Truncated(EncoderError):
-    """The frame does not fit into what was sampled."""
+    """The frame is longer than the sampled bits."""
 
     name = "truncated"
 
@@ -119,7 +119,7 @@ class OutOfRange(EncoderError):
 
 
 class SequenceMismatch(EncoderError):
-    """The sequence counter did not move as it should."""
+    """The sequence counter did not advance as specified."""
 
     name = "sequence_mismatch"
 
@@ -143,10 +143,10 @@ class RequestRejected(EncoderError):
 
 
 class NotStill(EncoderError):
-    """The shaft is turning, and this needs it standing still."""
+    """The command needs a stationary shaft, but the shaft is turning."""
 
     name = "not_still"
 
 
-#: The classes by the names of the errors.
+#: Classes of EncoderError by the name of the error.
 by_name: dict[str, type[EncoderError]] = {one.name: one for one in EncoderError.__subclasses__()}

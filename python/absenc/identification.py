@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Which encoder is on a line."""
+"""Identifies the encoder on a line."""
 from __future__ import annotations
 
 from typing import Any, NamedTuple
@@ -8,30 +8,30 @@ from . import _absenc
 
 
 class Found(NamedTuple):
-    """An encoder that explains what came."""
+    """An encoder that explains the received frames."""
 
     unit: str
-    settings: list[str]  #: the fewest that explain it: "model=23-bit"
-    address: str  #: what `absenc.open` takes
-    encoder: str  #: "address=3": which of several on the line
+    settings: list[str]  #: the fewest settings that explain the frames: "model=23-bit"
+    address: str  #: address for `absenc.open`
+    encoder: str  #: "address=3", if several encoders share the line
     line: str  #: "RS-485 half duplex, 2.5 Mbit/s"
-    tried: int  #: exchanges that were looked at
-    explained: int  #: of them
-    log10_chance: float  #: of the probability that noise explains as many
-    sure: bool  #: it is small enough
-    identity: dict[str, Any]  #: of a line: what it says of itself, as its serial number
+    tried: int  #: number of exchanges
+    explained: int  #: number of exchanges that this encoder explains
+    log10_chance: float  #: log10 of the probability that noise explains as many exchanges
+    sure: bool  #: this probability is small enough
+    identity: dict[str, Any]  #: identification read from the encoder, such as its serial number
 
 
 class Identified(NamedTuple):
-    """The likeliest first."""
+    """Result of `identify`."""
 
-    found: list[Found]
-    notes: list[str]  #: what could not be tried
-    is_complete: bool  #: False: the time was over before all was tried
+    found: list[Found]  #: most likely first
+    notes: list[str]  #: attempts that were not possible
+    is_complete: bool  #: False: `limit_s` expired before all attempts
 
 
 def identify(place: str, *, limit_s: float = 60) -> Identified:
-    """Asks in every protocol that fits, at its rates and addresses, by reads that change nothing. `place` is a port:
+    """Polls with every protocol of the port's kind, at its rates and addresses; it only reads. `place` is a port:
     "/dev/ttyUSB0", "tcp:HOST:PORT", "spi:/dev/spidev0.0", "can0". Raises PortError, UsageError."""
     found, notes, is_complete = _absenc.identify(place, limit_s)
     return Identified([Found(**one) for one in found], notes, is_complete)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What is known of each unit, and its frames without a line: plain codecs."""
+"""Descriptions of the protocols, and their frames as plain codecs, without a line."""
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
@@ -11,7 +11,7 @@ import numpy.typing as npt
 from . import _absenc
 from ._values import Field, Value, texts
 
-#: Bytes, or text as people write frames: "1A 00", of CAN "1FF:022B", of clocked links "0001".
+#: Bytes, or text: "1A 00"; on CAN "1FF:022B", on clocked links "0001".
 Frame = Union[bytes, bytearray, memoryview, str]
 
 
@@ -22,57 +22,57 @@ class Flag(NamedTuple):
     bit: int
     name: str
     meaning: str
-    action: str  #: what the operator must do; "": nothing
+    action: str  #: required action of the operator; "": none
 
 
 class Command(NamedTuple):
-    """What an encoder can be told."""
+    """A command of an encoder."""
 
     name: str
-    verb: str  #: what it is for
+    verb: str  #: purpose, independent of the name
     meaning: str
     changes_encoder: bool
     arguments: tuple[str, ...]
 
 
 class Protocol:
-    """One unit: `absenc.protocol["tformat"]`."""
+    """One protocol: `absenc.protocol["tformat"]`."""
 
     def __init__(self, unit: str) -> None:
-        told = _absenc.unit(unit)
-        self.id: str = told["id"]
-        self.name: str = told["name"]  #: maker and protocol, for people
-        self.document: str = told["document"]  #: the source
-        self.link: str = told["link"]  #: "half_duplex", "full_duplex", "exchange" (SPI), "clocked" or "can"
-        self.line: str = told["line"]  #: "RS-485 half duplex, 2.5 Mbit/s"
-        self.options: list[str] = told["options"]
-        self.models: list[str] = told["models"]
-        self.fields: list[str] = told["fields"]
-        self.conditions: list[str] = told["conditions"]  #: of its virtual encoder
-        self.flags: list[Flag] = [Flag(*flag) for flag in told["flags"]]  #: of alarms and status
+        description = _absenc.unit(unit)
+        self.id: str = description["id"]
+        self.name: str = description["name"]  #: maker and protocol, for people
+        self.document: str = description["document"]  #: document that specifies the protocol
+        self.link: str = description["link"]  #: "half_duplex", "full_duplex", "exchange" (SPI), "clocked" or "can"
+        self.line: str = description["line"]  #: "RS-485 half duplex, 2.5 Mbit/s"
+        self.options: list[str] = description["options"]
+        self.models: list[str] = description["models"]
+        self.fields: list[str] = description["fields"]
+        self.conditions: list[str] = description["conditions"]  #: names of the conditions of its virtual encoder
+        self.flags: list[Flag] = [Flag(*flag) for flag in description["flags"]]  #: flags of all alarm and status fields
         named = {flag.name: flag for flag in reversed(self.flags)}  # a status flag may have the name of an alarm
-        self.alarms: list[Flag] = [named[name] for name in told["alarms"]]
+        self.alarms: list[Flag] = [named[name] for name in description["alarms"]]
         self.commands: dict[str, Command] = {
             one["name"]: Command(
                 one["name"], one["verb"], one["meaning"], one["changes_encoder"], tuple(one["arguments"])
             )
-            for one in told["commands"]
+            for one in description["commands"]
         }
 
     def __repr__(self) -> str:
         return f"<absenc.Protocol {self.id}: {self.name}>"
 
     def decode(self, reply: Frame, *, request: Frame = b"", model: str = "", **options: Value) -> dict[str, Field]:
-        """The fields of a reply, checked as a host checks it; of an empty reply: those of the request. Raises
-        EncoderError: the class says what is wrong. What does not hold is None."""
+        """Checks a reply like a host and returns its fields; for an empty reply, those of the request. Invalid values
+        are None. Raises a subclass of EncoderError that names the kind of error."""
         return _absenc.decode_frame(self.id, _plain(reply), _plain(request), model, texts(options))
 
     def encode(self, command: str, *values: int, model: str = "", **options: Value) -> Union[bytes, str]:
-        """The request of a command: bytes, on CAN text, on clocked links the bits that the host says."""
+        """Returns the request of a command: bytes, on CAN text, on clocked links the bits that the host sends."""
         return _absenc.encode_request(self.id, command, list(values), model, texts(options))
 
     def flag_names(self, field: str, bits: int) -> list[str]:
-        """The names of the flags that are set in a number, as captures have it."""
+        """Returns the names of the flags that are set in a number, as in captures."""
         return [flag.name for flag in self.flags if flag.field == field and bits >> flag.bit & 1]
 
 
@@ -81,15 +81,15 @@ def _plain(frame: Frame) -> Union[bytes, str]:
 
 
 class Protocols(Mapping[str, Protocol]):
-    """All units by their names."""
+    """All protocols by name."""
 
     def __init__(self) -> None:
-        self._made: dict[str, Protocol] = {}
+        self._created: dict[str, Protocol] = {}
 
     def __getitem__(self, unit: str) -> Protocol:
-        if unit not in self._made:
-            self._made[unit] = Protocol(unit)
-        return self._made[unit]
+        if unit not in self._created:
+            self._created[unit] = Protocol(unit)
+        return self._created[unit]
 
     def __contains__(self, unit: object) -> bool:
         return unit in _absenc.units()
@@ -101,7 +101,7 @@ class Protocols(Mapping[str, Protocol]):
         return len(_absenc.units())
 
 
-#: All units: protocol["tformat"]. A name that is none raises UsageError, which names the nearest.
+#: All protocols: protocol["tformat"]. An unknown name raises UsageError with the most similar name.
 protocol = Protocols()
 
 
@@ -115,8 +115,8 @@ def crc(
     refout: bool = False,
     xorout: int = 0,
 ) -> Union[int, npt.NDArray[np.uint16]]:
-    """A CRC of 3 to 16 bits in the parameters of the Rocksoft model: of bytes a number, of an array (n, length) of
-    bytes an array of n."""
+    """Computes a CRC of 3 to 16 bits with the parameters of the Rocksoft model: a number for bytes, an array of n for
+    an array (n, length) of bytes."""
     rows = np.frombuffer(data, np.uint8) if isinstance(data, (bytes, bytearray)) else np.asarray(data, np.uint8)
     sums = _absenc.crc(np.atleast_2d(rows), width, poly, init, refin, refout, xorout)
     return int(sums[0]) if rows.ndim == 1 else sums

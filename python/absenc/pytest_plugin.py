@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Fixtures for the tests of programs that read encoders.
+"""Pytest fixtures for programs that read encoders.
 
     def test_drive(absenc_emulate):
         encoder = absenc_emulate("tformat", motion="rpm=60")
@@ -18,6 +18,6 @@ from .emulation import Emulation, emulate
 
 @pytest.fixture
 def absenc_emulate() -> Iterator[Callable[..., Emulation]]:
-    """As `absenc.emulate`, any number of times; they end with the test."""
+    """Calls `absenc.emulate`, any number of times; the virtual encoders end with the test."""
     with ExitStack() as running:
         yield lambda *arguments, **options: running.enter_context(emulate(*arguments, **options))

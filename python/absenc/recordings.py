@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Recordings of `absenc record` as columns of NumPy."""
+"""Loads recordings of `absenc record` as NumPy columns."""
 from __future__ import annotations
 
 import csv
@@ -18,27 +18,26 @@ from .captures import Column, Masked, Table
 from .errors import Failure, UsageError
 from .protocols import Protocol, protocol
 
-FLAG_WORDS = "names, separated by spaces"  # how a header begins what it says of flags
-ALL_CLEAR = "none"  # of flags in CSV; an empty cell: they are not reported
-NOT_ENDED = "18446744073709551615"  # in the attribute `rows` of HDF5
+FLAG_WORDS = "names, separated by spaces"  # start of the meaning of a flags column in a header
+ALL_CLEAR = "none"  # cell of flags in CSV; an empty cell: not reported
+NOT_ENDED = "18446744073709551615"  # attribute `rows` in HDF5 while the recording is written
 
-#: What a file tells of one row, by column; None: not told, or it does not hold.
+#: Values of one row, by column; None: missing or invalid.
 Cells = Mapping[str, Any]
 
 
 class Recording(Table):
-    """Readings in the order of their time, and what came between: `recording["angle_deg"]` is a column, `rows` all of
-    them as one structured masked array. Where nothing was told, or a position does not hold, it is masked (and NaN in
-    floats).
+    """Readings and events in order of time: `recording["angle_deg"]` is a column, `rows` has all columns as one
+    structured masked array. A value that is missing or invalid is masked (and NaN in floats).
 
-    `event` is "" of a reading and "restarted" of one whose `position` starts again; "lost" and "back" are of the port,
-    "gap" has in `missed` how many readings were due and not taken, all others are errors that came in place of a
-    reading. `header` has what the file begins with: "encoder", "protocol", "model", "options", "started" ... Flags are
+    `event` is "" for a reading and "restarted" for one whose `position` starts again; "lost" and "back" concern the
+    port; "gap" counts in `missed` the readings that were due but not taken; all others are errors instead of a reading.
+    `header` has the values at the start of the file: "encoder", "protocol", "model", "options", "started" ... Flags are
     numbers: `Protocol.flag_names` names them; 0: all are reported clear, masked: not all are reported.
 
-    `is_whole`: the file says that it ended in order, and has as many rows as it says. It is False of a recording that is
-    still written, of one whose process was killed or whose disk was full, of a file that was cut, and of one that an
-    absenc before 0.5 wrote. `damage` says what was left out: "" mostly, or that the last line was cut."""
+    `is_whole`: the file has an end mark and as many rows as this states. It is False for a recording that is still being
+    written, whose process was killed or whose disk was full, for a truncated file, and for files of absenc before 0.5.
+    `damage` describes an omitted last line that was truncated; it is "" otherwise."""
 
     def __init__(
         self, rows: Masked, columns: dict[str, Column], header: dict[str, str], is_whole: bool = False, damage: str = ""
@@ -49,7 +48,7 @@ class Recording(Table):
         self.damage = damage
 
     def good(self) -> npt.NDArray[np.bool_]:
-        """Which rows are readings."""
+        """Returns which rows are readings."""
         return np.isin(self.rows.data["event"].astype(str), ["", "restarted"])
 
 
@@ -88,13 +87,13 @@ def _unit_of(name: str) -> str:
 
 
 class _Parsed(NamedTuple):
-    """What a file of text tells, before its cells are values."""
+    """A parsed text file whose cells are not converted yet."""
 
     header: dict[str, str]
     meanings: Mapping[str, str]
     names: Sequence[str]
     rows: Sequence[Cells]
-    ends_after: Union[int, None]  # so many rows, as the last line says; None: there is no such line
+    ends_after: Union[int, None]  # number of rows according to the last line; None without such a line
 
 
 def _recording(parsed: _Parsed, damage: str) -> Recording:
@@ -107,12 +106,12 @@ def _recording(parsed: _Parsed, damage: str) -> Recording:
     rows = np.empty(count, [(name, kind.dtype) for name, kind in kinds.items()])
     missing = np.zeros(count, [(name, "?") for name in kinds])
     for name, kind in kinds.items():
-        told = [row.get(name) for row in parsed.rows]
+        cells = [row.get(name) for row in parsed.rows]
         rows[name] = [
-            kind.empty if value is None else kind.of_text(value) if isinstance(value, str) else value for value in told
+            kind.empty if value is None else kind.of_text(value) if isinstance(value, str) else value for value in cells
         ]
         if kind is not _TEXT:
-            missing[name] = [value is None for value in told]
+            missing[name] = [value is None for value in cells]
     if parsed.ends_after not in (None, count):
         raise ValueError(f"it ended after {parsed.ends_after} rows, and {count} are there")
     is_whole = parsed.ends_after is not None and not damage
@@ -142,7 +141,7 @@ def _parse_json_lines(lines: list[str]) -> _Parsed:
     names: list[str] = []
     for name in meanings:
         names.append(name)
-        if name in ("singleturn", "multiturn"):  # these alone say beside them whether they hold
+        if name in ("singleturn", "multiturn"):  # only these have a column for their validity
             names.append(name + "_valid")
     for row in rows:
         for name, value in row.items():
@@ -180,7 +179,7 @@ def _load_hdf5(path: Path) -> Recording:
             raise Failure(f"{path} is HDF5, but no recording of absenc")
         names = attributes.pop("columns").split(",")
         ended = attributes.pop("rows", NOT_ENDED)
-        count = len(file["time_s"])  # written after all others: of a killed recording they may have more
+        count = len(file["time_s"])  # written last: after a kill the other columns may have more rows
         dtypes = {
             name: "O" if type.kind == "S" else "?" if type == np.int8 else f"{type.kind}{type.itemsize}"
             for name, type in ((name, file[name].dtype) for name in names)
@@ -205,14 +204,14 @@ def _load_hdf5(path: Path) -> Recording:
 
 
 def load(file: Union[str, os.PathLike[str]]) -> Recording:
-    """A recording of `absenc record`, whose name ends in .csv, in .jsonl or .ndjson for JSON lines, or in .h5 or .hdf5.
-    Columns have the same names and types whichever it is. Details that only JSON lines have (`message`, `sent` ...) are
-    left out; and times have microseconds in CSV.
+    """Loads a recording of `absenc record`, whose name ends in .csv, in .jsonl or .ndjson for JSON lines, or in .h5 or
+    .hdf5. All formats give the same columns and types. Details that only JSON lines have (`message`, `sent` ...) are
+    omitted; times have a resolution of one microsecond in CSV.
 
-    A last line without its end may be the beginning of other numbers: it is left out, with a warning and in
-    `Recording.damage`. `Recording.is_whole` says whether anything can be missing.
+    A last line without a line end may be incomplete: it is omitted, which a warning and `Recording.damage` report.
+    `Recording.is_whole` is False if rows may be missing.
 
-    Raises UsageError; Failure, which names the file, when it is no recording or damaged elsewhere; OSError."""
+    Raises UsageError; Failure, which names the file, if it is no recording or damaged elsewhere; OSError."""
     path = Path(file)
     if path.suffix in (".h5", ".hdf5"):
         try:

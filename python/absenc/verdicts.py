@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Whether an encoder is well, whether it keeps to its document, what frames tell of its options; which ports there are;
-and the wires of a virtual encoder as a file."""
+"""Diagnosis (doctor), conformance tests, options found from frames, the ports of this computer, and waveform files of
+virtual encoders."""
 from __future__ import annotations
 
 import json
@@ -14,42 +14,42 @@ from .errors import UsageError
 
 
 class Finding(NamedTuple):
-    """A defect, or a fact that is good to know."""
+    """A fault, a warning or a note about an encoder or its line."""
 
-    id: str  #: "reply_late", as docs/doctor.md lists them
-    severity: str  #: "note", "warning": it works, but not for long; "fault": it does not work
-    evidence: str  #: what was seen
-    cause: str  #: the most likely one
-    action: str  #: what to do
+    id: str  #: "reply_late", see docs/doctor.md
+    severity: str  #: "note"; "warning": may fail soon; "fault": does not work
+    evidence: str  #: observation
+    cause: str  #: most likely cause
+    action: str  #: recommended action
 
 
 class Examination(NamedTuple):
     """The verdict of `absenc doctor --json`."""
 
-    ok: bool  #: nothing is to be mended
-    findings: list[Finding]  #: in the order in which they are to be mended
+    ok: bool  #: no finding needs a repair
+    findings: list[Finding]  #: in the order in which to fix them
     readings: int
-    good: int  #: of them
-    complete: bool  #: False: it was interrupted
-    seconds: float  #: from the first to the last reading
-    failures_below: float  #: the share of failures is below it, at 95 % confidence
-    verdict: str  #: "good: ..." with what was looked at, or "first: ..." with what to mend first
+    good: int  #: readings without an error
+    complete: bool  #: False: the examination was interrupted
+    seconds: float  #: time from the first to the last reading
+    failures_below: float  #: upper limit of the share of failures, at 95 % confidence
+    verdict: str  #: "good: ..." with the checks, or "first: ..." with what to fix first
     readings_per_second: Optional[float] = None
-    echo: Optional[str] = None  #: whether the adapter hears what it sends
-    latency_ms: Optional[float] = None  #: that the way to the line adds, where it is known
-    quickest_reply_ms: Optional[float] = None  #: from the end of the request to the end of the reply; None: not known
+    echo: Optional[str] = None  #: whether the adapter receives its own transmission
+    latency_ms: Optional[float] = None  #: latency that adapter and driver add, if known
+    quickest_reply_ms: Optional[float] = None  #: from the end of a request to the end of its reply; None: unknown
     slowest_reply_ms: Optional[float] = None
 
 
 class Clause(NamedTuple):
-    """A rule of the encoder's document."""
+    """A clause of the encoder's document, with its verdict."""
 
     id: str
     document: str
     paragraph: str
     words: str
     verdict: str  #: "kept", "broken", "untested"
-    evidence: str  #: what was seen and how often, or why nothing was
+    evidence: str  #: observations and their number, or why it is untested
 
 
 class Conformance(NamedTuple):
@@ -57,66 +57,66 @@ class Conformance(NamedTuple):
 
     ok: bool  #: the verdict is "kept"
     protocol: str
-    verdict: str  #: "broken" where any clause is, else "kept" where any is, else "untested"
+    verdict: str  #: "broken" if any clause is, else "kept" if any is, else "untested"
     kept: int
     broken: int
     untested: int
     clauses: list[Clause]
-    left: list[str]  #: commands that put back by hand what could not be: the encoder is changed
+    left: list[str]  #: commands to restore values that could not be restored automatically
 
 
 class OptionEvidence(NamedTuple):
-    """Whether frames allow a value of an option that the document leaves open."""
+    """Whether the frames permit a value of an option that the document leaves open."""
 
     option: str
     value: Union[bool, int, str]
     possible: bool
     why: str
-    frame: Optional[int] = None  #: the number, from 1 on, of the frame that excludes the value
+    frame: Optional[int] = None  #: number, from 1, of the frame that excludes the value
 
 
 class Probed(NamedTuple):
     """The result of `absenc probe --json`."""
 
     protocol: str
-    ok: bool  #: some options explain all frames
+    ok: bool  #: a combination of options explains all frames
     evidence: list[OptionEvidence]
-    settled: list[str]  #: "name=value": the options to go on with; none: the defaults will do
+    settled: list[str]  #: "name=value": options that the frames require; empty: the defaults
 
 
 class Waved(NamedTuple):
-    """A waveform that was drawn."""
+    """Summary of a waveform file."""
 
     results: int
-    failures: int  #: of them
-    seconds: float  #: of the whole waveform
+    failures: int  #: failed results
+    seconds: float  #: duration of the waveform
     wires: list[str]
 
 
 class Port(NamedTuple):
-    """A port of this computer, as `absenc ports --json` prints it. None: not known, or not of this kind."""
+    """A port of this computer, as `absenc ports --json` prints it. None: unknown, or not applicable to this kind."""
 
     port: str  #: "/dev/ttyUSB0", "can0", "/dev/spidev0.0"
     kind: str  #: "serial", "can", "spi"
-    lasting_name: Optional[str] = None  #: "/dev/serial/by-id/...", whatever else is plugged in
+    lasting_name: Optional[str] = None  #: "/dev/serial/by-id/...", independent of other adapters
     maker: Optional[str] = None
     adapter: Optional[str] = None
     serial_number: Optional[str] = None
     chip: Optional[str] = None
     driver: Optional[str] = None
-    latency_timer_ms: Optional[int] = None  #: so long the adapter holds back what it has received
-    highest_rate: Optional[int] = None  #: bits a second
+    latency_timer_ms: Optional[int] = None  #: how long the adapter may delay received bytes
+    highest_rate: Optional[int] = None  #: bits per second
     may_open: Optional[bool] = None
-    refusal: Optional[str] = None  #: why it may not
-    in_use_by: Optional[str] = None  #: "absenc serve (process 4711)"
+    refusal: Optional[str] = None  #: why the port may not be opened
+    in_use_by: Optional[str] = None  #: process that uses the port: "absenc serve (process 4711)"
 
 
 def doctor(
     text: str, *, seconds: float = 3, readings: int = 100_000, turning_s: float = 0, **options: Value
 ) -> Examination:
-    """Looks from the port up and reads for so long; changes nothing. A port that does not open is a finding. With
-    `turning_s` it then reads for so long while somebody turns the shaft. Text and options as for `open`. Raises
-    UsageError."""
+    """Examines port, line and encoder, and reads for `seconds`; changes nothing. A port that cannot be opened is a
+    finding. With `turning_s` it reads for this time while the user turns the shaft. Text and options are as for
+    `open`. Raises UsageError."""
     if not seconds > 0:
         raise UsageError(f"seconds is greater than 0, not {seconds!r}")
     found = json.loads(
@@ -129,10 +129,10 @@ def doctor(
 def conform(
     text: str, *, readings: int = 100, changes: bool = False, resets: bool = False, **options: Value
 ) -> Conformance:
-    """Tests an encoder against the clauses of its document. Nothing is written to it without `changes`, which puts back
-    what it writes; `resets` loses its zero, turns and alarms as well. Raises UsageError, PortError, Failure."""
+    """Tests an encoder against the clauses of its document. `changes` permits writing, and restores what was written;
+    `resets` also permits tests that lose zero, turns and alarms. Raises UsageError, PortError, Failure."""
     if resets and not changes:
-        raise UsageError("resets says what changes may lose: give both, or neither")
+        raise UsageError("resets needs changes: give both, or neither")
     found = json.loads(_absenc.conform(text, texts(options), natural("readings", readings, 1), changes, resets))
     found["clauses"] = [Clause(**one) for one in found["clauses"]]
     return Conformance(**found)
@@ -141,8 +141,8 @@ def conform(
 def probe(
     protocol: str, replies: Sequence[str], requests: Sequence[str] = (), *, model: str = "", **options: Value
 ) -> Probed:
-    """Finds the options that the document of the protocol leaves open from captured frames. `replies` and `requests` are
-    hexadecimal, in the same order; "" where one did not come or is not known. Raises UsageError."""
+    """Finds options that the protocol's document leaves open, from captured frames. `replies` and `requests` are
+    hexadecimal, in the same order; "" for one that is missing or unknown. Raises UsageError."""
     found = json.loads(_absenc.probe(protocol, model, texts(options), list(replies), list(requests)))
     found["evidence"] = [OptionEvidence(**one) for one in found["evidence"]]
     return Probed(**found)
@@ -160,9 +160,9 @@ def wave(
     **options: Value,
 ) -> Waved:
     """Writes a conversation with a virtual encoder ("tformat", "sim:esl?fault=corrupt=0.1") as a waveform: .vcd, .sr
-    (sigrok) or .csv (Saleae Logic 2), by the end of the name. Without commands it reads, `count` results at `rate` a
-    second. Time is virtual and exact to the nanosecond. Raises UsageError, also where the file is there already,
-    unless it `replaces` it."""
+    (sigrok) or .csv (Saleae Logic 2), by the end of the name. Without commands it reads, `count` results at `rate` per
+    second. Time is virtual and exact to the nanosecond. Raises UsageError, also if the file exists, unless `replaces`
+    is set."""
     return Waved(
         *_absenc.wave(
             text,
@@ -178,5 +178,5 @@ def wave(
 
 
 def ports() -> list[Port]:
-    """The ports of this computer behind which an encoder may be. None of them is opened."""
+    """Returns the ports of this computer that an encoder may be connected to. It opens none of them."""
     return [Port(**json.loads(one)) for one in _absenc.ports()]

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The build backend of the Python package (PEP 517): CMake builds it, and what it has built becomes a wheel. Nothing is
-downloaded: what it takes are Debian packages (command_packages in ./dev).
+"""Build backend of the Python package (PEP 517): CMake builds the module, which is then packed into a wheel. Nothing is
+downloaded: all dependencies are Debian packages (command_packages in ./dev).
 
     pip install --no-build-isolation --no-index --no-deps .
-    pip install ... --config-settings build-dir=build/release .     # a tree that is configured already
+    pip install ... --config-settings build-dir=build/release .     # uses a configured build tree
 """
 import base64
 import hashlib
@@ -47,7 +47,7 @@ def entry_points():
 
 
 def build(tree, configured):
-    """The folder of the package, built in `tree`."""
+    """Builds the package in `tree` and returns its folder."""
     if not configured:
         subprocess.run(
             ["cmake", "-S", SOURCE, "-B", tree, "-G", "Ninja", "-DCMAKE_BUILD_TYPE=Release", "-DABSENC_PYTHON=ON",
@@ -91,8 +91,8 @@ def build_sdist(sdist_directory, config_settings=None):
     with tarfile.open(Path(sdist_directory) / f"{name}.tar.gz", "w:gz") as archive:
         for file in filter(None, files.decode().split("\0")):
             archive.add(SOURCE / file, f"{name}/{file}")
-        with tempfile.NamedTemporaryFile("w") as told:
-            told.write(metadata())
-            told.flush()
-            archive.add(told.name, f"{name}/PKG-INFO")
+        with tempfile.NamedTemporaryFile("w") as file_info:
+            file_info.write(metadata())
+            file_info.flush()
+            archive.add(file_info.name, f"{name}/PKG-INFO")
     return f"{name}.tar.gz"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Pictures of a recording of a rotary encoder: plots.py log.csv motion|noise|eccentricity picture.png"""
+"""Plots a recording of a rotary encoder: plots.py log.csv motion|noise|eccentricity picture.png"""
 import sys
 from typing import Any
 
@@ -9,7 +9,7 @@ import numpy as np
 
 
 def motion(recording: absenc.Recording) -> Any:
-    """Position, speed and alarms over time. What does not hold is a gap in the line."""
+    """Plots position, speed and alarms over time. Invalid values are gaps in the line."""
     figure, axes = plt.subplots(3, sharex=True, layout="constrained")
     for axis, name in zip(axes, ("position", "speed_rpm")):
         axis.plot(recording["time_s"], recording[name])
@@ -26,11 +26,11 @@ def motion(recording: absenc.Recording) -> Any:
 
 
 def noise(recording: absenc.Recording) -> Any:
-    """How often which count is read at standstill, around the mean."""
+    """Plots the distribution of the counts around their mean, at standstill."""
     counts = recording.rows.data["position"][~recording.rows.mask["position"]]
-    away = counts - round(counts.mean())
+    deviation = counts - round(counts.mean())
     figure, axis = plt.subplots(layout="constrained")
-    axis.hist(away, np.arange(away.min(), away.max() + 2) - 0.5)
+    axis.hist(deviation, np.arange(deviation.min(), deviation.max() + 2) - 0.5)
     axis.set_title(f"standard deviation {counts.std():.2f} counts")
     axis.set_xlabel("counts from the mean")
     axis.set_ylabel("readings")
@@ -38,14 +38,14 @@ def noise(recording: absenc.Recording) -> Any:
 
 
 def eccentricity(recording: absenc.Recording) -> Any:
-    """How far the position is from that of a constant speed, over the turn."""
-    held = ~recording.rows.mask["position"]
-    time, position = recording["time_s"][held], recording["position"][held]
-    away = position - np.polyval(np.polyfit(time, position, 1), time)
+    """Plots the deviation of the position from a constant speed, over the angle within the turn."""
+    valid = ~recording.rows.mask["position"]
+    time, position = recording["time_s"][valid], recording["position"][valid]
+    deviation = position - np.polyval(np.polyfit(time, position, 1), time)
     figure, axis = plt.subplots(layout="constrained")
-    axis.plot(recording["angle_deg"][held], away, ".")
+    axis.plot(recording["angle_deg"][valid], deviation, ".")
     axis.set_xlabel("angle, deg")
-    axis.set_ylabel("from a constant speed, counts")
+    axis.set_ylabel("deviation from constant speed, counts")
     return figure
 
 

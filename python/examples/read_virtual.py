@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""An encoder that turns, read at 100 Hz; a recording of it; and what a program sees when its supply fails."""
+"""Reads a turning virtual encoder at 100 Hz, records it, and shows the error after its supply has failed."""
 import os
 import tempfile
 

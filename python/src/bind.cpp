@@ -10,11 +10,11 @@
 namespace absenc::python {
 
 bool SignalWatch::wants_end() {
-  constexpr Time between_looks = std::chrono::milliseconds(20);
+  constexpr Time check_interval = std::chrono::milliseconds(20);
   if (raised_) return true;
   const Time now = os::now();
-  if (now < look_at_) return false;
-  look_at_ = now + between_looks;
+  if (now < next_check_) return false;
+  next_check_ = now + check_interval;
   const py::gil_scoped_acquire gil;
   if (PyErr_CheckSignals() != 0) raised_.emplace();
   return raised_.has_value();
@@ -32,7 +32,7 @@ void raise(const py::object& error) { PyErr_SetObject(py::type::of(error).ptr(),
 
 void raise(const char* name, const std::string& sentence) { raise(errors().attr(name)(sentence)); }
 
-// With the word of what became of a change, where the call was to make one.
+// Sets the state of the change on the exception, if the call was to change the encoder.
 py::object changed(py::object error, const std::exception& failure) {
   if (const client::Change* change = client::change_of(failure)) {
     error.attr("change") = py::str(std::string(client::word_of(change->state)));

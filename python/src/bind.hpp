@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the sources of the Python module share: waiting that Ctrl-C ends, exceptions, values.
+// Shared parts of the Python module: waits that Ctrl-C ends, exceptions, conversion of values.
 #pragma once
 
 #include <pybind11/pybind11.h>
@@ -18,32 +18,33 @@ namespace absenc::python {
 
 namespace py = pybind11;
 
-/// Whether a signal handler of Python wants to end what waits without the GIL. Python runs handlers in its main thread
-/// only, so in others this is never so.
+/// Checks whether a Python signal handler has raised an exception, during waits without the GIL. Python runs handlers
+/// in its main thread only, so `wants_end` is always false in other threads.
 class SignalWatch {
  public:
-  /// Looks every 20 ms at the most. Without the GIL.
+  /// Returns whether the wait must end. Checks at most every 20 ms. Call it without the GIL.
   [[nodiscard]] bool wants_end();
-  /// Throws what the handler raised. With the GIL.
+  /// Throws the exception that the handler raised, if any. Call it with the GIL.
   void rethrow();
 
  private:
-  Time look_at_{};
+  Time next_check_{};
   std::optional<py::error_already_set> raised_;
 };
 
-/// What the library throws becomes a class of absenc.errors.
+/// Registers the conversion of the library's exceptions to classes of absenc.errors.
 void register_exceptions();
 
-/// The object of absenc.errors for a failed command.
+/// Returns the exception object of absenc.errors for a failed command.
 [[nodiscard]] py::object error_object(const client::Trouble& trouble);
 
-/// Numbers, texts and bytes; of flags the names; None for nothing, for what does not hold and for what is not reported.
+/// Converts numbers, texts and bytes; flags become a tuple of names; missing, invalid and unreported values become
+/// None.
 [[nodiscard]] py::object to_python(const client::Value& value);
-/// A dict of them by column.
+/// Returns the values as a dict by column name.
 [[nodiscard]] py::dict to_python(const client::Answer& answer);
 [[nodiscard]] py::dict to_python(const std::vector<client::Column>& columns, const std::vector<client::Value>& values);
-/// The names of those that are raised, of all channels.
+/// Returns the names of the raised flags of all channels.
 [[nodiscard]] py::list names_of(const std::vector<client::Flags>& flags);
 
 [[nodiscard]] inline py::bytes to_bytes(Bytes bytes) {

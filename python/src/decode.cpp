@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A capture as columns of NumPy, some thousands of rows at a time.
+// Converts a capture to NumPy columns, some thousands of rows at a time.
 #include "absenc/client/decode.hpp"
 
 #include <pybind11/numpy.h>
@@ -21,7 +21,7 @@ using client::Column;
 using client::Type;
 using client::Value;
 
-/// The values of one column. Filled without the GIL, handed out with it.
+/// The values of one column. They are stored without the GIL and converted with it.
 struct Values {
   explicit Values(Type of_type) : type(of_type) {}
 
@@ -78,7 +78,7 @@ struct Values {
     return objects();
   }
 
-  // What comes again, as most requests and texts do, is one object.
+  // Creates one Python object for repeated values, such as most requests and texts.
   [[nodiscard]] py::object objects() const {
     py::list list(ends.size());
     std::unordered_map<std::string_view, py::object> known;
@@ -130,7 +130,7 @@ class Rows {
   Rows(const std::string& path, const std::string& unit, const client::DecodeChoices& choices)
       : decoded_(path, unit, choices) {}
 
-  /// (name, unit, dtype, meaning) of each column.
+  /// Returns (name, unit, dtype, meaning) of each column.
   [[nodiscard]] py::list columns() const {
     py::list list;
     for (const Column& column : decoded_.columns()) {
@@ -140,7 +140,7 @@ class Rows {
     return list;
   }
 
-  /// (values, missing) of each column; None at the end.
+  /// Returns (values, missing) of each column; None at the end.
   py::object take(std::size_t most) {
     std::vector<Values> columns;
     for (const Column& column : decoded_.columns()) columns.emplace_back(column.type);

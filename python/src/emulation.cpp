@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Virtual encoders for tests.
+// Binds virtual encoders.
 #include "absenc/client/emulate.hpp"
 
 #include "python/src/bind.hpp"

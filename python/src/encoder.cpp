@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// An open encoder.
+// Binds an open encoder.
 #include <algorithm>
 #include <atomic>
 #include <cstddef>
@@ -18,8 +18,8 @@ namespace absenc::python {
 
 namespace {
 
-/// Who was found by a scan: each record begins with whom it is of.
-struct Records final : FieldSink {
+/// Replies to a scan: each record starts with the field that identifies the encoder.
+struct ScanReplies final : FieldSink {
   void put(const FieldValue& value) override {
     if (value.info->role == Role::encoder || all.empty()) all.emplace_back();
     all.back().put(value);
@@ -38,10 +38,10 @@ struct Closed : client::UsageError {
   Closed() : UsageError("this encoder is closed: open it again") {}
 };
 
-/// Used by one Python thread at a time, whichever; others wait for it without the GIL.
+/// An encoder for any Python thread. Threads take turns and wait without the GIL.
 class PyEncoder {
  public:
-  /// `work` on the encoder without the GIL; what it returns holds no Python objects.
+  /// Calls `work` with the encoder, without the GIL; the result of `work` must not contain Python objects.
   template <class Work>
   auto use(const Work& work) {
     try {
@@ -63,17 +63,17 @@ class PyEncoder {
   PyEncoder(const PyEncoder&) = delete;
   PyEncoder& operator=(const PyEncoder&) = delete;
 
-  /// Throws what a handler of Python's has raised while samples were waited for.
+  /// Throws the exception that a Python signal handler raised during the wait for samples.
   void check() { watch_.rethrow(); }
 
   void close() {
-    encoder_.cancel();  // from any thread: what waits ends
+    encoder_.cancel();  // allowed from any thread: ends the waits
     const py::gil_scoped_release released;
     const std::lock_guard lock(mutex_);
     if (!std::exchange(closed_, true)) encoder_.connection().disconnect();
   }
 
-  /// So that one loop over samples ends and others may begin.
+  /// Ends the current loop over samples (true), or permits new ones (false).
   void stop(bool stopping) { stopping_ = stopping; }
 
   [[nodiscard]] const client::Encoder& encoder() const { return encoder_; }
@@ -120,13 +120,13 @@ class PySamples {
 std::int64_t whole_number(const Argument& argument, const py::handle& value) {
   try {
     return py::cast<std::int64_t>(value);
-  } catch (const py::cast_error&) {  // no number, or more than 64 bits
+  } catch (const py::cast_error&) {  // not a number, or more than 64 bits
     throw client::UsageError(std::string(argument.name) + " is " + std::string(py::repr(value)) +
                              ", but must be a whole number of up to 64 bits");
   }
 }
 
-/// Named arguments in the order of the command, those that are left out with their defaults.
+/// Returns the arguments in the order of the command; missing ones have their defaults.
 std::vector<std::int64_t> arguments_of(const Command& command, const py::args& args, const py::kwargs& named) {
   std::vector<std::int64_t> values;
   if (args.size() > command.arguments.size()) {
@@ -166,8 +166,8 @@ py::list scan(PyEncoder& encoder) {
                              " has no addresses to scan: there is one encoder on its line");
   }
   const std::vector<std::int64_t> arguments = client::complete_arguments(*command, {});
-  const Records records = encoder.use([&](client::Encoder& one) {
-    Records found;
+  const ScanReplies records = encoder.use([&](client::Encoder& one) {
+    ScanReplies found;
     client::run_into(one.connection(), *command, arguments, found);
     return found;
   });
@@ -218,7 +218,8 @@ py::bytes memory_read(PyEncoder& encoder, std::uint32_t address, std::uint32_t c
   client::MemoryImage wanted;
   for (std::uint32_t i = 0; i < count; ++i) {
     const client::MemoryAddress at{page, address + i};
-    client::require_open(unit, {{at, 0}}, client::Access::read);  // one by one: `count` may be any number
+    client::require_open(unit, {{at, 0}}, client::Access::read);  // each address separately, because `count` may be
+                                                                  // very large
     wanted[at] = 0;
   }
   const client::MemoryImage image = encoder.use([&](client::Encoder& one) { return one.memory().read(wanted); });

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Which encoder is on a line, or whose frames are in a capture.
+// Binds the identification of an encoder on a line.
 #include "absenc/client/identify.hpp"
 
 #include "absenc/os/signals.hpp"
@@ -30,7 +30,7 @@ py::tuple to_tuple(const client::Identified& identified) {
   return py::make_tuple(found, identified.notes, identified.is_complete);
 }
 
-/// Between two tries a handler of Python's may end the search.
+/// A Python signal handler may end the search between two attempts.
 py::tuple identify(const std::string& place, double limit_s) {
   SignalWatch watch;
   try {

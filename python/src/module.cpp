@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// absenc._absenc: what absenc/*.py is written over.
+// The extension module absenc._absenc, which absenc/*.py is based on.
 #include "python/src/bind.hpp"
 
 PYBIND11_MODULE(_absenc, module) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What is known of each unit, its frames as plain functions, and CRCs.
+// Binds the descriptions of protocols, their codecs, and CRCs.
 #include <pybind11/numpy.h>
 
 #include <algorithm>
@@ -17,7 +17,7 @@ namespace absenc::python {
 
 namespace {
 
-/// Bytes as they are, text as people write frames; an empty one is none.
+/// Converts a frame from bytes or text; an empty object is no frame.
 client::WireFrame frame_of(LinkKind link, const char* what, const py::object& object) {
   if (py::len(object) == 0) return {};
   if (py::isinstance<py::str>(object)) return client::parse_wire_text(link, what, py::cast<std::string>(object));
@@ -33,23 +33,24 @@ py::dict decode(const std::string& name, const py::object& reply, const py::obje
                 const std::vector<std::string>& settings) {
   const Unit& unit = client::require_unit(name);
   const Options options = client::require_options(unit, model, settings);
-  const client::WireFrame asked = frame_of(unit.link, "request", request);
-  const client::WireFrame told = frame_of(unit.link, "reply", reply);
-  if (asked.frame().empty() && told.frame().empty()) {
+  const client::WireFrame request_frame = frame_of(unit.link, "request", request);
+  const client::WireFrame reply_frame = frame_of(unit.link, "reply", reply);
+  if (request_frame.frame().empty() && reply_frame.frame().empty()) {
     throw client::UsageError("there is nothing to decode: reply and request are empty, and one of them is needed");
   }
   client::AnswerSink sink;
-  const Error error = unit.decode(options, asked.frame(), told.frame(), sink);
+  const Error error = unit.decode(options, request_frame.frame(), reply_frame.frame(), sink);
   if (error == Error::none) return to_python(sink.answer);
-  const Explanation said =
-      unit.explain != nullptr ? unit.explain(options, error, asked.frame(), told.frame()) : Explanation{};
-  const client::Subject subject = client::subject_of(unit, options, asked.frame(), told.frame());
-  const std::string_view advice = said.advice.empty() ? text_of(error).advice : said.advice;
+  const Explanation explanation = unit.explain != nullptr
+                                      ? unit.explain(options, error, request_frame.frame(), reply_frame.frame())
+                                      : Explanation{};
+  const client::Subject subject = client::subject_of(unit, options, request_frame.frame(), reply_frame.frame());
+  const std::string_view advice = explanation.advice.empty() ? text_of(error).advice : explanation.advice;
   throw client::EncoderFailure({.error = error,
-                                .message = client::describe(unit.link, subject, error, said.detail),
+                                .message = client::describe(unit.link, subject, error, explanation.detail),
                                 .advice = std::string(advice),
-                                .sent = client::to_wire_text(unit.link, asked.frame()),
-                                .received = client::to_wire_text(unit.link, told.frame())});
+                                .sent = client::to_wire_text(unit.link, request_frame.frame()),
+                                .received = client::to_wire_text(unit.link, reply_frame.frame())});
 }
 
 py::object encode(const std::string& name, const std::string& command_name, const std::vector<std::int64_t>& given,
@@ -137,7 +138,7 @@ std::vector<std::string> error_names() {
   return names;
 }
 
-/// One for each row.
+/// Returns one CRC for each row.
 py::array_t<std::uint16_t> crc(const py::array_t<std::uint8_t, py::array::c_style | py::array::forcecast>& rows,
                                unsigned width, std::uint16_t poly, std::uint16_t init, bool refin, bool refout,
                                std::uint16_t xorout) {

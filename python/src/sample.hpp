@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What an encoder said, as Python sees it: a reading, and a sample of many.
+// Python views of a reading and of a sample.
 #pragma once
 
 #include <algorithm>
@@ -17,21 +17,21 @@ struct PyReading {
   const Unit* unit;
   Reading reading;
 
-  [[nodiscard]] bool holds() const { return reading.ready && reading.singleturn_valid(); }
+  [[nodiscard]] bool is_valid() const { return reading.ready && reading.singleturn_valid(); }
   [[nodiscard]] py::object singleturn_valid() const {
     return to_python(client::value_of(reading.ready ? reading.singleturn_validity() : Validity::invalid));
   }
   [[nodiscard]] py::object multiturn_valid() const { return to_python(client::value_of(reading.multiturn_validity())); }
   [[nodiscard]] std::optional<double> angle_deg() const {
-    if (!holds() || reading.unit_um > 0) return {};
+    if (!is_valid() || reading.unit_um > 0) return {};
     return degrees(reading.singleturn, reading.singleturn_bits);
   }
   [[nodiscard]] std::optional<double> position_mm() const {
-    if (!holds() || reading.unit_um <= 0) return {};
+    if (!is_valid() || reading.unit_um <= 0) return {};
     return micrometres(reading.singleturn, reading.unit_um) / 1000;
   }
   [[nodiscard]] std::optional<std::uint64_t> singleturn() const {
-    if (!holds()) return {};
+    if (!is_valid()) return {};
     return reading.singleturn;
   }
   [[nodiscard]] std::optional<std::int64_t> multiturn() const {
@@ -40,7 +40,7 @@ struct PyReading {
   }
   [[nodiscard]] py::object alarms() const { return names_or_none(client::alarms_of(*unit, reading)); }
   [[nodiscard]] py::object status() const { return names_or_none(client::status_of(*unit, reading)); }
-  // None: none of the flags is raised, and not all are reported.
+  // Returns None if no flag is raised but not all flags are reported.
   [[nodiscard]] static py::object names_or_none(const std::vector<client::Flags>& channels) {
     const py::list names = names_of(channels);
     const bool is_complete = !channels.empty() && std::all_of(channels.begin(), channels.end(),
@@ -49,7 +49,7 @@ struct PyReading {
   }
   [[nodiscard]] py::str text() const {
     const auto position =
-        holds() ? py::object(py::cast(reading.unit_um > 0 ? position_mm() : angle_deg())) : py::none();
+        is_valid() ? py::object(py::cast(reading.unit_um > 0 ? position_mm() : angle_deg())) : py::none();
     return py::str("Reading({}={}, multiturn={}, alarms={})")
         .format(reading.unit_um > 0 ? "position_mm" : "angle_deg", position, py::cast(multiturn()), alarms());
   }
@@ -84,10 +84,10 @@ struct PySample {
     return valid ? std::optional<T>(value) : std::nullopt;
   }
   [[nodiscard]] py::str repr() const {
-    const py::object said = sample.kind == client::Sample::Kind::reading
-                                ? py::object(PyReading{unit, sample.reading}.text())
-                                : py::object(py::str(sample.text()));
-    return py::str("Sample({}, time_s={}, {})").format(kind(), seconds(sample.at), said);
+    const py::object contents = sample.kind == client::Sample::Kind::reading
+                                    ? py::object(PyReading{unit, sample.reading}.text())
+                                    : py::object(py::str(sample.text()));
+    return py::str("Sample({}, time_s={}, {})").format(kind(), seconds(sample.at), contents);
   }
   [[nodiscard]] py::object error() const {
     return sample.kind == client::Sample::Kind::failed ? error_object(sample.trouble) : py::none();

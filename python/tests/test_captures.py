@@ -23,7 +23,7 @@ def wave(tmp_path, request):
     return path
 
 
-def test_rows_with_errors_have_no_position():
+def test_masks_position_of_rows_with_errors():
     capture = absenc.decode(TEXT, "tformat")
     assert list(capture["error"]) == ["", "bad_checksum", ""]
     assert list(capture.good()) == [True, False, True]
@@ -33,26 +33,26 @@ def test_rows_with_errors_have_no_position():
     assert capture.columns["angle_deg"].unit == "deg"
 
 
-def test_same_as_the_command(wave):
-    told = subprocess.run([os.environ["ABSENC"], "decode", "tformat", str(wave), "--csv"], capture_output=True, text=True)
-    rows = list(csv.DictReader(io.StringIO(told.stdout)))
+def test_decodes_like_the_command(wave):
+    printed = subprocess.run([os.environ["ABSENC"], "decode", "tformat", str(wave), "--csv"], capture_output=True, text=True)
+    rows = list(csv.DictReader(io.StringIO(printed.stdout)))
     capture = absenc.decode(wave, "tformat")
     assert len(rows) == len(capture) >= 300
-    # An encoder that is switched on at 6000 rpm has no position that holds: here it is masked, there empty.
+    # An encoder that is switched on at 6000 rpm has no valid position: masked in NumPy, empty in CSV.
     absent = [row["angle_deg"] == "" for row in rows]
     assert absent == list(np.ma.getmaskarray(capture["angle_deg"]))
     assert absent == [row["singleturn_valid"] == "false" for row in rows] == list(np.ma.getmaskarray(capture["singleturn"]))
-    assert len(set(capture["reply"])) > 250  # it turns
+    assert len(set(capture["reply"])) > 250  # the encoder turns
     assert [[] if row["alarms"] == "none" else row["alarms"].split() for row in rows] == [
         absenc.protocol["tformat"].flag_names("alarms", int(bits)) for bits in capture["alarms"]]
     assert [float(row["angle_deg"]) for row in rows if row["angle_deg"]] == pytest.approx(capture["angle_deg"].compressed())
     for name in ("singleturn", "multiturn"):
-        told_here = [int(row[name]) for row in rows if row[f"{name}_valid"] == "true"]
-        assert told_here == capture[name].compressed().tolist()
+        valid = [int(row[name]) for row in rows if row[f"{name}_valid"] == "true"]
+        assert valid == capture[name].compressed().tolist()
     assert [bytes.fromhex(row["reply"]) for row in rows] == list(capture["reply"])
 
 
-def test_an_earlier_reply_is_remembered(tmp_path):
+def test_uses_alarms_of_earlier_replies(tmp_path):
     text = tmp_path / "bytes.txt"
     alone, whole, alarm = "02 02 00 CD AB 01 65", "1A 1A 00 45 23 01 11 34 12 00 00 4A", "02 02 20 CD AB 01 45"
     text.write_text("\n".join((alone, whole, alone, alarm)) + "\n")
@@ -61,7 +61,7 @@ def test_an_earlier_reply_is_remembered(tmp_path):
     assert list(np.ma.getmaskarray(capture["alarms"])) == [True, False, False, True]
 
 
-def test_batches_make_the_whole(wave):
+def test_batches_contain_all_rows(wave):
     whole = absenc.decode(wave, "tformat")
     batches = list(absenc.decode_batches(wave, "tformat", rows=7))
     assert {len(batch) for batch in batches[:-1]} == {7}
@@ -69,23 +69,23 @@ def test_batches_make_the_whole(wave):
         assert list(np.concatenate([batch.rows.data[name] for batch in batches])) == list(whole.rows.data[name])
 
 
-def test_pandas(wave):
+def test_converts_to_pandas(wave):
     pytest.importorskip("pandas")
     frame = absenc.decode(TEXT, "tformat").to_pandas()
     assert list(frame["singleturn"].isna()) == [False, True, False]
     assert frame["angle_deg"].isna()[1]
 
 
-def test_files_that_are_wrong(tmp_path):
+def test_refuses_missing_files_and_unknown_columns(tmp_path):
     with pytest.raises(absenc.AbsencError):
         absenc.decode(tmp_path / "none.sr", "tformat")
     with pytest.raises(absenc.AbsencError):
-        absenc.decode_batches(tmp_path / "none.sr", "tformat")  # before the first batch is asked for
+        absenc.decode_batches(tmp_path / "none.sr", "tformat")  # raised before the first batch is requested
     with pytest.raises(KeyError, match="angle_deg"):
         absenc.decode(TEXT, "tformat")["angel"]
 
 
-def test_frames():
+def test_encodes_and_decodes_frames():
     tformat = absenc.protocol["tformat"]
     reply = bytes.fromhex("1A0045230111341200004A")
     assert tformat.encode("position") == b"\x1a"
@@ -95,10 +95,10 @@ def test_frames():
     assert raised.value.sent == "1A"
     assert tformat.flag_names("alarms", 1 << 4) == ["over_heat"]
     with pytest.raises(TypeError):
-        tformat.decode(3)  # and not three zeros
+        tformat.decode(3)  # must not be decoded as three zero bytes
 
 
-def test_crc_of_arrays():
+def test_computes_crc_of_bytes_and_arrays():
     assert absenc.crc(b"123456789", width=16, poly=0x1021, init=0xFFFF) == 0x29B1
     rows = np.frombuffer(b"123456789" * 3, np.uint8).reshape(3, 9)
     assert list(absenc.crc(rows, width=8, poly=0x07)) == [0xF4] * 3

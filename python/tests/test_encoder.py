@@ -13,10 +13,10 @@ import tty
 import absenc
 import pytest
 
-PATIENCE_MS = 500  # the machine may be busy
+PATIENCE_MS = 500  # a busy machine may delay replies
 
 
-def test_errors_say_what_was_sent_what_came_and_what_to_try(absenc_emulate):
+def test_error_has_sent_and_received_bytes_and_advice(absenc_emulate):
     virtual = absenc_emulate("tformat")
     with absenc.open(virtual.address, latency=PATIENCE_MS) as encoder:
         virtual.power_off()
@@ -26,11 +26,11 @@ def test_errors_say_what_was_sent_what_came_and_what_to_try(absenc_emulate):
     assert raised.value.message and raised.value.advice and raised.value.exchange
 
 
-def test_each_error_has_a_class():
+def test_every_error_has_a_class():
     assert set(absenc.errors.by_name) == set(absenc._absenc.error_names())
 
 
-def test_damaged_replies_are_never_a_position(absenc_emulate):
+def test_damaged_reply_gives_no_position(absenc_emulate):
     virtual = absenc_emulate("tformat", singleturn=65536, faults={"corrupt": 1})
     with absenc.open(virtual.address, latency=PATIENCE_MS) as encoder:
         for sample in encoder.samples(count=2):
@@ -40,7 +40,7 @@ def test_damaged_replies_are_never_a_position(absenc_emulate):
         assert encoder.read().angle_deg == 180
 
 
-def test_conditions_while_it_runs(absenc_emulate):
+def test_changes_condition_while_encoder_runs(absenc_emulate):
     virtual = absenc_emulate("tformat", conditions={"temperature": 40})
     with absenc.open(virtual.address, latency=PATIENCE_MS) as encoder:
         assert encoder.run("temperature")["temperature_c"] == 40
@@ -48,14 +48,14 @@ def test_conditions_while_it_runs(absenc_emulate):
         assert encoder.run("temperature")["temperature_c"] == 71
 
 
-def test_an_alarm_that_nothing_reports_is_refused(absenc_emulate):
+def test_refuses_alarm_that_no_reply_reports(absenc_emulate):
     virtual = absenc_emulate("e201", carries="ssi", singleturn_bits=13)
     with pytest.raises(absenc.UsageError, match="the alarm error cannot be shown"):
         virtual.raise_alarm("error")
     absenc_emulate("e201", singleturn_bits=13).raise_alarm("error")
 
 
-def test_names_that_are_wrong_name_the_nearest(absenc_emulate):
+def test_wrong_name_suggests_the_most_similar(absenc_emulate):
     virtual = absenc_emulate("tformat")
     with pytest.raises(absenc.UsageError, match="over_heat"):
         virtual.raise_alarm("over_heet")
@@ -69,11 +69,11 @@ def test_names_that_are_wrong_name_the_nearest(absenc_emulate):
     assert raised.value.kind == "not_found"
 
 
-def test_numbers_and_options_that_cannot_be():
+def test_refuses_invalid_numbers_and_options():
     with absenc.open("sim:tformat", model=None) as encoder:
         for numbers in [(0, 10**9), (0, 2**31), (10**6, 1)]:
             with pytest.raises(absenc.UsageError):
-                encoder.memory.read(*numbers)  # without memory for as many bytes
+                encoder.memory.read(*numbers)  # refused without allocating memory for all bytes
         for argument in (2**80, -(2**80), "five", None, 1.5):
             with pytest.raises(absenc.UsageError, match="address is .*must be a whole number"):
                 encoder.run("memory-read", argument)
@@ -83,7 +83,7 @@ def test_numbers_and_options_that_cannot_be():
             encoder.run("memory-read", 1, 2, 3, 4, 5)
 
 
-def test_readings_are_copied_and_pickled():
+def test_copies_and_pickles_readings():
     for address in ("sim:tformat?singleturn=70000&multiturn=5&alarm=over_heat", "sim:ssi", "sim:esl"):
         with absenc.open(address) as encoder:
             reading = encoder.read()
@@ -95,7 +95,7 @@ def test_readings_are_copied_and_pickled():
         assert str(copy.deepcopy(sample)) == str(copy.copy(sample)) == str(sample)
 
 
-def test_memory_is_written_and_read_back(absenc_emulate):
+def test_writes_memory_and_reads_it_back(absenc_emulate):
     virtual = absenc_emulate("tformat")
     with absenc.open(virtual.address, latency=PATIENCE_MS) as encoder:
         assert encoder.memory.write(5, b"\x42\x43") == 2
@@ -105,7 +105,7 @@ def test_memory_is_written_and_read_back(absenc_emulate):
         assert encoder.run("memory-read", address=6)["value"] == 0x43
 
 
-def test_samples_say_what_they_are_and_refuse_impossible_rates():
+def test_sample_has_repr_and_invalid_rates_are_refused():
     with absenc.open("sim:tformat", singleturn=65536) as encoder:
         assert "angle_deg=180" in repr(next(encoder.samples(count=1)))
         for rate in (-1, float("nan")):
@@ -123,15 +123,15 @@ def test_samples_say_what_they_are_and_refuse_impossible_rates():
         absenc.decode_batches("drive.sr", "tformat", rows=0)
 
 
-def test_an_alarm_is_told_once(absenc_emulate):
-    """tformat has a status flag of the same name."""
+def test_reports_alarm_once(absenc_emulate):
+    """The protocol tformat has a status flag with the name of this alarm."""
     virtual = absenc_emulate("tformat")
     with absenc.open(virtual.address, latency=PATIENCE_MS) as encoder:
         virtual.raise_alarm("counting_error")
         assert [(alarm.field, alarm.name) for alarm in encoder.alarms()] == [("alarms", "counting_error")]
 
 
-def test_what_is_not_reported_is_none():
+def test_unreported_values_are_none():
     with absenc.open("sim:ssi") as encoder:
         reading = encoder.read()
         assert (reading.alarms, reading.status, encoder.alarms()) == (None, None, None)
@@ -148,19 +148,19 @@ def test_what_is_not_reported_is_none():
         assert (reading.alarms, reading.status, encoder.alarms()) == (None, [], None)
 
 
-def test_scan():
+def test_scan_returns_encoders_on_line():
     assert [one["clash"] for one in absenc.scan("sim:esl")] == [False]
     with absenc.open("sim:tformat") as encoder, pytest.raises(absenc.UsageError, match="no addresses"):
         encoder.scan()
 
 
-def test_tcp(absenc_emulate):
+def test_reads_over_tcp(absenc_emulate):
     virtual = absenc_emulate("tformat", tcp=0)
     with absenc.open(f"tformat:tcp:127.0.0.1:{virtual.tcp_port}", latency=PATIENCE_MS) as encoder:
         assert encoder.read().valid
 
 
-def test_samples_of_asyncio_leave_the_loop_free(absenc_emulate):
+def test_async_samples_do_not_block_the_event_loop(absenc_emulate):
     virtual = absenc_emulate("tformat", motion="rpm=60")
     turns = 0
 
@@ -182,7 +182,7 @@ def test_samples_of_asyncio_leave_the_loop_free(absenc_emulate):
     assert turns > 10
 
 
-def test_asyncio_cancels_a_long_wait(absenc_emulate):
+def test_asyncio_timeout_cancels_wait(absenc_emulate):
     virtual = absenc_emulate("tformat")
 
     async def read():
@@ -191,12 +191,12 @@ def test_asyncio_cancels_a_long_wait(absenc_emulate):
                 async with asyncio.timeout(0.2):
                     async for _ in encoder.samples(rate=0.001):
                         pass
-            return encoder.read().valid  # it is not closed
+            return encoder.read().valid  # still usable
 
     assert asyncio.run(read())
 
 
-def test_close_ends_what_waits_in_another_thread(absenc_emulate):
+def test_close_ends_samples_in_another_thread(absenc_emulate):
     virtual = absenc_emulate("tformat")
     encoder = absenc.open(virtual.address, latency=PATIENCE_MS)
     samples = iter(encoder.samples(rate=0.001))
@@ -211,8 +211,8 @@ def test_close_ends_what_waits_in_another_thread(absenc_emulate):
         encoder.read()
 
 
-def test_ctrl_c_ends_the_wait_for_an_answer():
-    """Long before the limit of the answer, which is 50 s."""
+def test_ctrl_c_ends_wait_for_reply():
+    """Ctrl-C ends the wait long before the timeout of 50 s."""
     master, slave = os.openpty()
     program = f"""
 import absenc
@@ -225,7 +225,7 @@ with absenc.open("tformat:{os.ttyname(slave)}?latency=50000") as encoder:
     tty.setraw(slave)
     with subprocess.Popen([sys.executable, "-c", program], stdout=subprocess.PIPE, text=True) as process:
         try:
-            assert select.select([master], [], [], 40)[0]  # the request
+            assert select.select([master], [], [], 40)[0]  # wait for the request
             os.kill(process.pid, signal.SIGINT)
             assert process.communicate(timeout=40)[0] == "interrupted\n"
         finally:
@@ -234,7 +234,7 @@ with absenc.open("tformat:{os.ttyname(slave)}?latency=50000") as encoder:
             os.close(slave)
 
 
-def test_close_ends_the_wait_for_an_answer():
+def test_close_ends_wait_for_reply():
     master, slave = os.openpty()
     tty.setraw(slave)
     ended = []
@@ -258,7 +258,7 @@ def test_close_ends_the_wait_for_an_answer():
 
 
 @pytest.mark.parametrize("wait", ["list(encoder.samples(rate=0.001))", "list(encoder.samples(rate=1000))"])
-def test_ctrl_c_ends_a_wait(wait):
+def test_ctrl_c_ends_wait_for_sample(wait):
     program = f"""
 import absenc
 with absenc.open("sim:tformat") as encoder:
@@ -280,7 +280,7 @@ with absenc.open("sim:tformat") as encoder:
             process.kill()
 
 
-def test_what_became_of_a_change() -> None:
+def test_reports_state_of_change() -> None:
     with absenc.open("sim:tformat") as encoder:
         assert encoder.change is None
         encoder.run("memory-write", 5, 0x42)
@@ -298,7 +298,7 @@ def test_what_became_of_a_change() -> None:
         assert written.value.change == "not_sent"
 
 
-def test_changes_are_kept(absenc_emulate, monkeypatch, tmp_path) -> None:
+def test_writes_changes_to_journal(absenc_emulate, monkeypatch, tmp_path) -> None:
     journal = tmp_path / "changes.tsv"
     monkeypatch.setenv("ABSENC_CHANGES", str(journal))
     with absenc.open(absenc_emulate("tformat").address, latency=PATIENCE_MS) as encoder:
@@ -309,7 +309,7 @@ def test_changes_are_kept(absenc_emulate, monkeypatch, tmp_path) -> None:
                        ["config set overheat-threshold", "90", "80", "confirmed"]]
 
 
-def test_speed_and_angles_of_a_drive_have_their_units_in_their_names():
+def test_speeds_and_joint_angles_have_the_unit_of_their_name():
     settings = "&gear=50/3&direction=-1&offset_deg=10&pole_pairs=7"
     with absenc.open("sim:tformat?multiturn=3&motion=rpm=60" + settings) as encoder:
         last = list(encoder.samples(rate=100, count=20))[-1]

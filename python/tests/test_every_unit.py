@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Each unit's virtual encoder, over a pseudo-terminal where its link goes over one."""
+"""Tests the virtual encoder of each unit, over a pseudo-terminal if its link permits."""
 import json
 import os
 import re
@@ -8,7 +8,7 @@ import subprocess
 import absenc
 import pytest
 
-PATIENCE_MS = 500  # the machine may be busy; whoever first waits for silence takes as long
+PATIENCE_MS = 500  # a busy machine may delay replies; a test that waits for silence takes this long
 UNITS = sorted(absenc.protocol)
 
 
@@ -24,7 +24,7 @@ def address(unit, absenc_emulate):
     return absenc_emulate(unit.id).address + f"?latency={PATIENCE_MS}"
 
 
-def test_reads(unit, address):
+def test_reads_valid_position(unit, address):
     with absenc.open(address) as encoder:
         reading = encoder.read()
         assert reading.ready
@@ -36,22 +36,22 @@ def test_reads(unit, address):
         assert encoder.protocol is unit
 
 
-def test_samples_in_order(address):
+def test_samples_have_ascending_times(address):
     with absenc.open(address) as encoder:
         samples = list(encoder.samples(count=3))
     assert [sample.kind for sample in samples] == ["reading"] * 3
     assert samples[0].time_s <= samples[1].time_s <= samples[2].time_s
 
 
-def test_info_answers(address):
+def test_info_has_no_failures(address):
     with absenc.open(address) as encoder:
         info = encoder.info()
     assert info.unit in absenc.protocol
     assert not info.failures
 
 
-def test_requests_are_encoded_and_decoded(unit):
-    """What is encoded is understood as a request, and another that begins and goes on otherwise is refused."""
+def test_encodes_and_decodes_requests(unit):
+    """An encoded request is decoded as one, and a request with another start and end is refused."""
     requests = []
     for command in unit.commands.values():
         if command.arguments:
@@ -59,30 +59,30 @@ def test_requests_are_encoded_and_decoded(unit):
         try:
             request = unit.encode(command.name)
         except absenc.UsageError:
-            continue  # not with the options of the first model
+            continue  # not encodable with the options of the first model
         if request:
             requests.append(request)
-    assert requests or unit.link == "clocked"  # the clock alone asks for a position
+    assert requests or unit.link == "clocked"  # on clocked links the clock itself requests a position
     for request in requests:
         assert isinstance(request, str if unit.link in ("can", "clocked") else bytes)
         unit.decode("", request=request)
         if unit.link == "clocked":
-            continue  # others than bits cannot be given
+            continue  # a clocked request has only bits, so no invalid one exists
         other = "7" + request[1:] if unit.link == "can" else b"\xff" + request[1:] + b"\xff"
         with pytest.raises(absenc.EncoderError):
             unit.decode("", request=other)
 
 
-def told(value):
-    """As JSON has it."""
+def json_value(value):
+    """Converts a field to its form in JSON."""
     if isinstance(value, bytes):
         return value.hex()
     return list(value) if isinstance(value, tuple) else value
 
 
-def test_every_vector(unit):
+def test_decodes_every_vector(unit):
     done = subprocess.run([os.environ["ABSENC"], "vectors", unit.id, "--json"], check=True, capture_output=True)
-    held, not_held = set(), set()
+    valid, invalid = set(), set()
     for vector in map(json.loads, done.stdout.splitlines()):
         is_text = unit.link in ("can", "clocked")
         reply, request = (text if is_text else bytes.fromhex(text) for text in (vector["response"], vector["request"]))
@@ -96,14 +96,14 @@ def test_every_vector(unit):
         assert "error" not in vector, vector
         for name, value in vector["fields"].items():
             if fields[name] is None and re.search("angle|turn|position|temperature", name):
-                not_held.add(name)
+                invalid.add(name)
                 continue
-            held.add(name)
-            assert told(fields[name]) == value, (name, vector)
-    assert not_held <= held  # what does not hold in one reply does in another
+            valid.add(name)
+            assert json_value(fields[name]) == value, (name, vector)
+    assert invalid <= valid  # a field that is invalid in one vector is valid in another
 
 
-def test_alarms_of_the_virtual_encoder(unit, absenc_emulate):
+def test_reads_alarm_of_virtual_encoder(unit, absenc_emulate):
     if unit.link in ("exchange", "clocked") or not unit.alarms:
         pytest.skip("no pseudo-terminal or no alarms")
     virtual = absenc_emulate(unit.id)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the pictures of examples/plots.py show."""
+"""Tests the plots of examples/plots.py."""
 import os
 import subprocess
 import sys
@@ -23,7 +23,7 @@ def turning(tmp_path):
     return absenc.load(path)
 
 
-def test_motion(turning):
+def test_plots_position_speed_and_alarms(turning):
     position, speed, alarms = plots.motion(turning).axes
     assert np.ma.allequal(position.lines[0].get_ydata(), turning["position"])
     assert np.nanmedian(np.ma.filled(speed.lines[0].get_ydata(), np.nan)) == pytest.approx(60, abs=1)
@@ -31,7 +31,7 @@ def test_motion(turning):
     assert len(alarms.lines[0].get_xdata()) == turning.good().sum()
 
 
-def test_noise(turning):
+def test_plots_distribution_of_counts(turning):
     turning.rows["position"] = 70000 + np.arange(len(turning)) % 3
     turning.rows["position"][turning.rows["event"] != ""] = np.ma.masked
     axis = plots.noise(turning).axes[0]
@@ -39,14 +39,14 @@ def test_noise(turning):
     assert sum(bar.get_height() for bar in axis.patches) == turning.good().sum()
 
 
-def test_eccentricity(turning):
+def test_plots_deviation_from_constant_speed(turning):
     good = turning.good()
     angle = np.radians(turning["angle_deg"][good].data)
     before = turning["position"][good].data.copy()
     turning.rows["position"][good] = turning["position"][good] + np.round(400 * np.sin(2 * angle)).astype(int)
     bump = turning["position"][good].data - before
     time = turning["time_s"][good].data
-    away = plots.eccentricity(turning).axes[0].lines[0].get_ydata()
-    expected = bump - np.polyval(np.polyfit(time, bump, 1), time)  # wherever on the turn a busy machine has read
-    assert np.abs(away - expected).max() < 3
-    assert np.ptp(away) > 600
+    deviation = plots.eccentricity(turning).axes[0].lines[0].get_ydata()
+    expected = bump - np.polyval(np.polyfit(time, bump, 1), time)  # at the angles that a busy machine happened to read
+    assert np.abs(deviation - expected).max() < 3
+    assert np.ptp(deviation) > 600

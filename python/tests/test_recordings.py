@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What `absenc record` wrote, loaded."""
+"""Tests loading of recordings of `absenc record`."""
 import csv
 import json
 import os
@@ -17,7 +17,7 @@ FAULTY = "sim:tformat?motion=rpm=60&alarm=over_heat&fault=corrupt=0.3"
 
 def record(path, address, count=50):
     subprocess.run([os.environ["ABSENC"], "record", address, "--output", str(path), "--rate", "0", "--count", str(count)],
-                   check=False, capture_output=True)  # status 1 when the last one failed
+                   check=False, capture_output=True)  # status 1 if the last reading failed
     return path
 
 
@@ -28,7 +28,7 @@ def json_lines(tmp_path):
 
 @pytest.fixture
 def both(tmp_path, json_lines):
-    """The same rows in both formats: those of JSON lines under the header of a CSV recording."""
+    """The same rows in both formats: the rows of the JSON lines with the header of a CSV recording."""
     header = record(tmp_path / "header.csv", FAULTY, 1).read_text().splitlines()
     names = next(line for line in header if not line.startswith("#"))
     path = tmp_path / "run.csv"
@@ -43,7 +43,7 @@ def both(tmp_path, json_lines):
     return absenc.load(path), absenc.load(json_lines)
 
 
-def test_both_formats_are_the_same(both):
+def test_csv_and_json_lines_give_the_same(both):
     of_csv, of_json = both
     assert of_csv.columns == of_json.columns
     assert of_csv.rows.dtype == of_json.rows.dtype
@@ -55,14 +55,14 @@ def test_both_formats_are_the_same(both):
         name: value for name, value in of_json.header.items() if name != "started"}
 
 
-def test_as_a_dict(both):
+def test_converts_to_dict(both):
     for recording in both:
         columns = dict(recording)
         assert list(columns) == list(recording.columns)
         assert np.ma.allequal(columns["time_s"], recording["time_s"])
 
 
-def test_hdf5_has_the_same_columns(tmp_path):
+def test_hdf5_has_the_columns_of_csv(tmp_path):
     of_csv, of_hdf5 = (absenc.load(record(tmp_path / name, FAULTY)) for name in ("run.csv", "run.h5"))
     assert of_hdf5.columns == of_csv.columns
     assert of_hdf5.rows.dtype == of_csv.rows.dtype
@@ -70,7 +70,7 @@ def test_hdf5_has_the_same_columns(tmp_path):
 
 
 @pytest.mark.parametrize("name", ["run.csv", "run.jsonl", "run.h5"])
-def test_types_units_and_what_does_not_hold(tmp_path, name):
+def test_columns_have_types_units_and_masks(tmp_path, name):
     recording = absenc.load(record(tmp_path / name, FAULTY))
     good = recording.good()
     assert good.sum() == 50 and not good.all()
@@ -89,7 +89,7 @@ def test_types_units_and_what_does_not_hold(tmp_path, name):
 
 
 @pytest.mark.parametrize("name", ["run.csv", "run.jsonl", "run.h5"])
-def test_alarms_are_clear_or_not_reported(tmp_path, name):
+def test_distinguishes_clear_from_unreported_alarms(tmp_path, name):
     for encoder, reported in (("sim:tformat", True), ("sim:ssi", False)):
         recording = absenc.load(record(tmp_path / (encoder[4:] + name), encoder, 3))
         good = recording.good()
@@ -97,7 +97,7 @@ def test_alarms_are_clear_or_not_reported(tmp_path, name):
         assert set(recording.rows.data["alarms"][good]) == {0}
 
 
-def test_files_that_are_no_recordings(tmp_path):
+def test_refuses_files_that_are_no_recordings(tmp_path):
     with pytest.raises(absenc.UsageError, match="csv"):
         absenc.load(tmp_path / "run.txt")
     other = tmp_path / "other.csv"
@@ -119,7 +119,7 @@ def rows_of(recording):
 
 
 @pytest.mark.parametrize("name", ["run.csv", "run.jsonl", "run.h5"])
-def test_a_recording_that_is_cut_at_any_byte_has_only_rows_that_were_written(tmp_path, name):
+def test_truncated_recording_has_only_written_rows(tmp_path, name):
     path = record(tmp_path / name, "sim:tformat?motion=rpm=60&fault=corrupt=0.1&seed=4", 8)
     content = path.read_bytes()
     whole = absenc.load(path)
@@ -143,7 +143,7 @@ def test_a_recording_that_is_cut_at_any_byte_has_only_rows_that_were_written(tmp
             assert len(cut) == content[:size].count(b"\n") - content.count(b"\n") + len(rows) + 1, size
 
 
-def test_a_line_that_is_missing_in_the_middle_is_damage(tmp_path):
+def test_missing_line_is_damage(tmp_path):
     for name in ("run.csv", "run.jsonl"):
         path = record(tmp_path / name, "sim:tformat", 8)
         lines = path.read_text().splitlines(keepends=True)
@@ -153,20 +153,20 @@ def test_a_line_that_is_missing_in_the_middle_is_damage(tmp_path):
 
 
 @pytest.mark.parametrize("name", ["run.csv", "run.jsonl", "run.h5"])
-def test_recorded_here(tmp_path, name):
+def test_records_from_python(tmp_path, name):
     with absenc.open("sim:tformat", motion="rpm=60") as encoder:
         recorded = encoder.record(tmp_path / name, rate=1000, count=20)
         assert recorded.paths == [str(tmp_path / name)]
         assert (recorded.readings, recorded.failures) == (20, 0)
         assert recorded.bytes == (tmp_path / name).stat().st_size
-        assert next(encoder.samples(count=1)).kind == "reading"  # it goes on
+        assert next(encoder.samples(count=1)).kind == "reading"  # the encoder is still usable
     recording = absenc.load(tmp_path / name)
     assert recording.good().sum() == 20
     assert recording.header["rate_hz"] == "1000"
     assert (np.diff(recording["position"][recording.good()]) > 0).all()
 
 
-def test_a_recording_ends_in_time_by_close_and_by_ctrl_c(tmp_path):
+def test_recording_ends_by_time_close_or_ctrl_c(tmp_path):
     with absenc.open("sim:tformat") as encoder:
         timed = encoder.record(tmp_path / "timed.csv", rate=50, seconds=0.2)
         assert timed.readings + timed.missed == 10
@@ -186,7 +186,7 @@ def test_a_recording_ends_in_time_by_close_and_by_ctrl_c(tmp_path):
             assert closed.result().paths == [str(tmp_path / "closed.csv")]
 
 
-def test_parts_and_what_cannot_be(tmp_path):
+def test_writes_parts_and_refuses_invalid_arguments(tmp_path):
     with absenc.open("sim:tformat") as encoder:
         recorded = encoder.record(tmp_path / "log.csv", rate=0, count=300, part_bytes=10_000)
         assert len(recorded.paths) > 1

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The package gives the verdicts of the command, word for word."""
+"""Tests that the package returns the same verdicts as the command."""
 from __future__ import annotations
 
 import json
@@ -25,14 +25,14 @@ def known(values: tuple[object, ...], names: tuple[str, ...]) -> set[str]:
     return {name for name, value in zip(names, values) if value is not None}
 
 
-def test_doctor_of_a_healthy_encoder() -> None:
+def test_doctor_finds_nothing_on_good_encoder() -> None:
     found = absenc.doctor("sim:tformat", seconds=0.2)
     assert found.ok and not found.findings
     assert found.verdict.startswith("good: ")
     assert known(found, found._fields) == set(command("doctor", "sim:tformat", "--for", "0.2"))
 
 
-def test_doctor_of_an_ill_one() -> None:
+def test_doctor_reports_alarm() -> None:
     found = absenc.doctor("sim:tformat", readings=50, alarm="over_heat")
     assert not found.ok
     assert found.readings == 50
@@ -43,14 +43,14 @@ def test_doctor_of_an_ill_one() -> None:
     assert found.findings[0]._asdict() == printed[0]
 
 
-def test_doctor_of_no_port() -> None:
+def test_doctor_reports_missing_port() -> None:
     found = absenc.doctor("tformat:/dev/nothing")
     assert [one.id for one in found.findings] == ["port_missing"]
     with pytest.raises(absenc.UsageError):
         absenc.doctor("tfromat:/dev/nothing")
 
 
-def test_doctor_ends_at_a_signal() -> None:
+def test_signal_ends_doctor() -> None:
     def end(*_: object) -> None:
         raise InterruptedError
 
@@ -63,7 +63,7 @@ def test_doctor_ends_at_a_signal() -> None:
         signal.signal(signal.SIGALRM, before)
 
 
-def test_conform() -> None:
+def test_conform_returns_verdict_of_each_clause() -> None:
     kept = absenc.conform("sim:tformat", readings=10)
     assert (kept.ok, kept.verdict, kept.broken, kept.left) == (True, "kept", 0, [])
     assert kept.kept == sum(clause.verdict == "kept" for clause in kept.clauses) > 0
@@ -74,7 +74,7 @@ def test_conform() -> None:
         absenc.conform("sim:tformat", resets=True)
 
 
-def test_probe() -> None:
+def test_probe_excludes_options() -> None:
     found = absenc.probe("esl", [REPLY], [REQUEST])
     assert found.ok
     printed = command("probe", "esl", "--hex", REPLY, "--request", REQUEST)
@@ -87,7 +87,7 @@ def test_probe() -> None:
         absenc.probe("e201", ["3D"])
 
 
-def test_wave(tmp_path: Path) -> None:
+def test_wave_can_be_decoded(tmp_path: Path) -> None:
     file = tmp_path / "line.sr"
     drawn = absenc.wave("tformat", file, count=20, motion="rpm=60")
     assert (drawn.results, drawn.failures, drawn.wires) == (20, 0, ["line"])
@@ -97,7 +97,7 @@ def test_wave(tmp_path: Path) -> None:
     assert absenc.wave("sim:tformat", file, replaces=True, fault="silence=1").failures == 1
 
 
-def test_ports() -> None:
+def test_ports_equal_those_of_the_command() -> None:
     done = subprocess.run([os.environ["ABSENC"], "ports", "--json"], capture_output=True, text=True, check=True)
     printed = [json.loads(line) for line in done.stdout.splitlines() if line]
     assert [port.port for port in absenc.ports()] == [one["port"] for one in printed]
