@@ -4,6 +4,23 @@ find_package(GTest REQUIRED)
 find_package(rapidcheck REQUIRED)
 include(GoogleTest)
 
+# The tests with the label `long`, which `./dev test` leaves out: those of more than some seconds, and those that need
+# programs or packages that no other test needs. `./dev test --all` runs them.
+set(absenc_long_python_tests
+    can_peers modbus_peers wave  # clients, nodes and decoders that others wrote
+    doctor_faults doctor_healthy identify speed  # many faults, busy processes, every line again and again
+    install mutants_script new_protocol packages python_wheel  # they compile, install or configure
+    python python_units record_hdf5  # mypy, pytest, pandas, matplotlib, h5py
+    serve_broker serve_cluster serve_history serve_mqtt serve_others serve_proxy serve_spool  # brokers, proxies, full disks
+    serve_browser serve_client serve_look  # a browser, npm
+    mqtt_failures_abuse mqtt_packets_abuse mqtt_spool_abuse serve_history_abuse serve_http_abuse)
+# Series of faults behind the first, as filters of GoogleTest.
+set(absenc_long_series)
+foreach(series RANGE 1 9)
+  list(APPEND absenc_long_series "Seeds/*/${series}_*")
+endforeach()
+list(JOIN absenc_long_series ":" absenc_long_series)
+
 # GoogleTest is parsed once for all tests. The tests themselves are not optimised: they compile in half the time. Of the
 # long campaigns, sanitizers see one series of faults (CMakePresets.json), and of that a share (tests/cases.hpp).
 function(absenc_test_settings target)
@@ -33,8 +50,13 @@ function(absenc_test name)
   else()
     target_precompile_headers(${name}_test REUSE_FROM test_headers)
   endif()
-  gtest_discover_tests(${name}_test TEST_PREFIX "${name}." DISCOVERY_MODE PRE_TEST DISCOVERY_TIMEOUT 60
-                       PROPERTIES ENVIRONMENT "ABSENC_SOURCE_DIR=${PROJECT_SOURCE_DIR}")  # of generated documents
+  set(environment "ABSENC_SOURCE_DIR=${PROJECT_SOURCE_DIR}")  # tables in documents are compared with what the code says
+  set(discovery TEST_PREFIX "${name}." DISCOVERY_MODE PRE_TEST DISCOVERY_TIMEOUT 60)
+  gtest_discover_tests(${name}_test ${discovery} TEST_FILTER "-${absenc_long_series}" PROPERTIES ENVIRONMENT "${environment}")
+  if(name STREQUAL "kit")
+    gtest_discover_tests(${name}_test ${discovery} TEST_FILTER "${absenc_long_series}" TEST_LIST ${name}_long_tests
+                         PROPERTIES ENVIRONMENT "${environment}" LABELS long)
+  endif()
 endfunction()
 
 # GLOB: the tests of the folder alone, GLOB_RECURSE: and of those in it. ABSENC_SPLIT_TESTS: of units, each source by itself
@@ -123,7 +145,7 @@ endif()
 if(ABSENC_COMMAND)
   find_package(Python3 REQUIRED COMPONENTS Interpreter)
   file(GLOB python_tests CONFIGURE_DEPENDS "${PROJECT_SOURCE_DIR}/tests/*_test.py")
-  list(FILTER python_tests EXCLUDE REGEX "/firmware_test\\.py$")  # of what is built for ARM: ./dev test runs it
+  list(FILTER python_tests EXCLUDE REGEX "/firmware_test\\.py$")  # of programs for ARM, which ./dev test --all builds and runs
   if(NOT TARGET absenc-manual OR NOT PROJECT_IS_TOP_LEVEL)
     list(FILTER python_tests EXCLUDE REGEX "/install_test\\.py$")
   endif()
@@ -137,19 +159,17 @@ if(ABSENC_COMMAND)
       ENVIRONMENT "ABSENC=${absenc_bin_dir}/absenc;ABSENC_SOURCE_DIR=${PROJECT_SOURCE_DIR};ABSENC_BUSY_SECONDS=2"
       COST 100  # they mostly wait: first, beside what computes
       TIMEOUT 900)  # and some minutes on a machine that does something else
+    if(name IN_LIST absenc_long_python_tests)
+      set_tests_properties(${name}.py PROPERTIES LABELS long)
+      list(REMOVE_ITEM absenc_long_python_tests ${name})
+    endif()
   endforeach()
+  if(PROJECT_IS_TOP_LEVEL AND absenc_long_python_tests AND TARGET absenc-manual)
+    message(FATAL_ERROR "No such tests: ${absenc_long_python_tests}")
+  endif()
   # Browsers that draw, and tests that keep the machine busy on purpose, leave little time for other tests.
   set_tests_properties(serve_browser.py serve_look.py doctor_faults.py PROPERTIES PROCESSORS 4)
   set_tests_properties(speed.py doctor_healthy.py PROPERTIES RUN_SERIAL ON)
-endif()
-
-# What the tests in the virtual machine run beside the command.
-if(TARGET absenc-client)
-  add_executable(vm_can_emulation tests/vm/can_emulation.cpp)
-  absenc_settings(vm_can_emulation)
-  set_target_properties(vm_can_emulation PROPERTIES OUTPUT_NAME can_emulation
-                        RUNTIME_OUTPUT_DIRECTORY "${CMAKE_CURRENT_BINARY_DIR}/vm")
-  target_link_libraries(vm_can_emulation PRIVATE absenc::client)
 endif()
 
 # Examples end by themselves and tell by their exit status whether they worked.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tools of npm for the tests of `absenc serve`: ./dev test installs those of tests/npm/package-lock.json into build/npm."""
+"""Tools of npm for the tests of `absenc serve`: ./dev test --all installs those of tests/npm/package-lock.json into build/npm."""
 import os
 import pathlib
 import unittest
@@ -9,10 +9,10 @@ MODULES = SOURCE / "build/npm/node_modules"
 
 
 def tool(path):
-    """A file of node_modules. It is left out only if ./dev test has said that npm's registry cannot be reached."""
+    """A file of node_modules. It is left out only if ./dev has said that npm's registry cannot be reached."""
     if (MODULES / path).exists():
         return MODULES / path
     if os.environ.get("ABSENC_NO_NPM"):
         raise unittest.SkipTest("the tools of npm are not here, and its registry cannot be reached")
-    raise AssertionError(f"{MODULES / path} is not there: ./dev test installs it, or\n"
+    raise AssertionError(f"{MODULES / path} is not there: ./dev test --all installs it, or\n"
                          "mkdir -p build/npm && cp tests/npm/package*.json build/npm && npm ci --prefix build/npm")

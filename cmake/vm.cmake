@@ -1,0 +1,8 @@
+# SPDX-License-Identifier: Apache-2.0
+# The program that tests in the virtual machine run beside the command. ./dev builds it where it starts that machine, so
+# this needs no GoogleTest and is no part of `all`.
+add_executable(vm_can_emulation EXCLUDE_FROM_ALL tests/vm/can_emulation.cpp)
+absenc_settings(vm_can_emulation)
+set_target_properties(vm_can_emulation PROPERTIES OUTPUT_NAME can_emulation
+                      RUNTIME_OUTPUT_DIRECTORY "${CMAKE_CURRENT_BINARY_DIR}/vm")
+target_link_libraries(vm_can_emulation PRIVATE absenc::client)
