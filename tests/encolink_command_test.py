@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""EncoLink as a user types it: over a pseudo-terminal (UART), and both wires in the simulator."""
+"""Tests EncoLink with the command: over a pseudo-terminal (UART), and over UART and SPI in the simulator."""
 import csv
 import json
 import os
@@ -15,13 +15,13 @@ def fields(*arguments):
     return json.loads(result.stdout)["fields"]
 
 
-class OverAPseudoTerminal(Case):
+class PseudoTerminal(Case):
     def emulator(self, *arguments):
         emulator = Emulator(self.directory, *arguments, protocol="encolink")
         self.addCleanup(emulator.end)
         return emulator
 
-    def test_reads_what_it_was_not_told_and_what_it_was(self):
+    def test_reads_with_and_without_options(self):
         path = self.emulator("--singleturn", "1000", "--multiturn", "7").path
         for uri in (f"encolink:{path}", f"encolink:{path}?{KNOWN}"):
             with self.subTest(uri):
@@ -29,7 +29,7 @@ class OverAPseudoTerminal(Case):
                 self.assertEqual((reading["singleturn"], reading["multiturn"]), (1000, 7))
                 self.assertEqual((reading["singleturn_bits"], reading["confirmed"]), (20, True))
 
-    def test_a_wrong_resolution(self):
+    def test_detects_wrong_resolution(self):
         path = self.emulator("--singleturn", "1001").path
         result = absenc("read", f"encolink:{path}?resolution=19&multiturn_bits=16")
         self.assert_failed(result, "out_of_range", "resolution")
@@ -42,20 +42,20 @@ class OverAPseudoTerminal(Case):
         again = self.emulator("--singleturn", "1005", "--memory", memory)
         self.assertEqual(json.loads(absenc("read", f"encolink:{again.path}?{KNOWN}", "--json").stdout)["singleturn"], 5)
 
-    def test_an_encoder_that_transmits_by_itself(self):
+    def test_reads_streaming_encoder(self):
         path = self.emulator("--singleturn", "77", "--option", "stream_rate=500").path
         reading = json.loads(absenc("read", f"encolink:{path}?{KNOWN}&stream_rate=500", "--json").stdout)
         self.assertEqual(reading["singleturn"], 77)
 
-    def test_breaks_no_rule(self):
+    def test_host_violates_no_rule(self):
         emulator = self.emulator("--motion", "rpm=60")
         self.assert_good(absenc("run", f"encolink:{emulator.path}", "info"))
         self.assert_good(absenc("read", f"encolink:{emulator.path}", "--count", "20", "--rate", "0"))
         self.assertNotIn("rules", emulator.end()[2])
 
 
-class TurnsAcrossAGap(Case):
-    """The identity says that no turns are counted, whatever would be expected of an encoder that says nothing."""
+class TurnsAcrossPause(Case):
+    """The identity says that the encoder counts no turns, so the host must not assume any."""
 
     def record(self, motion, settings=""):
         emulator = Emulator(self.directory, "--option", "multiturn_bits=0", "--motion", motion, protocol="encolink")
@@ -66,7 +66,7 @@ class TurnsAcrossAGap(Case):
         with open(path, encoding="utf-8", newline="") as file:
             return result, list(csv.DictReader(line for line in file if not line.startswith("#")))
 
-    def test_what_cannot_be_known_is_not_presented_as_known(self):
+    def test_unknown_turns_are_marked_as_restart(self):
         result, rows = self.record("rpm=600")
         self.assertEqual([row["event"] for row in rows], [""] + 5 * ["restarted"])
         self.assertEqual([row["speed_rpm"] for row in rows], 6 * [""])
@@ -75,7 +75,7 @@ class TurnsAcrossAGap(Case):
         self.assertIn("max_rpm=RPM", result.stderr)
         self.assertIn("started again 5 times", result.stderr)
 
-    def test_the_monitor_shows_no_speed_that_it_cannot_know(self):
+    def test_monitor_shows_no_unknown_speed(self):
         emulator = Emulator(self.directory, "--option", "multiturn_bits=0", "--motion", "rpm=600", protocol="encolink")
         self.addCleanup(emulator.end)
         result = absenc("monitor", f"encolink:{emulator.path}", "--json", "--rate", "5", "--for", "2")
@@ -84,7 +84,7 @@ class TurnsAcrossAGap(Case):
         self.assertGreater(last["restarts"], 1)
         self.assertIsNone(last["speed_rpm"])
 
-    def test_a_shaft_that_is_known_to_be_slow_is_followed(self):
+    def test_follows_slow_shaft(self):
         _, rows = self.record("rpm=6", "?max_rpm=6")
         self.assertEqual({row["event"] for row in rows}, {""})
         turned = int(rows[-1]["position"]) - int(rows[0]["position"])
@@ -98,7 +98,7 @@ class Identity(Case):
         self.addCleanup(emulator.end)
         return f"encolink:{emulator.path}{settings}"
 
-    def test_info_shows_the_resolution_that_it_says(self):
+    def test_info_shows_resolution_of_identity(self):
         built = ["--option", "resolution=17", "--option", "multiturn_bits=0", "--singleturn", "1000"]
         uri = self.encoder(*built)
         result = absenc("info", uri)
@@ -106,7 +106,7 @@ class Identity(Case):
         self.assertRegex(result.stdout, r"(?m)^resolution +17 bits in a turn$")
         info = json.loads(absenc("info", uri, "--json").stdout)
         self.assertEqual(info["resolution"], {"singleturn_bits": 17, "multiturn_bits": 0})
-        # Against options that say otherwise no position is shown.
+        # No position is shown if the options contradict the identity.
         for settings in ("?resolution=20&multiturn_bits=0", "?resolution=20"):
             with self.subTest(settings):
                 result = absenc("info", uri + settings, "--json")
@@ -116,7 +116,7 @@ class Identity(Case):
                 self.assertFalse(info["answers"]["position"]["ok"])
         self.assert_failed(absenc("read", uri + "?resolution=20"), "unexpected_reply", "another resolution")
 
-    def test_one_byte_more_than_it_has(self):
+    def test_accepts_identity_of_twenty_bytes(self):
         uri = self.encoder("--option", "identity_bytes=20", "--singleturn", "1000")
         for _ in range(3):
             self.assertEqual(json.loads(absenc("read", uri, "--json").stdout)["singleturn"], 1000)
@@ -125,7 +125,7 @@ class Identity(Case):
         padded = "02074d42303830534c4132304d454e5430302900"
         self.assert_good(absenc("decode", "encolink", "--hex", padded))
 
-    def test_version_4_has_positions_and_no_registers(self):
+    def test_version_4_has_no_registers(self):
         uri = self.encoder("--option", "protocol_version=4", "--singleturn", "1000")
         self.assertEqual(json.loads(absenc("read", uri, "--json").stdout)["singleturn"], 1000)
         for one in (uri, f"{uri}?{KNOWN}", "sim:encolink-spi?protocol_version=4"):
@@ -142,8 +142,8 @@ class Identity(Case):
         self.assertIn("AksIM-4", shown["registers"])
 
 
-class InTheSimulator(Case):
-    def test_both_wires(self):
+class Simulator(Case):
+    def test_uart_and_spi(self):
         for unit in ("sim:encolink", "sim:encolink-spi"):
             with self.subTest(unit):
                 info = fields(f"{unit}?motion=rpm=60", "info")
@@ -157,12 +157,12 @@ class InTheSimulator(Case):
                 self.assertEqual(fields(unit, "set-position-offset", "4096")["position_offset"], 4096)
                 self.assertEqual(fields(f"{unit}?motion=rpm=120", "self-calibrate")["calibrations"], 1)
 
-    def test_alarms_in_words(self):
+    def test_alarms_have_advice(self):
         result = absenc("read", "sim:encolink?alarm=amplitude_low")
         self.assert_good(result)
         self.assertIn("make the gap smaller", result.stdout + result.stderr)
 
-    def test_refusals(self):
+    def test_refusals_state_reason(self):
         self.assert_failed(absenc("run", "sim:encolink", "memory-write", "0x4C", "1"), "request_rejected", "access denied")
         self.assert_failed(absenc("run", "sim:encolink", "memory-read", "0x9999", "2"), "no register at this address")
         self.assert_failed(absenc("run", "sim:encolink", "self-calibrate"), "did not turn far enough", "turn it evenly")

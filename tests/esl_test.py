@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""QS35 ESL encoders on a pseudo-terminal: against a client that shares no code with them, and by the command."""
+"""Tests QS35 ESL encoders on a pseudo-terminal, with an independent client and with the command."""
 import json
 import os
 import select
@@ -16,18 +16,18 @@ LENGTH = {POSITION: 18, QUICK: 6, TEMPERATURE: 4, READ: 4, WRITE: 4}
 READY, CHANNEL_2 = 0x40, 0x20
 REQUEST = "0875"  # ID 1, address 0
 REPLY = "084000efcdab34125646b3086000abd6cd84"
-# The same encoder with another profile, and with one bit wrong in channel 2.
+# The same reply with another profile, and with one wrong bit in channel 2.
 MSB_REQUEST, MSB_REPLY = "0857", "084000efcdab341255277e086000abd57f67"
 WRONG_CHANNEL_2 = "084000efcdab3412553b5e086000afd5b069"
 
 
 def control_field(data_id, address=0):
-    parity = (bin(data_id).count("1") + 1) & 1  # with it the number of ones is odd
+    parity = (bin(data_id).count("1") + 1) & 1  # makes the number of ones odd
     return parity << 7 | (data_id & 0xF) << 3 | address
 
 
 def remainder(data, polynomial, bits, register=0):
-    """Bytes least significant bit first."""
+    """Returns the CRC remainder of the bytes, least significant bit first."""
     for byte in data:
         for bit in range(8):
             top = register >> (bits - 1) & 1
@@ -94,15 +94,15 @@ class EslCase(EncoderCase):
         return json.loads(result.stdout)
 
 
-class Wire(EslCase):
+class VirtualEncoder(EslCase):
     def check_position(self, reply, singleturn, multiturn, address=0, alarms=0):
-        """Both channels, each by itself and against the other; returns both sequence counters."""
+        """Checks both channels, alone and against each other. Returns both sequence counters."""
         self.assertEqual(len(reply), 18, reply.hex(" "))
         one, two = reply[:11], reply[11:]
         self.assertEqual(one[9:], crc16(one[:9], 0x0000), reply.hex(" "))
         self.assertEqual(two[5:], crc16(two[:5], 0xFFFF), reply.hex(" "))
         self.assertEqual((one[0], two[0]), (control_field(POSITION, address),) * 2)
-        self.assertEqual((one[1] & ~0x0C, two[1] & ~0x0C), (READY, READY | CHANNEL_2))  # errors aside
+        self.assertEqual((one[1] & ~0x0C, two[1] & ~0x0C), (READY, READY | CHANNEL_2))  # apart from the error bits
         self.assertEqual((one[2], two[2]), (alarms, alarms))
         self.assertEqual(int.from_bytes(one[3:6], "little"), singleturn)
         self.assertEqual(int.from_bytes(one[6:8], "little"), multiturn)
@@ -110,7 +110,7 @@ class Wire(EslCase):
         self.assertEqual(two[4] & 0x7F, one[8] & 0x7F)
         return one[8], two[4] & 0x7F
 
-    def test_position_in_both_channels(self):
+    def test_position_is_in_both_channels(self):
         client = self.client("--singleturn", "0xABCDEF", "--multiturn", "0x1234")
         before, _ = self.check_position(client.exchange(POSITION), 0xABCDEF, 0x1234)
         after, _ = self.check_position(client.exchange(POSITION), 0xABCDEF, 0x1234)
@@ -128,7 +128,7 @@ class Wire(EslCase):
         self.assertEqual((reply[0], reply[1], reply[3:]), (0xC8, READY, crc8(reply[:3])))
 
     def read_memory(self, client, address):
-        """EEPROM: the first answers are busy, what follows them is the byte."""
+        """Reads one EEPROM byte. The first replies are busy, and the next one has the byte."""
         was_busy = False
         deadline = time.monotonic() + PATIENCE
         while time.monotonic() < deadline:
@@ -148,7 +148,7 @@ class Wire(EslCase):
         self.assertEqual(reply[3:], crc8(reply[:3]))
         self.assertEqual(self.read_memory(client, 5), 0x5A)
 
-    def test_wrong_requests_get_no_answer(self):
+    def test_wrong_requests_get_no_reply(self):
         client = self.client("--option", "address=2")
         for request in [bytes([control_field(POSITION, 3)]), bytes([control_field(POSITION, 2)])]:
             wrong = b"\0" if request[0] & 7 == 2 else crc8(request)
@@ -156,7 +156,7 @@ class Wire(EslCase):
             self.assertEqual(client.receive(1, 0.1), b"")
         self.check_position(client.exchange(POSITION, address=2), 0, 0, address=2)
 
-    def test_a_wrong_parity_is_reported_at_every_address(self):
+    def test_wrong_parity_is_reported_at_every_address(self):
         for address in range(8):
             emulator = Emulator(self.directory, "--option", f"address={address}", protocol="esl", name=f"at{address}")
             self.addCleanup(emulator.end)
@@ -169,11 +169,11 @@ class Wire(EslCase):
             self.assertEqual((reply[0], reply[11]), (field, field))
             self.assertEqual((reply[1] & 3, reply[12] & 3), (1, 1), address)
 
-    def test_several_on_one_line(self):
+    def test_several_encoders_on_one_line(self):
         client = self.client("--singleturn", "1000", "--also", "address=3&singleturn=70000&multiturn=7",
                              "--also", "address=5&alarm=multiturn_error", "--also", "address=6&singleturn=0x5555",
                              "--also", "address=6&singleturn=0xAAAA")
-        for _ in range(3):  # without a pause between them
+        for _ in range(3):  # without a pause between the requests
             self.check_position(client.exchange(POSITION, address=0), 1000, 0)
             self.check_position(client.exchange(POSITION, address=3), 70000, 7, address=3)
             self.check_position(client.exchange(POSITION, address=5), 0, 0, address=5, alarms=2)
@@ -198,12 +198,12 @@ class Command(EslCase):
         safe = self.good_json("run", encoder, "safe-position")["fields"]
         self.assertEqual(safe["safe_singleturn"], 0xABCDEF)
 
-    def test_what_changes_the_encoder(self):
+    def test_changing_commands(self):
         encoder = self.encoder("--singleturn", "0x500000", "--multiturn", "5", "--alarm", "multiturn_error")
         self.assert_wrong_usage(absenc("zero", encoder), "--yes")
         for verb in ["zero", "reset-multiturn", "clear-alarms"]:
-            # On a busy machine the eight requests may reach the encoder closer together than it allows: then it does
-            # nothing, and the command says so.
+            # On a busy machine the eight requests may arrive faster than the encoder allows. It then changes nothing,
+            # and the command reports that.
             results = [absenc(verb, encoder, "--yes")]
             while results[-1].returncode != 0 and len(results) < 4:
                 results.append(absenc(verb, encoder, "--yes"))
@@ -223,7 +223,7 @@ class Command(EslCase):
         self.assert_wrong_usage(absenc("memory", "read", encoder, "0", "--page", "7"), "esl has no page 7")
         self.assert_failed(absenc("memory", "read", f"{encoder}&bus=true", "0"), "unsupported", "bus=false")
 
-    def test_load_needs_force_too(self):
+    def test_load_of_protected_page_needs_force(self):
         encoder = self.encoder()
         dump = self.file("dump")
         self.assert_good(absenc("memory", "dump", encoder, "--output", dump))
@@ -242,7 +242,7 @@ class Command(EslCase):
         self.assertEqual((fields["singleturn"], fields["redundant_singleturn"]), (0xABCDEF, 0xABCDEF >> 15))
         self.assert_failed(absenc("decode", "esl", "--request", REQUEST, "--hex", WRONG_CHANNEL_2), "bad_checksum")
 
-    def test_scan(self):
+    def test_scan_finds_encoders_and_clash(self):
         line = self.encoder("--also", "address=3&singleturn=5", "--also", "address=6&singleturn=0x5555", "--also",
                             "address=6&singleturn=0xAAAA", latency=60)
         found = self.good_json("scan", line)["encoders"]
@@ -254,8 +254,8 @@ class Command(EslCase):
         self.assertRegex(result.stdout, r"(?m)^6 +yes +-")
         self.assert_sentence(result.stderr, "two encoders share the address")
 
-    def test_scan_of_an_encoder_that_refuses(self):
-        """Its answers are whole: nobody else has its address."""
+    def test_scan_finds_encoder_that_refuses(self):
+        """Its replies are intact, so no other encoder has its address."""
         encoder = self.encoder("--condition", "ch1_status_set=1")
         result = absenc("scan", encoder, "--json")
         self.assertEqual(result.returncode, 1)
@@ -269,18 +269,18 @@ class Command(EslCase):
         self.assertIn("refused: ", verdict.stdout)
         self.assertNotIn("disconnect one", verdict.stdout)
 
-    def test_scan_of_nobody(self):
+    def test_scan_without_encoder(self):
         encoder = self.encoder(latency=20, more="&crc_bit_order=msb")
         self.assert_failed(absenc("scan", encoder), "timeout")
         self.assert_wrong_usage(absenc("scan", "sim:tformat"), "one encoder")
 
 
-class Reasons(EslCase):
-    """What a host says of a bad reply, `decode` says too, of one frame and in a capture."""
+class DecodeReasons(EslCase):
+    """`decode` explains a bad reply like a host, for single frames and for captures."""
     ONE = bytes.fromhex("084000efcdab34125646b3")
     TWO = bytes.fromhex("086000abd6cd84")
 
-    def test_are_those_of_a_host(self):
+    def test_reasons_equal_those_of_host(self):
         damaged = bytes([*self.ONE[:5], self.ONE[5] ^ 1, *self.ONE[6:]])
         for reply, words in ((self.TWO + self.ONE, "the channels are swapped"),
                              (self.ONE, "channel 2 is missing"),
@@ -296,7 +296,7 @@ class Reasons(EslCase):
                 lines = json_lines(absenc("decode", "esl", capture, "--json").stdout)
                 self.assertIn(words, " ".join(line.get("message", "") for line in lines))
 
-    def test_a_counter_that_stands_still(self):
+    def test_reports_stuck_counter(self):
         request = absenc("encode", "esl", "position").stdout.strip()
         reply = (self.ONE + self.TWO).hex()
         capture = self.file("still.txt", f"{request}\n{reply}\n" * 2)
@@ -304,8 +304,8 @@ class Reasons(EslCase):
         self.assertTrue(first["ok"])
         self.assertEqual((second["ok"], second["error"]), (False, "sequence_mismatch"))
 
-    def test_a_refusal(self):
-        """The check of the request is right: what the encoder says of it is the error."""
+    def test_reports_refusal(self):
+        """The request's check is right, so the status of the reply is the error."""
         good = absenc("encode", "esl", "position").stdout.strip()
         field = control_field(POSITION) ^ 0x80
         refused = bytes([field]) + crc8([field])
@@ -315,17 +315,17 @@ class Reasons(EslCase):
         self.assert_failed(absenc("decode", "esl", "--request", refused.hex(), "--hex", answer.hex()),
                            "request_rejected", "wrong parity bit")
         wave = Wave(D0=1)
-        for asked, told in ((bytes.fromhex(good), self.ONE + self.TWO), (refused, answer)):
+        for asked, result in ((bytes.fromhex(good), self.ONE + self.TWO), (refused, answer)):
             wave.send("D0", asked, 100)
             wave.wait(2000)
-            wave.send("D0", told, 100)
+            wave.send("D0", result, 100)
             wave.wait(10_000)
         lines = json_lines(absenc("decode", "esl", self.file("refused.vcd", wave.vcd()), "--json").stdout)
         self.assertEqual([(one["kind"], one["ok"]) for one in lines], [("exchange", True), ("exchange", False)])
         self.assertEqual(lines[1]["error"], "request_rejected")
         self.assertIn("wrong parity bit", lines[1]["message"])
 
-    def test_probe_names_what_contradicts(self):
+    def test_probe_names_contradiction(self):
         result = absenc("probe", "esl", "--request", "0858", "--hex", (self.ONE + self.TWO).hex())
         self.assertEqual(result.returncode, 1)
         self.assertNotIn("number of bytes", result.stdout + result.stderr)
@@ -333,14 +333,14 @@ class Reasons(EslCase):
 
 
 class Probe(EslCase):
-    def test_one_reply(self):
+    def test_probes_one_reply(self):
         result = absenc("probe", "esl", "--request", MSB_REQUEST, "--hex", MSB_REPLY)
         self.assert_good(result)
         self.assertRegex(result.stdout, r"(?m)^crc_bit_order +lsb +no +frame 1: ")
         self.assertRegex(result.stdout, r"(?m)^ +msb +possible +only this value explains all frames$")
         self.assertIn("go on with: --option crc_bit_order=msb ", result.stdout)
 
-    def test_what_it_says_can_be_used(self):
+    def test_reported_options_decode_frames(self):
         client = self.client("--option", "crc16_byte_order=high", "--option", "sequence_step=safety")
         frames = []
         for data_id in [POSITION, TEMPERATURE, POSITION]:
@@ -355,7 +355,7 @@ class Probe(EslCase):
         self.assert_good(absenc("decode", "esl", *frames[:4], *settings))
         self.assertEqual(absenc("decode", "esl", *frames[:4]).returncode, 1)
 
-    def test_damaged_and_missing_frames(self):
+    def test_reports_damaged_and_missing_frames(self):
         self.assert_failed(absenc("probe", "esl", "--hex", REPLY[:-2]), "whatever the options, frame 1")
         self.assert_failed(absenc("probe", "esl", "--hex", MSB_REPLY, "--hex", REPLY), "no options explain all frames")
         self.assert_wrong_usage(absenc("probe", "esl"), "--hex")
@@ -365,8 +365,8 @@ class Probe(EslCase):
         self.assert_good(absenc("probe", "esl", "--request", "", "--hex", REPLY))
 
 
-class Sentences(EslCase):
-    """What is said of bad replies."""
+class ErrorMessages(EslCase):
+    """Messages about bad replies."""
 
     def fake(self, *replies):
         fake = FakeEncoder({reply[0]: reply for reply in replies})
@@ -374,29 +374,29 @@ class Sentences(EslCase):
         self.addCleanup(fake.__exit__)
         return f"esl:{fake.path}?latency=50&echo=off"
 
-    def assert_said(self, reply, *words, options=""):
+    def assert_message(self, reply, *words, options=""):
         self.assert_failed(absenc("read", self.fake(reply) + options), *words)
 
     def test_bad_replies(self):
         good = bytes.fromhex(REPLY)
-        self.assert_said(bytes.fromhex(WRONG_CHANNEL_2), "bad_checksum", "channel 2")
-        self.assert_said(good[:5] + bytes([good[5] ^ 1]) + good[6:], "bad_checksum", "channel 1")
-        self.assert_said(good[:11], "wrong_length", "channel 2")
+        self.assert_message(bytes.fromhex(WRONG_CHANNEL_2), "bad_checksum", "channel 2")
+        self.assert_message(good[:5] + bytes([good[5] ^ 1]) + good[6:], "bad_checksum", "channel 1")
+        self.assert_message(good[:11], "wrong_length", "channel 2")
 
-    def test_the_address_of_another(self):
+    def test_reply_of_other_address(self):
         other = bytes.fromhex(REPLY)
         fake = FakeEncoder({control_field(POSITION, 1): other})
         with fake:
             self.assert_failed(absenc("read", f"esl:{fake.path}?latency=50&echo=off&address=1"), "unexpected_reply",
                                "address")
 
-    def test_a_profile_that_does_not_fit_is_named(self):
+    def test_names_option_of_other_profile(self):
         encoder = self.encoder("--option", "crc16_byte_order=high")
         self.assert_failed(absenc("read", encoder), "bad_checksum", "crc16_byte_order=high")
         self.assert_good(absenc("read", f"{encoder}&crc16_byte_order=high"))
 
-    def test_a_replay(self):
-        """Replies to IDs 1 and 2 that are good by themselves, with the same sequence counter."""
+    def test_repeated_counter(self):
+        """Replies to IDs 1 and 2 that are valid alone but have the same sequence counter."""
         one = bytes([control_field(0x2), READY, 0, 0xEF, 0xCD, 0xAB, 0x56])
         two = bytes([control_field(0x2), READY | CHANNEL_2, 0, 0xAB, 0x80 | 0x56])
         singleturn = one + crc16(one, 0x0000) + two + crc16(two, 0xFFFF)
@@ -404,7 +404,7 @@ class Sentences(EslCase):
         self.assert_good(absenc("read", encoder))
         self.assert_failed(absenc("run", encoder, "safe-position"), "sequence_mismatch", "stands still")
 
-    def test_a_memory_that_stays_busy(self):
+    def test_memory_that_stays_busy(self):
         page = bytes([control_field(WRITE), 0xFE, 0])
         busy = bytes([control_field(READ), 1, 0])
         encoder = self.fake(page + crc8(page), busy + crc8(busy))
@@ -412,16 +412,16 @@ class Sentences(EslCase):
 
 
 class SafePositions(EslCase):
-    """One after the other, each compared with the one before."""
+    """Consecutive safe positions, each compared with the previous one."""
 
     def test_read(self):
         lines = json_lines(absenc("read", "sim:esl?singleturn=5&multiturn=3", "--command", "safe-position", "--count", "20",
                                   "--rate", "0", "--json").stdout)
         self.assertEqual([one["singleturn"] for one in lines], [5] * 20)
         self.assertTrue(all(one["singleturn_valid"] for one in lines))
-        self.assertTrue(all("multiturn" not in one for one in lines), lines[0])  # no part of a safe position
+        self.assertTrue(all("multiturn" not in one for one in lines), lines[0])  # a safe position has no turns
 
-    def test_a_counter_that_stands_still_is_an_error_each_time(self):
+    def test_stuck_counter_is_an_error_each_time(self):
         encoder = "sim:esl?condition=ch1_sequence=5&condition=ch2_sequence=5&command=safe-position"
         result = absenc("read", encoder, "--count", "3", "--json")
         self.assertEqual(result.returncode, 1)
@@ -438,22 +438,22 @@ class SafePositions(EslCase):
             rows = json_lines(file.read())
         self.assertEqual([row["singleturn"] for row in rows if "singleturn" in row], [77] * 30)
 
-    def test_two_on_one_line(self):
-        """Whoever speaks in between does not break the sequence."""
+    def test_two_encoders_on_one_line(self):
+        """Requests to another encoder in between do not break the sequence."""
         line = self.encoder("--also", "address=3&singleturn=70000", latency=300)
         live = self.watch(line, f"{line}&address=3", "--command", "safe-position", until=lambda live: len(live) == 2)
         self.assertEqual(sorted(one["singleturn"] for one in live.values()), [0, 70000])
         result = absenc("monitor", line, f"{line}&address=3", "--command", "safe-position", "--for", "2", "--json")
         self.assertEqual([one["errors"] for one in json_lines(result.stdout)][-2:], [{}, {}])
 
-    def test_what_cannot_be_read_again_and_again(self):
+    def test_refuses_commands_that_cannot_be_repeated(self):
         self.assert_wrong_usage(absenc("read", "sim:esl?command=zero"), "changes the encoder")
         self.assert_wrong_usage(absenc("monitor", "sim:esl", "--command", "memory-read"), "takes arguments")
         self.assert_wrong_usage(absenc("read", "sim:esl?command=safe-positon"), "safe-position")
         self.assert_failed(absenc("read", "sim:esl?command=temperature"), "temperature yields no position")
 
 
-class OneTurn(EslCase):
+class SingleTurn(EslCase):
     def test_has_no_turns(self):
         reading = self.good_json("read", "sim:esl?model=single-turn&singleturn=1000")
         self.assertEqual((reading["singleturn"], "multiturn" in reading), (1000, False))
@@ -461,14 +461,14 @@ class OneTurn(EslCase):
         self.assertEqual(info["answers"]["encoder-id"]["fields"]["encoder_id"], 0x98)
         self.assert_failed(absenc("reset-multiturn", "sim:esl?model=single-turn", "--yes"), "unsupported", "one turn")
 
-    def test_an_encoder_id_that_contradicts_the_options(self):
+    def test_reports_encoder_id_that_contradicts_options(self):
         encoder = self.encoder("--model", "single-turn")
         self.assert_failed(absenc("run", encoder, "encoder-id"), "unexpected_reply", "no turns", "model")
         self.assert_good(absenc("run", f"{encoder}&model=single-turn", "encoder-id"))
 
 
 class Doctor(EslCase):
-    """What a reply reports is found, and named as what it is."""
+    """Doctor reports the flags of a reply under the right finding."""
 
     def verdict(self, settings, *words):
         result = absenc("doctor", f"sim:esl?{settings}")
@@ -486,20 +486,20 @@ class Doctor(EslCase):
         self.verdict("condition=temperature=120", "status: ", "temperature_warning")
         self.verdict("alarm=singleturn_error", "alarm: ", "singleturn_error")
         result = absenc("doctor", "sim:esl?alarm=singleturn_error", "--json")
-        self.assertEqual(len(json.loads(result.stdout)["findings"]), 1)  # safety_error is the sum of it
+        self.assertEqual(len(json.loads(result.stdout)["findings"]), 1)  # safety_error only summarizes the alarm
 
-    def test_replies_that_come_twice_are_not_late(self):
+    def test_repeated_replies_are_not_late(self):
         self.verdict("fault=repeat=1", "two_answer: ")
 
 
 class TwoChannels(EslCase):
-    """What only one channel says, wherever readings are shown."""
+    """Flags that only one channel reports, in every output of a reading."""
 
     NONE = {"ch1_status": ["ready"], "ch1_alarms": [], "ch2_status": ["channel_2", "ready"], "ch2_alarms": [],
             "alarms": []}
 
     def fake(self, status_2=READY | CHANNEL_2, alarms_2=0):
-        """IDs 1 and 2 with flags in channel 2 alone."""
+        """Returns an encoder whose replies to IDs 1 and 2 have flags in channel 2 only."""
         replies = {}
         for data_id, turns in ((POSITION, b"\x34\x12"), (0x2, b"")):
             field = control_field(data_id)
@@ -514,13 +514,13 @@ class TwoChannels(EslCase):
     def flags_of(self, reading):
         return {name: reading[name] for name in self.NONE}
 
-    def test_an_alarm_of_channel_2(self):
+    def test_alarm_of_channel_2(self):
         encoder = self.fake(alarms_2=0x20)
         wanted = dict(self.NONE, ch2_alarms=["singleturn_error"], alarms=["singleturn_error"])
         reading = self.good_json("read", encoder)
         self.assertEqual(self.flags_of(reading), wanted)
         self.assertFalse(reading["singleturn_valid"])
-        info = json.loads(absenc("info", encoder, "--json").stdout)  # the fake answers nothing else
+        info = json.loads(absenc("info", encoder, "--json").stdout)  # the fake encoder answers no other request
         self.assertEqual(self.flags_of(info["answers"]["position"]), wanted)
         text = absenc("read", encoder).stdout
         self.assertIn("no ch1_alarms", text)
@@ -529,7 +529,7 @@ class TwoChannels(EslCase):
         self.assertEqual((alarms["ch1_alarms"], [one["name"] for one in alarms["ch2_alarms"]]), ([], ["singleturn_error"]))
         self.assertRegex(absenc("alarms", encoder).stdout, r"no ch1_alarms\nch2_alarms:\n +singleturn_error: .*stop the drive")
 
-    def test_a_status_of_channel_2(self):
+    def test_status_of_channel_2(self):
         encoder = self.fake(status_2=CHANNEL_2 | 0x04)
         reading = self.good_json("read", encoder)
         self.assertEqual(self.flags_of(reading), dict(self.NONE, ch2_status=["safety_error", "channel_2"]))
@@ -561,24 +561,24 @@ class TwoChannels(EslCase):
                          dict(self.NONE, ch2_alarms=["singleturn_error"], alarms=["singleturn_error"]))
 
 
-class OneLine(EslCase):
+class SharedLine(EslCase):
     def lines(self, *arguments, seconds=2):
         result = absenc("monitor", *arguments, "--for", str(seconds), "--interval", "0.5", "--json")
         last = {line["encoder"]: line for line in json_lines(result.stdout)}
         return result, [last[name] for name in arguments if name in last]
 
-    def test_each_has_its_turn(self):
+    def test_monitor_reads_encoders_in_turn(self):
         line = self.encoder("--also", "address=3&singleturn=70000", "--also", "address=6&singleturn=0x5555", "--also",
                             "address=6&singleturn=0xAAAA", latency=20)
         names = [line, f"{line}&address=3", f"{line}&address=6", f"{line}&address=7"]
         result, last = self.lines(*names, "--rate", "0", seconds=6)
-        self.assertEqual(result.returncode, 1)  # two were never read
+        self.assertEqual(result.returncode, 1)  # two encoders were never read
         self.assertEqual([one["state"] for one in last], ["live", "live", "failing", "failing"])
         self.assertEqual([one["reading"]["singleturn"] for one in last[:2]], [0, 70000])
         self.assertEqual([one["errors"] for one in last[:2]], [{}, {}])
         self.assertEqual(set(last[3]["errors"]), {"timeout"})
         least, most = sorted(one["readings"] for one in last[:2])
-        self.assertGreater(least, 10)  # those that do not answer take their time
+        self.assertGreater(least, 10)  # timeouts of absent encoders take time
         self.assertLess(most, 2 * least + 10)
 
     def test_names_of_one_bus(self):
@@ -598,8 +598,9 @@ class OneLine(EslCase):
         live = self.watch("shoulder", "elbow", until=lambda live: len(live) == 2, env=dict(os.environ, ABSENC_CONFIG=config))
         self.assertEqual([live[name]["singleturn"] for name in ("shoulder", "elbow")], [0, 70000])
 
-    def test_memory_is_for_one_encoder_on_its_line(self):
-        """By the encoder, which knows that others are there, and by the host, where its file says so."""
+    def test_memory_is_refused_on_shared_line(self):
+        """The encoder refuses if it knows of others on its line; the host refuses if the configuration file names
+        others."""
         emulator = self.emulator("--also", "address=3")
         encoder = f"esl:{emulator.path}?latency=20"
         self.assert_failed(absenc("memory", "read", encoder, "0"), "timeout", "others share its line")
@@ -623,21 +624,21 @@ class OneLine(EslCase):
         env = dict(os.environ, ABSENC_CONFIG=config)
         for command in (["memory", "read", "elbow", "0"], ["memory", "write", "elbow", "0", "1", "--yes"]):
             self.assert_failed(absenc(*command, env=env), "unsupported", "several encoders on the line", "nothing was sent")
-        told = json.loads(absenc("run", "elbow", "led-or-lissajous", "--json", env=env).stdout)["fields"]
-        self.assertEqual((told["led_error"], told["lissajous_error"]), (False, False))  # by SF, without memory
+        result = json.loads(absenc("run", "elbow", "led-or-lissajous", "--json", env=env).stdout)["fields"]
+        self.assertEqual((result["led_error"], result["lissajous_error"]), (False, False))  # reported by SF, without memory
         self.assert_good(absenc("memory", "read", "knee", "0", env=env))
         self.assert_failed(absenc("memory", "read", "elbow?bus=false", "0", env=env), "timeout")
         summary = emulator.end()[2]
         self.assertIn("memory access with several encoders on the line", summary)
 
-    def test_what_cannot_share_a_line(self):
+    def test_refuses_encoders_that_cannot_share_a_line(self):
         self.assert_wrong_usage(absenc("monitor", "esl:/dev/x", "esl:/dev/x?address=1&baud=115200"), "/dev/x", "baud")
         self.assert_wrong_usage(absenc("monitor", "esl:/dev/x", "tformat:/dev/x"), "one line", "baud")
         self.assert_wrong_usage(absenc("monitor", "esl:/dev/x?address=1", "esl:/dev/x?address=1"), "the same encoder")
         self.assert_wrong_usage(absenc("emulate", "esl", "--also", "adress=1"), "adress", "address")
         self.assert_wrong_usage(absenc("emulate", "esl", "--also", "address=1", "--memory", "x"), "--memory")
 
-    def test_all_see_the_loss_and_the_return(self):
+    def test_reports_loss_and_return_of_all(self):
         first = self.emulator("--also", "address=3")
         names = [f"esl:{first.path}?latency=300&address={address}" for address in (0, 3)]
         monitor = self.start("monitor", *names, "--json", "--interval", "0.1")

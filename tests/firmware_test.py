@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""The programs of firmware/ on machines that QEMU emulates. ABSENC_FIRMWARE is the folder they were
-built in, ABSENC_FIRMWARE_RISCV that of those for RISC-V; ABSENC_FIRMWARE_POSITIONS how many the drive reads, ABSENC_FIRMWARE_ALL whether all programs were built (./dev firmware)."""
+"""Runs the programs of firmware/ on machines emulated by QEMU. ABSENC_FIRMWARE and ABSENC_FIRMWARE_RISCV are the build
+folders for ARM and RISC-V, ABSENC_FIRMWARE_POSITIONS is the number of positions that the drive reads, and
+ABSENC_FIRMWARE_ALL is set if all programs were built (./dev firmware)."""
 import copy
 import json
 import os
@@ -15,7 +16,7 @@ import unittest
 from command_support import Emulator, absenc, end, read_line
 
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.dirname(os.path.abspath(__file__))), "firmware"))
-import figures  # noqa: E402: it is beside the programs that it measures
+import figures  # noqa: E402: the module is in the folder of the programs that it measures
 
 FOLDER = os.path.abspath(os.environ.get("ABSENC_FIRMWARE", "build/arm/firmware"))
 RISCV_FOLDER = os.path.abspath(os.environ.get("ABSENC_FIRMWARE_RISCV", "build/riscv/firmware"))
@@ -26,11 +27,11 @@ ALL = bool(os.environ.get("ABSENC_FIRMWARE_ALL"))
 CORES = ("m0plus", "m4f") if ALL else ("m0plus",)
 MACHINES = {"microbit": "microbit", "m0plus": "mps2-an385", "m4f": "mps2-an386", "rv32": "virt"}
 SINGLETURN, MULTITURN = 74565, 4660
-LATENCY = 250  # ms: a reply that a busy machine delays longer would be a fault that nobody injected
+LATENCY = 250  # ms; a longer delay by a busy machine would look like a fault that was not injected
 
 
 def emulator_of(program, machine, *arguments, serial="null"):
-    """The command that runs a program."""
+    """Returns the command line that runs a program in QEMU."""
     riscv = machine == MACHINES["rv32"]
     path = os.path.join(RISCV_FOLDER if riscv else FOLDER, program + ".elf")
     emulator = ["qemu-system-riscv32", "-bios", "none"] if riscv else ["qemu-system-arm"]
@@ -41,7 +42,7 @@ def emulator_of(program, machine, *arguments, serial="null"):
 
 
 def emulated(program, machine, *arguments, serial="null"):
-    """Runs a program to its end; what it says."""
+    """Runs a program to its end. Returns its exit status and output."""
     command = emulator_of(program, machine, *arguments, serial=serial)
     result = subprocess.run(command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
                             timeout=PATIENCE, text=True, check=False)
@@ -52,15 +53,15 @@ class Vectors(unittest.TestCase):
     def test_all_are_decoded(self):
         for cpu in (*CORES, "rv32") if ALL else CORES:
             with self.subTest(cpu):
-                status, said = emulated(f"vectors-{cpu}", MACHINES[cpu])
-                self.assertEqual(status, 0, said)
-                decoded = re.search(r"^decoded (\d+), wrong 0, ", said, re.MULTILINE)
-                self.assertTrue(decoded, said)
+                status, output = emulated(f"vectors-{cpu}", MACHINES[cpu])
+                self.assertEqual(status, 0, output)
+                decoded = re.search(r"^decoded (\d+), wrong 0, ", output, re.MULTILINE)
+                self.assertTrue(decoded, output)
                 self.assertGreaterEqual(int(decoded[1]), 600)
 
 
 class Drive(unittest.TestCase):
-    """Every fault of the line is one that the drive noticed, and no position is wrong."""
+    """The drive must detect every injected fault, and report no wrong position."""
 
     def drive(self, cpu):
         with tempfile.TemporaryDirectory(prefix="absenc-test-") as folder:
@@ -70,24 +71,24 @@ class Drive(unittest.TestCase):
                           "--fault", "corrupt=0.01", "--fault", "drop=0.01") as emulator:
                 port = emulator.line().rsplit(":", 1)[1].strip()
                 line = f"socket,id=line,host=127.0.0.1,port={port},nodelay=on"
-                status, said = emulated(f"drive-{cpu}", MACHINES[cpu], POSITIONS, SINGLETURN, MULTITURN, LATENCY,
+                status, output = emulated(f"drive-{cpu}", MACHINES[cpu], POSITIONS, SINGLETURN, MULTITURN, LATENCY,
                                         serial=line)
                 _, _, summary = emulator.end()
             with open(memory, encoding="utf-8") as file:
-                return status, said, summary, file.read()
+                return status, output, summary, file.read()
 
     def check(self, cpu):
-        status, said, summary, memory = self.drive(cpu)
-        everything = said + summary
+        status, output, summary, memory = self.drive(cpu)
+        everything = output + summary
         self.assertEqual(status, 0, everything)
-        counted = {name: int(number) for name, number in re.findall(r"^([a-z_]+) (\d+)$", said, re.MULTILINE)}
+        counted = {name: int(number) for name, number in re.findall(r"^([a-z_]+) (\d+)$", output, re.MULTILINE)}
         self.assertGreaterEqual(counted["good"], POSITIONS, everything)
         self.assertEqual(counted["wrong"], 0, everything)
         self.assertEqual(counted["unasked"], 0, everything)
         self.assertEqual(counted["requests"], int(re.search(r"(\d+) requests answered", summary)[1]), everything)
         damaged = int(re.search(r"replies with faults: (\d+)", summary)[1])
         noticed = counted["silences"] + counted["implausible"]
-        # Every fault is noticed, once. A reply that a busy machine delivers late is a silence without a fault.
+        # Every fault must be detected once. A reply that a busy machine delays looks like silence without a fault.
         self.assertGreaterEqual(noticed, damaged, everything)
         self.assertLessEqual(noticed, damaged + 3 + POSITIONS // 400, everything)
         if POSITIONS >= 1000:
@@ -97,20 +98,20 @@ class Drive(unittest.TestCase):
         stored = re.findall(r"^[0-9A-F]{4}: (.*)$", memory, re.MULTILINE)
         self.assertEqual(" ".join(stored).split()[page * 127 + address], value)
 
-    def test_positions_alarms_a_reset_and_a_write(self):
+    def test_reads_positions_and_alarms_resets_and_writes(self):
         for cpu in ("microbit", *CORES):
             with self.subTest(cpu):
                 self.check(cpu)
 
 
 class Encoder(unittest.TestCase):
-    """The device role on the machine, read by the command. The port adds what the network does."""
+    """Runs the device role on the machine and reads it with the command. A serial port over TCP adds its latency."""
 
     PAGE, ADDRESS, VALUE = 2, 7, 0x5A
 
     def start(self, cpu, rpm, silence=LATENCY, latency=LATENCY):
-        """The process, which takes so many ms without a character for a silence, and the encoder's name. QEMU says where
-        it waits for whoever connects first."""
+        """Returns the process and the encoder's address. The program takes `silence` ms without a character for a
+        pause. QEMU prints the port on which it waits for the first connection."""
         command = emulator_of(f"encoder-{cpu}", MACHINES[cpu], SINGLETURN, MULTITURN, rpm, silence,
                               serial="socket,id=line,host=127.0.0.1,port=0,nodelay=on,server=on,wait=on")
         process = subprocess.Popen(command, bufsize=0, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
@@ -130,7 +131,7 @@ class Encoder(unittest.TestCase):
         return [json.loads(line) for line in
                 self.run_well("read", encoder, "--count", str(count), "--rate", "0", "--json").splitlines()]
 
-    def test_positions_an_alarm_and_memory(self):
+    def test_positions_alarm_and_memory(self):
         for cpu in ("microbit", *CORES):
             with self.subTest(cpu):
                 process, encoder = self.start(cpu, 0)
@@ -141,21 +142,22 @@ class Encoder(unittest.TestCase):
                 self.assertEqual(self.readings(encoder, 1)[0]["alarms"], [])
                 self.run_well("memory", "write", encoder, str(self.ADDRESS), str(self.VALUE), "--page",
                               str(self.PAGE), "--yes")
-                said = self.run_well("memory", "read", encoder, str(self.ADDRESS), "--page", str(self.PAGE))
-                self.assertIn("5A", said.upper())
+                output = self.run_well("memory", "read", encoder, str(self.ADDRESS), "--page", str(self.PAGE))
+                self.assertIn("5A", output.upper())
                 _, _, rules = end(process)
-                self.assertNotIn("memory access", rules)  # before its page is ready: both clocks go alike
+                # no memory access before its page was ready, because both clocks run equally fast
+                self.assertNotIn("memory access", rules)
 
-    def test_it_keeps_what_the_document_demands(self):
-        # A request that it must refuse ends by silence: that has to be over while the host still waits. A reply that is
-        # later than the host waits breaks a clause, also where the machine was only busy.
+    def test_keeps_clauses_of_document(self):
+        # An invalid request ends by silence, which must be over before the host's timeout. A reply after the timeout
+        # breaks a clause, even if only the machine was busy.
         process, encoder = self.start("m0plus", 0, LATENCY // 5, 8 * LATENCY)
-        said = self.run_well("conform", encoder)
-        self.assertRegex(said, r"\b[1-9]\d* kept, 0 broken, 1 untested")
-        self.assertRegex(said, r"untested: bad-delimiter: (.*\n){2} *this kind of port cannot change to")
+        output = self.run_well("conform", encoder)
+        self.assertRegex(output, r"\b[1-9]\d* kept, 0 broken, 1 untested")
+        self.assertRegex(output, r"untested: bad-delimiter: (.*\n){2} *this kind of port cannot change to")
         end(process)
 
-    def test_a_shaft_that_turns(self):
+    def test_turning_shaft(self):
         process, encoder = self.start("m0plus", 1)
         read = self.readings(encoder, 200)
         positions = [one["multiturn"] << 17 | one["singleturn"] for one in read]
@@ -167,12 +169,12 @@ class Encoder(unittest.TestCase):
 class Figures(unittest.TestCase):
     TABLE = os.path.join(SOURCES, "docs/firmware-figures.json")
 
-    def test_each_is_within_3_percent_of_the_table(self):
+    def test_figures_are_within_3_percent_of_table(self):
         command = [sys.executable, "-B", os.path.join(SOURCES, "firmware/figures.py"), FOLDER, self.TABLE, "--check"]
         result = subprocess.run(command, capture_output=True, timeout=PATIENCE, text=True, check=False)
         self.assertEqual(result.returncode, 0, result.stdout + result.stderr)
 
-    def test_one_that_grows_by_10_percent_is_told(self):
+    def test_growth_by_10_percent_is_reported(self):
         with open(self.TABLE, encoding="utf-8") as file:
             table = json.load(file)
         for reader, cores in table["figures"].items():
@@ -180,9 +182,9 @@ class Figures(unittest.TestCase):
                 for name, value in values.items():
                     found = copy.deepcopy(table)
                     found["figures"][reader][cpu][name] = value and value * 11 // 10
-                    told = figures.differences(table, found)
-                    self.assertEqual(len(told), 1 if value else 0, told)
-                    self.assertTrue(all(f"{reader} {cpu} {name}" in one for one in told), told)
+                    differences = figures.differences(table, found)
+                    self.assertEqual(len(differences), 1 if value else 0, differences)
+                    self.assertTrue(all(f"{reader} {cpu} {name}" in one for one in differences), differences)
 
 
 if __name__ == "__main__":

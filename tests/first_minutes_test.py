@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""From what is plugged in to a reading: who types only what the command printed last."""
+"""Follows a new user from a port to a reading: each step runs the command that the previous one printed."""
 import json
 import re
 import shlex
@@ -23,7 +23,7 @@ class FirstMinutes(Case):
         self.assertTrue(found, text)
         return shlex.split(found[0])[1:]
 
-    def test_from_a_port_to_a_reading(self):
+    def test_leads_from_port_to_reading(self):
         units = serial_units()
         self.assertGreater(len(units), 4)
         for unit in units:
@@ -41,32 +41,32 @@ class FirstMinutes(Case):
                 self.assert_good(reading)
                 self.assertTrue(json.loads(reading.stdout)["ok"])
 
-    def test_every_verb_that_reads_names_identify(self):
+    def test_reading_verbs_refer_to_identify(self):
         for verb in ["read", "monitor", "scan", "info", "alarms", "bench"]:
             with self.subTest(verb):
                 self.assert_wrong_usage(absenc(verb, "/dev/ttyUSB9"), "`absenc identify /dev/ttyUSB9`")
         self.assert_wrong_usage(absenc("read", "tcp:localhost:4001"), "`absenc identify tcp:localhost:4001`")
 
-    def test_doctor_of_a_port_identifies_first(self):
+    def test_doctor_identifies_port(self):
         with Emulator(self.directory, "--motion", "rpm=10", protocol="raa38") as emulator:
             result = absenc("doctor", emulator.path, "--readings", "10")
             self.assertIn(f"raa38:{emulator.path}", result.stderr)
             self.assertTrue(result.stdout.startswith("good"), result.stdout)
             self.assertEqual(result.returncode, 0)
 
-    def test_doctor_of_a_port_where_nobody_answers(self):
+    def test_doctor_reports_port_without_reply(self):
         with Emulator(self.directory, "--fault", "silence=1") as emulator:
             result = absenc("doctor", emulator.path)
             self.assert_failed(result, "which encoder is on", "nothing came back")
 
-    def test_doctor_of_a_port_where_chance_could_answer_as_well(self):
-        with Emulator(self.directory, protocol="raa38") as emulator:  # the same frame again and again
+    def test_doctor_reports_uncertain_protocol(self):
+        with Emulator(self.directory, protocol="raa38") as emulator:  # a standing shaft repeats the same frame
             result = absenc("doctor", emulator.path)
             self.assert_failed(result, "It may be raa38", "may be chance")
             command = shlex.split(re.search(r"`absenc (doctor [^`]*)`", result.stderr).group(1))
             self.assert_good(absenc(*command, "--readings", "10"))
 
-    def test_doctor_of_a_port_ends_at_once(self):
+    def test_doctor_ends_by_interrupt(self):
         with Emulator(self.directory, "--motion", "rpm=1") as emulator:
             doctor = subprocess.Popen([ABSENC, "doctor", emulator.path], stdout=subprocess.PIPE, stderr=subprocess.PIPE)
             wait_for_handler(doctor)
@@ -74,7 +74,7 @@ class FirstMinutes(Case):
             self.assertEqual((status, out), (1, ""))
             self.assertIn("interrupted", err)
 
-    def test_ports(self):
+    def test_ports_are_listed(self):
         alone = absenc()
         self.assert_good(alone)
         ports = absenc("ports")
@@ -87,7 +87,7 @@ class FirstMinutes(Case):
             if port["kind"] == "serial" and port["may_open"] and port["in_use_by"] is None:
                 self.assertIn(f"absenc identify {port['port']}", ports.stdout)
 
-    def test_names_that_people_know(self):
+    def test_list_accepts_product_names(self):
         for word, words in [("tamagawa", ["Tamagawa: the protocol is tformat", "TS5700N8500", "Commands"]),
                             ("AksIM-2", ["AksIM-2 is a model of encolink and encolink-spi", "full-duplex UART"]),
                             ("rls", ["RLS: the protocols are encolink, encolink-spi", "e201"]),
@@ -106,7 +106,7 @@ class FirstMinutes(Case):
                 self.assert_wrong_usage(absenc("read", encoder), *words)
         self.assert_wrong_usage(absenc("list", "tfromat"), "did you mean tformat?")
 
-    def test_a_capture_without_its_protocol_is_identified(self):
+    def test_decode_identifies_capture_without_protocol(self):
         capture = self.file("drive.vcd")
         self.assert_good(absenc("wave", "tformat?motion=rpm=60", capture, "--count", "20"))
         result = absenc("decode", capture)
@@ -114,15 +114,15 @@ class FirstMinutes(Case):
         self.assertIn("the protocol is missing", result.stderr)
         self.assertIn(f"go on with: absenc decode tformat {capture}", result.stdout)
 
-    def test_every_model_leads_to_its_protocol(self):
+    def test_list_finds_protocol_of_every_model(self):
         for line in absenc("list", "--json").stdout.splitlines():
             unit = json.loads(line)
             for model in unit["models"]:
                 named = [json.loads(one)["protocol"] for one in absenc("list", model["name"], "--json").stdout.splitlines()]
                 self.assertIn(unit["protocol"], named)
 
-    def test_one_spelling_in_every_verb(self):
-        """What stands behind ? of an encoder means the same in each verb that takes a protocol or an encoder."""
+    def test_settings_have_same_form_in_every_verb(self):
+        """Settings after `?` have the same meaning in each verb that takes a protocol or an encoder."""
         settings = "model=23-bit"
         capture = self.file("capture.vcd")
         for arguments in [["read", f"sim:tformat?{settings}"], ["wave", f"tformat?{settings}", capture],
@@ -147,7 +147,7 @@ class FirstMinutes(Case):
             with self.subTest(arguments):
                 self.assert_wrong_usage(absenc(*arguments), words)
 
-    def test_a_turning_encoder_was_switched_on_at_rest(self):
+    def test_virtual_encoder_is_valid_at_high_speed(self):
         for line in absenc("list", "--json").stdout.splitlines():
             unit = json.loads(line)["protocol"]
             with self.subTest(unit):
@@ -156,7 +156,7 @@ class FirstMinutes(Case):
                 for one in read.stdout.splitlines():
                     self.assertNotEqual(json.loads(one).get("singleturn_valid"), False, one)
 
-    def test_what_people_type(self):
+    def test_accepts_common_spellings(self):
         self.assertEqual(absenc("version").stdout, absenc("--version").stdout)
         self.assertEqual(absenc("help").stdout, absenc("--help").stdout)
         self.assertEqual(absenc("help", "read").stdout, absenc("read", "--help").stdout)

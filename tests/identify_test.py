@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`absenc identify`: virtual encoders on pseudo-terminals, lines on which nobody or noise is, captured frames."""
+"""Tests `absenc identify` with virtual encoders on pseudo-terminals, silent and noisy lines, and captured frames."""
 import concurrent.futures
 import json
 import os
@@ -17,19 +17,19 @@ UNITS = json_lines(absenc("list", "--json").stdout)
 
 
 def with_role(infos, role):
-    """The options or fields of a unit that are this to those who know no protocol."""
+    """Returns the options or fields of a unit that have this role."""
     return [one for one in infos if one.get("role") == role]
 
 
 def another(option):
-    """A value of an option that is not its usual one."""
+    """Returns a value of the option other than its default."""
     if "choices" in option:
         return next(one for one in option["choices"] if one != option["default"])
     return option["maximum"] if option["maximum"] != option["default"] else option["minimum"]
 
 
 def cases(unit):
-    """How an encoder of this protocol is emulated, and which of its options must be found."""
+    """Yields (settings of the emulated encoder, options that identify must find)."""
     yield {}, {}
     model = unit["models"][-1] if unit["models"] else {"options": {}}
     if model["options"]:
@@ -37,30 +37,30 @@ def cases(unit):
     for role in ("encoder", "rate"):
         for option in with_role(unit["options"], role):
             if role == "rate" and unit["link"] == "can":
-                continue  # an slcan adapter of a pseudo-terminal has no rate
+                continue  # the slcan adapter of a pseudo-terminal has no rate
             yield {option["name"]: another(option)}, {option["name"]: another(option)}
 
 
 def usual(unit, settings):
-    """These settings at the usual rate, as behind the port of an address."""
+    """Returns these settings with the default rate, in the form that follows a port in an address."""
     rates = {option["name"]: option["default"] for option in with_role(unit["options"], "rate")}
     texts = [f"{name}={value}" for name, value in {**settings, **rates}.items()]
     return "?" + "&".join(texts) if texts else ""
 
 
-# What no line of characters or CAN frames carries needs an SPI controller.
+# Other links (clocked, SPI) need an SPI controller.
 ENCODERS = [(unit, *case) for unit in UNITS if unit["link"] not in ("exchange", "clocked") for case in cases(unit)]
 
-SEARCH = 300  # seconds for a search on a busy machine; alone it takes ten
+SEARCH = 300  # seconds per search on a busy machine; alone a search takes ten
 
 
 def identify(*arguments, **settings):
-    """Exit status and what --json says."""
+    """Returns the result of the command and the parsed output of --json."""
     result = absenc("identify", *arguments, "--json", **settings)
     return result, json.loads(result.stdout) if result.stdout else None
 
 
-class OnALine(EncoderCase):
+class IdentifyOnLine(EncoderCase):
     def find(self, index, unit, settings):
         protocol = unit["protocol"]
         arguments = [word for name, value in settings.items()
@@ -70,10 +70,10 @@ class OnALine(EncoderCase):
             place = ("slcan:" if unit["link"] == "can" else "") + emulator.path
             result, found = identify(place, "--for", str(SEARCH), timeout=2 * SEARCH)
             self.assertEqual(result.returncode, 0, f"{protocol}: {result.stdout}{result.stderr}")
-            # One reading on a busy machine: with more time for the encoder to be let run.
+            # The latency allows for a busy machine that delays the emulator.
             verb, encoder = found["candidates"][0]["command"].replace('"', "").split()[1:3]
             again = absenc(verb, encoder + ("&" if "?" in encoder else "?") + "latency=1000", "--json")
-            # A pseudo-terminal has no rate: another one is seen only by who answers too slowly for the usual one.
+            # A pseudo-terminal has no rate. Only encoders that are too slow for the default rate show another one.
             at_usual_rate = absenc("read", f"{protocol}:{place}{usual(unit, settings)}", "--json").returncode == 0
             return found["candidates"], again, at_usual_rate
 
@@ -85,17 +85,17 @@ class OnALine(EncoderCase):
                 candidates, again, at_usual_rate = search.result()
                 rates = [] if at_usual_rate else with_role(unit["options"], "rate")
                 self.check(unit, wanted, candidates[0], with_role(unit["options"], "encoder") + rates)
-                # The command to go on with does.
+                # The command that identify recommends must work.
                 self.assertEqual(again.returncode, 0, again.stderr)
                 self.assertTrue(json_lines(again.stdout)[0]["ok"])
 
     def check(self, unit, wanted, best, shown):
-        """`shown`: the options that replies tell; of others any value is as good."""
+        """`shown`: the options that the replies reveal; any value of the others is correct."""
         self.assertEqual(best["protocol"], unit["protocol"])
         self.assertTrue(best["found"])
         self.assertGreater(best["explained"], 0.9 * best["tried"])
         if best["unasked"] and not best["encoder"]:
-            return  # it tells no more than its position
+            return  # its replies reveal only the position
         for option in shown:
             if option["name"] in wanted:
                 self.assertEqual(best["options"][option["name"]], wanted[option["name"]])
@@ -104,7 +104,7 @@ class OnALine(EncoderCase):
         for name in wanted.keys() & identity.keys():
             self.assertEqual((best["options"][name], identity[name]), (wanted[name], wanted[name]))
 
-    def test_people_are_told_how_to_go_on(self):
+    def test_text_names_next_command(self):
         emulator = self.emulator("--model", "23-bit")
         result = absenc("identify", f"{emulator.path}?baud=2500000")
         self.assert_good(result)
@@ -112,7 +112,7 @@ class OnALine(EncoderCase):
         self.assertIn("\n1 says: encoder_id 0x17\n", result.stdout)
         self.assertRegex(result.stdout, r'go on with: absenc read "tformat:.*\?model=23-bit')
 
-    def test_nothing_that_changes_an_encoder_is_sent(self):
+    def test_sends_no_changing_request(self):
         memory = self.file("memory")
         with Emulator(self.directory, "--memory", memory, "--alarm", "battery_alarm") as emulator:
             identify(f"{emulator.path}?baud=2500000")
@@ -120,7 +120,7 @@ class OnALine(EncoderCase):
         self.assertEqual(alarms, ["battery_alarm"])
 
 
-class NobodyKnown(Case):
+class UnknownLine(Case):
     def setUp(self):
         super().setUp()
         self.master, self.slave = os.openpty()
@@ -130,7 +130,7 @@ class NobodyKnown(Case):
         self.addCleanup(os.close, self.master)
 
     def serve(self, answer):
-        """Answers whatever comes until the test is over."""
+        """Answers every request with `answer` until the test ends."""
         wake, waker = os.pipe()
 
         def run():
@@ -149,12 +149,12 @@ class NobodyKnown(Case):
             os.close(waker)
         self.addCleanup(stop)
 
-    def test_a_silent_line(self):
+    def test_silent_line(self):
         result = absenc("identify", self.path, "--for", "2")
         self.assert_failed(result, "nothing came back", "A and B", "supply")
         self.assertEqual(result.stdout, "")
 
-    def test_noise(self):
+    def test_noise_replies(self):
         noise = random.Random(1)
         self.serve(lambda request: noise.randbytes(noise.randrange(4, 24)))
         result, found = identify(self.path, "--for", "2")
@@ -162,7 +162,7 @@ class NobodyKnown(Case):
         self.assertFalse(found["ok"])
         self.assertFalse(any(candidate["found"] for candidate in found["candidates"]))
 
-    def test_a_stream_of_noise(self):
+    def test_noise_stream(self):
         noise = random.Random(2)
         stop = threading.Event()
         os.set_blocking(self.master, False)
@@ -190,21 +190,21 @@ class NobodyKnown(Case):
         self.assertEqual(result.returncode, 1, result.stdout)
         self.assertNotIn("go on with", result.stdout)
 
-    def test_the_time_is_limited(self):
+    def test_time_is_limited(self):
         result = absenc("identify", self.path, "--for", "0.3")
         self.assert_failed(result, "the time is over")
 
-    def test_an_interrupt_ends_it(self):
+    def test_interrupt_ends_it(self):
         process = subprocess.Popen([ABSENC, "identify", self.path], stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
                                    stderr=subprocess.PIPE)
-        os.read(self.master, 1)  # it has begun to ask
+        os.read(self.master, 1)  # the search has sent its first byte
         status, _, err = end(process, signal.SIGINT)
         self.assertEqual(status, 1)
         self.assertIn("interrupted", err)
 
 
 class SeveralEncoders(EncoderCase):
-    def test_on_one_line(self):
+    def test_several_on_one_line(self):
         more = [word for address in (3, 5) for word in ("--also", f"address={address}")]
         with Emulator(self.directory, *more, protocol="esl") as emulator:
             result = absenc("identify", emulator.path)
@@ -215,23 +215,23 @@ class SeveralEncoders(EncoderCase):
         self.assertEqual(sorted(command.strip('"').partition("?")[2] for command in commands),
                          ["", "address=3", "address=5"])
 
-    def test_who_sends_by_himself_on_can_has_his_number(self):
+    def test_streaming_can_node_is_found_by_its_number(self):
         with Emulator(self.directory, "--option", "node=0x21", "--option", "cyclic=100", protocol="raa38-can") as emulator:
-            _, found = identify(f"slcan:{emulator.path}", "--for", "0.4")  # nobody can be asked in that time
+            _, found = identify(f"slcan:{emulator.path}", "--for", "0.4")  # too short to send a request
         self.assertEqual({one["options"]["node"] for one in found["candidates"]}, {0x21})
 
 
 class WrongUsage(Case):
-    def test_a_wrong_path(self):
+    def test_refuses_missing_port(self):
         self.assert_failed(absenc("identify", self.file("nothing")), "there is no port", "nothing")
 
-    def test_not_with_a_protocol(self):
+    def test_refuses_protocol(self):
         self.assert_wrong_usage(absenc("identify", "tformat:/dev/null"), "says which protocol")
 
-    def test_not_with_options_of_a_protocol(self):
+    def test_refuses_options_of_protocol(self):
         self.assert_wrong_usage(absenc("identify", "/dev/null?singleturn_bits=23"), "no setting of a port")
 
-    def test_either_a_port_or_frames(self):
+    def test_needs_port_or_frames(self):
         self.assert_wrong_usage(absenc("identify"), "one of")
         self.assert_wrong_usage(absenc("identify", "/dev/null", "--hex", "00"), "one of")
         self.assert_wrong_usage(absenc("identify", "--request", "1A"), "--hex")
@@ -240,31 +240,31 @@ class WrongUsage(Case):
 
 
 class Frames(Case):
-    def test_a_frame_with_its_request(self):
+    def test_frame_with_request(self):
         result = absenc("identify", "--request", "1A", "--hex", "1A 00 45 23 01 11 34 12 00 00 4A")
         self.assert_good(result)
         self.assertIn("go on with: absenc decode tformat --request", result.stdout)
 
-    def test_options_are_found(self):
+    def test_finds_options(self):
         result, found = identify("--hex", "084000efcdab341255277e086000abd57f67")
         self.assertEqual(result.returncode, 0)
         self.assertEqual(found["candidates"][0]["options"]["crc_bit_order"], "msb")
 
-    def test_a_damaged_frame(self):
+    def test_damaged_frame(self):
         result = absenc("identify", "--request", "1A", "--hex", "1A 00 45 23 01 11 34 12 00 00 4B")
         self.assert_failed(result, "no protocol explains")
 
-    def test_a_word_that_only_moves(self):
+    def test_unchecked_word_is_ssi(self):
         moving = [f"{i:012b}" for i in range(100, 108)]
         result, found = identify(*[argument for word in moving for argument in ("--hex", word)])
         self.assertEqual(result.returncode, 0, result.stdout)
         self.assertEqual(found["candidates"][0]["protocol"], "ssi")
-        # Where the turns would stand is no other explanation of a word without turns.
+        # A word without turns must not also be explained by the option that places turns.
         ssi = [one["options"] for one in found["candidates"] if one["protocol"] == "ssi"]
         self.assertEqual({options["multiturn_first"] for options in ssi}, {ssi[0]["multiturn_first"]})
 
-    def test_two_that_explain_a_frame(self):
-        # The same frames are sent by UART and SPI.
+    def test_two_protocols_explain_a_frame(self):
+        # EncoLink sends the same frames by UART and SPI.
         frames = ["0000000d131e00", "0000029c735600", "0000036a439e00", "0000052bd3ec00"]
         arguments = [argument for frame in frames for argument in ("--hex", frame)]
         result, found = identify(*arguments)
@@ -272,7 +272,7 @@ class Frames(Case):
         self.assertEqual({one["protocol"] for one in found["candidates"][:2]}, {"encolink", "encolink-spi"})
         self.assertIn("equally well", absenc("identify", *arguments).stderr)
 
-    def test_what_noise_could_do_as_well(self):
+    def test_reports_that_match_may_be_chance(self):
         self.assert_failed(absenc("identify", "--hex", "0001 0010 0011"), "may be chance", "turn the shaft")
 
 
@@ -287,13 +287,13 @@ class Capture(Case):
         self.assertEqual({name: best["options"][name] for name in wanted}, wanted)
         self.assert_good(absenc(*best["command"].split()[1:]))
 
-    def test_of_a_line(self):
+    def test_line(self):
         self.check("tformat?model=23-bit&motion=rpm=60", "line.vcd", "tformat", {"singleturn_bits": 23})
 
-    def test_options_are_found(self):
+    def test_finds_options(self):
         self.check("esl?crc_bit_order=msb&motion=rpm=60", "line.sr", "esl", {"crc_bit_order": "msb"})
 
-    def test_a_word_with_a_checksum_is_not_one_without(self):
+    def test_word_with_checksum_is_not_ssi(self):
         self.check("biss?model=rotary-19&motion=rpm=60", "words.vcd", "biss", {"singleturn_bits": 19})
 
     def test_random_bytes(self):
@@ -310,7 +310,7 @@ class Capture(Case):
                     result, found = identify(self.file(f"{kind}{size}.txt", text.rstrip() + "\n"))
                     self.assertEqual(result.returncode, 1, result.stdout)
 
-    def test_nothing_in_it(self):
+    def test_capture_without_frames(self):
         path = self.file("bytes.txt", "00 11 22 33 44 55 66 77\n")
         self.assert_failed(absenc("identify", path), "no protocol explains")
 

@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Include lines follow the layers: core <- link <- protocol <- {host, sim, capture} <- client <- serve <- tools; os needs
-core, link. A public header, which is installed, needs public ones only. Folders of client do not include each other in a
-circle."""
+"""Checks that include lines follow the layers: core <- link <- protocol <- {host, sim, capture} <- client <- serve <-
+tools; os needs core and link. A public (installed) header may include public ones only. Folders of client must not
+include each other in a circle."""
 
 import graphlib
 import os
@@ -13,7 +13,7 @@ from pathlib import Path
 
 SOURCE = Path(os.environ.get("ABSENC_SOURCE_DIR", Path(__file__).resolve().parent.parent))
 
-# What a layer may include, itself aside.
+# Layers that a layer may include, besides itself.
 BELOW = {
     "core": set(),
     "link": {"core"},
@@ -32,7 +32,7 @@ FREESTANDING_HEADERS = set(
 )
 # Layers whose headers are all public.
 WHOLLY_PUBLIC = {"core", "link", "protocol", "host", "sim"}
-# Each costs seconds for every file that includes it.
+# Each of these costs seconds of compile time in every file that includes it.
 HEAVY = ("CLI/", "toml++/", "nlohmann/", "microhttpd.h", "sqlite3.h", "mosquitto.h")
 LIGHT = {"nlohmann/json_fwd.hpp"}
 OS_HEADER = re.compile(
@@ -48,7 +48,8 @@ def is_test(path):
 
 
 def unit_of(path):
-    """protocol/tformat/frame.hpp -> tformat; protocol/unit.hpp and what units are made with -> None."""
+    """Returns "tformat" for protocol/tformat/frame.hpp, and None for headers shared by the units, such as
+    protocol/unit.hpp."""
     is_unit = path.parts[:2] == ("absenc", "protocol") and len(path.parts) > 3 and path.parts[2] != "author"
     return path.parts[2] if is_unit else None
 
@@ -60,7 +61,7 @@ def built_on(root, unit):
 
 
 def is_public(path):
-    """What CMakeLists.txt gives to absenc_public."""
+    """Returns whether CMakeLists.txt lists the header in absenc_public."""
     if path.suffix != ".hpp" or path.parts[0] != "absenc" or is_test(path):
         return False
     in_client = path.parts[1] == "client" and len(path.parts) == 3
@@ -68,7 +69,7 @@ def is_public(path):
 
 
 def layer_fault(root, path, target):
-    """Why the file at `path` must not include the project's header `target`, or None."""
+    """Returns the reason why the file at `path` must not include the project's header `target`, or None."""
     layer = path.parts[1] if path.parts[0] == "absenc" else path.parts[0]
     if not (root / target).is_file():
         return "is no path from the repository root"
@@ -90,7 +91,7 @@ def layer_fault(root, path, target):
 
 
 def system_fault(path, header):
-    """Why the file at `path` must not include <header>, or None."""
+    """Returns the reason why the file at `path` must not include <header>, or None."""
     in_absenc = path.parts[0] == "absenc"
     if in_absenc and path.parts[1] in FREESTANDING and not is_test(path):
         return None if header in FREESTANDING_HEADERS else "is not a freestanding header"
@@ -101,7 +102,7 @@ def system_fault(path, header):
 
 
 def client_circles(root):
-    """Folders of client that include each other, directly or through others: "captures -> identify -> captures"."""
+    """Returns circles of folders in client, direct or indirect, as "captures -> identify -> captures"."""
     client = Path("absenc/client")
     included = {}
     for file in sorted((root / client).rglob("*.[ch]pp")):
@@ -140,13 +141,13 @@ def faults(root):
 
 
 class IncludeDirection(unittest.TestCase):
-    def test_the_sources(self):
+    def test_sources_have_no_fault(self):
         self.assertTrue((SOURCE / "absenc" / "core").is_dir(), SOURCE)
         self.assertEqual(faults(SOURCE), [])
 
 
-class TheCheckItself(unittest.TestCase):
-    """A small tree that is right, and one wrong line at a time added to it."""
+class SelfTest(unittest.TestCase):
+    """Runs the check on a small correct tree, and with one wrong line added at a time."""
 
     GOOD = {
         "absenc/core/bits.hpp": "#include <cstdint>\n",
@@ -185,10 +186,10 @@ class TheCheckItself(unittest.TestCase):
                 file.write_text(text + (line + "\n" if name == path else ""), encoding="utf-8")
             return faults(Path(folder))
 
-    def test_a_good_tree_passes(self):
+    def test_accepts_correct_tree(self):
         self.assertEqual(self.faults_with(None, ""), [])
 
-    def test_each_wrong_line_is_found(self):
+    def test_finds_each_wrong_line(self):
         for path, line in (
             ("absenc/core/bits.hpp", '#include "absenc/link/step.hpp"'),
             ("absenc/core/bits.hpp", "#include <string>"),

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`absenc info` and `absenc alarms` over the real serial path."""
+"""Tests `absenc info` and `absenc alarms` over a pseudo-terminal."""
 import json
 import unittest
 
@@ -8,14 +8,14 @@ from command_support import Case, Emulator, absenc, json_lines
 
 class EncoderCase(Case):
     def encoder(self, *arguments, latency=300, more=""):
-        """The address of an emulator, with patience for a machine that is busy with other tests."""
+        """Returns the address of an emulator, with a latency that a busy machine needs."""
         emulator = Emulator(self.directory, *arguments)
         self.addCleanup(emulator.end)
         return f"tformat:{emulator.path}?latency={latency}{more}"
 
 
 def questions():
-    """What an encoder can be asked without arguments, in the order in which info asks."""
+    """Returns the commands without required arguments, in the order in which info sends them."""
     commands = json_lines(absenc("list", "tformat", "--json").stdout)[0]["commands"]
     free = [command for command in commands if not any(one["required"] for one in command["arguments"])]
     return [command["name"] for verb in ("info", "temperature", "config_get", "read")
@@ -23,7 +23,7 @@ def questions():
 
 
 class Info(EncoderCase):
-    def test_words(self):
+    def test_all_fields_as_text(self):
         result = absenc("info", self.encoder("--singleturn", "74565", "--multiturn", "4660"), "--all")
         self.assert_good(result)
         self.assertEqual(result.stderr, "")
@@ -38,8 +38,8 @@ class Info(EncoderCase):
         places = [result.stdout.index(f"\n{name} ") for name in questions()]
         self.assertEqual(places, sorted(places))
 
-    def test_a_card(self):
-        """Who, what, how, and nothing else: no option at its default, no raw field, no setting."""
+    def test_summary_as_text(self):
+        """The summary has identity, options and state: no option at its default, no raw field, no setting."""
         result = absenc("info", self.encoder("--singleturn", "74565", "--multiturn", "4660"))
         self.assert_good(result)
         for row in [r"^model +TS5700N8500: ", r"^options +all at their defaults$", r"^encoder id +0x11$",
@@ -55,7 +55,7 @@ class Info(EncoderCase):
                 self.assertRegex(card.stdout, r"(?m)^position +\d")
         self.assertRegex(absenc("info", "sim:tformat?singleturn_bits=20").stdout, r"(?m)^options +singleturn_bits=20 ")
 
-    def test_two_channels_are_named_where_they_differ(self):
+    def test_names_channels_only_if_they_differ(self):
         for verb in ("read", "info"):
             well = absenc(verb, "sim:esl")
             self.assertIn("0 turns   both channels ready   no alarms", well.stdout)
@@ -87,13 +87,13 @@ class Info(EncoderCase):
         self.assertIn("turns INVALID (0)   alarms: battery_error\n  battery_error: the battery was below",
                       result.stdout)
 
-    def test_no_model(self):
+    def test_options_without_model(self):
         result = absenc("info", "sim:tformat?singleturn_bits=20", "--json")
         info = json.loads(result.stdout)
         self.assertEqual((info["model"], info["resolution"]["singleturn_bits"]), (None, 20))
         self.assertIn("none with these options", absenc("info", "sim:tformat?singleturn_bits=20").stdout)
 
-    def test_silence(self):
+    def test_timeout_is_reported_once(self):
         address = self.encoder("--fault", "silence=1", latency=1)
         result = absenc("info", address, "--all")
         self.assert_failed(result, "timeout: the encoder did not answer", "Try: ")
@@ -106,15 +106,15 @@ class Info(EncoderCase):
         self.assertEqual(list(answers), questions())
         self.assertEqual({answer["error"] for answer in answers.values()}, {"timeout"})
 
-    def test_what_fails_does_not_stop_the_rest(self):
-        # The encoder id is not the one that was assumed; memory does not carry it.
+    def test_one_failure_does_not_stop_the_rest(self):
+        # The encoder id differs from the option. The reply to a memory request does not contain it.
         result = absenc("info", self.encoder(more="&encoder_id=23"), "--all")
         self.assert_failed(result, "unexpected_reply", "set model=TS5700N8500")
         self.assertRegex(result.stdout, r"(?m)^encoder-id +FAILED +unexpected_reply: ")
         self.assertRegex(result.stdout, r"(?m)^  temperature_c +35 degC ")
         self.assertRegex(result.stdout, r"(?m)^position +FAILED +unexpected_reply: ")
 
-    def test_readings_that_do_not_agree(self):
+    def test_reports_readings_that_disagree(self):
         address = "sim:tformat?motion=file=" + self.file("motion.csv", "0,0\n0.0001,0\n100,600000000\n")
         result = absenc("info", address)
         self.assertRegex(result.stdout, r"position unconfirmed \(\d+\) .*\n  no two readings in a row agree")
@@ -123,7 +123,7 @@ class Info(EncoderCase):
 
 
 class Alarms(EncoderCase):
-    def test_none(self):
+    def test_no_alarms(self):
         address = self.encoder()
         result = absenc("alarms", address)
         self.assert_good(result)
@@ -131,7 +131,7 @@ class Alarms(EncoderCase):
         self.assertEqual(json.loads(absenc("alarms", address, "--json").stdout),
                          {"ok": True, "protocol": "tformat", "alarms": [], "status": []})
 
-    def test_words(self):
+    def test_alarms_as_text(self):
         result = absenc("alarms", self.encoder("--alarm", "over_heat", "--alarm", "battery_alarm"))
         self.assert_good(result)
         self.assertEqual(
@@ -142,9 +142,10 @@ class Alarms(EncoderCase):
             "  battery_alarm: the battery is below 3.1 V. What to do: replace the battery with the encoder switched on; "
             "without a battery set battery=false\n"
             "status:\n"
-            "  alarm: over-heat, multi-turn error, battery error or battery alarm\n")  # "read the alarms" is done
+            # without the advice to read the alarms
+            "  alarm: over-heat, multi-turn error, battery error or battery alarm\n")
 
-    def test_a_status_sends_to_the_alarms_only_where_they_are_not_shown(self):
+    def test_status_refers_to_alarms_only_if_not_shown(self):
         address = self.encoder("--alarm", "over_heat")
         status = json.loads(absenc("alarms", address, "--json").stdout)["status"]
         self.assertEqual([(flag["name"], flag["action"]) for flag in status], [("alarm", "")])
@@ -154,7 +155,7 @@ class Alarms(EncoderCase):
         self.assertIn("let it cool, then `absenc clear-alarms`", both.stdout)
         self.assertNotIn("`absenc alarms`", both.stdout)
 
-    def test_an_encoder_id_is_shown_as_documents_name_it(self):
+    def test_encoder_id_is_hexadecimal(self):
         address = self.encoder()
         for shown in (absenc("run", address, "encoder-id"), absenc("info", address, "--all")):
             self.assertRegex(shown.stdout, r"encoder_id +0x11 ")
@@ -174,7 +175,7 @@ class Alarms(EncoderCase):
                 self.assert_good(result)
                 self.assertEqual(json.loads(result.stdout)["alarms"], [flag])
 
-    def test_silence(self):
+    def test_timeout(self):
         address = self.encoder("--fault", "silence=1", latency=1)
         result = absenc("alarms", address)
         self.assert_failed(result, "timeout: the encoder did not answer", "sent 1A to ", "Try: ")

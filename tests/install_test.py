@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What is installed and packaged: all is there and nothing else, it works from another place, others can use it."""
+"""Tests the installation and the packages: they are complete, contain nothing else, work from another folder, and other
+projects can use them."""
 import gzip
 import json
 import os
@@ -18,8 +19,8 @@ BUILD = Path(os.environ["ABSENC"]).parent.parent
 VERSION = re.search(r"^project\(absenc VERSION ([\d.]+)", (SOURCE / "CMakeLists.txt").read_text(), re.MULTILINE)[1]
 
 BY_NAME = SOURCE / "examples/read_by_name.cpp"
-BY_NAME_SAYS = r"^(0\.0000 degrees\n)+0\.0 rpm, within \d"  # the speed as soon as its window is long enough
-# As firmware would use it: a conversation with a virtual encoder that stands at 7 turns and a quarter.
+BY_NAME_SAYS = r"^(0\.0000 degrees\n)+0\.0 rpm, within \d"  # the speed appears as soon as its window is long enough
+# A firmware-like program: a conversation with a virtual encoder at 7.25 turns.
 FIRMWARE = """
 #include <cstdint>
 #include <cstdio>
@@ -48,7 +49,8 @@ int main() {
 """
 FIRMWARE_SAYS = "90.0000 degrees, 7 turns\n"
 
-# Whatever ends a call is a std::exception, as the examples catch it; each line is printed behind such a catch.
+# Every error of the library must be a std::exception, which the examples catch. Each line is printed after such a
+# catch.
 ENDINGS = r"""
 #include <cstdio>
 #include <chrono>
@@ -142,7 +144,7 @@ if((ABSENC_CLIENT AND NOT TARGET absenc::client) OR (NOT ABSENC_CLIENT AND TARGE
   message(FATAL_ERROR "ABSENC_CLIENT is not what decides")
 endif()
 """
-# What bash does at the tab key; `compopt` works only there.
+# Emulates bash at the tab key, outside of which `compopt` does not work.
 COMPLETE = r"""
 source "$1"
 shift
@@ -168,13 +170,13 @@ def files_below(folder):
 
 
 def pkg_config(root, *arguments):
-    """What pkg-config answers of the tree at `root`."""
+    """Returns pkg-config's output for the tree at `root`."""
     [pc] = root.rglob("absenc.pc")
     return run("pkg-config", *arguments, env={**os.environ, "PKG_CONFIG_PATH": str(pc.parent)}).split()
 
 
 def public_headers():
-    """Where they are installed."""
+    """Returns the paths at which the public headers are installed."""
     patterns = [f"{layer}/**/*.hpp" for layer in ("core", "link", "protocol", "host", "sim")]
     patterns += ["client/*.hpp", "os/error.hpp"]
     sources = [path for pattern in patterns for path in (SOURCE / "absenc").glob(pattern)]
@@ -182,14 +184,14 @@ def public_headers():
 
 
 def verbs():
-    """Each verb with its help."""
+    """Returns the help text of each verb."""
     listed = re.findall(r"^  (\S+(?: \S+)?)  ", absenc("--help").stdout.split("\nVerbs:\n")[1].split("\nAn ")[0],
                         re.MULTILINE)
     return {verb: absenc(*verb.split(), "--help").stdout for verb in listed}
 
 
 class Case(unittest.TestCase):
-    """The tree as it was installed, in another place than where it was installed to."""
+    """Installs the tree and moves it to another folder."""
 
     @classmethod
     def setUpClass(cls):
@@ -200,7 +202,7 @@ class Case(unittest.TestCase):
 
 
 class Installed(Case):
-    def test_all_and_nothing_else(self):
+    def test_installs_all_files_and_no_others(self):
         files = files_below(self.root)
         headers = {path for path in files if path.startswith("include/")}
         package = "lib/python3/dist-packages/absenc/"
@@ -218,25 +220,26 @@ class Installed(Case):
             "share/doc/absenc/mqtt-schema.json", "share/doc/absenc/grafana-dashboard.json", "lib/absenc.service"})
         self.assertEqual(headers, public_headers())
 
-    def test_headers_need_only_installed_ones(self):
+    def test_headers_include_only_installed_ones(self):
         for header in (self.root / "include").rglob("*.hpp"):
             text = header.read_text()
             for included in re.findall(r"^#include <(.+)>", text, re.MULTILINE):
-                self.assertRegex(included, r"^(\w+|bits/chrono\.h)$", header)  # of C++: no other library, no operating system
+                # C++ headers only: no other library, no operating system
+                self.assertRegex(included, r"^(\w+|bits/chrono\.h)$", header)
             for included in re.findall(r'^#include "(.+)"', text, re.MULTILINE):
                 self.assertTrue((self.root / "include" / included).is_file(), f"{header}: {included}")
 
-    def test_no_file_knows_where_it_was_made(self):
+    def test_no_file_contains_build_paths(self):
         for path in files_below(self.root):
             content = (self.root / path).read_bytes()
             for place in (BUILD, SOURCE, self.folder / "first"):
                 self.assertNotIn(str(place).encode() + b"/", content, path)
 
-    def test_the_command(self):
+    def test_command_runs(self):
         self.assertEqual(run(self.root / "bin/absenc", "--version"), f"absenc {VERSION}\n")
         self.assertIn("0 turns", run(self.root / "bin/absenc", "read", "sim:tformat"))
 
-    def test_a_project_that_finds_the_package(self):
+    def test_cmake_project_finds_package(self):
         project = self.folder / "project"
         project.mkdir()
         (project / "CMakeLists.txt").write_text(PROJECT)
@@ -247,12 +250,12 @@ class Installed(Case):
         self.assertEqual(run(project / "build/firmware"), FIRMWARE_SAYS)
 
     def program(self, name, source, library):
-        """Compiled and linked with what pkg-config says of `library`."""
+        """Compiles and links a program with the flags of pkg-config for `library`."""
         run("g++", "-std=c++20", "-O0", source, *pkg_config(self.root, "--cflags", "--libs", library), "-o",
             self.folder / name)
         return self.folder / name
 
-    def test_programs_with_pkg_config(self):
+    def test_programs_build_with_pkg_config(self):
         firmware = self.folder / "firmware.cpp"
         firmware.write_text(FIRMWARE)
         self.assertRegex(run(self.program("by_name", BY_NAME, "absenc-client"), "sim:tformat"), BY_NAME_SAYS)
@@ -265,7 +268,7 @@ class Installed(Case):
         self.assertEqual({flag for flag in pkg_config(self.root, "--libs", "absenc") if flag.startswith("-l")},
                          {"-labsenc"})
 
-    def test_a_parent_project_installs_nothing_of_it(self):
+    def test_parent_project_installs_nothing_of_it(self):
         parent = self.folder / "parent"
         parent.mkdir()
         (parent / "CMakeLists.txt").write_text(PARENT)
@@ -283,20 +286,20 @@ class ManPage(Case):
         cls.path = cls.root / "share/man/man1/absenc.1"
 
     def shown(self, *options):
-        """As `man` shows it; its warnings go to standard error."""
+        """Returns the page as shown by `man`, with warnings on standard error."""
         environment = {**os.environ, "LC_ALL": "C.UTF-8", "MANWIDTH": "1000", "MANROFFOPT": "", "MANOPT": ""}
         return subprocess.run(["man", "-l", *options, self.path], stdin=subprocess.DEVNULL, capture_output=True,
                               text=True, timeout=60, check=True, env=environment)
 
-    def test_has_no_warning(self):
+    def test_has_no_warnings(self):
         self.assertEqual(self.shown("--warnings=w").stderr, "")
         done = subprocess.run(["groff", "-man", "-ww", "-z", self.path], capture_output=True, text=True, timeout=60)
         self.assertEqual((done.returncode, done.stdout, done.stderr), (0, "", ""))
 
-    def test_can_be_found_by_its_name(self):
+    def test_is_found_by_name(self):
         self.assertIn('"absenc - ', run("lexgrog", self.path))
 
-    def test_says_what_help_says(self):
+    def test_agrees_with_help(self):
         shown = [line.strip() for line in self.shown().stdout.splitlines()]
         helps = verbs()
         self.assertGreater(len(helps), 20)
@@ -310,7 +313,7 @@ class ManPage(Case):
                 for example in re.findall(r"^  (absenc .+)$", text, re.MULTILINE):
                     self.assertIn(example, shown)
 
-    def test_has_the_usual_sections(self):
+    def test_has_standard_sections(self):
         sections = [line for line in self.shown().stdout.splitlines() if re.match(r"[A-Z]", line)][1:]
         self.assertEqual(sections, ["NAME", "SYNOPSIS", "DESCRIPTION", "ENCODERS", "VERBS", "EXAMPLES", "FILES",
                                     "ENVIRONMENT", "EXIT STATUS"])
@@ -321,11 +324,11 @@ class Completion(Case):
         script = self.root / "share/bash-completion/completions/absenc"
         return run("bash", "-u", "-c", COMPLETE, "bash", script, *words).splitlines()
 
-    def test_is_bound_to_the_command(self):
+    def test_is_bound_to_command(self):
         script = self.root / "share/bash-completion/completions/absenc"
         self.assertIn("-F _absenc absenc", run("bash", "-c", 'source "$1"; complete -p absenc', "bash", script))
 
-    def test_verbs_and_their_options(self):
+    def test_completes_verbs_and_options(self):
         offered = self.complete("")
         for verb, text in verbs().items():
             with self.subTest(verb):
@@ -334,13 +337,13 @@ class Completion(Case):
                 self.assertEqual(set(self.complete(*verb.split(), "--")), options)
         self.assertEqual(self.complete("temp"), ["temperature"])
 
-    def test_values_of_an_option(self):
+    def test_completes_values_of_options(self):
         self.assertEqual(self.complete("emulate", "tformat", "--power-on", ""), ["real", "skip"])
         self.assertEqual(self.complete("emulate", "--power-on", "=", "s"), ["skip"])
         self.assertEqual(self.complete("emulate", "--seed", ""), [])
         self.assertEqual(self.complete("emulate", "--seed", "5", "tf"), ["tformat"])
 
-    def test_protocols(self):
+    def test_completes_protocols(self):
         listed = set(re.findall(r"^([a-z]\S+) ", absenc("list").stdout, re.MULTILINE))
         units = [json.loads(line) for line in absenc("list", "--json").stdout.splitlines()]
         known = {name for unit in units for name in [*unit["known_as"], *(model["name"] for model in unit["models"])]}
@@ -350,7 +353,7 @@ class Completion(Case):
         self.assertEqual(set(self.complete("read", "")), {f"{id}:" for id in listed} | {f"sim:{id}" for id in listed})
         self.assertEqual(set(self.complete("read", "sim", ":")), listed)
 
-    def test_encoders(self):
+    def test_completes_encoders(self):
         self.assertEqual(self.complete("read", "--json", "tf"), ["compopt -o nospace", "tformat:"])
         self.assertEqual(self.complete("read", "sim", ":", "tf"), ["tformat"])
         self.assertEqual(self.complete("read", '"sim:tf'), ["sim:tformat"])
@@ -363,7 +366,7 @@ class Completion(Case):
         self.assertEqual(self.complete("zero", f"'tformat:{self.folder}/tt")[-1], f"tformat:{self.folder}/tty one")
         self.assertEqual(self.complete("zero", "tformat", ":", f"{self.folder}/tty", "tf"), [])
 
-    def test_files(self):
+    def test_completes_files(self):
         (self.folder / "memory.txt").touch()
         self.assertEqual(self.complete("emulate", "tformat", "--memory", f"{self.folder}/mem"),
                          ["compopt -o filenames", f"{self.folder}/memory.txt"])
@@ -388,7 +391,7 @@ class Packages(unittest.TestCase):
     def depends(self, package):
         return set(re.findall(r"[a-z0-9.+-]+(?= \(|,|$)", self.field(package, "Depends")))
 
-    def test_are_three_and_say_what_they_are(self):
+    def test_there_are_three_with_metadata(self):
         sections = {"absenc": "electronics", "libabsenc-dev": "libdevel", "python3-absenc": "python"}
         self.assertEqual(set(self.packages), set(sections))
         for name, section in sections.items():
@@ -401,12 +404,12 @@ class Packages(unittest.TestCase):
                 self.assertRegex(self.field(name, "Description"), r"\A[A-Z].+[^.]\n .+")
         self.assertEqual(len({self.field(name, "Description").splitlines()[0] for name in self.packages}), 3)
 
-    def test_the_command_needs_nothing_to_develop_with(self):
+    def test_command_needs_no_development_packages(self):
         for library in ("libc6", "libstdc++6", "libfmt"):
             self.assertIn(library, self.field("absenc", "Depends"))
         self.assertEqual({name for name in self.depends("absenc") if name.endswith("-dev")}, set())
 
-    def test_the_library_needs_what_is_linked(self):
+    def test_library_depends_on_linked_libraries(self):
         linked = [flag[2:] for flag in pkg_config(self.development, "--libs", "absenc-client")
                   if flag.startswith("-l") and not flag.startswith("-labsenc")]
         self.assertGreater(len(linked), 3)
@@ -414,7 +417,7 @@ class Packages(unittest.TestCase):
         owners = {run("dpkg", "-S", file).split(":")[0] for file in files}
         self.assertEqual(self.depends("libabsenc-dev"), owners)
 
-    def test_hold_what_is_installed_once(self):
+    def test_each_installed_file_is_in_one_package(self):
         run("cmake", "--install", BUILD, "--prefix", self.folder / "installed")
         installed = files_below(self.folder / "installed") - {"share/doc/absenc/LICENSE", "share/man/man1/absenc.1"}
         added = {"share/doc/absenc/copyright", "share/man/man1/absenc.1.gz", "share/doc/libabsenc-dev/copyright",
@@ -431,24 +434,24 @@ class Packages(unittest.TestCase):
         for name, held in (("absenc", command), ("libabsenc-dev", development), ("python3-absenc", python)):
             self.assertEqual(files_below(self.folder / name), {"usr/" + path for path in held})
 
-    def test_belong_to_root_and_may_be_read_by_all(self):
+    def test_files_belong_to_root_and_are_readable(self):
         for package in self.packages.values():
             for line in run("dpkg-deb", "-c", package).splitlines():
                 mode = "-rwxr-xr-x" if line.endswith("bin/absenc") else "-rw-r--r--"
                 mode = "drwxr-xr-x" if line.endswith("/") else mode
                 self.assertTrue(line.startswith(f"{mode} root/root "), line)
 
-    def test_the_unpacked_command(self):
+    def test_unpacked_command_runs(self):
         self.assertIn("turns", run(self.command / "bin/absenc", "read", "sim:tformat"))
 
-    def test_the_unpacked_module(self):
+    def test_unpacked_module_runs(self):
         for package in ("libc6", "libfmt", "python3", "python3-numpy"):
             self.assertIn(package, self.field("python3-absenc", "Depends"))
         modules = self.python / "lib/python3/dist-packages"
         run("env", f"PYTHONPATH={modules}", "/usr/bin/python3", "-B", "-c",
             "import absenc; assert absenc.open('sim:tformat').read().valid")
 
-    def test_the_unpacked_documents(self):
+    def test_unpacked_documents_are_complete(self):
         made = self.command / "share"
         self.assertEqual(gzip.decompress((made / "man/man1/absenc.1.gz").read_bytes()),
                          (BUILD / "manual/absenc.1").read_bytes())

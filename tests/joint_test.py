@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Angles of joint and motor as the command, its recordings and `serve` show them."""
+"""Tests the angles of joint and motor in the output of the command, in recordings and in `serve`."""
 import csv
 import json
 import os
@@ -18,7 +18,7 @@ def joint_of(position):
     return -(360 * position / TURN - 10) / (50 / 3)
 
 
-class Shown(EncoderCase):
+class Command(EncoderCase):
     def test_read(self):
         address = self.encoder("--singleturn", "32768", "--multiturn", "3", more="&" + SETTINGS)
         result = absenc("read", address)
@@ -45,7 +45,7 @@ class Shown(EncoderCase):
                 self.assertTrue(row["joint_speed_uncertainty_rpm"])
         self.assertGreater(int(rows[-1]["position"]) - int(rows[0]["position"]), 3 * TURN)
 
-    def test_settings_of_the_file(self):
+    def test_settings_in_configuration_file(self):
         with open(os.path.join(self.directory, "absenc.toml"), "w", encoding="utf-8") as file:
             file.write('[encoder.elbow]\nprotocol = "tformat"\nport = "sim"\ngear = 100\ndirection = -1\noffset_deg = 12.5\n'
                        'pole_pairs = 4\n[encoder.wrist]\nprotocol = "tformat"\nport = "sim"\ngear = 0\n')
@@ -57,8 +57,8 @@ class Shown(EncoderCase):
         self.assertIn('gear is "0", but must be a number above 0', wrist.stderr)
 
 
-class Served(ServeCase):
-    def test_values(self):
+class Serve(ServeCase):
+    def test_json(self):
         name = f"sim:tformat?singleturn=32768&multiturn=3&{SETTINGS}"
         server = self.without_history(name, "sim:tformat")
         wait_until(lambda: server.json(of(name))["state"] == "live", "it is read")

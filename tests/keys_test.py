@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""One quantity has one name: in JSON, CSV, recordings of each format, and samples of Python."""
+"""Tests that each quantity has the same name in JSON, CSV, recordings of each format, and samples in Python."""
 import csv
 import json
 import os
@@ -11,9 +11,9 @@ from command_support import Case, absenc, json_lines
 from python_support import PACKAGE
 
 sys.path.insert(0, str(PACKAGE))
-import absenc as library  # noqa: E402 - from the build, not from the system
+import absenc as library  # noqa: E402 - the module of this build, not of the system
 
-# Columns of a recording that describe the row, not the encoder.
+# Columns of a recording that describe its row, not the encoder.
 ONLY_IN_ROWS = {"event", "missed"}
 # Keys that describe the line of JSON, not the encoder.
 ONLY_IN_JSON = {"protocol", "ok", "event"}
@@ -30,7 +30,7 @@ class Keys(Case):
         self.assertEqual(result.returncode, 0, result.stderr)
         return path
 
-    def test_words_of_every_protocol(self):
+    def test_names_agree_for_every_protocol(self):
         protocols = [one["protocol"] for one in json_lines(absenc("list", "--json").stdout)]
         self.assertGreater(len(protocols), 10)
         for protocol in protocols:
@@ -43,10 +43,10 @@ class Keys(Case):
         shown = header(absenc("read", encoder, "--count", "1", "--csv").stdout)
         with open(self.recorded(encoder, "csv"), encoding="utf-8") as file:
             columns = header(file.read())
-        # A recording has what read shows, in the same order, and speed and losses behind it.
+        # A recording has the columns of `read` in the same order, then speed and lost readings.
         self.assertEqual([name for name in columns if name in shown], shown)
         with open(self.recorded(encoder, "jsonl"), encoding="utf-8") as file:
-            rows = [row for row in map(json.loads, file) if row.get("ok")]  # the others say what happened
+            rows = [row for row in map(json.loads, file) if row.get("ok")]  # the other rows describe events
         self.assertEqual(len(rows), 3)
         computed = set(columns) - set(shown) - ONLY_IN_ROWS
         for row in rows:
@@ -54,7 +54,7 @@ class Keys(Case):
         for suffix in ("csv", "jsonl", "h5"):
             self.assertEqual(list(library.load(self.recorded(encoder, suffix)).keys()), columns, suffix)
 
-        # In Python a sample has what is computed from readings, and its reading what was on the wire. Flags and alarms are
+        # In Python, a sample has the computed values, and its reading has the transmitted ones. Flags and alarms are
         # lists there, which name their channel.
         with library.open(encoder) as opened:
             sample = next(iter(opened.samples(rate=200)))

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Late replies, end to end: between the command and a virtual encoder stands a way that holds replies up. Whatever is
-shown belongs to the last request that had been sent when it came. On pseudo-terminals and over TCP."""
+"""Tests late replies end to end, on pseudo-terminals and over TCP. A relay between the command and a virtual encoder
+delays replies. Every reported position must belong to the last request that was sent before its reply arrived."""
 import json
 import os
 import re
@@ -14,7 +14,7 @@ import unittest
 
 from command_support import Emulator, absenc, end
 
-ENCODERS = {  # what the command says of an encoder that turns, and the length of the request and reply of a position
+ENCODERS = {  # address and options of a turning encoder, length of the request and of the reply of a position
     "tformat": ("tformat", "", 1, 11),
     "esl": ("esl", "", 2, 18),
     "e201": ("e201", "", 1, 17),
@@ -23,26 +23,26 @@ ENCODERS = {  # what the command says of an encoder that turns, and the length o
 }
 
 
-class Way(threading.Thread):
-    """Passes bytes between a host and an encoder, the replies late: `delay(n)` seconds for the n-th. Keeps the order."""
+class DelayingRelay(threading.Thread):
+    """Forwards bytes between a host and an encoder in order. The n-th reply is delayed by `delay(n)` seconds."""
 
     def __init__(self, host, encoder, delay):
         super().__init__(daemon=True)
         self.host, self.encoder, self.delay = host, encoder, delay
-        self.requests = 0  # bursts of the host so far
-        self.passed = []   # (burst of the host it answers, bursts of the host when it was passed on, bytes)
-        self.held = []     # (time to pass on, burst, bytes)
+        self.requests = 0  # bursts received from the host so far
+        self.forwarded = []  # (burst that the reply answers, bursts received when it was forwarded, bytes)
+        self.delayed = []  # (time at which to forward, burst, bytes)
         self.replies = 0
         self.stop, self.wake = os.pipe()
 
     def run(self):
         while True:
             now = time.monotonic()
-            while self.held and self.held[0][0] <= now:
-                _, burst, data = self.held.pop(0)
-                self.passed.append((burst, self.requests, data))
+            while self.delayed and self.delayed[0][0] <= now:
+                _, burst, data = self.delayed.pop(0)
+                self.forwarded.append((burst, self.requests, data))
                 os.write(self.host, data)
-            limit = max(0, self.held[0][0] - now) if self.held else None
+            limit = max(0, self.delayed[0][0] - now) if self.delayed else None
             ready = select.select([self.host, self.encoder, self.stop], [], [], limit)[0]
             if self.stop in ready:
                 return
@@ -50,12 +50,12 @@ class Way(threading.Thread):
                 data = os.read(self.encoder, 4096)
                 at = time.monotonic() + self.delay(self.replies)
                 self.replies += 1
-                last = self.held[-1][0] if self.held else 0
-                self.held.append((max(at, last), self.requests, data))
+                last = self.delayed[-1][0] if self.delayed else 0
+                self.delayed.append((max(at, last), self.requests, data))
             if self.host in ready:
                 try:
                     data = os.read(self.host, 4096)
-                except OSError:  # a pseudo-terminal whose host has closed it
+                except OSError:  # a pseudo-terminal that the host has closed
                     time.sleep(0.001)
                     continue
                 if not data:
@@ -63,9 +63,9 @@ class Way(threading.Thread):
                 self.requests += 1
                 os.write(self.encoder, data)
 
-    def fresh(self):
-        """The replies that came before the host had asked for anything else."""
-        return [data for burst, asked, data in self.passed if burst == asked]
+    def replies_in_time(self):
+        """Returns the replies that were forwarded before the host sent another request."""
+        return [data for burst, asked, data in self.forwarded if burst == asked]
 
     def end(self):
         os.write(self.wake, b".")
@@ -82,8 +82,8 @@ class LateReplyTest(unittest.TestCase):
         self.directory = tempfile.TemporaryDirectory(prefix="absenc.")
         self.addCleanup(self.directory.cleanup)
 
-    def pty_way(self, encoder, delay):
-        """An emulator behind a way, and the path of the host's end."""
+    def pty_relay(self, encoder, delay):
+        """Returns a relay to a new emulator, and the path of the host's end."""
         unit, _, _, _ = ENCODERS[encoder]
         options = [f"--option={option}" for option in ENCODERS[encoder][1].lstrip("?").split("&") if option]
         self.emulators = getattr(self, "emulators", 0) + 1
@@ -94,21 +94,21 @@ class LateReplyTest(unittest.TestCase):
         raw(slave)
         path = os.ttyname(slave)
         far = raw(os.open(emulator.path, os.O_RDWR | os.O_NOCTTY))
-        way = Way(master, far, delay)
-        way.start()
+        relay = DelayingRelay(master, far, delay)
+        relay.start()
         self.addCleanup(lambda: [os.close(descriptor) for descriptor in (master, slave, far)])
-        self.addCleanup(way.end)
-        return way, f"{encoder}:{path}{ENCODERS[encoder][1]}"
+        self.addCleanup(relay.end)
+        return relay, f"{encoder}:{path}{ENCODERS[encoder][1]}"
 
-    def tcp_way(self, encoder, delay):
-        way, _ = self.pty_way(encoder, delay)
+    def tcp_relay(self, encoder, delay):
+        relay, _ = self.pty_relay(encoder, delay)
         server = socket.create_server(("127.0.0.1", 0))
         self.addCleanup(server.close)
 
         def serve():
             connection, _ = server.accept()
-            way.end()
-            over_tcp = Way(connection.fileno(), way.encoder, delay)
+            relay.end()
+            over_tcp = DelayingRelay(connection.fileno(), relay.encoder, delay)
             self.over_tcp = over_tcp
             with connection:
                 over_tcp.run()
@@ -117,7 +117,7 @@ class LateReplyTest(unittest.TestCase):
         return f"{encoder}:tcp:127.0.0.1:{server.getsockname()[1]}{ENCODERS[encoder][1]}"
 
     def positions_in(self, encoder, replies):
-        """What the library makes of these replies, read alone."""
+        """Returns the positions that the library decodes from these replies, each decoded alone."""
         unit, options, _, _ = ENCODERS[encoder]
         request = {"tformat": "1A", "esl": None, "e201": "34", "raa38": "BC AA B1", "raa38-modbus": None}[encoder]
         found = set()
@@ -132,53 +132,54 @@ class LateReplyTest(unittest.TestCase):
                 found.add(row["fields"].get("singleturn", row["fields"].get("position")))
         return found
 
-    def check(self, encoder, way, rows):
+    def check(self, encoder, relay, rows):
         shown = [row["singleturn"] for row in rows if row.get("ok", True) and row.get("singleturn") is not None]
-        fresh = self.positions_in(encoder, way.fresh())
-        stale = [position for position in shown if position not in fresh]
+        replies_in_time = self.positions_in(encoder, relay.replies_in_time())
+        stale = [position for position in shown if position not in replies_in_time]
         self.assertEqual(stale, [], f"{len(stale)} of {len(shown)} positions are older than their request")
         return len(shown)
 
     def test_one_late_reply(self):
-        """One reply 60 ms late: the hiccup that made each later reading the one before."""
+        """One reply is 60 ms late. Without protection, each later reading would then show the previous position."""
         for encoder in ENCODERS:
             with self.subTest(encoder):
-                way, address = self.pty_way(encoder, lambda n: 0.06 if n == 6 else 0)
+                relay, address = self.pty_relay(encoder, lambda n: 0.06 if n == 6 else 0)
                 done = absenc("read", address, "--count", "20", "--rate", "50", "--json")
                 rows = [json.loads(line) for line in done.stdout.splitlines()]
-                self.assertGreater(self.check(encoder, way, rows), 10)
+                self.assertGreater(self.check(encoder, relay, rows), 10)
 
-    def test_constant_lateness(self):
-        """Each reply is later than its limit: an error that says so and what to do, not positions."""
+    def test_all_replies_late(self):
+        """Every reply arrives after its timeout. The command must report an error with advice, and no position."""
         for encoder in ("tformat", "esl", "e201"):
             with self.subTest(encoder):
-                way, address = self.pty_way(encoder, lambda n: 0.25)
+                relay, address = self.pty_relay(encoder, lambda n: 0.25)
                 done = absenc("read", address, "--count", "3", "--json")
                 rows = [json.loads(line) for line in done.stdout.splitlines()]
-                self.check(encoder, way, rows)
+                self.check(encoder, relay, rows)
                 self.assertEqual(done.returncode, 1, done.stdout)
                 self.assertIn("latency=", rows[-1]["advice"], rows)
-                # And it helps.
-                told = re.search(r"latency=(\d+)", rows[-1]["advice"]).group(1)
+                # The advised latency must work.
+                latency = re.search(r"latency=(\d+)", rows[-1]["advice"]).group(1)
                 joined = "&" if "?" in address else "?"
-                done = absenc("read", f"{address}{joined}latency={told}", "--count", "3", "--json")
+                done = absenc("read", f"{address}{joined}latency={latency}", "--count", "3", "--json")
                 self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
 
     def test_record_and_bench(self):
         for encoder in ("tformat", "raa38"):
             with self.subTest(encoder):
-                way, address = self.pty_way(encoder, lambda n: 0.1 if n % 7 == 5 else 0)
+                relay, address = self.pty_relay(encoder, lambda n: 0.1 if n % 7 == 5 else 0)
                 path = os.path.join(self.directory.name, f"{encoder}.jsonl")
                 done = absenc("record", address, "--rate", "100", "--for", "1", "--output", path)
                 self.assertIn(done.returncode, (0, 1), done.stderr)
                 with open(path, encoding="utf-8") as file:
                     rows = [json.loads(line) for line in file]
-                self.assertGreater(self.check(encoder, way, rows), 0)
+                self.assertGreater(self.check(encoder, relay, rows), 0)
 
     def test_over_tcp(self):
         for encoder in ("tformat", "e201"):
             with self.subTest(encoder):
-                address = self.tcp_way(encoder, lambda n: 0.6)  # a network is given 250 ms, E201 50 ms more
+                # the timeout over a network is 250 ms, for E201 50 ms more
+                address = self.tcp_relay(encoder, lambda n: 0.6)
                 done = absenc("read", address, "--count", "5", "--rate", "10", "--json")
                 rows = [json.loads(line) for line in done.stdout.splitlines()]
                 self.check(encoder, self.over_tcp, rows)

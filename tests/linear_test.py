@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Linear encoders have millimetres where others have degrees: read, info, record and monitor."""
+"""Tests linear encoders, which have millimetres instead of degrees: read, info, record and monitor."""
 import csv
 import json
 import os
@@ -8,7 +8,7 @@ import unittest
 from command_support import Case, absenc, json_lines
 from monitor_test import Terminal
 
-# 32 bits of 0.05 um: 214748.3648 mm, along which the virtual encoder goes in one revolution.
+# 32 bits of 0.05 um are 214748.3648 mm. The virtual encoder moves that far in one revolution.
 SLOW = "sim:biss?model=linear-32-0.05um&singleturn=1579271"
 FAST = "sim:biss?model=linear-26-1um&motion=rpm=60"
 
@@ -41,7 +41,7 @@ class Reading(Case):
                                  "status,alarms,event")
         self.assertEqual(row.split(",")[1:], ["78.96355", "78963.55", "1579271", "true", "", "", "", "none", ""])
 
-    def test_what_is_not_valid_is_no_number(self):
+    def test_invalid_position_is_no_number(self):
         address = SLOW + "&alarm=error"
         self.assertIn("position INVALID (1579271)", absenc("read", address).stdout)
         reading = json.loads(absenc("read", address, "--json").stdout)
@@ -57,7 +57,7 @@ class Reading(Case):
         self.assertIn("32 bits of 0.05 um", text)
         self.assertIn("78.96355 mm", text)
 
-    def test_a_word_with_a_unit_is_linear(self):
+    def test_word_with_unit_is_linear(self):
         for protocol in ("biss", "ssi", "e201"):
             reading = json.loads(absenc("read", f"sim:{protocol}?word=position:20 error:1&unit_um=0.5&singleturn=30",
                                         "--json").stdout)
@@ -67,13 +67,13 @@ class Reading(Case):
 class Recording(Case):
     def record(self, name, *more):
         path = os.path.join(self.directory, name)
-        # From 0.1 mm downwards: past 0 at once.
+        # Moves down from 0.1 mm, so that the position passes 0 at once.
         self.assert_good(absenc("record", "sim:biss?model=linear-26-1um&motion=rpm=-60&singleturn=100", "--output", path,
                                 "--for", "0.5", *more))
         return path
 
     def assert_motion(self, rows):
-        rows = [row for row in rows if row.get("event") != "gap"]  # of a busy machine
+        rows = [row for row in rows if row.get("event") != "gap"]  # a busy machine may cause gaps
         first = rows[0]
         for row in rows[5:]:
             self.assertAlmostEqual(float(row["speed_mm_s"]), -2**26 / 1000, delta=2)
@@ -113,7 +113,7 @@ class Recording(Case):
 
 
 class SpeedLimit(Case):
-    def test_is_in_millimetres_a_second(self):
+    def test_is_in_mm_per_second(self):
         encoder = "sim:biss?model=linear-26-1um"
         self.assert_good(absenc("read", f"{encoder}&max_mm_s=500"))
         for setting, other in (("&max_rpm=500", "max_mm_s=MM/S"), ("&max_mm_s=0", "max_mm_s")):
@@ -124,8 +124,8 @@ class SpeedLimit(Case):
         self.assertEqual(result.returncode, 2)
         self.assertIn("set max_rpm=RPM", result.stderr)
 
-    def test_a_pause_says_how_to_set_it(self):
-        """A scale of 67 m: nobody knows where a carriage of 1000 m/s was meanwhile."""
+    def test_pause_names_option(self):
+        """On a scale of 67 m the position is ambiguous after a pause, if the carriage moves at up to 1000 m/s."""
         log = os.path.join(self.directory, "pause.csv")
         result = absenc("record", "sim:biss?model=linear-26-1um&max_mm_s=1000000", "--output", log, "--rate", "10", "--for", "0.5")
         self.assertIn("at up to 1000000 mm/s", result.stderr)
@@ -142,14 +142,14 @@ class Monitor(Case):
         self.assertNotIn("speed_rpm", shown)
 
     def test_screen(self):
-        terminal = Terminal(self, "sim:biss?model=linear-26-1um&singleturn=33554432")  # the middle
+        terminal = Terminal(self, "sim:biss?model=linear-26-1um&singleturn=33554432")  # the middle of the scale
         screen = terminal.wait_for(r"live +33554\.43")
         self.assertRegex(screen, r"state +mm +turns +mm/s +a second")
         self.assertIn("33554.432 mm", screen)
         self.assertRegex(screen, r"0 \|-+\+-+O-+\+-+\| 67108\.9 mm")
         terminal.wait_for(r"speed 0\.0+ \+/- 0\.\d+ mm/s, .*; position 33554\.432 mm")
 
-    def test_beside_a_rotary_encoder(self):
+    def test_beside_rotary_encoder(self):
         terminal = Terminal(self, "sim:biss?model=linear-26-1um", "sim:tformat")
         terminal.wait_for(r"deg, mm +turns +rpm, mm/s")
 

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`absenc memory` and `absenc config` over the real serial path, with faults, interruptions and files of all kinds."""
+"""Tests `absenc memory` and `absenc config` over a pseudo-terminal, with faults, interruptions and all kinds of
+files."""
 import json
 import os
 import pty
@@ -18,7 +19,7 @@ EMPTY = {(page, address): 0 for page in range(PAGES) for address in range(ADDRES
 
 
 def crc(text):
-    """CRC-16 as docs/dump-format.md describes it."""
+    """Returns the CRC-16 of docs/dump-format.md."""
     register = 0xFFFF
     for byte in text.encode():
         register ^= byte << 8
@@ -28,7 +29,7 @@ def crc(text):
 
 
 def parse(dump):
-    """The bytes of a dump by page and address; checks the checksum."""
+    """Returns the bytes of a dump by page and address, after checking its checksum."""
     lines = [line for line in dump.splitlines() if line and not line.startswith("#")]
     assert lines.pop() == "checksum: " + crc("".join(line + "\n" for line in lines)), dump
     image = {}
@@ -40,7 +41,7 @@ def parse(dump):
 
 
 def addresses(words):
-    """Those of "page 0 to 2: 0x05 to 0x07, 0x10; page 3: 0x00"."""
+    """Returns the addresses in a text such as "page 0 to 2: 0x05 to 0x07, 0x10; page 3: 0x00"."""
     found = set()
     for part in words.split("; "):
         first, last, ranges = re.fullmatch(r"page (\d+)(?: to (\d+))?: (.*)", part).groups()
@@ -58,11 +59,11 @@ class MemoryCase(Case):
         return emulator
 
     def encoder(self, *arguments, latency=300):
-        """The address of an emulator, with patience for a machine that is busy with other tests."""
+        """Returns the address of an emulator, with a latency that a busy machine needs."""
         return f"tformat:{self.emulator(*arguments).path}?latency={latency}"
 
     def stored(self):
-        """What the emulator has on disk."""
+        """Returns the bytes in the emulator's memory file."""
         with open(self.file("memory"), encoding="ascii") as file:
             lines = file.read().splitlines()[4:]
         data = bytes.fromhex("".join(line.split(": ")[1] for line in lines))
@@ -74,7 +75,7 @@ class MemoryCase(Case):
         return parse(result.stdout)
 
     def partial(self, image):
-        """A dump of these bytes only, as somebody wrote it by hand."""
+        """Writes a dump with only these bytes, as edited by hand, and returns its path."""
         lines = [f"page {page} address {address}: {value:02x}\n" for (page, address), value in image.items()]
         return self.file("partial.dump", HEADER + "".join(lines) + "checksum: edited\n")
 
@@ -92,7 +93,7 @@ class Bytes(MemoryCase):
         answer = json.loads(absenc("memory", "read", address, "14", "--page", "2", "--count", "3", "--json").stdout)
         self.assertEqual(answer, {"ok": True, "page": 2, "address": 14, "data": "414243"})
 
-    def test_only_what_differs_is_written(self):
+    def test_writes_only_changed_bytes(self):
         address = self.encoder()
         self.assert_good(absenc("memory", "write", address, "5", "1", "2", "--yes"))
         result = absenc("memory", "write", address, "5", "1", "3", "--yes", "--json")
@@ -111,11 +112,11 @@ class Bytes(MemoryCase):
         self.assertNotIn("written", result.stdout)
         self.assertEqual(self.dump(address), EMPTY)
 
-    def test_two_areas_in_one_reading(self):
+    def test_reads_across_two_areas(self):
         self.assertEqual(absenc("memory", "read", self.encoder(), "4", "--page", "7", "--count", "2").stdout,
                          "0x04  DA 23  .#\n")
 
-    def test_wrong_usage(self):
+    def test_refuses_wrong_usage(self):
         emulator = self.emulator()
         encoder = f"tformat:{emulator.path}"
         for arguments, words in [(["read", encoder, "127"], ["no page 0 address 0x7F", "page 0 to 5: 0x00 to 0x7E"]),
@@ -144,7 +145,7 @@ class Bytes(MemoryCase):
             self.assertEqual((answer["ok"], answer["error"]), (False, "timeout"))
 
     def ask(self, address, answer):
-        """Writes a byte from a terminal; returns the exit status and what was shown there."""
+        """Writes a byte from a terminal. Returns the exit status and the terminal's text."""
         terminal, ours = pty.openpty()
         process = subprocess.Popen([ABSENC, "memory", "write", address, "5", "0x5A"], stdin=ours,
                                    stdout=subprocess.DEVNULL, stderr=ours)
@@ -174,7 +175,7 @@ class Bytes(MemoryCase):
             self.assertIn(word, shown)
         self.assertEqual(self.dump(address)[0, 5], 0x5A)
 
-    def test_without_standard_output_nothing_is_written(self):
+    def test_writes_nothing_without_standard_output(self):
         emulator = self.emulator()
         result = subprocess.run(["sh", "-c", '"$0" memory write "tformat:$1?latency=300" 5 1 --yes >&-', ABSENC,
                                  emulator.path], capture_output=True, text=True, timeout=PATIENCE, check=False)
@@ -183,7 +184,7 @@ class Bytes(MemoryCase):
 
 
 class Files(MemoryCase):
-    def test_round_trip(self):
+    def test_dump_and_load(self):
         address = self.encoder()
         result = absenc("memory", "dump", address, "--output", self.file("empty.dump"))
         self.assertEqual(result.stdout, f"762 bytes are in {self.file('empty.dump')}\n")
@@ -212,19 +213,19 @@ class Files(MemoryCase):
                          {"ok": True, "same": False, "compared": 2,
                           "differences": [{"page": 1, "address": 2, "encoder": 0, "wanted": 3}]})
 
-    def test_the_emulator_keeps_what_was_loaded(self):
+    def test_loaded_bytes_are_in_memory_file(self):
         emulator = self.emulator()
         wanted = {(page, address): 0x10 * page + address % 16 for page in (0, 5) for address in (7, 8, 99)}
         self.assert_good(absenc("memory", "load", f"tformat:{emulator.path}?latency=300", self.partial(wanted), "--yes"))
         emulator.end()
         self.assertEqual(self.stored(), EMPTY | wanted)
 
-    def test_threshold_in_a_file(self):
+    def test_loads_threshold(self):
         address = self.encoder()
         self.assert_good(absenc("memory", "load", address, self.partial({(7, 4): 0x80 + 70}), "--yes"))
         self.assertIn("70 degC", absenc("config", "get", address).stdout)
 
-    def test_a_dump_that_was_cut_off_is_refused(self):
+    def test_refuses_truncated_dump(self):
         emulator = self.emulator()
         good = absenc("memory", "dump", "sim:tformat").stdout
         for size in (900, good.index("checksum"), good.index("checksum") - 1):
@@ -236,7 +237,7 @@ class Files(MemoryCase):
                     self.assertEqual(result.stdout, "")
         self.assertIn("0 requests answered", emulator.end()[2])
 
-    def test_a_dump_that_was_cut_off_is_taken_by_force(self):
+    def test_force_accepts_truncated_dump(self):
         path = self.file("cut.dump", HEADER + "page 0 address 0x00: 00 00\n")
         for verb in ("load", "verify"):
             result = absenc("memory", verb, "sim:tformat", path, "--force")
@@ -244,7 +245,7 @@ class Files(MemoryCase):
             self.assertIn(f"note: {path} has no checksum", result.stderr)
             self.assertIn("2 bytes of it", result.stderr)
 
-    def test_files_that_are_refused(self):
+    def test_refuses_invalid_files(self):
         emulator = self.emulator()
         good = absenc("memory", "dump", "sim:tformat").stdout
         self.file("memory file", "absenc memory 1\nprotocol: tformat\n")
@@ -268,16 +269,16 @@ class Files(MemoryCase):
                 self.assert_failed(absenc("memory", "load", f"tformat:{emulator.path}", path, "--yes"), path, *words)
         self.assertIn("0 requests answered", emulator.end()[2])
 
-    def test_a_file_that_never_ends_is_refused(self):
+    def test_refuses_endless_file(self):
         for verb in ("load", "verify"):
             self.assert_failed(absenc("memory", verb, "sim:tformat", "/dev/zero"), "/dev/zero", "16 MiB")
 
-    def test_a_dump_is_no_memory_file(self):
+    def test_dump_is_no_memory_file(self):
         path = self.file("some.dump", absenc("memory", "dump", "sim:tformat").stdout)
         result = absenc("emulate", "tformat", "--memory", path, "--for", "60")
         self.assert_failed(result, path, "is a dump", "absenc memory load")
 
-    def test_an_encoder_of_another_model_is_noticed(self):
+    def test_detects_other_model(self):
         emulator = self.emulator("--model", "23-bit")
         for arguments in (["dump"], ["load", self.partial({(0, 0): 1}), "--yes"], ["verify", self.partial({(0, 0): 1})]):
             arguments.insert(1, f"tformat:{emulator.path}?latency=300")
@@ -286,7 +287,7 @@ class Files(MemoryCase):
         emulator.end()
         self.assertEqual(self.stored(), EMPTY)
 
-    def test_output_that_cannot_be_written(self):
+    def test_refuses_unwritable_output(self):
         emulator = self.emulator()
         for path, words in [(self.file("nowhere/dump"), ["no directory"]), (self.directory, ["no regular file"]),
                             ("/dev/null", ["no regular file"])]:
@@ -295,7 +296,7 @@ class Files(MemoryCase):
                 self.assert_failed(result, path, *words)
         self.assertIn("0 requests answered", emulator.end()[2])
 
-    def test_a_failed_dump_leaves_the_old_file(self):
+    def test_failed_dump_keeps_old_file(self):
         path = self.file("old.dump", "old")
         result = absenc("memory", "dump", "sim:tformat?fault=silence=1", "--output", path)
         self.assert_failed(result, "timeout")
@@ -311,17 +312,18 @@ class Files(MemoryCase):
 class Interruptions(MemoryCase):
     wanted = {(page, address): 1 + address for page in (0, 4) for address in range(30)}
 
-    def account(self, err):
-        """What an unfinished load says: the addresses written, unknown and not written, which are all there are."""
-        said = []
+    def progress_of(self, err):
+        """Returns the addresses that an unfinished load reports as written, unknown and not written. Together they must
+        be complete."""
+        listed = []
         for words in ("written and read back", "not known whether written", "not written"):
             found = re.search(rf"^  {words}: (.*)$", err, re.MULTILINE)
-            said.append(addresses(found.group(1)) if found else set())
-        return said
+            listed.append(addresses(found.group(1)) if found else set())
+        return listed
 
-    def assert_as_said(self, err, image):
-        """Whoever was to be written is in exactly one list, and what is in the encoder agrees."""
-        written, unknown, left = self.account(err)
+    def assert_progress_is_true(self, err, image):
+        """Each address must be in exactly one list, and the lists must agree with the encoder's memory."""
+        written, unknown, left = self.progress_of(err)
         self.assertEqual({at for at in written if image[at] != self.wanted[at]}, set(), err)
         self.assertEqual({at for at in left if image[at] == self.wanted[at]}, set(), err)
         self.assertFalse(written & left or written & unknown or unknown & left, err)
@@ -339,7 +341,7 @@ class Interruptions(MemoryCase):
             self.assertLess(time.monotonic(), deadline)
             select.select([], [], [], 0.003)
 
-    def test_interrupted_loads_say_what_they_did_and_go_on(self):
+    def test_interrupted_load_reports_progress_and_can_continue(self):
         address = self.encoder()
         done = set()
         for number in (signal.SIGINT, signal.SIGTERM, signal.SIGINT):
@@ -349,7 +351,7 @@ class Interruptions(MemoryCase):
             status, _, err = end(process, number)
             self.assertEqual(status, 1, err)
             self.assertTrue(err.split("\n")[1] == "absenc: interrupted", err)
-            written, unknown, left = self.assert_as_said(err, self.dump(address))
+            written, unknown, left = self.assert_progress_is_true(err, self.dump(address))
             self.assertEqual(unknown, set())
             self.assertEqual(done | written | left, set(self.wanted), err)
             self.assertTrue(written and left, err)
@@ -361,7 +363,7 @@ class Interruptions(MemoryCase):
         self.assertIn(f"{len(self.wanted) - len(done)} bytes written", result.stdout)
         self.assertEqual(self.dump(address), EMPTY | self.wanted)
 
-    def test_interrupted_before_anything_was_written(self):
+    def test_interrupted_before_first_write(self):
         emulator = self.emulator("--fault", "silence=1")
         process = self.start(f"tformat:{emulator.path}?latency=60000")
         wait_for_handler(process)
@@ -378,7 +380,7 @@ class Interruptions(MemoryCase):
         err = err.decode()
         self.assertEqual(process.returncode, 1)
         self.assertIn("went away", err)
-        written, unknown, left = self.assert_as_said(err, self.stored())
+        written, unknown, left = self.assert_progress_is_true(err, self.stored())
         self.assertEqual(written | unknown | left, set(self.wanted))
         self.assertEqual(len(unknown), 1)
         again = self.encoder()
@@ -392,13 +394,13 @@ class Interruptions(MemoryCase):
         emulator.kill()
         _, err = process.communicate(timeout=PATIENCE)
         self.assertEqual(process.returncode, 1)
-        written, unknown, left = self.account(err.decode())
+        written, unknown, left = self.progress_of(err.decode())
         self.assertEqual(written | unknown | left, set(self.wanted), err)
         again = self.encoder()
         self.assert_good(absenc("memory", "load", again, self.file("partial.dump"), "--yes"))
         self.assertEqual(self.dump(again), EMPTY | self.wanted)
 
-    def test_account_as_json(self):
+    def test_progress_as_json(self):
         emulator = self.emulator()
         process = subprocess.Popen([ABSENC, "memory", "load", f"tformat:{emulator.path}?latency=300",
                                     self.partial(self.wanted), "--yes", "--json"], bufsize=0, stdin=subprocess.DEVNULL,
@@ -411,8 +413,8 @@ class Interruptions(MemoryCase):
         self.assertEqual((answer["ok"], answer["message"], sum(counts)), (False, "interrupted", len(self.wanted)))
         self.assertGreater(counts[0], 0)
 
-    def test_bad_lines(self):
-        """Almost every second reply is damaged: a load may fail, but the same command again comes to the end."""
+    def test_load_over_bad_line(self):
+        """Almost every second reply is damaged. A load may fail, but repeating the command must succeed in the end."""
         emulator = self.emulator("--fault", "corrupt=0.25", "--fault", "drop=0.25", "--seed", "3")
         address = f"tformat:{emulator.path}?latency=30"
         self.wanted = {(2, at): 0xA0 + at for at in range(40, 52)}
@@ -424,7 +426,7 @@ class Interruptions(MemoryCase):
                 break
             failures += 1
             self.assertLess(time.monotonic(), deadline, result.stderr)
-            written, unknown, left = self.account(result.stderr)
+            written, unknown, left = self.progress_of(result.stderr)
             self.assertLessEqual(written | unknown | left, set(self.wanted))
             self.assertFalse(written & left or written & unknown or unknown & left, result.stderr)
         self.assertGreater(failures, 0, "the line was not bad enough to test anything")
@@ -456,8 +458,8 @@ class Config(MemoryCase):
                           "change": "confirmed"})
         self.assertEqual(absenc("memory", "read", address, "4", "--page", "7").stdout, "0x04  00  .\n")
 
-    def test_a_threshold_of_zero_degrees_is_no_setting(self):
-        """As `config set` has it: 1 to 127 degC, or off."""
+    def test_refuses_threshold_of_zero_degrees(self):
+        """`config set` also accepts only 1 to 127 degC or off."""
         address = self.encoder()
         refused = absenc("memory", "write", address, "4", "0x80", "--page", "7", "--yes")
         self.assertEqual(refused.returncode, 1)
@@ -467,7 +469,7 @@ class Config(MemoryCase):
         for byte in ("0x81", "0x00"):
             self.assert_good(absenc("memory", "write", address, "4", byte, "--page", "7", "--yes"))
 
-    def test_wrong_usage(self):
+    def test_refuses_wrong_usage(self):
         emulator = self.emulator()
         encoder = f"tformat:{emulator.path}"
         for arguments, words in [(["get", encoder, "overheat"], ['"overheat"', "did you mean overheat-threshold?"]),

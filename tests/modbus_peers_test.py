@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Modbus RTU against what others wrote: libmodbus as client and as server, and mbpoll, over pseudo-terminals."""
+"""Tests Modbus RTU against independent implementations over pseudo-terminals: libmodbus as client and server, and
+mbpoll."""
 import ctypes
 import errno
 import json
@@ -52,7 +53,7 @@ class Mapping(ctypes.Structure):
 
 
 class Libmodbus:
-    """One end of a line."""
+    """A libmodbus context at one end of a line."""
 
     def __init__(self, path, address, baud=19200):
         self.context = MODBUS.modbus_new_rtu(path.encode(), baud, b"N", 8, 1)
@@ -94,7 +95,7 @@ class PeerCase(Case):
 
 
 class LibmodbusClient(PeerCase):
-    def test_reads_the_position(self):
+    def test_reads_position(self):
         for bits, position in ((10, 1023), (14, 383), (16, 0xFEDC), (17, 0x1FFFF), (21, 0x1FABCD)):
             with self.subTest(bits):
                 emulator = self.emulator("--option", f"bits={bits}", "--singleturn", str(position), name=f"e{bits}")
@@ -106,7 +107,7 @@ class LibmodbusClient(PeerCase):
                 self.assertEqual(high << 16 | low, position)
                 self.assertEqual(self.position(emulator.path, f"&bits={bits}"), position)
 
-    def test_several_on_one_line(self):
+    def test_several_encoders_on_one_line(self):
         emulator = self.emulator("--singleturn", "11", "--also", "address=2&singleturn=22", "--also",
                                  "address=247&singleturn=33")
         for address, position in ((1, 11), (2, 22), (247, 33)):
@@ -114,7 +115,7 @@ class LibmodbusClient(PeerCase):
             self.assertEqual(client.read(0, 1), [position])
             client.close()
 
-    def test_is_refused_in_its_own_words(self):
+    def test_exceptions_have_texts_of_libmodbus(self):
         client = self.client(self.emulator().path)
         write = MODBUS.modbus_write_register
         for words, ask in (("Illegal function", lambda: client.read(0, 1, MODBUS.modbus_read_input_registers)),
@@ -123,14 +124,14 @@ class LibmodbusClient(PeerCase):
                            ("Illegal data address", lambda: client.read(0, 3))):
             with self.assertRaisesRegex(OSError, words):
                 ask()
-        # libmodbus does not send what it knows to be wrong.
+        # libmodbus itself refuses to send this invalid request.
         client.check(MODBUS.modbus_send_raw_request(client.context, bytes([1, 3, 0, 0, 0, 0]), 6))
         reply = ctypes.create_string_buffer(260)
         size = client.check(MODBUS.modbus_receive_confirmation(client.context, reply))
         self.assertEqual(reply.raw[:size - 2], bytes([1, 0x83, 3]), "illegal data value")
         self.assertEqual(client.read(0, 1), [0])
 
-    def test_hears_nothing_at_another_rate_or_address(self):
+    def test_times_out_at_other_rate_or_address(self):
         path = self.emulator().path
         for address, baud in ((1, 9600), (2, 19200)):
             client = Libmodbus(path, address, baud)
@@ -140,7 +141,7 @@ class LibmodbusClient(PeerCase):
             self.assertEqual(raised.exception.errno, errno.ETIMEDOUT)
             client.close()
 
-    def test_follows_what_absenc_has_set(self):
+    def test_uses_address_and_baud_rate_set_by_absenc(self):
         emulator = self.emulator("--singleturn", "500")
         for setting in (("address", "9"), ("baud", "57600")):
             uri = f"raa38-modbus:{emulator.path}?latency=300&address={9 if setting[0] == 'baud' else 1}"
@@ -150,12 +151,12 @@ class LibmodbusClient(PeerCase):
 
 
 class LibmodbusServer:
-    """libmodbus answers on a pseudo-terminal with fixed holding registers."""
+    """A libmodbus server on a pseudo-terminal, with fixed holding registers."""
 
     def __init__(self, registers, address=1):
         self.master, self.slave = os.openpty()
         tty.setraw(self.slave)
-        # libmodbus opens a path: it gets one end of a second pair, and what comes is passed on.
+        # libmodbus opens a path, so it gets one end of a second pseudo-terminal, and a thread forwards the bytes.
         self.inner, self.inner_slave = os.openpty()
         tty.setraw(self.inner_slave)
         self.path = os.ttyname(self.slave)
@@ -204,7 +205,7 @@ class LibmodbusServer:
 
 
 class ReadsLibmodbus(PeerCase):
-    def test_one_register_and_two(self):
+    def test_reads_one_and_two_registers(self):
         with LibmodbusServer([383]) as server:
             self.assertEqual(self.position(server.path), 383)
             self.assertGreaterEqual(server.answered, 2)
@@ -213,8 +214,8 @@ class ReadsLibmodbus(PeerCase):
         with LibmodbusServer([0, 383], address=17) as server:
             self.assertEqual(self.position(server.path, "&registers=2&address=17"), 383)
 
-    def test_replies_whose_last_byte_is_zero(self):
-        """A CRC behind which a 00 comes is a CRC again: the frame would be good without its last byte too."""
+    def test_replies_that_end_with_zero(self):
+        """If the CRC's last byte is 00, the frame also has a valid CRC without that byte."""
         positions = [low for low in range(2048) if crc(bytes([1, 3, 4, 0, 0x10, low >> 8, low & 0xFF])) < 0x100]
         self.assertGreater(len(positions), 3)
         with LibmodbusServer([0x0010, 0]) as server:
@@ -222,12 +223,12 @@ class ReadsLibmodbus(PeerCase):
                 server.registers[1] = low
                 self.assertEqual(self.position(server.path, "&bits=21"), 0x100000 + low)
 
-    def test_is_refused(self):
+    def test_reports_exception(self):
         with LibmodbusServer([]) as server:
             result = absenc("read", f"raa38-modbus:{server.path}?latency=300")
             self.assert_failed(result, "request_rejected", "exception 02, illegal data address", "01 83 02 C0 F1")
 
-    def test_a_position_that_is_none(self):
+    def test_refuses_position_out_of_range(self):
         with LibmodbusServer([0x4000]) as server:
             self.assert_failed(absenc("read", f"raa38-modbus:{server.path}?latency=300"), "out_of_range", "more bits")
 
@@ -237,7 +238,7 @@ class Mbpoll(PeerCase):
         command = ["mbpoll", "-m", "rtu", "-b", "19200", "-P", "none", "-0", "-1", "-o", "5", *arguments, path]
         return subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE, stdin=subprocess.DEVNULL)
 
-    def test_polls_the_position(self):
+    def test_polls_position(self):
         emulator = self.emulator("--singleturn", "383", "--also", "address=5&singleturn=12345")
         for address, position in ((1, 383), (5, 12345)):
             polled = self.mbpoll(emulator.path, "-a", str(address), "-t", "4", "-r", "0", "-c", "1")
@@ -250,7 +251,7 @@ class Mbpoll(PeerCase):
         polled = self.mbpoll(emulator.path, "-a", "1", "-t", "4:hex", "-r", "0", "-c", "2")
         self.assertEqual(re.findall(r"^\[\d\]:\s+(0x\w+)", polled.stdout, re.MULTILINE), ["0x001F", "0xABCD"])
 
-    def test_is_refused(self):
+    def test_reports_exception(self):
         polled = self.mbpoll(self.emulator().path, "-a", "1", "-t", "3", "-r", "0", "-c", "1")
         self.assertIn("Illegal function", polled.stdout + polled.stderr)
 

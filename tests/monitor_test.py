@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`absenc monitor`: its screen in a terminal that tmux drives, and its lines where there is none."""
+"""Tests `absenc monitor`: its screen in a terminal driven by tmux, and its lines without a terminal."""
 import json
 import os
 import re
@@ -15,11 +15,11 @@ KEYS = " q quit  p pause  z zero  c clear  tab next  e errors  h help"
 
 
 class Terminal:
-    """A terminal of tmux with `absenc monitor` in it."""
+    """A tmux terminal that runs `absenc monitor`."""
 
     def __init__(self, case, *arguments, columns=80, rows=24, environment=""):
         self.case = case
-        number = len(os.listdir(case.directory))  # a case may have several
+        number = len(os.listdir(case.directory))  # a test may open several terminals
         self.socket = os.path.join(case.directory, f"tmux-{number}")
         self.status = os.path.join(case.directory, f"status-{number}")
         command = f"env {environment} {shlex.join([ABSENC, 'monitor', *arguments])}; echo $? >{self.status}; read wait"
@@ -40,7 +40,7 @@ class Terminal:
         return self.tmux("capture-pane", "-p", *arguments)
 
     def wait_for(self, pattern, *arguments):
-        """The screen, as soon as it has the pattern."""
+        """Returns the screen as soon as it matches the pattern."""
         deadline = time.monotonic() + PATIENCE
         while time.monotonic() < deadline:
             screen = self.screen(*arguments)
@@ -63,14 +63,14 @@ class Terminal:
 
 class MonitorCase(EncoderCase):
     def assert_screen(self, screen, *patterns):
-        """Line by line; each pattern must match the whole line but for spaces at its end."""
+        """Compares line by line. Each pattern must match the whole line, apart from trailing spaces."""
         lines = [line.rstrip() for line in screen.splitlines()]
         for number, pattern in enumerate(patterns):
             self.assertRegex(lines[number], f"^{pattern}$", f"line {number} of\n{screen}")
 
 
 class Screen(MonitorCase):
-    def test_everything_about_an_encoder(self):
+    def test_details_of_one_encoder(self):
         address = self.encoder("--singleturn", "65536", "--multiturn", "12", "--alarm", "over_heat")
         terminal = Terminal(self, address)
         screen = terminal.wait_for(r"live .* [1-9]\d\.\d +0 !")
@@ -108,10 +108,10 @@ class Screen(MonitorCase):
         terminal.press("Up")
         terminal.wait_for(r"^> tformat:/dev/nothing")
         terminal.press("q")
-        self.assertEqual(terminal.exit_status(), 1)  # one was never read
+        self.assertEqual(terminal.exit_status(), 1)  # one encoder was never read
         self.assertIn("/dev/nothing: 0 readings", terminal.wait_for("of processor time each"))
 
-    def test_zero_asks(self):
+    def test_zero_needs_confirmation(self):
         emulator = self.emulator("--singleturn", "1000")
         terminal = Terminal(self, f"tformat:{emulator.path}?latency=300")
         terminal.wait_for(r"live +2\.747")
@@ -130,7 +130,7 @@ class Screen(MonitorCase):
         self.assertEqual(terminal.exit_status(), 0, screen)
         self.assertEqual(json.loads(absenc("read", f"tformat:{emulator.path}", "--json").stdout)["singleturn"], 0)
 
-    def test_clearing_alarms_asks(self):
+    def test_clear_alarms_needs_confirmation(self):
         emulator = self.emulator("--alarm", "over_speed")
         terminal = Terminal(self, f"tformat:{emulator.path}?latency=300")
         terminal.wait_for("over_speed: ")
@@ -144,7 +144,7 @@ class Screen(MonitorCase):
         terminal.wait_for("clear-alarms: sent and confirmed")
         terminal.wait_for("no alarms")
 
-    def test_an_alarm_whose_cause_is_still_there(self):
+    def test_alarm_with_persistent_cause(self):
         emulator = self.emulator("--condition", "temperature=127")
         terminal = Terminal(self, f"tformat:{emulator.path}?latency=300")
         terminal.wait_for("over_heat: ")
@@ -153,7 +153,7 @@ class Screen(MonitorCase):
         terminal.press("y")
         terminal.wait_for("clear-alarms failed: .*over_heat")
 
-    def test_an_encoder_whose_alarms_cannot_be_cleared(self):
+    def test_encoder_without_clear_command(self):
         terminal = Terminal(self, "sim:ssi")
         terminal.wait_for(" live ")
         terminal.press("c")
@@ -194,7 +194,7 @@ class Screen(MonitorCase):
             terminal.press("q")
             self.assertEqual(terminal.exit_status(), 0)
 
-    def test_an_encoder_that_falls_silent(self):
+    def test_encoder_that_stops_replying(self):
         emulator = self.emulator("--singleturn", "65536")
         terminal = Terminal(self, f"tformat:{emulator.path}?latency=300")
         terminal.wait_for(r"live +180\.000")
@@ -206,7 +206,7 @@ class Screen(MonitorCase):
             emulator.process.send_signal(signal.SIGCONT)
         terminal.wait_for(r"live +180\.000")
 
-    def test_sizes(self):
+    def test_window_sizes(self):
         terminal = Terminal(self, "sim:tformat?alarm=battery_alarm")
         terminal.wait_for(" live ")
         terminal.resize(50, 12)
@@ -218,8 +218,8 @@ class Screen(MonitorCase):
         screen = terminal.wait_for(r"battery_alarm: the battery is below 3\.1 V")
         self.assertEqual(screen.splitlines()[15].rstrip(), KEYS)
 
-    def test_names_that_do_not_fit(self):
-        """What tells encoders apart is shown at every width, and so is the mark of alarms."""
+    def test_long_names_stay_distinguishable(self):
+        """At every width the screen shows the part of the name that differs, and the alarm mark."""
         path = self.emulator_of_two().path
         addresses = [f"esl:{path}?latency=300&address={number}" for number in (0, 3)]
         terminal = Terminal(self, *addresses, columns=64, rows=20)
@@ -238,7 +238,7 @@ class Screen(MonitorCase):
         self.addCleanup(emulator.end)
         return emulator
 
-    def test_fields_that_the_reading_lacks(self):
+    def test_extra_fields_of_reading(self):
         terminal = Terminal(self, "sim:esl?singleturn=0xABCDEF&alarm=multiturn_error")
         screen = terminal.wait_for(r"ch2_alarms multiturn_error")
         self.assertRegex(screen, rf"(?m)^  .*redundant_singleturn {0xABCDEF >> 15} counts")
@@ -246,7 +246,7 @@ class Screen(MonitorCase):
         self.assertNotRegex(screen, r"(?m)^  .*\bsingleturn \d")
         terminal.resize(64, 16)
         screen = terminal.wait_for(rf"\A(.*\n){{15}}{KEYS}")
-        self.assertRegex(screen.splitlines()[14], r"^ +\d+\.\d{3}  ")  # the trace keeps its place
+        self.assertRegex(screen.splitlines()[14], r"^ +\d+\.\d{3}  ")  # the trace keeps its line
         terminal.press("e")
         terminal.wait_for("no exchange has failed")
 
@@ -269,7 +269,7 @@ class Screen(MonitorCase):
                 self.assertIn(KEYS.strip()[:10], screen)
                 terminal.tmux("kill-server")
 
-    def test_interrupt_gives_the_terminal_back(self):
+    def test_interrupt_restores_terminal(self):
         terminal = Terminal(self, "sim:tformat")
         terminal.wait_for(" live ")
         terminal.press("C-c")
@@ -277,15 +277,15 @@ class Screen(MonitorCase):
         screen = terminal.wait_for(r"absenc: sim:tformat: \d+ readings; \d+ good")
         self.assertNotIn(KEYS, screen)
 
-    def test_a_terminal_that_cannot_draw(self):
+    def test_terminal_without_cursor_control(self):
         terminal = Terminal(self, "sim:tformat", "--for", "1.2", environment="TERM=dumb")
         terminal.wait_for(r"^sim:tformat: +0\.000 deg +0 counts +0 turns +no alarms")
         self.assertEqual(terminal.exit_status(), 0)
 
 
 class Lines(MonitorCase):
-    def test_the_closing_lines_agree_with_each_other(self):
-        """Also while the line fails now and then, and with one encoder that takes all the time there is."""
+    def test_summary_lines_agree(self):
+        """One encoder has occasional errors, and one uses all the available time."""
         result = absenc("monitor", "sim:tformat", "sim:esl?fault=corrupt=0.05", "sim:ssi", "--rate", "0", "--for", "0.73",
                         "--json", "--interval", "0.2")
         closing = re.findall(r"^absenc: (sim:\S+): (\d+) readings; (\d+) good(.*)", result.stderr, re.MULTILINE)
@@ -298,7 +298,7 @@ class Lines(MonitorCase):
             self.assertEqual("failed" in rest, "fault" in name)
         self.assertIn(f"{sum(int(readings) for _, readings, _, _ in closing)} readings in ", result.stderr)
 
-    def test_words(self):
+    def test_text(self):
         address = self.encoder("--singleturn", "65536", "--alarm", "battery_alarm")
         result = absenc("monitor", address, "--for", "1.2", "--interval", "0.3")
         self.assert_good(result)
@@ -349,22 +349,22 @@ class Lines(MonitorCase):
             if condition(line):
                 return line
 
-    def test_a_reading_that_is_not_new_has_its_age(self):
+    def test_old_reading_has_age(self):
         result = absenc("monitor", "sim:tformat", "--rate", "1", "--for", "3", "--interval", "0.4")
         self.assertRegex(result.stdout, r"rpm   \(0\.[2-9] s old\)")
 
-    def test_head(self):
+    def test_closed_output_ends_it(self):
         result = subprocess.run(["sh", "-c", '"$0" monitor sim:tformat sim:tformat --interval 0.1 | head -1', ABSENC],
                                 capture_output=True, text=True, timeout=PATIENCE, check=False)
         self.assertEqual((result.returncode, len(result.stdout.splitlines())), (0, 1))
 
-    def test_wrong_usage(self):
+    def test_refuses_wrong_usage(self):
         self.assert_wrong_usage(absenc("monitor"), "<encoder> is missing")
         self.assert_wrong_usage(absenc("monitor", "tformt:/dev/x"), "did you mean tformat?")
         self.assert_wrong_usage(absenc("monitor", "tformat:/dev/x", "tformat:/dev/x?echo=on"), "the same encoder")
         self.assert_wrong_usage(absenc("monitor", "sim:tformat", "--rate", "fast"), "--rate")
 
-    def test_two_commands_and_one_port(self):
+    def test_port_of_another_command_is_in_use(self):
         address = self.encoder()
         process = self.start("monitor", address, "--json", "--interval", "0.1")
         self.wait_for(process, lambda line: line["state"] == "live")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A broker of our own that keeps to MQTT 5, until a script makes it say something else."""
+"""A fake MQTT 5 broker that follows the protocol unless a test's function replies otherwise."""
 import json
 import socket
 import threading
@@ -24,11 +24,11 @@ class Closed(Exception):
 
 
 class Connection:
-    """One conversation with one client."""
+    """One connection of one client."""
 
     def __init__(self, connection):
         self.socket = connection
-        self.old = False  # it speaks MQTT 3.1.1
+        self.old = False  # whether the client speaks MQTT 3.1.1
         self.socket.settimeout(PATIENCE)
 
     def read(self, count):
@@ -44,7 +44,7 @@ class Connection:
         return data
 
     def packet(self):
-        """(kind, flags, body)"""
+        """Returns (kind, flags, body)."""
         first, size, shift = self.read(1)[0], 0, 0
         while True:
             byte = self.read(1)[0]
@@ -68,7 +68,7 @@ class Connection:
 
 
 def published(flags, body, old=False):
-    """(topic, number of the packet or None, payload) of a PUBLISH without properties; `old`: of MQTT 3.1.1."""
+    """Returns (topic, packet number or None, payload) of a PUBLISH without properties. `old` means MQTT 3.1.1."""
     size = int.from_bytes(body[:2], "big")
     topic, rest = body[2:2 + size].decode(), body[2 + size:]
     number = None
@@ -78,12 +78,12 @@ def published(flags, body, old=False):
 
 
 class FakeBroker:
-    """`answer(broker, connection, kind, flags, body)` says what comes back to a packet; None: what MQTT 5 says.
-    `opened(connection)` makes what it needs for one conversation."""
+    """`answer(broker, connection, kind, flags, body, usual)` returns the reply to a packet, or None for the regular
+    reply `usual`."""
 
     def __init__(self, answer=None):
         self.answer = answer
-        self.payloads = {}  # by topic, as JSON or None, in the order in which they came
+        self.payloads = {}  # by topic, as JSON or None, in the order of arrival
         self.connections = 0
         self.lock = threading.Lock()
         self.open = set()
@@ -139,13 +139,13 @@ class FakeBroker:
         return packet(PINGRESP, b"") if kind == PINGREQ else b""
 
     def all(self, ending):
-        """Payloads of the topics that end in this."""
+        """Returns the payloads of all topics that end with `ending`."""
         with self.lock:
             return [payload for topic, payloads in self.payloads.items() if topic.endswith(ending)
                     for payload in payloads]
 
     def after(self, topic, count):
-        """Payloads of the topic behind the first `count`: who looks again and again takes only what is new."""
+        """Returns the payloads of the topic after the first `count`, so that a polling test gets only new ones."""
         with self.lock:
             return self.payloads.get(topic, [])[count:]
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A broker of our own and a receiver for the tests of `absenc serve` with MQTT."""
+"""Shared by the MQTT tests of `absenc serve`: brokers and a receiver."""
 import json
 import os
 import pathlib
@@ -33,7 +33,7 @@ def answers(port):
 
 
 class Daemon:
-    """Somebody else's server, until its port answers."""
+    """A third-party server, started until its port accepts connections."""
 
     def __init__(self, command, port, log, wait=True):
         self.command, self.port, self.log = command, port, log
@@ -84,7 +84,7 @@ class Broker(Daemon):
 
 
 class Receiver:
-    """All that comes for a topic, in order: (topic, payload as JSON or None, retained)."""
+    """Collects all messages of a topic in order: (topic, payload as JSON or None, retained)."""
 
     def __init__(self, port, topics="#", version=paho.MQTTv5, client_id="", login=None):
         self.messages = []
@@ -110,7 +110,7 @@ class Receiver:
             self.messages.append((message.topic, payload, bool(message.retain)))
 
     def all(self, kind):
-        """Payloads of the topics that end in this."""
+        """Returns the payloads of all topics that end with `kind`."""
         with self.lock:
             return [payload for topic, payload, _ in self.messages if topic.endswith("/" + kind)]
 
@@ -125,7 +125,7 @@ class Receiver:
 
 
 def numbers(messages, encoder):
-    """The numbers of the readings of an encoder, each message once, in the order in which they came."""
+    """Returns the numbers of an encoder's readings in the order of arrival, without repeated messages."""
     found, seen = [], set()
     for one in messages:
         if one["encoder"] == encoder and one["id"] not in seen:
@@ -135,12 +135,12 @@ def numbers(messages, encoder):
 
 
 def twice(messages):
-    """How many messages came again."""
+    """Returns how many messages are repetitions."""
     return len(messages) - len({one["id"] for one in messages})
 
 
 def waiting_in(spool):
-    """The payloads that wait in the files of a spool (absenc/serve/spool_file.hpp)."""
+    """Returns the payloads that wait in the files of a spool (absenc/serve/spool_file.hpp)."""
     found = []
     for path in sorted(pathlib.Path(spool).glob("*.part")):
         data, at = path.read_bytes(), 0

@@ -1,29 +1,30 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Finds the mutants of a C++ source: one wrong change each, of what a protocol's document demands.
+"""Finds the mutants of a C++ source: each is one wrong change of a behaviour that a protocol's document demands.
 
-No list of places: rules over the tokens of sources that clang-format has formatted (a binary operator stands between
-spaces, a template's bracket does not). By the name that they have in a mutant's id, the coarse ones:
+The rules work on the tokens of sources formatted by clang-format, where a binary operator has spaces around it and a
+template's bracket has none. The coarse rules, by the name in a mutant's id:
 
-  never        a check does not refuse: its condition is false, or one of those joined by || is left out; a rule counts
-               as kept
-  skip         a step of a procedure whose answer nobody looks at is left out
-  half, twice  a time in a header, where those of the document stand
-  zero, ten    a time in a source, which its author chose: nothing, and ten times as much
+  never        a check never refuses: its condition becomes false, or loses one of the terms joined by ||; a protocol
+               rule counts as kept
+  skip         leaves out a step of a procedure whose result is not used
+  half, twice  changes a time in a header, where the document's times are
+  zero, ten    changes a time in a source, which its author chose, to zero or to ten times its value
 
-and the fine ones:
+The fine rules:
 
-  drop         one term of a condition is left out; `&&` for `||` is no rule: whatever notices these notices that
-  edge         `<` for `<=`, `>=` for `>` in a condition, and the other way round
-  true, false  what a predicate of one comparison returns
-  number       a constant, or a length that a function returns: one more, from 256 on twice as much; written in
-               hexadecimal digits, its lowest bit the other way
-  bit          a mask without its lowest bit
-  shift        one bit further
-  sign         + 1 for - 1, and the other way round
+  drop         leaves out one term of a condition; there is no rule that replaces `||` by `&&`, because any test that
+               detects such a change detects this one
+  edge         swaps `<` and `<=`, or `>` and `>=`, in a condition
+  true, false  fixes the result of a predicate with one comparison
+  number       adds one to a constant or to a length that a function returns; doubles it from 256 on; inverts the lowest
+               set bit of a hexadecimal constant
+  bit          clears the lowest set bit of a mask
+  shift        shifts by one bit more
+  sign         swaps + 1 and - 1
 
-A check is an `if` that refuses: with an error or with nothing (`return false`, `return std::nullopt`); what `expect`
-takes for a kept rule; `good ? value : Error::x`; and an error that is left when all cases are through. Terms and edges
-are also those of what is returned or assigned.
+A check is one of these: an `if` that refuses, with an error or with nothing (`return false`, `return std::nullopt`); the
+condition of `expect`; `good ? value : Error::x`; and an error that is returned after all cases. Drop and edge also apply
+to returned and assigned values.
 """
 
 import hashlib
@@ -33,20 +34,21 @@ from typing import NamedTuple
 from cpp_source import CLOSING, OPENING, Source
 
 ASSIGNMENT = {"=", "+=", "-=", "*=", "/=", "%=", "&=", "|=", "^=", "<<=", ">>="}
-# What no operand of && or || reaches across.
+# Tokens that end an operand of && or ||.
 ENDS_OPERAND = {";", ",", "?", ":", "return", "co_return", "case", "else"} | ASSIGNMENT
 COARSE = {"never", "skip", "half", "twice", "zero", "ten"}
-ARITHMETIC = {"bit", "shift", "sign"}  # one of them in a line says what all of them would
+ARITHMETIC = {"bit", "shift", "sign"}  # in a line with several of these, one mutant represents them all
 EDGE = {"<": "<=", "<=": "<", ">": ">=", ">=": ">"}
 REFUSES = re.compile(r"fail|failed|refuse\w*|reject\w*|settle\w*")
 NOTHING = {"returnfalse;", "returnstd::nullopt;", "returnnullptr;", "return{};", "std::nullopt", "nullptr"}
-TABLES = {"array", "to_array", "Option", "option", "Argument", "Command", "Fields"}  # texts and their numbers
+TABLES = {"array", "to_array", "Option", "option", "Argument", "Command", "Fields"}  # tables of texts with numbers
 DURATION = re.compile(r"[\d'.]+(ns|us|ms|s|min|h)")
 INTEGER = re.compile(r"(0[xX][\da-fA-F']+|0[bB][01']+|[\d']+)(?:u|U|l|L|ul|UL|z|uz)?")
 
 
 class Switch(NamedTuple):
-    """The same, chosen while a program runs: `IS` in what is put before and behind is whether it is this mutant."""
+    """The mutant as a run-time choice. In `before` and `behind`, `IS` stands for the condition that this mutant is
+    chosen."""
 
     start: int
     end: int
@@ -55,7 +57,7 @@ class Switch(NamedTuple):
 
 
 class Mutant(NamedTuple):
-    file: str  # below the folder of the sources, as the id has it
+    file: str  # path below the source folder, as in the id
     rule: str
     line: int
     start: int
@@ -64,15 +66,16 @@ class Mutant(NamedTuple):
     after: str
     id: str
     switch: "Switch | None"
-    constant: "str | None" = None  # its name: it is switched where all that use it call a function (as_functions)
+    # name of the constant, which is switched if all its users can call a function (as_functions)
+    constant: "str | None" = None
 
     def applied_to(self, text):
         return text[: self.start] + self.after + text[self.end :]
 
 
 def with_switches(text, numbered):
-    """`text` with all mutants in it, given with their numbers; `chosen_mutant(N)` says whether it is that one."""
-    # Those in others are put in between; of those at one place the first is the outermost.
+    """Returns `text` with all mutants switched in. `chosen_mutant(N)` returns whether mutant N is chosen."""
+    # Nested mutants are inserted inside; of mutants at the same place, the first is the outermost.
     inserted = []
     for order, (number, mutant) in enumerate(numbered):
         start, end, before, behind = mutant.switch
@@ -86,8 +89,8 @@ def with_switches(text, numbered):
 
 
 def as_functions(text, names):
-    """`text` in which these constants of type Time, and whatever uses them, are functions; None where one of the names
-    means something else, too."""
+    """Returns `text` with these constants of type Time, and constants that use them, as functions. Returns None if one
+    of the names also has another meaning."""
     source = Source(text)
     inserted = []
     for i, token in enumerate(source.tokens):
@@ -106,7 +109,7 @@ def as_functions(text, names):
 
 
 def value_of(number):
-    """Of the text of an integer; None for everything else."""
+    """Returns the value of an integer literal, or None for any other text."""
     found = INTEGER.fullmatch(number)
     if not found:
         return None
@@ -150,7 +153,7 @@ class Finder:
         return sorted(self.found, key=lambda mutant: mutant.start)
 
     def _leave(self, word):
-        """What stands in the brackets behind `word` is not touched."""
+        """Excludes the bracket after `word` from mutation."""
         for i, token in enumerate(self.source.tokens):
             if token.text == word and i + 1 in self.source.partner:
                 for j in range(i, self.source.partner[i + 1]):
@@ -161,7 +164,7 @@ class Finder:
         return Switch(tokens[first].start, tokens[last - 1].end, before, behind)
 
     def _change(self, rule, first, last, after, switch=None, constant=None):
-        """The tokens from `first` up to, without, `last` become `after`."""
+        """Adds a mutant that replaces the tokens from `first` to `last`, exclusive, by `after`."""
         tokens = self.source.tokens
         start, end = tokens[first].start, tokens[last - 1].end
         result = (start, end, after)
@@ -173,12 +176,12 @@ class Finder:
             if line in self._calculating:
                 return
             self._calculating.add(line)
-        # The id holds while the line does, wherever it goes and whatever is said beside it.
+        # The id depends on the line's code only, not on its position or its comments.
         begin, behind = self.source.tokens_of_lines(line, self.source.line_of(end - 1))
         context = [token.text for token in tokens[begin:behind]]
-        told = "\n".join([rule, after, str(first - begin), *context])
-        seen = self._seen[told] = self._seen.get(told, 0) + 1
-        digest = hashlib.sha256(f"{told}\n{seen}".encode()).hexdigest()[:8]
+        description = "\n".join([rule, after, str(first - begin), *context])
+        repetition = self._seen[description] = self._seen.get(description, 0) + 1
+        digest = hashlib.sha256(f"{description}\n{repetition}".encode()).hexdigest()[:8]
         name = f"{self.file}:{rule}:{digest}"
         before = self.source.text[start:end]
         self.found.append(Mutant(self.file, rule, line, start, end, before, after, name, switch, constant))
@@ -201,7 +204,7 @@ class Finder:
                 self._refusal(i)
 
     def _mark(self, first, last):
-        """The conditions of a check; what lambdas in it do is not looked at."""
+        """Marks the conditions of a check, except inside lambdas."""
         i = first
         while i < last:
             if self.source[i] == "{":
@@ -210,7 +213,7 @@ class Finder:
             i += 1
 
     def _refuses(self, first, last):
-        """Whether a statement, or a block without what its inner blocks do, refuses something."""
+        """Returns whether a statement refuses something, or a block apart from its inner blocks."""
         source = self.source
         body = "".join(source[i] for i in range(first, last))
         if body in NOTHING or body[1:-1] in NOTHING:
@@ -241,7 +244,7 @@ class Finder:
             self._never(first, closing, "||", "false")
 
     def _refusal(self, index):
-        """What is left to a function when all its cases are through."""
+        """Handles the error that a function returns after all its cases."""
         source = self.source
         block = self._around(index)
         is_branch = source[block - 1] == "else" or source[source.partner.get(block - 1, 0) - 1] == "if"
@@ -251,7 +254,7 @@ class Finder:
                 self._change("never", index + 3, index + 4, "none", switch)
 
     def _choice(self, index):
-        """`good ? value : Error::x`, either way round."""
+        """Handles `good ? value : Error::x` and its opposite."""
         source = self.source
         colon = source.right(index + 1, {":", ";"})
         if source[colon] != ":":
@@ -264,7 +267,7 @@ class Finder:
             self._never(first, index, *(("||", "false") if is_error[0] else ("&&", "true")))
 
     def _never(self, first, last, operator, harmless):
-        """Each of the terms that `operator` joins is a check of its own."""
+        """Treats each term joined by `operator` as a check of its own."""
         source = self.source
         ends = ENDS_OPERAND | {operator} | ({"||"} if operator == "&&" else set())
         switch = ("(!IS && (", "))") if harmless == "false" else ("(IS || (", "))")
@@ -300,7 +303,7 @@ class Finder:
         return any(self.source.partner.get(i, 0) > index for i in range(outer, index) if self.source[i] in OPENING)
 
     def _rule(self, index):
-        """What `expect(kept, rule, at)` takes for kept; not where it is declared."""
+        """Handles the condition `kept` of `expect(kept, rule, at)`, but not the declaration of `expect`."""
         source = self.source
         first = index + 2
         last = source.right(first, {","})
@@ -311,13 +314,13 @@ class Finder:
     # ---- Constants
 
     def _declared_times(self):
-        """`Time name = ...;`, whatever it is computed from."""
+        """Handles `Time name = ...;` with any expression."""
         source = self.source
         for i in range(len(source.tokens)):
             if source[i] != "Time" or source[i + 2] != "=" or source.tokens[i + 1].kind != "word" or self.left_alone[i]:
                 continue
             end = source.right(i + 3, {";", ","})
-            # A constant, or a member with the value it has unless told otherwise: not what a function computes.
+            # Only a constant, or a member's default value: not a value that a function computes.
             is_member = source[i - 1] in (";", "{", "}") and source.tokens[i + 3].kind == "number" and end == i + 4
             if source[i - 1] == "constexpr" or is_member:
                 self._times(i + 3, end, "" if is_member or self._is_local(i) else source[i + 1])
@@ -325,7 +328,7 @@ class Finder:
                     self.left_alone[j] = True
 
     def _computed_times(self):
-        """What a function returns whose type is Time."""
+        """Handles the return values of functions of type Time."""
         source = self.source
         for i in range(len(source.tokens)):
             if source[i] != "Time" or source.tokens[i + 1].kind != "word" or source[i + 2] != "(":
@@ -343,14 +346,14 @@ class Finder:
                         self.left_alone[k] = True
 
     def _is_local(self, index):
-        """Whether what is declared there is a function's."""
+        """Returns whether the declaration at `index` is local to a function."""
         source = self.source
         outer = self._around(index)
         begin = source.left(outer, {";", "}"})
         return source[outer] == "{" and not {"namespace", "class", "struct"} & {source[i] for i in range(begin, outer)}
 
     def _times(self, first, last, constant=None):
-        """`constant`: its name; empty: what cannot be switched."""
+        """Adds the mutants of a time. `constant` is its name, or empty if it cannot be switched."""
         before = f"Time({self.source.span(first, last)})"
         if self.file.endswith(".hpp"):
             changes = {"half": f"{before} / 2", "twice": f"{before} * 2"}
@@ -390,7 +393,8 @@ class Finder:
         return f"({number} + 1)" if value < 256 else f"({number} * 2)"
 
     def _is_constant(self, index):
-        """The value of an enumerator, or anywhere in that of a constant: the polynomial of a CRC, for example."""
+        """Returns whether `index` is in the value of an enumerator or of a constant, such as the polynomial of a
+        CRC."""
         source = self.source
         outer = self._around(index)
         if source[index - 1] == "=" and source.tokens[index - 2].kind == "word" and source[outer] == "{":
@@ -406,11 +410,11 @@ class Finder:
                 return False
             index = begin - 1
             if source[index - 1] in (")", ":", "const", "noexcept"):
-                return False  # a function's
+                return False  # inside a function
         return False
 
     def _around(self, index):
-        """The bracket around a token."""
+        """Returns the index of the bracket that encloses a token."""
         while index > 0:
             index -= 1
             if self.source[index] in OPENING:
@@ -421,5 +425,5 @@ class Finder:
 
 
 def find(file, text):
-    """The mutants of one source; `file` is what their ids begin with."""
+    """Returns the mutants of one source. `file` is the first part of their ids."""
     return Finder(file, text).mutants()

@@ -1,13 +1,12 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Breaks the units in one place at a time and looks whether tests notice.
+"""Breaks the units in one place at a time and checks whether a test fails.
 
-tests/mutant_rules.py finds the places. In a copy of the sources (build/mutants) most mutants of a unit are compiled at
-once, each behind a switch, and for each one the generic tests, as far as they concern its unit, the seeds of its fuzzer
-and its own tests run, the fastest first, until one fails. Mutants that cannot be switched (few constants) and those that
-survived are compiled one at a time, which tells what is checked at compile time. A mutant that survives shows a test
-that is missing, or it changes nothing: tests/mutants_survivors.txt lists those with their reason.
-"""
+tests/mutant_rules.py finds the places. In a copy of the sources (build/mutants) most mutants of a unit are compiled
+together, each behind a switch. For each mutant, the generic tests that concern its unit, the seeds of its fuzzer and
+its own tests run until one fails, the fastest first. Mutants that cannot be switched (a few constants) and those that
+survive are compiled one at a time, which includes the checks at compile time. A mutant that survives means that a test
+is missing, or that the mutant changes nothing: tests/mutants_survivors.txt lists those with a reason."""
 
 import argparse
 import fcntl
@@ -30,9 +29,9 @@ import mutant_rules
 ROOT = Path(__file__).resolve().parent.parent
 COPIED = ("CMakeLists.txt", "absenc", "cmake", "tests")
 NO_SOURCE = re.compile(r"_(test|fuzz|bench)\.|^(test_|testing|vectors|fields|explain|texts)")
-# Of what the compiler says when a vector or another thing that is checked at compile time no longer holds.
+# Matches compiler errors of checks at compile time, such as a static_assert about a vector.
 STATIC_CHECK = re.compile(r"static.assert|constant.expression|non-constant|non-.constexpr|duplicate case value")
-# What is switched in meets the first series of faults only; what survives is compiled and meets all (tests/kit).
+# Switched mutants run only the first series of faults. Survivors are compiled alone and run all series (tests/kit).
 FIRST_SERIES = "-" + ":".join(f"*/{series}_*" for series in range(1, 10))
 HANGS = (-signal.SIGXCPU, -signal.SIGKILL)
 SWITCH_HEADER = Path("absenc/chosen_mutant.hpp")
@@ -49,18 +48,18 @@ OUTCOMES = ("static_assert", "kit", "own", "time", "known", "new", "no C++")
 class Program(NamedTuple):
     name: str
     is_own: bool
-    tests: str = "*"  # of GoogleTest
+    tests: str = "*"  # filter of GoogleTest
 
 
 def unit_folders():
-    """By name: every unit, and the layers that all of them stand on."""
+    """Returns the folders by name: every unit, and the layers that all units depend on."""
     protocol = ROOT / "absenc" / "protocol"
     folders = {folder.name: folder for folder in sorted(protocol.iterdir()) if folder.is_dir()}
     return folders | {"host": ROOT / "absenc" / "host"}
 
 
 def generic_programs():
-    """Those that test every unit: a source of tests/ is one, or a folder in it (cmake/tests.cmake)."""
+    """Returns the programs that test every unit: each source in tests/, and each folder there (cmake/tests.cmake)."""
     tests = ROOT / "tests"
     names = []
     for path in [*sorted(tests.glob("*_test.cpp")), *sorted(tests.glob("*/*_test.cpp"))]:
@@ -70,13 +69,13 @@ def generic_programs():
 
 
 def id_of(path):
-    """What the ids of the mutants of a source begin with."""
+    """Returns the first part of the ids of a source's mutants."""
     below = path.relative_to(ROOT / "absenc")
     return str(below.relative_to("protocol") if below.parts[0] == "protocol" else below)
 
 
 def find_mutants(folder):
-    """With the path and the text of their source."""
+    """Yields each mutant with the path and the text of its source."""
     for path in sorted([*folder.rglob("*.cpp"), *folder.rglob("*.hpp")]):
         if not NO_SOURCE.search(path.name):
             text = path.read_text(encoding="utf-8")
@@ -85,7 +84,7 @@ def find_mutants(folder):
 
 
 def shown(mutant, path, text):
-    """Where it is, and its lines before and after."""
+    """Returns the mutant's place, and its lines before and after the change."""
     last = text.count("\n", 0, mutant.end) + 1
     changed = mutant.applied_to(text).splitlines()
     end = last + len(changed) - len(text.splitlines())
@@ -96,7 +95,7 @@ def shown(mutant, path, text):
 
 
 def read_survivors(path):
-    """The reason why a mutant may survive, by its id."""
+    """Returns the reason why a mutant may survive, by its id."""
     lines = path.read_text(encoding="utf-8").splitlines() if path.exists() else []
     known = [line.split(maxsplit=1) for line in lines if line.strip() and not line.startswith("#")]
     bare = [words[0] for words in known if len(words) < 2]
@@ -106,7 +105,7 @@ def read_survivors(path):
 
 
 class Tree:
-    """A copy of the sources, and what is built from it."""
+    """A copy of the sources, and its build."""
 
     def __init__(self, folder):
         self.source = folder / "source"
@@ -119,7 +118,7 @@ class Tree:
 
     def prepare(self):
         self.source.mkdir(parents=True, exist_ok=True)
-        self.lock = open(self.source.parent / "lock", "w", encoding="utf-8")  # until this process ends
+        self.lock = open(self.source.parent / "lock", "w", encoding="utf-8")  # held until this process ends
         try:
             fcntl.flock(self.lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
@@ -134,7 +133,7 @@ class Tree:
         for path in self.source.rglob("*"):
             if path.is_file() and path.relative_to(self.source) not in wanted:
                 path.unlink()
-        # What reads behind the end of its bytes is told; warnings are not looked at.
+        # The assertions detect reads beyond the end of a container. Warnings are disabled.
         options = ["-DCMAKE_BUILD_TYPE=Release", "-DCMAKE_CXX_FLAGS_RELEASE=-O1 -w -D_GLIBCXX_ASSERTIONS"]
         options += ["-DABSENC_TESTS=ON", "-DABSENC_SPLIT_TESTS=ON", "-DABSENC_COMMAND=OFF", "-DABSENC_INSTALL=OFF"]
         options += ["-DABSENC_UNITY=OFF"]
@@ -144,7 +143,7 @@ class Tree:
 
     @staticmethod
     def write(path, content):
-        """Only what differs, so that only that is compiled again."""
+        """Writes the file only if its content differs, so that only changed files are compiled again."""
         if not path.exists() or path.read_bytes() != content:
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_bytes(content)
@@ -152,21 +151,21 @@ class Tree:
     def run_or_exit(self, command):
         done = subprocess.run(command, env=self.environment, capture_output=True, text=True, check=False)
         if done.returncode != 0:
-            told = " ".join(map(str, command))
-            raise SystemExit(f"mutants: without any mutant this fails: {told}\n{done.stdout}{done.stderr}")
+            shown_command = " ".join(map(str, command))
+            raise SystemExit(f"mutants: without any mutant this fails: {shown_command}\n{done.stdout}{done.stderr}")
         return done.stdout
 
     def build_command(self, *targets):
         return ["cmake", "--build", self.build, "-j", "1", "--target", *targets]
 
     def compile(self, target):
-        """What the compiler said; None when it took it."""
+        """Compiles a target. Returns the compiler's output if it failed, otherwise None."""
         command = self.build_command(target)
         done = subprocess.run(command, env=self.environment, capture_output=True, text=True, check=False)
         return None if done.returncode == 0 else done.stdout + done.stderr
 
     def switch_in(self, numbered):
-        """These mutants, given by their numbers. Those of constants that cannot be switched are taken out of them."""
+        """Switches these numbered mutants in. Removes those of constants that cannot be switched from `numbered`."""
         self.write(self.source / SWITCH_HEADER, SWITCH.encode())
         functions = self.constants_as_functions(numbered)
         for number, (mutant, path, _) in list(numbered.items()):
@@ -182,10 +181,11 @@ class Tree:
 
     @staticmethod
     def constants_as_functions(numbered):
-        """Of each source the constants that are functions in it: all of a folder that use one must be able to."""
+        """Returns the constants of each source that become functions. Every user of such a constant in its folder must
+        allow it."""
         functions = {}
         for path, name in {(path, mutant.constant) for mutant, path, _ in numbered.values() if mutant.constant}:
-            folder = path.parent.parent if path.parent.name == "author" else path.parent  # all units stand on it
+            folder = path.parent.parent if path.parent.name == "author" else path.parent  # all units depend on author
             users = [*folder.rglob("*.hpp"), *folder.rglob("*.cpp")] if path.suffix == ".hpp" else [path]
             users = [user for user in users if re.search(rf"\b{name}\b", user.read_text(encoding="utf-8"))]
             if all(mutant_rules.as_functions(user.read_text(encoding="utf-8"), {name}) is not None for user in users):
@@ -202,7 +202,8 @@ class Tree:
             self.write(self.source / path.relative_to(ROOT), text.encode())
 
     def run(self, program, cpu_limit, number=0):
-        """Its exit status and the seconds that it computed; the limit does not count what others compute meanwhile."""
+        """Returns the exit status and the processor seconds of a test program. The limit excludes time used by other
+        processes."""
         limits = ["prlimit", f"--cpu={cpu_limit}:{cpu_limit + 1}", f"--as={4 << 30}", "--core=0"]
         tests = program.tests + (FIRST_SERIES if number else "")
         environment = {**self.environment, "GTEST_FILTER": tests, "CHOSEN_MUTANT": str(number)}
@@ -213,7 +214,7 @@ class Tree:
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
         )
-        too_long = threading.Timer(10 * cpu_limit, running.kill)  # it waits for what never comes
+        too_long = threading.Timer(10 * cpu_limit, running.kill)  # the program may wait for an event that never occurs
         too_long.start()
         _, status, usage = os.wait4(running.pid, 0)
         too_long.cancel()
@@ -221,7 +222,8 @@ class Tree:
         return running.returncode, usage.ru_utime + usage.ru_stime
 
     def concerning(self, program, unit):
-        """The tests of a generic program that concern a unit: those that name it, and those that look at all units."""
+        """Returns the filter of a generic program's tests that concern a unit: those that name the unit, and those for
+        all units."""
         listed = self.run_or_exit([self.build / "tests" / program.name, "--gtest_list_tests"])
         suite, chosen, is_named = "", [], False
         for line in listed.splitlines():
@@ -237,7 +239,7 @@ class Tree:
         return program._replace(tests=":".join(chosen)) if is_named else None
 
     def programs(self, unit, folders):
-        """Those that may kill a unit's mutants, the fastest first. All of them pass without a mutant."""
+        """Returns the programs that may kill a unit's mutants, the fastest first. All of them pass without a mutant."""
         kit = [Program(name, False) for name in generic_programs()]
         owners = list(folders) if unit == "author" else [unit]
         seeds = [f"{p.stem}_seeds" for owner in owners for p in sorted(folders[owner].rglob("*_fuzz.cpp"))]
@@ -258,21 +260,22 @@ class Tree:
         return sorted(programs, key=lambda program: (self.limits[program], program.is_own))
 
     def killed(self, program, number=0):
-        """How; nothing when it passes."""
+        """Returns how the program fails, or an empty text if it passes."""
         status, _ = self.run(program, self.limits[program], number)
         return "" if status == 0 else "time" if status in HANGS else "own" if program.is_own else "kit"
 
     def switched_outcome(self, number, programs):
-        """What became of a mutant that was switched in, and the program that killed it."""
+        """Returns the outcome of a switched mutant, and the program that killed it."""
         for program in programs:
             if outcome := self.killed(program, number):
                 return outcome, program.name
         return "survived", ""
 
     def outcome(self, mutant, path, text, programs):
-        """The same of a mutant that is compiled alone. The source stays as the mutant has it."""
+        """Returns the outcome of a mutant that is compiled alone. Leaves the mutated source in place."""
         self.write(self.source / path.relative_to(ROOT), mutant.applied_to(text).encode())
-        # Vectors are checked where the unit is described: one file to compile tells most of what is wrong in a header.
+        # Vectors are checked at compile time in the unit's description, so compiling that file reveals most faults in a
+        # header.
         unit = path.relative_to(ROOT).with_name("unit.cpp")
         first = [f"CMakeFiles/absenc.dir/{unit}.o"] if (ROOT / unit).exists() else []
         programs = sorted(programs, key=lambda program: program != self.last_own)
@@ -284,13 +287,13 @@ class Tree:
             first = []
             if outcome := self.killed(program):
                 if program.is_own:
-                    self.last_own = program  # of neighbours it kills the next one, too
+                    self.last_own = program  # it often kills neighbouring mutants too
                 return outcome, program.name
         return "survived", ""
 
 
 class Campaign:
-    """Trees work through the mutants, a unit at a time."""
+    """Distributes the units' mutants to the trees."""
 
     def __init__(self, known, folders, verbose, quick):
         self.known = known
@@ -338,7 +341,7 @@ class Campaign:
             self.stopping = True
 
     def switch(self, tree, unit, mutants):
-        """Those that are left."""
+        """Runs the switched mutants of a unit. Returns the mutants that are left."""
         numbered = dict(enumerate([one for one in mutants if one[0].switch], start=1))
         left = []
         if numbered:
@@ -360,7 +363,7 @@ class Campaign:
         return left
 
     def switched_programs(self, tree, unit, numbered):
-        """With the constants among them, if the compiler takes them as functions: those that it does not are left."""
+        """Switches the mutants in, if possible including constants as functions. Otherwise leaves out the constants."""
         try:
             tree.switch_in(numbered)
             return self.programs(tree, unit)

@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""tests/mutant_rules.py: what it breaks in a source, what it leaves alone, and that ids stay where lines move."""
+"""Tests tests/mutant_rules.py: the mutants that it finds, the places that it leaves alone, and ids that survive moved
+lines."""
 
 import os
 import sys
@@ -50,7 +51,7 @@ Procedure zero(Dialog& dialog) {
 
 
 def changes(text, file="toy.hpp"):
-    """(rule, before, after) of each mutant; white space made single."""
+    """Returns (rule, before, after) of each mutant, with single spaces."""
     return [
         (found.rule, " ".join(found.before.split()), " ".join(found.after.split()))
         for found in mutant_rules.find(file, text)
@@ -61,7 +62,7 @@ class Rules(unittest.TestCase):
     def setUp(self):
         self.found = changes(TOY)
 
-    def test_checks(self):
+    def test_mutates_checks(self):
         for change in (
             ("never", "bytes.size() < 4 ||", ""),
             ("never", "|| bytes[0] != format.id", ""),
@@ -76,17 +77,17 @@ class Rules(unittest.TestCase):
         ):
             self.assertIn(change, self.found)
 
-    def test_each_term_is_left_out_once(self):
+    def test_leaves_out_each_term_once(self):
         found = changes("bool f() { return a && b == 2 && g(c && d) || e; }")
         terms = [before for rule, before, _ in found if rule == "drop"]
         expected = ["a &&", "&& b == 2", "&& g(c && d)", "c &&", "&& d", "a && b == 2 && g(c && d) ||", "|| e"]
         self.assertEqual(sorted(terms), sorted(expected))
 
-    def test_what_is_left_when_all_cases_are_through(self):
+    def test_mutates_final_error(self):
         found = changes("Error f() { switch (x) { case 1: return Error::none; default: return Error::busy; } }")
         self.assertEqual(found, [("never", "busy", "none")])
 
-    def test_timing_rules(self):
+    def test_mutates_times(self):
         for change in (
             ("half", "40us", "Time(40us) / 2"),
             ("twice", "40us", "Time(40us) * 2"),
@@ -102,10 +103,10 @@ class Rules(unittest.TestCase):
         self.assertEqual(chosen, [("zero", "40us", "Time{}"), ("ten", "40us", "Time(40us) * 10")])
         self.assertEqual(sum(rule == "half" and "character" in before for rule, before, _ in self.found), 1)
 
-    def test_steps_of_procedures(self):
+    def test_skips_steps_of_procedures(self):
         self.assertIn(("skip", "co_await dialog.ask({Ask::zero})", ""), self.found)
 
-    def test_constants(self):
+    def test_mutates_constants(self):
         for change in (("number", "8", "(8 + 1)"), ("number", "3", "(3 + 1)"), ("bit", "0x0F", "(0x0F ^ 1)")):
             self.assertIn(change, self.found)
         self.assertEqual(changes("constexpr std::uint8_t bit = 0x60;"), [("number", "0x60", "(0x60 ^ 32)")])
@@ -113,23 +114,23 @@ class Rules(unittest.TestCase):
         self.assertEqual(changes("void f() { g(a << 8 * i, n - 1); }"), [("shift", "8", "9")])
         self.assertEqual(changes("void f() { g(n - 1); }"), [("sign", "-", "+")])
 
-    def test_leaves_alone(self):
+    def test_leaves_other_places_alone(self):
         lines = TOY.splitlines()
         broken = {lines[found.line - 1] for found in mutant_rules.find("toy.hpp", TOY)}
         for begin in ("//", "#define", "static_assert", "    return fail"):
             self.assertFalse([line for line in broken if line.startswith(begin)], begin)
-        # Neither the header of a loop nor templates' brackets nor raw strings.
+        # Loop headers, template brackets and raw strings are also left alone.
         self.assertEqual(changes("void f() { for (int i = 0; i < 3 && i + 1 < n; ++i) g(i); }"), [])
         self.assertEqual(changes('void f() { g(h<pair<int, 4>>(1), R"(a && b < 2ms)", "1s", \'&\'); }'), [])
 
-    def test_several_are_switched_in_at_once(self):
+    def test_switches_several_mutants_in(self):
         lines = (
             ("if (a || b) return false;", "if ((!chosen_mutant(1) && (a)) || (!chosen_mutant(2) && (b))) return false;"),
             ("x = good ? value : Error::y;", "x = (chosen_mutant(1) || (good)) ? value : Error::y;"),
             ("co_await dialog.ask();", "if (chosen_mutant(1)) {} else co_await dialog.ask();"),
             ("rest(10ms);", "rest((chosen_mutant(1) ? Time(Time(10ms) / 2) : Time((chosen_mutant(2) ? "
              "Time(Time(10ms) * 2) : Time(10ms)))));"),
-            ("constexpr Time pause = 40us;", None),  # a function's
+            ("constexpr Time pause = 40us;", None),  # local to a function
         )
         for line, expected in lines:
             text = f"void f() {{ {line} }}"
@@ -139,7 +140,7 @@ class Rules(unittest.TestCase):
                 switched = mutant_rules.with_switches(text, list(enumerate(found, start=1)))
                 self.assertEqual(switched, f"void f() {{ {expected} }}")
 
-    def test_constants_become_functions(self):
+    def test_turns_constants_into_functions(self):
         text = "constexpr Time a = 40us;\nconstexpr Time b = 2 * a;\nTime f(X x) { return x.a + n::a; }\nusing n::a;"
         found = [one for one in mutant_rules.find("toy.cpp", text) if one.constant == "a"]
         switched = mutant_rules.as_functions(mutant_rules.with_switches(text, list(enumerate(found, start=1))), {"a"})
@@ -151,7 +152,7 @@ class Rules(unittest.TestCase):
         self.assertEqual(switched.splitlines(), [declared, *used])
         self.assertIsNone(mutant_rules.as_functions("constexpr Time a = 40us; void f(Time a);", {"a"}))
 
-    def test_only_the_place_changes(self):
+    def test_changes_only_its_place(self):
         for found in mutant_rules.find("toy.hpp", TOY):
             broken = found.applied_to(TOY)
             self.assertNotEqual(broken, TOY)
@@ -160,7 +161,7 @@ class Rules(unittest.TestCase):
             self.assertEqual(broken[found.start + len(found.after) :], TOY[found.end :])
 
 
-class Ids(unittest.TestCase):
+class MutantIds(unittest.TestCase):
     @staticmethod
     def ids(text):
         return [found.id for found in mutant_rules.find("toy.hpp", text)]
@@ -176,14 +177,14 @@ class Ids(unittest.TestCase):
         indented = TOY.replace("  if (at < free_at_)", "      if (at < free_at_)")
         self.assertEqual(self.ids(indented), self.ids(TOY))
 
-    def test_go_with_their_line(self):
+    def test_change_with_their_line(self):
         other = self.ids(TOY.replace("40us", "50us"))
         gone = set(self.ids(TOY)) - set(other)
         self.assertEqual({name.split(":")[1] for name in gone}, {"half", "twice"})
 
 
 class Script(unittest.TestCase):
-    def test_finds_enough_in_the_units(self):
+    def test_finds_enough_mutants_in_units(self):
         coarse = [
             found.id
             for folder in mutants.unit_folders().values()
@@ -194,7 +195,7 @@ class Script(unittest.TestCase):
         self.assertEqual(len(set(coarse)), len(coarse))
         self.assertFalse([name for name in coarse if "_test." in name or "vectors" in name or "fields" in name])
 
-    def test_tells_failing_from_hanging(self):
+    def test_distinguishes_failure_from_hang(self):
         with tempfile.TemporaryDirectory() as folder:
             tree = mutants.Tree(Path(folder))
             programs = tree.build / "tests"
@@ -206,7 +207,7 @@ class Script(unittest.TestCase):
             self.assertEqual(tree.run(mutants.Program("bad", True), 5)[0], 1)
             self.assertIn(tree.run(mutants.Program("endless", True), 1)[0], mutants.HANGS)
 
-    def test_survivors_have_reasons(self):
+    def test_survivors_need_reasons(self):
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / "survivors.txt"
             path.write_text("# a comment\n\ntoy.cpp:edge:12345678 the same at the edge\n", encoding="utf-8")
@@ -215,7 +216,7 @@ class Script(unittest.TestCase):
             with self.assertRaises(SystemExit):
                 mutants.read_survivors(path)
 
-    def test_shows_the_lines_before_and_after(self):
+    def test_shows_lines_before_and_after(self):
         path = mutants.ROOT / "absenc" / "toy.hpp"
         found = next(one for one in mutant_rules.find("toy.hpp", TOY) if one.rule == "half")
         lines = ["  - constexpr Time pause = 40us;", "  + constexpr Time pause = Time(40us) / 2;"]

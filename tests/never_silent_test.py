@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""A line that is never silent, on a pseudo-terminal: whatever the command is asked to do there, it ends and says so."""
+"""Tests every verb of the command on a pseudo-terminal that is never silent: each must end and report the problem."""
 import concurrent.futures
 import json
 import time
@@ -8,12 +8,12 @@ import unittest
 
 from command_support import BabblingLine, Case, absenc
 
-LIMIT = 40.0  # seconds on a busy machine; alone the longest takes about ten
-AT_ONCE = 8   # commands that mostly wait
+LIMIT = 40.0  # seconds on a busy machine; alone the slowest command takes about ten
+AT_ONCE = 8  # commands in parallel, because they mostly wait
 
 
 def units():
-    """Those on a line of characters."""
+    """Returns the units with a character link."""
     listed = [json.loads(line) for line in absenc("list", "--json").stdout.splitlines()]
     return [unit for unit in listed if unit["link"] in ("half_duplex", "full_duplex")]
 
@@ -23,7 +23,7 @@ def least(argument):
 
 
 def invocations(unit, encoder):
-    """Each verb of the command that converses with this unit, and each command of the unit."""
+    """Yields the command line of each verb that communicates with this unit, and of each command of the unit."""
     verbs = {command["verb"] for command in unit["commands"]}
     yield "read", encoder
     yield "read", encoder, "--count", "2"
@@ -48,7 +48,7 @@ def invocations(unit, encoder):
 
 class NeverSilentTest(Case):
     def run_all(self, period, pieces, wanted):
-        """Each invocation on a line of its own; `wanted`: of those of a unit."""
+        """Runs each command line that `wanted` selects, each on its own line."""
         def one(unit, number):
             with BabblingLine(period, pieces) as line:
                 arguments = list(invocations(unit, f"{unit['protocol']}:{line.path}"))[number]
@@ -63,25 +63,25 @@ class NeverSilentTest(Case):
                 with self.subTest(arguments=arguments):
                     self.assertLess(duration, LIMIT)
                     self.assertIn(result.returncode, (0, 1), result.stderr)
-                    # What is told to an interface without being answered may find it silent for a moment.
+                    # A `run` that only sends, without a reply, may succeed in a silent moment.
                     if arguments[0] != "run":
                         self.assert_failed(result)
 
-    def test_a_byte_every_5_ms_ends_every_conversation(self):
+    def test_every_command_ends_with_a_byte_every_5_ms(self):
         self.run_all(0.005, (b"\x55",), lambda arguments: True)
 
-    def test_a_flood_ends_reading(self):
+    def test_reading_ends_on_flooded_line(self):
         self.run_all(0, (b"\x55" * 64,), lambda arguments: arguments[0] in ("read", "zero", "scan"))
 
-    def test_lines_that_are_answers_to_nothing_end_reading(self):
+    def test_reading_ends_with_empty_lines_only(self):
         self.run_all(0.005, (b"\r",), lambda arguments: arguments[0] in ("read", "info", "zero"))
 
-    def test_it_says_what_it_heard(self):
+    def test_reports_received_bytes(self):
         with BabblingLine() as line:
             result = absenc("read", f"tformat:{line.path}?latency=500&echo=off")
         self.assert_failed(result, "something sends without a pause", "received 55 55 55", "find the node")
 
-    def test_identify_ends_in_its_time(self):
+    def test_identify_ends_in_time(self):
         with BabblingLine() as line:
             start = time.monotonic()
             result = absenc("identify", line.path, "--for", "2")

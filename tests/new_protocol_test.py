@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`./dev new-protocol` makes a unit that builds, is listed, passes the kit, and whose own test fails until it is written."""
+"""Tests that `./dev new-protocol` creates a unit that builds, is listed and passes the kit, and whose own test fails
+until it is written."""
 
 import os
 import re
@@ -13,7 +14,7 @@ SOURCE = Path(os.environ["ABSENC_SOURCE_DIR"])
 LIBRARY = Path(os.environ["ABSENC"]).parent.parent / "libabsenc.a"
 COMPILE = ["g++", "-std=c++20", "-O0", "-Wall", "-Wextra", "-Wpedantic", "-Wshadow", "-Wconversion", "-Werror"]
 
-# Of the kit what needs no virtual encoder: all of it takes too long to compile.
+# The parts of the kit that need no virtual encoder; the whole kit takes too long to compile.
 KIT_TEST = """
 #include <gtest/gtest.h>
 #include "absenc/protocol/all.hpp"
@@ -47,7 +48,7 @@ class NewProtocol(unittest.TestCase):
         return subprocess.run(["python3", "-B", str(self.root / "tools/new-protocol.py"), name, "--root", str(self.root)],
                               capture_output=True, text=True)
 
-    def test_begins_a_unit_that_builds_and_fails(self):
+    def test_creates_unit_that_builds_and_fails(self):
         made = self.new_protocol("my_encoder")
         self.assertEqual(made.returncode, 0, made.stderr)
         unit = self.root / "absenc/protocol/my_encoder"
@@ -65,8 +66,8 @@ class NewProtocol(unittest.TestCase):
         failed = [line for line in kit.stdout.splitlines() if line.startswith("[  FAILED  ]")]
         self.assertEqual({line.split()[3] for line in failed} - {"1"}, {"ProtocolName.IsNoLongerTheInventedOne"})
 
-    def test_the_example_is_of_the_template(self):
-        """What CONTRIBUTING shows is compiled by the test above."""
+    def test_example_in_contributing_is_from_template(self):
+        """The template's code is compiled by the test above."""
         text = (SOURCE / "CONTRIBUTING.md").read_text(encoding="utf-8")
         template = (SOURCE / "docs/protocol-template/unit.cpp").read_text(encoding="utf-8")
         examples = re.findall(r"^( *)```cpp\n(.*?)^ *```", text, re.MULTILINE | re.DOTALL)
@@ -74,7 +75,7 @@ class NewProtocol(unittest.TestCase):
         for indent, example in examples:
             self.assertIn(re.sub(f"^{indent}", "", example, flags=re.MULTILINE), template)
 
-    def test_refuses_names_that_are_none_or_taken(self):
+    def test_refuses_invalid_or_existing_names(self):
         self.assertEqual(self.new_protocol("tformat").returncode, 1)
         for name in ("Upper", "1st", "core", "a-b", ""):
             self.assertEqual(self.new_protocol(name).returncode, 2, name)

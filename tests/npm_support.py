@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tools of npm for the tests of `absenc serve`: ./dev test --all installs those of tests/npm/package-lock.json into build/npm."""
+"""Finds the npm tools for the tests of `absenc serve`. ./dev test --all installs them from tests/npm/package-lock.json into
+build/npm."""
 import os
 import pathlib
 import unittest
@@ -9,7 +10,7 @@ MODULES = SOURCE / "build/npm/node_modules"
 
 
 def tool(path):
-    """A file of node_modules. It is left out only if ./dev has said that npm's registry cannot be reached."""
+    """Returns a file of node_modules. It may only be missing if ./dev found npm's registry unreachable."""
     if (MODULES / path).exists():
         return MODULES / path
     if os.environ.get("ABSENC_NO_NPM"):

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""The library in the packages that firmware is made of: each builds the same sources, and each is tried as far as it can be
-without its tools. What only those know is held against the keys that they document."""
+"""Tests the library as a package of firmware build systems. Each package must build the same sources, and is tried as
+far as possible without the vendor's tools. The manifests are checked against the documented keys."""
 import glob
 import json
 import os
@@ -30,7 +30,7 @@ def run(*command, **settings):
 
 
 def sources():
-    """What every package must build, from the root."""
+    """Returns the sources that every package must build, relative to the root."""
     found = [path for layer in LAYERS for path in (ROOT / "absenc" / layer).rglob("*.cpp")]
     return {str(path.relative_to(ROOT)) for path in found if not re.search(r"_(test|fuzz|bench)\.cpp$", path.name)}
 
@@ -41,7 +41,7 @@ class Case(unittest.TestCase):
         self.addCleanup(shutil.rmtree, self.folder)
 
     def configured(self, project):
-        """What a CMake project of this text says when it is configured."""
+        """Configures a CMake project with this text and returns CMake's output."""
         (self.folder / "CMakeLists.txt").write_text(project)
         return run("cmake", "-S", self.folder, "-B", self.folder / "build")
 
@@ -59,7 +59,7 @@ class PlatformIO(Case):
         super().setUp()
         self.library = json.loads((ROOT / "library.json").read_text())
 
-    def test_keys(self):
+    def test_manifest_has_documented_keys(self):
         self.assertEqual(self.library.keys(), self.KEYS)
         self.assertEqual(self.library["build"].keys(), self.BUILD_KEYS)
         self.assertEqual(self.library["version"], VERSION)
@@ -68,10 +68,10 @@ class PlatformIO(Case):
         for path in self.library["headers"] + self.library["export"]["include"]:
             self.assertTrue((ROOT / path).exists(), path)
 
-    def test_sources(self):
+    def test_builds_all_sources(self):
         chosen = set()
         for sign, pattern in (re.match(r"([+-])<(.+)>$", one).groups() for one in self.library["build"]["srcFilter"]):
-            # As match_src_files of PlatformIO: a folder is all that is below it.
+            # PlatformIO's match_src_files takes a folder with everything below it.
             matched = set()
             for path in glob.glob(str(ROOT / pattern), recursive=True):
                 below = Path(path).rglob("*.cpp") if os.path.isdir(path) else [Path(path)]
@@ -81,15 +81,15 @@ class PlatformIO(Case):
 
 
 class Zephyr(Case):
-    # The schema in zephyr/scripts/zephyr_module.py
-    def test_module(self):
+    # The schema is in zephyr/scripts/zephyr_module.py
+    def test_module_file(self):
         module = yaml.safe_load((ROOT / "zephyr/module.yml").read_text())
         self.assertEqual(module.keys(), {"name", "build"})
         self.assertEqual(module["build"].keys(), {"cmake", "kconfig"})
         self.assertTrue((ROOT / module["build"]["cmake"] / "CMakeLists.txt").is_file())
         self.assertTrue((ROOT / module["build"]["kconfig"]).is_file())
 
-    def test_option(self):
+    def test_kconfig_option(self):
         (self.folder / "Kconfig").write_text(f"""
 config CPP
 	bool "C++"
@@ -122,24 +122,24 @@ foreach(name IN ITEMS zephyr_include_directories zephyr_library_named zephyr_lib
 endforeach()
 """
 
-    def test_sources(self):
-        said = self.configured(f'{self.PROJECT}set(CONFIG_ABSENC y)\nadd_subdirectory({ROOT}/packages/zephyr absenc)')
-        called = dict(re.findall(r"^-- (zephyr_\w+)=(.*)$", said, re.MULTILINE))
+    def test_builds_all_sources(self):
+        output = self.configured(f'{self.PROJECT}set(CONFIG_ABSENC y)\nadd_subdirectory({ROOT}/packages/zephyr absenc)')
+        called = dict(re.findall(r"^-- (zephyr_\w+)=(.*)$", output, re.MULTILINE))
         self.assertEqual(called["zephyr_include_directories"], str(ROOT))
         self.assertEqual(called["zephyr_library_named"], "absenc")
         self.assertIn("-fdata-sections", called["zephyr_library_compile_options"])
         self.assert_same_sources(called["zephyr_library_sources"].split(";"))
 
-    def test_nothing_without_the_option(self):
-        said = self.configured(f"{self.PROJECT}add_subdirectory({ROOT}/packages/zephyr absenc)")
-        self.assertNotIn("zephyr_", said)
+    def test_builds_nothing_without_option(self):
+        output = self.configured(f"{self.PROJECT}add_subdirectory({ROOT}/packages/zephyr absenc)")
+        self.assertNotIn("zephyr_", output)
 
 
 class EspIdf(Case):
     # https://docs.espressif.com/projects/idf-component-manager/en/latest/reference/manifest_file.html
     KEYS = {"version", "description", "license", "tags", "dependencies", "files"}
 
-    def test_manifest(self):
+    def test_manifest_has_documented_keys(self):
         manifest = yaml.safe_load((ROOT / "idf_component.yml").read_text())
         self.assertEqual(manifest.keys(), self.KEYS)
         self.assertEqual(manifest["version"], VERSION)
@@ -151,7 +151,7 @@ class EspIdf(Case):
         self.assertGreaterEqual(packed, sources() | {"CMakeLists.txt", "cmake/sources.cmake", "packages/esp-idf.cmake"})
         self.assertFalse([path for path in packed if path.startswith(("absenc/os", "absenc/sim", "tools", "tests"))])
 
-    # What idf_component_register has made when it comes back: a library.
+    # The mock of idf_component_register creates a library, as the real one does.
     PROJECT = f"""
 cmake_minimum_required(VERSION 3.16)
 project(esp LANGUAGES CXX)
@@ -166,13 +166,13 @@ set(ESP_PLATFORM 1)
 add_subdirectory({ROOT} absenc)
 """
 
-    def test_sources(self):
-        said = self.configured(self.PROJECT)
-        self.assert_same_sources(re.search("^-- sources=(.*)$", said, re.MULTILINE)[1].split(";"))
-        self.assertEqual(re.search("^-- headers=(.*)$", said, re.MULTILINE)[1], str(ROOT))
+    def test_builds_all_sources(self):
+        output = self.configured(self.PROJECT)
+        self.assert_same_sources(re.search("^-- sources=(.*)$", output, re.MULTILINE)[1].split(";"))
+        self.assertEqual(re.search("^-- headers=(.*)$", output, re.MULTILINE)[1], str(ROOT))
 
-    def test_requirements_are_asked_for_by_a_script(self):
-        """Where idf_component_register ends the list, and files cannot be looked for."""
+    def test_early_script_stops_at_registration(self):
+        """In early expansion idf_component_register ends the script, and files cannot be searched."""
         (self.folder / "early.cmake").write_text(f"""
 set(ESP_PLATFORM 1)
 set(CMAKE_BUILD_EARLY_EXPANSION 1)
@@ -195,7 +195,7 @@ class Arduino(Case):
         run(ROOT / "packages/arduino/export.py", self.folder)
         self.library = self.folder / "absenc"
 
-    def test_properties(self):
+    def test_properties_are_documented(self):
         lines = (self.library / "library.properties").read_text().splitlines()
         properties = dict(line.split("=", 1) for line in lines)
         self.assertEqual(properties.keys(), self.REQUIRED | self.OPTIONAL)
@@ -203,23 +203,23 @@ class Arduino(Case):
         self.assertEqual(properties["category"], "Device Control")
         self.assertTrue((self.library / "src" / properties["includes"]).is_file())
 
-    def test_sources(self):
+    def test_exports_all_sources(self):
         exported = self.library / "src"
         self.assert_same_sources(ROOT / path.relative_to(exported) for path in exported.rglob("*.cpp"))
 
-    def test_the_sketch_reads_positions(self):
+    def test_sketch_reads_positions(self):
         sketch = self.library / "examples/ReadTFormat/ReadTFormat.ino"
         program = self.folder / "sketch.cpp"
-        # As Arduino does: its header in front of the sketch, and a main that calls what is in it.
+        # Builds the sketch as Arduino does: its header before the sketch, and a `main` that calls `setup` and `loop`.
         program.write_text(f'#include <Arduino.h>\n#include "{sketch}"\n'
                            "int main() { setup(); for (int i = 0; i < 20000; ++i) loop(); }\n")
         exported = self.library / "src"
         run("c++", "-std=gnu++20", "-Wall", "-Werror", "-I", ROOT / "tests/arduino", "-I", exported, "-o",
             self.folder / "sketch", program, exported / "absenc/protocol/host_rules.cpp",
             *sorted((exported / "absenc/protocol/author").rglob("*.cpp")))
-        said = run(self.folder / "sketch").splitlines()
-        # Every third reply is damaged, and the first behind it only confirms the next.
-        self.assertEqual(said[:6], ["4660 74565", "bad_checksum"] * 3)
+        output = run(self.folder / "sketch").splitlines()
+        # Every third reply is damaged, and the next one only confirms the one after it.
+        self.assertEqual(output[:6], ["4660 74565", "bad_checksum"] * 3)
 
 
 @unittest.skipUnless(os.environ.get("ABSENC_FIRMWARE_ALL"), "compiles all of it twice: ./dev firmware")
@@ -232,17 +232,17 @@ class FetchContent(Case):
         run("cmake", "--build", self.folder)
         return self.folder / "position"
 
-    def test_natively(self):
+    def test_builds_natively(self):
         run(self.built("-DCMAKE_BUILD_TYPE=Debug"))
 
-    def test_units_that_are_not_used_cost_nothing(self):
+    def test_unused_units_take_no_space(self):
         program = self.built("--toolchain", ROOT / "cmake/arm-none-eabi.cmake", "-DCMAKE_BUILD_TYPE=MinSizeRel",
                              "-DCMAKE_EXE_LINKER_FLAGS=--specs=nano.specs --specs=nosys.specs")
         symbols = run("arm-none-eabi-nm", "-C", program)
         self.assertIn("absenc::tformat::", symbols)
         for unit in self.UNITS:
             self.assertNotIn(f"absenc::{unit}::", symbols)
-        # The same program with no more of the library than it needs: not a byte less.
+        # A program linked with only the needed sources must have the same size.
         alone = self.folder / "alone"
         flags = "-mcpu=cortex-m0plus -mthumb -std=c++20 -Os -DNDEBUG -ffreestanding -ffunction-sections -fdata-sections"
         run("arm-none-eabi-g++", *flags.split(), "-fno-exceptions", "-fno-rtti", "-fno-threadsafe-statics",

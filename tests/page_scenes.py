@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The page of `absenc serve` in Chromium, of encoders with names: for tests that look at it, and for ./dev pictures."""
+"""Shows the page of `absenc serve` in Chromium with named encoders, for tests and for ./dev pictures."""
 import os
 import sys
 import urllib.parse
 
-SYSTEM_PYTHON = "/usr/bin/python3"  # the one that Debian's python3-selenium is for
+SYSTEM_PYTHON = "/usr/bin/python3"  # the interpreter that has Debian's python3-selenium
 
 try:
     from selenium import webdriver
@@ -15,7 +15,7 @@ except ImportError:
 
 from selenium.webdriver.chrome.service import Service
 
-# Name: protocol and options. A port in braces is one of the caller's.
+# Name: protocol and options. A port in braces is supplied by the caller.
 KINDS = {
     "shoulder": ("tformat", "motion=rpm=60"),
     "slide-x": ("biss", "model=linear-26-1um&motion=sine=20,0.1&singleturn=33554432"),
@@ -32,7 +32,7 @@ KINDS = {
 
 
 def config(kinds, ports=None):
-    """absenc.toml of these."""
+    """Returns an absenc.toml with these encoders."""
     text = ""
     for name, (protocol, options) in kinds.items():
         text += f'[encoder.{name}]\nprotocol = "{protocol}"\nport = "{(ports or {}).get(name, "sim")}"\nrate_hz = 100\n'
@@ -44,13 +44,13 @@ def config(kinds, ports=None):
 
 
 def hundred():
-    """A hundred encoders of all kinds."""
+    """Returns a hundred encoders of all kinds."""
     kinds = list(KINDS.items())
     return {f"{name}-{i:02}": kind for i in range(100) for name, kind in [kinds[i % len(kinds)]]}
 
 
 class Browser:
-    """Chromium with a window of any width."""
+    """Chromium with an adjustable window size."""
 
     def __init__(self, *arguments):
         options = webdriver.ChromeOptions()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The Python package: its own tests, over every unit's virtual encoder."""
+"""Runs the Python package's own tests, which use every unit's virtual encoder."""
 import tempfile
 import unittest
 
@@ -7,7 +7,7 @@ from python_support import SOURCE, PackageCase
 
 
 class Units(PackageCase):
-    def test_its_own_tests(self):
+    def test_own_tests_pass(self):
         with tempfile.TemporaryDirectory() as scratch:
             self.run_python("-m", "pytest", "-q", "-p", "no:cacheprovider", f"--basetemp={scratch}/tests",
                             str(SOURCE / "python" / "tests"))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The Python package: a wheel, installed into a clean environment."""
+"""Builds a wheel of the Python package and installs it into a clean environment."""
 import os
 import subprocess
 import tempfile
@@ -10,7 +10,7 @@ from python_support import PACKAGE, PATIENCE, SOURCE, PackageCase
 
 
 class Wheel(PackageCase):
-    def test_a_wheel_in_a_clean_environment(self):
+    def test_wheel_works_in_clean_environment(self):
         with tempfile.TemporaryDirectory() as scratch:
             scratch = Path(scratch)
             self.run_python("-m", "pip", "wheel", "--no-build-isolation", "--no-index", "--no-deps", "-w", str(scratch),
@@ -26,7 +26,7 @@ class Wheel(PackageCase):
                                   check=True, env=environment, capture_output=True, text=True, cwd=scratch,
                                   timeout=PATIENCE)
             self.assertTrue(said.stdout.startswith(str(scratch / "clean")))
-            # The plugin is found by its entry point.
+            # pytest finds the plugin by its entry point.
             (scratch / "test_drive.py").write_text(
                 "def test(absenc_emulate):\n    assert absenc_emulate('tformat').path.startswith('/dev/')\n")
             done = subprocess.run([python, "-m", "pytest", "-q", "-p", "no:cacheprovider", "test_drive.py"], cwd=scratch,

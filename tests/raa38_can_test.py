@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The RAA38S6 on CAN as a user types it: behind an slcan adapter on a pseudo-terminal, and in the simulator."""
+"""Tests the RAA38S6 on CAN with the command: behind an slcan adapter on a pseudo-terminal, and in the simulator."""
 import json
 import os
 import re
@@ -11,14 +11,14 @@ import unittest
 from command_support import PATIENCE, Case, Emulator, absenc, json_lines
 
 
-class OnTheBus(Case):
+class CanBus(Case):
     def emulator(self, *arguments, name="adapter"):
         emulator = Emulator(self.directory, *arguments, protocol="raa38-can", name=name)
         self.addCleanup(emulator.end)
         return emulator
 
     def bus(self, *arguments):
-        """The address of a virtual bus, with patience for a machine that is busy with other tests."""
+        """Returns the address of a virtual bus, with a latency that a busy machine needs."""
         self.node = self.emulator(*arguments)
         return f"raa38-can:slcan:{self.node.path}?latency=300"
 
@@ -38,7 +38,7 @@ class OnTheBus(Case):
         self.assert_good(result)
         return json.loads(result.stdout)["singleturn"]
 
-    def test_reads_by_asking_and_by_listening(self):
+    def test_reads_by_polling_and_by_listening(self):
         address = self.bus("--singleturn", "9799", "--option", "cyclic=50")
         reading = json.loads(absenc("read", address, "--json").stdout)
         self.assertEqual((reading["singleturn"], reading["singleturn_bits"], reading["confirmed"]), (9799, 14, True))
@@ -49,7 +49,8 @@ class OnTheBus(Case):
         self.assert_no_rule_broken()
 
     def burst(self, count):
-        """So many requests in one write: how many the adapter took, refused, and how many the node answered."""
+        """Sends `count` requests in one write. Returns how many the adapter accepted and refused, and how many the node
+        answered."""
         descriptor = os.open(self.node.path, os.O_RDWR | os.O_NOCTTY)
         self.addCleanup(os.close, descriptor)
         tty.setraw(descriptor)
@@ -64,19 +65,19 @@ class OnTheBus(Case):
                 text += os.read(descriptor, 4096)
         return text.count(b"z\r"), text.count(b"\a"), text.count(b"t120")
 
-    def test_fifty_requests_at_once(self):
+    def test_adapter_queues_fifty_requests(self):
         self.bus("--option", "cyclic=0")
         self.assertEqual(self.burst(50), (50, 0, 50))
         self.assert_no_rule_broken()
 
-    def test_more_requests_than_an_adapter_keeps(self):
+    def test_adapter_refuses_requests_beyond_its_queue(self):
         self.bus("--option", "cyclic=0")
         taken, refused, answered = self.burst(150)
         self.assertEqual((taken + refused, answered), (150, taken))
         self.assertGreater(refused, 0)
         self.assertIn(f"frames refused because too many waited for the bus: {refused}", self.node.end()[2])
 
-    def test_twenty_one_bits(self):
+    def test_21_bits(self):
         address = self.bus("--singleturn", "1223629", "--option", "bits=21")
         self.assertEqual(self.singleturn(address + "&bits=21"), 1223629)
         self.assert_failed(absenc("read", address), "out_of_range", "bits", "120:CDAB120000000000")
@@ -96,13 +97,13 @@ class OnTheBus(Case):
         zero = self.fields("zero", address, "--yes")
         self.assertEqual((zero["before"], zero["after"], zero["written"], zero["answered"]), (5000, 0, True, True))
         self.assertEqual(self.singleturn(address), 0)
-        self.assertFalse(self.fields("zero", address, "--yes")["written"])  # it is zero
-        self.assertEqual(self.singleturn(address + "&listen=true"), 0)  # and sends again
+        self.assertFalse(self.fields("zero", address, "--yes")["written"])  # the position is zero already
+        self.assertEqual(self.singleturn(address + "&listen=true"), 0)  # the node sends cyclic frames again
         self.assert_no_rule_broken()
         again = self.emulator("--singleturn", "5010", "--memory", memory, name="again")
         self.assertEqual(self.singleturn(f"raa38-can:slcan:{again.path}?latency=300"), 10)
 
-    def test_node(self):
+    def test_sets_node(self):
         address = self.bus("--singleturn", "77")
         self.assertEqual(json.loads(absenc("config", "get", address, "--json").stdout)["settings"],
                          {"node": {"node": 0x20}})
@@ -117,12 +118,12 @@ class OnTheBus(Case):
         self.assertIn("nothing was sent, because it is so already", again.stderr)
         self.assert_no_rule_broken()  # nothing was written twice
 
-    def test_node_again_by_force(self):
+    def test_force_writes_node_again(self):
         address = self.bus()
         self.assert_good(absenc("config", "set", address, "node", "0x20", "--yes", "--force"))
         self.assertIn("a setting written that was set already", self.node.end()[2])
 
-    def test_bit_rate(self):
+    def test_sets_bit_rate(self):
         address = self.bus("--singleturn", "77")
         result = absenc("config", "set", address, "bitrate", "500000", "--yes", "--json")
         self.assert_good(result)
@@ -134,7 +135,7 @@ class OnTheBus(Case):
                            "invalid_argument", "1000000, 500000 or 250000")
         self.assertNotIn("rules", self.node.end()[2])
 
-    def test_direction(self):
+    def test_sets_direction(self):
         address = self.bus("--singleturn", "1000")
         change = json.loads(absenc("config", "set", address, "direction", "1", "--yes", "--json").stdout)
         self.assertTrue(change["new"]["mirrored"])
@@ -143,7 +144,7 @@ class OnTheBus(Case):
         self.assert_wrong_usage(absenc("config", "set", address, "direction", "1", "--yes", "--force"), "force")
         self.assert_no_rule_broken()
 
-    def test_settings_reach_every_node(self):
+    def test_refuses_settings_that_reach_every_node(self):
         address = self.bus("--also", "node=0x21")
         for setting in (["node", "5"], ["bitrate", "500000"]):
             self.assert_failed(absenc("config", "set", address, *setting, "--yes"), "invalid_argument",
@@ -160,7 +161,7 @@ class OnTheBus(Case):
         self.assertTrue(5 <= nodes[0]["readings_per_s"] <= 11, nodes)
         self.assertEqual(nodes[1]["readings_per_s"], 0)
 
-    def test_scan_says_what_it_may_disturb_and_asks(self):
+    def test_scan_warns_and_needs_consent(self):
         address = self.bus("--also", "node=0x42")
         log = self.file("scan.log")
         for arguments in (["scan", f"{address}&log={log}"], ["run", f"{address}&log={log}", "scan"]):
@@ -175,7 +176,7 @@ class OnTheBus(Case):
         self.assertIn("201#8001 to 2FF#80FF", result.stderr)
         self.assertNotIn("201#8001", absenc("scan", "sim:raa38-can").stderr, "nobody else is there")
 
-    def test_what_only_reads_asks_the_given_node_alone(self):
+    def test_reading_commands_send_only_to_given_node(self):
         address = self.bus("--also", "node=0x42", "--option", "cyclic=0")
         for number, arguments in enumerate((["info"], ["config", "get"], ["read"])):
             log = self.file(f"{number}.log")
@@ -184,7 +185,7 @@ class OnTheBus(Case):
                 sent = {line.split()[2] for line in file if line.split()[2].startswith("2")}
             self.assertEqual(sent, {"220#8020000000000000"}, arguments)
 
-    def test_two_nodes_in_turn(self):
+    def test_monitors_two_nodes(self):
         address = self.bus("--singleturn", "500", "--also", "node=0x21&singleturn=700")
         other = address + "&node=0x21"
         live = self.watch(address, other, "--rate", "20", until=lambda live: len(live) == 2)
@@ -205,7 +206,7 @@ class OnTheBus(Case):
         self.assertEqual(times, sorted(times))
         self.assert_failed(absenc("read", f"{address}&log={log}"), log)  # nothing is overwritten
 
-    def test_faults(self):
+    def test_survives_faults(self):
         address = self.bus("--fault", "silence=0.2", "--fault", "drop=0.1", "--fault", "repeat=0.1", "--singleturn", "9",
                            "--option", "cyclic=0").replace("latency=300", "latency=30")
         result = absenc("read", address, "--count", "60", "--rate", "0", "--json")
@@ -214,11 +215,11 @@ class OnTheBus(Case):
         self.assertEqual({reading["singleturn"] for reading in readings if "singleturn" in reading}, {9})
         self.assertRegex(self.node.end()[2], r"faults injected: .*drop.*silence.*repeat")
 
-    def test_interrupted_adapter(self):
-        """Something else on the line: garbage and another program's frames."""
+    def test_survives_interrupted_adapter(self):
+        """Garbage, and frames of another program, arrive on the line."""
         address = self.bus("--singleturn", "9799")
         with open(self.node.path, "wb", buffering=0) as other:
-            other.write(b"garbage\rt22")  # breaks off in the middle
+            other.write(b"garbage\rt22")  # an incomplete frame
         self.assertEqual(self.singleturn(address), 9799)
 
     def test_bench(self):
@@ -228,7 +229,7 @@ class OnTheBus(Case):
         self.assertGreater(json.loads(result.stdout)["readings"], 5)
 
 
-class InTheSimulator(Case):
+class Simulator(Case):
     def test_verbs(self):
         for arguments in (["read", "sim:raa38-can"], ["read", "sim:raa38-can?listen=true"], ["info", "sim:raa38-can"],
                           ["zero", "sim:raa38-can?singleturn=500"], ["scan", "sim:raa38-can"],
@@ -241,20 +242,20 @@ class InTheSimulator(Case):
             with self.subTest(arguments):
                 self.assert_good(absenc(*arguments))
 
-    def test_log_of_the_simulator(self):
+    def test_log_of_simulator(self):
         log = self.file("sim.log")
         self.assert_good(absenc("read", f"sim:raa38-can?log={log}"))
         with open(log, encoding="utf-8") as file:
             self.assertIn(" sim 220#8020000000000000\n", file.read())
 
-    def test_what_it_has_not(self):
+    def test_refuses_unsupported_verbs(self):
         self.assert_wrong_usage(absenc("temperature", "sim:raa38-can"), "no command for this")
         self.assert_wrong_usage(absenc("alarms", "sim:raa38-can"))
         self.assert_wrong_usage(absenc("read", "sim:raa38-can?alarm=x"), "no alarms")
 
 
 class Usage(Case):
-    def test_encoders_that_do_not_exist(self):
+    def test_refuses_wrong_addresses(self):
         for encoder, words in [("raa38-can:/dev/ttyUSB0", ["does not go over a serial port", "slcan:/dev/ttyACM0"]),
                                ("raa38-can:tcp:host:1", ["does not go over TCP"]),
                                ("raa38-can:slcan:", ["which serial port"]),
@@ -268,7 +269,7 @@ class Usage(Case):
             with self.subTest(encoder):
                 self.assert_wrong_usage(absenc("read", encoder), *words)
 
-    def test_emulate(self):
+    def test_emulate_refuses_wrong_usage(self):
         for arguments, words in [(["tformat", "--can", "vcan0"], ["CAN bus"]),
                                  (["raa38-can", "--can", "vcan0", "--pty", "x"], ["--pty is a line of its own: not with --can"]),
                                  (["raa38-can", "--singleturn", "16384"], ["0 to 16383"]),
@@ -277,14 +278,14 @@ class Usage(Case):
             with self.subTest(arguments):
                 self.assert_wrong_usage(absenc("emulate", *arguments, "--for", "0.01"), *words)
 
-    def test_no_such_interface(self):
+    def test_reports_missing_interface(self):
         for arguments in (["read", "raa38-can:absenc-none"], ["emulate", "raa38-can", "--can", "absenc-none"]):
             with self.subTest(arguments):
                 result = absenc(*arguments)
                 self.assertEqual(result.returncode, 1)
                 self.assertRegex(result.stderr, "there is no CAN interface absenc-none|this kernel has no CAN.*modprobe")
 
-    def test_no_such_adapter(self):
+    def test_reports_missing_adapter(self):
         self.assert_failed(absenc("read", f"raa38-can:slcan:{self.directory}/none"), "none")
 
 
@@ -292,7 +293,7 @@ class Frames(Case):
     def decode(self, *arguments):
         return json.loads(absenc("decode", "raa38-can", "--json", *arguments).stdout)
 
-    def test_every_bad_frame_in_words(self):
+    def test_explains_every_bad_frame(self):
         for arguments, error, words in [
                 (["--hex", "120:47260000000000"], "wrong_length", "8 bytes"),
                 (["--hex", "120:"], "wrong_length", "8 bytes"),
@@ -312,7 +313,7 @@ class Frames(Case):
                 self.assertEqual((decoded["ok"], decoded["error"]), (False, error))
                 self.assertIn(words, decoded["message"])
 
-    def test_named_frames(self):
+    def test_names_canopen_frames(self):
         for frame, fields in [("000:0120", {"function": "NMT", "data": "0120"}),
                               ("080:", {"function": "SYNC", "data": ""}),
                               ("0A0:1081110000000000", {"node": 32, "function": "EMCY", "data": "1081110000000000"}),
@@ -324,7 +325,7 @@ class Frames(Case):
                 self.assertEqual({name: str(value).upper() if name == "data" else value
                                   for name, value in decoded["fields"].items()}, fields)
 
-    def test_requests(self):
+    def test_encodes_requests(self):
         for arguments, wanted in [(["position"], "220:8020000000000000"), (["start"], "220:0120000000000000"),
                                   (["cyclic", "10"], "220:31200A0000000000"), (["stop"], "220:3120000000000000"),
                                   (["zero"], "220:2020000000000000"), (["direction", "1"], "220:2220010000000000"),

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""The RAA38S6 over Modbus RTU on a pseudo-terminal, read and set up by the command."""
+"""Tests the RAA38S6 over Modbus RTU on a pseudo-terminal, read and configured with the command."""
 import json
 import os
 import re
@@ -10,7 +10,7 @@ from command_support import Case, Emulator, FakeEncoder, absenc, json_lines
 
 
 def framed(text):
-    """The bytes with their CRC, low byte first, in the manual's own steps (3.1.7)."""
+    """Returns the bytes with their CRC, low byte first, computed in the steps of the manual (3.1.7)."""
     data = bytes.fromhex(text)
     crc = 0xFFFF
     for byte in data:
@@ -21,7 +21,7 @@ def framed(text):
 
 
 REQUEST_1, REQUEST_2 = framed("010300000001"), framed("010300000002")
-# Options, request and reply; the error, what is found and what is advised.
+# Each row: options, request, reply, error, evidence in the message, advice.
 FRAMES = [
     ("bits=14", REQUEST_1, framed("0103020180")[:-1], "wrong_length", "byte count 02", "bits and registers"),
     ("bits=14", REQUEST_1, framed("01030400000180"), "wrong_length", "byte count 02", "more than 16 bits has two"),
@@ -41,7 +41,7 @@ FRAMES = [
     ("bits=14", REQUEST_1, framed("01830b"), "request_rejected", "behind the gateway", "gateway"),
     ("bits=14", REQUEST_1, framed("018377"), "request_rejected", "the standard does not have", "manual"),
 ]
-# The same of frames that no reading brings.
+# Further bad replies, to requests that no reading sends.
 OTHER_FRAMES = [
     (framed("ffa0"), framed("ffa000"), "out_of_range", "from 1 to 247"),
     (framed("ffa0"), framed("ffa001")[:-1], "wrong_length", "several encoders"),
@@ -85,7 +85,7 @@ class ModbusCase(Case):
 
 
 class Reading(ModbusCase):
-    def test_every_form_of_a_reply(self):
+    def test_every_form_of_reply(self):
         for options, data in (("bits=14", "four"), ("bits=21", "four"), ("bits=21", "three"),
                               ("bits=21", "three_as_four"), ("bits=12&registers=2", "three_as_four")):
             with self.subTest(options, data=data):
@@ -113,12 +113,12 @@ class Reading(ModbusCase):
         self.assertEqual(answers["baud"]["fields"], {"baud": 19200})
         self.assertEqual(answers["position"]["singleturn"], 7)
 
-    def test_what_the_options_allow(self):
+    def test_refuses_options_out_of_range(self):
         for option in ("address=0", "address=248", "bits=9", "bits=22", "registers=3", "baud=38400"):
             self.assert_wrong_usage(absenc("read", f"sim:raa38-modbus?{option}"), option.split("=", maxsplit=1)[0])
         self.assert_failed(absenc("read", "sim:raa38-modbus?bits=17&registers=1"), "16 bits", "registers=2")
 
-    def test_a_name_has_a_baud_rate(self):
+    def test_named_encoder_has_baud_rate(self):
         config = self.file("absenc.toml", '[encoder.drum]\nprotocol = "raa38-modbus"\nport = "sim"\nbaud = 2400\n')
         info = absenc("info", "drum", "--json", env={**os.environ, "ABSENC_CONFIG": config})
         self.assert_good(info)
@@ -127,7 +127,7 @@ class Reading(ModbusCase):
 
 
 class WrongAddress(ModbusCase):
-    def test_the_right_one_is_named(self):
+    def test_names_right_address(self):
         emulator = self.emulator("--option", "address=42")
         uri = self.uri(emulator, "&address=5")
         named = "nobody answers at address 5, but A0 is answered by address 42 at 19200 baud"
@@ -137,7 +137,7 @@ class WrongAddress(ModbusCase):
         self.assertEqual(info.returncode, 1)
         self.assertIn(named, info.stdout)
 
-    def test_a0_in_both_orders(self):
+    def test_address_reply_with_either_crc_order(self):
         for order in ("low_first", "high_first"):
             emulator = self.emulator("--option", "address=42", "--option", f"address_crc={order}", name=order)
             found = self.good_json("config", "get", self.uri(emulator), "address")
@@ -148,7 +148,7 @@ class WrongAddress(ModbusCase):
 
 
 class Settings(ModbusCase):
-    def test_a_baud_rate_is_followed(self):
+    def test_host_follows_new_baud_rate(self):
         emulator = self.emulator("--singleturn", "383", "--memory", self.file("memory"))
         uri = self.uri(emulator)
         for before, baud in ((19200, 57600), (57600, 2400), (2400, 19200), (19200, 9600)):
@@ -164,14 +164,14 @@ class Settings(ModbusCase):
         kept = self.emulator("--memory", self.file("memory"), name="again")
         self.assertEqual(self.good_json("read", self.uri(kept, "&baud=9600"))["singleturn"], 0)
 
-    def test_a_change_of_the_baud_rate_leaves_the_parity(self):
+    def test_new_baud_rate_keeps_parity(self):
         for parity in ("odd", "even"):
             uri = f"sim:raa38-modbus?parity={parity}&singleturn=383"
             self.assertEqual(self.good_json("read", uri)["singleturn"], 383)
             now, _ = self.set(uri, "baud", "9600")
             self.assertEqual((now["old"], now["new"]), ({"baud": 19200}, {"baud": 9600}))
 
-    def test_an_address_is_verified(self):
+    def test_new_address_is_verified(self):
         emulator = self.emulator()
         now, note = self.set(self.uri(emulator), "address", "200")
         self.assertEqual((now["old"], now["new"]), ({"address": 1}, {"address": 200}))
@@ -180,7 +180,7 @@ class Settings(ModbusCase):
         self.assert_good(absenc("read", self.uri(emulator, "&address=200")))
         self.assertEqual(self.violations(emulator), [])
 
-    def test_what_is_so_already_is_not_sent(self):
+    def test_unchanged_value_is_not_sent(self):
         emulator = self.emulator()
         for setting, value in (("address", "1"), ("baud", "19200")):
             now, note = self.set(self.uri(emulator), setting, value)
@@ -193,18 +193,18 @@ class Settings(ModbusCase):
         self.assertEqual(len(rules), 2, rules)
         self.assertIn("wears out", rules[0])
 
-    def test_force_is_for_those_who_know_it(self):
+    def test_refuses_wrong_values_and_force(self):
         uri = self.uri(self.emulator())
         self.assert_wrong_usage(absenc("config", "set", uri, "direction", "1", "--yes", "--force"), "--force")
         self.assert_failed(absenc("config", "set", uri, "baud", "14400", "--yes"), "2400, 4800")
         self.assert_wrong_usage(absenc("config", "set", uri, "address", "248", "--yes"), "1 to 247")
         self.assert_wrong_usage(absenc("config", "set", uri, "baud", "9600"), "--yes")
 
-    def test_an_address_that_is_taken(self):
+    def test_refuses_address_of_another_encoder(self):
         emulator = self.emulator("--also", "address=2")
         result = absenc("config", "set", self.uri(emulator), "address", "2", "--yes")
         self.assert_failed(result, "invalid_argument", "answers at that address already", "nothing was sent")
-        self.set(self.uri(emulator), "address", "3")  # A0 is no help with two on the line
+        self.set(self.uri(emulator), "address", "3")  # A0 identifies no address with two encoders on the line
         self.assert_good(absenc("read", self.uri(emulator, "&address=2")))
         self.assertEqual(self.violations(emulator), [])
 
@@ -214,16 +214,16 @@ class Settings(ModbusCase):
         now, _ = self.set(uri, "direction", "2")
         self.assertIn("does not tell", now["new"]["direction"])
         self.assertEqual((now["old"]["singleturn"], now["new"]["singleturn"]), (100, 16284))
-        told = self.good_json("run", uri, "set-direction", "1", "--yes")["fields"]
-        self.assertEqual((told["parameter"], told["setting"]), (1, "positive direction"))
-        self.assertIn("has changed", told["effect"])
+        result = self.good_json("run", uri, "set-direction", "1", "--yes")["fields"]
+        self.assertEqual((result["parameter"], result["setting"]), (1, "positive direction"))
+        self.assertIn("has changed", result["effect"])
         self.assertEqual(self.good_json("zero", uri, "--yes")["fields"]["singleturn"], 0)
         self.assertEqual(self.good_json("read", uri)["singleturn"], 0)
         self.assertEqual(self.violations(emulator), [])
         turning = self.emulator("--motion", "rpm=60", name="turning")
         self.assert_failed(absenc("zero", self.uri(turning), "--yes"), "turning", "nothing was changed")
 
-    def test_a_server_of_ports_keeps_its_rate(self):
+    def test_refuses_baud_rate_over_tcp(self):
         emulator = self.emulator("--tcp", "0")
         port = emulator.line().strip().rpartition(":")[2]
         result = absenc("config", "set", f"raa38-modbus:tcp:127.0.0.1:{port}", "baud", "9600", "--yes")
@@ -231,7 +231,7 @@ class Settings(ModbusCase):
         self.assert_good(absenc("read", self.uri(emulator)))
 
 
-class Line(ModbusCase):
+class SharedLine(ModbusCase):
     def test_scan(self):
         alone = self.emulator("--option", "address=77", name="alone")
         self.assertEqual(self.good_json("scan", f"raa38-modbus:{alone.path}")["encoders"],
@@ -248,14 +248,14 @@ class Line(ModbusCase):
         nobody = absenc("run", "sim:raa38-modbus?address=9&fault=silence=1", "scan", "1", "3")
         self.assert_failed(nobody, "timeout", "no address was answered")
 
-    def test_several_are_watched(self):
+    def test_monitors_several_encoders(self):
         emulator = self.emulator("--also", "address=2&singleturn=222", "--also", "address=3&singleturn=333")
         uris = [self.uri(emulator, f"&address={address}") for address in (1, 2, 3)]
         live = self.watch(*uris, until=lambda live: len(live) == 3)
         self.assertEqual([live[uri]["singleturn"] for uri in uris], [0, 222, 333])
         self.assertEqual(self.violations(emulator), [])
 
-    def test_faults_are_survived(self):
+    def test_survives_faults(self):
         emulator = self.emulator("--singleturn", "383", "--fault", "corrupt=0.2", "--fault", "drop=0.1", "--seed", "3")
         result = absenc("read", f"raa38-modbus:{emulator.path}", "--count", "50", "--json")
         self.assertTrue(all(line.get("singleturn", 383) == 383 for line in json_lines(result.stdout)), result.stdout)
@@ -263,14 +263,14 @@ class Line(ModbusCase):
 
 
 class Frames(ModbusCase):
-    def test_read_says_what_came_and_what_to_do(self):
+    def test_read_reports_received_bytes_and_advice(self):
         for options, _, reply, error, found, advice in FRAMES:
             with self.subTest(reply.hex()), FakeEncoder({0x01: reply}) as encoder:
                 result = absenc("read", f"raa38-modbus:{encoder.path}?{options}&latency=300")
                 self.assert_failed(result, error, found, reply.hex(" ").upper())
                 self.assertIn(advice, result.stderr.partition("Try: ")[2])
 
-    def test_decode_says_the_same(self):
+    def test_decode_reports_same_errors(self):
         for options, request, reply, error, found, _ in FRAMES:
             with self.subTest(reply.hex()):
                 result = absenc("decode", "raa38-modbus", "--request", request.hex(), "--hex", reply.hex(), "--option",
@@ -286,10 +286,10 @@ class Frames(ModbusCase):
     def test_silence_and_noise(self):
         with FakeEncoder({0x01: b""}) as encoder:
             self.assert_failed(absenc("read", f"raa38-modbus:{encoder.path}"), "timeout", "nobody answers", "scan")
-        with FakeEncoder({0x01: REQUEST_1}) as encoder:  # the echo of the adapter alone
+        with FakeEncoder({0x01: REQUEST_1}) as encoder:  # only the adapter's echo
             self.assert_failed(absenc("read", f"raa38-modbus:{encoder.path}"), "request itself came back")
 
-    def test_without_the_request(self):
+    def test_decode_without_request(self):
         def decoded(reply, *options):
             arguments = [word for option in options for word in ("--option", option)]
             return self.good_json("decode", "raa38-modbus", "--hex", reply.hex(), *arguments)["fields"]

@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""RAA38S6 encoders on serial lines: by the command on a pseudo-terminal, and against frames of another hand."""
+"""Tests RAA38S6 encoders on serial lines: virtual ones with the command, and fake ones with independently built
+frames."""
 import csv
 import io
 import json
@@ -28,13 +29,13 @@ class RaaCase(EncoderCase):
         self.assertIn("\n  Try: ", result.stderr)
 
     def read_fake(self, reply, options):
-        """What `read` says of a bus encoder that always answers the same."""
+        """Returns the result of `read` for a bus encoder that always sends the same reply."""
         with FakeEncoder({0xBC: reply}) as fake:
             return absenc("read", f"raa38:{fake.path}?mode=bus&latency=50{options}")
 
 
 class Stream(RaaCase):
-    def test_positions_one_after_the_other(self):
+    def test_reads_consecutive_positions(self):
         path = self.emulator("--singleturn", "383", "--option", "refresh_hz=500").path
         result = absenc("read", f"raa38:{path}", "--count", "20", "--rate", "0", "--json")
         self.assert_good(result)
@@ -42,13 +43,13 @@ class Stream(RaaCase):
             self.assertEqual((reading["singleturn"], reading["confirmed"]), (383, True))
             self.assertAlmostEqual(reading["angle_deg"], 360 * 383 / 2**14)
 
-    def test_reading_is_as_fast_as_the_stream(self):
+    def test_reads_as_fast_as_stream(self):
         emulator = self.emulator("--option", "refresh_hz=1000", "--motion", "rpm=60")
         result = absenc("bench", f"raa38:{emulator.path}", "--seconds", "2", "--json")
         self.assert_good(result)
         self.assertGreater(json.loads(result.stdout)["readings_per_s"], 900)
 
-    def test_a_slow_reader_gets_what_is_new(self):
+    def test_slow_reader_gets_newest_position(self):
         emulator = self.emulator("--option", "refresh_hz=200", "--motion", "rpm=60")
         result = absenc("read", f"raa38:{emulator.path}", "--count", "5", "--rate", "5", "--csv")
         self.assert_good(result)
@@ -66,11 +67,11 @@ class Stream(RaaCase):
         self.assertRegex(result.stderr, r"[1-9][0-9]* failed \(.*bad_checksum")
         self.assertEqual({line["reading"]["singleturn"] for line in json_lines(result.stdout)}, {383})
 
-    def test_dropped_frames_are_counted_where_no_reading_shows_them(self):
+    def test_dropped_frames_are_counted(self):
         result = absenc("read", "sim:raa38?fault=corrupt=0.3&refresh_hz=1000", "--rate", "0", "--count", "100")
         self.assert_good(result)
         dropped = int(re.search(r"(\d+) damaged frames of the stream were dropped", result.stderr).group(1))
-        # With 30 of 100 damaged, about 43 are dropped while 100 come through, and more on a busy machine.
+        # With 30 of 100 frames damaged, about 43 are dropped per 100 good ones. A busy machine skips some of them.
         self.assertGreater(dropped, 15, result.stderr)
         result = absenc("read", "sim:raa38?refresh_hz=1000", "--rate", "0", "--count", "100")
         self.assertEqual((result.returncode, result.stderr), (0, ""))
@@ -84,29 +85,29 @@ class Stream(RaaCase):
         self.assertGreater(len(rows), 100)
         self.assertEqual({row["singleturn"] for row in rows if not row["event"]}, {"383"})
 
-    def test_other_sizes(self):
+    def test_other_frame_sizes(self):
         for bits, value, size in ((10, 1023, 2), (17, 109517, 3), (21, 2097151, 3)):
             with self.subTest(bits=bits), BabblingLine(pieces=[frame(value, size)]) as fake:
                 result = absenc("read", f"raa38:{fake.path}?bits={bits}", "--json")
                 self.assert_good(result)
                 self.assertEqual(json.loads(result.stdout)["singleturn"], value)
 
-    def test_nothing_comes(self):
+    def test_silent_line(self):
         with BabblingLine(pieces=[b""]) as fake:
             result = absenc("read", f"raa38:{fake.path}")
         self.assert_trouble(result, "timeout", "nothing comes", f"nothing came from {fake.path}", "mode=bus")
 
-    def test_something_else_comes(self):
+    def test_line_without_frames(self):
         with BabblingLine(pieces=[b"\x55\xAA\x00"]) as fake:
             result = absenc("read", f"raa38:{fake.path}")
         self.assert_trouble(result, "bad_framing", "no two frames in a row", "received 55 AA 00", "baud, parity")
 
-    def test_more_bits_than_were_said(self):
+    def test_position_with_more_bits_than_option(self):
         with BabblingLine(pieces=[frame(0x4001)]) as fake:
             result = absenc("read", f"raa38:{fake.path}")
         self.assert_trouble(result, "out_of_range", "more bits", "received FF 81 40 01", "set bits")
 
-    def test_the_speed_limit_is_that_of_every_encoder(self):
+    def test_accepts_speed_limit(self):
         with BabblingLine(pieces=[FRAME]) as fake:
             self.assert_good(absenc("read", f"raa38:{fake.path}?max_rpm=100"))
 
@@ -117,7 +118,7 @@ class Bus(RaaCase):
                              "--also", "unit=3&second_byte=echo&singleturn=77",
                              "--also", "unit=9", "--also", "unit=9&singleturn=99&second_byte=echo").path
 
-    def test_each_unit_and_a_clash(self):
+    def test_each_unit_and_clash(self):
         path = self.bus()
         for unit, value in ((1, 383), (3, 77)):
             result = absenc("read", f"raa38:{path}?mode=bus&unit={unit}&latency=300", "--json")
@@ -135,16 +136,16 @@ class Bus(RaaCase):
                  for one in json.loads(result.stdout)["encoders"]}
         self.assertEqual(found, {1: (False, 383), 3: (False, 77), 9: (True, None)})
 
-    def test_scan_of_a_stream_finds_nobody(self):
+    def test_scan_reports_stream(self):
         result = absenc("scan", f"raa38:{self.emulator().path}")
         self.assert_trouble(result, "unexpected_reply", "although nobody asks", "mode=timing")
 
-    def test_scan_without_answer(self):
+    def test_scan_without_reply(self):
         with FakeEncoder({0xBC: b""}) as fake:
             result = absenc("scan", f"raa38:{fake.path}?latency=10")
         self.assert_trouble(result, "timeout", "no number from 0 to F")
 
-    def test_zero_is_asked_for_and_read_back(self):
+    def test_zero_needs_consent_and_is_read_back(self):
         path = self.bus()
         address = f"raa38:{path}?mode=bus&unit=3&zeroing=command&latency=300"
         refused = absenc("zero", address)
@@ -155,11 +156,11 @@ class Bus(RaaCase):
         fields = json.loads(result.stdout)["fields"]
         self.assertEqual((fields["before"], fields["singleturn"]), (77, 0))
 
-    def test_zero_without_effect_is_told(self):
+    def test_reports_zero_without_effect(self):
         result = absenc("zero", f"raa38:{self.bus()}?mode=bus&zeroing=command&zero_unit=12&latency=100", "--yes")
         self.assert_trouble(result, "cross_check_failed", "not zero after the zero was set", "zero_unit")
 
-    def test_the_zero_survives(self):
+    def test_zero_survives_restart(self):
         memory = self.file("memory")
         options = ("--option", "mode=bus", "--option", "zeroing=command", "--singleturn", "383", "--memory", memory)
         address = "raa38:{}?mode=bus&zeroing=command&latency=300"
@@ -182,7 +183,7 @@ class Bus(RaaCase):
             with self.subTest(reply=reply.hex(), options=options):
                 self.assert_trouble(self.read_fake(reply, options), error, "sent BC AA B1", *words)
 
-    def test_both_forms_are_read(self):
+    def test_accepts_both_forms_of_second_byte(self):
         for second in (0x81, 0xB1):
             result = self.read_fake(frame(383, second=second), "")
             self.assert_good(result)
@@ -190,18 +191,18 @@ class Bus(RaaCase):
 
 
 class Settings(RaaCase):
-    def test_a_real_port_needs_its_baud(self):
+    def test_port_needs_baud_rate(self):
         result = absenc("read", "raa38:/dev/absenc-no-such-port")
         self.assert_wrong_usage(result, "states no baud rate", '"raa38:/dev/absenc-no-such-port?baud=9600"')
         self.assert_failed(absenc("read", "raa38:/dev/absenc-no-such-port?baud=9600"), "there is no port")
         self.assertIsNone(json.loads(absenc("list", "raa38", "--json").stdout)["line"]["rate"])
 
-    def test_handshake_needs_a_wire(self):
+    def test_handshake_needs_trigger_wire(self):
         for place, *words in ((self.emulator().path, "trigger=rts", "trigger=gpio:NAME"),
                               ("tcp:127.0.0.1:1", "TCP does not carry")):
             self.assert_wrong_usage(absenc("read", f"raa38:{place}?mode=handshake"), "a pulse asks raa38", *words)
 
-    def test_wires_are_checked(self):
+    def test_refuses_wrong_wires(self):
         path = self.emulator().path
         for setting, *words in (("trigger=cts", "rts, dtr or gpio:NAME"), ("clear=gpio:", "gpioinfo"),
                                 ("trigger_us=0", "from 1 to"), ("clear_active=no", "must be low or high"),
@@ -219,20 +220,20 @@ class Settings(RaaCase):
         self.assert_good(result)
         self.assertIn("sets the zero: sim:raa38 does", result.stderr)
 
-    def test_no_way_to_set_the_zero(self):
+    def test_refuses_zero_without_zeroing_option(self):
         result = absenc("zero", "sim:raa38", "--yes")
         self.assert_trouble(result, "unsupported", "nothing is known", "zeroing=line")
         result = absenc("zero", "sim:raa38?zeroing=command", "--yes")
         self.assert_trouble(result, "invalid_argument", "command of a bus", "mode=bus")
 
-    def test_parity_and_baud_of_a_virtual_line(self):
+    def test_parity_and_baud_rate(self):
         path = self.emulator().path
         for settings in ("parity=even", "parity=odd&baud=9600"):
             result = absenc("read", f"raa38:{path}?{settings}")
             self.assert_good(result)
         self.assert_good(absenc("read", "sim:raa38?parity=even"))
 
-    def test_acquisition_may_take_long(self):
+    def test_waits_for_slow_acquisition(self):
         for mode in ("handshake", "bus"):
             for t3 in (20_000, 400_000):
                 result = absenc("read", f"sim:raa38?mode={mode}&acquisition_us={t3}&singleturn=383", "--json")
@@ -261,7 +262,7 @@ class Frames(RaaCase):
             fields = json.loads(result.stdout)["fields"]
             self.assertEqual({name: fields[name] for name in wanted}, wanted)
 
-    def test_a_request_of_a_bus_tells_the_mode(self):
+    def test_decode_infers_bus_mode_from_request(self):
         for mode in ("timing", "bus"):
             other = absenc("decode", "raa38", "--request", "bcaab1", "--hex", "ffb2017f31", "--option", f"mode={mode}")
             self.assert_failed(other, "unexpected_reply", "another unit answered", "`absenc scan` shows who answers")

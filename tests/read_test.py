@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`absenc read`, `run` and `bench` over the real serial path, and what they say when something is wrong."""
+"""Tests `absenc read`, `run` and `bench` over a pseudo-terminal, and their error messages."""
 import json
 import os
 import pty
@@ -20,13 +20,13 @@ NOBODY = 65534
 
 
 class Readings(EncoderCase):
-    def test_words(self):
+    def test_text(self):
         result = absenc("read", self.encoder("--singleturn", "74565", "--multiturn", "4660"))
         self.assert_good(result)
         self.assertRegex(result.stdout, r"^204\.799 deg +74565 counts +4660 turns +no alarms\n$")
         self.assertEqual(result.stderr, "")
 
-    def test_digits_of_the_resolution(self):
+    def test_angle_has_digits_of_resolution(self):
         result = absenc("read", self.encoder("--model", "23-bit", "--singleturn", "1", more="&model=23-bit"))
         self.assertRegex(result.stdout, r"^ *0\.00004 deg +1 counts")
 
@@ -53,7 +53,7 @@ class Readings(EncoderCase):
         self.assertEqual(rows[0][1:], ["0", "0", "true", "7", "false", "none", "over_speed", ""])
         self.assertEqual(result.stderr, "")
 
-    def test_csv_has_a_row_for_a_failed_reading(self):
+    def test_csv_has_row_for_failed_reading(self):
         for place in ("sim:tformat?", "sim:esl?", "sim:biss?model=linear-32-0.05um&"):
             with self.subTest(place):
                 result = absenc("read", place + "fault=silence=1", "--csv", "--count", "3", "--rate", "0")
@@ -66,7 +66,7 @@ class Readings(EncoderCase):
                     self.assertEqual(set(row[1:-1]), {""})
                     self.assertIn(f"absenc: {row[-1]}: ", result.stderr)
 
-    def test_a_missing_port_is_json(self):
+    def test_missing_port_is_reported_in_json(self):
         for verb in ("read", "info", "alarms", "temperature", "bench"):
             with self.subTest(verb):
                 result = absenc(verb, "tformat:/dev/nothing", "--json")
@@ -97,12 +97,12 @@ class Readings(EncoderCase):
                     self.assertEqual(reading[part + "_valid"], part != invalid)
                 self.assertEqual(reading["angle_deg"] is None, invalid == "singleturn")
 
-    def test_a_turning_shaft(self):
+    def test_turning_shaft(self):
         address = self.encoder("--motion", "rpm=60")
         readings = json_lines(absenc("read", address, "--json", "--count", "20", "--rate", "200").stdout)
         for before, after in zip(readings, readings[1:]):
             turned = (after["angle_deg"] - before["angle_deg"]) % 360
-            # One revolution a second. The reading is dated when its request was out, the encoder answers later.
+            # One revolution per second. The timestamp is the end of the request; the encoder samples later.
             self.assertAlmostEqual(turned, 360 * (after["time_s"] - before["time_s"]), delta=360 * 0.3)
             self.assertGreater(turned, 0)
 
@@ -126,14 +126,14 @@ class Readings(EncoderCase):
                 self.assert_good(result)
                 self.assertEqual([reading["singleturn"] for reading in json_lines(result.stdout)], [5, 5, 5])
 
-    def test_options_beside_the_encoder(self):
+    def test_options_of_command_line(self):
         emulator = self.emulator("--model", "23-bit", "--singleturn", "8000000")
         result = absenc("read", f"tformat:{emulator.path}", "--option", "model=23-bit", "--option", "latency=300")
         self.assert_good(result)
 
 
-class Simulated(EncoderCase):
-    def test_without_hardware(self):
+class Simulator(EncoderCase):
+    def test_reads_without_hardware(self):
         result = absenc("read", "sim:tformat?singleturn=5&multiturn=7", "--json")
         self.assert_good(result)
         reading = json.loads(result.stdout)
@@ -146,21 +146,21 @@ class Simulated(EncoderCase):
         self.assertEqual(readings[0]["singleturn_bits"], 23)
 
     def test_damaged_words_are_not_confirmed(self):
-        """SSI has no check: only another word that agrees, within what the shaft can turn meanwhile, tells."""
+        """SSI has no check. A word is only confirmed by another word that agrees within the possible motion."""
         result = absenc("read", "sim:ssi?fault=corrupt=1&max_rpm=1", "--json", "--count", "6", "--rate", "50")
         readings = [json.loads(line) for line in result.stdout.splitlines()]
         self.assertEqual(len(readings), 6)
         for one in readings:
             away = min(one["singleturn"], 4096 - one["singleturn"])
-            self.assertTrue(not one["confirmed"] or away <= 4, one)  # counts: what noise may do
+            self.assertTrue(not one["confirmed"] or away <= 4, one)  # counts; random words may agree that closely
         doubtful = [one for one in readings if not one["confirmed"]]
         self.assertTrue(doubtful)
         for one in doubtful:
             self.assertIsNone(one["angle_deg"])
             self.assertFalse(one["singleturn_valid"])
 
-    def test_every_model_has_a_speed_limit(self):
-        """Words of which three of ten are damaged: a twentieth of the confirmed ones may agree by chance."""
+    def test_speed_limit_confirms_words(self):
+        """Three of ten words are damaged. Up to a twentieth of the confirmed ones may agree by chance."""
         for encoder in ("sim:ssi?fault=corrupt=0.3&max_rpm=1", "sim:amt21?fault=corrupt=0.3&max_rpm=1"):
             result = absenc("read", encoder, "--json", "--count", "400", "--rate", "0")
             readings = [json.loads(line) for line in result.stdout.splitlines()]
@@ -174,8 +174,8 @@ class Simulated(EncoderCase):
         self.assertEqual(json.loads(result.stdout)["alarms"], ["over_heat", "battery_alarm"])
 
 
-class Trouble(EncoderCase):
-    """Each message says what happened, what went over the line, and what to try."""
+class ErrorMessages(EncoderCase):
+    """Each message states what happened, the transmitted bytes, and what to try."""
 
     def test_silence(self):
         result = absenc("read", f"tformat:{self.emulator('--fault', 'silence=1').path}")
@@ -200,21 +200,21 @@ class Trouble(EncoderCase):
         self.assertGreater(len(bad), 10)
         self.assertRegex(bad[0]["received"], r"^([0-9A-F]{2} ){10}[0-9A-F]{2}$")
 
-    def test_a_stream_goes_on_and_advice_comes_once(self):
+    def test_repeated_error_has_advice_once(self):
         result = absenc("read", self.encoder("--fault", "silence=1", latency=0), "--count", "3", "--rate", "0")
         self.assert_failed(result)
         self.assertEqual(result.stderr.count("absenc: timeout"), 3)
         self.assertEqual(result.stderr.count("Try:"), 1)
 
-    def test_echo_that_is_not_expected(self):
+    def test_unexpected_echo(self):
         result = absenc("read", self.encoder("--fault", "echo=1", latency=20, more="&echo=off"))
         self.assert_failed(result, "wrong_length", "after the adapter's echo", "received 1A 1A 00", "set echo=on")
 
-    def test_echo_that_does_not_come(self):
+    def test_missing_echo(self):
         result = absenc("read", self.encoder(latency=20, more="&echo=on"))
         self.assert_failed(result, "if no echo is taken from it", "set echo=off")
 
-    def test_a_refusal_is_explained(self):
+    def test_refusal_is_explained(self):
         for alarm, words in [(0x40, "ca0: it received the request with a parity error"),
                              (0x80, "ca1: it received a damaged character")]:
             reply = bytes([0x1A, alarm, 0, 0, 0, 0x11, 0, 0, 0, 0, 0x1A ^ alarm ^ 0x11])
@@ -241,11 +241,11 @@ class Trouble(EncoderCase):
             result = absenc("read", f"tformat:{fake.path}?latency=20")
             self.assert_failed(result, "wrong_length", "received 1A 00 00 00 00 11 00 00 00 00 ")
 
-    def test_another_model(self):
+    def test_other_model(self):
         result = absenc("read", self.encoder("--model", "23-bit", latency=20))
         self.assert_failed(result, "unexpected_reply", "a good reply of the model 23-bit", "Try: set model=23-bit")
 
-    def test_no_such_port(self):
+    def test_missing_port(self):
         result = absenc("read", "tformat:/dev/ttyABSENC9")
         self.assert_failed(result, "there is no port /dev/ttyABSENC9")
         ports = [f"/dev/{name}" for name in sorted(os.listdir("/sys/class/tty"))
@@ -262,10 +262,10 @@ class Trouble(EncoderCase):
         except OSError:
             return ""
 
-    def test_no_port_at_all(self):
+    def test_file_is_no_port(self):
         self.assert_failed(absenc("read", f"tformat:{self.file('file', 'text')}"), "not a serial port")
 
-    def test_nobody_listens(self):
+    def test_nothing_listens_on_tcp_port(self):
         with socket.socket() as listener:
             listener.bind(("127.0.0.1", 0))  # reserved, but not listening
             result = absenc("read", f"tformat:tcp:127.0.0.1:{listener.getsockname()[1]}")
@@ -280,7 +280,7 @@ class Trouble(EncoderCase):
         self.assertEqual(process.returncode, 1)
         self.assertIn("went away", err.decode())
 
-    def test_endless_reading_waits_for_an_unplugged_encoder(self):
+    def test_endless_reading_waits_for_unplugged_encoder(self):
         with Emulator(self.directory, "--singleturn", "1000") as emulator:
             process = self.start("read", f"tformat:{emulator.path}?latency=300", "--count", "0", "--rate", "100", "--json")
             self.first_line(process)
@@ -307,7 +307,7 @@ class Trouble(EncoderCase):
 
 
 class OrdinaryUser(EncoderCase):
-    """Root may open everything: then these are run as nobody, with a copy of the command that nobody may run."""
+    """Root may open any file. As root, these tests run a copy of the command as the user nobody."""
 
     def setUp(self):
         super().setUp()
@@ -323,7 +323,7 @@ class OrdinaryUser(EncoderCase):
         return subprocess.run([self.command, *arguments], capture_output=True, text=True, timeout=PATIENCE, check=False,
                               stdin=subprocess.DEVNULL, **self.settings)
 
-    def test_in_use(self):
+    def test_port_in_use(self):
         emulator = self.emulator()
         if self.settings:
             os.chown(emulator.path, NOBODY, NOBODY)
@@ -334,13 +334,14 @@ class OrdinaryUser(EncoderCase):
             self.first_line(first)
             second = self.as_user("read", address)
             self.assert_failed(second, emulator.path, "in use", f"process {first.pid}")
-            self.assertIsNotNone(read_line(first.stdout, time.monotonic() + PATIENCE))  # not disturbed
+            # the first reader is not disturbed
+            self.assertIsNotNone(read_line(first.stdout, time.monotonic() + PATIENCE))
         finally:
             end(first)
         self.assert_good(self.as_user("read", address))
 
     @unittest.skipUnless(os.getuid() == 0, "only root can give a port to another group")
-    def test_no_permission(self):
+    def test_port_without_permission(self):
         import grp
         emulator = self.emulator()
         group = grp.getgrnam("dialout")
@@ -349,7 +350,7 @@ class OrdinaryUser(EncoderCase):
         self.assert_failed(self.as_user("read", f"tformat:{emulator.path}"), "no permission", "the group dialout",
                            "usermod -aG dialout")
 
-    def test_memory_file_of_another(self):
+    def test_read_only_memory_file(self):
         path = self.file("memory")
         self.assert_good(absenc("emulate", "tformat", "--memory", path, "--for", "0.01"))
         os.chmod(path, 0o444)
@@ -357,7 +358,7 @@ class OrdinaryUser(EncoderCase):
         self.assert_failed(result, path, "cannot be written")
 
 
-class Ends(EncoderCase):
+class Termination(EncoderCase):
     def test_interrupted_stream(self):
         for number in (signal.SIGINT, signal.SIGTERM):
             with self.subTest(number), Emulator(self.directory) as emulator:
@@ -374,7 +375,7 @@ class Ends(EncoderCase):
         self.assertEqual(status, 1)
         self.assertRegex(err, r"0 good readings and \d+ failed ones .*\d+ timeout")
 
-    def test_interrupted_readings(self):
+    def test_interrupted_count(self):
         process = self.start("read", self.encoder(), "--count", "1000")
         self.first_line(process)
         status, _, err = end(process, signal.SIGINT)
@@ -386,15 +387,16 @@ class Ends(EncoderCase):
         wait_for_handler(process)
         status, _, err = end(process, signal.SIGINT)
         self.assertEqual(status, 1)
-        self.assert_sentence(err, "interrupted in the middle of zero", "Change: not sent")  # it only looked
+        # the command had only sent read requests
+        self.assert_sentence(err, "interrupted in the middle of zero", "Change: not sent")
 
-    def test_interrupted_wait_for_an_answer(self):
+    def test_interrupted_wait_for_reply(self):
         emulator = self.emulator("--fault", "silence=1")
         process = self.start("read", f"tformat:{emulator.path}?latency=60000")
         wait_for_handler(process)
         self.assertEqual(end(process, signal.SIGINT)[::2], (1, "absenc: interrupted\n"))
 
-    def test_a_reader_that_goes_away(self):
+    def test_closed_output_ends_reading(self):
         for form in ([], ["--json"], ["--csv"]):
             with self.subTest(form), Emulator(self.directory) as emulator:
                 process = self.start("read", f"tformat:{emulator.path}?latency=300", "--count", "0", "--rate", "0", *form)
@@ -415,7 +417,7 @@ class Ends(EncoderCase):
         result = subprocess.run(["sh", "-c", '"$0" read "tformat:$1?latency=300" >&-', ABSENC, emulator.path],
                                 capture_output=True, text=True, timeout=PATIENCE, check=False)
         self.assert_failed(result, "standard output cannot be written")
-        # Two requests of one byte, and not the text of a reading.
+        # The emulator received two requests of one byte, and not the text of a reading.
         self.assertIn("absenc: 2 requests answered", emulator.end()[2])
 
 
@@ -426,7 +428,7 @@ class Run(EncoderCase):
         result = absenc("run", address, "temperature", "--json")
         self.assertEqual(json.loads(result.stdout), {"ok": True, "fields": {"temperature_c": 35}})
 
-    def test_what_does_not_hold_is_shown_so(self):
+    def test_invalid_fields_are_marked(self):
         for encoder, command, field, words in [
                 ("sim:tformat?singleturn=74565&alarm=full_absolute_status", "singleturn", "singleturn",
                  "INVALID (only the top 5 of 17 bits hold: 73728 counts)"),
@@ -449,7 +451,7 @@ class Run(EncoderCase):
         fields = json.loads(absenc("run", "sim:biss?alarm=error", "position", "--json").stdout)["fields"]
         self.assertIs(fields["angle_deg_valid"], False)
 
-    def test_results_of_changes_show_what_does_not_hold(self):
+    def test_invalid_fields_of_changes_are_marked(self):
         result = absenc("zero", "sim:tformat?multiturn=5&alarm=over_speed", "--yes")
         self.assert_good(result)
         self.assertRegex(result.stdout, r"(?m)^multiturn +INVALID \(5 revolutions\)")
@@ -471,7 +473,7 @@ class Run(EncoderCase):
         reading = json.loads(absenc("read", address, "--json").stdout)
         self.assertEqual((reading["singleturn"], reading["multiturn"]), (0, 7))
 
-    def test_verbs_of_their_own(self):
+    def test_verbs_for_common_commands(self):
         address = self.encoder("--singleturn", "1000", "--multiturn", "7", "--alarm", "over_speed")
         self.assertRegex(absenc("temperature", address).stdout, r"^temperature_c +35 degC ")
         cleared = json.loads(absenc("clear-alarms", address, "--yes", "--json").stdout)
@@ -481,13 +483,13 @@ class Run(EncoderCase):
         reading = json.loads(absenc("read", address, "--json").stdout)
         self.assertEqual((reading["singleturn"], reading["multiturn"], reading["alarms"]), (0, 0, []))
 
-    def test_verbs_that_change_need_consent(self):
+    def test_changing_verbs_need_consent(self):
         emulator = self.emulator("--multiturn", "7")
         for verb in ("zero", "reset-multiturn", "clear-alarms"):
             self.assert_wrong_usage(absenc(verb, f"tformat:{emulator.path}"), "--yes", "changes the encoder")
         self.assertIn("0 requests answered", emulator.end()[2])
 
-    def test_no_zero_is_made_of_a_position_that_does_not_hold(self):
+    def test_refuses_zero_of_invalid_position(self):
         for address in (self.encoder("--alarm", "counting_error", "--singleturn", "1000"),
                         "sim:esl?alarm=singleturn_error"):
             self.assert_failed(absenc("zero", address, "--yes"), "invalid_argument", "does not hold", "`absenc alarms`")
@@ -497,20 +499,20 @@ class Run(EncoderCase):
         self.assert_failed(absenc("clear-alarms", address, "--yes"), "turns are lost", "reset-multiturn")
         self.assertEqual(json.loads(absenc("read", address, "--json").stdout)["alarms"], ["battery_error"])
 
-    def test_a_turning_shaft_is_not_zeroed(self):
+    def test_refuses_zero_of_turning_shaft(self):
         result = absenc("run", self.encoder("--motion", "rpm=60"), "zero", "--yes", "--json")
         self.assertEqual(result.returncode, 1)
         answer = json.loads(result.stdout)
         self.assertEqual((answer["ok"], answer["error"]), (False, "not_still"))
         self.assertIn("the shaft is turning", answer["message"])
 
-    def test_nobody_to_ask(self):
+    def test_change_without_terminal_needs_yes(self):
         emulator = self.emulator("--singleturn", "1000")
         self.assert_wrong_usage(absenc("run", f"tformat:{emulator.path}", "zero"), "--yes", "zero changes the encoder")
         self.assertIn("0 requests answered", emulator.end()[2])
 
     def ask(self, address, answer):
-        """Runs `zero` on a terminal; returns the exit status and what was shown there."""
+        """Runs `zero` on a terminal. Returns the exit status and the terminal's text."""
         terminal, ours = pty.openpty()
         process = subprocess.Popen([ABSENC, "run", address, "zero"], stdin=ours, stdout=subprocess.DEVNULL, stderr=ours)
         os.close(ours)
@@ -541,7 +543,7 @@ class Run(EncoderCase):
             self.assertEqual(self.ask(address, answer)[0], 0)
         self.assertEqual(json.loads(absenc("read", address, "--json").stdout)["singleturn"], 0)
 
-    def test_closed_memory(self):
+    def test_closed_memory_area(self):
         result = absenc("run", self.encoder(), "memory-read", "5", "6")
         self.assert_failed(result, "invalid_argument", "this area is closed")
 
@@ -557,7 +559,7 @@ class Bench(EncoderCase):
         self.assertGreater(measured["cpu_us_per_reading"], 0)
         self.assertGreater(measured["line_share"], 0)
 
-    def test_words(self):
+    def test_text(self):
         result = absenc("bench", self.encoder(), "--seconds", "0.1")
         self.assert_good(result)
         for word in ("a second", "latency", "99.9 %", "processor", "2500000 baud"):

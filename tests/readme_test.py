@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The README and the pages that it names show real output: each example runs, from top to bottom."""
+"""Tests that the README and the pages it names show real output: each example is run, from top to bottom."""
 import os
 import re
 import select
@@ -18,17 +18,17 @@ SOURCE = Path(os.environ["ABSENC_SOURCE_DIR"])
 PAGES = ["README.md", *(f"docs/{name}.md" for name in ("read", "set-up", "record", "serve", "decode", "test-a-drive", "doctor", "cpp",
                                                         "python", "add-an-encoder"))]
 PORT = "/dev/ttyUSB0"
-# Languages of blocks that are not run here: commands that change the computer, texts, programs that other tests run.
+# Languages of blocks that are not run here: commands that change the computer, texts, and programs of other tests.
 OTHERS = {"sh", "text", "cmake", "cpp", "yaml", "nginx", "caddy"}
 
 
 def blocks(text):
-    """(language, content) of each block, in its order."""
+    """Returns (language, content) of each block, in order."""
     return re.findall(r"^```(\w*)\n(.*?)^```$", text, re.MULTILINE | re.DOTALL)
 
 
 def commands(block):
-    """(command, lines shown below it) of a block."""
+    """Returns (command, lines shown below it) of a block."""
     found = []
     for line in block.splitlines():
         if line.startswith("$ "):
@@ -39,19 +39,19 @@ def commands(block):
 
 
 def masked(text):
-    """Numbers differ from run to run, and so does the width of what they stand in. On a busy machine a reading may fail."""
+    """Masks numbers, which vary between runs, and the spaces around them. On a busy machine a reading may fail."""
     text = re.sub(r" \(\d+ failed\)", "", text)
     return [re.sub(r"\s+", " ", re.sub(r"\d+(\.\d+)?", "N", line)).strip() for line in text.splitlines() if line.strip()]
 
 
 class Page:
-    """Runs the examples of a page in a folder of their own, with a virtual encoder in place of the real one."""
+    """Runs the examples of a page in a temporary folder, with a virtual encoder instead of the real one."""
 
     def __init__(self, name, folder):
         self.text = (SOURCE / name).read_text(encoding="utf-8")
         self.folder = folder
         self.running = []
-        self.port = free_port()  # in place of the usual one of `absenc serve`
+        self.port = free_port()  # replaces the default port of `absenc serve`
         (folder / "bin").mkdir()
         (folder / "bin" / "absenc").symlink_to(ABSENC)
         self.environment = {**os.environ, "PATH": f"{folder}/bin:{os.environ['PATH']}", "PYTHONPATH": str(PACKAGE), "HOME": str(folder),
@@ -64,7 +64,7 @@ class Page:
         return text.replace("/tmp/", f"{self.folder}/").replace(PORT, f"{self.folder}/ttyUSB0").replace("127.0.0.1:8420", f"127.0.0.1:{self.port}")
 
     def start(self, command):
-        """In the background, until the page ends; it says when it is ready."""
+        """Starts the command in the background until the page ends, and waits until it prints that it is ready."""
         process = subprocess.Popen(["bash", "-c", "exec " + self.here(command)], cwd=self.folder, env=self.environment, stdin=subprocess.DEVNULL,
                                    stdout=subprocess.PIPE, stderr=subprocess.PIPE)
         self.running.append(process)
@@ -92,7 +92,7 @@ class Page:
 class Readme(unittest.TestCase):
     maxDiff = None
 
-    def test_each_page_runs_from_top_to_bottom(self):
+    def test_examples_of_each_page_run(self):
         for name in PAGES:
             with self.subTest(page=name), tempfile.TemporaryDirectory() as folder:
                 page = Page(name, Path(folder))
@@ -119,14 +119,14 @@ class Readme(unittest.TestCase):
             else:
                 self.assertIn(language, OTHERS)
 
-    def test_the_readme_is_short_and_shows_pictures_first(self):
+    def test_readme_is_short_and_begins_with_picture(self):
         text = (SOURCE / "README.md").read_text(encoding="utf-8")
         self.assertLess(len(text.splitlines()), 220)
         self.assertLess(text.index("docs/pictures/serve-overview.png"), text.index("\n## "))
         for line in text.splitlines():
             self.assertTrue(len(line) <= 120 or line.startswith(("|", "!", "warning:", "good:")), line)
 
-    def test_the_readme_has_each_protocol(self):
+    def test_readme_has_each_protocol(self):
         listed = {line.split()[0] for line in self.listed().splitlines()[1:]}
         text = (SOURCE / "README.md").read_text(encoding="utf-8")
         families = text.split("## Encoders")[1].split("\n## ")[0]
@@ -139,10 +139,10 @@ class Readme(unittest.TestCase):
         done = subprocess.run([ABSENC, "list"], capture_output=True, text=True, timeout=PATIENCE, check=True)
         return done.stdout.split("\n\n")[0].strip()
 
-    def test_the_table_of_encoders_is_that_of_list(self):
+    def test_table_of_encoders_equals_list(self):
         self.assertIn(self.listed(), (SOURCE / "docs/encoders.md").read_text(encoding="utf-8"))
 
-    def test_the_programs_are_the_examples(self):
+    def test_programs_equal_examples(self):
         shown = [block for language, block in blocks((SOURCE / "docs/cpp.md").read_text(encoding="utf-8")) if language == "cpp"]
         examples = ["read_by_name.cpp", "read_position.cpp"]
         self.assertEqual(len(shown), len(examples))
@@ -150,7 +150,7 @@ class Readme(unittest.TestCase):
             example = (SOURCE / "examples" / name).read_text(encoding="utf-8")
             self.assertEqual(textwrap.dedent(example.split("// [readme]\n")[1].rsplit("\n", 1)[0]).strip(), block.strip())
 
-    def test_first_lines_of_firmware_are_the_source_that_is_compiled(self):
+    def test_first_firmware_program_equals_source(self):
         shown = next(block for language, block in blocks((SOURCE / "docs/firmware.md").read_text(encoding="utf-8")) if language == "cpp")
         source = (SOURCE / "firmware/hookup/first_reading.cpp").read_text(encoding="utf-8")
         self.assertEqual(source.split("\n", 2)[2].strip(), shown.strip())

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Recordings in HDF5, read by h5py."""
+"""Tests recordings in HDF5 with h5py."""
 import datetime
 import os
 import random
@@ -15,7 +15,7 @@ import numpy
 from command_support import ABSENC, PATIENCE, absenc, end
 from record_test import COLUMNS, RecordCase, wait_until
 
-LOST = 2  # seconds at most; one where nothing else keeps the machine busy
+LOST = 2  # seconds of lost rows at most; one on an idle machine
 
 
 def can_be_read(path):
@@ -31,7 +31,7 @@ class Hdf5(RecordCase):
         return super().output(name)
 
     def read(self, path=None):
-        """Attributes and columns of a recording that can be opened; all of it must be as it was written."""
+        """Returns the attributes and columns of a recording, and checks that they are complete."""
         with h5py.File(path or self.output(), "r") as file:
             attributes = {name: value.decode() if isinstance(value, bytes) else value for name, value in file.attrs.items()}
             count = len(file["time_s"])
@@ -43,14 +43,14 @@ class Hdf5(RecordCase):
         return attributes, columns
 
     def assert_is_what_the_shaft_did(self, columns):
-        """60 turns a minute from 0 on: a count for each 7.6 us, whatever was missed."""
+        """The shaft turns at 60 rpm from 0, which is one count every 7.6 us. Lost readings make no difference."""
         good = columns["event"] == b""
         turns = columns["position"][good] / 2**17
         self.assertLess(numpy.ptp(turns - columns["time_s"][good]), 1e-4)
         self.assertTrue((columns["position"][~good] == numpy.iinfo("i8").min).all())
 
-    def test_a_file_that_is_there_can_be_opened(self):
-        """Killed in the moment in which its name appears."""
+    def test_file_is_valid_as_soon_as_it_exists(self):
+        """The recorder is killed as soon as the file's name appears."""
         for i in range(20):
             path = self.output(f"{i}.h5")
             process = subprocess.Popen([ABSENC, "record", "sim:tformat", "--output", path], stdout=subprocess.DEVNULL,
@@ -65,7 +65,7 @@ class Hdf5(RecordCase):
             self.read(path)
         self.assertEqual(len(os.listdir(self.directory)), 20)
 
-    def test_one_column_a_dataset(self):
+    def test_each_column_is_a_dataset(self):
         result = absenc("record", "sim:tformat?motion=rpm=60&alarm=over_heat", "--output", self.output(), "--count", "70")
         self.assertEqual(result.returncode, 0, result.stderr)
         attributes, columns = self.read()
@@ -93,8 +93,8 @@ class Hdf5(RecordCase):
             self.assertEqual(attributes["part"], number)
             self.assertTrue(set(columns["event"]) - {b"", b"gap"}, part)
 
-    def test_killed(self):
-        """SIGKILL at any time: it can be opened, and little is missing."""
+    def test_killed_recording_is_valid(self):
+        """After SIGKILL at any time the file can be opened and few rows are missing."""
         random.seed(3)
         for number in range(8):
             path = self.output(f"{number}.h5")
@@ -108,13 +108,13 @@ class Hdf5(RecordCase):
             self.assertLess(killed - (started + columns["time_s"][-1]), LOST)
             self.assert_is_what_the_shaft_did(columns)
 
-    def test_a_slow_encoder_is_on_disk_within_a_second(self):
+    def test_slow_readings_are_on_disk_within_a_second(self):
         process = self.start("record", "sim:tformat", "--output", self.output(), "--rate", "0.01")
         wait_until(lambda: can_be_read(self.output()), "its only reading")
         self.assertEqual(end(process, signal.SIGINT)[0], 0)
         self.assertEqual(len(self.read()[1]["time_s"]), 1)
 
-    def test_removed(self):
+    def test_removed_file_is_an_error(self):
         process = self.start("record", "sim:tformat", "--output", self.output())
         wait_until(lambda: can_be_read(self.output()), "readings")
         os.remove(self.output())
@@ -124,7 +124,7 @@ class Hdf5(RecordCase):
         self.assertNotIn("is whole", messages)
 
     def test_full_disk(self):
-        """No file may be larger: what was said to be written is there."""
+        """A limit on the file size stands in for a full disk. The rows that the message reports must be in the file."""
         limit = ("import resource, signal, os, sys; signal.signal(signal.SIGXFSZ, signal.SIG_IGN); "
                  "resource.setrlimit(resource.RLIMIT_FSIZE, (1_000_000, 1_000_000)); os.execv(sys.argv[1], sys.argv[1:])")
         result = subprocess.run([sys.executable, "-c", limit, ABSENC, "record", "sim:tformat?motion=rpm=60", "--rate", "0",

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`absenc record`: what is in its files, whatever happens to the encoder, the disk or the command."""
+"""Tests the files of `absenc record` when the encoder, the disk or the command fails."""
 import csv
 import datetime
 import glob
@@ -28,7 +28,7 @@ def wait_until(condition, what):
 
 
 def read_csv(path):
-    """The header and the rows of a recording; every line must be whole."""
+    """Returns the header and the rows of a recording. Every line must be complete."""
     with open(path, encoding="utf-8", newline="") as file:
         text = file.read()
     if text and not text.endswith("\n"):
@@ -43,7 +43,7 @@ def read_csv(path):
 
 
 def rows_so_far(path):
-    """Of a recording that may not have begun yet."""
+    """Returns the rows of a recording, or an empty list before it begins."""
     return read_csv(path)[1] if os.path.exists(path) and os.path.getsize(path) > 0 else []
 
 
@@ -86,7 +86,7 @@ class Files(RecordCase):
         started = datetime.datetime.fromisoformat(header["started"].replace("Z", "+00:00"))
         self.assertLess(abs((started - before).total_seconds()), PATIENCE)
         self.assert_rising(times(rows))
-        rows = [row for row in rows if row["event"] != "gap"]  # of a busy machine
+        rows = [row for row in rows if row["event"] != "gap"]  # a busy machine may cause gaps
         self.assertEqual(len(rows), 20)
         for row in rows:
             self.assertEqual((row["singleturn"], row["singleturn_valid"], row["multiturn"], row["multiturn_valid"],
@@ -100,15 +100,16 @@ class Files(RecordCase):
         self.assert_good(absenc("record", self.encoder("--singleturn", "5"), "--output", self.output("log.jsonl"),
                                 "--count", "12", "--rate", "10"))
         header, rows = read_json_lines(self.output("log.jsonl"))
-        rows = [row for row in rows if row.get("event") != "gap"]  # of a busy machine
+        rows = [row for row in rows if row.get("event") != "gap"]  # a busy machine may cause gaps
         self.assertEqual((header["absenc_record"], header["protocol"], header["model"]), (1, "tformat", "TS5700N8500"))
         self.assertIn("speed_rpm", header["units"])
         self.assertEqual([row["singleturn"] for row in rows], [5] * 12)
         self.assertEqual(rows[0]["position"], 5)
         self.assertEqual(rows[0]["speed_rpm"], None)
-        self.assertEqual({row["speed_rpm"] for row in rows[1:]} - {None}, {0})  # of a busy machine not all
+        # a busy machine may leave some rows without speed
+        self.assertEqual({row["speed_rpm"] for row in rows[1:]} - {None}, {0})
 
-    def test_speed_and_position_past_the_wrap(self):
+    def test_speed_and_position_past_wrap(self):
         result = absenc("record", "sim:tformat?motion=rpm=-90", "--output", self.output(), "--for", "1.2")
         self.assert_good(result)
         rows = [row for row in read_csv(self.output())[1] if row["event"] == ""]
@@ -116,7 +117,7 @@ class Files(RecordCase):
         self.assertIn("65535", [row["multiturn"] for row in rows])
         for row in rows[5:]:
             self.assertAlmostEqual(float(row["speed_rpm"]), -90, delta=1)
-            # The position is that of the time it is said to be: 1.5 revolutions a second.
+            # The position must match its timestamp: 1.5 revolutions per second.
             self.assertAlmostEqual(float(row["position"]) - float(rows[0]["position"]),
                                    -1.5 * 2**17 * (float(row["time_s"]) - float(rows[0]["time_s"])), delta=20)
 
@@ -172,10 +173,10 @@ class Files(RecordCase):
 
 
 class Gaps(RecordCase):
-    """Readings that were due and were not taken."""
+    """Readings that were due but not taken."""
 
     def record_and_stop(self, name, stopped, *arguments):
-        """Its message at the end; meanwhile it was stopped for so many seconds."""
+        """Records for 3 s, stops the process for `stopped` seconds meanwhile, and returns its final message."""
         path = self.output(name)
         process = self.start("record", "sim:tformat", "--output", path, "--rate", "200", "--for", "3", *arguments)
         wait_until(lambda: os.path.exists(path) and os.path.getsize(path) > 3000, "readings")
@@ -186,7 +187,7 @@ class Gaps(RecordCase):
         self.assertEqual(status, 0, messages)
         return messages.decode()
 
-    def test_stopped(self):
+    def test_stopped_process(self):
         message = self.record_and_stop("log.csv", 1)
         _, rows = read_csv(self.output())
         self.assert_rising(times(rows))
@@ -201,7 +202,7 @@ class Gaps(RecordCase):
         before = rows.index(gaps[missed.index(max(missed))]) - 1
         self.assertGreaterEqual(times(rows)[before + 2] - times(rows)[before], 0.9)
 
-    def test_stopped_until_behind_the_end(self):
+    def test_process_stopped_beyond_end(self):
         message = self.record_and_stop("log.jsonl", 3.2)
         _, rows = read_json_lines(self.output("log.jsonl"))
         missed = sum(row["missed"] for row in rows if row.get("event") == "gap")
@@ -209,7 +210,7 @@ class Gaps(RecordCase):
         self.assertIn(f"{missed} readings that were due were not taken", message)
         self.assertEqual(rows[-1]["event"], "gap")
 
-    def test_stopped_and_then_ended(self):
+    def test_process_stopped_and_ended(self):
         path = self.output()
         process = self.start("record", "sim:tformat", "--output", path, "--rate", "200")
         wait_until(lambda: len(rows_so_far(path)) > 20, "readings")
@@ -222,7 +223,7 @@ class Gaps(RecordCase):
         self.assertGreaterEqual(int(rows[-1]["missed"]), 80)
         self.assertIn("readings that were due were not taken", messages)
 
-    def test_a_line_too_slow_for_the_rate(self):
+    def test_line_too_slow_for_rate(self):
         address = self.encoder("--fault", "silence=1", latency=25)
         result = absenc("record", address, "--output", self.output(), "--rate", "100", "--for", "1")
         self.assertEqual(result.returncode, 1)
@@ -234,9 +235,9 @@ class Gaps(RecordCase):
         self.assertIn(f"{missed} readings that were due were not taken", result.stderr)
 
 
-class Trouble(RecordCase):
+class Failures(RecordCase):
     def lose(self, change, *words):
-        """Records, does something to the file, and expects an error at once."""
+        """Records, changes the file with `change`, and expects an immediate error."""
         path = self.output(f"{len(os.listdir(self.directory))}.csv")
         process = self.start("record", "sim:tformat", "--output", path, "--every", "1000", "--rate", "100")
         wait_until(lambda: len(rows_so_far(path)) > 0, "readings")
@@ -247,10 +248,10 @@ class Trouble(RecordCase):
         self.assertNotIn("are in", messages)
         self.assertNotIn("is whole", messages)
 
-    def test_removed(self):
+    def test_removed_file(self):
         self.lose(os.remove, "was removed")
 
-    def test_replaced(self):
+    def test_replaced_file(self):
         def replace(path):
             other = self.file("other", "precious\n")
             os.rename(other, path)
@@ -258,13 +259,13 @@ class Trouble(RecordCase):
 
         self.lose(replace, "was replaced by another")
 
-    def test_moved_away(self):
+    def test_moved_file(self):
         self.lose(lambda path: os.rename(path, path + ".1"), "was moved away")
 
-    def test_cut(self):
+    def test_truncated_file(self):
         self.lose(lambda path: os.truncate(path, 10), "was cut by another program")
 
-    def test_the_log_of_frames_is_removed(self):
+    def test_removed_log_of_frames(self):
         log = self.output("bus.log")
         process = self.start("record", f"sim:raa38-can?log={log}", "--output", self.output())
         wait_until(lambda: len(rows_so_far(self.output())) > 3, "readings")
@@ -272,7 +273,7 @@ class Trouble(RecordCase):
         self.assertEqual(process.wait(PATIENCE), 1)
         self.assert_sentence(process.communicate()[1].decode(), log, "was removed", "what is written so far is whole")
 
-    def test_the_tally_is_that_of_the_file(self):
+    def test_summary_equals_file(self):
         with Emulator(self.directory) as first:
             process = self.start("record", f"tformat:{first.path}?latency=300", "--output", self.output())
             wait_until(lambda: len(rows_so_far(self.output())) > 5, "readings")
@@ -297,7 +298,7 @@ class Trouble(RecordCase):
         self.assert_wrong_usage(absenc("record", "sim:tformat", "--output", self.output(), "--count", "1", "--part-size",
                                        "1"), "log-0007.csv", "another name")
 
-    def test_wrong_usage(self):
+    def test_refuses_wrong_usage(self):
         self.assert_wrong_usage(absenc("record", "sim:tformat"), "--output is missing")
         self.assert_wrong_usage(absenc("record", "sim:tformat", "--output", self.output("log.txt")), ".csv", ".jsonl")
         self.assert_wrong_usage(absenc("record", "sim:tformat", "--output", self.output(), "--every", "0"), "--every")
@@ -306,7 +307,7 @@ class Trouble(RecordCase):
         self.assert_failed(absenc("record", "tformat:/dev/nothing", "--output", self.output()), "no port /dev/nothing")
         self.assertFalse(os.path.exists(self.output()))
 
-    def test_failures_are_lines(self):
+    def test_failures_have_rows(self):
         absenc("record", "sim:tformat?fault=truncate=0.7&singleturn=77", "--output", self.output(), "--rate", "0", "--for",
                "0.5")
         _, rows = read_csv(self.output())
@@ -341,7 +342,7 @@ class Trouble(RecordCase):
                 self.assertEqual(row["alarms"], "none" if number < lost else "battery_alarm")
 
     def test_full_disk(self):
-        """A file system of 1 MB: mounted, as root or in a namespace of our own."""
+        """Uses a file system of 1 MB, mounted as root or in a separate namespace."""
         script = ('mount -t tmpfs -o size=1m absenc-test "$1" && "$0" record sim:tformat --rate 0 --output "$1/log.csv" 2>"$2"; '
                   'echo $? >"$3"; cp "$1/log.csv" "$4"; df --output=avail "$1"; umount "$1"')
         folder, messages, status, copy = (self.output(name) for name in ("disk", "messages", "status", "copy.csv"))
@@ -361,8 +362,8 @@ class Trouble(RecordCase):
         self.assertIn(f"{len(rows)} readings", text)
         self.assertGreater(os.path.getsize(copy), 2**20 - 3 * 4096)
 
-    def test_killed(self):
-        """Nothing but SIGKILL, a hundred times: every line is whole and the last second is there."""
+    def test_killed_recording_is_complete(self):
+        """After SIGKILL, a hundred times, every line is complete and at most the last second is missing."""
         random.seed(1)
         for number in range(100):
             path = self.output(f"{number}.csv")
@@ -379,7 +380,7 @@ class Trouble(RecordCase):
             self.assertLess(killed - (started + times(rows)[-1]), 1)
             self.assert_rising(times(rows))
 
-    def test_the_clock_of_the_day_is_set_back(self):
+    def test_system_clock_set_back(self):
         library = glob.glob("/usr/lib/*/faketime/libfaketime.so.1")
         self.assertTrue(library, "the package faketime is missing")
         shift = self.file("shift", "+0")
@@ -398,7 +399,7 @@ class Trouble(RecordCase):
         self.assert_rising(times(together))
         self.assertLess(times(together)[-1], PATIENCE)
 
-    def test_ends_by_a_signal(self):
+    def test_signal_ends_recording(self):
         for number in (signal.SIGINT, signal.SIGTERM):
             with self.subTest(number):
                 path = self.output(f"{number}.csv")
@@ -409,7 +410,7 @@ class Trouble(RecordCase):
                 readings = [row for row in read_csv(path)[1] if row["event"] == ""]
                 self.assertIn(f"{len(readings)} readings", messages)
 
-    def test_progress_is_for_terminals(self):
+    def test_progress_appears_only_on_terminals(self):
         terminal, ours = pty.openpty()
         process = subprocess.run([ABSENC, "record", "sim:tformat", "--output", self.output(), "--for", "0.3"], stdin=ours,
                                  stdout=subprocess.DEVNULL, stderr=ours, check=False, timeout=PATIENCE)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A line that is never silent: what is to end after a time ends, and so does what is interrupted."""
+"""Tests that `record` and `monitor` end on a line that is never silent: after their time, and when interrupted."""
 import signal
 import time
 import unittest
@@ -9,14 +9,14 @@ from command_support import BabblingLine, EncoderCase, absenc, end, wait_for_han
 PROTOCOLS = ["tformat", "esl", "encolink", "e201", "raa38-modbus"]
 
 
-class AnEndThatHolds(EncoderCase):
+class EndOfRun(EncoderCase):
     def run_for_a_second(self, *arguments):
         start = time.monotonic()
         result = absenc(*arguments, "--for", "1")
         self.assertLess(time.monotonic() - start, 20, result.stderr)
         return result
 
-    def test_record(self):
+    def test_record_ends_after_its_time(self):
         for protocol in PROTOCOLS:
             with self.subTest(protocol), BabblingLine(pieces=[b"\x1a"]) as line:
                 output = self.file(f"{protocol}.csv")
@@ -26,7 +26,7 @@ class AnEndThatHolds(EncoderCase):
                 with open(output, encoding="utf-8") as file:
                     self.assertTrue(file.read().endswith("\n"))
 
-    def test_monitor(self):
+    def test_monitor_ends_after_its_time(self):
         with BabblingLine(pieces=[b"\x1a"]) as one, BabblingLine(pieces=[b"\x55"]) as other:
             for protocol in PROTOCOLS:
                 with self.subTest(protocol):
@@ -34,7 +34,7 @@ class AnEndThatHolds(EncoderCase):
                     self.assertEqual(result.returncode, 1, result.stderr)
                     self.assertEqual(result.stderr.count(" 0 readings; "), 2, result.stderr)
 
-    def test_interrupted(self):
+    def test_interrupt_ends_both(self):
         with BabblingLine(pieces=[b"\x1a"]) as line:
             for arguments in (["monitor"], ["record", "--output", self.file("log.csv")]):
                 with self.subTest(arguments):

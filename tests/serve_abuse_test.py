@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Clients of `absenc serve` that ask for too much, too slowly or for nothing at all: others are answered all the same."""
+"""Tests `absenc serve` with clients that send too much, too slowly or nothing at all: other clients must still be
+served."""
 import contextlib
 import os
 import resource
@@ -28,7 +29,7 @@ class Abuse(ServeCase):
         return connection
 
     def status(self, path="/healthz", address="127.0.0.1"):
-        """Of an answer on a connection of its own; None: it was closed without one."""
+        """Returns the status of a request on a new connection, or None if the server closes it without a reply."""
         with socket.create_connection(("127.0.0.1", self.served.port), PATIENCE, (address, 0)) as connection:
             with contextlib.suppress(ConnectionError):
                 connection.sendall(f"GET {path} HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n".encode())
@@ -40,7 +41,7 @@ class Abuse(ServeCase):
         self.addCleanup(resource.setrlimit, resource.RLIMIT_NOFILE, (soft, hard))
 
     def open_streams(self, count, address="127.0.0.1"):
-        """None of them is read; their statuses."""
+        """Opens event streams that are never read. Returns the status of each."""
         connections = [self.connect(address) for _ in range(count)]
         for connection in connections:
             connection.sendall(b"GET /api/stream HTTP/1.1\r\nHost: localhost\r\n\r\n")
@@ -50,12 +51,12 @@ class Abuse(ServeCase):
         with open(f"/proc/{self.served.process.pid}/status", encoding="ascii") as file:
             return next(int(line.split()[1]) for line in file if line.startswith("VmRSS"))
 
-    def test_half_sent_requests(self):
+    def test_half_sent_requests_are_closed(self):
         halves = [self.connect() for _ in range(100)]
         for half in halves:
             half.sendall(b"GET /api/encoders HTTP/1.1\r\nHost: local")
         self.assert_well()
-        # Each is ended, also when it says a byte now and then.
+        # Each incomplete request is closed after a time limit, even if another byte arrives now and then.
         talker = halves[0]
         talker.settimeout(0.2)
         deadline = time.monotonic() + PATIENCE
@@ -71,7 +72,8 @@ class Abuse(ServeCase):
         self.fail("it is still waited for")
 
     def raw(self, request):
-        """What comes back until the server closes, or has answered once."""
+        """Returns the bytes received until the server closes the connection or has sent one reply, and the
+        connection."""
         connection = self.connect()
         connection.sendall(request)
         answer = b""
@@ -79,7 +81,7 @@ class Abuse(ServeCase):
             answer += part
         return answer, connection
 
-    def test_ambiguous_requests(self):
+    def test_refuses_ambiguous_requests(self):
         hello = b"POST /api/command HTTP/1.1\r\nHost: localhost\r\n"
         chunk = b"Transfer-Encoding: chunked\r\n"
         for request in (hello + b"Content-Length: 5\r\nContent-Length: 6\r\n\r\nhello!",
@@ -96,10 +98,10 @@ class Abuse(ServeCase):
             with self.subTest(request):
                 answer, connection = self.raw(request)
                 self.assertIn(b" 400 ", answer.split(b"\r\n")[0])
-                while connection.recv(4096):  # it closes
+                while connection.recv(4096):  # until the server closes it
                     pass
 
-    def test_much_is_answered(self):
+    def test_answers_long_requests(self):
         for count in (1, 100, 500):
             query = "&".join(f"a{i}={i}" for i in range(count))
             self.assertEqual(self.served.ask(f"/healthz?{query}")[0], 200, count)
@@ -107,22 +109,22 @@ class Abuse(ServeCase):
         answer, _ = self.raw(b"POST /api/command HTTP/1.1\r\nHost: localhost\r\nTransfer-Encoding: chunked\r\n\r\n" + body)
         self.assertIn(b" 413 ", answer.split(b"\r\n")[0])
 
-    def test_names_without_their_case(self):
+    def test_host_name_ignores_case(self):
         self.assertEqual(self.served.ask("/api/encoders", headers={"Host": f"LocalHost:{self.served.port}"})[0], 200)
         self.assertEqual(self.served.ask("/api/encoders", headers={"Host": "localhostx"})[0], 403)
 
-    def test_large_headers(self):
+    def test_refuses_large_headers(self):
         connection = self.connect()
         with contextlib.suppress(OSError):
             connection.sendall(b"GET / HTTP/1.1\r\nHost: localhost\r\nX: " + b"x" * 1_000_000 + b"\r\n\r\n")
         with contextlib.suppress(OSError):
             self.assertNotIn(b" 200 ", connection.recv(100))
 
-    def test_large_bodies(self):
+    def test_refuses_large_bodies(self):
         status, _ = self.served.ask(of("sim:tformat?motion=rpm=60", "command"), "POST", {"Content-Length": "1000000000"})
         self.assertEqual(status, 413)
 
-    def test_many_connections(self):
+    def test_many_connections_use_no_more_memory(self):
         before = self.memory_kb()
         for _ in range(10):
             with contextlib.ExitStack() as stack:
@@ -131,37 +133,37 @@ class Abuse(ServeCase):
         self.assert_well()
         self.assertLess(self.memory_kb() - before, 64_000)
 
-    def test_connections_of_one_address_shut_nobody_out(self):
+    def test_connections_of_one_address_do_not_block_others(self):
         self.allow_many_files()
         for _ in range(2000):
             self.connect()
-        # Neither itself, because its oldest idle one goes first, nor others.
+        # A new connection replaces the oldest idle one of the same address, so nobody is refused.
         self.assertEqual([self.status() for _ in range(20)], [200] * 20)
 
         def longest():
             begin = time.monotonic()
             self.assertEqual(self.status("/api/encoders", "127.0.0.2"), 200)
             return time.monotonic() - begin
-        # 4 ms at the most on a machine of its own; on a busy one some round is undisturbed.
+        # On an idle machine a reply takes 4 ms at most. On a busy one the measurement repeats until it is undisturbed.
         wait_until(lambda: max(longest() for _ in range(20)) < 0.1, "another address is served within 100 ms")
 
-    def test_idle_connections_of_many_addresses_shut_nobody_out(self):
+    def test_idle_connections_of_many_addresses_do_not_block_others(self):
         self.allow_many_files()
         for i in range(10):
             for _ in range(100):
                 self.connect(f"127.0.1.{i + 1}")
         begin = time.monotonic()
         self.assertEqual([self.status("/api/encoders", f"127.0.2.{i + 1}") for i in range(20)], [200] * 20)
-        self.assertLess(time.monotonic() - begin, 5)  # before the others end by themselves, after 10 s
+        self.assertLess(time.monotonic() - begin, 5)  # sooner than idle connections end by themselves, after 10 s
 
-    def test_streams_that_are_never_read_leave_room_for_those_of_others(self):
+    def test_unread_streams_leave_room_for_other_addresses(self):
         statuses = self.open_streams(300)
         self.assertEqual((statuses.count(200), statuses.count(503)), (200, 100))
         self.assertEqual(self.open_streams(100, "127.0.0.2"), [200] * 100)
-        self.assertEqual(self.open_streams(20, "127.0.0.3"), [200] * 20)  # though there are 300
+        self.assertEqual(self.open_streams(20, "127.0.0.3"), [200] * 20)  # although 300 streams are open
         self.assertEqual(self.status(address="127.0.0.4"), 200)
 
-    def test_many_who_want_the_same_encoder(self):
+    def test_many_requests_for_same_encoder(self):
         asked = [f"{method} {of('sim:tformat?motion=rpm=60', part)}".encode()
                  for method, part in (("POST", "doctor"), ("GET", "memory"), ("GET", "settings"))] * 20
         clients = [self.connect() for _ in asked]
@@ -186,7 +188,7 @@ class Abuse(ServeCase):
                                            b" HTTP/1.1\r\nHost: localhost\r\n" + os.urandom(100) + b"\r\n\r\n")
         self.assert_well()
 
-    def test_a_slow_reader_delays_nobody(self):
+    def test_slow_reader_delays_nobody(self):
         slow = self.connect()
         slow.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 2048)
         slow.sendall(b"GET " + of("sim:tformat?motion=rpm=60", "stream").encode() +

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`absenc serve` at a broker that breaks MQTT: the encoders are read all the same, and no message is lost."""
+"""Tests `absenc serve` with a broker that violates MQTT: the encoders must still be read, and no message may be
+lost."""
 import json
 import os
 import shutil
@@ -12,7 +13,7 @@ from mqtt_support import numbers
 from serve_support import ServeCase, wait_until
 
 ONE = "sim:tformat?motion=rpm=60"
-DEADLY = {  # each ended the server: assertions of libmosquitto 2.0.11
+DEADLY = {  # each fails an assertion of libmosquitto 2.0.11, which ended the server
     "CONNACK with an unknown property": bytes.fromhex("20050000027f00"),
     "DISCONNECT with an unknown property": bytes.fromhex("e00487027f00"),
     "PUBACK with an unknown property": bytes.fromhex("4006000100027f00"),
@@ -34,7 +35,7 @@ class BrokerCase(ServeCase):
         return server.json("/api/mqtt")
 
     def children(self, server):
-        """(number, state, arguments) of the processes that the server started, zombies too."""
+        """Returns (number, state, arguments) of the server's child processes, including zombies."""
         found = []
         for name in filter(str.isdigit, os.listdir("/proc")):
             try:
@@ -48,7 +49,7 @@ class BrokerCase(ServeCase):
         return found
 
     def events(self, broker):
-        """Each once, also where it came again."""
+        """Returns the text of each event once, even if its message was repeated."""
         return list({one["id"]: one["text"] for one in broker.all("/event")}.values())
 
 
@@ -77,7 +78,7 @@ class BadPackets(BrokerCase):
                 server.process.wait()
                 shutil.rmtree(os.path.join(self.directory, "spool"))
 
-    def test_a_client_that_is_killed_is_begun_again(self):
+    def test_killed_client_is_restarted(self):
         broker = self.fake()
         server = self.sender(broker.url)
         wait_until(lambda: self.mqtt(server)["sent"], "it sends")
@@ -85,7 +86,7 @@ class BadPackets(BrokerCase):
         wait_until(lambda: broker.connections > 1 and self.mqtt(server)["connected"], "it connects again")
         self.assertEqual(self.mqtt(server)["client_deaths"], 1)
 
-    def test_a_client_that_hangs_is_ended(self):
+    def test_hanging_client_is_ended(self):
         broker = self.fake()
         server = self.sender(broker.url)
         wait_until(lambda: self.mqtt(server)["sent"], "it sends")
@@ -95,7 +96,7 @@ class BadPackets(BrokerCase):
         self.assertFalse(os.path.exists(f"/proc/{number}"))
         self.assertEqual(server.encoder()["state"], "live")
 
-    def test_a_broker_that_comes_and_goes_is_no_flood_of_events(self):
+    def test_unstable_broker_causes_few_events(self):
         def answer(_broker, connection, kind, _flags, _body, usual):
             connection.seen = getattr(connection, "seen", 0) + (kind == PUBLISH)
             return DEADLY["PUBLISH that is too short"] if connection.seen > 3 and connection.index < 4 else usual
@@ -107,8 +108,8 @@ class BadPackets(BrokerCase):
         self.assertEqual(len([one for one in self.events(broker) if one.startswith("connected")]), 1)
 
 
-class Refused(BrokerCase):
-    """One of two encoders whose readings the broker does not take, until it does."""
+class RefusedMessages(BrokerCase):
+    """The broker refuses the readings of one of two encoders, and accepts them later."""
     BAD, GOOD = "/bad/readings", "/good/readings"
 
     def serve(self, answer):
@@ -147,15 +148,15 @@ class Refused(BrokerCase):
         broker.taken = lambda _: getattr(broker, "kept", [])
         return number if is_bad else None
 
-    def test_by_a_reason(self):
+    def test_refused_with_reason_code(self):
         def answer(broker, _connection, kind, flags, body, usual):
             number = self.refuses(broker, kind, flags, body)
             return usual if number is None else packet(PUBACK, number.to_bytes(2, "big") + bytes((NOT_AUTHORIZED,)))
         broker, server = self.serve(answer)
         self.check(broker, server, 1, "Not authorized")
 
-    def test_by_the_end_of_the_connection(self):
-        """As by brokers of MQTT 3.1.1, and by some of 5."""
+    def test_refused_by_closing_connection(self):
+        """Brokers of MQTT 3.1.1 refuse in this manner, and some of MQTT 5."""
         def answer(broker, _connection, kind, flags, body, usual):
             if self.refuses(broker, kind, flags, body) is not None:
                 raise Closed
@@ -163,7 +164,7 @@ class Refused(BrokerCase):
         broker, server = self.serve(answer)
         self.check(broker, server, 6, "ends the connection")
 
-    def test_states_too(self):
+    def test_refused_states(self):
         def answer(_broker, _connection, kind, flags, body, usual):
             topic, number, _ = published(flags, body) if kind == PUBLISH else ("", 0, b"")
             if topic != "plant/bad/state":
@@ -176,14 +177,14 @@ class Refused(BrokerCase):
         self.assertIn("(plant/bad/state)", self.mqtt(server)["trouble"])
 
 
-class Process(BrokerCase):
+class ClientProcess(BrokerCase):
     def started(self, *arguments, **settings):
         broker = self.fake()
         server = self.sender(broker.url, *arguments, **settings)
         wait_until(lambda: self.mqtt(server)["sent"], "it sends")
         return broker, server
 
-    def test_it_has_no_secret_and_no_port_of_its_parent(self):
+    def test_has_no_secrets_and_no_inherited_files(self):
         login = self.file("login", "bench secret-of-plants\n")
         os.chmod(login, 0o600)
         inherited = os.open("/dev/zero", os.O_RDONLY)
@@ -199,11 +200,11 @@ class Process(BrokerCase):
         self.assertNotIn("/dev/zero", links)
 
     def links(self, number):
-        """Files and sockets that a process has open."""
+        """Returns the targets of the files and sockets that a process has open."""
         folder = f"/proc/{number}/fd"
         return {os.readlink(f"{folder}/{one}") for one in os.listdir(folder)}
 
-    def test_it_ends_with_its_parent(self):
+    def test_ends_with_its_parent(self):
         for ending in (signal.SIGKILL, signal.SIGTERM):
             with self.subTest(ending):
                 _, server = self.started()
@@ -212,8 +213,8 @@ class Process(BrokerCase):
                 server.process.wait(PATIENCE)
                 wait_until(lambda n=number: not os.path.exists(f"/proc/{n}"), "it is gone")
 
-    def test_the_broker_is_left_in_order_when_all_processes_get_a_signal(self):
-        """As from Ctrl-C and systemd."""
+    def test_disconnects_cleanly_if_all_processes_get_a_signal(self):
+        """Ctrl-C and systemd send the signal to all processes."""
         broker, server = self.started(preexec_fn=os.setsid)
         os.killpg(server.process.pid, signal.SIGTERM)
         self.assertEqual(server.process.wait(PATIENCE), 0)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The page of `absenc serve` in Debian's chromium: what somebody sees, does by keyboard and is told."""
+"""Tests the page of `absenc serve` in Debian's Chromium: texts, keyboard operation and notifications."""
 import os
 import signal
 import subprocess
@@ -7,7 +7,7 @@ import time
 import unittest
 import urllib.parse
 
-from page_scenes import Browser  # first: it looks for selenium
+from page_scenes import Browser  # imported first, because it checks for selenium
 from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
@@ -28,7 +28,7 @@ class Page(ServeCase):
         super().setUp()
         self.emulator = Emulator(self.directory, "--singleturn", "1000")
         self.addCleanup(lambda: self.emulator.end())
-        self.name = f"tformat:{self.emulator.path}?latency=300"  # on a machine that does something else
+        self.name = f"tformat:{self.emulator.path}?latency=300"  # the latency allows for a busy machine
         self.served = self.server(self.name, "sim:esl?motion=rpm=60", "sim:tformat?alarm=over_heat&fault=corrupt=0.2",
                                   "--token-file", self.tokens(), "--history", self.file("history"))
         self.window.window(1200, 900)
@@ -38,7 +38,7 @@ class Page(ServeCase):
         self.browser.get(self.served.url + hash_text)
 
     def text(self, selector="body"):
-        """What is shown, in one look: the page may replace its nodes between two."""
+        """Returns the visible text in one step, because the page may replace its nodes between two steps."""
         return self.browser.execute_script("""
             return [...document.querySelectorAll(arguments[0])].filter((one) => one.getClientRects().length > 0)
                    .map((one) => one.innerText).join("\\n");""", selector)
@@ -58,7 +58,7 @@ class Page(ServeCase):
     def card(self, name):
         return f".card:has(a[href='#encoder={urllib.parse.quote(name, safe='')}'])"
 
-    def test_the_overview(self):
+    def test_overview(self):
         served = self.without_history("sim:tformat", "sim:esl?motion=rpm=60", "sim:tformat?alarm=over_heat")
         self.browser.get(served.url)
         wait_until(lambda: self.pills() == ["▲ 1 alarm", "● 2 good"], "the bar says who is well")
@@ -76,8 +76,8 @@ class Page(ServeCase):
         wait_until(lambda: "L" in (self.browser.find_element(By.CSS_SELECTOR, spark).get_attribute("d") or ""), "there is a trace")
         self.assert_no_errors()
 
-    def test_figures_do_not_jump(self):
-        """Whatever the value, its decimal point and its unit stay where they are."""
+    def test_digits_keep_their_place(self):
+        """The decimal point and the unit must not move when the value changes."""
         name = "sim:tformat?motion=rpm=60"
         served = self.without_history(name)
         self.browser.get(served.url)
@@ -90,8 +90,8 @@ class Page(ServeCase):
             values.add(self.text(".digits"))
         self.assertEqual(len(places), 1, (places, values))
 
-    def test_what_is_not_reported_is_not_good(self):
-        """A word without an error bit, one that has one, and turns that an alarm takes away."""
+    def test_distinguishes_good_from_not_reported(self):
+        """Three encoders: a word without an error bit, a word with one, and turns that an alarm makes invalid."""
         served = self.without_history("sim:ssi", "sim:ssi?error_bit=active_high", "sim:tformat?alarm=battery_error")
         self.browser.get(served.url)
         wait_until(lambda: self.pills() == ["▲ 1 alarm", "○ 1 live, alarms not reported", "● 1 good"], "the bar tells them apart")
@@ -102,7 +102,7 @@ class Page(ServeCase):
         self.wait_for("Alarms not reported.", ".side")
         self.assert_no_errors()
 
-    def test_the_bar_and_the_filter_show_some(self):
+    def test_groups_filter_encoders(self):
         served = self.without_history(*(f"sim:tformat?singleturn={i}" for i in range(4)), "sim:ssi")
         self.browser.get(served.url)
         wait_until(lambda: len(self.pills()) == 2, "the bar has two groups")
@@ -119,7 +119,7 @@ class Page(ServeCase):
         self.browser.find_element(By.XPATH, "//button[text()='Show all']").click()
         wait_until(lambda: self.browser.execute_script(cards) == 5, "all are shown")
 
-    def test_the_lines_of_a_grid_have_labels_of_their_own(self):
+    def test_grid_labels_are_distinct(self):
         name = "sim:encolink?multiturn=60000&motion=rpm=0.5"  # many turns, of which few change
         served = self.without_history(name)
         self.window.go(served.url, encoder=name, unit="turns")
@@ -136,7 +136,7 @@ class Page(ServeCase):
         self.assertEqual(self.browser.execute_script(cut), [])
         self.assert_no_errors()
 
-    def test_a_link_to_a_range_can_be_shared(self):
+    def test_link_to_range(self):
         name = "sim:esl?motion=rpm=60"
         self.open()
         self.window.go(self.served.url, encoder=name)
@@ -153,7 +153,7 @@ class Page(ServeCase):
         wait_until(lambda: "rpm" in self.text(".dygraph-axis-label-y"), "its axis has the unit")
         self.assert_no_errors()
 
-    def test_an_encoder_is_lost_and_comes_back(self):
+    def test_encoder_is_lost_and_returns(self):
         card = self.card(self.name)
         self.open()
         self.wait_for("2.747", card + " .digits")
@@ -167,7 +167,7 @@ class Page(ServeCase):
         self.emulator = Emulator(self.directory, "--singleturn", "1000")
         wait_until(lambda: self.text(card + " .digits") == "2.747", "it is back")
 
-    def test_the_page_of_a_lost_encoder_shows_its_past(self):
+    def test_page_of_lost_encoder_shows_its_history(self):
         self.open()
         wait_until(lambda: self.served.json("/api/minute")["encoders"][0]["seconds"], "it was read for a second")
         self.emulator.kill()
@@ -179,23 +179,23 @@ class Page(ServeCase):
         off = "return document.querySelector('[data-command=zero]')?.disabled"
         wait_until(lambda: self.browser.execute_script(off), "no command can be given")
 
-    def test_an_encoder_that_was_never_there_has_no_axes(self):
+    def test_encoder_without_readings_has_no_axes(self):
         served = self.without_history("tformat:" + self.file("nothing"))
         self.window.go(served.url, encoder="tformat:" + self.file("nothing"))
         self.wait_for("There has been no reading since the server started.")
         self.assertEqual(self.browser.find_elements(By.CSS_SELECTOR, ".plot canvas"), [])
 
-    def test_a_link_to_an_unknown_encoder_names_the_nearest(self):
+    def test_link_to_unknown_encoder_suggests_name(self):
         served = self.without_history("sim:tformat")
         self.window.go(served.url, encoder="sim:tfornat")
         self.wait_for('There is no encoder "sim:tfornat" here; did you mean sim:tformat?', "#connection")
 
-    def test_a_link_that_is_no_address_is_an_unknown_encoder(self):
+    def test_invalid_link_is_unknown_encoder(self):
         served = self.without_history("sim:tformat")
         self.browser.get(served.url + "#encoder=%")
         self.wait_for('There is no encoder "%" here', "#connection")
 
-    def test_the_page_of_an_encoder_that_is_removed_says_so(self):
+    def test_page_of_removed_encoder_reports_removal(self):
         both = '[encoder.elbow]\nprotocol = "tformat"\nport = "sim"\n[encoder.wrist]\nprotocol = "esl"\nport = "sim"\n'
         served = self.without_history(ABSENC_CONFIG=self.file("absenc.toml", both))
         self.window.go(served.url, encoder="elbow")
@@ -212,7 +212,7 @@ class Page(ServeCase):
         wait_until(lambda: self.text("#connection") == "", "the page is as before")
         self.assert_no_errors()
 
-    def test_the_server_is_lost(self):
+    def test_server_is_lost(self):
         self.open()
         self.wait_for("°", ".unit")
         self.served.process.kill()
@@ -222,7 +222,7 @@ class Page(ServeCase):
         self.assertEqual(set(self.text(".digits").split()), {"—"})
         self.assertEqual(self.pills(), ["▲ 3 not known"])
 
-    def test_by_keyboard_to_one(self):
+    def test_keyboard_reaches_encoder_page(self):
         self.open()
         self.wait_for("good", ".pill")
         for _ in range(20):
@@ -241,7 +241,8 @@ class Page(ServeCase):
         self.assert_no_errors()
 
     def canvas_has(self, selector, color):
-        """Whether a plot has points of this [red, green, blue]. A thin line between two rows of points is half transparent."""
+        """Returns whether a plot has pixels of this [red, green, blue] colour. Thin lines between two rows of pixels
+        are half transparent."""
         return self.browser.execute_script("""
             const [selector, [red, green, blue]] = arguments;
             return [...document.querySelectorAll(selector + " canvas")].some((canvas) => {
@@ -257,10 +258,10 @@ class Page(ServeCase):
         self.browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": [
             {"name": "prefers-color-scheme", "value": "dark" if on else "light"}]})
 
-    def test_figures_of_one_in_trouble(self):
+    def test_exchange_figures(self):
         self.window.go(self.served.url, encoder="sim:tformat?alarm=over_heat&fault=corrupt=0.2", range="10m", tab="exchanges")
         self.wait_for("bad checksum", ".histogram")
-        # By the page itself, which makes them anew when something changes.
+        # The page redraws the figures on every change.
         labels = "return [...document.querySelectorAll('.histogram')].map((table) => table.getAttribute('aria-label'))"
         wait_until(lambda: self.browser.execute_script(labels) == ["replies by latency", "failed attempts by kind"], "there are both")
         widest = "return Math.max(...[...document.querySelectorAll('.histogram .bar')].map((bar) => bar.offsetWidth))"
@@ -272,7 +273,7 @@ class Page(ServeCase):
         wait_until(lambda: self.canvas_has(past, [0xff, 0x80, 0x80]), "in the colour of the dark theme, too")
         self.assert_no_errors()
 
-    def test_a_loss_is_marked_in_the_history(self):
+    def test_history_marks_loss(self):
         self.window.go(self.served.url, encoder=self.name, range="10m")
         self.wait_for("2.747", ".digits")
         wait_until(lambda: self.served.json(of(self.name, "history"))["rows"], "the history has a second")
@@ -282,7 +283,7 @@ class Page(ServeCase):
         wait_until(lambda: self.canvas_has(past, [0xb3, 0x16, 0x1c]), "it is marked although nothing is read after it")
         self.assert_no_errors()
 
-    def test_figures_go_with_the_server(self):
+    def test_figures_disappear_with_server(self):
         self.window.go(self.served.url, encoder="sim:tformat?alarm=over_heat&fault=corrupt=0.2", tab="exchanges")
         self.wait_for("bad checksum", "[aria-label='last bad exchanges']")
         self.served.process.kill()
@@ -291,7 +292,7 @@ class Page(ServeCase):
         self.assertEqual(self.browser.find_elements(By.CSS_SELECTOR, shown), [])
         self.assertEqual(self.text(".digits"), "—")
 
-    def test_a_change_shows_before_after_and_who_and_needs_a_token(self):
+    def test_change_shows_before_after_and_name_and_needs_token(self):
         self.open("#encoder=" + self.name)
         self.wait_for("2.747", ".digits")
         wait_until(lambda: self.browser.find_elements(By.CSS_SELECTOR, "[data-command=zero]"), "there are commands")
@@ -302,7 +303,7 @@ class Page(ServeCase):
         yes = self.browser.find_element(By.ID, "dialog-yes")
         token = self.browser.find_element(By.ID, "dialog-token")
         token.send_keys("another-secret-than-that")
-        yes.click()  # the machine was not said to be safe
+        yes.click()  # the checkbox about the machine's safety was not set
         self.assertEqual(self.text("#dialog-wrong"), "")
         self.browser.find_element(By.ID, "dialog-safe").click()
         yes.click()
@@ -321,7 +322,7 @@ class Page(ServeCase):
         self.assert_no_errors()
 
     def ask_for(self, command):
-        """Opens the dialog of a command."""
+        """Opens the confirmation dialog of a command."""
         wait_until(lambda: self.browser.find_elements(By.CSS_SELECTOR, f"[data-command={command}]"), "there are commands")
         self.browser.execute_script("document.querySelector('dialog').close()")
         wait_until(lambda: self.text("#dialog-body") == "", "the one before is gone")
@@ -333,7 +334,7 @@ class Page(ServeCase):
         shown = "return [...document.querySelectorAll('dialog dl > div:not([hidden]) dd')].map((one) => one.textContent).slice(0, 2)"
         wait_until(lambda: self.browser.execute_script(shown) == [before, after], f"it says {before} and {after}")
 
-    def test_before_a_change_the_value_that_it_changes_is_shown(self):
+    def test_dialog_shows_value_before_change(self):
         good = {"Authorization": f"Bearer {TOKEN}"}
         self.assertEqual(self.served.command(self.name, "memory-write", good, argument=[3, 0x41])[0], 200)
         self.open("#encoder=" + self.name)
@@ -349,18 +350,18 @@ class Page(ServeCase):
         self.before_and_after("0x41 (65)", "0x42 (66)")
         self.assert_no_errors()
 
-    def test_values_have_names_and_units_for_people(self):
+    def test_values_have_names_and_units(self):
         self.window.go(self.served.url, encoder=self.name, tab="exchanges")
         words = self.wait_for("1000 counts", "#panel-exchanges")
         self.assertIn("position within the turn", words)
         self.press("Settings", "Read the settings")
-        words += self.says("Settings", "35 °C")
+        words += self.wait_for_panel("Settings", "35 °C")
         self.window.go(self.served.url, encoder="sim:esl?motion=rpm=60", tab="exchanges")
         words += self.wait_for("channel 1 status", "#panel-exchanges")
         for part in ("data id", "data_id", "degC", " SF\n", "ch1"):
             self.assertNotIn(part, words)
 
-    def test_the_live_trace_begins_with_points_that_the_server_kept(self):
+    def test_live_trace_begins_with_stored_points(self):
         self.open()
         self.window.go(self.served.url, encoder="sim:esl?motion=rpm=60")
         wait_until(lambda: self.canvas_has(".plot", [0x0b, 0x5c, 0xad]), "the trace is drawn")
@@ -368,7 +369,7 @@ class Page(ServeCase):
         self.assertIn("points", asked)
         self.assertNotIn("minute", asked)
 
-    def test_an_alarm_is_acknowledged_by_a_token_and_stays(self):
+    def test_alarm_is_acknowledged_with_token_and_remains(self):
         name = "sim:tformat?alarm=over_heat&fault=corrupt=0.2"
         self.window.go(self.served.url, encoder=name)
         button = "document.querySelector('[data-acknowledge=over_heat]')"
@@ -388,13 +389,13 @@ class Page(ServeCase):
         self.assertEqual(self.text(self.card(name) + " .state"), "▲ alarm, seen")
         self.assert_no_errors()
 
-    def test_the_browser_notifies_where_it_is_allowed(self):
+    def test_browser_notifications(self):
         recorder = self.browser.execute_cdp_cmd("Page.addScriptToEvaluateOnNewDocument", {"source": """
-            window.told = [];
+            window.notifications = [];
             window.Notification = class {
               static permission = "default";
               static async requestPermission() { return this.permission = "granted"; }
-              constructor(title, {body, tag}) { told.push([title, body, tag]); }
+              constructor(title, {body, tag}) { notifications.push([title, body, tag]); }
               close() {}
             };"""})
         self.addCleanup(self.browser.execute_cdp_cmd, "Page.removeScriptToEvaluateOnNewDocument", recorder)
@@ -404,29 +405,29 @@ class Page(ServeCase):
         served = self.without_history(name)
         self.browser.get(served.url)
         self.wait_for("good", ".pill")
-        told = "return told"
+        notifications = "return notifications"
 
         def order(line):
             emulator.process.stdin.write(line)
             self.assertTrue(emulator.line().startswith("ok"))
         order(b"alarm over_speed\n")
         self.wait_for("1 alarm", ".pill")
-        self.assertEqual(self.browser.execute_script(told), [])  # nobody has allowed it
+        self.assertEqual(self.browser.execute_script(notifications), [])  # the user has not allowed notifications yet
         self.browser.find_element(By.ID, "notify").click()
         wait_until(lambda: self.browser.find_element(By.ID, "notify").get_attribute("aria-pressed") == "true", "it is on")
         order(b"alarm over_heat\n")
-        wait_until(lambda: self.browser.execute_script(told), "it is told")
-        title, body, tag = self.browser.execute_script(told)[0]
+        wait_until(lambda: self.browser.execute_script(notifications), "the alarm is notified")
+        title, body, tag = self.browser.execute_script(notifications)[0]
         self.assertEqual(title, f"{name}: over heat")
         self.assertIn("let it cool", body)
         self.assertEqual(tag, f"{name} alarm over_heat")
         emulator.kill()
-        wait_until(lambda: [one for one in self.browser.execute_script(told) if one[0] == f"{name}: lost"], "a loss is told")
+        wait_until(lambda: [one for one in self.browser.execute_script(notifications) if one[0] == f"{name}: lost"], "the loss is notified")
         self.browser.find_element(By.ID, "notify").click()
         wait_until(lambda: self.browser.find_element(By.ID, "notify").get_attribute("aria-pressed") == "false", "it is off")
         self.assert_no_errors()
 
-    def test_without_tokens_the_page_says_how_to_get_some(self):
+    def test_without_tokens_page_explains_them(self):
         served = self.without_history("sim:tformat")
         self.browser.get(served.url + "#encoder=sim:tformat")
         self.wait_for("--token-file FILE", ".commands")
@@ -439,61 +440,61 @@ class Page(ServeCase):
         return self.browser.find_element(By.ID, f"panel-{title.lower()}")
 
     def press(self, title, button):
-        """The button in that tab; by keyboard, as whoever sees no pointer does."""
+        """Presses the button in that tab by keyboard, as users without a pointer do."""
         wait_until(lambda: self.browser.find_elements(By.ID, f"tab-{title.lower()}") and
                    self.browser.find_element(By.ID, f"tab-{title.lower()}").is_displayed(), f"there is {title}")
         found = self.panel(title).find_element(By.XPATH, f".//button[text()='{button}']")
         wait_until(lambda: found.is_displayed() and found.is_enabled(), f"{title} can be asked")
         found.send_keys(Keys.ENTER)
 
-    def says(self, title, words):
+    def wait_for_panel(self, title, words):
         return wait_until(lambda: words in self.panel(title).text and self.panel(title).text, f"{title} says {words!r}")
 
-    def test_what_doctor_does_is_told_meanwhile(self):
+    def test_doctor_shows_progress(self):
         line = SilentLine()
         line.__enter__()
         self.addCleanup(line.__exit__, None, None, None)
         self.served = self.without_history(f"tformat:{line.path}?latency=200")
         self.open(f"#encoder=tformat:{line.path}?latency=200")
         self.press("Doctor", "Examine")
-        self.says("Doctor", "the encoder is being examined, readings continue afterwards: reading")
+        self.wait_for_panel("Doctor", "the encoder is being examined, readings continue afterwards: reading")
         self.wait_for("examined", ".state")
         self.assertFalse(self.panel("Doctor").find_element(By.TAG_NAME, "button").is_enabled())
-        self.says("Doctor", "fault: no answer")
+        self.wait_for_panel("Doctor", "fault: no answer")
         wait_until(lambda: "no reply" in self.text(".state"), "it is asked again")
         self.assert_no_errors()
 
-    def test_doctor_names_what_is_wrong(self):
+    def test_doctor_shows_findings(self):
         name = "sim:tformat?alarm=over_heat&fault=corrupt=0.2"
         self.window.go(self.served.url, encoder=name)
         self.press("Doctor", "Examine")
-        words = self.says("Doctor", "warning: damaged bits")
+        words = self.wait_for_panel("Doctor", "warning: damaged bits")
         for part in ("first: damaged_bits", "seen", "likely", "try", "warning: alarm"):
             self.assertIn(part, words)
         self.assert_no_errors()
 
-    def test_memory_and_settings_are_those_of_the_encoder(self):
+    def test_memory_and_settings_equal_encoder(self):
         good = {"Authorization": f"Bearer {TOKEN}"}
         self.assertEqual(self.served.command(self.name, "memory-write", good, argument=[1, 0x41, 2])[0], 200)
         self.assertEqual(self.served.command(self.name, "set-overheat-threshold", good, argument=[77])[0], 200)
         self.open("#encoder=" + self.name)
         self.press("Settings", "Read the settings")
-        self.assertIn("overheat threshold 77 °C", self.says("Settings", "may be set to degrees"))
+        self.assertIn("overheat threshold 77 °C", self.wait_for_panel("Settings", "may be set to degrees"))
         Select(self.panel("Memory").find_element(By.TAG_NAME, "select")).select_by_value("2")
         self.press("Memory", "Read the memory")
-        self.says("Memory", "127 bytes read at")
+        self.wait_for_panel("Memory", "127 bytes read at")
         first = self.panel("Memory").find_element(By.CSS_SELECTOR, "tbody tr").text
         self.assertRegex(first, "^2 0x00 [0-9A-F]{2} 41 ")
         self.press("Doctor", "Examine")
-        self.says("Doctor", "good: ")
+        self.wait_for_panel("Doctor", "good: ")
         self.emulator.kill()
-        self.says("Memory", "no longer shown: the encoder is lost")
+        self.wait_for_panel("Memory", "no longer shown: the encoder is lost")
         self.assertNotIn("0x00", self.panel("Memory").text)
         self.assertNotIn("77 °C", self.panel("Settings").text)
         self.press("Settings", "Read the settings")
-        self.says("Settings", "was not done")
+        self.wait_for_panel("Settings", "was not done")
         self.press("Doctor", "Examine")
-        self.says("Doctor", "fault: port ")
+        self.wait_for_panel("Doctor", "fault: port ")
         self.assert_no_errors()
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""openapi.json as those use it who generate a client of it: openapi-typescript, the compiler of TypeScript, Node."""
+"""Tests openapi.json with a generated client: openapi-typescript, the TypeScript compiler and Node."""
 import json
 import os
 import re
@@ -20,7 +20,7 @@ class Client(ServeCase):
         return subprocess.run(command, cwd=self.directory, capture_output=True, text=True, timeout=4 * PATIENCE, check=False)
 
     def generate(self):
-        """The types of the API, made by openapi-typescript."""
+        """Generates the types of the API with openapi-typescript."""
         generator = tool("openapi-typescript/bin/cli.js")
         os.symlink(MODULES, os.path.join(self.directory, "node_modules"))
         self.file("package.json", '{"type": "module"}')
@@ -31,7 +31,7 @@ class Client(ServeCase):
         self.file("tsconfig.json", json.dumps({"compilerOptions": OPTIONS, "files": [name]}))
         return self.run_tool("node", str(tool("typescript/bin/tsc")), "--project", "tsconfig.json")
 
-    def test_a_generated_client_finds_all_that_is_described(self):
+    def test_generated_client_finds_all_routes(self):
         self.generate()
         shutil.copy(SOURCE / "tests/npm/client.ts", self.directory)
         done = self.compile("client.ts")
@@ -48,12 +48,12 @@ class Client(ServeCase):
         self.assertIn("alarm", found["kinds"])
         self.assertIn(["overheat_threshold_c", "90 degC"], found["setting"])
         self.assertEqual((found["stream"], found["unknown"], found["ok"], found["has_metrics"]), (200, 404, True, True))
-        self.assertEqual((found["bytes"], found["doctor"]), (127, False))  # it has an alarm
+        self.assertEqual((found["bytes"], found["doctor"]), (127, False))  # doctor finds the alarm
         asked = set(re.findall(r'client\.\w+\("([^"]+)"', (SOURCE / "tests/npm/client.ts").read_text(encoding="utf-8")))
         described = set(server.json("/openapi.json")["paths"]) - {"/openapi.json", "/api/encoders/{encoder}/stream"}
         self.assertEqual(asked, described)
 
-    def test_what_is_not_described_does_not_compile(self):
+    def test_undescribed_routes_do_not_compile(self):
         self.generate()
         head = 'import createClient from "openapi-fetch";\nimport type {paths} from "./api.js";\nconst client = createClient<paths>();\n'
         for wrong in ('await client.GET("/api/history");', 'console.log((await client.GET("/api/encoders")).data?.encoders[0]?.angle);',

@@ -1,8 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Two `absenc serve` beside a cluster of three nats-server with JetStream, whose MQTT is 3.1.1: a node and a server are
-killed with -9 and come back, and every reading that was shown as taken arrives.
-
-ABSENC_CLUSTER_READINGS: how many are published, 3000 unless given; docs/benchmarks.md has the figures of 20000."""
+"""Tests two `absenc serve` with a cluster of three nats-server with JetStream, whose MQTT is version 3.1.1. A node and
+a server are killed with SIGKILL and restarted; every reading that the server counted as taken must arrive.
+ABSENC_CLUSTER_READINGS is the number of readings (default 3000). docs/benchmarks.md has the figures for 20000."""
 import json
 import os
 import unittest
@@ -14,7 +13,7 @@ from mqtt_support import Daemon, Receiver, free_port, now, numbers, twice
 from serve_support import ServeCase, wait_until
 
 READINGS = int(os.environ.get("ABSENC_CLUSTER_READINGS", "3000"))
-RATE = 500  # readings a second of each of the two
+RATE = 500  # readings per second of each server
 
 
 class Cluster(ServeCase):
@@ -29,7 +28,7 @@ class Cluster(ServeCase):
                 "cluster": {"name": "hall", "listen": f"127.0.0.1:{route}",
                             "routes": [f"nats://127.0.0.1:{one}" for one in routes]},
                 "mqtt": {"listen": f"127.0.0.1:{mqtt}"}}))
-            # Its MQTT port answers only when the others are there: all begin before any is waited for.
+            # A node's MQTT port answers only if the other nodes run, so all start before the test waits for any.
             nodes.append((["nats-server", "-c", config], mqtt, os.path.join(self.directory, f"node{index}.log")))
         started = [Daemon(*one, wait=False) for one in nodes]
         for one in started:
@@ -49,7 +48,7 @@ class Cluster(ServeCase):
     def taken(server, name):
         return server.json("/api/mqtt")["taken"].get(name, 0)
 
-    def test_every_reading_shown_as_taken_arrives(self):
+    def test_every_reading_counted_as_taken_arrives(self):
         first, second, third = self.cluster()
         receiver = Receiver(third.port, "plant/#", version=paho.MQTTv311, client_id="collects")
         self.addCleanup(receiver.end)

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The history of `absenc serve` while others move, remove, replace or damage its file, and where there is none to write."""
+"""Tests the history of `absenc serve` when its file is moved, removed, replaced or damaged, and when it cannot be
+written."""
 import contextlib
 import glob
 import json
@@ -20,14 +21,15 @@ NOTICED_S = 5
 
 
 def seconds_in(path):
-    """The seconds of a history that is whole."""
+    """Returns the seconds recorded in a history, after an integrity check."""
     with contextlib.closing(sqlite3.connect(path)) as database:
         assert database.execute("PRAGMA integrity_check").fetchall() == [("ok",)]
         return {at for at, in database.execute("SELECT at FROM second")}
 
 
-class Disturbed(ServeCase):
-    """Whatever is done to the file: within 5 s it is told and a history is kept again, and nothing that was is lost."""
+class DisturbedFile(ServeCase):
+    """After any damage to the file, the server must report it and record again within 5 s. Existing rows must not be
+    lost."""
 
     def setUp(self):
         super().setUp()
@@ -39,36 +41,37 @@ class Disturbed(ServeCase):
     def rows(self):
         return self.served.json(of(NAME, "history"), rows=5000)["rows"]
 
-    def begins_anew_after(self, disturb, words):
-        """Returns the seconds of before."""
+    def records_again_after(self, disturb, words):
+        """Disturbs the file, and waits until the server reports it and records again. Returns the seconds recorded
+        before."""
         before = {row[0] for row in self.rows()}
         begin = self.disturbed_at = time.time()
         disturb()
         self.assertEqual(self.served.encoder()["state"], "live")
-        told = wait_until(lambda: self.tells(words), f"it tells {words!r}")
+        event = wait_until(lambda: self.reported_event(words), f"an event has {words!r}")
         late = time.time() - begin
-        wait_until(lambda: self.is_kept_since(begin), "seconds are kept again")
+        wait_until(lambda: self.is_recorded_since(begin), "seconds are kept again")
         self.assertTrue(self.served.json("/healthz")["ok"])
-        self.assertLess(told["at_ms"] / 1000 - begin, NOTICED_S, late)
+        self.assertLess(event["at_ms"] / 1000 - begin, NOTICED_S, late)
         return before
 
-    def tells(self, words):
+    def reported_event(self, words):
         status, body = self.served.ask("/api/events")
-        if status == 503:  # between the two
+        if status == 503:  # while the history is being reopened
             return None
         events = [event for event in json.loads(body)["events"] if event["kind"] == "history"]
         return next((one for one in events if words in one["text"] and one["at_ms"] > 1000 * self.disturbed_at), None)
 
-    def is_kept_since(self, begin):
+    def is_recorded_since(self, begin):
         status, body = self.served.ask(of(NAME, "history"), rows=5000)
         return status == 200 and any(row[0] > begin for row in json.loads(body)["rows"])
 
-    def kept_as(self):
-        kept, = glob.glob(self.path + ".damaged-*Z")
-        return kept
+    def set_aside_path(self):
+        recorded, = glob.glob(self.path + ".damaged-*Z")
+        return recorded
 
     def test_moved(self):
-        before = self.begins_anew_after(lambda: os.rename(self.path, self.path + ".old"), "was moved or removed")
+        before = self.records_again_after(lambda: os.rename(self.path, self.path + ".old"), "was moved or removed")
         self.assertLessEqual(before, seconds_in(self.path + ".old"))
         self.assertTrue(seconds_in(self.path).isdisjoint(before))
 
@@ -76,7 +79,7 @@ class Disturbed(ServeCase):
         def move():
             for ending in ("", "-wal", "-shm"):
                 os.rename(self.path + ending, self.path + ".old" + ending)
-        before = self.begins_anew_after(move, "was moved or removed")
+        before = self.records_again_after(move, "was moved or removed")
         self.assertLessEqual(before, seconds_in(self.path + ".old"))
 
     def test_moved_with_its_folder(self):
@@ -93,49 +96,49 @@ class Disturbed(ServeCase):
         self.assertEqual(self.served.ask(of(NAME, "history"))[0], 503)
         os.mkdir(folder)
         wait_until(lambda: self.served.json("/healthz")["history"] == "good", "it is well again")
-        wait_until(lambda: self.tells("could not be written"), "the rows that are missing are told")
+        wait_until(lambda: self.reported_event("could not be written"), "the missing rows are reported")
         self.assertLessEqual(before, seconds_in(os.path.join(folder + ".old", "history.sqlite")))
 
     def test_removed(self):
-        self.begins_anew_after(lambda: os.unlink(self.path), "was moved or removed")
+        self.records_again_after(lambda: os.unlink(self.path), "was moved or removed")
 
-    def test_all_of_it_removed(self):
+    def test_removed_with_its_log(self):
         def remove():
             for ending in ("", "-wal", "-shm"):
                 os.unlink(self.path + ending)
-        self.begins_anew_after(remove, "was moved or removed")
+        self.records_again_after(remove, "was moved or removed")
 
-    def test_replaced_by_a_copy(self):
+    def test_replaced_by_copy(self):
         copy = self.path + ".copy"
         with contextlib.closing(sqlite3.connect(self.path)) as database:
             database.execute("VACUUM INTO ?", (copy,))
         copied = seconds_in(copy)
-        self.begins_anew_after(lambda: os.rename(copy, self.path), "was replaced")
+        self.records_again_after(lambda: os.rename(copy, self.path), "was replaced")
         self.assertLessEqual(copied, seconds_in(self.path))
 
-    def test_replaced_by_something_else(self):
+    def test_replaced_by_other_file(self):
         other = self.file("other", "")
         with open(other, "wb") as file:
             file.write(GARBAGE)
-        self.begins_anew_after(lambda: os.replace(other, self.path), "it was renamed to")
-        with open(self.kept_as(), "rb") as file:
+        self.records_again_after(lambda: os.replace(other, self.path), "it was renamed to")
+        with open(self.set_aside_path(), "rb") as file:
             self.assertEqual(file.read(), GARBAGE)
 
-    def test_truncated(self):
-        self.begins_anew_after(lambda: os.truncate(self.path, 0), "it was renamed to")
-        self.assertTrue(self.kept_as())
+    def test_truncated_to_nothing(self):
+        self.records_again_after(lambda: os.truncate(self.path, 0), "it was renamed to")
+        self.assertTrue(self.set_aside_path())
 
-    def test_cut_off(self):
+    def test_truncated_to_half(self):
         self.write_to_the_file()
         size = os.path.getsize(self.path)
         with open(self.path, "rb") as file:
             half = file.read(size // 2)
-        self.begins_anew_after(lambda: os.truncate(self.path, size // 2), "it was renamed to")
-        with open(self.kept_as(), "rb") as file:
+        self.records_again_after(lambda: os.truncate(self.path, size // 2), "it was renamed to")
+        with open(self.set_aside_path(), "rb") as file:
             self.assertEqual(file.read(), half)
 
-    def test_overwritten_by_a_copy(self):
-        """As by `cp`: the file stays the same one. With the log of before, the copy would be neither."""
+    def test_overwritten_by_copy(self):
+        """`cp` keeps the same inode. The copy is not valid together with the previous write-ahead log."""
         self.write_to_the_file()
         copy = self.path + ".copy"
         with contextlib.closing(sqlite3.connect(self.path)) as database:
@@ -144,33 +147,33 @@ class Disturbed(ServeCase):
             database.execute("DELETE FROM second WHERE at % 7 = 0")
             database.commit()
             database.execute("VACUUM")
-        self.begins_anew_after(lambda: shutil.copyfile(copy, self.path), f"the history {self.path} ")
-        if kept := glob.glob(self.path + ".damaged-*Z"):  # otherwise what came of both is whole
-            self.assertEqual(seconds_in(copy), seconds_in(kept[0]))
+        self.records_again_after(lambda: shutil.copyfile(copy, self.path), f"the history {self.path} ")
+        if recorded := glob.glob(self.path + ".damaged-*Z"):  # otherwise the mixed file is valid
+            self.assertEqual(seconds_in(copy), seconds_in(recorded[0]))
         self.assertTrue(seconds_in(self.path))
 
-    def test_overwritten_by_something_else(self):
+    def test_overwritten_by_garbage(self):
         def overwrite():
             with open(self.path, "r+b") as file:
                 file.write(GARBAGE)
-        self.begins_anew_after(overwrite, "it was renamed to")
-        with open(self.kept_as(), "rb") as file:
+        self.records_again_after(overwrite, "it was renamed to")
+        with open(self.set_aside_path(), "rb") as file:
             self.assertEqual(file.read()[:len(GARBAGE)], GARBAGE)
 
     def write_to_the_file(self, rows=5000):
-        """And not to its log alone."""
+        """Writes rows into the main file, not only into its log."""
         with contextlib.closing(sqlite3.connect(self.path, timeout=PATIENCE)) as database:
             database.executemany("INSERT INTO second SELECT id, ?, 50, 0, 1, 2, 3, NULL, NULL, NULL FROM encoder",
                                  [(1_000_000 + i,) for i in range(rows)])
             database.commit()
             database.execute("PRAGMA wal_checkpoint(FULL)")
-        wait_until(lambda: self.tells("was changed by another program"), "it tells that another has written")
+        wait_until(lambda: self.reported_event("was changed by another program"), "it tells that another has written")
         begin = time.time()
-        wait_until(lambda: self.is_kept_since(begin), "it goes on")
+        wait_until(lambda: self.is_recorded_since(begin), "it goes on")
 
 
-class Unusable(ServeCase):
-    """Where no history can be written, encoders are read and shown, and health says so."""
+class UnusableFile(ServeCase):
+    """If the history cannot be written, encoders must still be read and shown, and the health check must report it."""
 
     def assert_failing(self, path, words, **settings):
         server = self.server(NAME, "--history", path, "--token-file", self.tokens(), **settings)
@@ -193,20 +196,20 @@ class Unusable(ServeCase):
             file.write(GARBAGE)
         server = self.assert_failing(path, "move it away")
         with open(path, "rb") as file:
-            self.assertEqual(file.read(), GARBAGE)  # it may be of somebody else
+            self.assertEqual(file.read(), GARBAGE)  # the file may belong to another program
         os.rename(path, path + ".old")
         self.assert_well_again(server)
 
-    def test_no_folder(self):
+    def test_missing_folder(self):
         folder = self.file("folder")
         server = self.assert_failing(os.path.join(folder, "history.sqlite"), "No such file")
         os.mkdir(folder)
         self.assert_well_again(server)
 
-    def test_a_folder_that_cannot_be_written(self):
-        self.assert_failing("/sys/absenc-history.sqlite", "/sys/absenc-history.sqlite")  # not even by root
+    def test_unwritable_folder(self):
+        self.assert_failing("/sys/absenc-history.sqlite", "/sys/absenc-history.sqlite")  # not writable even by root
 
-    def test_a_full_disk(self):
+    def test_full_disk(self):
         def limit():
             signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
             resource.setrlimit(resource.RLIMIT_FSIZE, (0, resource.RLIM_INFINITY))
@@ -223,7 +226,7 @@ class Unusable(ServeCase):
             server = self.assert_failing(path, "locked")
         self.assert_well_again(server)
 
-    def test_kept_by_another_server(self):
+    def test_used_by_another_server(self):
         path = self.file("history.sqlite")
         self.server(NAME, "--history", path)
         with self.assertRaisesRegex(AssertionError, "another server keeps its history"):
@@ -233,8 +236,8 @@ class Unusable(ServeCase):
 DAY = 86_400
 
 
-class WrongClock(ServeCase):
-    """The computer's clock jumps while the server reads (libfaketime; the clock of readings goes on as it was)."""
+class WrongSystemClock(ServeCase):
+    """The system clock jumps while the server reads (libfaketime). The clock of the readings is not affected."""
 
     def setUp(self):
         super().setUp()
@@ -242,7 +245,7 @@ class WrongClock(ServeCase):
         library = glob.glob("/usr/lib/*/faketime/libfaketimeMT.so.1")
         self.assertTrue(library, "the package faketime is missing")
         self.settings = {"LD_PRELOAD": library[0], "FAKETIME_TIMESTAMP_FILE": self.file("clock"), "FAKETIME_NO_CACHE": "1",
-                         "NO_FAKE_STAT": "1",  # the times of files are those of the disk
+                         "NO_FAKE_STAT": "1",  # file times remain those of the disk
                          "FAKETIME_DONT_FAKE_MONOTONIC": "1"}
         self.wrong_by(0)
 
@@ -256,19 +259,19 @@ class WrongClock(ServeCase):
     def wait_for_event(self, server, words):
         everything = {"from": 0, "to": int(time.time()) + 500 * DAY}
         wait_until(lambda: any(words in event["text"] for event in server.json("/api/events", **everything)["events"]),
-                   f"it tells {words!r}")
+                   f"an event has {words!r}")
 
     def wait_for_readings(self, server, more=150):
-        """Returns how many there are."""
+        """Waits for `more` readings and returns their total number."""
         before = server.json(of(NAME))["readings"]
         wait_until(lambda: server.json(of(NAME))["readings"] >= before + more, "it is read")
         return server.json(of(NAME))["readings"]
 
-    def kept(self, condition="1"):
+    def recorded(self, condition="1"):
         with contextlib.closing(sqlite3.connect(self.path)) as database:
             return database.execute(f"SELECT ifnull(sum(readings), 0) FROM second WHERE {condition}").fetchone()[0]
 
-    def test_days_ahead_for_a_while_delete_nothing_also_when_the_server_starts_meanwhile(self):
+    def test_clock_ahead_by_days_deletes_nothing_even_across_restart(self):
         server = self.serve()
         self.wait_for_readings(server)
         self.wrong_by(400 * DAY)
@@ -276,27 +279,27 @@ class WrongClock(ServeCase):
         self.wait_for_readings(server)
         end(server.process)
         now = int(time.time())
-        before = self.kept(f"at < {now + DAY}")
+        before = self.recorded(f"at < {now + DAY}")
         self.assertGreater(before, 0)
-        self.assertGreater(self.kept(f"at > {now + 300 * DAY}"), 0)
+        self.assertGreater(self.recorded(f"at > {now + 300 * DAY}"), 0)
         server = self.serve()
         self.wait_for_readings(server)
         self.wrong_by(0)
         self.wait_for_event(server, "the clock went back by 400 days")
         end(server.process)
-        self.assertGreaterEqual(self.kept(f"at < {now + DAY}"), before)
+        self.assertGreaterEqual(self.recorded(f"at < {now + DAY}"), before)
 
-    def test_a_step_back_loses_no_readings(self):
+    def test_step_back_loses_no_readings(self):
         server = self.serve()
         self.wait_for_readings(server)
         self.wrong_by(-600)
         self.wait_for_event(server, "the clock went back by 10 minutes")
         self.wait_for_readings(server)
-        self.wrong_by(-602)  # too little to be told: some seconds come twice
+        self.wrong_by(-602)  # too small to be reported: some seconds occur twice
         readings = self.wait_for_readings(server)
-        self.wait_for_readings(server)  # the second that is under way then is over
+        self.wait_for_readings(server)  # the second in progress is then over
         end(server.process)
-        self.assertGreaterEqual(self.kept(), readings)
+        self.assertGreaterEqual(self.recorded(), readings)
 
 
 if __name__ == "__main__":

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How the page of `absenc serve` looks, measured in Chromium: no text is broken, cut or covered, at six widths in both
-themes; axe-core finds nothing at any. With ABSENC_SCREENSHOTS=FOLDER each scene becomes a contact sheet to look at."""
+"""Checks the rendered page of `absenc serve` in Chromium: no text may be broken, cut off or covered, at six widths in
+both themes, and axe-core must find no fault. ABSENC_SCREENSHOTS=FOLDER writes a contact sheet of each scene."""
 import os
 import unittest
 
-from page_scenes import KINDS, Browser, config, hundred  # first: it looks for selenium
+from page_scenes import KINDS, Browser, config, hundred  # imported first, because it checks for selenium
 from selenium.webdriver.common.by import By
 
 from command_support import Emulator
@@ -14,7 +14,7 @@ from serve_support import ServeCase, wait_until
 WIDTHS = (390, 768, 1280, 1400, 1920, 3840)
 SCREENSHOTS = os.environ.get("ABSENC_SCREENSHOTS")
 
-# What is wrong with the page as it is drawn now, as sentences.
+# JavaScript that returns the faults of the rendered page as sentences.
 MEASURE = """
 const wrong = [];
 const root = document.documentElement;
@@ -111,7 +111,7 @@ class Look(ServeCase):
         wait_until(lambda: self.browser.ask(f"return Boolean({ready})"), ready)
 
     def draw(self):
-        """Waits until the page has drawn itself anew."""
+        """Waits until the page has redrawn itself."""
         self.browser.driver.execute_async_script("""
             const done = arguments[0];
             requestAnimationFrame(() => requestAnimationFrame(() => setTimeout(() => requestAnimationFrame(() => done()), 150)));""")
@@ -147,7 +147,7 @@ class Look(ServeCase):
     READY = "document.querySelectorAll('.card .digits').length > 0 && document.querySelector('.spark .line')?.getAttribute('d')"
     ONE = "document.querySelector('.one .plot canvas') && document.querySelector('.commands button')"
 
-    def test_all_kinds_one_lost_one_with_alarms(self):
+    def test_all_kinds_with_lost_and_alarmed_encoder(self):
         emulator = Emulator(self.directory, "--motion", "rpm=20")
         self.addCleanup(emulator.end)
         server = self.served({"press-2": ("tformat", "latency=300"), **KINDS}, ports={"press-2": emulator.path})
@@ -168,7 +168,7 @@ class Look(ServeCase):
             self.open(server, self.ONE, encoder=name)
             self.look(f"one-{name}", WIDTHS if name in ("press-2", "elbow", "slide-x") else (390, 1280, 1920))
 
-    def test_the_tabs(self):
+    def test_tabs(self):
         server = self.served({name: KINDS[name] for name in ("wrist", "elbow", "table")})
         for tab, button, done in (("history", None, "document.querySelectorAll('#panel-history td').length > 0"),
                                   ("exchanges", None, "document.querySelectorAll('#panel-exchanges code').length > 1"),
@@ -182,7 +182,7 @@ class Look(ServeCase):
             self.browser.ask("document.querySelector('.tablist').scrollIntoView()")
             self.look(f"tab-{tab}", (390, 1400, 3840))
 
-    def test_what_asks_before_a_change(self):
+    def test_confirmation_dialogs(self):
         server = self.served({"elbow": KINDS["elbow"]})
         for command in ("zero", "set-overheat-threshold"):
             self.open(server, self.ONE, encoder="elbow")
@@ -191,13 +191,14 @@ class Look(ServeCase):
             wait_until(lambda: self.browser.ask("return document.querySelector('dialog').open"), "it asks")
             self.look(f"change-{command}", (390, 1400))
 
-    def test_a_hundred(self):
+    def test_hundred_encoders(self):
         server = self.served(hundred())
         self.open(server, "document.querySelectorAll('.card .digits').length === 100")
         self.look("hundred")
 
-    def test_a_drawing_writes_only_what_has_changed(self):
-        """A write of the same has the browser compute styles and places anew: of a hundred encoders that was most of its work."""
+    def test_redraw_writes_only_changes(self):
+        """Writing an unchanged value makes the browser recompute styles and layout. With a hundred encoders that was
+        most of its work."""
         server = self.served(hundred())
         self.open(server, "document.querySelectorAll('.card .digits').length === 100")
         same, often = self.browser.driver.execute_async_script("""
@@ -230,7 +231,7 @@ class Look(ServeCase):
         self.assertEqual(same, 0)
         self.assertIn(often, range(1, 6))  # twice a second, of 60 states
 
-    def test_one_and_none(self):
+    def test_one_encoder_and_none(self):
         path = self.file("absenc.toml", config({"elbow": ("tformat", "motion=rpm=60")}))
         server = self.without_history(ABSENC_CONFIG=path)
         self.open(server, self.READY)
@@ -239,7 +240,7 @@ class Look(ServeCase):
         self.open(server, "document.querySelector('.one .plot canvas')", encoder="elbow")
         wait_until(lambda: "the server has no tokens" in self.browser.ask("return document.body.innerText"), "it says why")
         self.look("without-tokens", (390, 1400))
-        # A server has at least one; a page may still be given none.
+        # A server has at least one encoder, but the page must handle an empty list.
         self.open(server, self.READY)
         self.browser.driver.execute_async_script("""
             const done = arguments[0];
@@ -249,7 +250,7 @@ class Look(ServeCase):
             });""")
         self.look("none")
 
-    def test_the_server_gone(self):
+    def test_lost_server(self):
         server = self.served(KINDS)
         for name, place in (("overview", {}), ("one", {"encoder": "shoulder"})):
             if name == "one":
@@ -263,7 +264,7 @@ class Look(ServeCase):
 
 
 def sheet(paths, path):
-    """The pictures side by side, three in a row."""
+    """Combines the pictures into one, three in a row."""
     from PIL import Image
     pictures = [Image.open(one).convert("RGB") for one in paths]
     height = 560

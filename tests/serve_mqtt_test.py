@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`absenc serve` with MQTT: what a broker of Debian's gets, and what happens when it, or the server, is killed."""
+"""Tests `absenc serve` with MQTT: the messages that Debian's mosquitto receives, and recovery when it or the server is
+killed."""
 import json
 import os
 import pathlib
@@ -25,8 +26,8 @@ def check(kind, payload):
     jsonschema.validate(payload, {**SCHEMA, "$ref": f"#/$defs/{kind}"}, jsonschema.Draft202012Validator)
 
 
-class What(MqttCase):
-    def test_it_is_as_the_schema_says(self):
+class Messages(MqttCase):
+    def test_match_schema(self):
         jsonschema.Draft202012Validator.check_schema(SCHEMA)
         broker = self.broker()
         receiver = self.receiver(broker)
@@ -60,7 +61,7 @@ class What(MqttCase):
         turned = (later["readings"][0][1] - first["readings"][0][1]) / 360
         self.assertAlmostEqual(turned, at[1] - at[0], delta=0.05)
 
-    def test_a_batch_above_ten_readings_a_second(self):
+    def test_readings_are_batched_above_ten_per_second(self):
         broker = self.broker()
         receiver = self.receiver(broker)
         path = self.file("absenc.toml", "".join(
@@ -72,7 +73,8 @@ class What(MqttCase):
         seconds = now() - started
         all_of = {name: [one for one in receiver.all("readings") if one["encoder"] == name] for name in ("slow", "fast")}
         alone = [one for one in all_of["slow"] if len(one["readings"]) == 1]
-        self.assertGreater(len(alone), len(all_of["slow"]) / 2)  # a busy machine may be late and then have two
+        # a delay of a busy machine puts two readings into one message
+        self.assertGreater(len(alone), len(all_of["slow"]) / 2)
         self.assertLessEqual(len(all_of["fast"]), 10 * seconds + 2)
         for name, messages in all_of.items():
             found = numbers(messages, name)
@@ -86,12 +88,12 @@ class What(MqttCase):
         self.sender(broker.url, f"tformat:{emulator.path}")
         receiver.until("state", lambda one: one["state"] == "live")
         emulator.kill()
-        told = receiver.until("event", lambda one: one["kind"] == "lost")
+        event = receiver.until("event", lambda one: one["kind"] == "lost")
         state = receiver.until("state", lambda one: one.get("encoder") and one["state"] == "lost")
-        self.assertEqual(told["text"], state["message"])
+        self.assertEqual(event["text"], state["message"])
 
 
-    def test_who_has_seen_an_alarm_is_not_sent(self):
+    def test_acknowledgements_are_not_sent(self):
         broker = self.broker()
         receiver = self.receiver(broker)
         name = "sim:tformat?alarm=over_heat"
@@ -100,13 +102,13 @@ class What(MqttCase):
         good = {"Authorization": f"Bearer {TOKEN}"}
         self.assertEqual(server.ask(of(name, "acknowledge"), "POST", good, alarm="over_heat")[0], 200)
         server.command(name, "position", good)
-        receiver.until("event", lambda one: one["kind"] == "command")  # it was told later
+        receiver.until("event", lambda one: one["kind"] == "command")  # this event came later than the acknowledgement
         self.assertNotIn("acknowledged", [one["kind"] for one in receiver.all("event")])
         self.assertNotIn("acknowledged", [one for state in receiver.all("state") for alarm in state.get("alarms") or [] for one in alarm])
 
 
 class State(MqttCase):
-    def test_last_will_after_kill_9(self):
+    def test_last_will_after_kill(self):
         broker = self.broker()
         receiver = self.receiver(broker, "plant/hall/state")
         server = self.sender(broker.url, ONE)
@@ -114,13 +116,13 @@ class State(MqttCase):
         server.process.kill()
         self.assertEqual(receiver.until("state", lambda one: one["state"] == "offline")["why"],
                          "the connection was lost")
-        late = self.receiver(broker, "plant/hall/state")  # it is kept
+        late = self.receiver(broker, "plant/hall/state")  # the message is retained
         self.assertEqual(late.until("state")["state"], "offline")
         self.assertTrue(late.messages[0][2])
         self.sender(broker.url, ONE)
         wait_until(lambda: receiver.all("state")[-1]["state"] == "online", "it is online again")
 
-    def test_the_end_is_told(self):
+    def test_end_of_server_is_published(self):
         broker = self.broker()
         receiver = self.receiver(broker)
         server = self.sender(broker.url, ONE)
@@ -130,7 +132,7 @@ class State(MqttCase):
         self.assertEqual(receiver.until("state", lambda one: one["state"] == "offline")["why"], "it ended")
         self.assertEqual(waiting_in(self.spool()), [])
 
-    def test_an_encoder_that_is_no_longer_served(self):
+    def test_removed_encoder_is_cleared(self):
         broker = self.broker()
         text = '[encoder.{}]\nprotocol = "tformat"\nport = "sim"\n'
         path = self.file("absenc.toml", text.format("elbow") + text.format("wrist"))
@@ -149,7 +151,7 @@ class Spool(MqttCase):
     def numbers(self, receiver):
         return numbers(receiver.all("readings"), ONE)
 
-    def test_nothing_is_lost_while_the_broker_is_away(self):
+    def test_no_reading_is_lost_while_broker_is_away(self):
         broker = self.broker()
         receiver = self.receiver(broker, client_id="keeps")
         server = self.sender(broker.url, ONE, "--rate", "100")
@@ -165,13 +167,13 @@ class Spool(MqttCase):
         wait_until(lambda: self.numbers(receiver)[-1] >= goal, "they come")
         found = self.numbers(receiver)
         self.assertEqual(found, sorted(found))
-        # What the broker had taken and not yet passed on is gone with it: it keeps that in memory.
+        # The killed broker had accepted some messages but not forwarded them: it keeps them in memory only.
         missing = set(range(1, goal + 1)) - set(found)
         self.assertFalse([one for one in missing if not seen < one <= before], missing)
         self.assertEqual(self.mqtt(server)["dropped"], 0)
 
-    def test_it_outlives_kill_9(self):
-        port = free_port()  # nobody is there
+    def test_survives_kill(self):
+        port = free_port()  # no broker is running
         server = self.sender(f"mqtt://127.0.0.1:{port}", ONE, "--rate", "100")
         wait_until(lambda: self.taken(server) > 150, "they are spooled")
         shown = self.taken(server)
@@ -187,8 +189,8 @@ class Spool(MqttCase):
         self.assertEqual(found, list(range(1, len(found) + 1)))
         wait_until(lambda: self.mqtt(server)["waiting"] < 5, "the spool is empty")
 
-    def test_a_message_that_was_not_acknowledged_comes_again(self):
-        """A broker that takes messages and says nothing."""
+    def test_unacknowledged_message_is_repeated(self):
+        """A broker accepts messages but acknowledges none."""
         silent = SilentBroker()
         self.addCleanup(silent.end)
         server = self.sender(f"mqtt://127.0.0.1:{silent.port}", ONE)
@@ -199,14 +201,14 @@ class Spool(MqttCase):
         second = silent.published(5)
         self.assertEqual([one["id"] for one in second], [one["id"] for one in first])
 
-    def test_it_is_bounded(self):
+    def test_size_is_limited(self):
         server = self.sender(f"mqtt://127.0.0.1:{free_port()}", ONE, "sim:esl?motion=rpm=6", "--rate", "0",
                              "--mqtt-spool-mb", "1")
         stream = self.stream(server)
         dropped = wait_until(lambda: self.mqtt(server)["dropped"] > 500 and self.mqtt(server), "some were dropped")
         self.assertLessEqual(dropped["waiting_bytes"], 1_000_000)
-        told = stream.until(lambda event, data: event == "happening" and "the spool is full" in data["text"])
-        self.assertRegex(told["text"], r"^\d+ readings in \d+ messages were dropped, the oldest first: the spool is full")
+        event = stream.until(lambda event, data: event == "happening" and "the spool is full" in data["text"])
+        self.assertRegex(event["text"], r"^\d+ readings in \d+ messages were dropped, the oldest first: the spool is full")
         end(server.process, signal.SIGKILL)
         broker = self.broker()
         receiver = self.receiver(broker)
@@ -215,7 +217,7 @@ class Spool(MqttCase):
         self.assertGreater(found[0], 1)
         self.assertLess(sum(one.stat().st_size for one in os.scandir(self.spool())), 4_000_000)
 
-    def test_two_servers_do_not_share_one(self):
+    def test_two_servers_cannot_share_it(self):
         url = f"mqtt://127.0.0.1:{free_port()}"
         self.sender(url, ONE)
         result = absenc("serve", ONE, "--listen", "127.0.0.1:0", "--history", "none", "--mqtt", url, "--mqtt-spool",
@@ -225,7 +227,7 @@ class Spool(MqttCase):
 
 
     def test_many_open_descriptors(self):
-        """More than select() knows."""
+        """More descriptors than select() supports."""
         broker = self.broker()
         receiver = self.receiver(broker)
         crowded = 'ulimit -n 4096 && for ((i = 3; i < 1030; ++i)); do eval "exec $i</dev/null"; done; exec "$@"'
@@ -233,11 +235,11 @@ class Spool(MqttCase):
         receiver.until("readings")
         self.assertGreater(max(int(one) for one in os.listdir(f"/proc/{server.process.pid}/fd")), 1024)
 
-    def test_a_full_disk_is_told(self):
+    def test_full_disk_is_reported(self):
         server = self.sender(f"mqtt://127.0.0.1:{free_port()}", ONE, "--rate", "500", "--mqtt-spool-mb", "1",
                              preexec_fn=lambda: signal.signal(signal.SIGXFSZ, signal.SIG_IGN))
         shown = wait_until(lambda: self.taken(server) > 20 and self.taken(server), "readings are spooled")
-        # A limit of the kernel for the size of files is to the writer what a full disk is.
+        # A limit on the file size has the same effect on the server as a full disk.
         resource.prlimit(server.process.pid, resource.RLIMIT_FSIZE, (4096, resource.RLIM_INFINITY))
         full = wait_until(lambda: self.mqtt(server)["dropped"] > 20 and self.mqtt(server), "it says so")
         self.assertIn("the spool", full["trouble"])
@@ -252,17 +254,18 @@ class Spool(MqttCase):
         self.assertLessEqual(set(range(1, shown + 1)), set(found))
         self.assertGreaterEqual(found[-1] - len(found), 20, "a gap tells of those that were dropped")
 
-    def test_the_example_of_the_documentation(self):
+    def test_example_of_documentation(self):
         text = (SOURCE / "docs/mqtt.md").read_text(encoding="utf-8")
         path = self.file("absenc.toml", "".join(re.findall(r"```toml\n(.*?)```", text, re.DOTALL)))
         result = absenc("serve", ONE, "--history", "none", "--listen", "127.0.0.1:0", "--mqtt-spool", self.spool(),
                         env={**os.environ, "ABSENC_CONFIG": path})
         self.assertEqual(result.returncode, 1, result.stderr)
-        self.assertIn("/etc/absenc/mqtt-login", result.stderr)  # all of it was understood: this file is not there
+        # everything else was accepted: only this file is missing
+        self.assertIn("/etc/absenc/mqtt-login", result.stderr)
 
 
 class SilentBroker:
-    """Takes messages of MQTT 5 and acknowledges none."""
+    """A fake MQTT 5 broker that acknowledges no message."""
 
     def __init__(self):
         self.listener = socket.create_server(("127.0.0.1", 0))
@@ -289,7 +292,7 @@ class SilentBroker:
                 return kind, read(size)
 
     def published(self, count):
-        """That many messages of readings, from a new connection."""
+        """Accepts a connection and returns that many messages of readings."""
         self.connection, _ = self.listener.accept()
         self.connection.settimeout(PATIENCE)
         self.packet()
@@ -333,13 +336,13 @@ class Access(MqttCase):
         self.assertEqual(result.returncode, 1)
         self.assertIn("chmod 600", result.stderr)
 
-    def test_a_topic_that_is_refused_stays_in_the_spool(self):
+    def test_refused_topic_stays_in_spool(self):
         rules = self.file("rules", "topic write plant/hall/#\ntopic read #\n")
         closed = self.file("closed", f"topic write plant/hall/state\ntopic write plant/hall/{ONE_LEVEL}/state\n")
         broker = self.broker("allow_anonymous true", f"acl_file {closed}")
         server = self.sender(broker.url, ONE)
         wait_until(lambda: "refuses a message" in self.mqtt(server)["trouble"], "it says so")
-        self.assertIn("(plant/hall/", self.mqtt(server)["trouble"])  # and which
+        self.assertIn("(plant/hall/", self.mqtt(server)["trouble"])  # and names the topic
         self.assertGreater(self.mqtt(server)["waiting"], 0)
         self.assertEqual(self.mqtt(server)["sent"], 0)
         pathlib.Path(closed).write_text(pathlib.Path(rules).read_text(encoding="utf-8"), encoding="utf-8")
@@ -354,7 +357,7 @@ class Access(MqttCase):
         os.chmod(key, 0o644)
         broker = self.broker("allow_anonymous true", f"certfile {cert}", f"keyfile {key}")
         url = f"mqtts://127.0.0.1:{broker.port}"
-        for place in (url, f"mqtts://localhost:{broker.port}"):  # which may be ::1 first
+        for place in (url, f"mqtts://localhost:{broker.port}"):  # localhost may resolve to ::1 first
             server = self.sender(place, ONE, "--mqtt-ca-file", cert)
             wait_until(lambda s=server: self.mqtt(s)["sent"], "it is sent")
             end(server.process)
@@ -367,8 +370,8 @@ class Access(MqttCase):
 
 
 class OldBroker(MqttCase):
-    def test_one_that_knows_3_1_1_only(self):
-        """Its answer to MQTT 5 is that of version 3.1.1."""
+    def test_broker_with_only_3_1_1(self):
+        """The broker answers the MQTT 5 CONNECT with a reply of version 3.1.1."""
         with socket.create_server(("127.0.0.1", 0)) as listener:
             listener.settimeout(PATIENCE)
             server = self.sender(f"mqtt://127.0.0.1:{listener.getsockname()[1]}", ONE)
@@ -381,8 +384,8 @@ class OldBroker(MqttCase):
                     versions.append(connection.recv(4096)[8])
                     connection.sendall(answer)
                     if len(versions) == 2:
-                        told = stream.until(lambda event, data: event == "happening" and data["kind"] == "mqtt")
-                        self.assertIn("3.1.1", told["text"])
+                        event = stream.until(lambda event, data: event == "happening" and data["kind"] == "mqtt")
+                        self.assertIn("3.1.1", event["text"])
             self.assertEqual(versions, [5, 4])
 
 
@@ -390,7 +393,7 @@ class Settings(MqttCase):
     FILE = ('[serve.mqtt]\nbroker = "{}"\nprefix = "plant/{}"\nspool = "{}"\nbatch_ms = 50\n'
             '[encoder.elbow]\nprotocol = "tformat"\nport = "sim"\n')
 
-    def test_the_file_and_reading_it_again(self):
+    def test_file_is_reloaded(self):
         broker = self.broker()
         receiver = self.receiver(broker)
         path = self.file("absenc.toml", self.FILE.format(broker.url, "a", self.spool()))
@@ -405,22 +408,22 @@ class Settings(MqttCase):
         self.assertLess(max(later - earlier for earlier, later in zip(times, times[1:])), 1_000_000 * BUSY)
         self.file("absenc.toml", self.FILE.format("ftp://x", "b", self.spool()))
         server.process.send_signal(signal.SIGHUP)
-        self.assertIn("mqtt://", self.told(server, "goes on as it was"))
+        self.assertIn("mqtt://", self.event(server, "goes on as it was"))
         self.assertTrue(self.mqtt(server)["connected"])
         self.file("absenc.toml", self.FILE.format(broker.url, "b", "/none/spool"))
         server.process.send_signal(signal.SIGHUP)
-        self.assertIn("/none/spool", self.told(server, "not all of it can be sent"))
+        self.assertIn("/none/spool", self.event(server, "not all of it can be sent"))
         self.assertEqual(server.encoder()["state"], "live")
 
-    def told(self, server, words):
-        """The next line of messages that has these."""
+    def event(self, server, words):
+        """Returns the next message line of the server that contains these words."""
         line = ""
         while words not in line:
             line = read_line(server.process.stderr, now() + PATIENCE)
             self.assertIsNotNone(line, words)
         return line
 
-    def test_what_is_wrong(self):
+    def test_refuses_wrong_settings(self):
         good = 'broker = "mqtt://127.0.0.1:1"\n'
         for text, words in (("", "broker"), (good + 'prefx = "a"\n', 'did you mean prefix'),
                             (good + 'prefix = "a/#"\n', "prefix"), (good + "spool_mb = 0\n", "spool_mb"),
@@ -435,7 +438,7 @@ class Settings(MqttCase):
         result = absenc("serve", ONE, "--history", "none", env={**os.environ, "ABSENC_CONFIG": path})
         self.assertIn("did you mean mqtt", result.stderr)
 
-    def test_without_it(self):
+    def test_without_mqtt(self):
         server = self.without_history(ONE)
         self.assertIsNone(self.mqtt(server))
         self.assertNotIn("absenc_mqtt", server.ask("/metrics")[1])

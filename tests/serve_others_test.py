@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`absenc serve` beside what plants run: Home Assistant, PlotJuggler, Prometheus, Grafana's dashboard."""
+"""Tests `absenc serve` with other programs: Home Assistant, PlotJuggler, Prometheus, and Grafana's dashboard."""
 import json
 import os
 import pathlib
@@ -34,11 +34,11 @@ class HomeAssistant(ServeCase):
         self.addCleanup(receiver.end)
         return receiver
 
-    def test_what_it_finds(self):
+    def test_publishes_entities(self):
         receiver = self.receiver()
         server = self.server_with(ONE, "sim:biss?model=linear-26-1um&motion=sine=20,0.5&singleturn=30000000",
                                   "--home-assistant")
-        wait_until(lambda: len(receiver.all("config")) == 7, "all entities are told")
+        wait_until(lambda: len(receiver.all("config")) == 7, "all entities are published")
         configs = {topic: payload for topic, payload, _ in receiver.messages if topic.endswith("/config")}
         self.assertEqual(len({one["unique_id"] for one in configs.values()}), 7)
         self.assertEqual(len({one["device"]["identifiers"][0] for one in configs.values()}), 2)
@@ -48,7 +48,7 @@ class HomeAssistant(ServeCase):
         with receiver.lock:
             last = {topic: payload for topic, payload, _ in receiver.messages}
         for topic, config in configs.items():
-            # The form that Home Assistant requires: PREFIX/COMPONENT/NODE/OBJECT/config.
+            # Home Assistant requires the form PREFIX/COMPONENT/NODE/OBJECT/config.
             self.assertRegex(topic, r"^homeassistant/(sensor|binary_sensor)/[a-zA-Z0-9_-]+/[a-zA-Z0-9_-]+/config$")
             self.assertIn(config["state_topic"], last)
             for one in config["availability"]:
@@ -57,13 +57,13 @@ class HomeAssistant(ServeCase):
             self.assertIn(key, last[config["state_topic"]])
         template = next(one["value_template"] for one in configs.values() if one["name"] == "Alarm")
         expression = template.strip("{} ").replace("is none", "is None").replace("value_json.alarms", "alarms")
-        told = [eval(expression, {"alarms": alarms}) for alarms in ([], [{"name": "over_heat"}], None)]
-        self.assertEqual(told, ["OFF", "ON", "None"])  # what is not reported is no OFF: None is "unknown" there
+        values = [eval(expression, {"alarms": alarms}) for alarms in ([], [{"name": "over_heat"}], None)]
+        self.assertEqual(values, ["OFF", "ON", "None"])  # an alarm that is not reported is None ("unknown"), not OFF
         units = {(one["name"], one.get("unit_of_measurement")) for one in configs.values()}
         self.assertLessEqual({("Angle", "°"), ("Position", "mm"), ("Speed", "rpm"), ("Speed", "mm/s")}, units)
         self.assertEqual(end(server.process)[0], 0)
 
-    def test_nothing_is_told_unasked(self):
+    def test_publishes_nothing_without_option(self):
         receiver = self.receiver()
         self.server_with(ONE)
         receiver.until("readings")
@@ -89,14 +89,14 @@ class PlotJuggler(ServeCase):
         self.assertLessEqual({"position", "speed", "counts", "turns"}, set(found[-1][name]))
         wait_until(lambda: server.encoder()["state"] == "live", "it goes on while nobody is there")
 
-    def test_no_such_place(self):
+    def test_refuses_address_without_port(self):
         result = absenc("serve", "sim:tformat", "--history", "none", "--udp", "127.0.0.1")
         self.assertEqual(result.returncode, 2)
         self.assertIn("HOST:PORT", result.stderr)
 
 
 class Metrics(ServeCase):
-    def test_names_and_units_follow_the_conventions_of_prometheus(self):
+    def test_names_and_units_follow_prometheus_conventions(self):
         server = self.without_history(ONE, "--mqtt", f"mqtt://127.0.0.1:{free_port()}", "--mqtt-spool",
                                       os.path.join(self.directory, "spool"))
         wait_until(lambda: 'alarm="' in server.ask("/metrics")[1], "it is live")
@@ -109,7 +109,7 @@ class Metrics(ServeCase):
 
 
 class Dashboard(ServeCase):
-    def test_each_metric_is_one_of_ours(self):
+    def test_uses_only_existing_metrics(self):
         text = (SOURCE / "docs/grafana-dashboard.json").read_text(encoding="utf-8")
         dashboard = json.loads(text)
         used = set(re.findall(r"\babsenc_\w+", text))
@@ -128,7 +128,7 @@ class Dashboard(ServeCase):
 
 
 class Prometheus(ServeCase):
-    def test_it_scrapes(self):
+    def test_scrapes_metrics(self):
         server = self.without_history(ONE, "--mqtt", f"mqtt://127.0.0.1:{free_port()}", "--mqtt-spool",
                                       os.path.join(self.directory, "spool"))
         config = self.file("prometheus.yml", "scrape_configs:\n  - job_name: absenc\n    scrape_interval: 500ms\n"
@@ -145,13 +145,13 @@ class Prometheus(ServeCase):
                 with urllib.request.urlopen(address, timeout=PATIENCE) as answer:
                     return json.load(answer)["data"]["result"]
             except urllib.error.HTTPError as refused:
-                self.assertEqual(refused.code, 503)  # it is not ready yet
+                self.assertEqual(refused.code, 503)  # Prometheus is not ready yet
                 return []
         wait_until(lambda: [one for one in ask('up{job="absenc"}') if one["value"][1] == "1"], "it is scraped")
         dashboard = json.loads((SOURCE / "docs/grafana-dashboard.json").read_text(encoding="utf-8"))
         for panel in dashboard["panels"]:
             for target in panel["targets"]:
-                query = target["expr"].replace("$encoder", ".*").replace("$__range", "5m")  # as Grafana does
+                query = target["expr"].replace("$encoder", ".*").replace("$__range", "5m")  # as Grafana replaces them
                 self.assertNotIn("$", query)
                 found = wait_until(lambda q=query: ask(q), f"{panel['title']}: {query} has values")
                 for label in re.findall(r"\{\{(\w+)\}\}", target["legendFormat"]):

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`absenc serve` behind nginx and Caddy, as docs/serve.md configures them: page and commands, and who may what there."""
+"""Tests `absenc serve` behind nginx and Caddy, configured as in docs/serve.md: the page, commands, and access
+rights."""
 import contextlib
 import http.client
 import json
@@ -13,7 +14,7 @@ import time
 import unittest
 import unittest.mock
 
-from page_scenes import Browser  # first: it looks for selenium
+from page_scenes import Browser  # imported first, because it checks for selenium
 
 from command_support import PATIENCE, end
 from npm_support import SOURCE
@@ -65,7 +66,7 @@ class Proxy(ServeCase):
         wait_until(is_ready, "the proxy is ready")
 
     def start(self, proxy, passes_host, upstream):
-        """The configuration of the document, with other ports and paths."""
+        """Starts the proxy with the configuration of the document, with other ports and paths."""
         self.port = free_port()
         text = from_document(proxy)
         if not passes_host:
@@ -116,31 +117,31 @@ class Proxy(ServeCase):
             begin = time.time()
             lines = iter(connection.getresponse().readline, b"")
             state = json.loads(next(line for line in lines if b'"encoders"' in line)[6:])
-            self.assertLess(abs(state["at_ms"] / 1000 - begin), 1 + BUSY)  # it is not kept back
+            self.assertLess(abs(state["at_ms"] / 1000 - begin), 1 + BUSY)  # the proxy does not buffer the stream
         own = {**GOOD, "Origin": f"https://{SITE}", "Sec-Fetch-Site": "same-origin"}
         self.assertEqual(self.zero({**own, "Authorization": "Bearer " + "x" * 20})[0], 401)
         for evil in ({"Origin": "https://evil.example"}, {"Origin": f"http://{SITE}.evil.example"}, {"Sec-Fetch-Site": "cross-site"}):
             self.assertEqual(self.zero({**own, **evil})[0], 403, evil)
-        # What a client says of itself does not stand in the history.
+        # The history must not contain an address that the client itself claims.
         status, body = self.zero({**own, "X-Forwarded-For": "203.0.113.9"})
         self.assertEqual(status, 200, body)
         events = json.loads(self.ask("/api/events", headers=GOOD)[1])["events"]
         self.assertEqual([event["who"] for event in events if event["kind"] == "command"], ["anna from 127.0.0.1"])
 
-    def test_nginx_that_passes_the_name_on(self):
+    def test_nginx_that_forwards_host_name(self):
         self.assert_page_and_commands_work("nginx", True)
 
-    def test_nginx_that_gives_the_name_of_the_server(self):
+    def test_nginx_that_replaces_host_name(self):
         self.assert_page_and_commands_work("nginx", False)
 
-    def test_caddy_that_passes_the_name_on(self):
+    def test_caddy_that_forwards_host_name(self):
         self.assert_page_and_commands_work("caddy", True)
 
-    def test_caddy_that_gives_the_name_of_the_server(self):
+    def test_caddy_that_replaces_host_name(self):
         self.assert_page_and_commands_work("caddy", False)
 
-    def test_the_page_in_a_browser(self):
-        port = free_port()  # the origin of a browser has it
+    def test_page_in_browser(self):
+        port = free_port()  # part of the browser's origin
         served = self.server(NAME, "--history", "none", "--token-file", self.tokens(), "--public-url", f"https://{SITE}:{port}")
         with unittest.mock.patch(f"{__name__}.free_port", return_value=port):
             self.start("nginx", False, served)
@@ -157,8 +158,9 @@ class Proxy(ServeCase):
                                               of(NAME, "command") + "?command=memory-write&argument=5&argument=66", TOKEN)
         self.assertEqual(status, 200)
 
-    def test_a_proxy_that_is_not_named(self):
-        """Where only headers say that there is one, looking needs a token, and what is refused says what to do."""
+    def test_proxy_without_public_url(self):
+        """Without --public-url, forwarding headers make reading need a token too, and the refusal explains the
+        option."""
         self.server_behind("caddy", False, "--token-file", self.tokens())
         self.assertEqual(self.ask("/api/encoders")[0], 401)
         self.assertEqual(self.ask("/api/encoders", headers=GOOD)[0], 200)
@@ -168,16 +170,16 @@ class Proxy(ServeCase):
 
 
 class NamedProxy(ServeCase):
-    """The rules, as a proxy on this computer meets them."""
+    """The access rules, tested directly with a proxy's headers."""
 
-    def test_only_its_name_is_answered_to(self):
+    def test_accepts_only_public_host_name(self):
         server = self.without_history(NAME, "--token-file", self.tokens(), "--public-url", f"https://{SITE}")
         for host, expected in ((SITE, 200), (SITE.upper(), 200), (f"{SITE}:443", 200), ("localhost", 200), ("evil.example", 403),
                                (f"{SITE}.evil.example", 403)):
             self.assertEqual(server.ask("/api/encoders", headers={**GOOD, "Host": host})[0], expected, host)
         self.assertEqual(server.ask("/api/encoders")[0], 401)
 
-    def test_the_name_of_the_client_is_its_last_word(self):
+    def test_client_address_is_last_forwarded_one(self):
         path = self.file("history")
         for arguments, forwarded, expected in (
                 (("--public-url", f"https://{SITE}"), "203.0.113.9, 10.1.2.3", "10.1.2.3"),
@@ -192,11 +194,11 @@ class NamedProxy(ServeCase):
             self.assertEqual(last["who"], f"anna from {expected}")
             end(server.process)
 
-    def test_without_tokens_everybody_may_look_whom_the_proxy_lets_in(self):
+    def test_without_tokens_everybody_may_read(self):
         server = self.without_history(NAME, "--public-url", f"https://{SITE}")
         self.assertEqual(server.ask("/api/encoders", headers={"Host": SITE, "X-Forwarded-For": "10.1.2.3"})[0], 200)
 
-    def test_what_is_no_address_of_a_page(self):
+    def test_refuses_invalid_public_url(self):
         for url in (SITE, "ftp://encoders.example", "https://", "https://user@encoders.example"):
             with self.assertRaisesRegex(AssertionError, "--public-url"):
                 self.without_history(NAME, "--public-url", url)

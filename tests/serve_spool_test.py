@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The spool of `absenc serve` on a full disk, removed, damaged: what is read goes on, and nothing is lost unsaid."""
+"""Tests the spool of `absenc serve` when its disk is full and when it is removed or damaged: reading must continue, and
+every loss must be reported."""
 import os
 import pathlib
 import resource
@@ -12,7 +13,7 @@ from command_support import absenc, end
 from mqtt_support import ONE, MqttCase, free_port, numbers, twice, waiting_in
 from serve_support import wait_until
 
-# A disk of its own, for this process and its children alone.
+# Mounts a small file system that only this process and its children see.
 ON_DISK = ("unshare", "-Urm", "sh", "-c", 'mount -t tmpfs -o size=3m none "$0" && exec "$@"')
 
 
@@ -28,18 +29,19 @@ class SpoolCase(MqttCase):
         return (self.numbers(receiver) or [0])[-1]
 
     def remove_spool(self):
-        """At once: a server that sees its newest file gone makes another one in the folder."""
+        """Removes the spool in one step, because a server that misses its newest file creates another one in the
+        folder."""
         os.rename(self.spool(), self.spool() + ".gone")
         shutil.rmtree(self.spool() + ".gone")
 
     def events(self, receiver):
         return [one["text"] for one in receiver.all("event")]
 
-    def told(self, receiver, words):
+    def wait_for_event(self, receiver, words):
         wait_until(lambda: [one for one in self.events(receiver) if words in one], f"an event has: {words}")
 
     def away(self):
-        """A broker that can be begun later."""
+        """Returns a stopped broker that can be started later."""
         broker = self.broker()
         broker.kill()
         return broker
@@ -47,7 +49,7 @@ class SpoolCase(MqttCase):
 
 class FullDisk(SpoolCase):
     @unittest.skipUnless(has_disks(), "no user namespaces here")
-    def test_a_spool_that_filled_its_disk_drains(self):
+    def test_spool_that_filled_its_disk_drains(self):
         broker = self.away()
         disk = os.path.join(self.directory, "disk")
         os.mkdir(disk)
@@ -58,8 +60,8 @@ class FullDisk(SpoolCase):
         seen = f"/proc/{server.process.pid}/root{disk}"
         with open(f"{seen}/others", "wb", buffering=0) as others, self.assertRaises(OSError):
             while True:
-                others.write(bytes(65536))  # another program fills it, all but what is written meanwhile
-        # 4 MB of memory are left, at 45 kB a second: the rest of the test is for those on disk.
+                others.write(bytes(65536))  # another program fills the rest of the disk
+        # The spool buffers 4 MB in memory at 45 kB/s; the test checks the readings on disk.
         wait_until(lambda: "No space left" in self.mqtt(server)["trouble"], "it says that the disk is full")
         self.assertEqual(server.json("/healthz")["mqtt"], "failing")
         self.assertFalse(server.json("/healthz")["ok"])
@@ -71,11 +73,11 @@ class FullDisk(SpoolCase):
         found = self.numbers(receiver)
         self.assertEqual(found, list(range(1, len(found) + 1)))
         self.assertEqual(twice(receiver.all("readings")), 0)
-        self.told(receiver, "the spool cannot be written")
-        self.told(receiver, "can be written again")
+        self.wait_for_event(receiver, "the spool cannot be written")
+        self.wait_for_event(receiver, "can be written again")
         self.assertTrue(os.path.exists(f"{seen}/others"))
 
-    def test_live_messages_go_on_while_nothing_can_be_written(self):
+    def test_live_messages_continue_while_disk_is_full(self):
         broker = self.broker()
         receiver = self.receiver(broker)
         server = self.sender(broker.url, ONE, preexec_fn=lambda: signal.signal(signal.SIGXFSZ, signal.SIG_IGN))
@@ -91,7 +93,7 @@ class FullDisk(SpoolCase):
         wait_until(lambda: server.json("/healthz")["ok"], "it is well again")
         self.assertEqual(self.mqtt(server)["dropped"], 0)
 
-    def test_drops_are_told_everywhere(self):
+    def test_drops_are_reported_everywhere(self):
         broker = self.away()
         server = self.sender(broker.url, ONE, "--mqtt-spool-mb", "1", "--rate", "0")
         stream = self.stream(server)
@@ -101,17 +103,17 @@ class FullDisk(SpoolCase):
         self.assertGreater(health["mqtt_dropped"], 0)
         stream.until(lambda event, data: event == "happening" and "were dropped" in data["text"])
         broker.start()
-        self.told(self.receiver(broker), "were dropped")
+        self.wait_for_event(self.receiver(broker), "were dropped")
 
 
 class Damage(SpoolCase):
-    def test_a_spool_that_is_removed_is_made_anew(self):
+    def test_removed_spool_is_created_again(self):
         broker = self.broker()
         receiver = self.receiver(broker)
         server = self.sender(broker.url, ONE)
         wait_until(lambda: self.numbers(receiver), "readings come")
         self.remove_spool()
-        self.told(receiver, "was removed")
+        self.wait_for_event(receiver, "was removed")
         wait_until(lambda: os.path.isdir(self.spool()), "it is there again")
         goal = self.taken(server) + 50
         wait_until(lambda: self.last(receiver) > goal, "readings go on")
@@ -119,7 +121,7 @@ class Damage(SpoolCase):
         self.assertEqual(found, list(range(1, len(found) + 1)), "what the open file had is sent from memory")
         self.assertEqual(self.mqtt(server)["dropped"], 0)
 
-    def test_what_is_removed_with_it_is_counted(self):
+    def test_removed_messages_are_counted(self):
         broker = self.away()
         server = self.sender(broker.url, ONE, "--mqtt-spool-mb", "2", "--rate", "0")
         wait_until(lambda: len(os.listdir(self.spool())) > 3, "there are several files")
@@ -127,11 +129,11 @@ class Damage(SpoolCase):
         wait_until(lambda: self.mqtt(server)["dropped"], "the loss is counted")
         broker.start()
         receiver = self.receiver(broker)
-        self.told(receiver, "was removed")
+        self.wait_for_event(receiver, "was removed")
         found = wait_until(lambda: self.numbers(receiver), "the rest comes")
         self.assertGreater(found[0], 1)
 
-    def test_a_folder_that_is_moved_away_and_back(self):
+    def test_moved_folder_can_be_moved_back(self):
         broker = self.away()
         server = self.sender(broker.url, ONE)
         wait_until(lambda: self.taken(server) > 50, "they are spooled")
@@ -140,19 +142,19 @@ class Damage(SpoolCase):
         wait_until(lambda: os.path.exists(self.spool()), "it is made anew")
         wait_until(lambda: self.taken(server) > goal + 50, "it goes on")
         end(server.process, signal.SIGKILL)
-        first = next(one["first"] for one in waiting_in(self.spool()) if "first" in one)  # events stand between
+        first = next(one["first"] for one in waiting_in(self.spool()) if "first" in one)  # events are interspersed
         self.assertEqual(first, 1, "what the open file had was written again")
 
-    def test_garbage_in_its_place_is_set_aside(self):
+    def test_garbage_file_in_place_of_spool_is_set_aside(self):
         broker = self.broker()
         receiver = self.receiver(broker)
         pathlib.Path(self.spool()).write_bytes(b"SQLite format 3\0" + bytes(range(256)) * 10)
         self.sender(broker.url, ONE)
         wait_until(lambda: self.numbers(receiver), "readings come")
-        self.told(receiver, f"it is now {self.spool()}.bad")
+        self.wait_for_event(receiver, f"it is now {self.spool()}.bad")
         self.assertEqual(pathlib.Path(self.spool() + ".bad").stat().st_size, 2576)
 
-    def test_a_damaged_file_is_sent_as_far_as_it_is_good_and_set_aside(self):
+    def test_damaged_file_is_sent_up_to_damage_and_set_aside(self):
         broker = self.away()
         server = self.sender(broker.url, ONE, "--rate", "200")
         wait_until(lambda: self.mqtt(server)["waiting"] > 30, "they are spooled")
@@ -165,7 +167,7 @@ class Damage(SpoolCase):
         broker.start()
         receiver = self.receiver(broker)
         server = self.sender(broker.url, ONE)
-        self.told(receiver, "cannot be read from byte")
+        self.wait_for_event(receiver, "cannot be read from byte")
         wait_until(lambda: path.with_suffix(".part.bad").exists(), "it is set aside")
         self.assertEqual(path.with_suffix(".part.bad").stat().st_size, len(data))
         found = wait_until(lambda: self.numbers(receiver), "readings come")
@@ -174,7 +176,7 @@ class Damage(SpoolCase):
         self.assertEqual(len(set(ids)), len(ids))
         self.assertNotIn(first[-1]["id"], ids, "it was behind the damage")
 
-    def test_garbage_written_into_a_file_that_is_open(self):
+    def test_garbage_written_into_open_file(self):
         broker = self.away()
         server = self.sender(broker.url, ONE, "--mqtt-spool-mb", "1", "--rate", "1000")
         wait_until(lambda: len(os.listdir(self.spool())) > 2, "there are several files")
@@ -194,13 +196,13 @@ class Damage(SpoolCase):
 
 
 class Start(SpoolCase):
-    def test_a_folder_that_is_missing_is_refused(self):
+    def test_missing_parent_folder_is_refused(self):
         result = absenc("serve", ONE, "--listen", "127.0.0.1:0", "--history", "none", "--mqtt",
                         f"mqtt://127.0.0.1:{free_port()}", "--mqtt-spool", os.path.join(self.directory, "none/spool"))
         self.assertEqual(result.returncode, 1)
         self.assertIn("none/spool", result.stderr)
 
-    def test_a_disk_that_is_full_at_the_start(self):
+    def test_disk_full_at_start(self):
         broker = self.broker()
         receiver = self.receiver(broker)
         def limit():

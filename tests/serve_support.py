@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`absenc serve` for its tests: the server, its event streams, waiting for what it will say."""
+"""Shared by the tests of `absenc serve`: the server, its event streams, and waiting for a condition."""
 import contextlib
 import http.client
 import json
@@ -12,7 +12,7 @@ import urllib.parse
 from command_support import ABSENC, PATIENCE, Case, FakeLine, end, read_line
 
 TOKEN = "a-secret-of-nobody-else"
-BUSY = float(os.environ.get("ABSENC_BUSY_SECONDS", "1"))  # what "at once" is
+BUSY = float(os.environ.get("ABSENC_BUSY_SECONDS", "1"))  # time limit for an immediate reaction, in seconds
 
 
 def wait_until(true, what):
@@ -25,7 +25,7 @@ def wait_until(true, what):
 
 
 def of(encoder, part=""):
-    """The path of an encoder, or of a part of it: "history", "doctor"..."""
+    """Returns the URL path of an encoder, or of a part of it such as "history"."""
     return "/api/encoders/" + urllib.parse.quote(encoder, safe="") + (part and f"/{part}")
 
 
@@ -38,7 +38,7 @@ class Stream:
         self.answer = self.connection.getresponse()
 
     def next(self):
-        """(event, data)"""
+        """Returns (event, data)."""
         name = data = ""
         while True:
             line = self.answer.readline().decode().rstrip("\n")
@@ -50,7 +50,7 @@ class Stream:
                 return name, json.loads(data)
 
     def until(self, wanted):
-        """The first event that is wanted, with its data."""
+        """Returns the first event, with its data, for which `wanted` is true."""
         deadline = time.monotonic() + PATIENCE
         while time.monotonic() < deadline:
             event, data = self.next()
@@ -59,7 +59,7 @@ class Stream:
         raise AssertionError("in vain waited for an event")
 
     def state(self, wanted=lambda encoder: True):
-        """The one encoder of the first state in which it is as wanted."""
+        """Returns the only encoder of the first state for which `wanted` is true."""
         data = self.until(lambda event, data: event == "state" and wanted(data["encoders"][0]))
         return data["encoders"][0]
 
@@ -81,7 +81,7 @@ class Server:
         self.port = int(self.url.rstrip("/").rsplit(":", 1)[1])
 
     def answer(self, path, method="GET", headers=None, **values):
-        """(status, type, text)"""
+        """Returns (status, type, text)."""
         connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=PATIENCE)
         with contextlib.closing(connection):
             query = "?" + urllib.parse.urlencode(values, doseq=True) if values else ""
@@ -108,7 +108,7 @@ class Server:
 
 
 class SilentLine(FakeLine):
-    """Nobody answers: doctor takes long, because it tries all rates."""
+    """A line without an encoder. Doctor takes long on it, because it tries all rates."""
 
     def serve(self):
         select.select([self.wake], [], [])

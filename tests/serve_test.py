@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`absenc serve`: what it tells, to whom, and what it keeps."""
+"""Tests `absenc serve`: its API, access rights, and history."""
 import contextlib
 import json
 import os
@@ -22,8 +22,8 @@ from npm_support import SOURCE
 from serve_support import BUSY, TOKEN, ServeCase, Server, SilentLine, of, wait_until
 
 
-class Values(ServeCase):
-    def test_they_move(self):
+class EncoderValues(ServeCase):
+    def test_values_change(self):
         server = self.without_history("sim:tformat?motion=rpm=60")
         stream = self.stream(server)
         first = stream.state(lambda one: one["state"] == "live" and one["speed"] is not None)
@@ -31,7 +31,7 @@ class Values(ServeCase):
         self.assertEqual((second["protocol"], second["speed_unit"], second["alarms"]), ("tformat", "rpm", []))
         self.assertAlmostEqual(stream.state(lambda one: one["speed"] is not None)["speed"], 60, delta=6)
 
-    def test_points_of_one_encoder(self):
+    def test_stream_of_points(self):
         name = "sim:tformat?motion=rpm=60"
         server = self.without_history(name, "sim:esl?motion=rpm=6", "--rate", "100")
         stream = self.stream(server, name)
@@ -44,7 +44,7 @@ class Values(ServeCase):
         self.assertEqual(times, sorted(times))
         self.assertEqual(len(set(place for _, place, _, _ in points)), len(points))
 
-    def test_alarms_in_words(self):
+    def test_alarms_have_texts(self):
         server = self.without_history("sim:tformat?alarm=over_heat")
         encoder = wait_until(lambda: server.encoder()["alarms"] and server.encoder(), "it has an alarm")
         alarm = encoder["alarms"][0]
@@ -54,19 +54,19 @@ class Values(ServeCase):
         self.assertIn('alarm="over_heat"} 1\n', page)
         self.assertIn('alarm="over_speed"} 0\n', page)
 
-    def test_alarms_that_are_not_reported(self):
+    def test_unreported_alarms_are_null(self):
         server = self.without_history("sim:ssi")
         encoder = wait_until(lambda: server.encoder()["state"] == "live" and server.encoder(), "it is live")
         self.assertEqual((encoder["alarms"], encoder["status"], encoder["singleturn_valid"]), (None, None, True))
         self.assertIn("absenc_up", server.ask("/metrics")[1])
         self.assertNotIn("absenc_alarm{", server.ask("/metrics")[1])
 
-    def test_a_position_that_does_not_hold(self):
+    def test_invalid_turns_are_null(self):
         server = self.without_history("sim:tformat?alarm=battery_error")
         encoder = wait_until(lambda: server.encoder()["state"] == "live" and server.encoder(), "it is live")
         self.assertEqual((encoder["singleturn_valid"], encoder["multiturn_valid"], encoder["turns"]), (True, False, None))
 
-    def test_an_alarm_that_has_cleared_is_told_as_none(self):
+    def test_cleared_alarm_is_reported_as_zero(self):
         emulator = Emulator(self.directory, "--alarm", "over_heat")
         self.addCleanup(emulator.end)
         name = f"tformat:{emulator.path}"
@@ -81,7 +81,7 @@ class Values(ServeCase):
     def test_latencies(self):
         name = "sim:tformat"
         server = self.without_history(name)
-        latency = wait_until(lambda: (told := server.json(of(name))["latency_us"])["p50"] and told,
+        latency = wait_until(lambda: (result := server.json(of(name))["latency_us"])["p50"] and result,
                              "it was read")
         buckets = latency["buckets"]
         self.assertEqual([one["at_most"] for one in buckets[:4] + buckets[-2:]], [10, 20, 50, 100, 1e6, None])
@@ -99,7 +99,7 @@ class Values(ServeCase):
         self.assertTrue(0 < mean <= float(re.search(r"^absenc_latency_longest_seconds\{.*\} (\S+)$", page, re.M)[1]))
         self.assertIn('error="bad_checksum"} 0\n', page)
 
-    def test_everything_about_one(self):
+    def test_details_of_one_encoder(self):
         name = "sim:tformat?fault=corrupt=0.3&seed=1"
         server = self.without_history(name)
 
@@ -115,7 +115,7 @@ class Values(ServeCase):
         self.assertNotIn("position", changing)
         self.assertEqual(server.ask(of("none"))[0], 404)
 
-    def test_an_unknown_encoder_is_404_with_the_nearest_name(self):
+    def test_unknown_encoder_is_404_with_suggestion(self):
         server = self.server("sim:tformat", "sim:esl", "--history", self.file("history"), "--token-file", self.tokens())
         good = {"Authorization": f"Bearer {TOKEN}"}
         for part, method in (("", "GET"), ("history", "GET"), ("history.csv", "GET"), ("events", "GET"),
@@ -129,7 +129,7 @@ class Values(ServeCase):
         self.assertEqual((status, json.loads(body)["error"]),
                          (404, 'an encoder has no "histori"; did you mean history?'))
 
-    def test_an_old_path_is_404_with_the_new_one(self):
+    def test_old_path_is_404_with_new_path(self):
         server = self.without_history("sim:tformat", "--token-file", self.tokens())
         good = {"Authorization": f"Bearer {TOKEN}"}
         for part, method in (("history", "GET"), ("history.csv", "GET"), ("settings", "GET"), ("memory", "GET"),
@@ -142,13 +142,13 @@ class Values(ServeCase):
         status, body = server.ask("/api/stream", trace="sim:tformat")
         self.assertEqual((status, json.loads(body)["error"]), (404, "this path is now /api/encoders/NAME/stream"))
 
-    def test_a_name_with_slashes_and_a_question_mark(self):
+    def test_name_with_slashes_and_question_mark(self):
         name = "tformat:" + self.file("nothing") + "?latency=300"
         server = self.without_history(name)
         self.assertEqual(server.json(of(name))["encoder"], name)
         self.assertEqual(server.ask(of(name, "settings"))[0], 502)
 
-    def test_units_and_ends(self):
+    def test_units_and_ranges(self):
         server = self.without_history("sim:tformat", "sim:biss?model=linear-26-1um")
         turned, slid = (wait_until(lambda: server.encoder(i)["state"] == "live" and server.encoder(i), "it is live")
                         for i in range(2))
@@ -157,7 +157,7 @@ class Values(ServeCase):
         self.assertEqual([slid[name] for name in ("position_unit", "speed_unit", "counts_in_all", "length_mm", "has_turns")],
                          ["mm", "mm/s", 2**26, 67108.864, False])
 
-    def test_the_last_minute(self):
+    def test_last_minute(self):
         server = self.without_history("sim:tformat?motion=rpm=60")
 
         def seconds():
@@ -167,8 +167,8 @@ class Values(ServeCase):
         self.assertAlmostEqual(rows[2][2], 60, delta=1)
         self.assertAlmostEqual(rows[2][1] - rows[1][1], 360, delta=60)
 
-    def test_the_last_minute_has_positions_where_the_encoder_was(self):
-        """Within 40 degrees of zero: a mean of 1 and 359 degrees would be far from there."""
+    def test_last_minute_averages_across_wrap(self):
+        """The shaft stays within 40 degrees of zero. A plain mean of 1 and 359 degrees would be far outside."""
         server = self.without_history("sim:raa38-can?motion=sine=40,1")
 
         def places():
@@ -176,7 +176,7 @@ class Values(ServeCase):
         shown = wait_until(lambda: len(places()) >= 3 and places(), "three seconds are over")
         self.assertEqual([place for place in shown if 41 < place % 360 < 319], [])
 
-    def test_a_lost_encoder_has_a_last_reading(self):
+    def test_lost_encoder_has_last_reading(self):
         emulator = Emulator(self.directory, "--singleturn", "1000")
         self.addCleanup(emulator.end)
         server = self.without_history(f"tformat:{emulator.path}")
@@ -190,7 +190,7 @@ class Values(ServeCase):
         self.assertEqual(lost["last_reading"]["counts"], 1000)
         self.assertLess(abs(lost["last_reading"]["at_ms"] - before), 5000)
 
-    def test_whose_token_it_is(self):
+    def test_token_has_name(self):
         server = self.without_history("sim:tformat")
         self.assertEqual(server.json("/api/token"), {"tokens": False, "name": None})
         server = self.without_history("sim:tformat", "--token-file", self.tokens())
@@ -202,7 +202,7 @@ class Values(ServeCase):
             self.assertEqual(status, 401)
             self.assertIn("token is wrong", json.loads(body)["error"])
 
-    def test_the_last_points_lie_close_to_each_other(self):
+    def test_last_points_have_all_readings(self):
         name = "sim:tformat?motion=rpm=60"
         server = self.without_history(name, "--rate", "100")
         wait_until(lambda: len(server.json(of(name, "points"))["points"]) > 100, "it was read for a second")
@@ -211,10 +211,10 @@ class Values(ServeCase):
         steps = sorted(after - before for before, after in zip(times, times[1:]))
         self.assertGreaterEqual(steps[0], 10)
         self.assertLess(steps[len(steps) // 2], 50)
-        turned = points[-1][1] - points[0][1]  # at 360 degrees a second
+        turned = points[-1][1] - points[0][1]  # at 360 degrees per second
         self.assertAlmostEqual(turned / 360, (times[-1] - times[0]) / 1000, delta=0.1 * BUSY)
 
-    def test_one_setting_alone_is_asked_for(self):
+    def test_reads_single_setting(self):
         server = self.without_history("sim:tformat")
         found = server.json(of("sim:tformat", "settings"), setting="overheat-threshold")
         self.assertEqual({row["setting"] for row in found["rows"]}, {"overheat-threshold"})
@@ -224,7 +224,7 @@ class Values(ServeCase):
         shown = server.json(of("sim:tformat", "settings"))["rows"] + wait_until(lambda: server.json(of("sim:tformat"))["reply"], "there is a reply")
         self.assertNotIn("data_id", {row["field"] for row in shown})
 
-    def test_what_describes_it(self):
+    def test_description_health_and_page(self):
         server = self.without_history("sim:tformat")
         paths = set(server.json("/openapi.json")["paths"])
         self.assertLessEqual({"/api/encoders/{encoder}/" + part for part in ("command", "settings", "memory", "doctor")}, paths)
@@ -240,15 +240,15 @@ class Values(ServeCase):
             self.assertRegex(line, r'^(# (HELP|TYPE) absenc_\w+ .+|absenc_\w+\{.*\} [-+.e\d]+)$')
 
 
-class Described(ServeCase):
-    """openapi.json against what is answered."""
+class ApiDescription(ServeCase):
+    """Compares openapi.json with the server's replies."""
     NAME = "sim:tformat?motion=rpm=60&alarm=over_heat&fault=corrupt=0.1&seed=1"
-    # What a route must be asked with.
+    # Parameters that a route requires.
     VALUES = {"/api/encoders/{encoder}/command": {"command": "position"},
               "/api/encoders/{encoder}/acknowledge": {"alarm": "over_heat"}}
 
     def schema(self, schema, components):
-        """As jsonschema takes it: OpenAPI 3.0 has a word of its own for null."""
+        """Converts an OpenAPI 3.0 schema for jsonschema, which writes "nullable" differently."""
         if isinstance(schema, list):
             return [self.schema(one, components) for one in schema]
         if not isinstance(schema, dict):
@@ -258,7 +258,7 @@ class Described(ServeCase):
         made = {key: self.schema(value, components) for key, value in schema.items() if key != "nullable"}
         return {"anyOf": [made, {"type": "null"}]} if schema.get("nullable") is True else made
 
-    def test_every_path_of_the_server_is_described(self):
+    def test_every_route_of_source_is_described(self):
         source = (SOURCE / "absenc/serve/api.cpp").read_text(encoding="utf-8")
         parts = re.search(r"parts_of_encoder\{(.*?)\};", source, re.DOTALL)[1]
         there = {"/api/encoders/{encoder}/" + part for part in re.findall(r'"([\w.]+)"', parts)}
@@ -266,19 +266,19 @@ class Described(ServeCase):
         described = json.loads((SOURCE / "absenc/serve/page/openapi.json").read_text(encoding="utf-8"))
         self.assertEqual(set(described["paths"]), there)
 
-    def test_every_route(self):
+    def test_every_reply_matches_its_schema(self):
         server = self.server(self.NAME, "--history", self.file("history"), "--token-file", self.tokens())
         wait_until(lambda: server.json(of(self.NAME, "history"))["rows"], "it has a second")
         wait_until(lambda: server.json("/api/events")["events"], "something has happened")
         wait_until(lambda: server.json(of(self.NAME))["bad_exchanges"], "an exchange has failed")
         described = server.json("/openapi.json")
         for path, methods in described["paths"].items():
-            for method, told in methods.items():
+            for method, result in methods.items():
                 with self.subTest(route=f"{method} {path}"):
-                    (kind, content), = told["responses"]["200"]["content"].items()
+                    (kind, content), = result["responses"]["200"]["content"].items()
                     values = self.VALUES.get(path, {})
                     parameters = [described["components"]["parameters"][one["$ref"].rsplit("/", 1)[1]] if "$ref" in one
-                                  else one for one in told.get("parameters", [])]
+                                  else one for one in result.get("parameters", [])]
                     needed = [one["name"] for one in parameters if one.get("required") and one["in"] == "query"]
                     in_path = [one["name"] for one in parameters if one["in"] == "path"]
                     self.assertEqual(set(needed), set(values))
@@ -289,7 +289,7 @@ class Described(ServeCase):
 
     def check(self, server, method, path, values, kind, schema):
         if kind == "text/event-stream":
-            data = self.stream(server).until(lambda event, _: event == "state")  # what happens may come before
+            data = self.stream(server).until(lambda event, _: event == "state")  # other events may come first
             self.assertTrue(data["encoders"])
             return
         status, got, body = server.answer(path, method, {"Authorization": f"Bearer {TOKEN}"}, **values)
@@ -297,7 +297,7 @@ class Described(ServeCase):
         jsonschema.validate(json.loads(body) if kind == "application/json" else body, schema)
 
 
-class Acknowledged(ServeCase):
+class AcknowledgedAlarms(ServeCase):
     GOOD = {"Authorization": f"Bearer {TOKEN}"}
 
     def acknowledge(self, server, name, headers, **values):
@@ -308,7 +308,7 @@ class Acknowledged(ServeCase):
     def alarms(server):
         return server.encoder()["alarms"] or []
 
-    def test_it_is_kept_with_the_name_of_the_token_and_clears_nothing(self):
+    def test_stores_name_of_token_and_clears_nothing(self):
         name = "sim:tformat?alarm=over_heat&alarm=battery_alarm"
         server = self.server(name, "--history", self.file("history"), "--token-file", self.tokens())
         wait_until(lambda: len(self.alarms(server)) == 2, "both are raised")
@@ -321,15 +321,15 @@ class Acknowledged(ServeCase):
         stream = self.stream(server)
         stream.state()
         self.assertEqual(self.acknowledge(server, name, self.GOOD, alarm="over_heat"), (200, {"ok": True, "alarm": "over_heat", "who": "anna"}))
-        told = stream.until(lambda event, data: event == "happening" and data["kind"] == "acknowledged")
-        self.assertEqual((told["encoder"], told["text"], told["who"]), (name, "over_heat", "anna from 127.0.0.1"))
+        result = stream.until(lambda event, data: event == "happening" and data["kind"] == "acknowledged")
+        self.assertEqual((result["encoder"], result["text"], result["who"]), (name, "over_heat", "anna from 127.0.0.1"))
         seen = {one["name"]: one["acknowledged"] for one in stream.state()["alarms"]}
         self.assertEqual(seen["over_heat"]["who"], "anna")
         self.assertIsNone(seen["battery_alarm"])
-        self.assertIn(told, server.json(of(name, "events"))["events"])
+        self.assertIn(result, server.json(of(name, "events"))["events"])
         self.assertIn('alarm="over_heat"} 1', server.ask("/metrics")[1])
 
-    def test_it_ends_with_the_alarm(self):
+    def test_acknowledgement_ends_with_alarm(self):
         emulator = Emulator(self.directory, stdin=subprocess.PIPE)
         self.addCleanup(emulator.end)
         name = f"tformat:{emulator.path}?latency=300"
@@ -351,15 +351,15 @@ class Acknowledged(ServeCase):
         wait_until(lambda: self.alarms(server), "it is raised again")
         self.assertIsNone(self.alarms(server)[0]["acknowledged"])
 
-    def test_without_tokens_nobody_can(self):
+    def test_needs_tokens(self):
         name = "sim:tformat?alarm=over_heat"
         server = self.without_history(name)
         wait_until(lambda: self.alarms(server), "it is raised")
         self.assertEqual(self.acknowledge(server, name, {}, alarm="over_heat")[0], 403)
 
 
-class HeldPort(ServeCase):
-    def test_nobody_is_told_to_end_the_server_that_holds_a_port(self):
+class PortInUse(ServeCase):
+    def test_message_does_not_suggest_ending_the_server(self):
         with Emulator(self.directory) as emulator:
             served = self.without_history(f"tformat:{emulator.path}")
             wait_until(lambda: served.encoder()["state"] == "live", "it is read")
@@ -368,7 +368,7 @@ class HeldPort(ServeCase):
             self.assertIn(f"in use by absenc serve (process {served.process.pid})", refused.stderr)
             self.assertNotIn("end it", refused.stderr)
 
-    def test_who_finds_the_port_in_use_is_led_to_the_server(self):
+    def test_message_refers_to_server(self):
         with unittest.mock.patch.dict(os.environ, {"XDG_RUNTIME_DIR": self.directory}), \
              Emulator(self.directory) as emulator:
             served = self.without_history(f"tformat:{emulator.path}")
@@ -380,7 +380,7 @@ class HeldPort(ServeCase):
             self.assertEqual(json.loads(printed)["encoders"][0]["encoder"], f"tformat:{emulator.path}")
             folder = os.path.join(self.directory, "absenc")
             (notice,) = os.listdir(folder)
-            # A file that another process left behind says nothing of who has the port.
+            # A file left by another process does not identify the holder of the port.
             with open(os.path.join(folder, notice), "w", encoding="utf-8") as file:
                 file.write("1 http://127.0.0.1:1/\n")
             refused = absenc("read", f"tformat:{emulator.path}").stderr
@@ -390,8 +390,8 @@ class HeldPort(ServeCase):
             self.assertEqual(os.listdir(folder), [])
 
 
-class Losses(ServeCase):
-    def test_an_encoder_goes_and_comes_back(self):
+class LostEncoder(ServeCase):
+    def test_encoder_is_lost_and_returns(self):
         emulator = Emulator(self.directory)
         self.addCleanup(emulator.end)
         server = self.without_history(f"tformat:{emulator.path}")
@@ -400,10 +400,10 @@ class Losses(ServeCase):
         stream.state()
         emulator.kill()
         killed = time.monotonic()
-        told = stream.until(lambda event, data: event == "happening")
+        result = stream.until(lambda event, data: event == "happening")
         gone = stream.state(lambda one: one["state"] != "live")
         self.assertLess(time.monotonic() - killed, BUSY)
-        self.assertEqual((told["kind"], gone["state"]), ("lost", "lost"), told)
+        self.assertEqual((result["kind"], gone["state"]), ("lost", "lost"), result)
         self.assertIsNone(gone["angle_deg"])
         self.assertIsNone(gone["speed"])
         emulator.end()
@@ -411,7 +411,7 @@ class Losses(ServeCase):
         self.addCleanup(again.end)
         self.assertIsNotNone(stream.state(lambda one: one["state"] == "live")["angle_deg"])
 
-    def test_it_ends_cleanly(self):
+    def test_signal_ends_server(self):
         for number in (signal.SIGTERM, signal.SIGINT):
             server = self.without_history("sim:tformat", "tformat:/dev/nothing")
             stream = self.stream(server)
@@ -419,7 +419,7 @@ class Losses(ServeCase):
             status, _, err = end(server.process, number)
             self.assertEqual(status, 0, err)
 
-    def test_what_cannot_be(self):
+    def test_refuses_wrong_usage(self):
         for arguments, words in ((("sim:tformatt",), "tformat"), (("sim:tformat", "sim:tformat"), "twice"),
                                  (("sim:tformat", "--listen", "0.0.0.0:0"), "--token-file"),
                                  (("sim:tformat", "--listen", "127.0.0.1:x"), "HOST:PORT")):
@@ -441,7 +441,7 @@ class Reload(ServeCase):
     FILE = ('[encoder.elbow]\nprotocol = "tformat"\nport = "sim"\nrate_hz = 20\n'
             '[encoder.{}]\nprotocol = "esl"\nport = "sim"\nmultiturn = {}\n')
 
-    def test_those_that_did_not_change_go_on(self):
+    def test_unchanged_encoders_continue(self):
         path = self.file("absenc.toml", self.FILE.format("wrist", 3))
         server = self.without_history(ABSENC_CONFIG=path)
 
@@ -470,7 +470,7 @@ class Reload(ServeCase):
             if line is None or "absenc.toml" in line and "SIGHUP" not in line:
                 return line or ""
 
-    def test_its_rate(self):
+    def test_rate_changes(self):
         path = self.file("absenc.toml", self.FILE.format("wrist", 0))
         server = self.without_history("--rate", "200", ABSENC_CONFIG=path)
         wait_until(lambda: server.encoder(1)["rate_hz"] > 60, "the others have the usual rate")
@@ -483,7 +483,7 @@ class Reload(ServeCase):
         self.assertIn("rate_hz", result.stderr)
 
 
-class WhoMayWhat(ServeCase):
+class AccessRights(ServeCase):
     def setUp(self):
         super().setUp()
         self.emulator = Emulator(self.directory, "--singleturn", "1000")
@@ -493,7 +493,7 @@ class WhoMayWhat(ServeCase):
     def counts(self, server):
         return wait_until(lambda: server.encoder()["counts"] is not None and server.encoder(), "it is live")["counts"]
 
-    def test_zero(self):
+    def test_zero_needs_token(self):
         server = self.server(self.name, "--token-file", self.tokens(), "--history", self.file("history"))
         self.assertEqual(self.counts(server), 1000)
         good = {"Authorization": f"Bearer {TOKEN}"}
@@ -522,12 +522,12 @@ class WhoMayWhat(ServeCase):
     def command(self, server, headers):
         return server.command(self.name, "zero", headers)
 
-    def test_bad_commands(self):
+    def test_refuses_bad_commands(self):
         server = self.without_history(self.name, "--token-file", self.tokens())
         good = {"Authorization": f"Bearer {TOKEN}"}
         status, body = server.command(self.name, "memory-read", good, argument=["5"])
         self.assertEqual(status, 200, body)
-        self.assertNotIn("change", body)  # it only reads
+        self.assertNotIn("change", body)  # the command only reads
         status, body = server.command(self.name, "memory-write", good, argument=["5", "66"])
         self.assertEqual((status, body["change"]), (200, "confirmed"))
         for command, argument in (("zerro", []), ("memory-read", ["x"]), ("memory-read", ["5", "6", "7", "8", "9"])):
@@ -535,10 +535,10 @@ class WhoMayWhat(ServeCase):
             self.assertEqual(status, 400, body)
             self.assertTrue(body["error"])
 
-    def test_a_token_ends_when_it_is_removed(self):
+    def test_removed_token_is_refused(self):
         path = self.tokens()
         server = self.without_history(self.name, "--token-file", path)
-        good = {"Authorization": f"bearer {TOKEN}"}  # whatever its case
+        good = {"Authorization": f"bearer {TOKEN}"}  # the scheme ignores case
         self.assertEqual(self.command(server, good)[0], 200)
         with open(path, "w", encoding="utf-8") as file:
             file.write("berta another-secret-of-hers\n")
@@ -553,30 +553,31 @@ class WhoMayWhat(ServeCase):
             self.assertTrue(line, "it was read, although others may read it")
         self.assertEqual(self.command(server, {"Authorization": "Bearer another-secret-of-hers"})[0], 200)
 
-    def test_wrong_tokens_are_counted_limited_and_told(self):
+    def test_wrong_tokens_are_counted_limited_and_reported(self):
         server = self.server(self.name, "--token-file", self.tokens(), "--history", self.file("history"))
         wrong = {"Authorization": "Bearer " + "x" * 20}
         self.assertEqual([self.command(server, wrong)[0] for _ in range(13)], [401] * 10 + [429] * 3)
         self.assertEqual(self.command(server, {"Authorization": f"Bearer {TOKEN}"})[0], 200)
         self.assertIn("absenc_wrong_tokens_total{} 13\n", server.ask("/metrics")[1])
-        self.assertEqual(server.ask("/api/token", headers=wrong)[0], 429)  # nothing tells more about a token
+        # a limited address learns nothing about a token
+        self.assertEqual(server.ask("/api/token", headers=wrong)[0], 429)
         self.assertIn("absenc_wrong_tokens_total{} 14\n", server.ask("/metrics")[1])
 
         def events():
             return [event for event in server.json("/api/events")["events"] if event["kind"] == "access"]
-        told = wait_until(lambda: len(events()) >= 2 and events(), "both are told")
-        self.assertEqual(len(told), 2)
-        self.assertIn("a request had a wrong token", told[1]["text"])
-        self.assertIn("10", told[0]["text"])
-        self.assertEqual({event["who"] for event in told}, {"127.0.0.1"})
+        result = wait_until(lambda: len(events()) >= 2 and events(), "both are reported")
+        self.assertEqual(len(result), 2)
+        self.assertIn("a request had a wrong token", result[1]["text"])
+        self.assertIn("10", result[0]["text"])
+        self.assertEqual({event["who"] for event in result}, {"127.0.0.1"})
 
-    def test_without_tokens_nothing_changes(self):
+    def test_without_tokens_nothing_can_be_changed(self):
         server = self.without_history(self.name)
         status, body = self.command(server, {"Authorization": "Bearer "})
         self.assertEqual(status, 403)
         self.assertIn("--token-file", body["error"])
 
-    def test_other_computers_need_a_token_to_look(self):
+    def test_other_computers_need_token_to_read(self):
         server = Server("sim:tformat", "--token-file", self.tokens(), "--history", "none", "--listen", "0.0.0.0:0")
         self.addCleanup(end, server.process)
         self.assertEqual(server.ask("/api/encoders")[0], 401)
@@ -585,7 +586,7 @@ class WhoMayWhat(ServeCase):
         self.assertEqual(server.ask("/")[0], 200)
         self.assertEqual(server.ask("/api/encoders", headers={"Authorization": f"Bearer {TOKEN}"})[0], 200)
 
-    def test_names_of_this_computer_in_any_case(self):
+    def test_host_names_ignore_case(self):
         server = self.without_history(self.name, "--token-file", self.tokens())
         self.counts(server)
         headers = {"Authorization": f"BEARER {TOKEN}", "Host": f"LocalHost:{server.port}"}
@@ -594,24 +595,24 @@ class WhoMayWhat(ServeCase):
             status, body = server.command(self.name, "memory-write", {**headers, "Origin": origin}, **command)
             self.assertEqual(status, expected, body)
 
-    def test_other_names_of_this_computer(self):
+    def test_refuses_other_host_names(self):
         server = self.without_history(self.name)
         self.assertEqual(server.ask("/api/encoders", headers={"Host": "evil.example"})[0], 403)
         self.assertEqual(server.ask("/api/encoders", headers={"Host": f"localhost:{server.port}"})[0], 200)
 
-    def test_tokens_that_others_may_read(self):
+    def test_refuses_readable_token_file(self):
         path = self.tokens()
         os.chmod(path, 0o644)
-        result = Losses.run_serve("sim:tformat", "--token-file", path)
+        result = LostEncoder.run_serve("sim:tformat", "--token-file", path)
         self.assertEqual(result.returncode, 1)
         self.assertIn("chmod 600", result.stderr)
         os.chmod(path, 0o600)
         self.file("tokens", "anna short\n")
-        self.assertIn("16 characters", Losses.run_serve("sim:tformat", "--token-file", path).stderr)
+        self.assertIn("16 characters", LostEncoder.run_serve("sim:tformat", "--token-file", path).stderr)
 
 
-class Inside(ServeCase):
-    """Settings, memory, doctor: what is asked of an encoder between two readings, or instead of them."""
+class EncoderAccess(ServeCase):
+    """Settings, memory and doctor, which access an encoder between two readings or instead of them."""
 
     def post(self, server, encoder, headers=None):
         status, body = server.ask(of(encoder, "doctor"), "POST", headers)
@@ -625,23 +626,23 @@ class Inside(ServeCase):
     def live(self, server, index=0):
         return wait_until(lambda: server.encoder(index)["state"] == "live", "it is live")
 
-    def test_settings_are_those_of_config(self):
+    def test_settings_equal_config(self):
         units = ("tformat", "encolink", "e201", "biss")
         server = self.without_history(*(f"sim:{unit}" for unit in units))
         for unit in units:
             wanted = json.loads(absenc("config", "get", f"sim:{unit}", "--json").stdout)["settings"]
-            told = json.loads(absenc("info", f"sim:{unit}", "--json").stdout)["answers"]
+            result = json.loads(absenc("info", f"sim:{unit}", "--json").stdout)["answers"]
             with self.subTest(unit):
                 found = server.json(of(f"sim:{unit}", "settings"))
                 self.assertEqual((found["settings"], found["failed"]), (wanted, {}))
                 self.assertTrue(found["identity"])
                 for name, fields in found["identity"].items():
-                    self.assertEqual(list(fields), list(told[name]["fields"]))
+                    self.assertEqual(list(fields), list(result[name]["fields"]))
                 readable = server.json(of(f"sim:{unit}"))["readable"]
                 self.assertEqual(readable["settings"], [*found["identity"], *wanted])
                 self.assertLessEqual({row["setting"] for row in found["rows"]}, set(readable["settings"]))
 
-    def test_a_setting_that_was_written(self):
+    def test_written_setting_is_read(self):
         server = self.without_history("sim:tformat", "--token-file", self.tokens())
         good = {"Authorization": f"Bearer {TOKEN}"}
         status, body = server.command("sim:tformat", "set-overheat-threshold", good, argument=["77"])
@@ -653,7 +654,7 @@ class Inside(ServeCase):
         self.assertEqual([row["range"] for row in found["rows"] if row["range"]],
                          ["degrees: degC, 1 to 127; 0: never (0 to 127)"] * 2)
 
-    def test_memory_is_what_was_written(self):
+    def test_written_memory_is_read(self):
         emulator, name = self.emulator()
         server = self.without_history(name, "--token-file", self.tokens(), "--rate", "200")
         self.live(server)
@@ -672,19 +673,19 @@ class Inside(ServeCase):
         self.assertEqual([(part["page"], bytes.fromhex(part["data"])) for part in one["memory"]], [(2, pages[2])])
         end(server.process)
         for page, content in pages.items():
-            told = absenc("memory", "read", name, "0", "--page", str(page), "--count", "127", "--json")
-            self.assertEqual(bytes.fromhex(json.loads(told.stdout)["data"]), content, told)
+            result = absenc("memory", "read", name, "0", "--page", str(page), "--count", "127", "--json")
+            self.assertEqual(bytes.fromhex(json.loads(result.stdout)["data"]), content, result)
 
     def test_registers(self):
         server = self.without_history("sim:encolink")
         found = server.json(of("sim:encolink", "memory"))
-        told = json.loads(absenc("memory", "read", "sim:encolink", "serial_number", "--json").stdout)
+        result = json.loads(absenc("memory", "read", "sim:encolink", "serial_number", "--json").stdout)
         serial = next(one for one in found["registers"] if one["name"] == "serial_number")
-        self.assertEqual((serial["fields"], serial["value"]), (told["fields"], told["fields"]["serial_number"]))
+        self.assertEqual((serial["fields"], serial["value"]), (result["fields"], result["fields"]["serial_number"]))
         self.assertEqual(server.json(of("sim:encolink"))["readable"]["registers"],
                          len(found["registers"]) + len(found["failed"]))
 
-    def test_what_has_none_says_so(self):
+    def test_reports_missing_settings_and_memory(self):
         server = self.without_history("sim:ssi", "sim:tformat")
         for path, values, words in ((of("sim:ssi", "settings"), {}, "no settings"),
                                     (of("sim:ssi", "memory"), {}, "cannot be read"),
@@ -695,7 +696,7 @@ class Inside(ServeCase):
                 self.assertEqual(status, 400, body)
                 self.assertIn(words, json.loads(body)["error"])
 
-    def test_an_encoder_that_is_away(self):
+    def test_reports_unreachable_encoder(self):
         server = self.without_history("tformat:" + self.file("nothing"))
         for part in ("settings", "memory"):
             status, body = server.ask(of("tformat:" + self.file("nothing"), part))
@@ -704,7 +705,7 @@ class Inside(ServeCase):
         status, found = self.post(server, "tformat:" + self.file("nothing"))
         self.assertEqual((status, [one["id"] for one in found["findings"]]), (200, ["port_missing"]), found)
 
-    def test_a_healthy_encoder_is_good(self):
+    def test_doctor_passes_healthy_encoder(self):
         emulator, name = self.emulator("--singleturn", "1000")
         server = self.server(name, "--history", self.file("history"))
         self.live(server)
@@ -724,10 +725,10 @@ class Inside(ServeCase):
         self.assertEqual([(event["text"], event["who"]) for event in events],
                          [(f"doctor: {found['verdict']}", "127.0.0.1")])
         end(server.process)
-        told = json.loads(absenc("doctor", name, "--json").stdout)
-        self.assertEqual(list(found), list(told))
+        result = json.loads(absenc("doctor", name, "--json").stdout)
+        self.assertEqual(list(found), list(result))
 
-    def test_what_is_wrong_is_named(self):
+    def test_doctor_names_problems(self):
         names = ("sim:tformat?alarm=battery_alarm", "sim:tformat?fault=corrupt=0.3&seed=1")
         server = self.without_history(*names)
         for name, wanted in zip(names, ("alarm", "damaged_bits")):
@@ -737,7 +738,7 @@ class Inside(ServeCase):
                 self.assertTrue(found["findings"][0][part])
         self.assertIn("battery_alarm", self.post(server, names[0])[1]["findings"][0]["evidence"])
 
-    def test_a_virtual_encoder_stays_the_same(self):
+    def test_doctor_keeps_virtual_encoder(self):
         server = self.without_history("sim:tformat", "--token-file", self.tokens())
         good = {"Authorization": f"Bearer {TOKEN}"}
         self.assertEqual(server.command("sim:tformat", "memory-write", good, argument=[2, 0x77, 1])[0], 200)
@@ -745,7 +746,7 @@ class Inside(ServeCase):
         page = server.json(of("sim:tformat", "memory"), page=1)
         self.assertEqual(bytes.fromhex(page["memory"][0]["data"])[2], 0x77)
 
-    def test_others_on_the_line(self):
+    def test_doctor_refuses_shared_line(self):
         names = [f"amt21:{self.file('line')}?address={address}" for address in ("0x54", "0x58")]
         server = self.without_history(*names, "sim:tformat")
         status, body = self.post(server, names[0])
@@ -755,14 +756,14 @@ class Inside(ServeCase):
         self.assertEqual(self.post(server, "sim:tformat")[0], 200)
 
     def silent(self):
-        """The port of an encoder that never answers: it takes doctor long to try all rates."""
+        """Returns the port of a line without an encoder, on which doctor takes long to try all rates."""
         line = SilentLine()
         line.__enter__()
         self.addCleanup(line.__exit__, None, None, None)
         return line.path
 
     def begin(self, server, name):
-        """The doctor of another client, running."""
+        """Starts doctor as another client."""
         answers = []
 
         def ask():
@@ -774,7 +775,7 @@ class Inside(ServeCase):
         wait_until(lambda: server.encoder()["state"] == "examined", "it is examined")
         return client, answers
 
-    def test_one_at_a_time_and_others_go_on(self):
+    def test_one_doctor_at_a_time_and_others_continue(self):
         name = f"tformat:{self.silent()}?latency=200"
         server = self.without_history(name, "sim:tformat")
         self.live(server, 1)
@@ -791,7 +792,7 @@ class Inside(ServeCase):
         self.assertEqual((status, found["ok"], found["findings"][0]["id"]), (200, False, "no_answer"), found)
         wait_until(lambda: server.encoder()["state"] == "failing", "it is asked again")
 
-    def test_it_ends_with_the_server(self):
+    def test_doctor_ends_with_server(self):
         port = self.silent()
         for number in (signal.SIGTERM, signal.SIGHUP):
             path = self.file("absenc.toml", f'[encoder.still]\nprotocol = "tformat"\nport = "{port}"\n'
@@ -814,7 +815,7 @@ class Inside(ServeCase):
             else:
                 self.assertEqual(server.process.returncode, 0)
 
-    def test_who_may(self):
+    def test_access_rights_of_encoder_requests(self):
         server = self.without_history("sim:tformat")
         asked = [(of("sim:tformat", part), method)
                  for part, method in (("settings", "GET"), ("memory", "GET"), ("doctor", "POST"))]
@@ -840,7 +841,7 @@ class History(ServeCase):
     def rows(self, server):
         return server.json(of(self.NAME, "history"))["rows"]
 
-    def test_it_is_kept_over_kill_9(self):
+    def test_survives_kill(self):
         path = self.file("history")
         server = self.server(self.NAME, "--history", path)
         wait_until(lambda: len(self.rows(server)) >= 3, "it has three seconds")
@@ -861,7 +862,7 @@ class History(ServeCase):
         kinds = [event["kind"] for event in server.json("/api/events")["events"]]
         self.assertIn("alarm", kinds)
 
-    def test_a_command_is_there_before_its_answer(self):
+    def test_command_is_recorded_before_reply(self):
         for _ in range(5):
             path = self.file("history")
             server = self.server("sim:tformat", "--history", path, "--token-file", self.tokens())
@@ -887,7 +888,7 @@ class History(ServeCase):
         self.assertEqual(server.ask(of(self.NAME, "history.csv"), **{"from": 1, "to": 2})[1], lines[0] + "\n")
         self.assertEqual(server.ask(of(self.NAME, "history"), **{"from": 2, "to": 1})[0], 400)
 
-    def test_many_rows_of_csv(self):
+    def test_csv_with_many_rows(self):
         path = self.file("history")
         server = self.server(self.NAME, "--history", path)
         wait_until(lambda: self.rows(server), "it has a second")
@@ -901,13 +902,14 @@ class History(ServeCase):
         rows = server.json(of(self.NAME, "history"), rows=100, **{"from": now - 100_000, "to": now - 60_000})
         self.assertLessEqual(len(rows["rows"]), 101)
 
-    def test_what_is_old_goes(self):
+    def test_old_rows_are_deleted(self):
         path = self.file("history")
         server = self.server(self.NAME, "--history", path)
         wait_until(lambda: self.rows(server), "it has a second")
         end(server.process)
         with contextlib.closing(sqlite3.connect(path)) as database:
-            hours = [(int(time.time()) - 3600 * i,) for i in range(1, 25)]  # nothing is old before a day was recorded
+            # nothing is deleted before a day was recorded
+            hours = [(int(time.time()) - 3600 * i,) for i in range(1, 25)]
             database.executemany("INSERT INTO second SELECT id, ?, 50, 0, 1, 2, 3, NULL, NULL, NULL FROM encoder",
                                  [(1,), *hours])
             database.commit()
@@ -915,12 +917,12 @@ class History(ServeCase):
         with contextlib.closing(sqlite3.connect(path)) as database:
             self.assertGreater(database.execute("SELECT min(at) FROM second").fetchone()[0], 1)
 
-    def test_a_full_disk_is_told(self):
+    def test_full_disk_is_reported(self):
         server = self.server(self.NAME, "--history", self.file("history"),
                              preexec_fn=lambda: signal.signal(signal.SIGXFSZ, signal.SIG_IGN))
         wait_until(lambda: len(self.rows(server)) >= 2, "it has two seconds")
         before = self.rows(server)
-        # A limit of the kernel for the size of files is to the writer what a full disk is.
+        # A limit on the file size has the same effect on the server as a full disk.
         resource.prlimit(server.process.pid, resource.RLIMIT_FSIZE, (4096, resource.RLIM_INFINITY))
         wait_until(lambda: not server.json("/healthz")["ok"], "it says so")
         state = server.json("/api/encoders")
@@ -930,9 +932,9 @@ class History(ServeCase):
         resource.prlimit(server.process.pid, resource.RLIMIT_FSIZE, (resource.RLIM_INFINITY, resource.RLIM_INFINITY))
         wait_until(lambda: server.json("/healthz")["ok"], "it is well again")
 
-        def told():
+        def history_texts():
             return [event["text"] for event in server.json("/api/events")["events"] if event["kind"] == "history"]
-        wait_until(lambda: any("could not be written" in text for text in told()), "the rows that are missing are told")
+        wait_until(lambda: any("could not be written" in text for text in history_texts()), "the missing rows are reported")
 
 
 if __name__ == "__main__":

@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Speed in real time, over pseudo-terminals and beside busy processes: none is farther off than its uncertainty."""
+"""Tests measured speeds in real time, over pseudo-terminals and beside busy processes: no error may exceed its
+uncertainty."""
 import json
 import os
 import subprocess
@@ -10,19 +11,19 @@ from concurrent.futures import ThreadPoolExecutor
 from command_support import ABSENC, Busy, Emulator, EncoderCase, absenc
 
 SPEEDS = (1, 12, 60, 3000)  # rpm
-# Where a unit is not read with its default options, or also with others: encoders that send by themselves.
+# Options of units that are not tested with their defaults only, such as streaming encoders.
 OPTIONS = {"encolink": ("", "stream_rate=500&resolution=20"), "raa38": ("mode=bus", "mode=timing")}
 
 
 def serial_units():
-    """Names of the units whose emulator is on a pseudo-terminal."""
+    """Returns the names of the units whose emulator runs on a pseudo-terminal."""
     units = [json.loads(line) for line in absenc("list", "--json").stdout.splitlines()]
     return [unit["protocol"] for unit in units if unit["link"] not in ("exchange", "clocked")]
 
 
 class Speed(EncoderCase):
     def rows(self, name, protocol, options, rpm, *more):
-        """What `record` writes of an encoder that turns."""
+        """Returns the header and rows that `record` writes for a turning encoder."""
         settings = [word for option in options.split("&") if option for word in ("--option", option)]
         name = f"{protocol}-{len(options)}-{name}"
         with Emulator(self.directory, "--motion", f"rpm={rpm}", *settings, protocol=protocol, name=name) as emulator:
@@ -36,7 +37,8 @@ class Speed(EncoderCase):
         return header, rows
 
     def assert_within(self, header, rows, rpm):
-        """No speed is farther off than its uncertainty. Returns the pairs."""
+        """Checks that no speed differs from `rpm` by more than its uncertainty. Returns the (speed, uncertainty)
+        pairs."""
         unit = "mm_s" if "speed_mm_s" in header["units"] else "rpm"
         pairs = []
         for row in rows:
@@ -44,12 +46,12 @@ class Speed(EncoderCase):
             self.assertEqual(speed is None, uncertainty is None, row)
             if speed is None:
                 continue
-            self.assertLessEqual(abs(speed - rpm), uncertainty * 1.001 + 1e-9, row)  # as it is rounded
+            self.assertLessEqual(abs(speed - rpm), uncertainty * 1.001 + 1e-9, row)  # allows for rounding
             pairs.append((speed, uncertainty))
         return pairs
 
     def assert_all(self, busy):
-        """Of each unit, at all speeds at the same time: a crowd by itself."""
+        """Tests each unit at all speeds at the same time, which also loads the machine."""
         for protocol in serial_units():
             for options in OPTIONS.get(protocol, ("",)):
                 with Busy(busy), ThreadPoolExecutor() as pool:
@@ -59,17 +61,17 @@ class Speed(EncoderCase):
                     with self.subTest(protocol=protocol, options=options, rpm=rpm):
                         self.assert_within(*one.result(), rpm)
 
-    def test_none_is_farther_off_than_its_uncertainty_beside_busy_processes(self):
+    def test_errors_stay_within_uncertainty_beside_busy_processes(self):
         self.assert_all(4)
 
-    def test_it_comes_and_is_worth_something(self):
+    def test_uncertainty_is_useful(self):
         header, rows = self.rows("alone", "tformat", "", 60, "--rate", "200", "--count", "600")
         pairs = self.assert_within(header, rows, 60)
         self.assertGreater(len(pairs), 0, "3 s hold a window of 1 s")
         for speed, uncertainty in pairs:
             self.assertLess(uncertainty, 0.34 * abs(speed), "a fourth of the time to either side is the most")
 
-    def test_the_history_has_no_spikes(self):
+    def test_history_has_no_spikes(self):
         with Emulator(self.directory, "--motion", "rpm=12") as emulator, Busy(4):
             process = subprocess.Popen([ABSENC, "monitor", f"tformat:{emulator.path}?latency=300", "--json", "--for", "3",
                                         "--interval", "0.05"], stdout=subprocess.PIPE, stderr=subprocess.PIPE)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the tests of `tap` share: a line between a host and an emulator that is copied, and `tap` as a process."""
+"""Shared by the tests of `tap`: a relay that copies a line between a host and an emulator, and the `tap` process."""
 import os
 import select
 import signal
@@ -12,10 +12,9 @@ from command_support import ABSENC, PATIENCE, Case, Emulator, end, json_lines, r
 
 
 class Relay:
-    """Passes bytes between `host_path`, a pseudo-terminal for the host, and the encoder's, and copies each byte onto a third
-    one, `tap_path`, before it goes on, or into `copy_to`, a serial port that stands at its rate. Nobody's bytes are lost: it
-    waits where a line takes no more. `change` turns what comes (from the host: True) into what goes on; only the copy
-    counts the damage."""
+    """Forwards bytes between the host's pseudo-terminal `host_path` and the encoder's, and first copies each byte to
+    `tap_path`, a third pseudo-terminal, or to the serial port `copy_to`. No byte is lost, because the relay waits while
+    a line is full. `change(data, from_host)` may alter the bytes; `copied` has the altered bytes."""
 
     def __init__(self, encoder_path, change=lambda data, from_host: data, copy_to=None):
         self.change = change
@@ -31,7 +30,7 @@ class Relay:
             os.set_blocking(master, False)
         self.encoder = os.open(encoder_path, os.O_RDWR | os.O_NOCTTY)
         tty.setraw(self.encoder)
-        self.from_tap = bytearray()  # what tap sent: must stay empty
+        self.from_tap = bytearray()  # bytes sent by tap; must stay empty
         self.wake, self.waker = os.pipe()
         self.thread = threading.Thread(target=self.run)
 
@@ -48,7 +47,7 @@ class Relay:
                 return
             if self.tap in ready:
                 self.from_tap += os.read(self.tap, 4096)
-            # Bytes that the host has sent since then come behind the reply that it waited for.
+            # Bytes that the host has sent meanwhile follow the reply that it waited for.
             for here, there in ((self.encoder, self.host), (self.host, self.encoder)):
                 if here in ready:
                     data = self.change(os.read(here, 4096), here == self.host)
@@ -87,7 +86,7 @@ class TapCase(Case):
         return relay
 
     def tap(self, *arguments, stdin=subprocess.DEVNULL):
-        """Runs `tap`, which writes into files: nobody has to read along. Returns when it listens."""
+        """Runs `tap` with its output in a file, so that no reader is needed. Returns when tap is ready."""
         out, messages = open(self.file("out"), "w+b"), subprocess.PIPE
         self.addCleanup(out.close)
         process = subprocess.Popen([ABSENC, "tap", *arguments], stdin=stdin, stdout=out, stderr=messages, bufsize=0)
@@ -100,7 +99,7 @@ class TapCase(Case):
         return process
 
     def finish(self, process, number=signal.SIGINT):
-        """Ends `tap` when it has taken what there is, and returns status, output and messages."""
+        """Ends `tap`. Returns its status, output and messages."""
         if process.poll() is None:
             process.send_signal(number)
         _, messages = process.communicate(timeout=PATIENCE)
@@ -108,7 +107,7 @@ class TapCase(Case):
         return process.returncode, process.out.read().decode(), process.messages + messages.decode()
 
     def wait_for(self, process, found):
-        """Until what was printed so far satisfies `found`."""
+        """Waits until the output so far satisfies `found`."""
         deadline = time.monotonic() + PATIENCE
         while time.monotonic() < deadline:
             with open(process.out.name, encoding="utf-8") as file:
@@ -119,7 +118,7 @@ class TapCase(Case):
         self.fail(f"in vain waited: {text[-1000:]}")
 
     def wait_for_all(self, process, relay):
-        """Until each byte that was on the line stands in a line of `--json`."""
+        """Waits until `--json` has printed each byte of the line."""
         self.wait_for(process, lambda text: joined(json_lines(text[:text.rfind("\n") + 1])) == relay.copied.hex())
 
     def lines(self, text):

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""tap on a line between a host and an emulator: a relay copies both directions onto a third pseudo-terminal.
-`--all`: ten thousand exchanges of each."""
+"""Tests `tap` on a line between a host and an emulator; a relay copies both directions to a third pseudo-terminal.
+`--all` runs ten thousand exchanges per unit."""
 import collections
 import os
 import re
@@ -18,8 +18,8 @@ ALL = "--all" in sys.argv
 COUNT = 10_000 if ALL else 150
 
 
-# How each serial unit is emulated and read, so that the host asks; whose replies only silence ends, how long a reading
-# takes: as long as the way may hold them back, so that fewer are read.
+# Options of the emulator and of the host for each serial unit, and the number of readings. Fewer readings if only
+# silence ends a reply, because each then takes as long as the latency.
 UNITS = {
     "tformat": ([], "latency=1000", COUNT), "esl": ([], "latency=1000", COUNT), "e201": ([], "latency=1000", COUNT),
     "raa38": (["--option", "mode=bus"], "latency=1000&mode=bus", COUNT),
@@ -48,10 +48,10 @@ class EveryExchange(TapCase):
         self.wait_for_all(tap, relay)
         status, text, messages = self.finish(tap)
         lines, summary = self.lines(text)
-        # A busy machine may hold a reply back for longer than the host waits: then it does ask again.
+        # A busy machine may delay a reply beyond the host's timeout. The host then repeats its request.
         repeated = [line for line in lines if line["kind"] == "request" and line.get("error") == "timeout"]
         exchanges = [line for line in lines if line["kind"] == "exchange"]
-        # After half a second tap has given a request up: a reply that comes then is shown alone (docs/tap.md).
+        # After half a second tap reports a timeout. A later reply is shown without a request (docs/tap.md).
         late = [line for before, line in zip(lines, lines[1:])
                 if line["kind"] == "reply" and before in repeated and line["time_s"] - before["time_s"] >= 0.5]
         self.assertEqual([line for line in lines
@@ -59,13 +59,14 @@ class EveryExchange(TapCase):
         if count == COUNT:
             self.assertEqual(repeated + late, [], messages)
             self.assertEqual(status, 0, messages)
-        # Each byte of the line is in one exchange, in order, and nothing else is.
+        # Each byte of the line must be in exactly one exchange, in order.
         self.assertEqual(joined(lines), relay.copied.hex())
         self.assertEqual(bytes(relay.from_tap), b"")
         self.assertEqual(summary["exchanges"], len(exchanges))
         self.assertEqual(summary["bytes"], len(relay.copied))
         self.assertEqual(sum(kind["count"] for kind in summary["per_request"]), len(lines) - len(late))
-        # Each position that the host read was said, in that order; of some encoders it asks twice.
+        # Each position that the host read must be in an exchange, in the same order. Some encoders are polled twice per
+        # reading.
         key = "singleturn" if "singleturn" in readings[0] else "position"
         said = [line["fields"][key] for line in lines if key in line.get("fields", {})]
         wanted = [reading.get(key, reading.get("fields", {}).get(key)) for reading in readings]
@@ -96,7 +97,7 @@ class EveryExchange(TapCase):
 
 class Damage(TapCase):
     def test_damaged_bytes(self):
-        """The exchanges that are whole are shown, those that are not are bad, and none is invented."""
+        """Intact exchanges must be shown, damaged ones must be bad, and none may be invented."""
         emulator = self.emulator("tformat", "--motion", "rpm=60")
         replies = collections.Counter()
 
@@ -122,7 +123,7 @@ class Damage(TapCase):
         self.assertEqual(joined(lines), relay.copied.hex())
         self.assertEqual(status, 1)
 
-    def test_from_the_middle_of_a_frame(self):
+    def test_starts_in_the_middle_of_a_frame(self):
         data = bytes.fromhex("1a1a204523011134120010" + "7a")
         process = subprocess.run([ABSENC, "tap", "-", "tformat", "--json"], input=data[7:] + data * 30, timeout=PATIENCE,
                                  capture_output=True)
@@ -130,7 +131,7 @@ class Damage(TapCase):
         self.assertEqual([line["kind"] for line in lines if line["kind"] != "exchange"], ["noise"], lines[:3])
         self.assertEqual(sum(line["ok"] and line["kind"] == "exchange" for line in lines), 30)
 
-    def test_nobody_answers(self):
+    def test_no_reply(self):
         nobody, slave = os.openpty()
         for descriptor in (nobody, slave):
             self.addCleanup(os.close, descriptor)
@@ -147,8 +148,8 @@ class Damage(TapCase):
         self.assertEqual(status, 1)
 
 
-class WhoseFramesTheyAre(TapCase):
-    def test_is_found_out(self):
+class DetectedProtocol(TapCase):
+    def test_detects_protocol(self):
         for protocol in ("tformat", "esl", "raa38-modbus"):
             with self.subTest(protocol):
                 emulator = self.emulator(protocol, "--motion", "rpm=60", name=f"e-{protocol}")
@@ -166,7 +167,7 @@ class WhoseFramesTheyAre(TapCase):
                     self.assertIn(f"{protocol} explains what is said", messages)
                 emulator.end()
 
-    def test_nothing_explains_it(self):
+    def test_reports_unknown_protocol(self):
         process = subprocess.run([ABSENC, "tap", "-"], input=bytes(range(256)) * 4, timeout=PATIENCE, capture_output=True)
         self.assertEqual((process.returncode, process.stdout), (1, b""))
         self.assertIn("1024 bytes came, but no protocol explains them", process.stderr.decode())
@@ -179,7 +180,7 @@ class Output(TapCase):
         return subprocess.run([ABSENC, "tap", "-", "tformat", *arguments], input=data, timeout=PATIENCE, capture_output=True,
                               check=False)
 
-    def test_words_marks_and_rates(self):
+    def test_text_marks_and_rates(self):
         result = self.run_tap(data=self.EXCHANGE * 5)
         text = result.stdout.decode()
         self.assertRegex(text, r"(?m)^ +0\.\d{6}  ! 1A > 1A 20 45 23 01 11 34 12 00 10 7A .*alarms: ")
@@ -188,8 +189,8 @@ class Output(TapCase):
         self.assertNotIn("turn-around", text)
         self.assertEqual(result.returncode, 0, result.stderr)
 
-    def test_an_exchange_is_shown_at_once(self):
-        """Not when the next ones come."""
+    def test_exchange_is_shown_at_once(self):
+        """An exchange must not wait for the next one."""
         with subprocess.Popen([ABSENC, "tap", "-", "tformat", "--json"], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
                               stderr=subprocess.DEVNULL, bufsize=0) as process:
             for _ in range(20):
@@ -201,14 +202,14 @@ class Output(TapCase):
             process.stdin.close()
             process.wait(PATIENCE)
 
-    def test_csv_has_the_columns_of_decode(self):
+    def test_csv_equals_decode(self):
         record = self.file("a.txt")
         tapped = self.run_tap("--csv", "--record", record).stdout.decode().splitlines()
         decoded = absenc("decode", "tformat", record, "--csv").stdout.splitlines()
         self.assertEqual(tapped[0], decoded[0])
         self.assertEqual(len(tapped), 2)
 
-    def test_a_record_is_never_overwritten(self):
+    def test_record_is_never_overwritten(self):
         path = self.file("there.txt", "mine\n")
         result = self.run_tap("--record", path)
         self.assertEqual(result.returncode, 1)
@@ -218,14 +219,14 @@ class Output(TapCase):
         self.assertEqual(self.run_tap("--record", path, "--force").returncode, 0)
         self.assert_good(absenc("decode", "tformat", path))
 
-    def test_wrong_usage(self):
+    def test_refuses_wrong_usage(self):
         for arguments, words in ((["can-that-is-not-there", "raa38-can"], "candump"), (["-", "ssi"], "decode"),
                                  (["-", "tformat", "--json", "--csv"], "together"), (["-", "--model", "23-bit"], "protocol"),
                                  (["sim:tformat"], "virtual")):
             with self.subTest(arguments):
                 self.assert_wrong_usage(absenc("tap", *arguments), words)
 
-    def test_ends_with_the_time(self):
+    def test_ends_after_given_time(self):
         emulator = self.emulator("tformat")
         result = absenc("tap", emulator.path, "tformat", "--for", "0.2")
         self.assert_failed_with(result, "nothing came")
@@ -235,8 +236,8 @@ class Output(TapCase):
         self.assertIn(words, result.stderr)
 
 
-class OneSide(TapCase):
-    def test_replies_alone(self):
+class OneDirection(TapCase):
+    def test_replies_only(self):
         reply = Output.EXCHANGE[1:]
         result = subprocess.run([ABSENC, "tap", "-", "tformat", "--json"], input=reply * 40, timeout=PATIENCE,
                                 capture_output=True)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Logs of terminal programs through `grep | absenc decode -`, and captures that are damaged or not there."""
+"""Tests logs of terminal programs, piped through `grep` into `absenc decode -`, and damaged or missing captures."""
 import os
 import subprocess
 import unittest
@@ -15,7 +15,7 @@ def text_of(data):
     return "".join(chr(byte) if 0x20 <= byte < 0x7F else "." for byte in data)
 
 
-# Each makes a line of the number of the line, the port, whether it was received, and the bytes.
+# Each function formats a line from its number, the port, whether the bytes were received, and the bytes.
 STYLES = {
     "port": lambda n, port, rx, data: f"{port}: {plain(data)}",
     "brackets": lambda n, port, rx, data: f"[17:55:{n:02}.125] [{port}] {'RX' if rx else 'TX'}: {plain(data)}",
@@ -60,15 +60,16 @@ class Logs(Case):
                     result = self.decode(protocol, self.log(style, exchanges))
                     found = json_lines(result.stdout)
                     self.assertEqual([one for one in found if one["ok"] is False and one["error"] != "sequence_mismatch"], [],
-                                     result.stderr)  # they are no conversation: their counters stand still
+                                     # the vectors are no real conversation, so their counters do not advance
+                                     result.stderr)
                     self.assertEqual([(one["request"], one["reply"]) for one in found],
                                      [(request.hex(), reply.hex()) for request, reply in exchanges])
 
-    def test_two_ports_in_one_log(self):
+    def test_refuses_two_ports_in_one_log(self):
         path = self.log(STYLES["brackets"], self.exchanges("esl")[:3])
         self.assert_failed(absenc("decode", "esl", path), "damaged at byte", '"COM4", the first of "COM3"', "grep")
 
-    def test_what_is_no_log(self):
+    def test_refuses_other_texts(self):
         for text, words in [("COM3 opened at 115200 8N1\n", ['"opened" before the bytes']),
                             ("17:55:24 hello\n", ['"hello" before the bytes']),
                             ("12:34:56\n", ["a time or bytes"]),
@@ -84,7 +85,7 @@ class Damage(Case):
         self.assert_good(absenc("wave", "tformat", path, "--count", "20"))
         return path
 
-    def test_a_session_with_a_wrong_byte(self):
+    def test_session_with_wrong_byte(self):
         path = self.capture("wrong.sr")
         with open(path, "r+b") as file:
             size = os.path.getsize(path)
@@ -111,14 +112,14 @@ class Damage(Case):
                 self.assert_failed(result, "the time runs backwards")
                 self.assertNotIn("its level", result.stderr)
 
-    def test_identify_tells_the_damage_also_when_it_finds_something(self):
+    def test_identify_reports_damage_with_result(self):
         path = self.capture("cut.sr")
         os.truncate(path, os.path.getsize(path) // 2)
         result = absenc("identify", path)
         self.assert_good(result)
         self.assert_sentence(result.stderr, "note: the capture is damaged at byte", "cut off")
 
-    def test_a_file_that_is_not_there(self):
+    def test_reports_missing_file(self):
         self.capture("drive.sr")
         for name, words in [("typo.sr", []), ("driv.sr", ["did you mean drive.sr?"]), ("folder/typo.vcd", []),
                             (self.file("driev.sr"), [f"did you mean {self.file('drive.sr')}?"])]:

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""An alarm is reported and clear, reported and raised, or not reported; and so is each part of a position. What nobody has
-reported is never shown as clear, as valid or as INVALID."""
+"""Tests the three states of an alarm: reported and clear, reported and raised, not reported. The same holds for each
+part of a position. Values that no reply reports must not be shown as clear, valid or INVALID."""
 import csv
 import io
 import json
@@ -8,7 +8,7 @@ import unittest
 
 from command_support import Case, absenc, json_lines
 
-# T-format replies by data ID: 0 has SF alone, 3 has ALMC.
+# T-format replies by data ID: ID 0 carries only SF, ID 3 also ALMC.
 CLEAR_3 = "1A 1A 00 45 23 01 11 34 12 00 00 4A"
 CLEAR_0 = "02 02 00 CD AB 01 65"
 ALARM_0 = "02 02 20 CD AB 01 45"
@@ -16,7 +16,7 @@ COUNTING_0 = "02 02 10 CD AB 01 75"
 
 
 class EveryUnit(Case):
-    """From what `absenc list` says: no line of it is written for a unit."""
+    """Tests every unit in `absenc list`, without code for a particular unit."""
 
     def each(self):
         for about in json_lines(absenc("list", "--json").stdout):
@@ -25,7 +25,7 @@ class EveryUnit(Case):
             alarms = next((names for name, names in flags.items() if name.endswith("alarms")), [])
             for alarm in filter(None, alarms):
                 refused = absenc("read", f"sim:{about['protocol']}?alarm={alarm}")
-                if "nothing in what" not in refused.stderr:  # an alarm that its word cannot carry
+                if "nothing in what" not in refused.stderr:  # an alarm that the unit's word cannot carry
                     yield about, alarm
 
     def assert_raised_or_unknown(self, alarms, alarm):
@@ -54,7 +54,7 @@ class EveryUnit(Case):
                     file = self.file("wave.vcd")
                     wave = absenc("wave", f"{about['protocol']}?alarm={alarm}", file, "--force", "--command", command["name"])
                     if wave.returncode == 2:
-                        continue  # it has no waveform
+                        continue  # the command has no waveform
                     rows = json_lines(absenc("decode", about["protocol"], file, "--json").stdout)
                     for row in rows:
                         if "alarms" in row:
@@ -63,8 +63,8 @@ class EveryUnit(Case):
                     self.assertNotIn("no alarms", text)
 
 
-class NotReported(Case):
-    def test_a_word_without_an_error_bit(self):
+class UnreportedAlarms(Case):
+    def test_word_without_error_bit(self):
         self.assertIn("alarms not reported", absenc("read", "sim:ssi").stdout)
         reading, = json_lines(absenc("read", "sim:ssi", "--json").stdout)
         self.assertIsNone(reading["alarms"])
@@ -76,7 +76,7 @@ class NotReported(Case):
         result = absenc("alarms", "sim:ssi", "--json")
         self.assertEqual((result.returncode, json.loads(result.stdout)["ok"]), (1, False))
 
-    def test_a_word_with_one(self):
+    def test_word_with_error_bit(self):
         address = "sim:ssi?error_bit=active_high"
         self.assertIn("no alarms", absenc("read", address).stdout)
         self.assertEqual(absenc("alarms", address).stdout, "no alarms\n")
@@ -101,7 +101,7 @@ class NotReported(Case):
         self.assertEqual(json.loads(absenc("alarms", alone, "--json").stdout),
                          {"ok": True, "protocol": "encolink", "alarms": None, "general_status": []})
 
-    def test_one_channel_without_alarms(self):
+    def test_esl_channel_without_alarms(self):
         file = self.file("short.vcd")
         for command in ("position-short", "singleturn-short", "calibration"):
             with self.subTest(command):
@@ -120,7 +120,7 @@ class Captures(Case):
         self.assert_good(result)
         return result.stdout.splitlines(), json_lines(absenc("decode", "tformat", file, "--json").stdout)
 
-    def test_a_reply_alone(self):
+    def test_single_reply(self):
         for line, status, valid, position in [(CLEAR_0, [], None, "unknown"), (ALARM_0, ["alarm"], None, "unknown"),
                                               (COUNTING_0, ["counting_error"], False, "INVALID")]:
             with self.subTest(line):
@@ -133,7 +133,7 @@ class Captures(Case):
                 for name in status:
                     self.assertIn(f"status: {name}", text)
 
-    def test_an_earlier_reply_is_remembered(self):
+    def test_state_of_earlier_reply_is_kept(self):
         texts, rows = self.decode(CLEAR_3, CLEAR_0, COUNTING_0, ALARM_0, CLEAR_0)
         self.assertEqual([row["singleturn_valid"] for row in rows], [True, True, False, True, True])
         self.assertEqual([row["alarms"] for row in rows], [[], [], ["counting_error"], None, []])
@@ -141,7 +141,7 @@ class Captures(Case):
         self.assertIn("300.797 deg", texts[1])
         self.assertIn("status: alarm   alarms not reported: over_heat multiturn_error battery_error battery_alarm", texts[3])
 
-    def test_as_columns(self):
+    def test_csv(self):
         file = self.file("bytes.txt", f"{CLEAR_0}\n{CLEAR_3}\n{CLEAR_0}\n")
         rows = list(csv.DictReader(io.StringIO(absenc("decode", "tformat", file, "--csv").stdout)))
         self.assertEqual([(row["singleturn_valid"], row["status"], row["alarms"]) for row in rows],
@@ -156,7 +156,7 @@ class Captures(Case):
 
 
 class Live(Case):
-    def test_turns_under_alarms_that_are_not_of_the_turns(self):
+    def test_turns_are_invalid_only_with_alarms_of_turns(self):
         for alarm in ("battery_alarm", "over_heat"):
             answer = json.loads(absenc("run", f"sim:tformat?multiturn=12&alarm={alarm}", "multiturn", "--json").stdout)
             self.assertEqual(answer["fields"]["multiturn"], 12)

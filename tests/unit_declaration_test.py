@@ -1,9 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""A misspelt member of what an author declares does not compile; and each member that may be left out is tested.
-
-The unit is that of docs/protocol-template.
-"""
+"""Tests that a misspelt member in a unit's declaration does not compile, and that every optional member is tested. Uses
+the unit in docs/protocol-template."""
 
 import os
 import re
@@ -20,7 +18,7 @@ COMPILE = ["g++", "-std=c++20", "-fsyntax-only", "-Wall", "-Wextra", "-Werror"]
 
 
 def members(aggregate, header):
-    """Those of one of the aggregates that an author fills."""
+    """Returns the members of a struct that a unit's author fills in."""
     text = (AUTHOR / header).read_text(encoding="utf-8")
     body = re.search(rf"^struct {aggregate} {{\n(.*?)^}};", text, re.MULTILINE | re.DOTALL).group(1)
     return re.findall(r"^  (?!using)(?:\w[\w:<>, *&]* )?\*?\(?\*?(\w+)\)?(?:\([^;]*\))?(?:\{\}| = [\w.]+|);", body, re.MULTILINE)
@@ -42,14 +40,14 @@ class UnitDeclaration(unittest.TestCase):
         self.assertNotEqual(result.returncode, 0, f"{name} compiles")
         self.assertRegex(result.stderr, rf"error: .*'{name}'")
 
-    def test_the_template_compiles(self):
+    def test_template_compiles(self):
         self.assertEqual(self.compiled().stderr, "")
 
-    def test_a_misspelt_member_does_not(self):
+    def test_misspelt_member_does_not_compile(self):
         for right, wrong in ((".timing", ".timming"), (".put_reply", ".put_replay"), ("found{.put ", "found{.puts ")):
             self.refused(wrong.split(".")[1].strip(), change_unit=lambda text: text.replace(right, wrong))
 
-    def test_a_misspelt_function_of_the_protocol_does_not(self):
+    def test_misspelt_function_does_not_compile(self):
         names = ("expected", "is_whole", "latched")
         result = self.compiled(change_frames=lambda text: re.sub(rf"\b({'|'.join(names)})\(const", r"\1s(const", text))
         for name in names:

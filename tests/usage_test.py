@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What is not understood, wherever it stands, ends with status 2, and nothing was done."""
+"""Tests that any argument which is not understood ends the command with status 2 before it does anything."""
 import json
 import unittest
 
@@ -9,8 +9,8 @@ WRITE = ["memory", "write", "{encoder}", "0x10", "0x55", "--yes"]
 ZERO = ["zero", "{encoder}", "--yes"]
 
 
-class NothingIsDone(EncoderCase):
-    """Beside a verb that would change an encoder if what stands around it were passed over."""
+class WrongArguments(EncoderCase):
+    """The wrong arguments stand next to a verb that would change the encoder if they were ignored."""
 
     def setUp(self):
         super().setUp()
@@ -20,7 +20,7 @@ class NothingIsDone(EncoderCase):
         position = json.loads(absenc("read", self.address, "--json").stdout)["singleturn"]
         return position, absenc("memory", "read", self.address, "0x10", "--json").stdout
 
-    def test_words_and_options_in_the_wrong_place(self):
+    def test_misplaced_words_and_options_have_no_effect(self):
         before = self.state()
         for line, words in [(["--dry-run", *WRITE], ["--dry-run stands before the verb"]),
                             (["memory", "--dry-run", *WRITE[1:]], ["--dry-run stands before the verb", "memory"]),
@@ -52,19 +52,19 @@ class NothingIsDone(EncoderCase):
                 self.assert_wrong_usage(absenc(*(word.format(encoder=self.address) for word in line)), *words)
         self.assertEqual(self.state(), before)
 
-    def test_what_is_understood_is_done(self):
+    def test_correct_arguments_have_effect(self):
         self.assert_good(absenc("zero", "--yes", "--", self.address))
         self.assertEqual(self.state()[0], 0)
 
 
 class Help(EncoderCase):
-    def test_of_what_is_no_verb(self):
+    def test_help_of_unknown_verb_is_wrong_usage(self):
         for line in (["nonsense", "--help"], ["memory", "nonsense", "--help"], ["--version", "nonsense"],
                      ["-hjunk"], ["--helpp"]):
             with self.subTest(line):
                 self.assert_wrong_usage(absenc(*line))
 
-    def test_of_every_place(self):
+    def test_help_at_every_position(self):
         for line, words in [(["-h"], "Usage: absenc <verb>"), (["memory", "-h"], "Usage: absenc memory <verb>"),
                             (["zero", "--yes", "-h"], "Usage: absenc zero <encoder>"),
                             (["memory", "read", "sim:tformat", "--help"], "Usage: absenc memory read")]:

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Conversations of virtual encoders as waveforms, and what sigrok's decoders read of them."""
+"""Tests waveforms of virtual encoders, and compares them with sigrok's decoders."""
 import json
 import os
 import resource
@@ -14,7 +14,7 @@ from command_support import ABSENC, PATIENCE, Case, absenc, end
 UNITS = [json.loads(line) for line in absenc("list", "--json").stdout.splitlines()]
 WIRES = {"half_duplex": {"line"}, "full_duplex": {"host", "device"}, "exchange": {"cs", "sck", "mosi", "miso"},
          "clocked": {"clock", "data"}, "can": {"can"}}
-# A frame that no exchange carried whole: EncoLink's channels 2 and 3.
+# EncoLink's channels 2 and 3 are frames spread over several exchanges.
 IN_PARTS = "each of the last exchanges carried a byte of it"
 
 
@@ -29,20 +29,20 @@ class Wave(Case):
         result = subprocess.run(["sigrok-cli", *arguments], capture_output=True, text=True, timeout=60, check=True)
         return [line.split(": ", 1)[1] for line in result.stdout.splitlines()]
 
-    def test_every_unit_in_every_format(self):
+    def test_writes_every_unit_in_every_format(self):
         for unit, link in ((one["protocol"], one["link"]) for one in UNITS):
             for ending in ("vcd", "sr", "csv"):
                 with self.subTest(unit=unit, ending=ending):
                     path = self.file(f"{unit}.{ending}")
-                    told = self.wave(unit, path, "--count", "5")
-                    self.assertIn("5 results", told)
-                    self.assertIn("0 of them an error", told)
-                    wires = set(told.strip().rsplit("wires: ", 1)[1].split(", "))
+                    report = self.wave(unit, path, "--count", "5")
+                    self.assertIn("5 results", report)
+                    self.assertIn("0 of them an error", report)
+                    wires = set(report.strip().rsplit("wires: ", 1)[1].split(", "))
                     self.assertLessEqual(WIRES[link], wires)
                     self.assertLessEqual(wires - WIRES[link], {"trigger", "clear"})
                     self.assertGreater(os.path.getsize(path), 100)
 
-    def test_sigrok_reads_the_bytes(self):
+    def test_sigrok_decodes_uart(self):
         for ending in ("vcd", "sr"):
             path = self.file(f"tformat.{ending}")
             self.wave("tformat?singleturn=4660", path, "--count", "2")
@@ -55,7 +55,7 @@ class Wave(Case):
         self.assert_good(result)
         return [json.loads(line) for line in result.stdout.splitlines()]
 
-    def test_sigrok_reads_modbus(self):
+    def test_sigrok_decodes_modbus(self):
         path = self.file("modbus.sr")
         self.wave("raa38-modbus?motion=rpm=60", path, "--count", "20")
         read = self.sigrok("-i", path, "-P", "uart:rx=line:baudrate=19200,modbus:scchannel=RX:cschannel=RX", "-A",
@@ -64,17 +64,17 @@ class Wave(Case):
         self.assertEqual(len(set(positions)), 20)
         self.assertEqual(read, [f"0x{position:04X} / {position}" for position in positions])
 
-    def test_sigrok_reads_an_spi_bus(self):
+    def test_sigrok_decodes_spi(self):
         path = self.file("spi.sr")
         self.wave("encolink-spi?motion=rpm=60", path, "--count", "20")
         read = self.sigrok("-i", path, "-P", "spi:clk=sck:miso=miso:mosi=mosi:cs=cs:cpol=0:cpha=1", "-A",
                            "spi=miso-data")
-        # What is clocked behind a reply belongs to none.
+        # Bytes that are clocked after the end of a reply belong to no reply.
         replies = [one["reply"] for one in self.decoded("encolink-spi", path)]
         self.assertGreater(len(set(replies)), 20)
         self.assertRegex("".join(read).lower(), "^" + "(ff)*".join(replies) + "(ff)*$")
 
-    def test_decode_reads_what_wave_wrote(self):
+    def test_decode_reads_every_format(self):
         for unit in (one["protocol"] for one in UNITS):
             lines = {}
             for ending in ("vcd", "sr", "csv"):
@@ -98,18 +98,18 @@ class Wave(Case):
         self.assertIn("host 32 host 05 host 42 host 75", " ".join(comments))
         self.assertTrue(" ".join(comments).endswith("device EA device 05 device 42 device AD"))
 
-    def test_faults_show(self):
-        told = self.wave("tformat?fault=corrupt=1", self.file("bad.vcd"), "--count", "20")
-        self.assertIn("20 of them an error", told)
+    def test_faults_are_drawn(self):
+        report = self.wave("tformat?fault=corrupt=1", self.file("bad.vcd"), "--count", "20")
+        self.assertIn("20 of them an error", report)
 
-    def test_the_same_twice(self):
+    def test_output_is_reproducible(self):
         for name in ("a.vcd", "b.vcd"):
             self.wave("esl?motion=rpm=600&fault=drop=0.2", self.file(name), "--count", "30")
         with open(self.file("a.vcd"), "rb") as a, open(self.file("b.vcd"), "rb") as b:
             self.assertEqual(a.read(), b.read())
 
-    def test_what_decode_reads_is_all_that_wave_wrote(self):
-        """However slow the line is: what is before the first request and behind the last reply is long enough."""
+    def test_decode_finds_every_exchange(self):
+        """Even on a slow line the idle time before the first request and after the last reply must be long enough."""
         for unit, kind in (("tformat", "exchange"), ("esl", "exchange"), ("encolink", "exchange"),
                            ("encolink-spi", "exchange"), ("biss", "reply"), ("ssi", "reply"), ("e201", "exchange"),
                            ("raa38", "reply"), ("raa38?mode=bus", "exchange"), ("raa38-modbus", "exchange"),
@@ -130,8 +130,8 @@ class Wave(Case):
                         self.assertFalse(any("begins or ends" in row.get("message", "") for row in rows), rows)
                         self.assertGreaterEqual(sum(row["kind"] == kind for row in rows), count)
 
-    def test_frames_in_parts_are_no_replies(self):
-        """Cycles of EncoLink's channel 2 are rows; statistics do not take them for replies that nobody asked for."""
+    def test_spread_frames_are_no_replies(self):
+        """Cycles of EncoLink's channel 2 are rows, but statistics must not count them as unsolicited replies."""
         for unit in ("encolink", "encolink-spi"):
             with self.subTest(unit):
                 path = self.file(unit + ".vcd")
@@ -142,12 +142,12 @@ class Wave(Case):
                 self.assertEqual({tuple(row["alarms"]) for row in cycles}, {("signal_lost",)})
                 result = absenc("decode", unit, path, "--stats", "--json")
                 self.assert_good(result)
-                told = json.loads(result.stdout)
-                self.assertEqual((told["replies"], told["in_parts"]), (0, 3))
-                self.assertEqual(told["exchanges"], len(rows) - 3)
-                self.assertEqual(told["positions"], 0)
+                report = json.loads(result.stdout)
+                self.assertEqual((report["replies"], report["in_parts"]), (0, 3))
+                self.assertEqual(report["exchanges"], len(rows) - 3)
+                self.assertEqual(report["positions"], 0)
 
-    def test_requests_that_nobody_answers_are_read_at_the_rate_of_the_document(self):
+    def test_unanswered_requests_are_decoded_at_documented_rate(self):
         for unit, requests in (("e201", {"76", "34"}), ("amt21", {"54"}), ("tformat", {"1a"}), ("esl", {"0875"})):
             with self.subTest(unit):
                 path = self.file(unit + "_silent.vcd")
@@ -159,7 +159,7 @@ class Wave(Case):
                 self.assertIn("timeout", {row.get("error") for row in rows})
 
     def edges(self, *arguments):
-        """The times of each wire's changes, and the levels at first."""
+        """Returns the times of each wire's changes, and the initial levels."""
         path = self.file("edges.vcd")
         self.wave(*arguments[:1], path, *arguments[1:], "--force")
         names, times, at = {}, {}, 0
@@ -174,13 +174,13 @@ class Wave(Case):
                     times.setdefault(names[words[0][1:]], []).append(at)
         return times
 
-    def test_the_line_is_idle_long_enough_at_first(self):
+    def test_line_is_idle_before_first_request(self):
         for unit, wire, least in (("raa38-can", "can", 11 * 4000), ("e201", "host", 10 * 8681),
                                   ("raa38-modbus?baud=2400", "line", 35 * 416667)):
             with self.subTest(unit):
                 self.assertGreaterEqual(self.edges(unit)[wire][1], least)
 
-    def test_the_clock_of_spi_waits_for_the_encoder(self):
+    def test_spi_clock_waits_for_encoder(self):
         times = self.edges("encolink-spi", "--count", "3")
         selected = times["cs"][1::2]
         self.assertGreaterEqual(len(selected), 3)
@@ -189,7 +189,7 @@ class Wave(Case):
             self.assertEqual(clocks[0] - begin, 5000)
 
     def usage(self, path, *arguments):
-        """What a run of the command took: memory in KiB."""
+        """Returns the peak memory of a run of the command, in KiB."""
         process = subprocess.Popen([ABSENC, "wave", "tformat?motion=rpm=60", path, *arguments],
                                    stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
         _, status, usage = os.wait4(process.pid, 0)
@@ -198,14 +198,14 @@ class Wave(Case):
             self.assertEqual(process.returncode, 0, process.stderr.read())
         return usage.ru_maxrss
 
-    def test_its_memory_does_not_depend_on_its_length(self):
+    def test_memory_does_not_grow_with_length(self):
         for ending, long in (("vcd", 10_000), ("csv", 10_000), ("sr", 3_000)):
             path = self.file("long." + ending)
             short = self.usage(path, "--count", "10")
             with self.subTest(ending):
                 self.assertLess(self.usage(path, "--count", str(long), "--force") - short, 4096)
 
-    def test_interrupted_it_leaves_nothing(self):
+    def test_interrupt_leaves_no_file(self):
         for ending in ("vcd", "csv", "sr"):
             for existing in (None, "precious"):
                 with self.subTest(ending=ending, existing=existing):
@@ -225,7 +225,7 @@ class Wave(Case):
 
     @staticmethod
     def wait_for_work(process):
-        """Until it has written a little somewhere: it catches signals by then."""
+        """Waits until the process has written some data, because by then it catches signals."""
         deadline = time.monotonic() + PATIENCE
         while time.monotonic() < deadline:
             with open(f"/proc/{process}/io", encoding="ascii") as file:
@@ -233,7 +233,7 @@ class Wave(Case):
                     return
         raise AssertionError("it does not write")
 
-    def test_a_full_disk_leaves_nothing(self):
+    def test_full_disk_leaves_no_file(self):
         def small_files():
             resource.setrlimit(resource.RLIMIT_FSIZE, (300_000, 300_000))
             signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
@@ -247,12 +247,12 @@ class Wave(Case):
                 os.remove(path)
                 self.assertEqual(os.listdir(self.directory), [])
 
-    def test_only_a_regular_file_is_replaced(self):
+    def test_force_replaces_only_regular_files(self):
         path = self.file("fifo.vcd")
         os.mkfifo(path)
         self.assert_failed(absenc("wave", "tformat", path, "--force"), path, "no regular file")
 
-    def test_an_existing_file_is_kept(self):
+    def test_existing_file_is_not_overwritten(self):
         path = self.file("mine.vcd")
         with open(path, "w", encoding="ascii") as file:
             file.write("mine")
@@ -263,7 +263,7 @@ class Wave(Case):
             self.assertEqual(file.read(), "mine")
         self.wave("tformat", path, "--force")
 
-    def test_wrong_usage(self):
+    def test_refuses_wrong_usage(self):
         for arguments, words in [(["tformat", "x.txt"], ".vcd"), (["tformat:/dev/null", "x.vcd"], "no virtual encoder"),
                                  (["tformat", "x.vcd", "--command", "nothing"], "nothing"),
                                  (["tformat", "x.vcd", "--samplerate", "1000"], "for .sr"),

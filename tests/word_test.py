@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""An encoder that nobody has a driver for: its word is described by the user, and every verb works."""
+"""Tests encoders without a driver: the user describes the word, and every verb works."""
 import csv
 import json
 import os
@@ -13,7 +13,7 @@ PLAIN = "position:12 battery=value:4"
 
 
 def bits(**values):
-    """The word as it goes over the wire, written down once more."""
+    """Returns the word as transmitted, built independently of the library."""
     fields = [("multiturn", 12), ("position", 24), ("temperature", 8), ("error", 1), ("warning", 1)]
     return "".join(f"{values[name]:0{width}b}" for name, width in fields)
 
@@ -97,11 +97,11 @@ class Verbs(Case):
         self.assertFalse(self.json_of("list", "tformat")["takes_word"])
 
 
-class Mistakes(Case):
+class WrongWord(Case):
     def decode(self, protocol, *options):
         return absenc("decode", protocol, "--hex", "0101", *(f"--option={option}" for option in options))
 
-    def test_a_wrong_word_is_told_with_its_place(self):
+    def test_error_states_position_in_word(self):
         for word, *words in [("position:12 eror:1", "character 13", '"eror:1"', "none of position"),
                              ("position", "character 9", "its end", "bits is missing"),
                              ("", "character 1", "needs a position"),
@@ -111,30 +111,30 @@ class Mistakes(Case):
             with self.subTest(word):
                 self.assert_wrong_usage(self.decode("biss", f"word={word}"), f'word is "{word}"', *words)
 
-    def test_what_says_the_same_is_refused(self):
+    def test_refuses_options_that_word_replaces(self):
         self.assert_wrong_usage(self.decode("biss", f"word={WORD}", "singleturn_bits=3"), "singleturn_bits", "word")
         self.assert_wrong_usage(self.decode("ssi", "gray=true", f"word={WORD}"), "gray", "word")
         self.assert_wrong_usage(self.decode("biss", "model=rotary-19", f"word={WORD}"), "model", "word")
         self.assert_wrong_usage(absenc("decode", "biss", "--model", "rotary-19", "--hex", "01", *OPTION), "model", "word")
 
-    def test_protocols_without_words(self):
+    def test_refuses_word_for_other_protocols(self):
         self.assert_wrong_usage(self.decode("tformat", f"word={WORD}"), 'tformat has no option "word"')
         self.assert_wrong_usage(self.decode("ssi", "wrod=position:12"), "did you mean word?")
 
 
-class Config(Case):
+class ConfigurationFile(Case):
     def absenc(self, text, *arguments):
         path = self.file("absenc.toml", text)
         return absenc(*arguments, env={**os.environ, "ABSENC_CONFIG": path})
 
-    def test_a_named_encoder(self):
+    def test_named_encoder(self):
         text = f'[encoder.drum]\nprotocol = "ssi"\nport = "sim"\nword = "{WORD}"\nsingleturn = 77\n'
         self.assertEqual(json.loads(self.absenc(text, "read", "drum", "--json").stdout)["singleturn"], 77)
         self.assertEqual(json_lines(self.absenc(text, "list", "--names", "--json").stdout)[0]["options"]["word"], WORD)
         other = self.absenc(text, "read", f"drum?word={PLAIN}", "--json")
         self.assertEqual(json.loads(other.stdout)["singleturn_bits"], 12)
 
-    def test_mistakes_have_line_and_place(self):
+    def test_error_has_line_and_position(self):
         head = '[encoder.drum]\nprotocol = "ssi"\nport = "sim"\n'
         for line, *words in [('word = "position:12 eror:1"', ":4:1:", "character 13", "none of position"),
                              ("word = 12", ":4:1:", "none of position"),

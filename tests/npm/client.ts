@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A program of somebody who knows only openapi.json: asks the server for everything, and prints what it found.
+// A client written from openapi.json alone: requests every route of the server and prints the results.
 import createClient from "openapi-fetch";
 import type {components, paths} from "./api.js";
 
@@ -8,7 +8,7 @@ const [baseUrl, encoder, token] = process.argv.slice(2) as [string, string, stri
 const client = createClient<paths>({baseUrl, headers: {Authorization: `Bearer ${token}`}});
 const of = {params: {path: {encoder}}} as const;
 
-/** The answer, or the end of the program with the error. */
+/** Returns the data of a response, or throws its error. */
 function need<T>({data, error, response}: {data?: T, error?: unknown, response: Response}): T {
   if (data === undefined) throw new Error(`${response.url}: ${response.status} ${JSON.stringify(error)}`);
   return data;

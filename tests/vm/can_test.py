@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""SocketCAN: absenc and can-utils on virtual buses, and an adapter on a serial line behind slcand."""
+"""Tests SocketCAN: absenc with can-utils on virtual buses, and with a serial adapter behind slcand."""
 import contextlib
 import json
 import os
@@ -16,7 +16,7 @@ from doctor_test import doctor, ids
 from record_test import read_csv, rows_so_far, wait_until
 
 BUS = "vcan0"
-# Patience for a machine that is busy, and a shaft that is so slow that a late reading does not lose its turns.
+# The latency allows for a busy machine; the speed limit keeps the turns known across a late reading.
 ENCODER = f"raa38-can:{BUS}?latency=2000&max_rpm=60"
 HASTY = f"raa38-can:{BUS}"
 ASKING, ANSWER = "220#8020000000000000", "120#4726000000000000"  # 9799
@@ -36,18 +36,18 @@ def position(counts, identifier=NODE):
 
 
 def receivers(interface):
-    """How many sockets take every frame of it."""
+    """Returns how many sockets receive every frame of the interface."""
     with open("/proc/net/can/rcvlist_all", encoding="ascii") as file:
         return len(re.findall(rf"^\s*{interface} ", file.read(), re.MULTILINE))
 
 
 def losses(rows):
-    """Without the gaps that a busy machine leaves."""
+    """Returns the losses and returns, without the gaps that a busy machine causes."""
     return [row["event"] for row in rows if row["event"] in ("lost", "back")]
 
 
 class AnotherNode(threading.Thread):
-    """Answers each request for a position of node 20 with these frames, as they are."""
+    """Answers each position request of node 20 with the given raw frames."""
 
     def __init__(self, *answers, interface=BUS):
         super().__init__()
@@ -76,14 +76,14 @@ class AnotherNode(threading.Thread):
         self.socket.close()
 
 
-class OnABus(EncoderCase):
+class VirtualBus(EncoderCase):
     def setUp(self):
         super().setUp()
         self.add(BUS)
 
     def add(self, interface):
         run("ip", "link", "add", interface, "type", "vcan")
-        self.addCleanup(subprocess.run, ["ip", "link", "del", interface], capture_output=True)  # may be gone by then
+        self.addCleanup(subprocess.run, ["ip", "link", "del", interface], capture_output=True)  # may be deleted already
         self.up(interface)
 
     def up(self, interface=BUS):
@@ -130,7 +130,7 @@ class OnABus(EncoderCase):
         self.assertNotIn("rules", summary)
 
     def next_json(self, process, condition):
-        """The first line that is so."""
+        """Returns the first line that satisfies the condition."""
         deadline = time.monotonic() + PATIENCE
         while True:
             text = read_line(process.stdout, deadline)
@@ -149,7 +149,7 @@ class OnABus(EncoderCase):
                 return text
 
 
-class Verbs(OnABus):
+class Verbs(VirtualBus):
     def test_read_and_monitor(self):
         emulator = self.emulator("--singleturn", "9799")
         reading = self.run_json("read", ENCODER)
@@ -176,10 +176,10 @@ class Verbs(OnABus):
         emulator = self.emulator("--singleturn", "5000", "--option", "cyclic=50")
         zero = self.run_json("zero", ENCODER, "--yes")["fields"]
         self.assertEqual((zero["before"], zero["after"], zero["written"], zero["answered"]), (5000, 0, True, True))
-        self.assertEqual(self.singleturn(f"{ENCODER}&listen=true"), 0)  # and sends again
+        self.assertEqual(self.singleturn(f"{ENCODER}&listen=true"), 0)  # the node sends cyclic frames again
         self.assert_no_rule_broken(emulator)
 
-    def test_record_follows_the_shaft(self):
+    def test_record_follows_shaft(self):
         emulator = self.emulator("--motion", "rpm=30")
         log = self.file("log.csv")
         self.assert_good(absenc("record", ENCODER, "--output", log, "--count", "40", "--rate", "40"))
@@ -189,7 +189,8 @@ class Verbs(OnABus):
         counts = [int(row["position"]) for row in rows]
         moments = [float(row["time_s"]) for row in rows]
         self.assertEqual(counts, sorted(counts))
-        # Half a turn of 16384 counts a second; each reading is good to 20 ms even where the machine stumbles.
+        # The shaft turns half a turn (of 16384 counts) per second. Each reading is accurate to 20 ms, even on a busy
+        # machine.
         for moment, count in zip(moments, counts):
             self.assertAlmostEqual(count - counts[0], 8192 * (moment - moments[0]), delta=8192 * 0.02)
         self.assert_no_rule_broken(emulator)
@@ -205,12 +206,12 @@ class Verbs(OnABus):
         self.assert_failed(absenc("read", HASTY), "timeout", "scan", f"to {BUS}")
         rate = self.run_json("config", "set", f"{ENCODER}&node=0x42", "bitrate", "500000", "--yes")
         self.assertEqual((rate["new"]["bit_rate"], rate["new"]["written"]), (500000, True))
-        # A virtual bus has no bit rate: whoever is there hears everybody.
+        # A virtual bus has no bit rate, so all nodes receive each other.
         self.assertEqual(self.singleturn(f"{ENCODER}&node=0x42&bitrate=500000"), 16384 - 1000)
         self.assert_no_rule_broken(emulator)
 
-    def test_an_interface_whose_bit_rate_only_ip_sets(self):
-        """The kernel's name for it decides: this one is taken for that of an adapter."""
+    def test_interface_whose_bit_rate_needs_ip(self):
+        """The interface's name decides: absenc takes this one for a hardware adapter."""
         self.add("can7")
         self.emulator(interface="can7")
         encoder = "raa38-can:can7?latency=2000"
@@ -219,8 +220,8 @@ class Verbs(OnABus):
                            "sudo ip link set can7 up type can bitrate 500000", "then bitrate=500000")
 
 
-class Library(OnABus):
-    def test_a_virtual_encoder_of_a_program(self):
+class Library(VirtualBus):
+    def test_virtual_encoder_in_a_program(self):
         self.add("can8")
         process = subprocess.Popen(["can_emulation", "can8"], bufsize=0, stdin=subprocess.PIPE, stdout=subprocess.PIPE,
                                    stderr=subprocess.PIPE)
@@ -228,7 +229,7 @@ class Library(OnABus):
         self.assertEqual(self.line(process), "raa38-can:can8 9799")
         run("ip", "link", "del", "can8")
         process.stdin.write(b"\n")
-        self.assertEqual(self.line(process), "switched")  # also without its interface
+        self.assertEqual(self.line(process), "switched")  # works also without its interface
         self.add("can8")
         wait_until(lambda: receivers("can8") > 0, "the encoder to come back")
         self.assertEqual(self.singleturn("raa38-can:can8?latency=2000"), 9799)
@@ -237,7 +238,7 @@ class Library(OnABus):
         self.assertEqual(process.wait(PATIENCE), 0)
 
 
-class BesideCanUtils(OnABus):
+class CanUtils(VirtualBus):
     def test_candump_shows_both_directions(self):
         self.emulator("--singleturn", "9799")
         listener = self.candump()
@@ -247,14 +248,14 @@ class BesideCanUtils(OnABus):
         self.assertEqual(shown[0][2:], ["[8]", "80", "20", "00", "00", "00", "00", "00", "00"])
         self.assertEqual(shown[1][2:], ["[8]", "47", "26", "00", "00", "00", "00", "00", "00"])
 
-    def test_cansend_asks(self):
+    def test_cansend_requests_position(self):
         emulator = self.emulator("--singleturn", "9799")
         listener = self.candump("-L")
         run("cansend", BUS, ASKING)
         self.assertEqual([self.line(listener).split()[1:] for _ in range(2)], [[BUS, ASKING], [BUS, ANSWER]])
         self.assert_no_rule_broken(emulator)
 
-    def test_the_log_is_what_candump_sees(self):
+    def test_log_equals_candump(self):
         self.emulator("--singleturn", "9799", "--also", "node=0x21&cyclic=10&singleturn=77")
         listener = self.candump("-L")
         log, output = self.file("can.log"), self.file("log.csv")
@@ -269,7 +270,8 @@ class BesideCanUtils(OnABus):
         seen = []
         while not seen or seen[-1][2] != last:
             seen.append(self.line(listener).split())
-        # A request has the time before it was handed over: what others send in that moment may stand on either side.
+        # A request is logged with the time before it was sent, so frames of other nodes in that moment may be on either
+        # side.
         for kind in (ASKING, ANSWER, "121#4D00000000000000"):
             times, seen_times = ([float(line[0].strip("()")) for line in lines if line[2] == kind]
                                  for lines in (logged, seen))
@@ -278,8 +280,8 @@ class BesideCanUtils(OnABus):
             for moment, seen_moment in zip(times, seen_times[first:]):
                 self.assertAlmostEqual(moment, seen_moment, delta=0.04)
 
-    def test_a_busy_bus_loses_nothing(self):
-        """Extended frames with the number of the node's replies, as fast as this machine makes them: position 1."""
+    def test_no_reply_is_lost_on_busy_bus(self):
+        """cangen sends extended frames with the number of the node's replies (position 1) as fast as possible."""
         emulator = self.emulator("--singleturn", "9799")
         cangen = self.popen("cangen", BUS, "-g", "1", "-e", "-I", "120", "-L", "8", "-D", "01".ljust(16, "0"))
         before = self.frames()
@@ -289,7 +291,7 @@ class BesideCanUtils(OnABus):
         self.assertIsNone(cangen.poll(), "cangen has ended")
         self.assertGreater(load, 50)
         self.assertEqual([line["singleturn"] for line in json_lines(result.stdout)], 200 * [9799])
-        self.assertRegex(emulator.end()[2], r"^absenc: 20[0-2] requests answered")  # none was repeated
+        self.assertRegex(emulator.end()[2], r"^absenc: 20[0-2] requests answered")  # no request was repeated
 
     @staticmethod
     def frames():
@@ -297,7 +299,7 @@ class BesideCanUtils(OnABus):
             return int(file.read())
 
 
-class OtherFrames(OnABus):
+class OtherFrames(VirtualBus):
     def failure(self, *answers, words):
         with AnotherNode(*answers) as node:
             result = absenc("read", HASTY)
@@ -305,7 +307,7 @@ class OtherFrames(OnABus):
         self.assert_failed(result, *words)
         self.assertEqual(result.stdout, "")
 
-    def test_they_are_no_positions(self):
+    def test_invalid_frames_are_no_positions(self):
         data = (9799).to_bytes(8, "little")
         for answer, words in [
                 (frame(NODE | socket.CAN_RTR_FLAG, size=8), ["bad_framing", "remote frame", "received 120:R8"]),
@@ -316,17 +318,18 @@ class OtherFrames(OnABus):
             with self.subTest(words[-1]):
                 self.failure(answer, words=words)
 
-    def test_they_are_passed_over(self):
-        """Those of others; what has the node's own number and is no reply is not."""
+    def test_frames_of_other_nodes_are_ignored(self):
+        """Frames of other nodes are ignored. A frame with the node's own number that is no reply is an error."""
         with AnotherNode(position(1, NODE | socket.CAN_EFF_FLAG), position(2, 0x121), frame(0x121, b"\3"),
                          frame(0x7FF | socket.CAN_RTR_FLAG, size=8), position(9799)):
             self.assertEqual(self.singleturn(HASTY), 9799)
 
 
-class ErrorFrames(OnABus):
+class ErrorFrames(VirtualBus):
     BUS_OFF = "20000040#0000000000000000"
     NO_ACKNOWLEDGE = frame(socket.CAN_ERR_FLAG | 0x20, bytes(8))
-    WARNING = frame(socket.CAN_ERR_FLAG | 0x04, bytes([0, 8, 0, 0, 0, 0, 97, 0]))  # of the controller: nothing is lost
+    # a warning of the controller: no frame is lost
+    WARNING = frame(socket.CAN_ERR_FLAG | 0x04, bytes([0, 8, 0, 0, 0, 0, 97, 0]))
 
     def test_destroyed_frames(self):
         with AnotherNode(self.NO_ACKNOWLEDGE):
@@ -356,7 +359,7 @@ class ErrorFrames(OnABus):
         self.assertEqual(result.returncode, 1, f"{result.stdout}{result.stderr}")
         self.assertEqual(ids(found), list(wanted), result.stdout)
 
-    def test_doctor_names_them(self):
+    def test_doctor_names_error_frames(self):
         with AnotherNode(self.NO_ACKNOWLEDGE):
             self.assert_found("can_errors")
         with AnotherNode(frame(socket.CAN_ERR_FLAG | 0x40, bytes(8))):
@@ -364,7 +367,7 @@ class ErrorFrames(OnABus):
         self.down()
         self.assert_found("port_failed")
 
-    def test_after_bus_off_it_goes_on(self):
+    def test_record_continues_after_bus_off(self):
         emulator = self.emulator("--singleturn", "1000")
         log = self.file("log.csv")
         process = self.start("record", ENCODER, "--output", log, "--rate", "50")
@@ -379,7 +382,7 @@ class ErrorFrames(OnABus):
         self.next_message(emulator.process, f"{BUS} is back")
 
 
-class Down(OnABus):
+class InterfaceDown(VirtualBus):
     @contextlib.contextmanager
     def while_down(self):
         self.down()
@@ -397,7 +400,7 @@ class Down(OnABus):
             run("ip", "link", "add", BUS, "type", "vcan")
             self.up()
 
-    def test_record_goes_on(self):
+    def test_record_continues(self):
         for away, why in ((self.while_down, f"{BUS} went down"), (self.while_gone, f"{BUS} went (down|away)")):
             with self.subTest(away.__name__):
                 self.check_recording(away, why)
@@ -418,12 +421,12 @@ class Down(OnABus):
         rows = read_csv(output)[1]
         self.assertEqual(losses(rows), ["lost", "back"])
         self.assertEqual({row["singleturn"] for row in rows if row["event"] == ""}, {"1000"})
-        with open(can_log, encoding="utf-8") as file:  # before and after, in one file
+        with open(can_log, encoding="utf-8") as file:  # the frames before and after are in one file
             answers = file.read().count(f"{BUS} 120#E803000000000000\n")
         self.assertGreaterEqual(answers, sum(row["event"] == "" for row in rows))
         self.assert_no_rule_broken(emulator)
 
-    def test_monitor_goes_on(self):
+    def test_monitor_continues(self):
         self.emulator("--singleturn", "1000")
         process = self.start("monitor", ENCODER, "--json", "--interval", "0.1")
         self.next_json(process, lambda line: line["state"] == "live")
@@ -449,7 +452,7 @@ class Down(OnABus):
         for arguments in (["read", ENCODER], ["emulate", "raa38-can", "--can", BUS]):
             self.assert_failed(absenc(*arguments), f"{BUS} is down: `sudo ip link set {BUS} up` brings it up")
 
-    def test_other_interfaces(self):
+    def test_refuses_other_interfaces(self):
         for encoder, words in (("raa38-can:vcan9", ["there is no CAN interface vcan9", f"this machine has {BUS}"]),
                                ("raa38-can:lo", ["lo is a network interface, but none of a CAN bus"])):
             self.assert_failed(absenc("read", encoder), *words)
@@ -458,8 +461,8 @@ class Down(OnABus):
         self.assert_failed(absenc("read", ENCODER), f"there is no CAN interface {BUS}, nor any other", "slcan:/dev/tty")
 
 
-class BehindSlcand(EncoderCase):
-    """The kernel's own driver for an adapter on a serial line, which is our virtual one."""
+class Slcand(EncoderCase):
+    """Uses the kernel's slcan driver with a virtual serial adapter."""
 
     def setUp(self):
         super().setUp()
@@ -468,7 +471,7 @@ class BehindSlcand(EncoderCase):
         self.addCleanup(self.adapter.end)
 
     def slcand(self, *options):
-        # It wants a device in /dev.
+        # slcand needs a device below /dev.
         process = subprocess.Popen(["slcand", "-F", *options, os.path.realpath(self.adapter.path), "slcan0"],
                                    stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
         self.addCleanup(self.end_slcand, process)
@@ -485,7 +488,7 @@ class BehindSlcand(EncoderCase):
         self.assert_good(result)
         return [line["singleturn"] for line in json_lines(result.stdout)]
 
-    def test_slcand_opens_the_bus(self):
+    def test_slcand_opens_bus(self):
         self.slcand("-o", "-c", "-s5")
         self.assert_failed(absenc("read", "raa38-can:slcan0"), "slcan0 is down",
                            "`sudo ip link set slcan0 up type can bitrate 250000`")
@@ -498,13 +501,13 @@ class BehindSlcand(EncoderCase):
         self.assertNotIn("rules", summary)
         self.assertNotIn("frames lost", summary)
 
-    def test_ip_opens_the_bus(self):
-        """What absenc says to type."""
+    def test_ip_opens_bus(self):
+        """Runs the command that absenc's message recommends."""
         self.slcand()
         run("ip", "link", "set", "slcan0", "up", "type", "can", "bitrate", "250000")
         self.assertEqual(self.reading(), 5 * [9799])
 
-    def test_another_bit_rate(self):
+    def test_other_bit_rate(self):
         self.slcand("-o", "-c", "-s6")
         run("ip", "link", "set", "slcan0", "up")
         self.assert_failed(absenc("read", "raa38-can:slcan0"), "timeout", "the bit rate")

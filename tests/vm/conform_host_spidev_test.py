@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`absenc conform-host --spidev`: hosts on a device of CUSE, ours and one that shares no code with it, are judged."""
+"""Tests `absenc conform-host --spidev` on a CUSE device, with absenc's hosts and an independent one."""
 import json
 import signal
 import subprocess
@@ -36,15 +36,15 @@ class ConformHost(unittest.TestCase):
             host.terminate()
             host.wait(PATIENCE)
 
-    def test_our_hosts_hold_all(self):
+    def test_own_hosts_keep_all_clauses(self):
         for protocol in ("biss", "ssi", "encolink"):
             with self.subTest(protocol):
                 verdicts = self.ours(protocol, f"{protocol}:spi:/dev/{NAME}")
                 self.assertEqual(verdicts, {name: "untested" if name == "access" else "kept" for name in verdicts})
                 self.assertEqual(len(verdicts), {"biss": 7, "ssi": 5, "encolink": 8}[protocol])
 
-    def test_what_a_host_does_wrong_is_told(self):
-        """Too fast, in mode 0, without the pause of the chip select, and it gives up when nothing comes."""
+    def test_reports_mistakes_of_host(self):
+        """The host is too fast, uses mode 0, leaves no pause between chip selects, and stops after a lost reply."""
         process = self.judge("encolink", "--answers", "4", "--patience", "1")
         with Spi(f"/dev/{NAME}", mode=0, speed=8_000_000) as spi:
             for _ in range(2):
@@ -55,7 +55,7 @@ class ConformHost(unittest.TestCase):
         self.assertNotEqual(verdicts["silence"], "kept")
         self.assertEqual(verdicts["asks"], "kept")
 
-    def test_ends_by_ctrl_c(self):
+    def test_ends_by_interrupt(self):
         process = self.judge("ssi")
         self.assertEqual(end(process, signal.SIGINT)[:2], (1, ""))
 

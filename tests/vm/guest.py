@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Runs the tests inside the virtual machine and tells one line for each: ok NAME, or not ok NAME: WHY."""
+"""Runs the tests inside the virtual machine, and prints one line for each: "ok NAME", or "not ok NAME: WHY"."""
 import fnmatch
 import os
 import subprocess
@@ -14,11 +14,11 @@ def kernel_log():
 
 
 class Result(unittest.TestResult):
-    """A test is good when neither it nor one of its parts is bad."""
+    """Collects failures, including those of subtests. A test without any is reported as ok."""
 
     def startTest(self, test):
         super().startTest(test)
-        self.troubles = []
+        self.problems = []
         self.log = len(kernel_log())
 
     def addFailure(self, test, err):
@@ -39,15 +39,15 @@ class Result(unittest.TestResult):
         self.add(f"skipped: {reason}", "")
 
     def add(self, why, text):
-        self.troubles.append((" ".join(str(why).split()), text))
+        self.problems.append((" ".join(str(why).split()), text))
 
     def stopTest(self, test):
         super().stopTest(test)
-        if not self.troubles:
+        if not self.problems:
             print(f"ok {test.id()}", flush=True)
             return
-        print(f"not ok {test.id()}: {self.troubles[0][0]}")
-        lines = [line for _, text in self.troubles for line in text.splitlines()]
+        print(f"not ok {test.id()}: {self.problems[0][0]}")
+        lines = [line for _, text in self.problems for line in text.splitlines()]
         for line in [*lines, "the kernel's log meanwhile:", *kernel_log()[self.log:]]:
             print(f"# {line}")
         sys.stdout.flush()

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the virtual machine boots: Debian's kernel, and an initramfs with this computer's programs and the tests."""
+"""Builds what the virtual machine boots: Debian's kernel, and an initramfs with this computer's programs and the
+tests."""
 import contextlib
 import glob
 import importlib.util
@@ -15,11 +16,12 @@ import zlib
 TESTS = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 CACHE = os.path.join(os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache"), "absenc")
 
-# Programs of this computer, so that the tests share what the others use (tests/command_support.py). The kernel is
-# Debian's own, because no test should depend on the one that happens to run here, which a container cannot add modules
-# to. QEMU emulates the processor (run.py): with KVM it would depend on who runs it.
+# Programs from this computer, because the tests share modules with the other tests (tests/command_support.py). The
+# kernel is Debian's, so that no test depends on the running kernel, to which a container cannot add modules. QEMU
+# emulates the processor (run.py): KVM is not available to every user.
 
-# What they depend on comes with them, but for what the kernel asks for by itself: g_serial its functions.
+# Their dependencies are added automatically, except modules that the kernel itself loads on demand: g_serial's
+# functions.
 MODULES = ["can", "can-raw", "vcan", "slcan", "fuse", "cuse", "dummy_hcd", "cdc-acm", "usb_f_acm", "usb_f_serial",
            "usb_f_obex", "g_serial"]
 PROGRAMS = ["candump", "cangen", "cansend", "ip", "slcand", "spi-config", "spi-pipe"]
@@ -27,7 +29,7 @@ TOOLS = ["apt-cache", "apt-get", "dpkg-deb", "tar", "xz", "modinfo", "ldd", "bus
 
 
 class Missing(Exception):
-    """The machine cannot be built here; says why."""
+    """Raised with a reason if the machine cannot be built on this computer."""
 
 
 def output_of(*command):
@@ -47,12 +49,13 @@ def program(name):
 
 
 def kernel_package():
-    """Debian's present kernel, from the cache or its server; without a server the newest of the cache."""
+    """Returns Debian's current kernel package from the cache or the server. Without a server, the newest one of the
+    cache."""
     if platform.machine() != "x86_64":
         raise Missing(f"the machine is x86_64, the programs of this computer are {platform.machine()}")
     os.makedirs(CACHE, exist_ok=True)
     try:
-        # linux-image-amd64 is empty and depends on the kernel.
+        # linux-image-amd64 is an empty package that depends on the kernel.
         name = field_of("linux-image-amd64", r"Depends:.*?(linux-image-[0-9][^ ,]*)")
         version = field_of(name, r"Version: (.*)").replace(":", "%3a")
         path = os.path.join(CACHE, f"{name}_{version}_amd64.deb")
@@ -74,7 +77,7 @@ def field_of(package, pattern):
 
 
 def download(package, path):
-    """Instead of the kernels that were there before."""
+    """Downloads the package and deletes older kernels from the cache."""
     former = [old for old in glob.glob(os.path.join(CACHE, "linux-image-*"))
               if re.search(r"_amd64\.(deb|[0-9a-f]{8})$", old) and old != path]
     with own_folder(path) as folder:
@@ -92,7 +95,8 @@ def download(package, path):
 
 @contextlib.contextmanager
 def own_folder(path):
-    """Two runs at the same time do not disturb each other, and one that is ended leaves nothing that looks whole."""
+    """Gives each run its own folder, so that parallel runs do not interfere and an interrupted one leaves nothing that
+    looks complete."""
     folder = f"{path}.{os.getpid()}"
     os.makedirs(folder)
     try:
@@ -102,7 +106,8 @@ def own_folder(path):
 
 
 def unpacked_kernel():
-    """A folder with vmlinuz, modules as NAME.ko, and `order`: their names as they can be inserted."""
+    """Returns a folder with vmlinuz, the modules as NAME.ko, and the file `order`, which lists them in the order of
+    loading."""
     package = kernel_package()
     folder = f"{package.removesuffix('.deb')}.{zlib.crc32(' '.join(MODULES).encode()):08x}"
     if os.path.exists(folder):
@@ -121,7 +126,7 @@ def unpacked_kernel():
         with open(os.path.join(chosen, "order"), "w", encoding="ascii") as file:
             file.write("".join(f"{name}\n" for name in order))
         os.rename(glob.glob(os.path.join(whole, "boot/vmlinuz-*"))[0], os.path.join(chosen, "vmlinuz"))
-        if not os.path.exists(folder):  # another run may have been faster
+        if not os.path.exists(folder):  # another run may have created it meanwhile
             os.rename(chosen, folder)
     return folder
 
@@ -149,17 +154,18 @@ def make(folder):
 
 
 def libraries(path):
-    """What ldd finds for a program or library."""
+    """Returns the libraries that ldd finds for a program or library."""
     result = subprocess.run(["ldd", path], capture_output=True, text=True)
     return re.findall(r"(?:=> |^\s+)(/\S+) \(0x", result.stdout, re.MULTILINE)
 
 
 def python_files(scripts):
-    """The interpreter and whatever these scripts import, compiled where this computer has it compiled."""
+    """Yields the interpreter and every file that these scripts import, compiled if this computer has it compiled."""
     finder = modulefinder.ModuleFinder(path=[os.path.join(TESTS, "vm"), TESTS, *sys.path[1:]])
     for script in scripts:
         finder.run_script(script)
-    for name in ("os", "encodings.utf_8", "encodings.ascii", "encodings.latin_1"):  # the interpreter's own start
+    # imported when the interpreter starts
+    for name in ("os", "encodings.utf_8", "encodings.ascii", "encodings.latin_1"):
         finder.import_hook(name)
     files = {module.__file__ for module in finder.modules.values() if module.__file__}
     files |= {importlib.util.cache_from_source(path) for path in files if path.endswith(".py")}
@@ -167,7 +173,7 @@ def python_files(scripts):
 
 
 class Image:
-    """An initramfs: programs and libraries are where this computer has them."""
+    """An initramfs with programs and libraries at the same paths as on this computer."""
 
     def __init__(self, folder):
         self.root = make(folder)
@@ -201,7 +207,7 @@ class Image:
 
 
 def build(absenc, patterns, folder):
-    """The paths of the kernel and of the initramfs, which is made in the folder."""
+    """Returns the paths of the kernel and of the initramfs, which is written to the folder."""
     for name in PROGRAMS + TOOLS:
         program(name)
     kernel = unpacked_kernel()

@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tests of the kernel's own interfaces, in a virtual machine: run.py [part of a test's name...]
+"""Tests the kernel's own interfaces in a virtual machine. Usage: run.py [part of a test's name...]
 
-The last line says how many passed. Exit status: 0 all tests passed, 1 one failed or the machine did not reach its end,
-77 the machine cannot be built here.
-"""
+The last line states how many tests passed. Exit status: 0 all tests passed, 1 a test failed or the machine did not
+finish, 77 the machine cannot be built on this computer."""
 import os
 import re
 import signal
@@ -17,49 +16,49 @@ import image
 ABSENC = os.path.abspath(os.environ.get("ABSENC", "build/release/bin/absenc"))
 PATIENCE = 600  # seconds; all tests take far less
 SKIPPED = 77
-BUSY = "no_timer_check"  # a busy computer holds the timer up for so long that the kernel would give it up and panic
+BUSY = "no_timer_check"  # otherwise a busy computer delays the timer so much that the kernel panics
 
 
 def boot(kernel, initramfs, folder):
-    """Runs the machine to its end. Returns what it said on its console, and why that is not all if so."""
+    """Runs the machine to its end. Returns its console output, and the reason if the output is incomplete."""
     line = os.path.join(folder, "line")
     command = [
         image.program("qemu-system-x86_64"), "-accel", "tcg", "-m", "512", "-no-reboot", "-nodefaults", "-display",
         "none",
         "-kernel", kernel, "-initrd", initramfs, "-append", f"console=ttyS0 quiet panic=-1 {BUSY}",
         "-serial", "stdio",
-        # ttyS1 and ttyS2 are two ends of one line.
+        # ttyS1 and ttyS2 are the two ends of one line.
         "-chardev", f"socket,id=one,path={line},server=on,wait=off", "-chardev", f"socket,id=two,path={line}",
         "-serial", "chardev:one", "-serial", "chardev:two",
     ]  # fmt: skip
     with subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
                           stderr=subprocess.STDOUT) as machine:
         try:
-            said, _ = machine.communicate(timeout=PATIENCE)
+            output, _ = machine.communicate(timeout=PATIENCE)
             trouble = f"qemu ended with status {machine.returncode}" if machine.returncode else None
         except subprocess.TimeoutExpired:
             machine.kill()
-            said, _ = machine.communicate()
+            output, _ = machine.communicate()
             trouble = f"the machine did not end within {PATIENCE} s"
         finally:
-            machine.kill()  # what is over is not harmed
-    return said.decode(errors="replace").replace("\r", ""), trouble
+            machine.kill()  # has no effect on a machine that has ended
+    return output.decode(errors="replace").replace("\r", ""), trouble
 
 
-def judge(said, trouble):
-    """Shows what went wrong; how many tests passed and failed."""
-    good = re.findall(r"^ok (.*)$", said, re.MULTILINE)
-    bad = re.findall(r"^not ok .*\n(?:#.*\n)*", said, re.MULTILINE)
+def judge(output, trouble):
+    """Prints the failures. Returns how many tests passed and how many failed."""
+    good = re.findall(r"^ok (.*)$", output, re.MULTILINE)
+    bad = re.findall(r"^not ok .*\n(?:#.*\n)*", output, re.MULTILINE)
     for report in bad:
         print(report, end="")
-    end = re.search(r"^end of (\d+) tests$", said, re.MULTILINE)
+    end = re.search(r"^end of (\d+) tests$", output, re.MULTILINE)
     failed = len(bad)
     if end is None or int(end[1]) != len(good) + len(bad) or int(end[1]) == 0:
         trouble = trouble or "the tests did not reach their end"
         failed += 1
     if trouble:
-        print(f"{trouble}; the machine said at last:")
-        print("\n".join(said.splitlines()[-60:]))
+        print(f"{trouble}; the end of the machine's console:")
+        print("\n".join(output.splitlines()[-60:]))
     return len(good), max(failed, 1 if trouble else 0)
 
 
@@ -69,11 +68,11 @@ def main(patterns):
         try:
             kernel, initramfs = image.build(ABSENC, patterns, folder)
             built = time.monotonic()
-            said, trouble = boot(kernel, initramfs, folder)
+            output, trouble = boot(kernel, initramfs, folder)
         except image.Missing as missing:
             print(f"skipped: {missing}")
             return SKIPPED
-    good, failed = judge(said, trouble)
+    good, failed = judge(output, trouble)
     now = time.monotonic()
     print(f"{good} passed, {failed} failed in {now - start:.0f} s: "
           f"image {built - start:.1f} s, machine {now - built:.1f} s")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`absenc emulate --spidev`: the command, spi-tools and a client that shares no code with it on a device of CUSE."""
+"""Tests `absenc emulate --spidev` on a CUSE device: with the command, spi-tools, and an independent client."""
 import ctypes
 import errno
 import fcntl
@@ -33,7 +33,7 @@ RD_MODE32, WR_MODE32 = request(True, 5, 4), request(False, 5, 4)
 
 
 def crc8(data):
-    """x8+x7+x4+x2+x+1, inverted."""
+    """Returns the inverted CRC x8+x7+x4+x2+x+1."""
     register = 0
     for byte in data:
         register ^= byte
@@ -43,7 +43,7 @@ def crc8(data):
 
 
 class Transfer:
-    """One of a message: `out` of None sends nothing, `take` says whether somebody looks at what comes."""
+    """One transfer of a message. `out` None sends no buffer; `take` False passes no buffer for received bytes."""
 
     def __init__(self, out=None, size=None, take=True, speed=0, delay=0, bits=0, change=0, wires=0):
         size = len(out) if size is None else size
@@ -53,12 +53,12 @@ class Transfer:
         self.packed = struct.pack("=QQIIHBBBBBB", *address, size, speed, delay, bits, change, wires, 0, 0, 0)
 
     @property
-    def came(self):
+    def received(self):
         return self.into.raw
 
 
 class Spi:
-    """What a program does that uses spidev."""
+    """A client of the spidev interface."""
 
     def __init__(self, path, mode=None, speed=None):
         self.descriptor = os.open(path, os.O_RDWR)
@@ -81,13 +81,13 @@ class Spi:
 
     def message(self, *transfers):
         packed = bytearray(b"".join(transfer.packed for transfer in transfers))
-        # More than the 1024 bytes that fcntl copies by itself.
+        # Longer than the 1024 bytes that fcntl copies by itself.
         return fcntl.ioctl(self.descriptor, request(False, 0, len(packed)), packed, True)
 
     def exchange(self, out, **settings):
         transfer = Transfer(out, **settings)
         assert self.message(transfer) == len(out)
-        return transfer.came
+        return transfer.received
 
 
 class SpidevCase(unittest.TestCase):
@@ -103,7 +103,7 @@ class SpidevCase(unittest.TestCase):
         return process
 
     def summary(self, process, number=signal.SIGINT):
-        """What it says when it is ended."""
+        """Ends the emulator and returns its messages."""
         status, out, err = end(process, number)
         self.assertEqual((status, out), (0, ""), err)
         return err
@@ -127,7 +127,7 @@ class SpidevCase(unittest.TestCase):
         self.assertEqual(errno.errorcode[caught.exception.errno], errno.errorcode[error])
 
 
-class TheCommand(SpidevCase):
+class Command(SpidevCase):
     def test_encolink(self):
         process = self.serve("encolink", "--singleturn", "12345", "--multiturn", "7")
         reading = self.reading("encolink:spi:/dev/spidev9.0")
@@ -163,7 +163,8 @@ class TheCommand(SpidevCase):
         self.assertNotIn("rules", self.summary(process))
 
     def test_registers_of_biss(self):
-        """The clock idles low through the timeout where the host says 1: the mode is changed between messages."""
+        """A control bit of 1 needs a clock that idles low during the timeout, so the host changes the mode between
+        messages."""
         process = self.serve("biss", "--motion", "rpm=60")
         encoder = "biss:spi:/dev/spidev9.0"
         info = json.loads(self.good("info", encoder, "--json").stdout)["answers"]["info"]["fields"]
@@ -172,8 +173,8 @@ class TheCommand(SpidevCase):
         self.assertIn("a5", self.good("memory", "read", encoder, "5", "--json").stdout)
         self.assertNotIn("rules", self.summary(process))
 
-    def test_who_it_is(self):
-        """A BiSS encoder that nobody knows: its word, and by its registers its serial number."""
+    def test_identify(self):
+        """Identifies an unknown BiSS encoder from its word, and its serial number from its registers."""
         self.serve("biss", "--motion", "rpm=60")
         candidates = json.loads(self.good("identify", "spi:/dev/spidev9.0", "--json").stdout)["candidates"]
         found = candidates[0]
@@ -181,15 +182,15 @@ class TheCommand(SpidevCase):
         self.assertEqual(found["identity"]["serial_number"], 1)
         self.assertEqual(bytes.fromhex(found["identity"]["device_id"]), b"Absenc")
 
-    def test_it_turns_in_real_time(self):
+    def test_turns_in_real_time(self):
         self.serve("encolink", "--motion", "rpm=60")
         lines = self.good("read", "encolink:spi:/dev/spidev9.0", "--count", "20", "--rate", "20", "--json").stdout
         seen = [json.loads(line) for line in lines.splitlines()]
         turned = [(one["multiturn"] + one["singleturn"] / (1 << 20), one["time_s"]) for one in seen]
         self.assertAlmostEqual((turned[-1][0] - turned[0][0]) / (turned[-1][1] - turned[0][1]), 1, delta=0.05)
 
-    def test_a_wrong_mode_is_found(self):
-        """Every bit comes one clock late: the CRC sees it."""
+    def test_wrong_mode_is_detected(self):
+        """Every bit arrives one clock late, which the CRC detects."""
         for mode in (0, 2, 3):
             with self.subTest(mode):
                 process = self.serve("encolink", "--singleturn", "12345")
@@ -197,20 +198,20 @@ class TheCommand(SpidevCase):
                 self.assertIn("bad_checksum", result.stderr)
                 self.assertRegex(self.summary(process), r"messages in another SPI mode than the encoder's, which is 1: \d+\n")
 
-    def test_a_clock_that_idles_low(self):
-        """Mode 0 takes each bit of SSI one clock late: half of the position, and nothing shows it but this summary."""
+    def test_wrong_mode_of_ssi_is_in_summary(self):
+        """In mode 0 each bit of SSI arrives one clock late, which halves the position. Only this summary reports it."""
         process = self.serve("ssi", "--singleturn", "2748")
         self.assertEqual(self.reading("ssi:spi:/dev/spidev9.0?spi_mode=0")["singleturn"], (0x1000 | 2748) >> 1)
         self.assertRegex(self.summary(process), r"another SPI mode than the encoder's, which is 3: \d+\n")
 
-    def test_a_wrong_speed_is_refused(self):
+    def test_read_refuses_too_high_speed(self):
         process = self.serve("encolink")
         result = absenc("read", "encolink:spi:/dev/spidev9.0?speed=8000000")
         self.assertEqual(result.returncode, 2, result.stdout)
         self.assertIn("allows 4000000 Hz at most", result.stderr)
         self.assertNotIn("clock faster than 4 MHz", self.summary(process))
 
-    def test_a_wrong_speed_is_counted(self):
+    def test_emulator_counts_too_high_speed(self):
         process = self.serve("encolink")
         with Spi("/dev/spidev9.0", mode=1, speed=8_000_000) as spi:
             spi.exchange(bytes(8))
@@ -224,7 +225,7 @@ class TheCommand(SpidevCase):
         self.failed("read", "encolink:spi:/dev/spidev9.0?resolution=20&multiturn_bits=16")
         self.assertRegex(self.summary(process), r"faults injected: \d+ corrupt")
 
-    def test_memory_is_kept(self):
+    def test_memory_survives_restart(self):
         for arguments in (["zero", "encolink:spi:/dev/spidev9.0", "--yes"], None):
             process = self.serve("encolink", "--singleturn", "5000", "--memory", "/tmp/spidev-memory")
             if arguments:
@@ -237,12 +238,12 @@ class TheCommand(SpidevCase):
                 while now == before and time.monotonic() < deadline:
                     with open("/tmp/spidev-memory", encoding="utf-8") as file:
                         now = file.read()
-                self.assertNotEqual(now, before)  # while it runs
+                self.assertNotEqual(now, before)  # while the emulator runs
             reading = self.reading("encolink:spi:/dev/spidev9.0")
             self.assertEqual((reading["singleturn"], reading["multiturn"]), (0, 9))
             self.summary(process, signal.SIGTERM)
 
-    def test_a_second_command_is_told_that_it_is_in_use(self):
+    def test_device_in_use(self):
         self.serve("encolink", "--motion", "rpm=6")
         first = subprocess.Popen([ABSENC, "read", "encolink:spi:/dev/spidev9.0", "--count", "0", "--rate", "50"], bufsize=0,
                                  stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
@@ -252,7 +253,7 @@ class TheCommand(SpidevCase):
 
 
 class Doctor(SpidevCase):
-    """What `absenc doctor` says of a device of the kernel. A clock that is too fast is not among it: this device hears
+    """Findings of `absenc doctor` for a kernel device. A too fast clock is not tested, because this device follows
     every clock."""
 
     def assert_found(self, encoder, *wanted):
@@ -265,43 +266,43 @@ class Doctor(SpidevCase):
         self.serve("encolink")
         self.assert_found("encolink:spi:/dev/spidev9.0")
 
-    def test_a_wrong_mode(self):
+    def test_wrong_mode(self):
         self.serve("encolink", "--singleturn", "12345")
         found = self.assert_found("encolink:spi:/dev/spidev9.0?spi_mode=0&resolution=20&multiturn_bits=16", "wrong_spi_mode")
         self.assertEqual(found[0]["action"], "set spi_mode=1")
 
-    def test_a_data_line_that_stays(self):
+    def test_stuck_data_line(self):
         self.serve("encolink", "--fault", "silence=1")
         self.assert_found("encolink:spi:/dev/spidev9.0?resolution=20&multiturn_bits=16", "miso_stuck")
 
 
-class Beginnings(SpidevCase):
-    def test_the_node(self):
+class Lifecycle(SpidevCase):
+    def test_creates_character_device(self):
         self.serve("ssi")
         self.assertTrue(stat.S_ISCHR(os.stat("/dev/spidev9.0").st_mode))
 
-    def test_the_name_exists(self):
+    def test_refuses_existing_name(self):
         self.assertIn("/dev/null exists: choose another name", self.failed("emulate", "ssi", "--spidev", "null").stderr)
         self.serve("ssi")
         self.assertIn("exists", self.failed("emulate", "ssi", "--spidev", "spidev9.0").stderr)
 
-    def test_what_the_kernel_refuses(self):
-        """The node is away, the device is not."""
+    def test_reports_refusal_by_kernel(self):
+        """The device node was removed, but the device still exists."""
         self.serve("ssi")
         os.remove("/dev/spidev9.0")
         self.assertIn("the kernel did not make /dev/spidev9.0", self.failed("emulate", "ssi", "--spidev", "spidev9.0").stderr)
 
-    def test_no_name(self):
+    def test_refuses_invalid_name(self):
         self.assertIn("no name for a device", self.failed("emulate", "ssi", "--spidev", "../x").stderr)
 
-    def test_no_permission(self):
+    def test_reports_missing_permission(self):
         result = subprocess.run([ABSENC, "emulate", "ssi", "--spidev", "spidev9.0"], capture_output=True, text=True,
                                 timeout=PATIENCE, stdin=subprocess.DEVNULL, user=65534)
         self.assertEqual(result.returncode, 1)
         self.assertIn("no permission to open /dev/cuse", result.stderr)
 
-    def test_without_being_root(self):
-        """Whoever may open /dev/cuse and the device; the kernel makes it for root."""
+    def test_runs_as_ordinary_user(self):
+        """A user with access to /dev/cuse may create the device, but the kernel makes its node for root."""
         os.chmod("/dev/cuse", 0o666)
         self.addCleanup(os.chmod, "/dev/cuse", 0o600)
         self.serve("ssi", "--singleturn", "77", user=65534)
@@ -312,19 +313,19 @@ class Beginnings(SpidevCase):
         os.chmod("/dev/spidev9.0", 0o666)
         self.assertIn("77 counts", absenc("read", encoder, user=65534).stdout)
 
-    def test_no_cuse(self):
+    def test_reports_missing_cuse_module(self):
         os.rename("/dev/cuse", "/dev/cuse.away")
         self.addCleanup(os.rename, "/dev/cuse.away", "/dev/cuse")
         result = self.failed("emulate", "ssi", "--spidev", "spidev9.0")
         self.assertIn("there is no /dev/cuse: load the kernel's module (`sudo modprobe cuse`)", result.stderr)
 
-    def test_it_ends_by_itself(self):
+    def test_ends_after_given_time(self):
         result = self.good("emulate", "ssi", "--spidev", "spidev9.0", "--for", "0.2")
         self.assertIn("0 requests answered", result.stderr)
         self.assertFalse(os.path.lexists("/dev/spidev9.0"))
 
-    def test_a_reader_waits_for_it(self):
-        """The encoder goes and comes back under a command that runs for long."""
+    def test_reader_waits_for_device(self):
+        """The encoder disappears and returns while a long command reads it."""
         process = self.serve("encolink", "--singleturn", "1")
         reader = subprocess.Popen([ABSENC, "read", "encolink:spi:/dev/spidev9.0", "--count", "0", "--rate", "50", "--json"],
                                   bufsize=0, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
@@ -338,16 +339,16 @@ class Beginnings(SpidevCase):
             line = read_line(reader.stdout, deadline)
             self.assertIsNotNone(line)
 
-    def test_ended_within_a_message(self):
+    def test_ends_during_a_message(self):
         process = self.serve("encolink")
         with Spi("/dev/spidev9.0", mode=1) as spi:
-            troubles = []
+            errors = []
 
             def slow():
                 try:
                     spi.exchange(bytes(1000), speed=100)  # 80 s
                 except OSError as error:
-                    troubles.append(error.errno)
+                    errors.append(error.errno)
 
             thread = threading.Thread(target=slow)
             before = time.monotonic()
@@ -358,21 +359,21 @@ class Beginnings(SpidevCase):
                     waiting = file.read().strip()
             self.summary(process)
             thread.join(PATIENCE)
-            self.assertEqual(len(troubles), 1)
-            self.assertIn(errno.errorcode[troubles[0]], ("ESHUTDOWN", "ECONNABORTED"))
+            self.assertEqual(len(errors), 1)
+            self.assertIn(errno.errorcode[errors[0]], ("ESHUTDOWN", "ECONNABORTED"))
             self.assertLess(time.monotonic() - before, PATIENCE)
             self.refused(errno.ENOTCONN, lambda: spi.exchange(bytes(2)))
 
 
-class TheInterface(SpidevCase):
-    """What spidev promises, asked without the command."""
+class SpidevInterface(SpidevCase):
+    """Tests the ioctl interface of spidev without the command."""
 
     def setUp(self):
         self.process = self.serve("encolink", "--singleturn", "0x12345", "--multiturn", "0xABC")
         self.spi = Spi("/dev/spidev9.0", mode=1)
         self.addCleanup(self.spi.__exit__)
 
-    FRAME = bytes([0x0A, 0xBC, 0x12, 0x34, 0x50 | 3])  # active-low error and warning
+    FRAME = bytes([0x0A, 0xBC, 0x12, 0x34, 0x50 | 3])  # error and warning are active-low
 
     def check_frame(self, frame):
         self.assertEqual(frame[:5].hex(" "), self.FRAME.hex(" "))
@@ -395,7 +396,7 @@ class TheInterface(SpidevCase):
             self.assertEqual(spi.get(RD_SPEED, "I"), 123456)
             spi.put(WR_BITS, "B", 8)
 
-    def test_refusals(self):
+    def test_refuses_unsupported_settings(self):
         self.refused(errno.EINVAL, lambda: self.spi.put(WR_MODE, "B", CS_HIGH))
         self.refused(errno.EINVAL, lambda: self.spi.put(WR_MODE32, "I", 1 << 20))
         self.refused(errno.EINVAL, lambda: self.spi.put(WR_BITS, "B", 16))
@@ -412,44 +413,44 @@ class TheInterface(SpidevCase):
 
     def test_one_transfer(self):
         self.check_frame(self.spi.exchange(bytes(7)))
-        self.assertEqual(self.spi.exchange(bytes(9))[7:], b"\xFF\xFF")  # nobody drives
+        self.assertEqual(self.spi.exchange(bytes(9))[7:], b"\xFF\xFF")  # the line is not driven
 
     def test_without_buffers(self):
         into = Transfer(size=7)
         self.assertEqual(self.spi.message(into), 7)
-        self.check_frame(into.came)
+        self.check_frame(into.received)
         self.assertEqual(self.spi.message(Transfer(bytes(7), take=False)), 7)
         self.assertEqual(self.spi.message(Transfer(size=0, take=False)), 0)
         self.assertEqual(self.spi.message(Transfer(size=5, take=False)), 5)
         self.assertEqual(fcntl.ioctl(self.spi.descriptor, request(False, 0, 0), 0), 0)
 
-    def test_what_is_sent_arrives(self):
-        """The identity is asked for by the first byte, and comes with the next message."""
+    def test_sent_bytes_arrive(self):
+        """The first byte requests the identity, which follows in the next message."""
         self.spi.message(Transfer(b"\xBB", take=False), Transfer(b"\x00", take=False), Transfer(size=5))
         self.check_identity(self.spi.exchange(bytes(19)))
 
     def test_several_transfers_are_one_frame(self):
         parts = [Transfer(bytes(2)), Transfer(size=1, delay=20), Transfer(size=0, delay=5), Transfer(bytes(4))]
         self.assertEqual(self.spi.message(*parts), 7)
-        self.check_frame(b"".join(part.came for part in parts))
+        self.check_frame(b"".join(part.received for part in parts))
 
-    def test_deselected_between(self):
+    def test_deselected_between_transfers(self):
         first, second = Transfer(bytes(7), change=1), Transfer(bytes(7))
         self.spi.message(first, second)
-        self.check_frame(first.came)
-        self.check_frame(second.came)
+        self.check_frame(first.received)
+        self.check_frame(second.received)
 
-    def test_left_selected(self):
+    def test_left_selected_after_message(self):
         first = self.spi.exchange(bytes(3), change=1)
         self.check_frame(first + self.spi.exchange(bytes(4)))
 
     def test_many_transfers(self):
         parts = [Transfer(bytes(1)) for _ in range(127)]
         self.assertEqual(self.spi.message(*parts), 127)
-        self.check_frame(b"".join(part.came for part in parts[:7]))
+        self.check_frame(b"".join(part.received for part in parts[:7]))
         self.refused(errno.EMSGSIZE, lambda: self.spi.message(*[Transfer(bytes(1)) for _ in range(128)]))
 
-    def test_the_size_of_a_message(self):
+    def test_size_limit_of_message(self):
         self.assertEqual(len(self.spi.exchange(bytes(4096), speed=4_000_000)), 4096)
         self.refused(errno.EMSGSIZE, lambda: self.spi.exchange(bytes(4097)))
         self.refused(errno.EMSGSIZE, lambda: self.spi.message(Transfer(bytes(4000)), Transfer(bytes(97))))
@@ -466,20 +467,20 @@ class TheInterface(SpidevCase):
         self.spi.put(WR_LSB_FIRST, "B", 1)
         self.assertEqual(self.spi.exchange(bytes(7))[:5], turned)
 
-    def test_a_message_takes_its_time(self):
+    def test_message_takes_its_time(self):
         before = time.monotonic()
         self.spi.exchange(bytes(500), speed=10_000)
         took = time.monotonic() - before
         self.assertGreaterEqual(took, 0.4)
         self.assertLess(took, 30)
 
-    def test_a_wrong_mode_shifts(self):
+    def test_wrong_mode_shifts_received_bits(self):
         good = int.from_bytes(self.FRAME, "big")
         for mode in (0, 2, 3):
             self.spi.put(WR_MODE, "B", mode)
             self.assertEqual(int.from_bytes(self.spi.exchange(bytes(7))[:5], "big"), 1 << 39 | good >> 1, mode)
 
-    def test_what_a_wrong_mode_makes_of_what_is_sent(self):
+    def test_wrong_mode_of_sent_bytes(self):
         for mode, arrives in ((0, True), (2, True), (3, False)):
             self.spi.put(WR_MODE, "B", mode)
             self.spi.exchange(b"\xBB" + bytes(6))
@@ -497,17 +498,17 @@ class TheInterface(SpidevCase):
         self.assertEqual(self.spi.get(RD_SPEED, "I"), 250_000)
         os.close(self.spi.descriptor)
         self.spi.descriptor = os.open("/dev/spidev9.0", os.O_RDWR)
-        self.assertEqual(self.spi.get(RD_SPEED, "I"), 1_000_000)  # the last one gave it back
+        self.assertEqual(self.spi.get(RD_SPEED, "I"), 1_000_000)  # closing the last other descriptor restored it
         self.assertEqual(self.spi.get(RD_MODE, "B"), 1)
 
     def test_spi_tools(self):
-        """Programs of others."""
+        """spi-config and spi-pipe are independent programs."""
         device = ["-d", "/dev/spidev9.0"]
         subprocess.run(["spi-config", *device, "-m", "1"], check=True)
-        said = subprocess.run(["spi-config", *device, "-q"], check=True, capture_output=True, text=True).stdout
-        self.assertRegex(said, r"mode=1, lsb=0, bits=8, speed=1000000")
-        came = subprocess.run(["spi-pipe", *device, "-s", "2000000", "-b", "7", "-n", "3"], check=True, capture_output=True,
+        settings = subprocess.run(["spi-config", *device, "-q"], check=True, capture_output=True, text=True).stdout
+        self.assertRegex(settings, r"mode=1, lsb=0, bits=8, speed=1000000")
+        received = subprocess.run(["spi-pipe", *device, "-s", "2000000", "-b", "7", "-n", "3"], check=True, capture_output=True,
                               input=bytes(21)).stdout
-        self.assertEqual(len(came), 21)
+        self.assertEqual(len(received), 21)
         for i in range(3):
-            self.check_frame(came[7 * i:7 * i + 7])
+            self.check_frame(received[7 * i:7 * i + 7])

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Two 16550 UARTs, /dev/ttyS1 and /dev/ttyS2, at the two ends of one line."""
+"""Tests two 16550 UARTs, /dev/ttyS1 and /dev/ttyS2, which are the two ends of one line."""
 import errno
 import fcntl
 import json
@@ -17,20 +17,20 @@ from command_support import Emulator, EncoderCase, absenc, end, json_lines
 from tap_support import Relay, TapCase, joined
 
 PORT, OTHER = "/dev/ttyS1", "/dev/ttyS2"
-REGISTERS = 0x2F8  # of PORT
-CLOCK = 115200     # a divisor of 1
+REGISTERS = 0x2F8  # address of PORT's registers
+CLOCK = 115200  # baud rate with a divisor of 1
 NOBODY = 65534
 PARITY = termios.PARENB | termios.PARODD
 
-# <asm-generic/ioctls.h>, <asm-generic/termbits.h>, <linux/serial.h>, <linux/tty_flags.h>
+# Constants of <asm-generic/ioctls.h>, <asm-generic/termbits.h>, <linux/serial.h> and <linux/tty_flags.h>
 TCGETS2, BOTHER, BAUD_MASK = 0x802C542A, 0o010000, 0o010017
 TIOCGSERIAL, TIOCSSERIAL, ASYNC_LOW_LATENCY = 0x541E, 0x541F, 1 << 13
 SERIAL_STRUCT = struct.Struct("iiIiiiiiHcciPHIL")
-FLAGS = 4  # the place in it
+FLAGS = 4  # index of the flags in the struct
 
 
 def settings(path):
-    """struct termios2: flags of input, output, control and local, line discipline, characters, both rates."""
+    """Returns struct termios2: flags of input, output, control and local, line discipline, characters, both rates."""
     descriptor = os.open(path, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
     try:
         return struct.unpack("IIIIB19sII", fcntl.ioctl(descriptor, TCGETS2, bytes(44)))
@@ -51,7 +51,7 @@ def serial_struct(path, change=None):
 
 
 def divisor():
-    """What stands in the UART itself: the latch behind its data registers."""
+    """Returns the divisor latch of the UART itself, which is accessed through its data registers."""
     with open("/dev/port", "r+b", buffering=0) as registers:
         def get(number):
             registers.seek(REGISTERS + number)
@@ -69,10 +69,11 @@ def divisor():
 
 
 class EncoderAtOneRate(threading.Thread):
-    """Answers at OTHER, well while PORT has its rate. At others the frames are garbled, which the UARTs of a virtual
-    machine do not do by themselves."""
+    """An encoder at OTHER that replies correctly only while PORT has its rate. At other rates it sends garbled frames,
+    which the UARTs of a virtual machine do not produce by themselves."""
 
-    REPLY = bytes.fromhex("1a 00000000 11 000000 00 0b")  # to 1A: 17 bits and 16 of turns, both 0, no alarm
+    # reply to 1A: 17 bits of position, 16 bits of turns, both 0, no alarm
+    REPLY = bytes.fromhex("1a 00000000 11 000000 00 0b")
 
     def __init__(self, rate):
         super().__init__()
@@ -109,13 +110,14 @@ class Uart(EncoderCase):
         return absenc("read", f"tformat:{PORT}?latency=2000&{more}", *arguments)
 
     def reader(self, more):
-        """`read` that goes on, after its first reading: whoever looks into the UART then disturbs nothing under way."""
+        """Starts an endless `read` with a long interval and waits for its first reading, so that accesses to the UART
+        disturb no transfer."""
         process = self.start("read", f"tformat:{PORT}?latency=2000&{more}", "--count", "0", "--rate", "0.01")
         self.first_line(process)
         return process
 
-    def test_rates(self):
-        """One with a name in <termios.h>, which the kernel gives back to it, and two without."""
+    def test_baud_rates(self):
+        """One rate has a name in <termios.h>, which the kernel then reports; two have none."""
         for baud, name in ((38400, termios.B38400), (23040, BOTHER), (14400, BOTHER)):
             with self.subTest(baud):
                 emulator = self.emulator("--singleturn", "1000", baud=baud)
@@ -126,7 +128,7 @@ class Uart(EncoderCase):
                 self.assertEqual(end(reader, signal.SIGINT)[0], 0)
                 emulator.end()
 
-    def test_a_rate_that_the_uart_cannot_do(self):
+    def test_reports_impossible_rate(self):
         result = self.read("baud=2500000")
         self.assert_failed(result, f"the port {PORT} cannot do 2500000 baud", "nearest rate is 115200")
         result = absenc("emulate", "tformat", "--port", PORT, "--for", "5")
@@ -136,19 +138,19 @@ class Uart(EncoderCase):
         found = json.loads(absenc("doctor", f"tformat:{PORT}?latency=300&baud={baud}", "--for", "1", "--json").stdout)
         return found["verdict"]
 
-    def test_the_doctor_names_the_rate(self):
-        for rate, said in ((19200, 57600), (57600, 9600)):
+    def test_doctor_names_rate(self):
+        for rate, positions in ((19200, 57600), (57600, 9600)):
             with self.subTest(rate), EncoderAtOneRate(rate):
-                self.assertRegex(self.doctor(said), f"^first: wrong_baud: set baud={rate}$")
+                self.assertRegex(self.doctor(positions), f"^first: wrong_baud: set baud={rate}$")
                 self.assertRegex(self.doctor(rate), "^good: ")
 
-    def test_the_doctor_names_a_rate_that_the_uart_cannot_do(self):
+    def test_doctor_reports_impossible_rate(self):
         self.assertRegex(self.doctor(2500000), "^first: port_rate: ")
 
-    def test_a_uart_that_is_only_listed(self):
+    def test_reports_port_without_hardware(self):
         self.assert_failed(absenc("read", "tformat:/dev/ttyS3"), "the port /dev/ttyS3 is there", "no hardware")
 
-    def test_settings_come_back(self):
+    def test_settings_are_restored(self):
         subprocess.run(["stty", "-F", PORT, "1200", "parenb", "parodd", "cs7", "echo"], check=True)
         before = settings(PORT)
         self.emulator(baud=57600)
@@ -157,8 +159,8 @@ class Uart(EncoderCase):
         self.assertEqual(end(reader, signal.SIGINT)[0], 0)
         self.assertEqual(settings(PORT), before)
 
-    def test_a_change_of_the_rate_leaves_the_parity(self):
-        """On both sides: of the host that tells the encoder, and of the encoder that follows."""
+    def test_new_baud_rate_keeps_parity(self):
+        """Checks both sides: the host that sets the rate, and the encoder that follows."""
         emulator = Emulator("/dev", protocol="raa38-modbus", name=f"{OTHER}?parity=odd", line="--port")
         self.addCleanup(emulator.end)
         address = f"raa38-modbus:{PORT}?latency=2000&parity=odd"
@@ -171,7 +173,7 @@ class Uart(EncoderCase):
         self.assertEqual(end(reader, signal.SIGINT)[0], 0)
 
     def test_rs485(self):
-        """The 16550 has no RS-485: who asks for it must hear so, who leaves it to absenc must be able to read."""
+        """The 16550 has no RS-485 mode. The option rs485=on must fail, and the default must still work."""
         self.emulator("--singleturn", "1000", baud=115200)
         for choice in ("auto", "off"):
             result = self.read(f"baud=115200&rs485={choice}", "--json")
@@ -189,7 +191,7 @@ class Uart(EncoderCase):
         self.assert_good(self.read("baud=115200"))
         self.assertTrue(serial_struct(PORT)[FLAGS] & ASYNC_LOW_LATENCY)
 
-    def test_two_absencs_and_one_port(self):
+    def test_port_of_another_absenc_is_in_use(self):
         self.emulator(baud=115200)
         reader = self.reader("baud=115200")
         self.assert_failed(self.read("baud=115200"), f"the port {PORT} is in use by absenc", str(reader.pid))
@@ -198,8 +200,8 @@ class Uart(EncoderCase):
         self.assertEqual(end(reader, signal.SIGINT)[0], 0)
         self.assert_good(self.read("baud=115200"))
 
-    def test_programs_that_do_not_ask(self):
-        """Root may open a port in any case; others are kept out, as long as absenc has it and no longer."""
+    def test_port_is_exclusive(self):
+        """Root may always open a port. Other users are kept out while absenc uses it, and no longer."""
         os.chmod(PORT, 0o666)
         self.addCleanup(os.chmod, PORT, 0o600)
         self.emulator(baud=115200)
@@ -220,12 +222,12 @@ class Uart(EncoderCase):
         return os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
 
 
-class TapOfAUart(TapCase):
+class TapOnUart(TapCase):
     COUNT = 300
-    BAUD = 57600  # which both protocols have
+    BAUD = 57600  # a rate that both protocols support
 
-    def test_every_exchange(self):
-        """Of two protocols, as a receiver on the pair hears them; what was on the line is known."""
+    def test_shows_every_exchange(self):
+        """A receiver on the pair taps two protocols; the bytes on the line are known."""
         for protocol in ("tformat", "raa38-modbus"):
             with self.subTest(protocol):
                 emulator = self.emulator(protocol, "--motion", "rpm=60", name=f"e-{protocol}")
@@ -241,7 +243,7 @@ class TapOfAUart(TapCase):
                     self.assertEqual([line for line in lines if line["kind"] != "exchange" or not line["ok"]], [], messages)
                     self.assertEqual(joined(lines), relay.copied.hex())
                     self.assertEqual((status, summary["bytes"]), (0, len(relay.copied)), messages)
-                    said = [line["fields"]["singleturn"] for line in lines if "singleturn" in line["fields"]]
+                    positions = [line["fields"]["singleturn"] for line in lines if "singleturn" in line["fields"]]
                     for reading in json_lines(host.stdout):
-                        self.assertIn(reading["singleturn"], said)
+                        self.assertIn(reading["singleturn"], positions)
                 emulator.end()

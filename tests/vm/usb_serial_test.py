@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A USB serial port that can be unplugged: /dev/ttyACM0 of the host, whose other end is /dev/ttyGS0 of the gadget."""
+"""Tests a USB serial port that can be unplugged: /dev/ttyACM0 of the host, connected to /dev/ttyGS0 of the gadget."""
 import contextlib
 import json
 import os
@@ -32,7 +32,7 @@ class UsbSerial(EncoderCase):
     def setUp(self):
         super().setUp()
         self.addCleanup(plug)
-        # Whoever has closed the gadget's end has dropped the carrier; that may arrive late and hang up the next user.
+        # Closing the gadget's end drops the carrier. A late hang-up could otherwise hit the next user of the port.
         with self.without_cable():
             pass
 
@@ -56,7 +56,7 @@ class UsbSerial(EncoderCase):
 
     @contextlib.contextmanager
     def without_gadget(self):
-        """The other end goes too, as when the computer that plays the device is switched off."""
+        """Also removes the gadget, as when the computer that emulates the device is switched off."""
         subprocess.run(["rmmod", "g_serial"], check=True, timeout=PATIENCE)
         self.assertFalse(os.path.exists(GADGET))
         try:
@@ -66,7 +66,7 @@ class UsbSerial(EncoderCase):
             wait_until(lambda: os.path.exists(PORT), f"{PORT} to come")
 
     def next_json(self, process, condition):
-        """The first line that is so."""
+        """Returns the first line that satisfies the condition."""
         deadline = time.monotonic() + PATIENCE
         while True:
             text = read_line(process.stdout, deadline)
@@ -86,7 +86,7 @@ class UsbSerial(EncoderCase):
 
 
 class Reading(UsbSerial):
-    def test_reads_and_sets(self):
+    def test_reads_and_configures(self):
         options = ["--option", "singleturn_bits=19", "--option", "multiturn_bits=16"]
         emulator = self.emulator(*options, "--singleturn", "275096", "--multiturn", "3")
         self.assertEqual(emulator.ready, f"ready: {GADGET}\n")
@@ -106,7 +106,7 @@ class Reading(UsbSerial):
         self.assertLess(fields["valid_1100_khz"], 20)
         self.assertEqual((fields["restored_clock"], fields["aborted"]), (6, False))
 
-    def test_two_programs_and_one_port(self):
+    def test_port_in_use(self):
         self.emulator()
         first = self.start("read", ENCODER, "--count", "0")
         self.first_line(first)
@@ -116,7 +116,7 @@ class Reading(UsbSerial):
 
 
 class Unplugged(UsbSerial):
-    def test_record_goes_on(self):
+    def test_record_continues(self):
         for away in (self.without_cable, self.without_gadget):
             with self.subTest(away.__name__):
                 self.check_recording(away)
@@ -141,7 +141,7 @@ class Unplugged(UsbSerial):
         self.assertEqual({row["singleturn"] for row in rows if row["event"] == ""}, {"1000"})
         self.assertEqual(emulator.end()[0], 0)
 
-    def test_monitor_goes_on(self):
+    def test_monitor_continues(self):
         self.emulator("--singleturn", "1000")
         process = self.start("monitor", ENCODER, "--json", "--interval", "0.1")
         self.next_json(process, lambda line: line["state"] == "live")
@@ -157,7 +157,7 @@ class Unplugged(UsbSerial):
         self.assertEqual(status, 0)
         self.assertRegex(messages, "is lost: .*went away: unplugged")
 
-    def test_it_does_not_return(self):
+    def test_read_ends_if_port_does_not_return(self):
         self.emulator()
         process = self.start("read", ENCODER, "--count", "1000000", "--rate", "100")
         self.first_line(process)
@@ -166,7 +166,7 @@ class Unplugged(UsbSerial):
             _, err = process.communicate(timeout=PATIENCE)
             self.assertEqual(process.returncode, 1)
             self.assert_sentence(err.decode(), f"the port {PORT} went away: unplugged")
-            # The four ports of the 16550's driver are listed in /sys, one of them is not there.
+            # /sys lists the four ports of the 16550 driver, although one has no hardware.
             result = absenc("read", ENCODER)
             self.assert_failed(result, f"there is no port {PORT}", "/dev/ttyS1")
             self.assertNotIn("/dev/ttyS3", result.stderr)
@@ -176,7 +176,7 @@ class Unplugged(UsbSerial):
 
     start_sweep, read_until = e201_test.ClockSweep.start, e201_test.ClockSweep.read_until
 
-    def test_a_sweep_that_is_broken_off_says_what_it_left(self):
+    def test_interrupted_sweep_reports_clock(self):
         self.emulator()
         process, terminal = self.start_sweep(f"{PORT}?latency=2000", 1000)
         self.read_until(terminal, "clock-sweep: valid_35_khz:")
@@ -188,8 +188,8 @@ class Unplugged(UsbSerial):
         self.assertIn("clock-sweep was broken off and has left", messages)
         self.assertRegex(messages, r"previous_clock +4 ")
 
-    def test_an_emulator_goes_on(self):
-        """The other way round: it is the virtual encoder that is unplugged."""
+    def test_emulator_continues(self):
+        """Here the virtual encoder's end is unplugged."""
         emulator = self.emulator("--singleturn", "1000", port=PORT)
         address = f"e201:{GADGET}?latency=2000"
         self.assertEqual(self.run_json("read", address)["singleturn"], 1000)
