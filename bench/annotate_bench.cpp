@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a character of a fully loaded T-format line costs from the line decoder to a decoded exchange.
+// Time per character of a fully loaded T-format line, from the line decoder to the decoded exchange.
 #include <benchmark/benchmark.h>
 
 #include <memory>
@@ -12,7 +12,7 @@
 namespace absenc::capture {
 namespace {
 
-constexpr Tick character = 80;  // at 20 MS/s
+constexpr Tick character = 80;  // ticks, at 20 MS/s
 constexpr Tick turnaround = 60;
 constexpr Tick pause = 64;
 
@@ -29,18 +29,18 @@ struct Count final : AnnotationSink {
 std::vector<Character> line(std::size_t exchanges) {
   std::vector<Character> characters;
   Tick at = 1000;
-  const auto say = [&](Bytes bytes) {
+  const auto send = [&](Bytes bytes) {
     for (const std::uint8_t byte : bytes) {
       characters.push_back({.begin = at, .end = at + character, .value = byte});
       at += character;
     }
   };
   for (std::size_t i = 0; i < exchanges; ++i) {
-    say(tformat::encode_request({}));
+    send(tformat::encode_request({}));
     at += turnaround;
-    say(tformat::encode_reply({.singleturn = static_cast<std::uint32_t>(i * 37 % 131072),
-                               .multiturn = static_cast<std::uint32_t>(i % 65536),
-                               .encoder_id = 0x11}));
+    send(tformat::encode_reply({.singleturn = static_cast<std::uint32_t>(i * 37 % 131072),
+                                .multiturn = static_cast<std::uint32_t>(i % 65536),
+                                .encoder_id = 0x11}));
     at += pause;
   }
   return characters;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// An asynchronous line of 2.5 Mbps at 20 MS/s, from a raw file to characters, against the plain read of the file,
-// against itself with two threads and with bigger files, and against sigrok-cli's decoder.
+// Decodes an asynchronous line of 2.5 Mbit/s, sampled at 20 MS/s, from a raw file to characters. Compares this with a
+// plain read of the file, with two threads, with larger files, and with sigrok-cli's decoder.
 #include <fcntl.h>
 #include <sys/resource.h>
 #include <unistd.h>
@@ -35,9 +35,8 @@ constexpr std::uint64_t megabyte = 1'000'000;
 }
 
 struct Cost {
-  double time;  // seconds
-  double
-      processor;  // seconds of all threads and children: what one thread takes of a machine that has other things to do
+  double time;       // elapsed, seconds
+  double processor;  // of all threads and children, seconds: independent of other load
 };
 
 double processor_seconds() {
@@ -69,7 +68,7 @@ double least(const std::vector<double>& values) { return *std::min_element(value
 
 std::uint8_t byte_at(std::uint64_t index) { return static_cast<std::uint8_t>(index * 0x9E3779B97F4A7C15 >> 56); }
 
-/// A file in a folder of its own that goes away.
+/// A capture file in a temporary folder, deleted at the end.
 class File {
  public:
   explicit File(std::uint64_t size) : size_(size / ticks_per_character * ticks_per_character) {
@@ -99,7 +98,7 @@ class File {
   }
 
  private:
-  // Channel 0 carries characters without a pause between them, the others whatever else there is.
+  // Channel 0 has characters without pauses; the other channels have arbitrary levels.
   void write() const {
     const int out = open(path_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
     if (out < 0) fail("open");
@@ -152,7 +151,7 @@ class RawReader final : public Reader {
   std::vector<Damage> damages_;
 };
 
-// Decodes all of it, and looks at each character.
+// Decodes the whole file and checks each character.
 Cost decode(const File& file, unsigned threads) {
   RawReader reader(file);
   std::uint64_t count = 0;
@@ -167,7 +166,7 @@ Cost decode(const File& file, unsigned threads) {
       return true;
     });
   });
-  // The very first has no falling edge, and nothing tells the next ones from what is inside it.
+  // The first character has no falling edge, and the decoder may mistake its inner edges for the next start bits.
   if (!outcome.problem.empty() || wrong > 20 || count + 20 < file.characters()) {
     std::fprintf(stderr, "%llu of %llu characters, %llu wrong: %s\n", static_cast<unsigned long long>(count),
                  static_cast<unsigned long long>(file.characters()), static_cast<unsigned long long>(wrong),
@@ -177,7 +176,7 @@ Cost decode(const File& file, unsigned threads) {
   return cost;
 }
 
-// The same blocks, read and added up: what the machine could do at best.
+// Reads and sums up the same blocks: the highest possible rate of this machine.
 Cost plain_read(const File& file) {
   RawReader reader(file);
   std::uint64_t sum = 0;
@@ -191,12 +190,12 @@ Cost plain_read(const File& file) {
       }
     }
   });
-  if (sum == 1) std::puts("");  // so that it is not left out
+  if (sum == 1) std::puts("");  // keeps the compiler from omitting the sum
   return cost;
 }
 
-// Two files at once, each with a thread of its own: what a second core brings at best, beside whatever else is running.
-double two_alone(const File& file) {
+// Decodes two files at once with one thread each: the greatest possible gain of a second core under the current load.
+double two_independent(const File& file) {
   return cost_of([&] {
            std::jthread other([&] { decode(file, 1); });
            decode(file, 1);
@@ -218,7 +217,7 @@ void throughput(bool quick) {
       median(one), median(plain));
 }
 
-// Of the best of many short runs: both cores must be free for that, and sometimes they are.
+// Compares the shortest of many runs, because only some runs find both cores free.
 void two_threads(bool quick) {
   const File file(50 * megabyte);
   std::vector<double> alone;
@@ -227,7 +226,7 @@ void two_threads(bool quick) {
   for (int round = 0; round < (quick ? 30 : 300); ++round) {
     alone.push_back(decode(file, 1).time);
     together.push_back(decode(file, 2).time);
-    possible.push_back(two_alone(file));
+    possible.push_back(two_independent(file));
   }
   std::printf(
       "ratio of two threads to one: %.2f; two threads that have nothing to do with each other: %.2f (%u cores)\n",
@@ -259,8 +258,8 @@ void against_sigrok(bool quick) {
               median(ours) / theirs);
 }
 
-// The small file is read many times, so that both take about as long.
-void size_makes_no_difference(bool quick) {
+// The small file is decoded many times, so that both measurements take about the same time.
+void compare_file_sizes(bool quick) {
   const std::uint64_t most = (quick ? 100 : 4000) * megabyte;
   const File small(10 * megabyte);
   std::error_code ignored;
@@ -270,7 +269,7 @@ void size_makes_no_difference(bool quick) {
     return;
   }
   const File big(most);
-  plain_read(big);  // into memory, as far as it fits
+  plain_read(big);  // fills the page cache as far as possible
   std::vector<double> ratios;
   for (int round = 0; round < (quick ? 5 : 7); ++round) {
     double alone = 0;
@@ -285,11 +284,11 @@ void size_makes_no_difference(bool quick) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  const bool quick = argc > 1;  // any option of Google Benchmark asks for less time
+  const bool quick = argc > 1;  // any option of Google Benchmark selects the short run
   static_cast<void>(argv);
   throughput(quick);
   two_threads(quick);
   against_sigrok(quick);
-  size_makes_no_difference(quick);
+  compare_file_sizes(quick);
   return 0;
 }

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Reading captures against doing the least: raw samples against std::fread, a session of sigrok against libzip's own
-// inflate, as in a loop of its manual; and text, a value change dump and CSV, by itself. Files are of 64 MiB of
-// samples.
+// Compares reading of captures with the minimum of work: raw samples with std::fread, a sigrok session with a libzip
+// loop as in its manual. Text, value change dump and CSV are measured alone. Files have 64 MiB of samples.
 #include <zip.h>
 
 #include <array>
@@ -22,18 +21,18 @@ namespace {
 using namespace absenc::capture;
 
 constexpr std::size_t samples_size = 64 << 20;
-constexpr std::size_t piece_size = 4 << 20;  // as sigrok-cli writes them
+constexpr std::size_t piece_size = 4 << 20;  // the piece size of sigrok-cli
 
 void require_that(bool condition) {
   if (!condition) std::abort();
 }
 
-// One folder for the run, which goes when it ends.
+// A folder for the run, deleted at its end.
 struct Files {
   Files()
       : folder(std::filesystem::temp_directory_path() / ("absenc-bench-" + std::to_string(std::random_device()()))) {
     std::filesystem::create_directory(folder);
-    // Eight lines that change every 32 samples or so, as of a line that is sampled at 10 times its bit rate or more.
+    // Eight lines that change about every 32 samples, like a line that is sampled at 10 or more times its bit rate.
     std::mt19937 random(1);
     std::vector<char> samples(samples_size);
     unsigned levels = 0xFF;
@@ -87,7 +86,7 @@ struct Files {
     }
   }
 
-  // As Saleae's Logic 2 exports them.
+  // The CSV format of Saleae's Logic 2.
   void write_csv(const std::vector<char>& samples) const {
     std::ofstream file(csv());
     file << "Time [s],0,1,2,3,4,5,6,7\n";
@@ -131,7 +130,7 @@ void raw_samples(benchmark::State& state) {
 }
 BENCHMARK(raw_samples)->Unit(benchmark::kMillisecond);
 
-// Into one buffer of the same size, as much as fits at a time, past the buffer of the library.
+// Reads into one buffer of `samples_size`, in as large pieces as possible, without the library's own buffer.
 void raw_samples_reference(benchmark::State& state) {
   std::vector<char> buffer(1 << 20);
   const std::string path = files().raw();
@@ -156,7 +155,7 @@ void sigrok_session_reference(benchmark::State& state) {
     for (zip_uint64_t i = 2; i < samples_size / piece_size + 2; ++i) {
       zip_file_t* entry = zip_fopen_index(archive, i, 0);
       require_that(zip_fread(entry, buffer.data(), buffer.size()) == static_cast<zip_int64_t>(buffer.size()));
-      require_that(zip_fread(entry, buffer.data(), 1) == 0);  // compares the checksum
+      require_that(zip_fread(entry, buffer.data(), 1) == 0);  // checks the checksum
       zip_fclose(entry);
       benchmark::DoNotOptimize(buffer.data());
     }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Decoding and verifying frames: of the T-format against the same work with the CRC taken bit by bit, of BiSS against
-// the way of a motor controller.
+// Decoding and checking of frames: T-format compared with the same work and a bitwise CRC, BiSS compared with the
+// method of a motor controller.
 #include <algorithm>
 #include <array>
 
@@ -14,7 +14,7 @@ namespace {
 using namespace absenc;
 using namespace absenc::tformat;
 
-// Different replies in turn, so that nothing is a constant.
+// Replies differ, so that the compiler cannot treat any as a constant.
 std::array<ReplyBytes, 64> replies() {
   std::array<ReplyBytes, 64> made;
   for (std::uint32_t i = 0; i < made.size(); ++i) {
@@ -50,8 +50,8 @@ void tformat_everything_reference(benchmark::State& state) {
 }
 BENCHMARK(tformat_everything_reference);
 
-// 64 samples of SLO with a frame of 32 bits: packed, as an SPI controller or an E201-9S gives them, and a byte for
-// each, as a timer that samples a port gives them. Different ACKs and positions.
+// 64 samples of SLO with a frame of 32 bits: packed bits, as from an SPI controller or an E201-9S, and one byte per
+// sample, as from a port that a timer samples. ACK times and positions differ.
 constexpr biss::Format known{.word = "position:32 error:1! warning:1!"_word};
 
 struct Samples {
@@ -73,7 +73,7 @@ std::array<Samples, 64> biss_samples() {
   return made;
 }
 
-// What comes out is the position, or the benchmark ends.
+// Checks each decoded position; a wrong one ends the benchmark.
 template <class Decode>
 void run_biss(benchmark::State& state, Decode&& decode) {
   const auto frames = biss_samples();
@@ -107,7 +107,7 @@ void biss_any_format(benchmark::State& state) {
 }
 BENCHMARK(biss_any_format);
 
-// The reference of both.
+// Reference of both BiSS benchmarks.
 void biss_peer(benchmark::State& state) {
   bench::SampledPeer peer{pin, 32};
   benchmark::DoNotOptimize(peer);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Processor time for each reading when one `absenc monitor` watches 1, 8 and 64 virtual encoders at 100 readings a
-// second each: three rounds in turn, the median of each. The virtual encoders are processes of their own.
+// Processor time per reading when `absenc monitor` watches 1, 8 and 64 virtual encoders at 100 readings per second
+// each: medians of three interleaved rounds. Each virtual encoder is a separate process.
 #include <stdlib.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
@@ -27,7 +27,7 @@ constexpr std::array<int, 3> counts{1, 8, most_encoders};
   std::exit(1);
 }
 
-/// A process whose standard output, or error, can be read here.
+/// A process whose standard output or standard error is read here.
 struct Child {
   pid_t pid;
   FILE* output;
@@ -60,7 +60,7 @@ std::string line_of(FILE* file) {
   return line;
 }
 
-/// User and system time of the monitor for each reading, in microseconds.
+/// Returns user and system time of the monitor per reading, in microseconds.
 double measure(const std::string& absenc, const fs::path& folder, int count, const char* seconds) {
   std::vector<std::string> arguments{absenc, "monitor", "--json", "--rate", "100", "--for", seconds};
   for (int i = 0; i < count; ++i) arguments.push_back("tformat:" + (folder / std::to_string(i)).string());

@@ -1,14 +1,15 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""What the page of `absenc serve` costs a browser: the overview of 100 encoders, as the server sends it and forced to 30
-updates a second: bench/page_load.py [SECONDS [UPDATES]]. Chromium without a graphics processor, so that drawing counts."""
+"""Measures the load of the page of `absenc serve` on a browser: the overview of 100 encoders, with the server's updates
+and with 30 updates per second: bench/page_load.py [SECONDS [UPDATES]]. Chromium runs without a graphics processor, so
+that its processor time includes drawing."""
 import os
 import sys
 import tempfile
 import time
 
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.dirname(os.path.realpath(__file__))), "tests"))
-from page_scenes import Browser, config, hundred  # noqa: E402  first: it looks for selenium
+from page_scenes import Browser, config, hundred  # noqa: E402  first, because it locates selenium
 from command_support import end  # noqa: E402
 from serve_support import Server, wait_until  # noqa: E402
 
@@ -16,7 +17,7 @@ SECONDS = float(sys.argv[1]) if len(sys.argv) > 1 else 10
 UPDATES = float(sys.argv[2]) if len(sys.argv) > 2 else 30
 TICK = os.sysconf("SC_CLK_TCK")
 
-# States of the server as text, so that reading them counts; then shown again and again, at the times of now.
+# Records states of the server as text, so that the measurement includes parsing, then shows them with current times.
 RECORD = """
 const done = arguments[arguments.length - 1];
 (async () => {
@@ -45,7 +46,7 @@ import("./overview.js").then(({Overview}) => {
 
 
 def processes(root):
-    """The processes below this one."""
+    """Returns the process `root` and all its descendants."""
     parents = {}
     for pid in filter(str.isdigit, os.listdir("/proc")):
         try:
@@ -97,7 +98,7 @@ def main():
         try:
             browser.window(1920, 1080)
             browser.go(server.url)
-            wait_until(lambda: browser.ask("return document.querySelectorAll('.card .digits').length === 100"), "there are 100")
+            wait_until(lambda: browser.ask("return document.querySelectorAll('.card .digits').length === 100"), "100 cards are shown")
             measure(browser, "as sent")
             browser.driver.execute_async_script(RECORD)
             browser.driver.execute_async_script(FORCE, UPDATES)

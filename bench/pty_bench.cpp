@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Readings a second through a pseudo-terminal and the whole stack on both sides, against a bare loop of ppoll, read
-// and write on both sides: 40 blocks of each in turn, and the bare loop once more to show the noise.
+// Readings per second through a pseudo-terminal with the whole stack on both sides, compared with a bare loop of ppoll,
+// read and write on both sides: 40 interleaved blocks of each, and a second bare block each time to measure the noise.
 #include <fcntl.h>
 #include <poll.h>
 #include <stdlib.h>
@@ -54,7 +54,7 @@ int open_raw(const char* path) {
   return descriptor;
 }
 
-/// A child process; ended by its id, and its user CPU time told.
+/// A child process, ended by SIGKILL to its id. `end` returns its user CPU time in seconds.
 class Child {
  public:
   explicit Child(const std::function<void()>& body) : pid_(fork()) {
@@ -77,10 +77,10 @@ class Child {
   pid_t pid_;
 };
 
-/// Both sides bare: the far one in a child, the near one here.
-class Floor {
+/// Bare system calls on both sides: the encoder's side in a child, the host's side in this process.
+class BareLoop {
  public:
-  Floor() : master_(open_raw(nullptr)), child_([this] { answer(); }) {
+  BareLoop() : master_(open_raw(nullptr)), child_([this] { answer(); }) {
     if (grantpt(master_) != 0 || unlockpt(master_) != 0) fail("unlockpt");
     slave_ = open_raw(ptsname(master_));
   }
@@ -104,7 +104,7 @@ class Floor {
       wait_readable(master_);
       std::array<std::uint8_t, 64> buffer{};
       const ssize_t count = read(master_, buffer.data(), buffer.size());
-      // No slave is open yet: try again.
+      // Until the slave is open, read fails: try again.
       if (count > 0 && write(master_, reply.data(), reply.size()) < 0) _exit(1);
     }
   }
@@ -113,7 +113,7 @@ class Floor {
   Child child_;
 };
 
-/// Virtual encoder and EmulatorPort in a child; SerialPort and Session here.
+/// The whole stack: virtual encoder and EmulatorPort in a child, SerialPort and Session in this process.
 class Stack {
  public:
   explicit Stack(std::string link)
@@ -183,40 +183,40 @@ double median(std::vector<double> values) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  const bool quick = argc > 1;  // any option of Google Benchmark asks for less time
+  const bool quick = argc > 1;  // any option of Google Benchmark selects the short run
   static_cast<void>(argv);
   constexpr int blocks = 40;
   const int exchanges = quick ? 500 : 3000;
-  Floor floor;
+  BareLoop bare;
   Stack stack("/tmp/absenc-pty-bench-" + std::to_string(getpid()));
-  run(floor, 200);
+  run(bare, 200);
   run(stack, 200);
 
-  std::vector<double> floor_rates;
+  std::vector<double> bare_rates;
   std::vector<double> stack_rates;
   std::vector<double> ratios;
   std::vector<double> noise;
-  double floor_user = 0;
+  double bare_user = 0;
   double stack_user = 0;
   for (int i = 0; i < blocks; ++i) {
-    // Every second block in the other order, so that neither side always comes first.
-    const Block first = run(floor, exchanges);
+    // Every second block swaps the order of the bare runs, so that neither always comes first.
+    const Block first = run(bare, exchanges);
     const Block measured = run(stack, exchanges);
-    const Block second = run(floor, exchanges);
+    const Block second = run(bare, exchanges);
     const Block& before = i % 2 == 0 ? first : second;
     const Block& after = i % 2 == 0 ? second : first;
-    floor_rates.push_back(before.rate);
+    bare_rates.push_back(before.rate);
     stack_rates.push_back(measured.rate);
     ratios.push_back(measured.rate / before.rate);
     noise.push_back(after.rate / before.rate);
-    floor_user += first.user + second.user;
+    bare_user += first.user + second.user;
     stack_user += measured.user;
   }
-  floor_user += floor.end();
+  bare_user += bare.end();
   stack_user += stack.end();
   std::printf("%d blocks of %d exchanges of 1 + 11 bytes over a pseudo-terminal, medians:\n", blocks, exchanges);
   std::printf("  bare ppoll, read, write  %9.0f a second  %6.2f us of user CPU an exchange, both sides\n",
-              median(floor_rates), floor_user / (2.0 * blocks * exchanges) * 1e6);
+              median(bare_rates), bare_user / (2.0 * blocks * exchanges) * 1e6);
   std::printf("  whole stack              %9.0f a second  %6.2f us\n", median(stack_rates),
               stack_user / (1.0 * blocks * exchanges) * 1e6);
   if (stack.failed != 0) std::printf("  %d readings failed: the machine was too busy\n", stack.failed);

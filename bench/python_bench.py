@@ -1,8 +1,9 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""What the Python package costs beside the command: bench/python_bench.py [build folder]
+"""Compares the cost of the Python package with that of the command: bench/python_bench.py [build folder]
 
-A capture of 100 million samples decoded whole, and a loop that reads; both sides in turn, start included, medians."""
+Decodes a capture of 100 million samples and reads in a loop. The sides run in turn; times include their start. Prints
+medians."""
 import os
 import pathlib
 import statistics
@@ -25,7 +26,7 @@ def program(text):
 
 
 def measured(arguments):
-    """Time, processor time and peak memory of a process that must end well."""
+    """Runs a process and returns its time, processor time and peak memory. It must exit with status 0."""
     start = time.monotonic()
     with open(os.devnull, "wb") as nowhere:
         process = subprocess.Popen(arguments, stdout=nowhere, env=ENVIRONMENT)
@@ -38,7 +39,7 @@ def measured(arguments):
 
 
 def compare(title, rounds, sides):
-    """The first of the sides by name is what the others are compared with."""
+    """Measures the sides in turn and prints their ratios to the first one."""
     runs = {name: [] for name in sides}
     for _ in range(rounds):
         for name, arguments in sides.items():
@@ -47,8 +48,8 @@ def compare(title, rounds, sides):
     print(f"{title} (medians of {rounds} runs in turn)")
     first = next(iter(medians.values()))
     for name, values in medians.items():
-        told = (f"{value:.3g} {unit} ({value / base:.2f})" for unit, value, base in zip(MEASURES, values, first))
-        print(f"  {name:34} {', '.join(told)}", flush=True)
+        parts = (f"{value:.3g} {unit} ({value / base:.2f})" for unit, value, base in zip(MEASURES, values, first))
+        print(f"  {name:34} {', '.join(parts)}", flush=True)
 
 
 def main():

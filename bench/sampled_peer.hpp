@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a motor controller does that samples SLO with its timer, one byte of a port for each clock of MA: our own
-// stand-in for the way mjbots' moteus takes a BiSS frame apart, to measure ours beside it. Nothing else uses it.
+// Decoder of a motor controller that samples SLO with a timer, one byte of a port per clock of MA. It is our own
+// implementation of the method of mjbots' moteus for BiSS frames, used only to compare it with our decoder.
 #pragma once
 
 #include <array>
@@ -11,10 +11,10 @@
 
 namespace absenc::bench {
 
-/// What the controller is configured with.
+/// Configuration of the controller.
 struct SampledPeer {
   unsigned pin;
-  unsigned bits;  // of the position, up to 58
+  unsigned bits;  // bits of the position, up to 58
 };
 
 struct SampledPosition {
@@ -26,7 +26,7 @@ struct SampledPosition {
 
 namespace detail {
 
-// The remainder of six bits and six zeros behind them, by x^6 + x + 1.
+// Remainders of six bits followed by six zeros, for the polynomial x^6 + x + 1.
 inline constexpr auto six_bits = [] {
   std::array<std::uint8_t, 64> table{};
   for (unsigned value = 0; value < 64; ++value) {
@@ -41,14 +41,14 @@ constexpr std::uint32_t every_byte = 0x0101'0101;
 
 inline std::uint32_t four_samples(const std::uint8_t* samples, unsigned pin) {
   std::uint32_t four = 0;
-  __builtin_memcpy(&four, samples, sizeof four);  // a load, also in a freestanding program
+  __builtin_memcpy(&four, samples, sizeof four);  // one load instruction, also in a freestanding program
   return four >> pin & every_byte;
 }
 
-// One bit of each of four bytes, the first one the most significant, gathered by a multiplication.
+// Gathers one bit of each of four bytes by a multiplication; the first byte gives the highest bit.
 inline std::uint32_t gathered(std::uint32_t four) { return four * 0x0804'0201 >> 24; }
 
-// Six bits a step; as many steps as up to 30 bits need, or 60.
+// Processes six bits per step, in as many steps as 30 or 60 bits need.
 inline unsigned checksum(std::uint64_t data, unsigned bits) {
   unsigned rest = 0;
   const auto step = [&](unsigned shift) { rest = six_bits[(data >> shift & 0x3F) ^ rest]; };
@@ -67,7 +67,8 @@ Register gather(const std::uint8_t* samples, unsigned bits, unsigned pin) {
 
 }  // namespace detail
 
-/// The frame in `samples`, at least four more of which than it needs, whose start bit is looked for in the first 25.
+/// Decodes the frame in `samples`, which must have at least four samples after the frame. The start bit is searched in
+/// the first 25.
 inline SampledPosition take(const SampledPeer& peer, std::span<const std::uint8_t> samples) {
   using Error = SampledPosition::Error;
   constexpr std::size_t searched = 25;

@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""What readings cost `absenc serve` as encoders become more, and how late they come while many look on:
-bench/serve_load.py [SECONDS [ENCODERS...]]
+"""Measures the cost of readings in `absenc serve` for several numbers of encoders, and their lateness with many
+clients: bench/serve_load.py [SECONDS [ENCODERS...]]
 
-Each encoder is an `absenc emulate` of its own behind TCP, read 100 times a second; 200 event streams are open, each
-with the trace of one encoder. Late is what comes later after the reading before it than the period, by the server's
-times: also because of an emulator that is late itself, where all of them want more than the processors have."""
+Each encoder is a separate `absenc emulate` behind TCP, read 100 times per second; 200 event streams are open, each with
+the points of one encoder. A reading is late if more than the period has passed since the previous one, by the server's
+times. A late emulator also counts, if all processes together need more than the processors provide."""
 import contextlib
 import json
 import os
@@ -82,7 +82,7 @@ class Server:
 
 
 class Streams:
-    """Of all everything is read; of some, what the server says of the times of readings is kept."""
+    """Open event streams. Everything is read from all of them; the times of readings are stored for some."""
 
     def __init__(self, server, encoders):
         self.selector = selectors.DefaultSelector()
@@ -103,16 +103,16 @@ class Streams:
                 if not got:
                     sys.exit("the server has ended a stream")
                 if key.data in self.texts:
-                    self.keep(key.data, got)
+                    self.store_times(key.data, got)
 
-    def keep(self, i, got):
+    def store_times(self, i, got):
         *lines, self.texts[i] = (self.texts[i] + got).split(b"\n")
         for line in lines:
             if line.startswith(b"data: ") and b'"points":' in line:
                 self.times[i] += [at for at, _, _ in json.loads(line[6:])["points"]]
 
     def late_ms(self):
-        """Of each reading of those that are kept, in order."""
+        """Returns the lateness of each stored reading in ms, in ascending order."""
         return sorted(max(0, after - before - 1000 // RATE)
                       for times in self.times.values() for before, after in zip(times, times[1:]))
 

@@ -1,8 +1,9 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""What MQTT costs `absenc serve`, and how fast a full spool empties: bench/serve_mqtt.py [absenc]
+"""Measures the cost of MQTT in `absenc serve`, and how fast it sends a full spool: bench/serve_mqtt.py [absenc]
 
-Needs mosquitto, python3-paho-mqtt. The encoders are virtual ones within the server: what they take stands beside it."""
+Needs mosquitto, python3-paho-mqtt. The encoders are virtual ones within the server; a run without sending shows their
+cost."""
 import json
 import os
 import pathlib
@@ -45,7 +46,7 @@ class Server:
 
 
 def share(server):
-    """Of a core, in percent."""
+    """Returns the load of the server in percent of a core."""
     time.sleep(2)
     before, start = server.cpu(), time.monotonic()
     time.sleep(SECONDS)
@@ -61,7 +62,7 @@ def cost(folder, broker):
 
 
 def delay(folder, broker):
-    """From a reading to its receiver."""
+    """Measures the time from a reading to its receiver."""
     receiver = Receiver(broker.port, "bench/+/readings")
     late = []
     receiver.client.on_message = lambda client, data, message: late.extend(

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// Streams of 10 000 frames a second each on 1, 4 and 16 pseudo-terminals at once, read in one process with a thread, a
-// serial port and a session for each: every frame must come, and what each costs must not rise with their number.
-// The far side is a process that writes ten frames to each port every millisecond, as a USB adapter hands them over.
+// Streams of 10 000 frames per second each, on 1, 4 and 16 pseudo-terminals at once, read in one process with a thread,
+// a serial port and a session for each. No frame may be lost, and the cost per frame must not rise with the number of
+// ports. The sender is a process that writes ten frames to each port every millisecond, in bursts like those of a USB
+// adapter.
 #include <fcntl.h>
 #include <stdlib.h>
 #include <termios.h>
@@ -33,8 +34,8 @@ using namespace absenc::raa38;
 using namespace std::chrono_literals;
 
 constexpr std::array<std::size_t, 3> counts{1, 4, 16};
-constexpr std::uint32_t frames_each = 20'000;  // two seconds
-constexpr std::uint32_t together = 10;         // a millisecond
+constexpr std::uint32_t frames_each = 20'000;  // two seconds of frames per port
+constexpr std::uint32_t together = 10;         // frames per burst, one burst per millisecond
 constexpr int rounds = 3;
 
 [[noreturn]] void fail(const char* what) {
@@ -54,7 +55,7 @@ struct Terminal {
   std::string path;
 };
 
-// The position counts the frames, so that one that is missing shows. What a full port does not take is sent later.
+// The position counts the frames, so that a missing one is detected. Bytes that a full port refuses are sent later.
 void transmit(const std::vector<Terminal>& terminals) {
   const serial::Format format{.bits = 16};
   std::vector<std::vector<std::uint8_t>> unsent(terminals.size());
@@ -104,7 +105,7 @@ Reader read_stream(const std::string& path, std::atomic<std::size_t>& ready, std
   return reader;
 }
 
-/// Processor time of this process for each frame, in microseconds.
+/// Returns the processor time of this process per frame, in microseconds.
 double measure(std::size_t ports) {
   const std::vector<Terminal> terminals(ports);
   const pid_t child = ::fork();

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Unit::decode of every unit, as captures, `decode` and `identify` call it: options, checks, and every named value put.
-// The frames are the unit's good vectors; what they cost is compared with one CRC over their bytes, taken bit by bit.
+// Unit::decode of every unit, as captures, `decode` and `identify` call it: options, checks, and output of every field.
+// The frames are the unit's valid vectors. Their cost is compared with one CRC over their bytes, computed bit by bit.
 #include <algorithm>
 #include <array>
 #include <cstdio>
@@ -34,9 +34,9 @@ Options options_of(const Unit& unit, const Vector& vector) {
   return options;
 }
 
-/// A frame in the form its link carries, with what it refers to.
-struct Wire {
-  Wire(const Unit& unit, Bytes text) : bytes(text.begin(), text.end()) {
+/// A frame in the form of its link, with the data that `frame()` refers to.
+struct OwnedFrame {
+  OwnedFrame(const Unit& unit, Bytes text) : bytes(text.begin(), text.end()) {
     if (unit.link == LinkKind::clocked) {
       const auto packed = bits_of_text(text);
       bits = packed.size();
@@ -57,8 +57,8 @@ struct Wire {
 
 struct Sample {
   Options options;
-  Wire request;
-  Wire reply;
+  OwnedFrame request;
+  OwnedFrame reply;
 };
 
 std::vector<Sample> samples_of(const Unit& unit) {

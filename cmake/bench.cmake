@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-# One executable per bench/*.cpp, in build/release/bench. Each has its own main (BENCHMARK_MAIN).
+# Builds one executable per bench/*.cpp in build/release/bench. Each has its own main (BENCHMARK_MAIN).
 find_package(benchmark REQUIRED)
 
 add_custom_target(benchmarks)

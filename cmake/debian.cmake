@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-# What Debian's policy asks of each package beside what is installed: compressed man pages, a file "copyright", and
-# folders that all may enter, whatever the umask. A component is called as its package.
+# Applies Debian's policy to each package: compressed man pages, a file "copyright", and folders that are readable for
+# all, independent of the umask. Each component has the name of its package.
 foreach(package IN LISTS CPACK_COMPONENTS_ALL)
   set(root "${CPACK_TEMPORARY_DIRECTORY}/${package}/usr")
   file(GLOB_RECURSE man_pages "${root}/share/man/*.[1-9]")
@@ -8,7 +8,7 @@ foreach(package IN LISTS CPACK_COMPONENTS_ALL)
     execute_process(COMMAND gzip -9n ${man_pages} COMMAND_ERROR_IS_FATAL ANY)
   endif()
   set(documents "${root}/share/doc/${package}")
-  file(REMOVE "${documents}/LICENSE")  # stands in /usr/share/common-licenses
+  file(REMOVE "${documents}/LICENSE")  # the text is in /usr/share/common-licenses
   file(COPY "${CMAKE_CURRENT_LIST_DIR}/copyright" DESTINATION "${documents}"
        FILE_PERMISSIONS OWNER_READ OWNER_WRITE GROUP_READ WORLD_READ)
   file(CHMOD_RECURSE "${root}" DIRECTORY_PERMISSIONS

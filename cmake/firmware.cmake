@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-# Programs for machines that QEMU emulates (firmware/). Code for a Cortex-M0+ runs on all of them: there is no machine
-# with one. ./dev firmware builds and runs them.
+# Builds programs for machines that QEMU emulates (firmware/). QEMU has no machine with a Cortex-M0+, but its code runs
+# on all of these. `./dev firmware` builds and runs them.
 find_package(Python3 REQUIRED COMPONENTS Interpreter)
 
 set(firmware_folder "${CMAKE_CURRENT_BINARY_DIR}/firmware")
-set(m4f_flags -mcpu=cortex-m4 -mfloat-abi=hard -mfpu=fpv4-sp-d16)  # behind those of the toolchain, which they replace
+set(m4f_flags -mcpu=cortex-m4 -mfloat-abi=hard -mfpu=fpv4-sp-d16)  # follow the flags of the toolchain and override them
 
-# What each machine has in firmware/machine, and where its program and its RAM begin.
+# Sources of each machine in firmware/machine, and start addresses of its program and its RAM.
 set(microbit_machine cortex_m microbit)
 set(mps2_machine cortex_m mps2)
 set(virt_machine virt)
@@ -14,7 +14,7 @@ set(begin_of_microbit 0 0x20000000)
 set(begin_of_mps2 0 0x20000000)
 set(begin_of_virt 0x80000000 0x80400000)
 
-# firmware_program(NAME MACHINE ROM RAM SOURCES... [LIBRARY ...] [FLAGS ...]): NAME.elf
+# firmware_program(NAME MACHINE ROM RAM SOURCES... [LIBRARY ...] [FLAGS ...]) builds NAME.elf.
 function(firmware_program name machine rom ram)
   cmake_parse_arguments(one "" "LIBRARY" "SOURCES;FLAGS" ${ARGN})
   string(MAKE_C_IDENTIFIER "firmware_${machine}${one_FLAGS}" machine_objects)  # compiled once for all programs
@@ -42,7 +42,7 @@ function(firmware_program name machine rom ram)
                         RUNTIME_OUTPUT_DIRECTORY "${firmware_folder}")
 endfunction()
 
-# The vectors of the reference.
+# Tables of the reference vectors.
 file(GLOB vector_files CONFIGURE_DEPENDS "${PROJECT_SOURCE_DIR}/tests/vectors*.json")
 set(vector_tables "${firmware_folder}/reference_vectors.cpp")
 set(vector_script "${PROJECT_SOURCE_DIR}/firmware/vectors.py")
@@ -51,13 +51,13 @@ add_custom_command(OUTPUT "${vector_tables}" DEPENDS "${vector_script}" ${vector
                    COMMAND "${Python3_EXECUTABLE}" -B "${vector_script}" "${vector_tables}" ${vector_files} VERBATIM)
 set(vector_sources "${PROJECT_SOURCE_DIR}/firmware/vectors.cpp" "${vector_tables}")
 
-if(CMAKE_SYSTEM_PROCESSOR STREQUAL riscv)  # a compiler and a tree of its own, and none but these
+if(CMAKE_SYSTEM_PROCESSOR STREQUAL riscv)  # only this program uses the RISC-V compiler and build tree
   firmware_program(vectors-rv32 virt 1M 64K SOURCES ${vector_sources} LIBRARY absenc)
   add_custom_target(firmware-all DEPENDS firmware_vectors-rv32)
   return()
 endif()
 
-# All of the library for a Cortex-M4 with its FPU.
+# The whole library for a Cortex-M4 with FPU.
 absenc_sources(m4f_sources ${absenc_firmware_folders})
 add_library(absenc-m4f STATIC EXCLUDE_FROM_ALL ${m4f_sources})
 absenc_settings(absenc-m4f)
@@ -67,7 +67,7 @@ target_compile_options(absenc-m4f PRIVATE ${m4f_flags})
 firmware_program(vectors-m0plus mps2 1M 64K SOURCES ${vector_sources} LIBRARY absenc)
 firmware_program(vectors-m4f mps2 1M 64K SOURCES ${vector_sources} LIBRARY absenc-m4f FLAGS ${m4f_flags})
 
-# A T-format encoder at one end of the line, or at the other.
+# Two programs for the two ends of a T-format line.
 foreach(program IN ITEMS drive encoder)
   set(source "${PROJECT_SOURCE_DIR}/firmware/${program}.cpp")
   firmware_program(${program}-microbit microbit 256K 16K SOURCES "${source}" LIBRARY absenc)
@@ -79,7 +79,7 @@ add_custom_target(firmware DEPENDS firmware_vectors-m0plus firmware_drive-microb
                   firmware_encoder-microbit firmware_encoder-m0plus)
 add_custom_target(firmware-all DEPENDS firmware firmware_vectors-m4f firmware_drive-m4f firmware_encoder-m4f)
 
-# Readers of one position each, which firmware/figures.py measures. Of the library they need little.
+# Programs that each read one position, measured by firmware/figures.py. They need only a small part of the library.
 set(reading_sources ${m4f_sources})
 list(FILTER reading_sources INCLUDE REGEX "(engine|/host)\\.cpp$")
 foreach(cpu IN ITEMS m0plus m4f)

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-# The freestanding layers as firmware would take them. Every header is compiled on its own, and what all of it
-# together wants from outside is held against a list.
+# Compiles the freestanding layers as for firmware. Every header is compiled on its own, and the external symbols of all
+# objects together are compared with a list.
 set_target_properties(absenc PROPERTIES VERIFY_INTERFACE_HEADER_SETS ON)
 
 add_library(freestanding OBJECT tests/freestanding.cpp)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-# One libFuzzer executable per *_fuzz.cpp in build/sanitize/fuzzers, and a tool that writes the vectors as seeds.
+# Builds one libFuzzer executable per *_fuzz.cpp in build/sanitize/fuzzers, and a tool that writes the vectors as seeds.
 if(NOT CMAKE_CXX_COMPILER_ID MATCHES "Clang")
   message(FATAL_ERROR "ABSENC_FUZZ needs clang: cmake --preset sanitize")
 endif()

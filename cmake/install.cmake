@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-# What `cmake --install` and `cpack` make of a build tree, in components: absenc, the command, libabsenc-dev, and
+# Installation and packages by `cmake --install` and `cpack`. Components: absenc (the command), libabsenc-dev,
 # python3-absenc.
 include(CMakePackageConfigHelpers)
 
@@ -20,7 +20,7 @@ write_basic_package_version_file("${CMAKE_CURRENT_BINARY_DIR}/absencConfigVersio
 install(FILES "${CMAKE_CURRENT_BINARY_DIR}/absencConfigVersion.cmake" DESTINATION "${absenc_package_dir}"
         COMPONENT libabsenc-dev)
 
-# The way from the folder of the .pc files to the prefix, so that the tree may be moved.
+# Path from the folder of the .pc files to the prefix, so that the installed tree can be moved.
 cmake_path(RELATIVE_PATH CMAKE_INSTALL_PREFIX BASE_DIRECTORY "${CMAKE_INSTALL_PREFIX}/${absenc_pkgconfig_dir}"
            OUTPUT_VARIABLE absenc_prefix_from_pkgconfig)
 set(absenc_client_needs ${gpiod_LIBRARIES} ${hwy_LIBRARIES} ${libzip_LIBRARIES} ${libdeflate_LIBRARIES}
@@ -36,7 +36,7 @@ endforeach()
 
 install(FILES README.md LICENSE DESTINATION "${CMAKE_INSTALL_DOCDIR}" COMPONENT absenc)
 
-# The man page and the bash completion are written by a program that knows the tables of the command.
+# A program that links the command's tables writes the man page and the bash completion.
 if(TARGET absenc-command)
   install(TARGETS absenc-command COMPONENT absenc)
   install(FILES cmake/absenc.service DESTINATION lib/systemd/system COMPONENT absenc)
@@ -66,6 +66,6 @@ if(TARGET absenc-command)
 endif()
 
 if(PROJECT_IS_TOP_LEVEL)
-  file(TOUCH "${CMAKE_BINARY_DIR}/install_manifest.txt")  # it stays ours when root installs
+  file(TOUCH "${CMAKE_BINARY_DIR}/install_manifest.txt")  # keeps the file writable for the user when root installs
   include(package)
 endif()

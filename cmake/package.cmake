@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-# Debian packages of what is installed, one for each component: cpack --config build/release/CPackConfig.cmake
+# Debian packages, one for each component: cpack --config build/release/CPackConfig.cmake
 set(CPACK_GENERATOR DEB)
 set(CPACK_PACKAGE_NAME absenc)
 set(CPACK_PACKAGE_CONTACT "absenc developers <absenc@localhost.invalid>")
-set(CPACK_PACKAGE_DESCRIPTION_SUMMARY "")  # each package's description begins with its own
+set(CPACK_PACKAGE_DESCRIPTION_SUMMARY "")  # empty, because each package has its own description
 set(CPACK_PACKAGING_INSTALL_PREFIX /usr)
 set(CPACK_STRIP_FILES ON)
 set(CPACK_PRE_BUILD_SCRIPTS "${PROJECT_SOURCE_DIR}/cmake/debian.cmake")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-# The Python package, whole in build/release/python: its module, and beside it the sources in Python.
+# Builds the whole Python package in build/release/python: the extension module and the Python sources.
 find_package(Python3 3.11 REQUIRED COMPONENTS Interpreter Development.Module)
 set(Python_EXECUTABLE "${Python3_EXECUTABLE}")
 find_package(pybind11 REQUIRED)
@@ -21,7 +21,7 @@ foreach(file IN LISTS python_files)
   configure_file("${file}" "${absenc_python_dir}/${name}" COPYONLY)
 endforeach()
 
-# Where Debian's Python looks; wheels are made of the same folder (python/backend).
+# Debian's folder for Python packages. Wheels are made from the same build folder (python/backend).
 if(ABSENC_INSTALL AND NOT ABSENC_SANITIZE)
   install(DIRECTORY "${absenc_python_dir}" DESTINATION lib/python3/dist-packages COMPONENT python3-absenc
           PATTERN __pycache__ EXCLUDE)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-# RV32IMAC. Debian has no C++ library for it: the headers are those of ARM's, over picolibc.
+# RV32IMAC. Debian has no C++ library for it, so the headers of ARM's library are used, with picolibc.
 set(CMAKE_SYSTEM_NAME Generic)
 set(CMAKE_SYSTEM_PROCESSOR riscv)
 set(CMAKE_CXX_COMPILER riscv64-unknown-elf-g++)

@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-# Which files belong to what: for the build of this checkout, and for those of others that take part of it (packages/).
+# Lists of sources, for this build and for other build systems that use a part of the repository (packages/).
 get_filename_component(absenc_root "${CMAKE_CURRENT_LIST_DIR}/.." ABSOLUTE)
 
-# What needs no operating system, and what of a compiler makes that small: what nobody calls is not linked.
+# Folders that need no operating system, and compiler flags that keep firmware small by linking only functions in use.
 set(absenc_firmware_folders absenc/core absenc/link absenc/protocol absenc/host)
 set(absenc_firmware_flags -ffunction-sections -fdata-sections -fno-exceptions -fno-rtti -fno-threadsafe-statics)
 
-# Sources of folders, without what stands beside them for testing.
+# Returns the sources of folders, without tests, fuzzers and benchmarks.
 function(absenc_sources result)
   set(found)
   foreach(folder IN LISTS ARGN)

@@ -1,39 +1,40 @@
 # SPDX-License-Identifier: Apache-2.0
-# Unit tests: one executable per layer and per protocol folder. Cross-cutting tests: one per file of tests/.
+# Unit tests: one executable per layer and per protocol folder. Cross-cutting tests: one executable per file of tests/.
 find_package(GTest REQUIRED)
 find_package(rapidcheck REQUIRED)
 include(GoogleTest)
 
-# The tests with the label `long`, which `./dev test` leaves out: those of more than some seconds, and those that need
-# programs or packages that no other test needs. `./dev test --all` runs them.
+# Tests with the label `long` take more than some seconds, or need programs or packages that no other test needs.
+# `./dev test` skips them; `./dev test --all` runs them.
 set(absenc_long_python_tests
-    can_peers modbus_peers wave  # clients, nodes and decoders that others wrote
-    doctor_faults doctor_healthy identify speed  # many faults, busy processes, every line again and again
-    install mutants_script new_protocol packages python_wheel  # they compile, install or configure
-    python python_units record_hdf5  # mypy, pytest, pandas, matplotlib, h5py
-    serve_broker serve_cluster serve_history serve_mqtt serve_others serve_proxy serve_spool  # brokers, proxies, full disks
-    serve_browser serve_client serve_look  # a browser, npm
+    can_peers modbus_peers wave  # use clients, nodes and decoders of other projects
+    doctor_faults doctor_healthy identify speed  # many faults, loaded machines, repetitions on every line
+    install mutants_script new_protocol packages python_wheel  # compile, install or configure
+    python python_units record_hdf5  # need mypy, pytest, pandas, matplotlib, h5py
+    serve_broker serve_cluster serve_history serve_mqtt serve_others serve_proxy serve_spool  # need brokers, proxies, full disks
+    serve_browser serve_client serve_look  # need a browser, npm
     mqtt_failures_abuse mqtt_packets_abuse mqtt_spool_abuse serve_history_abuse serve_http_abuse)
-# Series of faults behind the first, as filters of GoogleTest.
+# GoogleTest filters for all series of faults but the first.
 set(absenc_long_series)
 foreach(series RANGE 1 9)
   list(APPEND absenc_long_series "Seeds/*/${series}_*")
 endforeach()
 list(JOIN absenc_long_series ":" absenc_long_series)
 
-# GoogleTest is parsed once for all tests. The tests themselves are not optimised: they compile in half the time. Of the
-# long campaigns, sanitizers see one series of faults (CMakePresets.json), and of that a share (tests/cases.hpp).
+# GoogleTest's headers are compiled once for all tests. Tests are not optimised, so they compile in half the time. Of
+# the long campaigns, sanitizer builds run one series of faults (CMakePresets.json), and only a share of it
+# (tests/cases.hpp).
 function(absenc_test_settings target)
   absenc_settings(${target})
   target_include_directories(${target} PRIVATE "${PROJECT_SOURCE_DIR}")
   target_compile_options(${target} PRIVATE -O0)
-  if(ABSENC_FUZZ)  # where they have been guides no fuzzer, and takes a quarter of their compile time
+  if(ABSENC_FUZZ)  # coverage of tests is useless for fuzzers, and takes a quarter of the compile time
     target_compile_options(${target} PRIVATE -fsanitize-coverage=0)
   endif()
   target_link_libraries(${target} PRIVATE absenc::absenc absenc::os absenc::capture rapidcheck GTest::gtest_main GTest::gmock)
 endfunction()
 
-# The one test that reads a file of the sources; elsewhere a path of this machine would keep compilers' caches from working.
+# Only this test reads a source file; the path would make compiler caches useless for all others.
 set_source_files_properties(absenc/protocol/raa38/serial/modes_test.cpp PROPERTIES
                             COMPILE_DEFINITIONS ABSENC_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
 file(CONFIGURE OUTPUT "${CMAKE_CURRENT_BINARY_DIR}/test_headers.cpp" CONTENT "")
@@ -45,12 +46,12 @@ function(absenc_test name)
   add_executable(${name}_test ${ARGN})
   absenc_test_settings(${name}_test)
   set_target_properties(${name}_test PROPERTIES RUNTIME_OUTPUT_DIRECTORY "${CMAKE_CURRENT_BINARY_DIR}/tests")
-  if(name STREQUAL "command" OR name STREQUAL "manual")  # other settings than the shared headers
+  if(name STREQUAL "command" OR name STREQUAL "manual")  # compiled with other settings than the precompiled headers
     target_link_libraries(${name}_test PRIVATE absenc-command-objects $<TARGET_NAME_IF_EXISTS:absenc-${name}-objects>)
   else()
     target_precompile_headers(${name}_test REUSE_FROM test_headers)
   endif()
-  set(environment "ABSENC_SOURCE_DIR=${PROJECT_SOURCE_DIR}")  # tables in documents are compared with what the code says
+  set(environment "ABSENC_SOURCE_DIR=${PROJECT_SOURCE_DIR}")  # for tests that compare tables in documents with the code
   set(discovery TEST_PREFIX "${name}." DISCOVERY_MODE PRE_TEST DISCOVERY_TIMEOUT 60)
   gtest_discover_tests(${name}_test ${discovery} TEST_FILTER "-${absenc_long_series}" PROPERTIES ENVIRONMENT "${environment}")
   if(name STREQUAL "kit")
@@ -59,8 +60,8 @@ function(absenc_test name)
   endif()
 endfunction()
 
-# GLOB: the tests of the folder alone, GLOB_RECURSE: and of those in it. ABSENC_SPLIT_TESTS: of units, each source by itself
-# (tests/mutants.py, which runs no more of them than it needs).
+# GLOB: only tests of the folder itself; GLOB_RECURSE: also those of subfolders. ABSENC_SPLIT_TESTS builds one
+# executable per source for host and protocol, because tests/mutants.py runs only those that it needs.
 function(absenc_folder_test name folder glob)
   file(${glob} sources CONFIGURE_DEPENDS "${PROJECT_SOURCE_DIR}/${folder}/*_test.cpp")
   if(ABSENC_SPLIT_TESTS AND folder MATCHES "^absenc/(host|protocol)")
@@ -111,14 +112,15 @@ if(TARGET absenc-manual-objects)
   absenc_folder_test(manual tools/manual GLOB_RECURSE)
 endif()
 
-# What every unit is tested with, and toys with mistakes that it must find.
+# The test kit for every unit, and toy units with errors that the kit must find.
 file(GLOB kit_sources CONFIGURE_DEPENDS "${PROJECT_SOURCE_DIR}/tests/kit/*.cpp")
 absenc_test(kit ${kit_sources})
 list(FILTER kit_sources EXCLUDE REGEX "_test\\.cpp$")
-# A million exchanges of each unit. What is precompiled for tests is not optimised.
+# The kit runs a million exchanges per unit, so it is optimised and cannot use the precompiled headers.
 set_source_files_properties(${kit_sources} PROPERTIES COMPILE_OPTIONS -O2 SKIP_PRECOMPILE_HEADERS ON)
 
-# Every fuzz body as a plain test: over all vectors, what is near them, and noise. Beside the fuzzers it says nothing new.
+# Runs every fuzz function as a plain test, on all vectors, on variations of them, and on noise. In fuzzer builds the
+# fuzzers do the same.
 if(ABSENC_LIBRARY_TESTS AND NOT ABSENC_FUZZ)
   add_library(fuzz_seeds_main OBJECT tests/fuzz_seeds_main.cpp)
   absenc_settings(fuzz_seeds_main)
@@ -137,15 +139,15 @@ if(ABSENC_LIBRARY_TESTS AND NOT ABSENC_FUZZ)
     endif()
     target_link_libraries(${target} PRIVATE fuzz_seeds_main absenc::absenc absenc::capture)
     add_test(NAME fuzz_seeds.${stem} COMMAND ${target})
-    set_tests_properties(fuzz_seeds.${stem} PROPERTIES TIMEOUT 400)  # a minute of computing, on a machine of its own
+    set_tests_properties(fuzz_seeds.${stem} PROPERTIES TIMEOUT 400)  # about a minute of processor time on an idle machine
   endforeach()
 endif()
 
-# Tests in Python: of the command as a user types it, and of the sources.
+# Tests in Python, of the command and of the sources.
 if(ABSENC_COMMAND)
   find_package(Python3 REQUIRED COMPONENTS Interpreter)
   file(GLOB python_tests CONFIGURE_DEPENDS "${PROJECT_SOURCE_DIR}/tests/*_test.py")
-  list(FILTER python_tests EXCLUDE REGEX "/firmware_test\\.py$")  # of programs for ARM, which ./dev test --all builds and runs
+  list(FILTER python_tests EXCLUDE REGEX "/firmware_test\\.py$")  # needs the ARM build: ./dev test --all runs it
   if(NOT TARGET absenc-manual OR NOT PROJECT_IS_TOP_LEVEL)
     list(FILTER python_tests EXCLUDE REGEX "/install_test\\.py$")
   endif()
@@ -155,10 +157,10 @@ if(ABSENC_COMMAND)
     string(REGEX REPLACE "_test$" "" name "${stem}")
     add_test(NAME ${name}.py COMMAND "${Python3_EXECUTABLE}" -B "${source}")
     set_tests_properties(${name}.py PROPERTIES
-      # What happens at once takes longer while other tests run.
+      # Busy time limits are relaxed, because other tests run at the same time.
       ENVIRONMENT "ABSENC=${absenc_bin_dir}/absenc;ABSENC_SOURCE_DIR=${PROJECT_SOURCE_DIR};ABSENC_BUSY_SECONDS=2"
-      COST 100  # they mostly wait: first, beside what computes
-      TIMEOUT 900)  # and some minutes on a machine that does something else
+      COST 100  # start first, because they mostly wait
+      TIMEOUT 900)  # enough for a busy machine
     if(name IN_LIST absenc_long_python_tests)
       set_tests_properties(${name}.py PROPERTIES LABELS long)
       list(REMOVE_ITEM absenc_long_python_tests ${name})
@@ -167,12 +169,12 @@ if(ABSENC_COMMAND)
   if(PROJECT_IS_TOP_LEVEL AND absenc_long_python_tests AND TARGET absenc-manual)
     message(FATAL_ERROR "No such tests: ${absenc_long_python_tests}")
   endif()
-  # Browsers that draw, and tests that keep the machine busy on purpose, leave little time for other tests.
+  # Browser tests, and tests that load the machine on purpose, leave little time for others.
   set_tests_properties(serve_browser.py serve_look.py doctor_faults.py PROPERTIES PROCESSORS 4)
   set_tests_properties(speed.py doctor_healthy.py PROPERTIES RUN_SERIAL ON)
 endif()
 
-# Examples end by themselves and tell by their exit status whether they worked.
+# Examples end by themselves; their exit status reports success.
 file(GLOB examples CONFIGURE_DEPENDS "${PROJECT_SOURCE_DIR}/examples/*.cpp")
 if(NOT TARGET absenc-client)
   set(examples)

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A capture of a logic analyser as rows: what was said on the line, and what was wrong with it.
+// Prints a capture of a logic analyser as rows: exchanges, fields and errors.
 #include <cstdio>
 #include <exception>
 

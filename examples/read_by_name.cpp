@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Any encoder by its name, as the command has it: tformat:/dev/ttyUSB0, ssi:spi:/dev/spidev0.0, sim:esl, elbow.
+// Reads any encoder by the address that the command uses: tformat:/dev/ttyUSB0, ssi:spi:/dev/spidev0.0, sim:esl, elbow.
 #include <cstdio>
 #include <exception>
 #include <optional>
@@ -17,7 +17,7 @@ int main(int argc, char** argv) try {
       continue;
     }
     const Reading& reading = sample.reading;
-    if (!reading.singleturn_valid()) continue;  // nobody confirmed it, or the encoder says so itself
+    if (!reading.singleturn_valid()) continue;  // not confirmed, or the encoder reports it as invalid
     std::printf("%.4f degrees\n", degrees(reading.singleturn, reading.singleturn_bits));
     const std::optional<client::Estimate> speed = sample.speed_rpm();
     if (speed) std::printf("%.1f rpm, within %.1f\n", speed->value, speed->uncertainty);

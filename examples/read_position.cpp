@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The library in 15 lines: read a Smart-Abs once. With a port as argument a real one, without one on a simulated line.
+// The library in 15 lines: reads a Smart-Abs once, at the port in the argument, or on a simulated line without one.
 #include <cstdio>
 
 #include "absenc/host/drive.hpp"
@@ -14,7 +14,7 @@ using namespace absenc;
 int read_from(Port<std::uint8_t>& port) {
   // [readme]
   tformat::ReadPosition read{tformat::Format{.singleturn_bits = 17, .multiturn_bits = 16, .encoder_id = 0x11}};
-  host::drive(read, port, [] { return true; });  // on a microcontroller: feed and next from your own UART driver
+  host::drive(read, port, [] { return true; });  // on a microcontroller, the interrupts of your UART call feed and next
 
   if (read.error() != Error::none) {
     std::printf("%s\n", text_of(read.error()).description.data());

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A virtual encoder in the test of a drive: it is found at a path like a real one, and misbehaves when it is told to.
+// A virtual encoder in the test of a drive: its port opens like that of a real encoder, and it fails on request.
 #include <cstdio>
 
 #include "absenc/client/emulate.hpp"
@@ -9,7 +9,8 @@ using namespace absenc;
 
 int main() {
   client::Emulation emulation = client::emulate("tformat?singleturn=65536");
-  client::Encoder encoder = client::open(emulation.address());  // here the drive under test opens emulation.path()
+  client::Encoder encoder = client::open(emulation.address());  // in a real test, the drive under test opens
+                                                                // emulation.path()
   Reading reading = encoder.read();
   if (!reading.singleturn_valid() || reading.singleturn != 65536) return 1;
 

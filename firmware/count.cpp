@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// A plugin of QEMU: prints how many instructions ran between each call of count_begin and that of count_end which
-// belongs to it, and in how many other such pairs that was. Their addresses are its arguments begin=ADDRESS and
-// end=ADDRESS. Debian's QEMU has plugins but no header for them: what is used of its interface (version 1) is declared
-// here.
+// A plugin for QEMU. For each pair of calls of count_begin and count_end it prints the nesting depth and the number of
+// instructions between them. The arguments begin=ADDRESS and end=ADDRESS are the addresses of these functions. Debian's
+// QEMU supports plugins but lacks their header, so the functions in use (interface version 1) are declared here.
 #include <cstdint>
 #include <cstdio>
 #include <cstdlib>
@@ -30,14 +29,14 @@ const int qemu_plugin_version = 1;
 namespace {
 
 std::uint64_t begin_address = 0, end_address = 0, count = 0;
-std::vector<std::uint64_t> begun;  // counts
+std::vector<std::uint64_t> begin_counts;  // instruction counts at each count_begin that has no count_end yet
 
-void one(unsigned, void*) { ++count; }
-void begin(unsigned, void*) { begun.push_back(count); }
+void count_instruction(unsigned, void*) { ++count; }
+void begin(unsigned, void*) { begin_counts.push_back(count); }
 void end(unsigned, void*) {
-  const unsigned long long counted = count - begun.back();
-  begun.pop_back();
-  std::printf("count %zu %llu\n", begun.size(), counted);
+  const unsigned long long counted = count - begin_counts.back();
+  begin_counts.pop_back();
+  std::printf("count %zu %llu\n", begin_counts.size(), counted);
   std::fflush(stdout);
 }
 
@@ -45,7 +44,7 @@ void translated(PluginId, TranslationBlock* block) {
   for (std::size_t i = 0; i < qemu_plugin_tb_n_insns(block); ++i) {
     Instruction* const instruction = qemu_plugin_tb_get_insn(block, i);
     const std::uint64_t address = qemu_plugin_insn_vaddr(instruction);
-    const ExecuteCallback what = address == begin_address ? begin : address == end_address ? end : one;
+    const ExecuteCallback what = address == begin_address ? begin : address == end_address ? end : count_instruction;
     qemu_plugin_register_vcpu_insn_exec_cb(instruction, what, no_registers, nullptr);
   }
 }

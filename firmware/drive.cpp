@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// A drive with a T-format encoder: a timer asks for positions, the UART's interrupts carry the conversations, the main
-// program gets readings, and in between clears an alarm and writes the encoder's memory.
-//   drive POSITIONS SINGLETURN MULTITURN LATENCY_MS: where the shaft stands, which is what every position must say
+// A drive with a T-format encoder: a timer requests positions, the UART's interrupts run the conversations, and the
+// main program evaluates the readings. Meanwhile it clears an alarm and writes to the encoder's memory.
+//
+//   drive POSITIONS SINGLETURN MULTITURN LATENCY_MS: number of readings, and the position that each must report
 #include <array>
 #include <new>
 
@@ -14,13 +15,14 @@
 namespace absenc::firmware {
 namespace {
 
-using machine::say;
+using machine::print;
 using namespace std::chrono_literals;
 
-constexpr Time tick_period = 500us;  // a position each, while the line is free
+constexpr Time tick_period = 500us;  // one position per tick while the line is free
 constexpr tformat::Format format{.singleturn_bits = 17, .multiturn_bits = 16, .encoder_id = 0x11};
-// Of the axis, not of the encoder. The XOR of T-format lets two flipped bits of the same place in two bytes pass: these
-// move a position by 255 counts or by turns, which no axis this slow does between two readings.
+// Highest speed of the axis, not of the encoder. The XOR checksum of T-format does not detect two flipped bits at the
+// same place of two bytes. These change a position by 255 or more counts or by turns, which so slow an axis cannot do
+// between two readings.
 constexpr std::uint32_t axis_rpm = 1;
 
 struct Result {
@@ -28,12 +30,12 @@ struct Result {
   Reading reading;
 };
 
-// In the interrupts: one conversation at a time, positions or what the main program has ordered.
+// Used by the interrupts: runs one conversation at a time, either a position or a command of the main program.
 class Axis {
  public:
   explicit Axis(Time latency) : carrier_(*this, latency) {}
 
-  // ---- Interrupts
+  // ---- Called by interrupts
 
   void tick(Time now) {
     carrier_.tick(now);
@@ -42,7 +44,7 @@ class Axis {
       running_ = ordered_;
       ordered_ = nullptr;
       carrier_.start(*running_, now);
-    } else if (positions_wanted_ && count_ < results_.size()) {
+    } else if (positions_requested_ && count_ < results_.size()) {
       running_ = position_ = new (position_memory_) tformat::ReadPosition(format);
       carrier_.start(*position_, now);
     }
@@ -53,7 +55,7 @@ class Axis {
   }
   void sent(Time now) { carrier_.sent(now); }
 
-  // ---- The line of the carrier
+  // ---- Called by the carrier
 
   void begin(const ByteStep& step) {
     ++requests_;
@@ -68,29 +70,29 @@ class Axis {
     running_ = nullptr;
   }
 
-  // ---- The main program
+  // ---- Called by the main program
 
-  void want_positions(bool wanted) {
-    const machine::Quiet quiet;
-    positions_wanted_ = wanted;
+  void request_positions(bool wanted) {
+    const machine::InterruptLock lock;
+    positions_requested_ = wanted;
   }
   bool take(Result& result) {
-    const machine::Quiet quiet;
+    const machine::InterruptLock lock;
     if (count_ == 0) return false;
     result = results_[first_];
     first_ = (first_ + 1) % results_.size();
     --count_;
     return true;
   }
-  // To its end; the conversation then has its error and what it found.
+  // Runs a conversation to its end; it then has an error or a result.
   void run(Conversation<std::uint8_t>& conversation) {
     {
-      const machine::Quiet quiet;
+      const machine::InterruptLock lock;
       ordered_ = &conversation;
     }
     for (bool over = false; !over;) {
       asm volatile("wfi");
-      const machine::Quiet quiet;
+      const machine::InterruptLock lock;
       over = ordered_ == nullptr && running_ != &conversation;
     }
   }
@@ -109,16 +111,16 @@ class Axis {
   std::size_t count_ = 0;
   std::uint32_t requests_ = 0;
   std::uint32_t unsolicited_ = 0;
-  bool positions_wanted_ = false;
+  bool positions_requested_ = false;
 };
 
 alignas(Axis) std::byte axis_memory[sizeof(Axis)];
 Axis* axis = nullptr;
 
-// What comes of readings.
-class Watch {
+// Checks and counts the readings.
+class ReadingCheck {
  public:
-  Watch(std::uint32_t singleturn, std::uint32_t multiturn) : singleturn_(singleturn), multiturn_(multiturn) {}
+  ReadingCheck(std::uint32_t singleturn, std::uint32_t multiturn) : singleturn_(singleturn), multiturn_(multiturn) {}
 
   void alarms_are(std::uint32_t alarms) { alarms_ = alarms; }
   void take(const Result& result) {
@@ -143,17 +145,17 @@ class Watch {
   }
   [[nodiscard]] std::uint32_t good() const { return good_; }
   [[nodiscard]] bool is_right() const { return wrong_ == 0; }
-  void tell() const {
-    tell("good", good_);
-    tell("failed", failed_);
-    tell("implausible", implausible_);
-    tell("wrong", wrong_);
+  void print_count() const {
+    print_count("good", good_);
+    print_count("failed", failed_);
+    print_count("implausible", implausible_);
+    print_count("wrong", wrong_);
   }
-  static void tell(std::string_view name, std::uint64_t number) {
-    say(name);
-    say(" ");
-    say(number);
-    say("\n");
+  static void print_count(std::string_view name, std::uint64_t number) {
+    print(name);
+    print(" ");
+    print(number);
+    print("\n");
   }
 
  private:
@@ -161,29 +163,29 @@ class Watch {
   std::uint32_t singleturn_;
   std::uint32_t multiturn_;
   std::uint32_t alarms_ = 0;
-  bool known_ = false;  // the last one was good
+  bool known_ = false;  // the last reading was good
   std::uint32_t good_ = 0;
   std::uint32_t failed_ = 0;
   std::uint32_t implausible_ = 0;
   std::uint32_t wrong_ = 0;
 };
 
-void read(Watch& watch, std::uint32_t until) {
-  axis->want_positions(true);
+void read(ReadingCheck& check, std::uint32_t until) {
+  axis->request_positions(true);
   Result result;
-  while (watch.good() < until) {
+  while (check.good() < until) {
     if (axis->take(result)) {
-      watch.take(result);
+      check.take(result);
     } else {
       asm volatile("wfi");
     }
   }
-  axis->want_positions(false);
-  while (axis->take(result)) watch.take(result);
+  axis->request_positions(false);
+  while (axis->take(result)) check.take(result);
 }
 
-// A command of the unit. What changes an encoder is never repeated by itself: this program decides to, because to clear
-// alarms twice, or to write the same byte twice, does no harm.
+// Runs a command of the unit. A command that changes the encoder is never repeated automatically. This program may
+// repeat these commands, because clearing alarms or writing the same byte twice does no harm.
 bool command(std::string_view name, Arguments arguments) {
   alignas(std::max_align_t) static std::array<std::byte, 4096> storage;
   const Unit& unit = tformat::unit;
@@ -197,35 +199,35 @@ bool command(std::string_view name, Arguments arguments) {
     if (conversation == nullptr) return false;
     axis->run(*conversation);
     if (conversation->error() == Error::none) return true;
-    Watch::tell(text_of(conversation->error()).name, attempt);
+    ReadingCheck::print_count(text_of(conversation->error()).name, attempt);
   }
   return false;
 }
 
 bool run() {
   const std::uint32_t positions = machine::argument(0, 1000);
-  Watch watch(machine::argument(1, 0), machine::argument(2, 0));
-  watch.alarms_are(tformat::alarms::over_heat);
-  read(watch, positions / 2);
+  ReadingCheck check(machine::argument(1, 0), machine::argument(2, 0));
+  check.alarms_are(tformat::alarms::over_heat);
+  read(check, positions / 2);
   const bool cleared = command("clear-alarms", {});
   constexpr std::array<std::int64_t, 3> written{5, 0x42, 2};  // address, value, page
   const bool stored = command("memory-write", written);
-  watch.alarms_are(0);
-  read(watch, positions);
-  watch.tell();
-  Watch::tell("requests", axis->requests());
-  Watch::tell("silences", axis->silences());
-  Watch::tell("unasked", axis->unsolicited());
-  Watch::tell("cleared", cleared ? 1 : 0);
-  Watch::tell("stored", stored ? 1 : 0);
-  Watch::tell("stack", machine::stack_used());
-  return watch.is_right() && cleared && stored;
+  check.alarms_are(0);
+  read(check, positions);
+  check.print_count();
+  ReadingCheck::print_count("requests", axis->requests());
+  ReadingCheck::print_count("silences", axis->silences());
+  ReadingCheck::print_count("unasked", axis->unsolicited());
+  ReadingCheck::print_count("cleared", cleared ? 1 : 0);
+  ReadingCheck::print_count("stored", stored ? 1 : 0);
+  ReadingCheck::print_count("stack", machine::stack_used());
+  return check.is_right() && cleared && stored;
 }
 
 }  // namespace
 }  // namespace absenc::firmware
 
-// Interrupts of one priority: what they call is one context.
+// All interrupts have one priority, so the functions that they call never interrupt each other.
 namespace absenc::machine {
 void on_tick() { firmware::axis->tick(now()); }
 void on_received(std::uint8_t byte) { firmware::axis->received(byte, now()); }

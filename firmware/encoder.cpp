@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// A T-format encoder: the device role in the UART's interrupts, on a shaft that stands or turns evenly.
-//   encoder SINGLETURN MULTITURN RPM LATENCY_MS: where the shaft stands at first, how fast it turns
-// It goes on until the emulator is ended, and says which rules its host breaks.
+// A T-format encoder: the device role in the UART's interrupts, on a shaft that stands still or turns evenly.
+//
+//   encoder SINGLETURN MULTITURN RPM LATENCY_MS: position at the start, and speed
+//
+// It runs until the emulator ends, and prints the rules of the document that its host violates.
 #include <new>
 
 #include "absenc/core/bytes.hpp"
@@ -14,8 +16,8 @@ namespace {
 
 using namespace std::chrono_literals;
 
-// Long, because the main program looks at the clock: a tick that the emulator is too late for would be
-// lost, and its time with it.
+// A long period, because a tick that the emulator delivers too late is lost, with its time. The main program reads the
+// clock instead.
 constexpr Time tick_period = 500ms;
 constexpr tformat::Format format{.singleturn_bits = 17, .multiturn_bits = 16, .encoder_id = 0x11};
 
@@ -24,7 +26,7 @@ class TurningShaft final : public Shaft {
   TurningShaft(std::int64_t position, std::uint32_t rpm) : position_(position), rpm_(rpm) {}
 
   [[nodiscard]] ShaftState at(Time time) const override {
-    constexpr std::uint64_t minute = 60'000'000;  // microseconds
+    constexpr std::uint64_t minute = 60'000'000;  // in microseconds
     const std::uint64_t turned = static_cast<std::uint64_t>(time / 1us) * rpm_;
     const std::uint64_t turns = turned / minute << 32 | (turned % minute << 32) / minute;
     return {.position = position_ + static_cast<std::int64_t>(turns),
@@ -44,16 +46,17 @@ class Encoder {
     device_.raise_alarms(tformat::alarms::over_heat);
   }
 
-  // ---- Interrupts
+  // ---- Called by interrupts
 
   void start(Time now) { carrier_.start(device_, now); }
   void tick(Time now) { carrier_.tick(now); }
   void received(std::uint8_t byte, Time now) { carrier_.received({&byte, 1}, now); }
   void sent(Time now) { carrier_.sent(now); }
 
-  // ---- The line of the carrier
+  // ---- Called by the carrier
 
-  // A reply lives in the device until it is fed again: by a host that talks meanwhile, as it must not.
+  // Copies the reply, because the device overwrites its own when a host sends during the reply, in violation of the
+  // document.
   void begin(const ByteStep& step) {
     reply_.clear();
     reply_.append(step.out);
@@ -61,7 +64,7 @@ class Encoder {
   }
   void result(bool) {}
 
-  // ---- The main program
+  // ---- Called by the main program
 
   [[nodiscard]] bool is_at_rest() const { return carrier_.due() == never; }
   [[nodiscard]] std::uint32_t broken_rules() const { return device_.violation_count(); }
@@ -80,7 +83,7 @@ Encoder* encoder = nullptr;
 }  // namespace
 }  // namespace absenc::firmware
 
-// Interrupts of one priority: what they call is one context.
+// All interrupts have one priority, so the functions that they call never interrupt each other.
 namespace absenc::machine {
 void on_tick() {}
 void on_received(std::uint8_t byte) { firmware::encoder->received(byte, now()); }
@@ -96,19 +99,19 @@ int main() {
                                          machine::argument(2, 0), std::chrono::milliseconds(machine::argument(3, 20)));
   machine::start_clock(tick_period);
   {
-    const machine::Quiet quiet;
+    const machine::InterruptLock lock;
     encoder->start(machine::now());
   }
   machine::start_uart();
-  for (std::uint32_t told = 0;;) {
-    const machine::Quiet quiet;
+  for (std::uint32_t reported = 0;;) {
+    const machine::InterruptLock lock;
     encoder->tick(machine::now());
-    // An interrupt that came meanwhile ends it at once. To look all the time would keep the emulator from its socket.
+    // An interrupt that is pending ends `wfi` at once. A busy loop would keep the emulator from its socket.
     if (encoder->is_at_rest()) asm volatile("wfi");
-    if (encoder->broken_rules() == told) continue;
-    told = encoder->broken_rules();
-    machine::say("broken rule: ");
-    machine::say(encoder->last_rule());
-    machine::say("\n");
+    if (encoder->broken_rules() == reported) continue;
+    reported = encoder->broken_rules();
+    machine::print("broken rule: ");
+    machine::print(encoder->last_rule());
+    machine::print("\n");
   }
 }

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """usage: figures.py FOLDER FIGURES.json [--check]
 
-What reading a position takes in firmware: sizes of the programs reader-*.elf in FOLDER above that of the base, and
-instructions, stack and what was read on an emulated machine. Writes the table, and the one in docs/firmware.md; with --check
-compares instead: every figure within 3 % of the table, whose compiler must be this one."""
+Measures the cost of reading a position in firmware: sizes of the programs reader-*.elf in FOLDER minus those of the base,
+and their instructions and stack on an emulated machine. Writes FIGURES.json and the table in docs/firmware.md. With
+--check it compares instead: every figure must be within 3 % of the table, and the compiler must be the same."""
 import json
 import os
 import re
@@ -30,7 +30,7 @@ def sizes(program):
 
 
 def marks(program):
-    """Where the marks are; a function's address has its lowest bit set."""
+    """Returns the addresses of the marks, as arguments of the plugin. Thumb functions have bit 0 set."""
     symbols = {name: int(address, 16) for address, _, name in
                re.findall(r"^([0-9a-f]+) (\w) (\w+)$", output("arm-none-eabi-nm", program), re.MULTILINE)}
     return f"begin={symbols['count_begin'] & ~1:#x},end={symbols['count_end'] & ~1:#x}"
@@ -45,7 +45,7 @@ def run(plugin, program, machine):
         sys.exit(f"{program} read no position: {result.stdout}{result.stderr}")
     counts, replies = ([int(count) for count in re.findall(rf"^count {depth} (\d+)", result.stdout, re.MULTILINE)]
                        for depth in (0, 1))
-    # What it says itself comes on another stream.
+    # The program's own output goes to standard error.
     stack = int(re.search(r"\d+", result.stderr)[0])
     return {"stack": stack, "reading": counts[0], "reply": replies[-1] if replies else None,
             "character": counts[1] if len(counts) > 1 else None}
@@ -63,7 +63,7 @@ def measured(folder):
                 program = os.path.join(folder, f"reader-{reader}-{cpu}.elf")
                 every[reader] = sizes(program) | run(plugin, program, machine)
             base = every.pop("base")
-            base["character"] = base["reply"] = base["reading"]  # what a pair of marks costs itself
+            base["character"] = base["reply"] = base["reading"]  # the cost of a pair of marks itself
             for reader, figures in every.items():
                 above = {name: None if figures[name] is None else figures[name] - base[name] for name in FIGURES}
                 table.setdefault(reader, {})[cpu] = above
@@ -91,10 +91,10 @@ def put_into_page(table):
 
 
 def differences(wanted, found):
-    """What is not within the tolerance, in words; also when less was measured than the table has."""
+    """Returns the figures outside the tolerance, in words; also those that are missing on one side."""
     if wanted["compiler"] != found["compiler"]:
-        return [f"the table is of {wanted['compiler']}, this is {found['compiler']}: ./dev firmware --figures"]
-    told = []
+        return [f"the table is from {wanted['compiler']}, but this compiler is {found['compiler']}: run ./dev firmware --figures"]
+    found_differences = []
     for reader in sorted(wanted["figures"].keys() | found["figures"].keys()):
         for cpu in MACHINES:
             for name in FIGURES:
@@ -102,8 +102,8 @@ def differences(wanted, found):
                 now = found["figures"].get(reader, {}).get(cpu, {}).get(name)
                 same = before == now or (None not in (before, now) and abs(now - before) <= TOLERANCE * before)
                 if not same:
-                    told.append(f"{reader} {cpu} {name}: {now}, in the table {before}")
-    return told
+                    found_differences.append(f"{reader} {cpu} {name}: {now}, in the table {before}")
+    return found_differences
 
 
 def main():
@@ -116,9 +116,9 @@ def main():
         put_into_page(found)
         return print(page(found))
     with open(path, encoding="utf-8") as file:
-        told = differences(json.load(file), found)
-    if told:
-        sys.exit("\n".join(told) + "\nIf that is meant: ./dev firmware --figures")
+        changed = differences(json.load(file), found)
+    if changed:
+        sys.exit("\n".join(changed) + "\nIf the changes are intended: ./dev firmware --figures")
     return None
 
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Decodes every vector of every unit on the machine, those that the units have and those of tests/*.json, and compares
-// fields and errors.
+// Decodes every vector of every unit on the machine, both the units' own and those of tests/*.json, and compares fields
+// and errors.
 #include <algorithm>
 #include <array>
 
@@ -12,9 +12,9 @@
 namespace absenc::firmware {
 namespace {
 
-using machine::say;
+using machine::print;
 
-// What stands in front of `end` in `text`, which loses both. Not substr(), which may throw.
+// Returns the part of `text` before `end`, and removes both from `text`. Does not use substr(), which may throw.
 std::string_view cut(std::string_view& text, char end) {
   const std::size_t size = std::min(text.find(end), text.size());
   const std::string_view front(text.data(), size);
@@ -22,7 +22,7 @@ std::string_view cut(std::string_view& text, char end) {
   return front;
 }
 
-// Of "name=value name=value".
+// Resolves options from a text "name=value name=value".
 bool resolve(const Unit& unit, std::string_view text, Options& options) {
   Buffer<OptionText, maximum_options> settings;
   while (!text.empty()) {
@@ -33,42 +33,42 @@ bool resolve(const Unit& unit, std::string_view text, Options& options) {
   return resolve_options(unit, {}, settings, options).kind == OptionError::Kind::none;
 }
 
-// What a vector of tests/*.json calls: flags by their names, other lists by their numbers, the rest by its value.
-class Reference final : public FieldSink {
+// Compares decoded fields with a vector of tests/*.json: flags by names, other lists as text, the rest by value.
+class ReferenceCheck final : public FieldSink {
  public:
-  explicit Reference(std::span<const Wanted> wanted) : wanted_(wanted) {}
+  explicit ReferenceCheck(std::span<const ExpectedField> expected) : expected_(expected) {}
 
   void put(const FieldValue& value) override {
-    for (const Wanted& one : wanted_) {
+    for (const ExpectedField& one : expected_) {
       if (one.field != value.info->name) continue;
       ++matches_;
-      if (!holds(one, value)) wrong_ = true;
+      if (!matches(one, value)) wrong_ = true;
     }
   }
-  // A list of nothing may be left out.
+  // Returns whether all expected fields matched. An empty text may be missing.
   [[nodiscard]] bool all() const {
-    const auto needed = std::count_if(wanted_.begin(), wanted_.end(), [](const Wanted& one) {
-      return one.kind != Wanted::Kind::text || !one.text.empty();
+    const auto needed = std::count_if(expected_.begin(), expected_.end(), [](const ExpectedField& one) {
+      return one.kind != ExpectedField::Kind::text || !one.text.empty();
     });
     return !wrong_ && matches_ >= static_cast<std::size_t>(needed);
   }
 
  private:
-  static bool holds(const Wanted& one, const FieldValue& value) {
+  static bool matches(const ExpectedField& one, const FieldValue& value) {
     using Kind = FieldInfo::Kind;
     switch (value.info->kind) {
       case Kind::flags:
-        return one.kind == Wanted::Kind::names && one.text == names(value);
+        return one.kind == ExpectedField::Kind::names && one.text == names(value);
       case Kind::real: {
         const double difference = one.real - value.real;
-        return one.kind != Wanted::Kind::names && difference < 1e-6 && difference > -1e-6;
+        return one.kind != ExpectedField::Kind::names && difference < 1e-6 && difference > -1e-6;
       }
       case Kind::text:
         return VectorCheck::same(one.text, value.bytes);
       case Kind::bytes:
         return hexadecimal(value.bytes) == one.text;
       default:
-        return one.kind == Wanted::Kind::number && one.number == value.number;
+        return one.kind == ExpectedField::Kind::number && one.number == value.number;
     }
   }
   using Text = Buffer<char, 192>;
@@ -100,15 +100,15 @@ class Reference final : public FieldSink {
     return view(text);
   }
 
-  std::span<const Wanted> wanted_;
+  std::span<const ExpectedField> expected_;
   std::size_t matches_ = 0;
   bool wrong_ = false;
 };
 
-// A frame as a vector has it: bytes, or the text of bits or of a CAN frame.
-class Made {
+// A frame of a vector, which has bytes, or the text of bits or of a CAN frame.
+class VectorFrame {
  public:
-  Made(LinkKind link, Bytes text) : bytes_(text), is_bits_(link == LinkKind::clocked) {
+  VectorFrame(LinkKind link, Bytes text) : bytes_(text), is_bits_(link == LinkKind::clocked) {
     if (is_bits_) bits_ = bits_of_text(text);
     is_can_ = link == LinkKind::can && !text.empty();
     if (is_can_) can_ = can_frame_of_text(text);
@@ -136,19 +136,19 @@ struct Count {
              Fields& fields) {
     ++decoded;
     Options options;
-    if (unit == nullptr || !resolve(*unit, settings, options)) return complain(id, "has no unit or other options");
-    const Made asked(unit->link, request);
-    const Made answered(unit->link, reply);
-    const Error found = unit->decode(options, asked.frame(), answered.frame(), fields);
-    if (found != error) return complain(id, text_of(found).name);
-    if (!fields.all()) complain(id, "decodes to other fields");
+    if (unit == nullptr || !resolve(*unit, settings, options)) return report(id, "has no unit or other options");
+    const VectorFrame request_frame(unit->link, request);
+    const VectorFrame reply_frame(unit->link, reply);
+    const Error found = unit->decode(options, request_frame.frame(), reply_frame.frame(), fields);
+    if (found != error) return report(id, text_of(found).name);
+    if (!fields.all()) report(id, "decodes to other fields");
   }
-  void complain(std::string_view id, std::string_view what) {
+  void report(std::string_view id, std::string_view what) {
     ++wrong;
-    say(id);
-    say(": ");
-    say(what);
-    say("\n");
+    print(id);
+    print(": ");
+    print(what);
+    print("\n");
   }
 };
 
@@ -166,15 +166,15 @@ int main() {
     }
   }
   for (const ReferenceVector& one : reference_vectors()) {
-    Reference fields(one.fields);
+    ReferenceCheck fields(one.fields);
     count.check(find_unit(one.unit), one.id, one.options, one.request, one.reply, one.error, fields);
   }
-  say("decoded ");
-  say(count.decoded);
-  say(", wrong ");
-  say(count.wrong);
-  say(", stack ");
-  say(machine::stack_used());
-  say("\n");
+  print("decoded ");
+  print(count.decoded);
+  print(", wrong ");
+  print(count.wrong);
+  print(", stack ");
+  print(machine::stack_used());
+  print("\n");
   machine::end(count.wrong == 0);
 }

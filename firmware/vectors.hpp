@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The vectors of tests/*.json as vectors.py writes them for a machine that has no file.
+// The vectors of tests/*.json, which vectors.py converts to tables, because the machine has no files.
 #pragma once
 
 #include <cstdint>
@@ -11,21 +11,21 @@
 
 namespace absenc::firmware {
 
-struct Wanted {
+struct ExpectedField {
   enum class Kind : std::uint8_t { number, real, text, names } kind;
   std::string_view field;
   std::int64_t number;
-  double real;            // of numbers too
-  std::string_view text;  // names with blanks between; bytes as hexadecimal
+  double real;            // also set for whole numbers
+  std::string_view text;  // flag names separated by blanks; bytes in hexadecimal
 };
 
 struct ReferenceVector {
   std::string_view unit;
   std::string_view id;
   std::string_view options;  // "name=value name=value"
-  Bytes request;             // clocked and CAN links: their text
+  Bytes request;             // clocked and CAN links: text of the frame
   Bytes reply;
-  std::span<const Wanted> fields;
+  std::span<const ExpectedField> fields;
   Error error;
 };
 

@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """usage: vectors.py OUTPUT.cpp VECTORS.json...
 
-Writes the vectors as tables for firmware/vectors.cpp. What a vector calls otherwise than its unit does is said here, once:
-control frames of BiSS are two rows of bits, channels have prefixes, lists of numbers are texts."""
+Writes the vectors as tables for firmware/vectors.cpp. This script converts names and forms that differ between a vector
+and its unit: control frames of BiSS are two rows of bits, channels have prefixes, lists of numbers are texts."""
 import json
 import sys
 
-TEXT_LINKS = {"biss", "biss-safety", "biss-chain", "ssi", "raa38-can"}  # whose frames are texts
+TEXT_LINKS = {"biss", "biss-safety", "biss-chain", "ssi", "raa38-can"}  # units whose frames are written as text
 SAME_UNIT = {"biss-control": "biss", "biss-control-request": "biss"}
 
 
@@ -15,7 +15,7 @@ def option_text(value):
 
 
 def options_of(vector):
-    if vector["protocol"] in SAME_UNIT:  # they describe the vector, not the frame
+    if vector["protocol"] in SAME_UNIT:  # these options describe the vector, not the frame
         return {}
     options = {name: value for name, value in vector["options"].items() if name != "configuration"}
     channels = options.pop("channels", None)
@@ -64,7 +64,7 @@ def wanted(name, value):
     else:
         kind, number, text = ("real" if isinstance(value, float) else "number"), value, ""
     whole = 0 if isinstance(number, float) else int(number)
-    return f"{{Wanted::Kind::{kind}, {quoted(name)}, {whole}, {float(number)!r}, {quoted(text)}}}"
+    return f"{{ExpectedField::Kind::{kind}, {quoted(name)}, {whole}, {float(number)!r}, {quoted(text)}}}"
 
 
 def table(kind, name, rows):
@@ -83,7 +83,7 @@ def main():
             for part, frame in zip(("request", "reply"), frames):
                 tables.append(table("std::uint8_t", f"{part}{number}", [str(byte) for byte in frame]))
             fields = fields_of(vector)
-            tables.append(table("Wanted", f"fields{number}", [wanted(*field) for field in fields.items()]))
+            tables.append(table("ExpectedField", f"fields{number}", [wanted(*field) for field in fields.items()]))
             request, reply = (f"{part}{number}" if frame else "{}" for part, frame in zip(("request", "reply"), frames))
             settings = " ".join(f"{name}={option_text(value)}" for name, value in options_of(vector).items())
             unit = SAME_UNIT.get(vector["protocol"], vector["protocol"])

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-# absenc as a component of ESP-IDF 5 and newer. It is first asked what it requires, by a script that cannot look for files.
+# absenc as a component of ESP-IDF 5 and newer. ESP-IDF first runs this file as a script that only collects requirements
+# and cannot search for files.
 include("${CMAKE_CURRENT_LIST_DIR}/../cmake/sources.cmake")
 if(NOT CMAKE_BUILD_EARLY_EXPANSION)
   absenc_sources(absenc_esp_sources ${absenc_firmware_folders})

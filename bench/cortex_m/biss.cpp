@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// A program without a library that decodes FRAMES of 64 BiSS frames with 32 bits, for count.sh. WAY: 0, a format known
-// at compile time; 1, one known at run time; 2, the peer of bench/sampled_peer.hpp; 3, moteus' own function, whose
-// header is in a folder of yours. It ends with status 0 when all were right.
+// A program without a library that decodes FRAMES times one of 64 BiSS frames with 32 bits, for count.sh. WAY selects
+// the decoder: 0, a format known at compile time; 1, a format known at run time; 2, the peer of bench/sampled_peer.hpp;
+// 3, moteus' own function, whose header must be in an include folder. The exit status is 0 if all positions are right.
 #include "absenc/protocol/biss/frame.hpp"
 #include "bench/sampled_peer.hpp"
 #if WAY == 3
@@ -65,7 +65,7 @@ extern "C" [[noreturn]] void _start() {
   std::uint32_t wrong = 0;
   for (std::size_t i = 0; i < FRAMES; ++i) wrong |= position(frames[i]) ^ frames[i].position;
   register std::uint32_t status asm("r0") = wrong != 0 ? 1 : 0;
-  register std::uint32_t end asm("r7") = 1;  // exit, as qemu-arm takes it
+  register std::uint32_t end asm("r7") = 1;  // exit, in the convention of qemu-arm
   asm volatile("svc 0" : : "r"(status), "r"(end));
   __builtin_unreachable();
 }

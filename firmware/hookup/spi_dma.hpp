@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// An SPI controller with DMA that clocks BiSS or SSI: it clocks whole bytes, of which the frame is some bits.
+// Hookup for an SPI controller with DMA that reads BiSS or SSI. It clocks whole bytes; the frame is a part of their
+// bits.
 #pragma once
 
 #include <algorithm>
@@ -12,12 +13,12 @@
 
 namespace absenc::firmware {
 
-/// Hardware is what the part has:
+/// Hardware provides the functions of the part:
 ///
-///   void clock(MutableBytes);            // receives by DMA, first bit first; `done` at its end
+///   void clock(MutableBytes);            // receives by DMA, first bit first; calls `done` at the end
 ///   void set_rate(std::uint32_t);
 ///
-/// It is set up with the unit's `line_settings`: their rate, `spi_mode`, and no chip select.
+/// Set up the controller with the unit's `line_settings`: rate, `spi_mode`, no chip select.
 template <class Hardware>
 class SpiDma {
  public:
@@ -29,7 +30,7 @@ class SpiDma {
 
   // ---- Interrupts
 
-  // The encoder's timeout must be over before it is clocked anew: the carrier holds the transfer back until then.
+  // The encoder's timeout must expire before the next clock; the carrier delays the transfer until then.
   void tick(Time now) { carrier_.tick(now); }
   void done(Time now) {
     align();
@@ -37,7 +38,7 @@ class SpiDma {
     carrier_.received(Bytes(buffer_).first((bits_ + 7) / 8), now);
   }
 
-  // ---- The line of the carrier
+  // ---- Called by the carrier
 
   void begin(const ByteStep& step) {
     if (step.kind == ByteStep::Kind::configure) return hardware_->set_rate(step.rate);
@@ -47,8 +48,8 @@ class SpiDma {
   void result(bool) {}
 
  private:
-  // The frame's first bit becomes the first of the first byte: what the first clocks showed is the idle line (SSI).
-  // What was clocked behind its last bit goes.
+  // Shifts the frame's first bit to the first bit of the first byte, because the first clocks return the idle line
+  // (SSI), and clears the bits after the frame.
   void align() {
     const std::size_t clocked = (idle_clocks_ + bits_ + 7) / 8;
     const std::size_t size = (bits_ + 7) / 8;
@@ -60,7 +61,7 @@ class SpiDma {
   }
 
   Hardware* hardware_;
-  unsigned idle_clocks_;  // fewer than 8
+  unsigned idle_clocks_;  // number of clocks before the frame, fewer than 8
   host::Carrier<std::uint8_t, SpiDma> carrier_;
   std::array<std::uint8_t, 64> buffer_{};
   std::size_t bits_ = 0;

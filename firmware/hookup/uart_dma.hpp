@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A UART with DMA and an interrupt when its line is idle, behind an RS-485 transceiver.
+// Hookup for a UART with DMA and an idle-line interrupt, behind an RS-485 transceiver.
 #pragma once
 
 #include <algorithm>
@@ -12,35 +12,35 @@
 
 namespace absenc::firmware {
 
-/// Hardware is what the part has:
+/// Hardware provides the functions of the part:
 ///
-///   void drive(bool on);                 // DE of the transceiver; its receiver off meanwhile, or nothing comes back
-///   void transmit(Bytes);                // by DMA; the UART's transmission complete, not the DMA's, ends it
-///   void receive(MutableBytes);          // by DMA: `arrived` when it is full, or the line was idle for a character
-///   std::size_t stop_receiving();        // how many came
+///   void drive(bool on);                 // DE of the transceiver; also disables its receiver, to avoid echo
+///   void transmit(Bytes);                // by DMA; ends with the UART's transmission complete, not the DMA's
+///   void receive(MutableBytes);          // by DMA; calls `arrived` when full, or after one character of idle line
+///   std::size_t stop_receiving();        // returns the number of received bytes
 ///   void set_rate(std::uint32_t);
 ///
-/// The members below `Interrupts` are called from interrupts of one priority.
+/// The functions below `Interrupts` are called from interrupts of one priority.
 template <class Hardware>
 class UartDma {
  public:
-  /// `latency`: the character for which the line is idle, and what the timer's tick adds.
+  /// `latency`: the idle time of one character, plus the period of the timer's tick.
   UartDma(Hardware& hardware, Time latency) : hardware_(&hardware), carrier_(*this, latency) {}
 
-  /// Begins a conversation. From the interrupts' context, as from a timer of their priority.
+  /// Starts a conversation. Call it in the context of the interrupts, for example from a timer of the same priority.
   void start(Machine<std::uint8_t>& machine, Time now) { carrier_.start(machine, now); }
   [[nodiscard]] bool is_busy() const { return carrier_.is_busy(); }
 
   // ---- Interrupts
 
   void tick(Time now) { carrier_.tick(now); }
-  // The receiver is ready before the line is free: the first character may come 3 us later.
+  // Receiving starts before the line is released, because the first character may follow after 3 us.
   void transmission_complete(Time now) {
     arm(expected_);
     hardware_->drive(false);
     carrier_.sent(now);
   }
-  // More may follow at once: the other buffer is ready for it before this one is looked at.
+  // More bytes may follow at once, so the other buffer is ready before this one is evaluated.
   void arrived(Time now) {
     const MutableBytes buffer = buffers_[current_];
     const std::size_t count = hardware_->stop_receiving();
@@ -50,7 +50,7 @@ class UartDma {
   }
   void line_error(Time now) { carrier_.line_error(now); }
 
-  // ---- The line of the carrier
+  // ---- Called by the carrier
 
   void begin(const ByteStep& step) {
     if (step.kind == ByteStep::Kind::configure) return hardware_->set_rate(step.rate);
@@ -62,7 +62,7 @@ class UartDma {
   void result(bool) {}
 
  private:
-  // A whole reply fills the buffer, and is told with its last character; without `count` the idle line tells.
+  // Starts receiving `count` bytes, so that the last byte of the reply calls `arrived`; 0: until the line is idle.
   void arm(std::size_t count) {
     const MutableBytes buffer = buffers_[current_];
     hardware_->receive(count == 0 ? buffer : buffer.first(std::min(count, buffer.size())));

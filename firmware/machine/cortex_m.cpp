@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What every Cortex-M has: vectors, SysTick, and a breakpoint that the emulator takes for a call.
+// Common parts of all Cortex-M machines: vectors, SysTick, and the breakpoint that calls the emulator.
 #include <array>
 
 #include "firmware/machine/machine.hpp"
@@ -27,7 +27,7 @@ constexpr auto filled = []<std::size_t count>(std::array<void (*)(), count> all,
   return all;
 };
 
-// Of the devices nothing but the UART is asked for interrupts.
+// Only the UART has its device interrupts enabled.
 [[gnu::section(".vectors"), gnu::used]] const Vectors vectors{
     &stack_top, start, filled(std::array<void (*)(), 13>{}, fault), tick, filled(std::array<void (*)(), 32>{}, uart)};
 
@@ -50,24 +50,24 @@ constexpr std::uint32_t tick_is_pending = 1u << 26;
 
 std::uint32_t counts_of_period = 0;
 Time period_of_ticks{};
-Time begin_of_tick{};  // the begin of this period; written by the tick alone
+Time begin_of_tick{};  // start of the current period; written by the tick only
 }  // namespace
 
 void start_clock(Time period) {
   period_of_ticks = period;
   counts_of_period = static_cast<std::uint32_t>(period.count()) / frequency.nanoseconds * frequency.counts;
-  at(reload) = counts_of_period - 1;
-  at(value) = 0;
-  at(control) = 7;  // the processor's clock, with interrupts
+  register_at(reload) = counts_of_period - 1;
+  register_at(value) = 0;
+  register_at(control) = 7;  // clock of the processor, interrupts enabled
 }
 
 Time now() {
   std::uint32_t masked;
   asm volatile("mrs %0, primask\ncpsid i" : "=r"(masked) : : "memory");
-  std::uint32_t left = at(value);
+  std::uint32_t left = register_at(value);
   Time begin = begin_of_tick;
-  if ((at(interrupts) & tick_is_pending) != 0) {  // it has begun anew, and nobody has counted it yet
-    left = at(value);
+  if ((register_at(interrupts) & tick_is_pending) != 0) {  // the counter restarted, but `tick` has not run yet
+    left = register_at(value);
     begin += period_of_ticks;
   }
   asm volatile("msr primask, %0" : : "r"(masked) : "memory");

@@ -14,7 +14,7 @@ namespace {
 constexpr std::uint32_t write_text = 0x04, get_arguments = 0x15, exit_with_status = 0x20;
 }
 
-void say(std::string_view text) {
+void print(std::string_view text) {
   std::array<char, 64> piece;
   while (!text.empty()) {
     const std::size_t size = std::min(text.size(), piece.size() - 1);
@@ -25,18 +25,18 @@ void say(std::string_view text) {
   }
 }
 
-void say(std::uint64_t number) {
+void print(std::uint64_t number) {
   std::array<char, 20> digits;
   std::size_t at = digits.size();
   do {
     digits[--at] = static_cast<char>('0' + number % 10);
     number /= 10;
   } while (number != 0);
-  say({digits.data() + at, digits.size() - at});
+  print({digits.data() + at, digits.size() - at});
 }
 
 void end(bool good) {
-  const std::array<std::uint32_t, 2> reason{0x20026, good ? 0u : 1u};  // the application ends, with a status
+  const std::array<std::uint32_t, 2> reason{0x20026, good ? 0u : 1u};  // the reason "application exit", with a status
   call_emulator(exit_with_status, reason.data());
   for (;;) {
   }
@@ -50,7 +50,7 @@ std::uint32_t argument(unsigned index, std::uint32_t otherwise) {
   } block{text.data(), text.size()};
   if (call_emulator(get_arguments, &block) != 0) return otherwise;
   const char* one = text.data();
-  for (unsigned i = 0; i <= index; ++i) {  // what is in front is the program
+  for (unsigned i = 0; i <= index; ++i) {  // skips the program's name, which comes first
     while (*one != ' ' && *one != 0) ++one;
     while (*one == ' ') ++one;
   }
@@ -60,7 +60,7 @@ std::uint32_t argument(unsigned index, std::uint32_t otherwise) {
   return number;
 }
 
-// ---- The stack, painted below where it stands
+// ---- Stack: the memory below the stack pointer is filled with a pattern
 
 namespace {
 constexpr std::uint32_t paint = 0xA5A5'A5A5;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the programs here know of the machine they run on: a clock that ticks, one UART, and QEMU for words and the end.
+// Interface of the programs to their machine: a clock with a tick, one UART, and QEMU for output and exit.
 #pragma once
 
 #include <cstddef>
@@ -12,60 +12,63 @@
 
 namespace absenc::machine {
 
-/// Prints on the terminal of the emulator; numbers are decimal.
-void say(std::string_view text);
-void say(std::uint64_t number);
+/// Prints on the emulator's terminal; numbers are decimal.
+void print(std::string_view text);
+void print(std::uint64_t number);
 /// Ends the emulator with status 0 or 1.
 [[noreturn]] void end(bool good);
-/// The number that is the emulator's argument `index`, 0 the first behind the program's name; `otherwise` without one.
+/// Returns the number in the emulator's argument `index`, where 0 is the first after the program's name; `otherwise` if
+/// it is missing.
 [[nodiscard]] std::uint32_t argument(unsigned index, std::uint32_t otherwise);
 
-/// From here on `on_tick` is called every `period`, at most 0.5 s.
+/// Starts the clock: `on_tick` is called every `period`, at most 0.5 s.
 void start_clock(Time period);
-/// Since `start_clock`, to a fraction of a microsecond. From interrupts as from the main program.
+/// Returns the time since `start_clock`, with a resolution below one microsecond. Interrupts may call it, too.
 [[nodiscard]] Time now();
 
-/// From here on `on_received` and `on_sent` are called.
+/// Starts the UART: `on_received` and `on_sent` are called from now on.
 void start_uart();
-/// Sends by interrupts; `bytes` must stay until `on_sent`.
+/// Sends by interrupts; `bytes` must stay valid until `on_sent`.
 void send(Bytes bytes);
 
-/// The most that the stack has taken since the start, bytes.
+/// Returns the largest size of the stack since `paint_stack`, in bytes.
 [[nodiscard]] std::size_t stack_used();
-/// Only what was paid from here on counts.
+/// Restarts the measurement of `stack_used`.
 void paint_stack();
 
-/// While one lives, no interrupt comes.
-class Quiet {
+/// Disables interrupts while an object exists.
+class InterruptLock {
  public:
-  Quiet() { asm volatile("cpsid i" : : : "memory"); }
-  ~Quiet() { asm volatile("cpsie i" : : : "memory"); }
-  Quiet(const Quiet&) = delete;
-  Quiet& operator=(const Quiet&) = delete;
+  InterruptLock() { asm volatile("cpsid i" : : : "memory"); }
+  ~InterruptLock() { asm volatile("cpsie i" : : : "memory"); }
+  InterruptLock(const InterruptLock&) = delete;
+  InterruptLock& operator=(const InterruptLock&) = delete;
 };
 
-// ---- What a program has; all interrupts have one priority, so that none comes into another
+// ---- Provided by the program; all interrupts have one priority, so none interrupts another
 
 void on_tick();
 void on_received(std::uint8_t byte);
-/// The last bit of what was sent is out.
+/// Called when the last bit of `send` is on the line.
 void on_sent();
 
-// ---- What each machine has: cortex_m.cpp with microbit.cpp or mps2.cpp; virt.cpp, which has the first alone
+// ---- Provided by the machine: cortex_m.cpp with microbit.cpp or mps2.cpp; virt.cpp provides only the first function
 
-/// Semihosting: asks the emulator for its service `number`.
+/// Calls the emulator's semihosting service `number`.
 std::uint32_t call_emulator(std::uint32_t number, const void* parameter);
 
-/// Of the clock that SysTick counts.
+/// Frequency of SysTick's clock.
 struct Frequency {
   std::uint32_t hertz;
-  std::uint32_t nanoseconds;  // of `counts` counts
+  std::uint32_t nanoseconds;  // duration of `counts` counts
   std::uint32_t counts;
 };
 extern const Frequency frequency;
 void handle_uart();
 
-/// A register of the machine.
-inline volatile std::uint32_t& at(std::uint32_t address) { return *reinterpret_cast<volatile std::uint32_t*>(address); }
+/// Returns a register of the machine.
+inline volatile std::uint32_t& register_at(std::uint32_t address) {
+  return *reinterpret_cast<volatile std::uint32_t*>(address);
+}
 
 }  // namespace absenc::machine

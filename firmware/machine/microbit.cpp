@@ -12,40 +12,40 @@ constexpr std::uint32_t start_receiver = uart + 0x000, start_transmitter = uart 
                         data_in = uart + 0x518, data_out = uart + 0x51C, set_enable = 0xE000'E100;
 constexpr std::uint32_t received_bit = 1u << 2, sent_bit = 1u << 7, uart_number = 2;
 
-Bytes going{};  // the first byte is in the transmitter
+Bytes unsent{};  // the first byte is in the transmitter
 }  // namespace
 
 const Frequency frequency{16'000'000, 125, 2};
 
 void start_uart() {
-  at(enable) = 4;
-  at(start_receiver) = 1;
-  at(start_transmitter) = 1;
-  at(enable_interrupts) = received_bit | sent_bit;
-  at(set_enable) = 1u << uart_number;
+  register_at(enable) = 4;
+  register_at(start_receiver) = 1;
+  register_at(start_transmitter) = 1;
+  register_at(enable_interrupts) = received_bit | sent_bit;
+  register_at(set_enable) = 1u << uart_number;
 }
 
 void send(Bytes bytes) {
-  going = bytes;
-  at(data_out) = going[0];
+  unsent = bytes;
+  register_at(data_out) = unsent[0];
 }
 
 void handle_uart() {
-  // Whoever is late to look finds both, and what was sent comes first. Looked for the other way round: what is received
-  // after the first look may be the answer to what is sent after the second.
-  const bool has_received = at(received) != 0;
-  while (at(sent) != 0) {
-    at(sent) = 0;
-    if (!going.empty()) going = going.subspan(1);
-    if (going.empty()) {
+  // A late handler finds both events and must handle the end of transmission first. The receiver's state is read before
+  // that, because a byte that is received later may be the reply to the next byte that is sent.
+  const bool has_received = register_at(received) != 0;
+  while (register_at(sent) != 0) {
+    register_at(sent) = 0;
+    if (!unsent.empty()) unsent = unsent.subspan(1);
+    if (unsent.empty()) {
       on_sent();
     } else {
-      at(data_out) = going[0];
+      register_at(data_out) = unsent[0];
     }
   }
   if (has_received) {
-    at(received) = 0;
-    on_received(static_cast<std::uint8_t>(at(data_in)));
+    register_at(received) = 0;
+    on_received(static_cast<std::uint8_t>(register_at(data_in)));
   }
 }
 

@@ -11,39 +11,39 @@ constexpr std::uint32_t data = uart, state = uart + 0x04, control = uart + 0x08,
 constexpr std::uint32_t receiver_is_full = 2, sent_bit = 1, received_bit = 2;
 constexpr std::uint32_t receiver_number = 0, transmitter_number = 1;
 
-Bytes going{};  // the first byte is in the transmitter
+Bytes unsent{};  // the first byte is in the transmitter
 }  // namespace
 
 const Frequency frequency{25'000'000, 40, 1};
 
 void start_uart() {
-  at(divider) = 16;
-  at(control) = 0xF;  // transmitter, receiver, and an interrupt of each
-  at(set_enable) = 1u << receiver_number | 1u << transmitter_number;
+  register_at(divider) = 16;
+  register_at(control) = 0xF;  // enables transmitter, receiver and the interrupts of both
+  register_at(set_enable) = 1u << receiver_number | 1u << transmitter_number;
 }
 
 void send(Bytes bytes) {
-  going = bytes;
-  at(data) = going[0];
+  unsent = bytes;
+  register_at(data) = unsent[0];
 }
 
 void handle_uart() {
-  // Whoever is late to look finds both, and what was sent comes first. Looked for the other way round: what is received
-  // after the first look may be the answer to what is sent after the second.
+  // A late handler finds both events and must handle the end of transmission first. The receiver's state is read before
+  // that, because a byte that is received later may be the reply to the next byte that is sent.
   for (;;) {
-    const bool has_received = (at(state) & receiver_is_full) != 0;
-    while ((at(pending) & sent_bit) != 0) {
-      at(pending) = sent_bit;
-      if (!going.empty()) going = going.subspan(1);
-      if (going.empty()) {
+    const bool has_received = (register_at(state) & receiver_is_full) != 0;
+    while ((register_at(pending) & sent_bit) != 0) {
+      register_at(pending) = sent_bit;
+      if (!unsent.empty()) unsent = unsent.subspan(1);
+      if (unsent.empty()) {
         on_sent();
       } else {
-        at(data) = going[0];
+        register_at(data) = unsent[0];
       }
     }
     if (!has_received) return;
-    at(pending) = received_bit;
-    on_received(static_cast<std::uint8_t>(at(data)));
+    register_at(pending) = received_bit;
+    on_received(static_cast<std::uint8_t>(register_at(data)));
   }
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// From reset to main, as soon as there is a stack. A part's own start-up takes its place.
+// Start-up from reset to main. On a real part, its own start-up code replaces this file.
 #include "firmware/machine/machine.hpp"
 
 int main();
@@ -11,7 +11,7 @@ extern const Constructor constructors_begin[], constructors_end[];
 
 [[noreturn]] void start() {
 #ifdef __ARM_FP
-  absenc::machine::at(0xE000'ED88) = 0xF << 20;  // CPACR: the FPU is on
+  absenc::machine::register_at(0xE000'ED88) = 0xF << 20;  // CPACR: enables the FPU
   asm volatile("dsb\nisb");
 #endif
   const std::uint32_t* from = &data_load;
@@ -23,13 +23,13 @@ extern const Constructor constructors_begin[], constructors_end[];
   absenc::machine::end(true);
 }
 
-// What nobody expects: a program that goes on after it would hide it.
+// An unexpected fault ends the program; continuing would hide it.
 [[noreturn]] void fault() {
-  absenc::machine::say("fault\n");
+  absenc::machine::print("fault\n");
   absenc::machine::end(false);
 }
 
-// A program without an exit has no destructors of static objects.
+// Static objects are never destroyed, because the program never exits.
 #ifdef __riscv
 int __cxa_atexit(void (*)(void*), void*, void*) { return 0; }
 #else
@@ -39,7 +39,7 @@ void* __dso_handle = nullptr;
 [[noreturn]] void __cxa_pure_virtual() { fault(); }
 }
 
-// Programs without interrupts have none of these.
+// Defaults for programs without interrupts.
 namespace absenc::machine {
 [[gnu::weak]] void on_tick() {}
 [[gnu::weak]] void on_received(std::uint8_t) {}

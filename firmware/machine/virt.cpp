@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// QEMU's RISC-V machine: for programs without interrupts, clock and UART.
+// QEMU's RISC-V machine, for programs without interrupts, clock and UART.
 #include "firmware/machine/machine.hpp"
 
 extern "C" {
-// Where QEMU begins: without a stack, and with no place for traps.
+// Entry point of QEMU, which sets up neither a stack nor a trap vector.
 [[gnu::naked, gnu::used, gnu::section(".vectors")]] void reset() {
   asm(".option arch, +zicsr\n"
       "la sp, stack_top\n"
@@ -17,7 +17,7 @@ extern "C" {
 
 namespace absenc::machine {
 
-// A breakpoint between two instructions that do nothing, none of them compressed (RISC-V Semihosting, 2).
+// The semihosting call is a breakpoint between two no-op instructions, all uncompressed (RISC-V Semihosting, 2).
 [[gnu::noinline]] std::uint32_t call_emulator(std::uint32_t number, const void* parameter) {
   register std::uint32_t a0 asm("a0") = number;
   register const void* a1 asm("a1") = parameter;

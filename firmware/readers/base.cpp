@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What every program has, and what figures are above: start-up, words, and the three functions of the C library that
-// every compiler calls.
+// The base that the other readers are compared with: start-up, output, and the three C library functions that every
+// compiler calls.
 #include <cstring>
 
 #include "firmware/readers/reader.hpp"
@@ -16,6 +16,6 @@ int main() {
   machine::paint_stack();
   count_begin();
   count_end();
-  machine::say(machine::stack_used());
+  machine::print(machine::stack_used());
   machine::end(true);
 }

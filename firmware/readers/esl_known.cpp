@@ -5,7 +5,7 @@
 #include "firmware/readers/reader.hpp"
 
 namespace {
-// As a drive knows its encoder.
+// A drive knows the profile of its encoder at compile time.
 constexpr absenc::esl::Profile profile{};
 constexpr absenc::esl::Request request{};
 }  // namespace

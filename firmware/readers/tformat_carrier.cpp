@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// T-format as tformat.cpp reads it, but through the carrier that firmware calls from its interrupts.
+// T-format as in tformat.cpp, but through the carrier that firmware calls from its interrupts.
 #include <array>
 
 #include "absenc/host/carrier.hpp"
@@ -17,7 +17,7 @@ using Carrier = host::Carrier<std::uint8_t, Line>;
 
 constexpr auto reply = std::to_array<std::uint8_t>({0x1A, 0x00, 0x45, 0x23, 0x01, 0x11, 0x34, 0x12, 0x00, 0x00, 0x4A});
 
-// As an interrupt's handler: its character comes in a register.
+// Represents an interrupt handler, whose character is in a register.
 [[gnu::noinline]] void interrupt(Carrier& carrier, std::uint8_t character, Time now) {
   carrier.received({&character, 1}, now);
 }
@@ -40,7 +40,7 @@ int main() {
   carrier.received(reply, now);
   count_end();
   count_end();
-  machine::say(machine::stack_used());
+  machine::print(machine::stack_used());
   carrier.start(by_character, now);
   carrier.sent(now);
   for (std::size_t i = 0; i < reply.size(); ++i) {

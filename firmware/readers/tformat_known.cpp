@@ -5,7 +5,7 @@
 #include "firmware/readers/reader.hpp"
 
 namespace {
-// As a drive knows its encoder.
+// A drive knows the format of its encoder at compile time.
 constexpr absenc::tformat::Format format{};
 }  // namespace
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a sketch includes first; then the headers of the encoder, as "absenc/protocol/tformat/host.hpp".
+// Header that a sketch includes first, followed by the headers of its encoder, such as
+// "absenc/protocol/tformat/host.hpp".
 #pragma once
 
 #include <Arduino.h>
@@ -8,7 +9,7 @@
 #error "absenc needs C++20: esp32 3.0 and newer has it, other cores with compiler.cpp.extra_flags=-std=gnu++20"
 #endif
 
-// Macros of Arduino.h that are names of ours, or of the standard library.
+// Macros of Arduino.h that clash with names of this library or the standard library.
 #undef abs
 #undef bit
 #undef degrees

@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """usage: export.py FOLDER
 
-Writes absenc as an Arduino library into FOLDER/absenc, which must not be there. An Arduino library has all its sources
-below src, and all of them are compiled: a checkout cannot be one. To install it, FOLDER is `libraries` of the sketchbook."""
+Writes absenc as an Arduino library into FOLDER/absenc, which must not exist. An Arduino library has all its sources
+below src and compiles all of them, so a checkout cannot be one. To install it, use the sketchbook's `libraries` as FOLDER."""
 import re
 import shutil
 import sys
@@ -12,7 +12,7 @@ from pathlib import Path
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent.parent
 LAYERS = ("core", "link", "protocol", "host")
-NOT_FOR_USE = re.compile(r"_(test|fuzz|bench)\.[ch]pp$|^test_|^testing\.hpp$")
+TEST_FILES = re.compile(r"_(test|fuzz|bench)\.[ch]pp$|^test_|^testing\.hpp$")
 
 
 def export(folder):
@@ -24,7 +24,7 @@ def export(folder):
     shutil.copy(ROOT / "LICENSE", library)
     for layer in LAYERS:
         for path in sorted((ROOT / "absenc" / layer).rglob("*.[ch]pp")):
-            if NOT_FOR_USE.search(path.name):
+            if TEST_FILES.search(path.name):
                 continue
             to = library / "src" / path.relative_to(ROOT)
             to.parent.mkdir(parents=True, exist_ok=True)

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Reads a Smart-Abs (T-format, 17 bits and 16 bits of turns) on Serial1 behind an RS-485 transceiver, once in 10 ms.
+// Reads a Smart-Abs (T-format, 17 bits and 16 bits of turns) on Serial1 behind an RS-485 transceiver, every 10 ms.
 #include <absenc.h>
 
 #include "absenc/host/first_reading.hpp"
@@ -7,14 +7,14 @@
 
 using namespace absenc;
 
-constexpr int direction_pin = 2;              // DE and /RE of the transceiver; high: this end sends
-constexpr std::uint32_t period_us = 10'000;   // a position each
-constexpr std::uint32_t fastest_rpm = 6'000;  // of the axis
-constexpr Time latency = std::chrono::milliseconds(2);  // of loop() and of the port's buffers
+constexpr int direction_pin = 2;              // DE and /RE of the transceiver; high: transmit
+constexpr std::uint32_t period_us = 10'000;   // time between two readings
+constexpr std::uint32_t fastest_rpm = 6'000;  // highest speed of the axis
+constexpr Time latency = std::chrono::milliseconds(2);  // greatest delay by loop() and the port's buffers
 
 constexpr tformat::Format format{.singleturn_bits = 17, .multiturn_bits = 16, .encoder_id = 0x11};
 
-// Serial1 as Carrier wants it. What was sent is told from loop(), never from here.
+// Connects Serial1 with the carrier. loop() reports the end of transmission, because begin() must not call the carrier.
 struct SerialLine {
   bool was_sent = false;
   bool is_over = false;
@@ -22,7 +22,7 @@ struct SerialLine {
   void begin(const ByteStep& step) {
     digitalWrite(direction_pin, HIGH);
     Serial1.write(step.out.data(), step.out.size());
-    Serial1.flush();  // until the last bit is out
+    Serial1.flush();  // waits until the last bit is sent
     digitalWrite(direction_pin, LOW);
     was_sent = true;
   }
@@ -34,7 +34,7 @@ host::Carrier<std::uint8_t, SerialLine> carrier(line, latency);
 tformat::ReadPosition position(format);
 host::FirstReading first(fastest_rpm);
 
-// micros() goes round after 71 minutes.
+// Returns the time since the start, although micros() wraps after 71 minutes.
 Time now() {
   static std::uint32_t last = 0;
   static std::uint64_t passed = 0;
