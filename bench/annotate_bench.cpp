@@ -12,7 +12,7 @@
 namespace absenc::capture {
 namespace {
 
-constexpr Tick character = 80;  // ticks, at 20 MS/s
+constexpr Tick character = 80;  // ticks per character, at 20 MS/s
 constexpr Tick turnaround = 60;
 constexpr Tick pause = 64;
 

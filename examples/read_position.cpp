@@ -36,7 +36,7 @@ int main(int argc, char** argv) {
     os::SerialPort port(argv[1], tformat::line_settings);
     return read_from(port);
   }
-  const sim::Motion shaft = sim::Motion::still(std::int64_t{7} << 32 | 0x4000'0000);  // 7 turns and a quarter
+  const sim::Motion shaft = sim::Motion::still(std::int64_t{7} << 32 | 0x4000'0000);  // the shaft is at 7 1/4 turns
   tformat::VirtualEncoder encoder({}, shaft);
   encoder.power_on(Time{}, Device<std::uint8_t>::PowerOn::skip);
   sim::SimPort<std::uint8_t> port(LinkKind::half_duplex, tformat::line_settings, encoder);

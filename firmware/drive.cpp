@@ -210,7 +210,7 @@ bool run() {
   check.alarms_are(tformat::alarms::over_heat);
   read(check, positions / 2);
   const bool cleared = command("clear-alarms", {});
-  constexpr std::array<std::int64_t, 3> written{5, 0x42, 2};  // address, value, page
+  constexpr std::array<std::int64_t, 3> written{5, 0x42, 2};  // arguments: address, value, page
   const bool stored = command("memory-write", written);
   check.alarms_are(0);
   read(check, positions);

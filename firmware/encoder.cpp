@@ -26,7 +26,7 @@ class TurningShaft final : public Shaft {
   TurningShaft(std::int64_t position, std::uint32_t rpm) : position_(position), rpm_(rpm) {}
 
   [[nodiscard]] ShaftState at(Time time) const override {
-    constexpr std::uint64_t minute = 60'000'000;  // in microseconds
+    constexpr std::uint64_t minute = 60'000'000;  // one minute in microseconds
     const std::uint64_t turned = static_cast<std::uint64_t>(time / 1us) * rpm_;
     const std::uint64_t turns = turned / minute << 32 | (turned % minute << 32) / minute;
     return {.position = position_ + static_cast<std::int64_t>(turns),

@@ -15,15 +15,15 @@ struct ExpectedField {
   enum class Kind : std::uint8_t { number, real, text, names } kind;
   std::string_view field;
   std::int64_t number;
-  double real;            // also set for whole numbers
+  double real;            // value of a number, also of a whole one
   std::string_view text;  // flag names separated by blanks; bytes in hexadecimal
 };
 
 struct ReferenceVector {
   std::string_view unit;
   std::string_view id;
-  std::string_view options;  // "name=value name=value"
-  Bytes request;             // clocked and CAN links: text of the frame
+  std::string_view options;  // options: "name=value name=value"
+  Bytes request;             // request; clocked and CAN links: its text
   Bytes reply;
   std::span<const ExpectedField> fields;
   Error error;

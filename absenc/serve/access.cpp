@@ -16,14 +16,14 @@ using namespace client;
 
 namespace {
 
-constexpr std::size_t least_token = 16;
+constexpr std::size_t shortest_token = 16;
 constexpr unsigned most_guesses = 10;  // wrong tokens allowed for one address within `time_of_guesses`
 constexpr Time time_of_guesses = std::chrono::seconds(60);
 constexpr std::size_t most_addresses = 1000;
 constexpr std::string_view wrong_token = "the token is wrong: the server's token file has no such token";
 
 // Compares host names and URL schemes as HTTP does: ASCII, ignoring case.
-bool same_word(std::string_view one, std::string_view other) {
+bool equals_ignoring_case(std::string_view one, std::string_view other) {
   const auto lower = [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; };
   return std::equal(one.begin(), one.end(), other.begin(), other.end(),
                     [&](char a, char b) { return lower(a) == lower(b); });
@@ -38,21 +38,21 @@ bool same_secret(std::string_view one, std::string_view other) {
 }
 
 // Returns the host name without its port: "localhost" of "localhost:8420", "[::1]" of "[::1]:8420".
-std::string_view name_in(std::string_view host) {
+std::string_view host_name_in(std::string_view host) {
   const std::size_t bracket = host.find(']');
   const std::size_t end = host.find(':', bracket == std::string_view::npos ? 0 : bracket);
   return host.substr(0, end);
 }
 
 bool names_loopback(std::string_view host) {
-  const std::string_view name = name_in(host);
-  return same_word(name, "localhost") || name == "127.0.0.1" || name == "[::1]";
+  const std::string_view name = host_name_in(host);
+  return equals_ignoring_case(name, "localhost") || name == "127.0.0.1" || name == "[::1]";
 }
 
 bool is_loopback_address(std::string_view address) { return address.starts_with("127.") || address == "::1"; }
 
 // Returns host and port of an origin: "encoders.example:8443" of "https://encoders.example:8443".
-std::string_view host_in(std::string_view origin) {
+std::string_view authority_of(std::string_view origin) {
   return origin.substr(std::min(origin.find("//") + 2, origin.size()));
 }
 
@@ -86,12 +86,12 @@ Access::Access(const Choices& choices, ServerEvents& server_events)
     if (on_loopback_) return;
     throw UsageError("anyone who can reach this address could read the encoders: add --token-file FILE");
   }
-  tokens_ = read_secrets("token", token_file_, least_token);
+  tokens_ = read_secrets("token", token_file_, shortest_token);
 }
 
 void Access::reload() {
   if (token_file_.empty()) return;
-  std::vector<Secret> tokens = read_secrets("token", token_file_, least_token);
+  std::vector<Secret> tokens = read_secrets("token", token_file_, shortest_token);
   const std::lock_guard lock(mutex_);
   tokens_ = std::move(tokens);
 }
@@ -103,7 +103,7 @@ std::uint64_t Access::wrong_tokens() const {
 
 // Counts a wrong token and returns whether the address may try again. However many guesses arrive, only two of them add
 // an event: the first of a minute, and the one that exceeds the limit.
-bool Access::may_guess_on(const std::string& peer) const {
+bool Access::may_try_again(const std::string& peer) const {
   const Time now = os::now();
   const std::lock_guard lock(mutex_);
   ++wrong_tokens_;
@@ -123,11 +123,11 @@ bool Access::may_guess_on(const std::string& peer) const {
   return guesses.count <= most_guesses;
 }
 
-std::string Access::who(const Request& request) const {
+std::string Access::token_name(const Request& request) const {
   constexpr std::string_view scheme = "Bearer ";
   const std::string_view given = request.authorization;
   std::string name;
-  if (!same_word(given.substr(0, scheme.size()), scheme)) return name;
+  if (!equals_ignoring_case(given.substr(0, scheme.size()), scheme)) return name;
   const std::lock_guard lock(mutex_);
   for (const Secret& token : tokens_) {
     if (same_secret(given.substr(scheme.size()), token.secret)) name = token.name;
@@ -137,22 +137,23 @@ std::string Access::who(const Request& request) const {
 
 // Checks that the request names this server. Otherwise a page of another site could make a browser send a request under
 // that site's own name and let the page read the response (DNS rebinding).
-bool Access::names_us(std::string_view host) const {
-  return names_loopback(host) ||
-         (!public_origin_.empty() && same_word(name_in(host), name_in(host_in(public_origin_))));
+bool Access::names_this_server(std::string_view host) const {
+  return names_loopback(host) || (!public_origin_.empty() &&
+                                  equals_ignoring_case(host_name_in(host), host_name_in(authority_of(public_origin_))));
 }
 
 bool Access::is_from_own_page(const Request& request) const {
   if (!request.fetch_site.empty() && request.fetch_site != "same-origin" && request.fetch_site != "none") return false;
   if (request.origin.empty()) return true;  // only browsers send Origin
-  return same_word(request.origin, "http://" + request.host) || same_word(request.origin, "https://" + request.host) ||
-         (!public_origin_.empty() && same_word(request.origin, public_origin_));
+  return equals_ignoring_case(request.origin, "http://" + request.host) ||
+         equals_ignoring_case(request.origin, "https://" + request.host) ||
+         (!public_origin_.empty() && equals_ignoring_case(request.origin, public_origin_));
 }
 
 // A proxy does not always add its header. With a configured proxy, even a read request from this computer therefore
 // needs a token.
-bool Access::needs_token(const Request& request, To what) const {
-  if (what == To::anybody || what == To::change || !on_loopback_) return what != To::anybody;
+bool Access::needs_token(const Request& request, Right what) const {
+  if (what == Right::open || what == Right::change || !on_loopback_) return what != Right::open;
   return has_tokens() && (request.is_forwarded || !public_origin_.empty());
 }
 
@@ -166,8 +167,8 @@ std::string Access::client_of(const Request& request) const {
   return last.empty() || !is_address ? request.peer : last;
 }
 
-std::optional<Response> Access::refusal(const Request& request, To what) const {
-  if (on_loopback_ && !names_us(request.host)) {
+std::optional<Response> Access::refusal(const Request& request, Right what) const {
+  if (on_loopback_ && !names_this_server(request.host)) {
     return error_response(
         403, public_origin_.empty()
                  ? "this server accepts requests to localhost, 127.0.0.1 and [::1] only: behind a proxy, start it "
@@ -175,7 +176,7 @@ std::optional<Response> Access::refusal(const Request& request, To what) const {
                  : fmt::format("this server accepts requests to localhost, 127.0.0.1, [::1] and the name in {} only",
                                public_origin_));
   }
-  if (what >= To::ask && !is_from_own_page(request)) {
+  if (what >= Right::poll && !is_from_own_page(request)) {
     return error_response(403,
                           "requests from other sites may not change or poll an encoder: if a proxy shows this page, "
                           "start the server with --public-url");
@@ -184,12 +185,12 @@ std::optional<Response> Access::refusal(const Request& request, To what) const {
   if (token_file_.empty()) {
     return error_response(403, "this server changes nothing: it was started without --token-file");
   }
-  if (!who(request).empty()) return {};
+  if (!token_name(request).empty()) return {};
   return refuse_token(request);
 }
 
 Response Access::refuse_token(const Request& request) const {
-  if (!request.authorization.empty() && !may_guess_on(request.peer)) {
+  if (!request.authorization.empty() && !may_try_again(request.peer)) {
     Response response = error_response(429, "too many wrong tokens from this address: try again in a minute");
     response.headers.emplace_back("Retry-After", "60");
     return response;

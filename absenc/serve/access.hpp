@@ -20,11 +20,11 @@ namespace absenc::serve {
 
 class Access {
  public:
-  enum class To : std::uint8_t {
-    anybody,  // the page itself and the health check: no token needed
-    look,     // to read what the server knows
-    ask,      // to poll the encoder or interrupt its readings, without changing it
-    change,   // to change the encoder, or to acknowledge an alarm
+  enum class Right : std::uint8_t {
+    open,    // the page itself and the health check: no token needed
+    read,    // to read what the server knows
+    poll,    // to poll the encoder or interrupt its readings, without changing it
+    change,  // to change the encoder, or to acknowledge an alarm
   };
 
   struct Choices {
@@ -41,11 +41,11 @@ class Access {
   void reload();
 
   /// Returns the response that refuses the request; nothing if the request is allowed.
-  [[nodiscard]] std::optional<Response> refusal(const Request& request, To what) const;
+  [[nodiscard]] std::optional<Response> refusal(const Request& request, Right what) const;
   /// Returns the address of the client. Behind a proxy on this computer it is the address that the proxy reports.
   [[nodiscard]] std::string client_of(const Request& request) const;
   /// Returns the name of the token in the request; "" without a valid token.
-  [[nodiscard]] std::string who(const Request& request) const;
+  [[nodiscard]] std::string token_name(const Request& request) const;
   /// Returns the response to a missing or wrong token, and counts a wrong token.
   [[nodiscard]] Response refuse_token(const Request& request) const;
   [[nodiscard]] bool has_tokens() const { return !token_file_.empty(); }
@@ -57,10 +57,10 @@ class Access {
     Time since{};
     unsigned count = 0;
   };
-  [[nodiscard]] bool may_guess_on(const std::string& peer) const;
-  [[nodiscard]] bool names_us(std::string_view host) const;
+  [[nodiscard]] bool may_try_again(const std::string& peer) const;
+  [[nodiscard]] bool names_this_server(std::string_view host) const;
   [[nodiscard]] bool is_from_own_page(const Request& request) const;
-  [[nodiscard]] bool needs_token(const Request& request, To what) const;
+  [[nodiscard]] bool needs_token(const Request& request, Right what) const;
 
   std::string token_file_;
   std::string public_origin_;  // "https://encoders.example:8443"; "": no proxy

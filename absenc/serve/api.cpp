@@ -157,11 +157,11 @@ void Api::answer(Request request, const Reply& reply) {
 void Api::get(const Request& request, const Reply& reply) {
   const std::string& path = request.path;
   const Asset* asset = find_asset(path);
-  const bool for_anybody = asset != nullptr || path == "/healthz";
+  const bool is_open = asset != nullptr || path == "/healthz";
   const bool is_of_encoder = path.starts_with(encoders_path);
   const Target target = is_of_encoder ? target_of(path) : Target{};
-  const bool asks = target.part == "settings" || target.part == "memory";
-  const Access::To what = for_anybody ? Access::To::anybody : asks ? Access::To::ask : Access::To::look;
+  const bool polls = target.part == "settings" || target.part == "memory";
+  const Access::Right what = is_open ? Access::Right::open : polls ? Access::Right::poll : Access::Right::read;
   if (const auto refused = access_->refusal(request, what)) return reply.send(*refused);
   if (asset != nullptr) return reply.send({200, std::string(asset->type), std::string(asset->content)});
   if (is_of_encoder) return get_of(require_encoder(*fleet_, target.name), target.part, request, reply);
@@ -204,7 +204,7 @@ void Api::get_of(const std::shared_ptr<Watch>& watch, std::string_view part, con
 void Api::post(const Request& request, const Reply& reply) {
   const bool is_of_encoder = request.path.starts_with(encoders_path);
   const Target target = is_of_encoder ? target_of(request.path) : Target{};
-  const Access::To what = target.part == "doctor" ? Access::To::ask : Access::To::change;
+  const Access::Right what = target.part == "doctor" ? Access::Right::poll : Access::Right::change;
   if (const auto refused = access_->refusal(request, what)) return reply.send(*refused);
   if (!is_of_encoder) throw NotFound(unknown_path(request));
   const std::shared_ptr<Watch> watch = require_encoder(*fleet_, target.name);
@@ -238,7 +238,7 @@ Response Api::health() const {
 
 // Reports whether the server has tokens, and the name of the token in the request.
 Response Api::token(const Request& request) const {
-  const std::string who = access_->who(request);
+  const std::string who = access_->token_name(request);
   if (who.empty() && !request.authorization.empty()) return access_->refuse_token(request);
   return json_response(
       Json::object().set("tokens", access_->has_tokens()).set("name", who.empty() ? Json() : Json(who)));
@@ -256,7 +256,7 @@ void Api::command(Watch& watch, const Request& request, const Reply& reply) {
   Order order;
   order.command = &wanted;
   order.arguments = arguments_in(request, wanted);
-  order.done = [reply](const Done& done) {
+  order.done = [reply](const OrderResult& done) {
     Json json = Json::object().set("ok", done.good).set("text", done.text).set("fields", done.json);
     if (done.change != ChangeState::none) json.set("change", word_of(done.change));
     reply.send({done.good ? 200U : 502U, "application/json", json.line() + "\n"});
@@ -268,7 +268,7 @@ void Api::command(Watch& watch, const Request& request, const Reply& reply) {
 void Api::acknowledge(Watch& watch, const Request& request, const Reply& reply) {
   const std::string alarm = request.value("alarm");
   if (alarm.empty()) throw BadRequest("alarm must name the alarm that is acknowledged");
-  const std::string token = access_->who(request);
+  const std::string token = access_->token_name(request);
   const std::string refused = watch.acknowledge(alarm, token, fmt::format("{} from {}", token, request.peer));
   if (!refused.empty()) return reply.send(error_response(409, refused));
   const auto answer = [reply, alarm, token] {
@@ -280,7 +280,7 @@ void Api::acknowledge(Watch& watch, const Request& request, const Reply& reply) 
 
 // The doctor opens the port again with other settings, so other encoders on the same line would lose their port.
 void Api::doctor(Watch& watch, const Request& request, const Reply& reply) {
-  const std::vector<std::string> others = fleet_->company_of(watch);
+  const std::vector<std::string> others = fleet_->others_on_line(watch);
   if (others.empty()) return give(watch, examination_order(), request, reply);
   reply.send(error_response(
       409, fmt::format("{} shares its line with {}, whose readings would stop too: end this server, then run "
@@ -290,17 +290,17 @@ void Api::doctor(Watch& watch, const Request& request, const Reply& reply) {
 
 // Queues the order. Unless the order has its own `done`, the response is the JSON result or {"error":"..."}.
 void Api::give(Watch& watch, Order order, const Request& request, const Reply& reply) {
-  const std::string who = access_->who(request);
+  const std::string who = access_->token_name(request);
   order.who = who.empty() ? request.peer : fmt::format("{} from {}", who, request.peer);
   if (!order.done) {
-    order.done = [reply](const Done& done) {
+    order.done = [reply](const OrderResult& done) {
       reply.send(done.good ? json_response(done.json) : error_response(502, done.text));
     };
   }
   // The history records who changed what, so the command is stored there before the client gets its response.
   if (chronicler_ != nullptr && order.kind == Order::Kind::command) {
     order.done = [chronicler = chronicler_, server_events = server_events_,
-                  answer = std::move(order.done)](const Done& done) {
+                  answer = std::move(order.done)](const OrderResult& done) {
       chronicler->when_written(server_events->added(), [answer, done] { answer(done); });
     };
   }

@@ -14,10 +14,10 @@ namespace absenc::serve {
 
 namespace {
 
-constexpr Time between_trims = std::chrono::seconds(60);
+constexpr Time trim_interval = std::chrono::seconds(60);
 
 // Formats a duration roughly: "400 days", "1.5 hours".
-std::string rough_words(std::int64_t ms) {
+std::string rough_duration(std::int64_t ms) {
   struct Measure {
     double ms;
     std::string_view name;
@@ -33,10 +33,10 @@ std::string rough_words(std::int64_t ms) {
 
 }  // namespace
 
-std::int64_t ClockWatch::look(std::int64_t calendar, Time now) {
+std::int64_t ClockWatch::check(std::int64_t calendar, Time now) {
   const std::int64_t passed = std::chrono::duration_cast<std::chrono::milliseconds>(now - at_).count();
-  const std::int64_t jump = looked_ ? calendar - calendar_ - passed : 0;
-  looked_ = true;
+  const std::int64_t jump = has_checked_ ? calendar - calendar_ - passed : 0;
+  has_checked_ = true;
   calendar_ = calendar;
   at_ = now;
   return std::abs(jump) < smallest_jump_ms ? 0 : jump;
@@ -46,7 +46,7 @@ Chronicler::Chronicler(const std::string& path, const HistoryLimits& limits, con
                        ServerEvents& server_events)
     : writer_(path, limits),
       fleet_(&fleet),
-      told_(&server_events),
+      server_events_(&server_events),
       health_{writer_.trouble(), 0},
       thread_([this](const std::stop_token& stop) { work(stop); }) {}
 
@@ -58,7 +58,7 @@ Chronicler::~Chronicler() {
 
 void Chronicler::add(const std::vector<ServerEvent>& server_events, std::uint64_t added) {
   const std::lock_guard lock(mutex_);
-  server_events_.insert(server_events_.end(), server_events.begin(), server_events.end());
+  unwritten_events_.insert(unwritten_events_.end(), server_events.begin(), server_events.end());
   added_ = added;
   if (!waiting_.empty()) changed_.notify_all();
 }
@@ -70,7 +70,7 @@ void Chronicler::when_written(std::uint64_t added, std::function<void()> then) {
 }
 
 // Returns whether a caller of `when_written` waits for events that can be written now. The mutex must be held.
-bool Chronicler::is_awaited() const {
+bool Chronicler::has_ready_caller() const {
   return std::any_of(waiting_.begin(), waiting_.end(), [this](const auto& one) { return one.first <= added_; });
 }
 
@@ -80,27 +80,27 @@ Chronicler::Health Chronicler::health() const {
 }
 
 void Chronicler::work(const std::stop_token& stop) {
-  Time next_trim = os::now() + between_trims;
+  Time next_trim = os::now() + trim_interval;
   while (!stop.stop_requested()) {
-    look_at_clock();
+    check_clock();
     write();
     if (os::now() >= next_trim) {
       writer_.trim();
-      next_trim = os::now() + between_trims;
+      next_trim = os::now() + trim_interval;
     }
     std::unique_lock lock(mutex_);
-    changed_.wait_for(lock, stop, std::chrono::seconds(1), [this] { return is_awaited(); });
+    changed_.wait_for(lock, stop, std::chrono::seconds(1), [this] { return has_ready_caller(); });
   }
 }
 
-void Chronicler::look_at_clock() {
+void Chronicler::check_clock() {
   const std::int64_t at_ms = calendar_ms();
-  const std::int64_t jump = clock_.look(at_ms, os::now());
+  const std::int64_t jump = clock_.check(at_ms, os::now());
   if (jump == 0) return;
-  told_->add(
+  server_events_->add(
       {at_ms, "", "history",
        fmt::format("the clock jumped {} by {}: rows are deleted by age only after a day of rows with the new time",
-                   jump > 0 ? "forward" : "back", rough_words(std::abs(jump)))});
+                   jump > 0 ? "forward" : "back", rough_duration(std::abs(jump)))});
 }
 
 void Chronicler::write() {
@@ -112,11 +112,11 @@ void Chronicler::write() {
   std::uint64_t added = 0;
   {
     const std::lock_guard lock(mutex_);
-    server_events = std::exchange(server_events_, {});
+    server_events = std::exchange(unwritten_events_, {});
     added = added_;
   }
   writer_.write(seconds, server_events);
-  for (std::string& note : writer_.take_notes()) told_->add({calendar_ms(), "", "history", std::move(note)});
+  for (std::string& note : writer_.take_notes()) server_events_->add({calendar_ms(), "", "history", std::move(note)});
   std::vector<std::function<void()>> served;
   {
     const std::lock_guard lock(mutex_);

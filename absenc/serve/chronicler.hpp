@@ -24,10 +24,10 @@ class ClockWatch {
 
   /// Returns the jump of the calendar clock since the last call, in milliseconds; 0 without one. `now` is a time of
   /// os::now.
-  std::int64_t look(std::int64_t calendar_ms, Time now);
+  std::int64_t check(std::int64_t calendar_ms, Time now);
 
  private:
-  bool looked_ = false;
+  bool has_checked_ = false;
   std::int64_t calendar_ = 0;
   Time at_{};
 };
@@ -37,7 +37,7 @@ class Chronicler {
   /// `fleet` and `server_events` must outlive this object. Events about the history are added to `server_events`.
   /// Throws HistoryInUse.
   Chronicler(const std::string& path, const HistoryLimits& limits, const Fleet& fleet, ServerEvents& server_events);
-  /// Writes the remaining rows.
+  /// Writes the remaining seconds and events.
   ~Chronicler();
 
   /// `added` is the number of events since the start, including these (ServerEvents::added).
@@ -55,18 +55,18 @@ class Chronicler {
 
  private:
   void work(const std::stop_token& stop);
-  void look_at_clock();
+  void check_clock();
   void write();
-  [[nodiscard]] bool is_awaited() const;
+  [[nodiscard]] bool has_ready_caller() const;
 
   HistoryWriter writer_;
   const Fleet* fleet_;
-  ServerEvents* told_;
+  ServerEvents* server_events_;
   ClockWatch clock_;
   mutable std::mutex mutex_;  // guards all members below
   std::condition_variable_any changed_;
-  std::vector<ServerEvent> server_events_;
-  std::uint64_t added_ = 0;  // events since the start, including those in `server_events_`
+  std::vector<ServerEvent> unwritten_events_;
+  std::uint64_t added_ = 0;  // events since the start, including those in `unwritten_events_`
   std::vector<std::pair<std::uint64_t, std::function<void()>>> waiting_;
   Health health_;
   std::jthread thread_;  // last member: the thread uses all others

@@ -18,22 +18,22 @@ std::size_t Connections::count(const std::function<bool(const Open&)>& matches) 
 
 void Connections::add(Id id, int socket, std::string peer, Time now) {
   Open& added = open_[id] = {socket, std::move(peer), now};
-  const auto is_ordinary = [](const Open& one) { return !one.of_reserve; };
+  const auto is_ordinary = [](const Open& one) { return !one.in_reserve; };
   const auto is_like_it = [&](const Open& one) { return is_ordinary(one) && one.peer == added.peer; };
   if (count(is_like_it) > most_of_address) {
     if (end_oldest_idle(id, is_like_it)) return;
   } else if (count(is_ordinary) <= most || end_oldest_idle_of_busiest(id)) {
     return;
   }
-  added.of_reserve = true;
-  const auto is_of_reserve = [](const Open& one) { return one.of_reserve; };
-  if (count(is_of_reserve) > reserve && !end_oldest_idle(id, is_of_reserve)) end(added);
+  added.in_reserve = true;
+  const auto is_in_reserve = [](const Open& one) { return one.in_reserve; };
+  if (count(is_in_reserve) > reserve && !end_oldest_idle(id, is_in_reserve)) end(added);
 }
 
-bool Connections::end_oldest_idle(Id but, const std::function<bool(const Open&)>& matches) {
+bool Connections::end_oldest_idle(Id excluded, const std::function<bool(const Open&)>& matches) {
   Open* oldest = nullptr;
   for (auto& [id, one] : open_) {
-    if (id == but || one.ended || one.idle_since == never || !matches(one)) continue;
+    if (id == excluded || one.ended || one.idle_since == never || !matches(one)) continue;
     if (oldest == nullptr || one.idle_since < oldest->idle_since) oldest = &one;
   }
   if (oldest == nullptr) return false;
@@ -42,15 +42,15 @@ bool Connections::end_oldest_idle(Id but, const std::function<bool(const Open&)>
 }
 
 // Closes an idle connection of the address with the most of them, so that addresses with few connections keep theirs.
-bool Connections::end_oldest_idle_of_busiest(Id but) {
+bool Connections::end_oldest_idle_of_busiest(Id excluded) {
   std::unordered_map<std::string, std::size_t> idle;
   for (const auto& [id, one] : open_) {
-    if (id != but && !one.ended && !one.of_reserve && one.idle_since != never) ++idle[one.peer];
+    if (id != excluded && !one.ended && !one.in_reserve && one.idle_since != never) ++idle[one.peer];
   }
   const auto busiest =
       std::max_element(idle.begin(), idle.end(), [](const auto& a, const auto& b) { return a.second < b.second; });
   if (busiest == idle.end()) return false;
-  return end_oldest_idle(but, [&](const Open& one) { return !one.of_reserve && one.peer == busiest->first; });
+  return end_oldest_idle(excluded, [&](const Open& one) { return !one.in_reserve && one.peer == busiest->first; });
 }
 
 void Connections::begin_request(Id id) {
@@ -61,12 +61,12 @@ void Connections::await_request(Id id, Time now) {
   if (const auto found = open_.find(id); found != open_.end()) found->second.idle_since = now;
 }
 
-bool Connections::is_of_reserve(Id id) const {
+bool Connections::is_in_reserve(Id id) const {
   const auto found = open_.find(id);
-  return found != open_.end() && found->second.of_reserve;
+  return found != open_.end() && found->second.in_reserve;
 }
 
-void Connections::end_half_sent(Time now) {
+void Connections::end_incomplete_requests(Time now) {
   for (auto& [id, one] : open_) {
     if (!one.ended && one.idle_since != never && now - one.idle_since > request_time) end(one);
   }

@@ -33,22 +33,22 @@ class Connections {
   void begin_request(Id id);
   void await_request(Id id, Time now);
   /// Returns whether the connection belongs to the reserve, which serves vital requests only.
-  [[nodiscard]] bool is_of_reserve(Id id) const;
+  [[nodiscard]] bool is_in_reserve(Id id) const;
   /// Closes connections whose request has been incomplete for longer than `request_time`.
-  void end_half_sent(Time now);
+  void end_incomplete_requests(Time now);
 
  private:
   struct Open {
     int socket = -1;
     std::string peer{};
     Time idle_since = never;  // `never` while a request is being answered
-    bool of_reserve = false;
+    bool in_reserve = false;
     bool ended = false;
   };
 
   void end(Open& one);
-  bool end_oldest_idle(Id but, const std::function<bool(const Open&)>& matches);
-  bool end_oldest_idle_of_busiest(Id but);
+  bool end_oldest_idle(Id excluded, const std::function<bool(const Open&)>& matches);
+  bool end_oldest_idle_of_busiest(Id excluded);
   [[nodiscard]] std::size_t count(const std::function<bool(const Open&)>& matches) const;
 
   std::function<void(int)> end_;

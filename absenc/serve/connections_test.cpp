@@ -26,7 +26,7 @@ struct Trial {
   }
 };
 
-TEST(Connections, AnAddressBeyondItsLimitLosesItsOldestIdleOne) {
+TEST(Connections, ClosesOldestIdleConnectionOfAddressBeyondItsLimit) {
   Trial trial;
   trial.add("b", 9000, 1);
   trial.add("a", 1, Connections::most_of_address);
@@ -36,7 +36,7 @@ TEST(Connections, AnAddressBeyondItsLimitLosesItsOldestIdleOne) {
   EXPECT_EQ(trial.ended, (std::set{2, 3}));
 }
 
-TEST(Connections, AllTogetherBeyondTheLimitLoseOneOfTheAddressWithTheMost) {
+TEST(Connections, ClosesConnectionOfBusiestAddressBeyondTotalLimit) {
   Trial trial;
   trial.add("b", 9000, 5);
   trial.add("a", 1, 300);
@@ -46,29 +46,29 @@ TEST(Connections, AllTogetherBeyondTheLimitLoseOneOfTheAddressWithTheMost) {
   EXPECT_EQ(trial.ended, (std::set{1}));
 }
 
-TEST(Connections, WithoutIdleOnesTheReserveIsLeft) {
+TEST(Connections, UsesReserveWhenNoConnectionIsIdle) {
   Trial trial;
   trial.add("a", 1, 240, true);
   trial.add("b", 1000, 240, true);
   trial.add("c", 5000, Connections::reserve, true);
   EXPECT_TRUE(trial.ended.empty());
-  EXPECT_FALSE(trial.connections.is_of_reserve(Trial::id(1000)));
-  EXPECT_TRUE(trial.connections.is_of_reserve(Trial::id(5000)));
+  EXPECT_FALSE(trial.connections.is_in_reserve(Trial::id(1000)));
+  EXPECT_TRUE(trial.connections.is_in_reserve(Trial::id(5000)));
   trial.add("c", 6000, 1);
   EXPECT_EQ(trial.ended, (std::set{6000}));
   trial.connections.await_request(Trial::id(1), trial.now);
   trial.add("c", 7000, 1);
   EXPECT_EQ(trial.ended, (std::set{1, 6000}));
-  EXPECT_FALSE(trial.connections.is_of_reserve(Trial::id(7000)));
+  EXPECT_FALSE(trial.connections.is_in_reserve(Trial::id(7000)));
 }
 
-TEST(Connections, HalfARequestEndsAfterItsTime) {
+TEST(Connections, ClosesIncompleteRequestAfterItsTimeLimit) {
   Trial trial;
   trial.add("a", 1, 2);
   trial.connections.begin_request(Trial::id(1));
-  trial.connections.end_half_sent(trial.now + Connections::request_time);
+  trial.connections.end_incomplete_requests(trial.now + Connections::request_time);
   EXPECT_TRUE(trial.ended.empty());
-  trial.connections.end_half_sent(trial.now + Connections::request_time + 1ms);
+  trial.connections.end_incomplete_requests(trial.now + Connections::request_time + 1ms);
   EXPECT_EQ(trial.ended, (std::set{2}));
 }
 

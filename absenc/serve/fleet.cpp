@@ -34,7 +34,7 @@ std::string description_of(const NamedEncoder& named) {
 
 }  // namespace
 
-struct Fleet::Wanted {
+struct Fleet::Configured {
   std::string name;
   std::string description;
   EncoderAddress address;
@@ -54,7 +54,7 @@ void Fleet::end() {
   for (const auto& watch : watches) watch->wait();
 }
 
-std::vector<Fleet::Wanted> Fleet::wanted() const {
+std::vector<Fleet::Configured> Fleet::configured() const {
   std::vector<std::string> names = names_;
   std::optional<NamedEncoders> file;
   if (names.empty() || std::any_of(names.begin(), names.end(), is_named)) {
@@ -64,7 +64,7 @@ std::vector<Fleet::Wanted> Fleet::wanted() const {
     for (const FileSection& encoder : file->file().encoders) names.push_back(encoder.name);
     if (names.empty()) throw UsageError(fmt::format("there is no encoder in {}", file->file().path));
   }
-  std::vector<Wanted> all;
+  std::vector<Configured> all;
   for (const std::string& name : names) {
     if (os::interrupted()) throw os::Interrupted{};
     NamedEncoder named;
@@ -74,7 +74,7 @@ std::vector<Fleet::Wanted> Fleet::wanted() const {
         {name, description_of(named), is_named(name) ? parse_address(name, *file) : parse_address(name), rate});
   }
   std::vector<EncoderAddress> addresses;
-  for (const Wanted& one : all) addresses.push_back(one.address);
+  for (const Configured& one : all) addresses.push_back(one.address);
   require_different(addresses, names);
   std::unordered_set<std::string_view> seen;
   for (const std::string& name : names) {
@@ -84,19 +84,19 @@ std::vector<Fleet::Wanted> Fleet::wanted() const {
 }
 
 std::string Fleet::reload() {
-  std::vector<Wanted> all = wanted();
-  std::vector<Served> going;
+  std::vector<Configured> all = configured();
+  std::vector<Served> unchanged;
   Watches ending;
   std::vector<std::string> gone;
   {
     const std::lock_guard lock(mutex_);
     for (Served& one : served_) {
-      const bool stays = std::any_of(all.begin(), all.end(), [&](const Wanted& now) {
+      const bool stays = std::any_of(all.begin(), all.end(), [&](const Configured& now) {
         return now.name == one.watch->name() && now.description == one.description;
       });
       if (!stays) gone.push_back(one.watch->name());
       if (!stays) ending.push_back(one.watch);
-      if (stays) going.push_back(one);
+      if (stays) unchanged.push_back(one);
     }
   }
   // A new encoder may need the port of an ended one.
@@ -106,10 +106,10 @@ std::string Fleet::reload() {
   std::vector<Served> next;
   for (std::size_t i = 0; i < all.size(); ++i) {
     if (os::interrupted()) throw os::Interrupted{};
-    const Wanted& now = all[i];
-    const auto same =
-        std::find_if(going.begin(), going.end(), [&](const Served& one) { return one.watch->name() == now.name; });
-    if (same != going.end()) {
+    const Configured& now = all[i];
+    const auto same = std::find_if(unchanged.begin(), unchanged.end(),
+                                   [&](const Served& one) { return one.watch->name() == now.name; });
+    if (same != unchanged.end()) {
       next.push_back(*same);
       continue;
     }
@@ -122,7 +122,7 @@ std::string Fleet::reload() {
   }
   const std::lock_guard lock(mutex_);
   served_ = std::move(next);
-  return fmt::format("{} unchanged; ended: {}; begun: {}", going.size(),
+  return fmt::format("{} unchanged; ended: {}; begun: {}", unchanged.size(),
                      gone.empty() ? "none" : fmt::format("{}", fmt::join(gone, ", ")),
                      added.empty() ? "none" : fmt::format("{}", fmt::join(added, ", ")));
 }
@@ -142,7 +142,7 @@ std::shared_ptr<Watch> Fleet::find(std::string_view name) const {
   return nullptr;
 }
 
-std::vector<std::string> Fleet::company_of(const Watch& watch) const {
+std::vector<std::string> Fleet::others_on_line(const Watch& watch) const {
   std::vector<std::string> names;
   for (const auto& other : all()) {
     if (other.get() == &watch || other->name() == watch.name()) continue;

@@ -34,15 +34,15 @@ class Fleet {
   /// Returns null for an unknown name.
   [[nodiscard]] std::shared_ptr<Watch> find(std::string_view name) const;
   /// Returns the names of the other encoders on the same line.
-  [[nodiscard]] std::vector<std::string> company_of(const Watch& watch) const;
+  [[nodiscard]] std::vector<std::string> others_on_line(const Watch& watch) const;
 
  private:
-  struct Wanted;
+  struct Configured;
   struct Served {
     std::string description;
     std::shared_ptr<Watch> watch;
   };
-  [[nodiscard]] std::vector<Wanted> wanted() const;
+  [[nodiscard]] std::vector<Configured> configured() const;
 
   std::vector<std::string> names_;
   double rate_;

@@ -91,25 +91,25 @@ void HistoryWriter::open() {
 // Ensures that the open file is intact and still at the path; opens or creates another file if needed.
 void HistoryWriter::require_file() {
   if (file_) {
-    const HistoryFile::State state = file_->look();
+    const HistoryFile::State state = file_->check();
     if (state == HistoryFile::State::whole) return;
     if (state == HistoryFile::State::damaged) {
       set_aside("was cut off or overwritten");
     } else {
-      leave(state);
+      close_file(state);
     }
   }
   open();
 }
 
-void HistoryWriter::leave(HistoryFile::State state) {
+void HistoryWriter::close_file(HistoryFile::State state) {
   const std::string_view what = state == HistoryFile::State::changed ? "was changed by another program: it is continued"
                                 : state == HistoryFile::State::gone
                                     ? "was moved or removed: a new one begins"
                                     : "was replaced by another file: it is continued there";
   notes_.push_back(fmt::format("the history {} {}", path_, what));
   reader_.refuse(notes_.back());
-  state == HistoryFile::State::changed ? file_->close() : file_->leave();
+  state == HistoryFile::State::changed ? file_->close() : file_->close_moved();
   file_.reset();
 }
 
@@ -130,11 +130,11 @@ void HistoryWriter::write(const std::vector<Entry>& seconds, const std::vector<S
       open();
       insert(seconds, server_events);
     }
-    if (lost_now_ != 0) {
-      notes_.push_back(
-          fmt::format("{} rows since {} could not be written: {}", lost_now_, lost_since_ms_ / 1000, trouble_));
+    if (unreported_losses_ != 0) {
+      notes_.push_back(fmt::format("{} rows since {} could not be written: {}", unreported_losses_,
+                                   lost_since_ms_ / 1000, trouble_));
     }
-    lost_now_ = 0;
+    unreported_losses_ = 0;
     trouble_.clear();
   } catch (const Failure& failure) {
     note_loss(seconds.size() + server_events.size(), failure.what());
@@ -167,10 +167,10 @@ void HistoryWriter::insert(const std::vector<Entry>& seconds, const std::vector<
 }
 
 void HistoryWriter::note_loss(std::size_t rows, const std::string& why) {
-  if (lost_now_ == 0) lost_since_ms_ = calendar_ms();
+  if (unreported_losses_ == 0) lost_since_ms_ = calendar_ms();
   if (trouble_.empty()) notes_.push_back(fmt::format("the history cannot be written: {}", why));
   lost_ += rows;
-  lost_now_ += rows;
+  unreported_losses_ += rows;
   trouble_ = why;
   if (!file_) reader_.refuse(why);
   roll_back();
@@ -179,7 +179,7 @@ void HistoryWriter::note_loss(std::size_t rows, const std::string& why) {
 void HistoryWriter::roll_back() {
   try {
     if (file_ && file_->sqlite().in_transaction()) file_->sqlite().run("ROLLBACK");
-  } catch (const Failure&) {  // SQLite has already rolled back
+  } catch (const Failure&) {  // then SQLite has already rolled back
   }
 }
 
@@ -189,7 +189,7 @@ void HistoryWriter::trim() {
   if (!file_) return;
   try {
     const std::int64_t too_old = calendar_ms() / 1000 - limits_.seconds;
-    if (was_recorded_since(too_old)) delete_before(too_old);
+    if (has_day_of_rows_since(too_old)) delete_before(too_old);
     Sqlite& sqlite = file_->sqlite();
     const std::int64_t page = sqlite.number("PRAGMA page_size");
     const std::int64_t used = page * (sqlite.number("PRAGMA page_count") - sqlite.number("PRAGMA freelist_count"));
@@ -202,7 +202,7 @@ void HistoryWriter::trim() {
 
 // Returns whether one encoder has rows in 24 different hours since `at_s`. A wrong clock that lasts less than that
 // deletes nothing, even if the server is started meanwhile.
-bool HistoryWriter::was_recorded_since(std::int64_t at_s) {
+bool HistoryWriter::has_day_of_rows_since(std::int64_t at_s) {
   constexpr std::int64_t hours = 24;
   Statement encoders(file_->sqlite(), "SELECT id FROM encoder");
   Statement found(file_->sqlite(),
@@ -255,7 +255,7 @@ void HistoryReader::accept() {
   refused_.clear();
 }
 
-// The mutex must be held.
+// Returns the open database, or opens it. The mutex must be held.
 Sqlite& HistoryReader::database() {
   if (!refused_.empty()) throw Failure(refused_);
   if (!database_) database_.emplace("the history", path_, Sqlite::For::reading);

@@ -92,12 +92,12 @@ class HistoryWriter {
  private:
   void open();
   void require_file();
-  void leave(HistoryFile::State state);
+  void close_file(HistoryFile::State state);
   void set_aside(std::string_view why);
   void insert(const std::vector<Entry>& seconds, const std::vector<ServerEvent>& server_events);
   void note_loss(std::size_t rows, const std::string& why);
   void roll_back();
-  [[nodiscard]] bool was_recorded_since(std::int64_t at_s);
+  [[nodiscard]] bool has_day_of_rows_since(std::int64_t at_s);
   [[nodiscard]] std::int64_t end_of_oldest_tenth();
   void delete_before(std::int64_t at_s);
 
@@ -108,7 +108,7 @@ class HistoryWriter {
   HistoryLimits limits_;
   std::string trouble_;
   std::uint64_t lost_ = 0;
-  std::uint64_t lost_now_ = 0;  // rows lost since the last report
+  std::uint64_t unreported_losses_ = 0;  // rows lost since the last report
   std::int64_t lost_since_ms_ = 0;
   std::vector<std::string> notes_;
 };

@@ -68,7 +68,7 @@ std::uint32_t big_endian(std::string_view bytes) {
 
 }  // namespace
 
-HistoryFile::HistoryFile(const std::string& path) : path_(path), kept_(lock(path)) {
+HistoryFile::HistoryFile(const std::string& path) : path_(path), owned_file_(lock(path)) {
   sqlite_.emplace("the history", path, Sqlite::For::writing);
   sqlite_->run("PRAGMA auto_vacuum = INCREMENTAL; PRAGMA journal_mode = WAL; PRAGMA synchronous = NORMAL");
   const std::int64_t found = sqlite_->number("PRAGMA user_version");
@@ -79,58 +79,58 @@ HistoryFile::HistoryFile(const std::string& path) : path_(path), kept_(lock(path
   index_ = os::identity_of(index_of(path));
   // After kill -9 the file has its full length only once the log is written into it.
   const bool is_in_file = sqlite_->number("PRAGMA wal_checkpoint(FULL)") == 0;
-  if (is_in_file && is_shorter_than_it_says()) throw DamagedFile(fmt::format("the history {} was cut off", path));
+  if (is_in_file && is_truncated()) throw DamagedFile(fmt::format("the history {} was cut off", path));
   note_written();
 }
 
 // The header has the page size at byte 16 and the number of pages at byte 28: https://www.sqlite.org/fileformat.html,
 // 1.3.
-bool HistoryFile::is_shorter_than_it_says() const {
+bool HistoryFile::is_truncated() const {
   constexpr std::string_view magic{"SQLite format 3\0", 16};
-  const std::string header = kept_->beginning(32);
+  const std::string header = owned_file_->beginning(32);
   if (header.size() < 32 || !header.starts_with(magic)) return true;
   const std::uint32_t written = big_endian(header.substr(16, 2));
   const std::int64_t page = written == 1 ? 65536 : written;
-  return kept_->state().size < page * std::int64_t{big_endian(header.substr(28, 4))};
+  return owned_file_->state().size < page * std::int64_t{big_endian(header.substr(28, 4))};
 }
 
 // Checks through a separate connection, which has no pages of the file in memory.
-bool HistoryFile::is_sound() const {
-  if (kept_->state().size == 0) return false;  // SQLite would delete the log of an empty file
+bool HistoryFile::passes_quick_check() const {
+  if (owned_file_->state().size == 0) return false;  // SQLite would delete the log of an empty file
   try {
     Sqlite other("the history", path_, Sqlite::For::reading);
-    Statement check(other, "PRAGMA quick_check(1)");
-    return check.next() && check.text(0) == "ok";
+    Statement quick_check(other, "PRAGMA quick_check(1)");
+    return quick_check.next() && quick_check.text(0) == "ok";
   } catch (const DamagedFile&) {
     return false;
   }
 }
 
-HistoryFile::State HistoryFile::look() const {
-  if (!kept_->has_its_name()) {
+HistoryFile::State HistoryFile::check() const {
+  if (!owned_file_->has_its_name()) {
     return os::identity_of(path_).number == 0 ? State::gone : State::replaced;
   }
   // The writer was SQLite in another program, which may also write our log to the file, or `cp`, which mixes our log
   // into the new content.
-  const bool is_changed = kept_->state().modified_ns != modified_ns_;
-  if (!is_changed && !is_shorter_than_it_says()) return State::whole;
-  if (!is_sound()) return State::damaged;
+  const bool is_changed = owned_file_->state().modified_ns != modified_ns_;
+  if (!is_changed && !is_truncated()) return State::whole;
+  if (!passes_quick_check()) return State::damaged;
   return is_changed ? State::changed : State::whole;
 }
 
-void HistoryFile::note_written() { modified_ns_ = kept_->state().modified_ns; }
+void HistoryFile::note_written() { modified_ns_ = owned_file_->state().modified_ns; }
 
 void HistoryFile::close() {
-  sqlite_->leave_log();
+  sqlite_->keep_log_on_close();
   sqlite_.reset();
-  kept_.reset();
+  owned_file_.reset();
 }
 
-void HistoryFile::leave() {
+void HistoryFile::close_moved() {
   bool is_in_file = false;
   try {
     is_in_file = sqlite_->number("PRAGMA wal_checkpoint(FULL)") == 0;
-  } catch (const Failure&) {  // the log is then renamed below
+  } catch (const Failure&) {  // the log is not in the file: it is renamed below
   }
   close();
   // SQLite would apply a log that stays beside the path to the next file there.

@@ -33,7 +33,7 @@ class HistoryFile {
     damaged,
   };
   /// Compares the file at the path with its state at the last `note_written`.
-  [[nodiscard]] State look() const;
+  [[nodiscard]] State check() const;
   /// Stores the modification time. Call it after each transaction: a different time later means that another program
   /// wrote.
   void note_written();
@@ -42,19 +42,19 @@ class HistoryFile {
   void close();
   /// Closes a file that is `gone` or `replaced`. All written rows are in that file, and its log is removed from the
   /// path.
-  void leave();
+  void close_moved();
   /// Closes a `damaged` file and renames it. Returns the new name. Throws Failure.
   std::string set_aside();
   /// Renames the file at `path`. Returns the new name. Throws Failure.
   static std::string set_aside(const std::string& path);
 
  private:
-  [[nodiscard]] bool is_shorter_than_it_says() const;
-  [[nodiscard]] bool is_sound() const;
+  [[nodiscard]] bool is_truncated() const;
+  [[nodiscard]] bool passes_quick_check() const;
 
   std::string path_;
-  std::unique_ptr<os::OwnedFile> kept_;  // stays open until the database is closed: closing it would release SQLite's
-                                         // locks
+  std::unique_ptr<os::OwnedFile> owned_file_;  // stays open until the database is closed: closing it would release
+                                               // SQLite's locks
   std::optional<Sqlite> sqlite_;
   os::FileIdentity log_;    // write-ahead log of SQLite
   os::FileIdentity index_;  // index of the write-ahead log

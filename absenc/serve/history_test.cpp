@@ -17,16 +17,16 @@ namespace {
 
 using namespace std::chrono_literals;
 
-TEST(ClockWatch, NoticesJumpsAndNotWhatNtpDoes) {
+TEST(ClockWatch, DetectsJumpsButIgnoresNtpAdjustments) {
   ClockWatch clock;
   Time now = 100s;
   std::int64_t calendar = 1'700'000'000'000;
   const auto pass = [&](Time time) {
     now += time;
     calendar += std::chrono::duration_cast<std::chrono::milliseconds>(time).count();
-    return clock.look(calendar, now);
+    return clock.check(calendar, now);
   };
-  EXPECT_EQ(clock.look(calendar, now), 0);
+  EXPECT_EQ(clock.check(calendar, now), 0);
   EXPECT_EQ(pass(59min), 0);
   constexpr std::int64_t days_400 = 400LL * 86'400'000;
   calendar += days_400;
@@ -57,7 +57,7 @@ std::size_t seconds_in(HistoryWriter& writer, const std::string& encoder) {
 }
 
 // Simulates a server start during a minute in which the clock is 400 days ahead, so that all older rows seem too old.
-TEST(History, IsDeletedForItsAgeOnceADayWasRecordedSince) {
+TEST(History, DeletesOldRowsOnlyAfterADayOfNewerRows) {
   const std::string path = new_path();
   {
     HistoryWriter writer(path, {});
@@ -80,7 +80,7 @@ TEST(History, IsDeletedForItsAgeOnceADayWasRecordedSince) {
 }
 
 // One row is years ahead, as after a wrong clock.
-TEST(History, BeyondItsSizeLosesTheOldestTenthOfItsRows) {
+TEST(History, DeletesOldestTenthOfRowsBeyondSizeLimit) {
   const std::string path = new_path();
   HistoryLimits limits;
   limits.bytes = 10'000;
@@ -96,13 +96,13 @@ TEST(History, BeyondItsSizeLosesTheOldestTenthOfItsRows) {
   remove_history(path);
 }
 
-TEST(History, IsWrittenByOneServer) {
+TEST(History, RefusesSecondWriter) {
   const std::string path = new_path();
   {
     const HistoryWriter first(path, {});
     try {
       const HistoryWriter second(path, {});
-      FAIL() << "both write it";
+      FAIL() << "two writers opened the same file";
     } catch (const client::Failure& failure) {
       EXPECT_NE(std::string(failure.what()).find("another server"), std::string::npos) << failure.what();
     }
@@ -111,7 +111,7 @@ TEST(History, IsWrittenByOneServer) {
   remove_history(path);
 }
 
-TEST(History, SecondThatComesTwiceHasTheReadingsOfBoth) {
+TEST(History, CombinesReadingsOfRepeatedSecond) {
   const std::string path = new_path();
   {
     HistoryWriter writer(path, {});

@@ -59,7 +59,7 @@ Request request_of(MHD_Connection* connection, const char* path, const char* met
     return MHD_YES;
   };
   ::MHD_get_connection_values(connection, MHD_GET_ARGUMENT_KIND, add, &request.query);
-  headers_of(connection).hand_on(request);
+  headers_of(connection).copy_to(request);
   request.peer = peer_of(connection);
   return request;
 }
@@ -84,13 +84,13 @@ void add_headers(MHD_Response* response, const std::string& type) {
 struct Stream::Sending {
   std::string type;
   std::size_t most;
-  std::function<void()> wanted;
+  std::function<void()> on_empty;
 
   std::mutex mutex;  // guards all members below
   std::deque<Text> queue;
   std::size_t sent_of_first = 0;
   MHD_Connection* suspended = nullptr;
-  int socket = -1;  // -1 unless a connection sends this stream
+  int socket = -1;  // socket of the connection that sends this stream; -1 without one
   Time taken_at = os::now();
   bool ended = false;  // no more texts will be added
   bool over = false;   // the connection has ended
@@ -105,16 +105,16 @@ struct Stream::Sending {
     {
       const std::lock_guard lock(mutex);
       taken_at = os::now();
-      if (!queue.empty()) return take_some(buffer, size);
+      if (!queue.empty()) return fill_buffer(buffer, size);
       if (ended) return MHD_CONTENT_READER_END_OF_STREAM;
       suspended = connection;
       ::MHD_suspend_connection(connection);
     }
-    if (wanted) wanted();
+    if (on_empty) on_empty();
     return 0;
   }
 
-  ssize_t take_some(char* buffer, std::size_t size) {
+  ssize_t fill_buffer(char* buffer, std::size_t size) {
     std::size_t filled = 0;
     while (!queue.empty() && filled < size) {
       const std::string& first = *queue.front();
@@ -130,11 +130,11 @@ struct Stream::Sending {
   }
 };
 
-Stream::Stream(std::string type, std::size_t most, std::function<void()> wanted)
+Stream::Stream(std::string type, std::size_t most, std::function<void()> on_empty)
     : sending_(std::make_unique<Sending>()) {
   sending_->type = std::move(type);
   sending_->most = most;
-  sending_->wanted = std::move(wanted);
+  sending_->on_empty = std::move(on_empty);
 }
 Stream::~Stream() = default;
 
@@ -157,7 +157,7 @@ void Stream::end() {
   sending_->resume();
 }
 
-void Stream::break_off() {
+void Stream::abort() {
   const std::lock_guard lock(sending_->mutex);
   sending_->ended = true;
   sending_->queue.clear();
@@ -232,19 +232,19 @@ struct HttpServer::Daemon {
     return queued;
   }
 
-  struct Carried {
+  struct StreamContext {
     Daemon* daemon;
     MHD_Connection* connection;
     std::shared_ptr<Stream> stream;
   };
 
-  static ssize_t read_stream(void* carried, std::uint64_t, char* buffer, std::size_t size) {
-    const auto* one = static_cast<Carried*>(carried);
+  static ssize_t read_stream(void* context, std::uint64_t, char* buffer, std::size_t size) {
+    const auto* one = static_cast<StreamContext*>(context);
     return one->stream->sending_->take(one->connection, buffer, size);
   }
 
-  static void free_stream(void* carried) {
-    const std::unique_ptr<Carried> one(static_cast<Carried*>(carried));
+  static void free_stream(void* context) {
+    const std::unique_ptr<StreamContext> one(static_cast<StreamContext*>(context));
     {
       const std::lock_guard lock(one->daemon->mutex);
       one->daemon->streams.erase(one->stream.get());
@@ -267,8 +267,8 @@ struct HttpServer::Daemon {
       const std::lock_guard lock(stream->sending_->mutex);
       stream->sending_->socket = socket_of(connection);
     }
-    MHD_Response* response = ::MHD_create_response_from_callback(MHD_SIZE_UNKNOWN, block, read_stream,
-                                                                 new Carried{this, connection, stream}, free_stream);
+    MHD_Response* response = ::MHD_create_response_from_callback(
+        MHD_SIZE_UNKNOWN, block, read_stream, new StreamContext{this, connection, stream}, free_stream);
     if (response == nullptr) return MHD_NO;
     add_headers(response, stream->sending_->type);
     const MHD_Result queued = ::MHD_queue_response(connection, MHD_HTTP_OK, response);
@@ -292,7 +292,7 @@ struct HttpServer::Daemon {
       const std::lock_guard lock(mutex);
       connections.begin_request(connection);
       const bool is_vital = std::find(vital.begin(), vital.end(), path) != vital.end();
-      if (connections.is_of_reserve(connection) && !is_vital) {
+      if (connections.is_in_reserve(connection) && !is_vital) {
         return exchange->answer(
             Response{503, "text/plain", "too many connections are open: try again later\n", {{"Connection", "close"}}},
             nullptr);
@@ -373,7 +373,7 @@ struct HttpServer::Daemon {
         MHD_OPTION_NOTIFY_COMPLETED, &completed, this, MHD_OPTION_NOTIFY_CONNECTION, &connected, this, MHD_OPTION_END);
     if (daemon == nullptr)
       throw client::Failure("the web server cannot be started: too many files are open, or no memory");
-    static_cast<void>(listener.socket.release());  // the daemon closes it
+    static_cast<void>(listener.socket.release());  // the daemon closes the listening socket
   }
 
   // Resumes all suspended connections first, because libmicrohttpd must not be stopped with suspended ones.
@@ -407,9 +407,9 @@ HttpServer::HttpServer(os::Listener listener, Handler handler, std::vector<std::
 
 HttpServer::~HttpServer() { daemon_->stop(); }
 
-void HttpServer::end_half_sent() {
+void HttpServer::end_incomplete_requests() {
   const std::lock_guard lock(daemon_->mutex);
-  daemon_->connections.end_half_sent(os::now());
+  daemon_->connections.end_incomplete_requests(os::now());
 }
 
 }  // namespace absenc::serve

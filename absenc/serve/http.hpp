@@ -20,7 +20,7 @@
 namespace absenc::serve {
 
 struct Request {
-  std::string method;  // "GET", "POST" ...
+  std::string method;  // HTTP method: "GET", "POST" ...
   std::string path;
   std::multimap<std::string, std::string> query;
   std::string peer;  // IP address of the client
@@ -48,8 +48,8 @@ class Stream {
  public:
   using Text = std::shared_ptr<const std::string>;
 
-  /// `wanted` is called in the thread of the connections when the queue is empty; it must return quickly.
-  explicit Stream(std::string type, std::size_t most = 64, std::function<void()> wanted = {});
+  /// `on_empty` is called in the thread of the connections when the queue is empty; it must return quickly.
+  explicit Stream(std::string type, std::size_t most = 64, std::function<void()> on_empty = {});
   ~Stream();
   Stream(const Stream&) = delete;
   Stream& operator=(const Stream&) = delete;
@@ -58,7 +58,7 @@ class Stream {
   /// Ends the stream after the queued texts are sent.
   void end();
   /// Closes the connection at once, even if the client receives nothing.
-  void break_off();
+  void abort();
   /// Returns whether the connection has ended.
   [[nodiscard]] bool over() const;
   [[nodiscard]] std::uint64_t dropped() const;
@@ -98,7 +98,7 @@ class HttpServer {
   HttpServer& operator=(const HttpServer&) = delete;
 
   /// Closes connections whose request stays incomplete. Call it about once a second.
-  void end_half_sent();
+  void end_incomplete_requests();
 
  private:
   struct Daemon;

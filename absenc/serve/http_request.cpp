@@ -53,7 +53,7 @@ std::string_view Headers::ambiguity(std::string_view version) const {
 
 std::uint64_t Headers::announced_length() const { return std::strtoull(first("Content-Length").c_str(), nullptr, 10); }
 
-void Headers::hand_on(Request& request) const {
+void Headers::copy_to(Request& request) const {
   request.host = first("Host");
   request.origin = first("Origin");
   request.fetch_site = first("Sec-Fetch-Site");

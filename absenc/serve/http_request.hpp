@@ -27,7 +27,7 @@ class Headers {
   /// Returns the announced length of the body in bytes; 0 without Content-Length.
   [[nodiscard]] std::uint64_t announced_length() const;
   /// Copies the headers that access control needs.
-  void hand_on(Request& request) const;
+  void copy_to(Request& request) const;
 
  private:
   std::vector<std::pair<std::string, std::string>> all_;

@@ -41,7 +41,7 @@ class Page {
   std::string text;
 };
 
-struct Seen {
+struct EncoderState {
   std::string label;
   const Unit* unit;
   Snapshot snapshot;
@@ -49,33 +49,34 @@ struct Seen {
 
 // Writes every alarm that the replies report, with 1 or 0. If only raised alarms were written, a cleared alarm would
 // look like an unknown one.
-void add_alarms(Page& page, const Seen& seen) {
-  if (seen.snapshot.state != State::live) return;
-  for (const Flags& flags : alarms_of(*seen.unit, seen.snapshot.last.reading)) {
+void add_alarms(Page& page, const EncoderState& encoder_state) {
+  if (encoder_state.snapshot.state != State::live) return;
+  for (const Flags& flags : alarms_of(*encoder_state.unit, encoder_state.snapshot.last.reading)) {
     for (std::size_t bit = 0; bit < flags.field->flags.size(); ++bit) {
       const std::string_view name = flags.field->flags[bit].name;
       if (name.empty() || (flags.reported >> bit & 1) == 0) continue;
-      page.line("absenc_alarm", fmt::format("{},channel=\"{}\",alarm=\"{}\"", seen.label, flags.field->name, name),
+      page.line("absenc_alarm",
+                fmt::format("{},channel=\"{}\",alarm=\"{}\"", encoder_state.label, flags.field->name, name),
                 flags.bits >> bit & 1);
     }
   }
 }
 
-void add_latencies(Page& page, const Seen& seen) {
-  const LatencyFigures& latency = seen.snapshot.latency;
+void add_latencies(Page& page, const EncoderState& encoder_state) {
+  const LatencyFigures& latency = encoder_state.snapshot.latency;
   for (std::size_t i = 0; i < latency_limits.size(); ++i) {
-    page.line("absenc_latency_seconds_bucket", fmt::format("{},le=\"{}\"", seen.label, seconds_of(latency_limits[i])),
-              latency.within[i]);
+    page.line("absenc_latency_seconds_bucket",
+              fmt::format("{},le=\"{}\"", encoder_state.label, seconds_of(latency_limits[i])), latency.within[i]);
   }
-  page.line("absenc_latency_seconds_bucket", seen.label + ",le=\"+Inf\"", latency.count);
-  page.line("absenc_latency_seconds_sum", seen.label, seconds_of(latency.sum));
-  page.line("absenc_latency_seconds_count", seen.label, latency.count);
+  page.line("absenc_latency_seconds_bucket", encoder_state.label + ",le=\"+Inf\"", latency.count);
+  page.line("absenc_latency_seconds_sum", encoder_state.label, seconds_of(latency.sum));
+  page.line("absenc_latency_seconds_count", encoder_state.label, latency.count);
 }
 
 }  // namespace
 
 std::string metrics(const Fleet::Watches& watches, const ServerFigures& figures) {
-  std::vector<Seen> all;
+  std::vector<EncoderState> all;
   for (const auto& watch : watches) {
     all.push_back({fmt::format("encoder=\"{}\",protocol=\"{}\"", label(watch->name()), watch->address().unit->id),
                    watch->address().unit, watch->snapshot()});
@@ -83,7 +84,7 @@ std::string metrics(const Fleet::Watches& watches, const ServerFigures& figures)
   Page page;
   const auto each = [&](std::string_view name, std::string_view kind, std::string_view help, auto value) {
     page.metric(name, kind, help);
-    for (const Seen& seen : all) page.line(name, seen.label, value(seen.snapshot));
+    for (const EncoderState& encoder_state : all) page.line(name, encoder_state.label, value(encoder_state.snapshot));
   };
   each("absenc_up", "gauge", "1 while readings arrive",
        [](const Snapshot& s) { return s.state == State::live ? 1 : 0; });
@@ -94,21 +95,21 @@ std::string metrics(const Fleet::Watches& watches, const ServerFigures& figures)
        [](const Snapshot& s) { return seconds_of(s.age); });
   each("absenc_rate_hertz", "gauge", "good readings per second", [](const Snapshot& s) { return s.rate; });
   page.metric("absenc_errors_total", "counter", "failed attempts by kind, including repetitions");
-  for (const Seen& seen : all) {
+  for (const EncoderState& encoder_state : all) {
     for (std::size_t i = 1; i < error_texts.size(); ++i) {
-      page.line("absenc_errors_total", fmt::format("{},error=\"{}\"", seen.label, error_texts[i].name),
-                seen.snapshot.counters.errors[i]);
+      page.line("absenc_errors_total", fmt::format("{},error=\"{}\"", encoder_state.label, error_texts[i].name),
+                encoder_state.snapshot.counters.errors[i]);
     }
   }
   page.metric("absenc_latency_seconds", "histogram", "time from the end of a request to the end of its reply");
-  for (const Seen& seen : all) add_latencies(page, seen);
+  for (const EncoderState& encoder_state : all) add_latencies(page, encoder_state);
   each("absenc_latency_longest_seconds", "gauge", "longest latency",
        [](const Snapshot& s) { return seconds_of(s.latency.longest); });
   page.metric(
       "absenc_alarm", "gauge",
       "1 while the encoder reports this alarm, 0 while it reports it clear; absent while it reports neither, or "
       "is not live");
-  for (const Seen& seen : all) add_alarms(page, seen);
+  for (const EncoderState& encoder_state : all) add_alarms(page, encoder_state);
   page.metric("absenc_streams", "gauge", "open event streams");
   page.line("absenc_streams", "", figures.streams);
   page.metric("absenc_stream_dropped_total", "counter", "messages lost by slow clients");

@@ -77,8 +77,8 @@ MqttHealth Mqtt::health() const {
   health.connected = sent.connected;
   health.trouble = collected.trouble.empty() ? sent.trouble : collected.trouble;
   health.failing = !collected.trouble.empty() || collected.drops;
-  health.waiting = parts_->spool.held().messages;
-  health.waiting_bytes = parts_->spool.held_bytes();
+  health.waiting = parts_->spool.stored().messages;
+  health.waiting_bytes = parts_->spool.stored_bytes();
   health.sent = sent.sent;
   health.client_deaths = sent.client_deaths;
   health.dropped = collected.dropped;

@@ -36,7 +36,7 @@ std::string printable(std::string text) {
 std::string Broker::text() const { return fmt::format("{}://{}:{}", tls ? "mqtts" : "mqtt", host, port); }
 
 MqttClient::MqttClient(const Broker& broker, const MqttIdentity& identity, MqttVersion version)
-    : process_({"absenc", std::string(mqtt_process_verb)}), incoming_(most_in_frame), heard_(os::now()) {
+    : process_({"absenc", std::string(mqtt_process_verb)}), incoming_(most_in_frame), last_frame_at_(os::now()) {
   WireFrame frame(Wire::begin);
   frame.add(broker.host).add(broker.port).add(broker.tls ? 1U : 0U);
   for (const auto* file : {&broker.login_file, &broker.ca_file, &broker.cert_file, &broker.key_file}) frame.add(*file);
@@ -62,7 +62,7 @@ MqttClient::State MqttClient::work(Time longest) {
   if (ready.to_read) receive();
   // The process may have ended: its last frames are received first, because they give the reason.
   if (state_ != State::lost && !process_.channel().send(outgoing_)) note_end();
-  if (state_ == State::connected && os::now() - heard_ > longest_silence) {
+  if (state_ == State::connected && os::now() - last_frame_at_ > longest_silence) {
     process_.end({});
     lose("the process of the MQTT client does not respond");
   }
@@ -71,7 +71,7 @@ MqttClient::State MqttClient::work(Time longest) {
 
 void MqttClient::receive() {
   const bool open = process_.channel().receive(incoming_.bytes);
-  heard_ = os::now();
+  last_frame_at_ = os::now();
   try {
     while (std::optional<WireFields> frame = incoming_.next()) take(std::move(*frame));
   } catch (const Failure& failure) {

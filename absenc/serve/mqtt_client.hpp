@@ -24,7 +24,7 @@ struct Broker {
   std::string key_file{};
 
   bool operator==(const Broker&) const = default;
-  /// "mqtts://host:8883"
+  /// Returns the address as a URL: "mqtts://host:8883".
   [[nodiscard]] std::string text() const;
 };
 
@@ -85,7 +85,7 @@ class MqttClient {
   bool wrong_version_ = false;
   bool died_ = false;
   std::string trouble_;
-  Time heard_;  // when the process last sent a frame
+  Time last_frame_at_;  // when the process last sent a frame
   int last_number_ = 0;
   std::vector<Acknowledgement> acknowledgements_;
 };

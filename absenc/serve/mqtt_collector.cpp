@@ -17,9 +17,9 @@ using namespace client;
 
 namespace {
 
-constexpr std::size_t most_in_a_message = 250;                       // readings; about 15 kB
-constexpr Time between_dropped_tellings = std::chrono::seconds(10);  // each such event is a message too
-constexpr Time time_drops_show = std::chrono::seconds(30);           // in the health, after the last drop
+constexpr std::size_t most_in_a_message = 250;                   // readings per message; about 15 kB
+constexpr Time drop_report_interval = std::chrono::seconds(10);  // between events about drops, which are messages too
+constexpr Time drop_display_time = std::chrono::seconds(30);     // the health shows drops for this time
 
 }  // namespace
 
@@ -49,7 +49,7 @@ void MqttCollector::add(const std::vector<ServerEvent>& server_events) {
 MqttCollector::Figures MqttCollector::figures() const {
   const std::lock_guard lock(mutex_);
   Figures figures = figures_;
-  figures.drops = figures.dropped != 0 && os::now() - last_dropped_ < time_drops_show;
+  figures.drops = figures.dropped != 0 && os::now() - last_dropped_ < drop_display_time;
   return figures;
 }
 
@@ -70,7 +70,7 @@ void MqttCollector::collect() {
   std::vector<Message> messages;
   std::map<std::string, std::uint64_t> changed;
   for (const auto& watch : fleet_->all()) {
-    Outbox::Taken taken = watch->take_passing(Watch::Outlet::mqtt);
+    Outbox::Taken taken = watch->take_outgoing(Watch::Outlet::mqtt);
     if (taken.dropped != 0) {
       next_numbers_.try_emplace(watch->name(), 1).first->second += taken.dropped;
       note_dropped({0, taken.dropped}, "the disk was too slow");
@@ -89,12 +89,12 @@ void MqttCollector::collect() {
     messages.push_back({id, topic_of(settings_->prefix, one.encoder, "event"), event_text(id_text(id), one), 0});
   }
   spool(messages, changed);
-  if (untold_.messages + untold_.readings == 0 || os::now() < next_told_) return;
-  next_told_ = os::now() + between_dropped_tellings;
-  const Spool::Counts told = std::exchange(untold_, {});
+  if (unreported_.messages + unreported_.readings == 0 || os::now() < next_report_) return;
+  next_report_ = os::now() + drop_report_interval;
+  const Spool::Counts dropped = std::exchange(unreported_, {});
   server_events_->add({calendar_ms(), "", "mqtt",
-                       fmt::format("{} readings in {} messages were dropped, the oldest first: {}", told.readings,
-                                   told.messages, untold_why_)});
+                       fmt::format("{} readings in {} messages were dropped, the oldest first: {}", dropped.readings,
+                                   dropped.messages, unreported_reason_)});
 }
 
 void MqttCollector::collect_readings(const Watch& watch, std::vector<OutgoingReading> readings,
@@ -126,9 +126,9 @@ void MqttCollector::spool(const std::vector<Message>& messages, const std::map<s
 }
 
 void MqttCollector::note_dropped(const Spool::Counts& dropped, const std::string& why) {
-  untold_.messages += dropped.messages;
-  untold_.readings += dropped.readings;
-  untold_why_ = why;
+  unreported_.messages += dropped.messages;
+  unreported_.readings += dropped.readings;
+  unreported_reason_ = why;
   const std::lock_guard lock(mutex_);
   figures_.dropped += dropped.readings;
   last_dropped_ = os::now();

@@ -46,14 +46,14 @@ class MqttCollector {
   const Fleet* fleet_;
   ServerEvents* server_events_;
 
-  // The members below are used by the thread only.
+  // The members below are used by the collector thread only.
   std::int64_t next_id_;
   std::map<std::string, std::uint64_t> next_numbers_;  // next number of a reading, by encoder
   std::map<std::string, std::uint64_t> not_on_disk_;   // by encoder: number of its last reading, while messages wait in
                                                        // memory
-  Spool::Counts untold_{};                             // dropped messages that no event has reported yet
-  std::string untold_why_;
-  Time next_told_{};
+  Spool::Counts unreported_{};                         // dropped messages that no event has reported yet
+  std::string unreported_reason_;
+  Time next_report_{};
 
   mutable std::mutex mutex_;  // guards all members below
   std::condition_variable_any changed_;

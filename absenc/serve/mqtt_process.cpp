@@ -32,12 +32,12 @@ using namespace std::chrono_literals;
 
 constexpr int keepalive_s = 15;
 constexpr int most_in_flight = 1000;  // messages without acknowledgement; the broker may set a lower limit
-constexpr const char* trusted_here = "/etc/ssl/certs";
+constexpr const char* system_certificates = "/etc/ssl/certs";
 constexpr std::size_t most_memory = 128'000'000;  // bytes; an MQTT packet may have 256 MB, but none is expected
 constexpr std::size_t most_frame = 256'000'000;   // bytes of a frame from the parent
-constexpr std::size_t much_outgoing = 100'000;    // bytes; above it nothing is read from the broker until the parent
+constexpr std::size_t outgoing_limit = 100'000;   // bytes; above it nothing is read from the broker until the parent
                                                   // has received them
-constexpr Time between_signs_of_life = 1s;
+constexpr Time sign_of_life_interval = 1s;
 
 void require(int error, const std::string& what) {
   if (error == MOSQ_ERR_SUCCESS) return;
@@ -54,24 +54,24 @@ class MqttProcess {
 
   void run() {
     while (!over_ || !outgoing_.empty()) {
-      if (!wait_and_talk()) return;  // without its parent the process has no task
-      if (!over_) turn_library();
-      if (os::now() < next_sign_) continue;
-      next_sign_ = os::now() + between_signs_of_life;
+      if (!wait_and_exchange()) return;  // without its parent the process has no task
+      if (!over_) run_library();
+      if (os::now() < next_sign_of_life_) continue;
+      next_sign_of_life_ = os::now() + sign_of_life_interval;
       outgoing_ += WireFrame(Wire::alive).bytes();
     }
   }
 
  private:
   // Waits for the parent or the broker, then exchanges frames with the parent. Returns false when the parent has ended.
-  bool wait_and_talk() {
+  bool wait_and_exchange() {
     const int broker = client_ == nullptr || over_ ? -1 : ::mosquitto_socket(client_);
-    const bool reads = outgoing_.size() < much_outgoing;
+    const bool reads = outgoing_.size() < outgoing_limit;
     const bool writes = broker >= 0 && ::mosquitto_want_write(client_);
     const auto events = [](bool in, bool out) { return static_cast<short>((in ? POLLIN : 0) | (out ? POLLOUT : 0)); };
     std::array<pollfd, 2> watched{
         {{parent_.get(), events(true, !outgoing_.empty()), 0}, {broker, events(reads, writes), 0}}};
-    os::wait_for(watched, std::min(next_sign_, os::now() + between_signs_of_life));
+    os::wait_for(watched, std::min(next_sign_of_life_, os::now() + sign_of_life_interval));
     broker_events_ = watched[1].revents;
     if (!parent_.receive(incoming_.bytes)) return false;
     while (std::optional<WireFields> frame = incoming_.next()) take(*frame);
@@ -138,8 +138,8 @@ class MqttProcess {
     }
     if (broker_.tls) {
       const char* file = or_null(broker_.ca_file);
-      require(::mosquitto_tls_set(client_, file, file == nullptr ? trusted_here : nullptr, or_null(broker_.cert_file),
-                                  or_null(broker_.key_file), nullptr),
+      require(::mosquitto_tls_set(client_, file, file == nullptr ? system_certificates : nullptr,
+                                  or_null(broker_.cert_file), or_null(broker_.key_file), nullptr),
               "the files for TLS to " + broker_.text());
     }
     const auto size = static_cast<int>(identity.will.size());
@@ -171,10 +171,11 @@ class MqttProcess {
   }
 
   // Does the work of mosquitto_loop, which would wait for the broker only and not for the parent.
-  void turn_library() {
+  void run_library() {
     if (client_ == nullptr || !connects_) return;
     if (::mosquitto_socket(client_) < 0) return lose("the connection was lost");
-    const bool is_over = (broker_events_ & (POLLERR | POLLHUP | POLLNVAL)) != 0;  // reading reports the reason
+    const bool is_over =
+        (broker_events_ & (POLLERR | POLLHUP | POLLNVAL)) != 0;  // mosquitto_loop_read reports the reason
     const bool reads = is_over || (broker_events_ & POLLIN) != 0;
     const bool writes = (broker_events_ & POLLOUT) != 0;
     errno = 0;  // the library reads errno after calls that do not set it
@@ -221,10 +222,10 @@ class MqttProcess {
     static_cast<MqttProcess*>(self)->connect_answered(reason);
   }
   static void on_disconnect(mosquitto*, void* self, int reason, const mosquitto_property*) {
-    const bool told = reason >= 128;
+    const bool has_reason = reason >= 128;
     static_cast<MqttProcess*>(self)->lose(
-        told ? fmt::format("the broker ended the connection: {}", ::mosquitto_reason_string(reason))
-             : "the connection was lost");
+        has_reason ? fmt::format("the broker ended the connection: {}", ::mosquitto_reason_string(reason))
+                   : "the connection was lost");
   }
   static void on_publish(mosquitto*, void* self, int given, int reason, const mosquitto_property*) {
     auto& process = *static_cast<MqttProcess*>(self);
@@ -242,7 +243,7 @@ class MqttProcess {
   mosquitto* client_ = nullptr;
   std::unordered_map<int, std::uint32_t> numbers_{};  // number of a message at the parent, by its number in the library
   short broker_events_ = 0;
-  Time next_sign_{};
+  Time next_sign_of_life_{};
   bool connects_ = false;
   bool connected_ = false;
   bool over_ = false;

@@ -54,7 +54,7 @@ class MqttRefusals {
     bool is_tried = false;  // one message of the topic is sent and not acknowledged
   };
 
-  std::map<std::string, Refused> refused_;  // by topic
+  std::map<std::string, Refused> refused_;  // refused topics
   std::set<std::string> suspects_;
   bool suspect_is_out_ = false;
   int ends_in_a_row_ = 0;

@@ -12,7 +12,7 @@ using Verdict = MqttRefusals::Verdict;
 
 }  // namespace
 
-TEST(MqttRefusals, PauseOfATopicDoublesAndOthersGoOn) {
+TEST(MqttRefusals, DoublesPauseOfRefusedTopicAndSendsOthers) {
   MqttRefusals refusals;
   EXPECT_TRUE(refusals.refuse("a", "why", 0s));
   EXPECT_EQ(refusals.verdict("b", 5, 0s), Verdict::send);
@@ -25,7 +25,7 @@ TEST(MqttRefusals, PauseOfATopicDoublesAndOthersGoOn) {
     EXPECT_EQ(refusals.verdict("a", 5, now), Verdict::send);
     refusals.sent("a");
     EXPECT_EQ(refusals.verdict("a", 5, now), Verdict::skip) << "one at a time";
-    EXPECT_FALSE(refusals.refuse("a", "why", now)) << "it is no news";
+    EXPECT_FALSE(refusals.refuse("a", "why", now)) << "not new";
   }
   EXPECT_TRUE(refusals.take_due(now + 60s));
   refusals.sent("a");
@@ -34,24 +34,24 @@ TEST(MqttRefusals, PauseOfATopicDoublesAndOthersGoOn) {
   EXPECT_EQ(refusals.text(), "");
 }
 
-TEST(MqttRefusals, AnotherReasonIsNews) {
+TEST(MqttRefusals, ReportsNewReason) {
   MqttRefusals refusals;
   EXPECT_TRUE(refusals.refuse("a", "why", 0s));
   EXPECT_FALSE(refusals.refuse("a", "why", 0s));
   EXPECT_TRUE(refusals.refuse("a", "another", 0s));
 }
 
-TEST(MqttRefusals, FindsTheTopicAtWhichTheConnectionEnds) {
+TEST(MqttRefusals, FindsTopicThatMakesBrokerCloseConnection) {
   MqttRefusals refusals;
   EXPECT_EQ(refusals.end_connection({"a", "b", "c"}, true, 0s), "");
   refusals.begin_connection();
-  EXPECT_EQ(refusals.verdict("a", 2, 0s), Verdict::send) << "once may be anything";
+  EXPECT_EQ(refusals.verdict("a", 2, 0s), Verdict::send) << "one lost connection proves nothing";
   EXPECT_EQ(refusals.end_connection({"a", "b", "c"}, true, 1s), "");
   refusals.begin_connection();
   EXPECT_EQ(refusals.verdict("a", 1, 1s), Verdict::wait);
   EXPECT_EQ(refusals.verdict("a", 0, 1s), Verdict::send);
   refusals.sent("a");
-  EXPECT_EQ(refusals.verdict("d", 1, 1s), Verdict::wait) << "a suspect is alone";
+  EXPECT_EQ(refusals.verdict("d", 1, 1s), Verdict::wait) << "a suspect is sent alone";
   EXPECT_FALSE(refusals.take("a"));
   refusals.sent("b");
   EXPECT_EQ(refusals.end_connection({"b"}, true, 2s), "b");
@@ -59,7 +59,7 @@ TEST(MqttRefusals, FindsTheTopicAtWhichTheConnectionEnds) {
   EXPECT_EQ(refusals.verdict("b", 0, 2s), Verdict::skip);
   EXPECT_EQ(refusals.verdict("a", 3, 2s), Verdict::send);
   EXPECT_TRUE(refusals.take_due(4s));
-  EXPECT_EQ(refusals.verdict("b", 1, 4s), Verdict::wait) << "it may end the connection of the others";
+  EXPECT_EQ(refusals.verdict("b", 1, 4s), Verdict::wait) << "it may close the connection for other topics";
 }
 
 }  // namespace absenc::serve

@@ -23,16 +23,16 @@ using namespace std::chrono_literals;
 
 constexpr std::size_t most_messages_out = 500;  // messages without acknowledgement
 constexpr Time one_wait = 20ms;
-constexpr Time between_state_looks = 200ms;
-constexpr Time between_many_state_looks = 1s;  // with more than `many` encoders
+constexpr Time state_interval = 200ms;
+constexpr Time many_state_interval = 1s;  // between states, with more than `many` encoders
 constexpr std::size_t many = 50;
-constexpr Time between_values = 1s;  // of the values for Home Assistant
+constexpr Time value_interval = 1s;  // between values for Home Assistant
 constexpr Time first_pause = 500ms;  // before the second attempt to connect; each further pause is twice as long
 constexpr Time longest_pause = 5s;
 constexpr Time time_to_connect = 10s;
 constexpr Time time_to_finish = 1s;
-constexpr Time time_to_hold = 10s;  // after a connection of this length, the next pause is `first_pause` again
-constexpr Time between_connected_tellings = 60s;  // minimum time between two events about a connection that is often
+constexpr Time stable_time = 10s;  // after a connection of this length, the next pause is `first_pause` again
+constexpr Time connection_report_interval = 60s;  // minimum time between two events about a connection that is often
                                                   // lost; a lasting connection is reported at once
 
 }  // namespace
@@ -40,7 +40,7 @@ constexpr Time between_connected_tellings = 60s;  // minimum time between two ev
 MqttSender::MqttSender(const MqttSettings& settings, Spool& spool, const Fleet& fleet, ServerEvents& server_events)
     : settings_(&settings), spool_(&spool), fleet_(&fleet), server_events_(&server_events) {
   for (const auto& [name, next] : spool.next_numbers()) served_.insert(name);
-  static_cast<void>(MqttClient(settings.broker, identity(), version_));  // throws if a file is unusable
+  static_cast<void>(MqttClient(settings.broker, identity(), version_));  // checks the files of the settings
   thread_ = std::jthread([this](const std::stop_token& stop) { work(stop); });
 }
 
@@ -64,16 +64,16 @@ void MqttSender::work(const std::stop_token& stop) {
   while (!stop.stop_requested()) {
     const MqttVersion tried = version_;
     try {
-      attend(stop);
+      run_connection(stop);
     } catch (const Failure& failure) {
-      become_lost(failure.what());
+      set_lost(failure.what());
     } catch (const os::Failure& failure) {  // the broker's name cannot be resolved
-      become_lost(failure.what());
+      set_lost(failure.what());
     }
     if (version_ != tried) continue;
     version_ = MqttVersion::v5;  // the broker may have been updated, or its answer was a mistake
-    const bool held = connected_at_ != Time{} && os::now() - connected_at_ >= time_to_hold;
-    if (has_taken_ && held) pause = first_pause;
+    const bool was_stable = connected_at_ != Time{} && os::now() - connected_at_ >= stable_time;
+    if (has_acknowledged_ && was_stable) pause = first_pause;
     std::unique_lock lock(mutex_);
     changed_.wait_for(lock, stop, pause, [] { return false; });
     pause = std::min(2 * pause, longest_pause);
@@ -82,17 +82,17 @@ void MqttSender::work(const std::stop_token& stop) {
 
 // Handles one connection from its start to its end. Messages without acknowledgement are sent again, in order, by the
 // next connection.
-void MqttSender::attend(const std::stop_token& stop) {
+void MqttSender::run_connection(const std::stop_token& stop) {
   outstanding_.clear();
   messages_out_.clear();
-  looked_to_ = 0;
+  last_checked_id_ = 0;
   refusals_.begin_connection();
-  has_taken_ = false;
+  has_acknowledged_ = false;
   connected_at_ = {};
   retained_.clear();
   next_states_ = {};
   std::vector<std::string> hosts = os::addresses_of(settings_->broker.host);
-  const bool by_name = settings_->broker.tls;  // the certificate is issued for the name
+  const bool by_name = settings_->broker.tls;  // TLS: the certificate is issued for the name
   const bool try_all = by_name && hosts.size() > 1;
   if (by_name) hosts = {settings_->broker.host};
   std::string why;
@@ -127,7 +127,7 @@ MqttClient::State MqttSender::connect(MqttClient& client, const std::string& hos
 
 void MqttSender::begin() {
   connected_at_ = os::now();
-  told_connected_ = false;
+  connection_reported_ = false;
   const std::lock_guard lock(mutex_);
   figures_.connected = true;
   figures_.trouble = refusals_.text();
@@ -135,26 +135,26 @@ void MqttSender::begin() {
 
 // Reports the connection by an event. After an event, the next one needs a lasting connection or a minute, so that an
 // unstable connection does not fill the history.
-void MqttSender::tell_connected() {
-  if (told_connected_) return;
-  if (os::now() < next_told_connected_ && os::now() - connected_at_ < time_to_hold) return;
-  told_connected_ = true;
-  next_told_connected_ = os::now() + between_connected_tellings;
-  told_lost_.clear();
+void MqttSender::report_connected() {
+  if (connection_reported_) return;
+  if (os::now() < next_connection_report_ && os::now() - connected_at_ < stable_time) return;
+  connection_reported_ = true;
+  next_connection_report_ = os::now() + connection_report_interval;
+  reported_losses_.clear();
   const bool old = version_ == MqttVersion::v3_1_1;
-  tell(fmt::format("connected to {}{}", settings_->broker.text(),
-                   old ? ", which supports MQTT 3.1.1 only and cannot report a refused message" : ""));
+  add_event(fmt::format("connected to {}{}", settings_->broker.text(),
+                        old ? ", which supports MQTT 3.1.1 only and cannot report a refused message" : ""));
 }
 
 void MqttSender::deliver(MqttClient& client, const std::stop_token& stop) {
   send_retained(client, {topic_of(settings_->prefix, "", "state"), "online", server_state_text("online", "")});
   while (!stop.stop_requested()) {
     if (os::now() >= next_states_ || refusals_.has_suspects()) {
-      next_states_ = os::now() + (fleet_->all().size() > many ? between_many_state_looks : between_state_looks);
+      next_states_ = os::now() + (fleet_->all().size() > many ? many_state_interval : state_interval);
       send_states(client);
     }
     if (!settings_->home_assistant.empty() && os::now() >= next_values_) {
-      next_values_ = os::now() + between_values;
+      next_values_ = os::now() + value_interval;
       send_values(client);
     }
     step(client);
@@ -163,10 +163,10 @@ void MqttSender::deliver(MqttClient& client, const std::stop_token& stop) {
 }
 
 void MqttSender::step(MqttClient& client) {
-  tell_connected();
+  report_connected();
   send_messages(client);
   const bool lost = client.work(one_wait) == MqttClient::State::lost;
-  settle(client);  // also acknowledgements that arrived before the loss
+  settle(client);  // handles also acknowledgements from before the loss
   if (!lost) return;
   note_death(client);
   if (!client.died()) note_lost_connection();  // otherwise a packet ended the process, and no topic is the cause
@@ -177,9 +177,10 @@ void MqttSender::step(MqttClient& client) {
 void MqttSender::note_lost_connection() {
   std::set<std::string> topics;
   for (const auto& [number, sent] : outstanding_) topics.insert(sent.topic);
-  const bool soon = os::now() - connected_at_ < time_to_hold;
+  const bool soon = os::now() - connected_at_ < stable_time;
   const std::string refused = refusals_.end_connection(topics, soon, os::now());
-  if (!refused.empty()) tell(fmt::format("the broker refuses {}: it closes the connection at this message", refused));
+  if (!refused.empty())
+    add_event(fmt::format("the broker refuses {}: it closes the connection at this message", refused));
 }
 
 void MqttSender::note_death(const MqttClient& client) {
@@ -191,7 +192,7 @@ void MqttSender::note_death(const MqttClient& client) {
 void MqttSender::finish(MqttClient& client) {
   const Time deadline = os::now() + time_to_finish;
   send_states(client);
-  while (os::now() < deadline && (spool_->held().messages != 0 || !outstanding_.empty())) step(client);
+  while (os::now() < deadline && (spool_->stored().messages != 0 || !outstanding_.empty())) step(client);
   send_retained(client, {topic_of(settings_->prefix, "", "state"), "ended", server_state_text("offline", "it ended")});
   while (os::now() < deadline && !outstanding_.empty()) step(client);
   client.end();
@@ -201,7 +202,7 @@ void MqttSender::finish(MqttClient& client) {
 
 void MqttSender::send_states(MqttClient& client) {
   const Fleet::Watches watches = fleet_->all();
-  clear_gone(client, watches);
+  clear_unserved(client, watches);
   for (const auto& watch : watches) {
     if (!settings_->home_assistant.empty() &&
         !retained_.contains(topic_of(settings_->prefix, watch->name(), "state"))) {
@@ -212,7 +213,7 @@ void MqttSender::send_states(MqttClient& client) {
 }
 
 // Otherwise the broker would keep the retained messages of an encoder that is no longer served.
-void MqttSender::clear_gone(MqttClient& client, const Fleet::Watches& watches) {
+void MqttSender::clear_unserved(MqttClient& client, const Fleet::Watches& watches) {
   std::set<std::string> now;
   for (const auto& watch : watches) now.insert(watch->name());
   for (const std::string& name : served_) {
@@ -249,13 +250,13 @@ void MqttSender::send_retained(MqttClient& client, const Retained& retained) {
 }
 
 void MqttSender::send_messages(MqttClient& client) {
-  if (refusals_.take_due(os::now())) looked_to_ = 0;
-  if (messages_out_.size() >= most_messages_out || spool_->held().messages <= messages_out_.size()) return;
-  for (const Message& one : spool_->after(looked_to_, most_messages_out)) {
+  if (refusals_.take_due(os::now())) last_checked_id_ = 0;
+  if (messages_out_.size() >= most_messages_out || spool_->stored().messages <= messages_out_.size()) return;
+  for (const Message& one : spool_->after(last_checked_id_, most_messages_out)) {
     const MqttRefusals::Verdict verdict = refusals_.verdict(one.topic, outstanding_.size(), os::now());
     const bool is_out = messages_out_.contains(one.id);
     if (!is_out && (verdict == MqttRefusals::Verdict::wait || messages_out_.size() >= most_messages_out)) return;
-    looked_to_ = one.id;
+    last_checked_id_ = one.id;
     if (is_out || verdict == MqttRefusals::Verdict::skip) continue;
     outstanding_[client.publish(one.topic, one.payload, 1, false)] = {one.id, one.topic};
     messages_out_.insert(one.id);
@@ -281,7 +282,7 @@ void MqttSender::settle(MqttClient& client) {
   }
   if (arrived.empty()) return;
   spool_->remove(arrived);
-  has_taken_ = true;
+  has_acknowledged_ = true;
   const std::lock_guard lock(mutex_);
   figures_.sent += arrived.size();
 }
@@ -293,29 +294,29 @@ void MqttSender::settle_refused(const Outstanding& sent, const std::string& why)
     const std::lock_guard lock(mutex_);
     figures_.trouble = refusals_.text();
   }
-  if (is_new) tell(fmt::format("the broker refuses {}: {}", sent.topic, why));
+  if (is_new) add_event(fmt::format("the broker refuses {}: {}", sent.topic, why));
 }
 
 void MqttSender::settle_taken(const Outstanding& sent) {
   if (!refusals_.take(sent.topic)) return;
-  looked_to_ = 0;  // other messages of this topic were skipped
+  last_checked_id_ = 0;  // other messages of this topic were skipped
   {
     const std::lock_guard lock(mutex_);
     figures_.trouble = refusals_.text();
   }
-  tell(fmt::format("the broker accepts {} again", sent.topic));
+  add_event(fmt::format("the broker accepts {} again", sent.topic));
 }
 
-void MqttSender::become_lost(const std::string& why) {
+void MqttSender::set_lost(const std::string& why) {
   {
     const std::lock_guard lock(mutex_);
     figures_.connected = false;
     figures_.trouble = refusals_.text().empty() ? why : refusals_.text();
   }
-  if (!told_lost_.insert(why).second) return;
-  tell(fmt::format("{} is not reachable: {}; messages wait on disk", settings_->broker.text(), why));
+  if (!reported_losses_.insert(why).second) return;
+  add_event(fmt::format("{} is not reachable: {}; messages wait on disk", settings_->broker.text(), why));
 }
 
-void MqttSender::tell(const std::string& text) { server_events_->add({calendar_ms(), "", "mqtt", text}); }
+void MqttSender::add_event(const std::string& text) { server_events_->add({calendar_ms(), "", "mqtt", text}); }
 
 }  // namespace absenc::serve

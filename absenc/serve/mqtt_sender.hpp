@@ -43,7 +43,7 @@ class MqttSender {
   };
 
   void work(const std::stop_token& stop);
-  void attend(const std::stop_token& stop);
+  void run_connection(const std::stop_token& stop);
   MqttClient::State connect(MqttClient& client, const std::string& host, bool try_all,
                             const std::stop_token& stop) const;
   void begin();
@@ -53,15 +53,15 @@ class MqttSender {
   void send_states(MqttClient& client);
   void send_values(MqttClient& client);
   void send_retained(MqttClient& client, const Retained& retained);
-  void clear_gone(MqttClient& client, const Fleet::Watches& watches);
+  void clear_unserved(MqttClient& client, const Fleet::Watches& watches);
   void send_messages(MqttClient& client);
   void settle(MqttClient& client);
   void settle_refused(const Outstanding& sent, const std::string& why);
   void settle_taken(const Outstanding& sent);
   void note_lost_connection();
-  void tell(const std::string& text);
-  void become_lost(const std::string& why);
-  void tell_connected();
+  void add_event(const std::string& text);
+  void set_lost(const std::string& why);
+  void report_connected();
   void note_death(const MqttClient& client);
   [[nodiscard]] MqttIdentity identity() const;
 
@@ -70,21 +70,21 @@ class MqttSender {
   const Fleet* fleet_;
   ServerEvents* server_events_;
 
-  // The members below are used by the thread only.
+  // The members below are used by the sender thread only.
   MqttVersion version_ = MqttVersion::v5;
   std::unordered_map<int, Outstanding> outstanding_;  // messages without acknowledgement, by their number at MqttClient
   std::set<std::int64_t> messages_out_;               // ids of the spooled messages in `outstanding_`
-  std::int64_t looked_to_ = 0;                        // last id that was sent, or skipped because its topic is refused
+  std::int64_t last_checked_id_ = 0;                  // last id that was sent, or skipped because its topic is refused
   MqttRefusals refusals_;
   std::set<std::string> served_;                 // encoders that may have retained messages at the broker
   std::map<std::string, std::string> retained_;  // by topic: condition of the retained message that was sent last
   Time next_states_{};
   Time next_values_{};
-  bool has_taken_ = false;  // the broker has acknowledged a message on this connection
+  bool has_acknowledged_ = false;  // the broker has acknowledged a message on this connection
   Time connected_at_{};
-  bool told_connected_ = false;  // an event has reported this connection
-  Time next_told_connected_{};
-  std::set<std::string> told_lost_;  // reported reasons of lost connections, since the last reported connection
+  bool connection_reported_ = false;  // an event has reported this connection
+  Time next_connection_report_{};
+  std::set<std::string> reported_losses_;  // reported reasons of lost connections, since the last reported connection
 
   mutable std::mutex mutex_;  // guards all members below
   std::condition_variable_any changed_;

@@ -19,45 +19,45 @@ using namespace client;
 
 namespace {
 
-constexpr std::size_t most_bytes = 4096;  // bytes of memory in one response
+constexpr std::size_t most_bytes = 4096;  // greatest number of memory bytes in one response
 
 using Between = std::function<void()>;
 
-Done done_well(const Command& command, const Answer& answer, const std::string& note, ChangeState change) {
+OrderResult success(const Command& command, const Answer& answer, const std::string& note, ChangeState change) {
   return {true, fmt::format("{}: done{}{}", command.name, note.empty() ? "" : "; ", note), to_json(answer.row()),
           change};
 }
 
 // Runs a command. A setting is read back and compared after it was written.
-Done do_command(Encoder& live, const Order& order) {
+OrderResult run_command(Encoder& encoder, const Order& order) {
   const Command& command = *order.command;
   if (command.verb != Verb::config_set) {
-    const Answer answer = live.run(command.name, order.arguments);
-    return done_well(command, answer, "", command.changes_encoder ? live.change().state : ChangeState::none);
+    const Answer answer = encoder.run(command.name, order.arguments);
+    return success(command, answer, "", command.changes_encoder ? encoder.change().state : ChangeState::none);
   }
   const std::string_view setting = command.reads_back.empty() ? command.name : command.reads_back;
-  const SettingChange change = live.settings().set(setting, order.arguments);
-  return done_well(command, change.now, change.was_so ? "it had this value already" : change.note, change.state);
+  const SettingChange change = encoder.settings().set(setting, order.arguments);
+  return success(command, change.now, change.was_so ? "it had this value already" : change.note, change.state);
 }
 
 // Sends one request after the other. A question that the encoder refuses, or that its options exclude, is reported with
 // its reason; `done` returns the first reason if no question was answered.
-class Questions {
+class OptionalReads {
  public:
-  Questions(Encoder& live, const Between& between) : live_(&live), between_(&between) {}
+  OptionalReads(Encoder& encoder, const Between& between) : encoder_(&encoder), between_(&between) {}
 
   std::optional<Answer> ask(std::string_view command, std::span<const std::int64_t> arguments) {
-    const bool first = !std::exchange(asked_, true);
+    const bool first = !std::exchange(has_sent_, true);
     if (!first) (*between_)();
-    was_asked_ = true;
+    was_sent_ = true;
     try {
-      Answer answer = live_->run(command, arguments);
+      Answer answer = encoder_->run(command, arguments);
       answered_ = true;
       return answer;
     } catch (const EncoderFailure& failure) {
       last_ = fmt::format("{}: {}", text_of(failure.trouble.error).name, failure.trouble.message);
     } catch (const UsageError& error) {
-      was_asked_ = false;
+      was_sent_ = false;
       last_ = error.what();
     }
     if (first_.empty()) first_ = last_;
@@ -67,17 +67,17 @@ class Questions {
   /// Returns why the last question failed.
   [[nodiscard]] const std::string& reason() const { return last_; }
   /// Returns false if the options of the encoder exclude the last question.
-  [[nodiscard]] bool was_asked() const { return was_asked_; }
-  [[nodiscard]] Done done(Json json) const {
+  [[nodiscard]] bool was_sent() const { return was_sent_; }
+  [[nodiscard]] OrderResult done(Json json) const {
     if (answered_) return {true, "read", std::move(json), ChangeState::none};
     return {false, first_, {}, ChangeState::none};
   }
 
  private:
-  Encoder* live_;
+  Encoder* encoder_;
   const Between* between_;
-  bool asked_ = false;  // a question was sent before
-  bool was_asked_ = false;
+  bool has_sent_ = false;  // a question was sent before
+  bool was_sent_ = false;
   bool answered_ = false;
   std::string first_;
   std::string last_;
@@ -98,7 +98,7 @@ std::string range_of(const Unit& unit, const Command& getter) {
 }
 
 // Returns null for an invalid value.
-Json shown(const Column& column, const Value& value) {
+Json value_for_people(const Column& column, const Value& value) {
   if (std::holds_alternative<Invalid>(value)) return {};
   if (std::holds_alternative<Unknown>(value)) return "unknown";
   const Flags* const flags = std::get_if<Flags>(&value);
@@ -107,31 +107,34 @@ Json shown(const Column& column, const Value& value) {
   return text.empty() ? "none" : text;
 }
 
-Json shown_row(const Column& column, const Value& value) {
-  return Json::object().set("field", column.name).set("value", shown(column, value)).set("meaning", column.meaning);
+Json row_for_people(const Column& column, const Value& value) {
+  return Json::object()
+      .set("field", column.name)
+      .set("value", value_for_people(column, value))
+      .set("meaning", column.meaning);
 }
 
 // `wanted` is the command that reads one setting; null: all settings.
-Done read_settings(Encoder& live, const Command* wanted, const Between& between) {
+OrderResult read_settings(Encoder& encoder, const Command* wanted, const Between& between) {
   Json identity = Json::object();
   Json settings = Json::object();
   Json rows = Json::array();
   Json failed = Json::object();
-  Questions asked(live, between);
-  for (const Command* getter : questions(live.unit())) {
+  OptionalReads asked(encoder, between);
+  for (const Command* getter : questions(encoder.unit())) {
     if (wanted != nullptr && wanted != getter) continue;
     const bool is_setting = getter->verb == Verb::config_get;
     const std::optional<Answer> answer = asked.ask(getter->name, {});
     if (!answer) {
-      if (is_setting || asked.was_asked()) failed.set(getter->name, asked.reason());
+      if (is_setting || asked.was_sent()) failed.set(getter->name, asked.reason());
       continue;
     }
     (is_setting ? settings : identity).set(getter->name, to_json(answer->row()));
     for (std::size_t i = 0; i < answer->columns.size(); ++i) {
       const Column& column = answer->columns[i];
       if (column.look.is_exchange) continue;
-      Json row = shown_row(column, answer->values[i]);
-      rows.append(row.set("setting", getter->name).set("range", range_of(live.unit(), *getter)));
+      Json row = row_for_people(column, answer->values[i]);
+      rows.append(row.set("setting", getter->name).set("range", range_of(encoder.unit(), *getter)));
     }
   }
   Json json = Json::object().set("ok", true).set("identity", identity).set("settings", settings);
@@ -139,12 +142,12 @@ Done read_settings(Encoder& live, const Command* wanted, const Between& between)
 }
 
 // Reads all readable registers. The last column of a reply has the meaning of the register.
-Done read_registers(Encoder& live, const Between& between) {
-  const Command& command = *find_command(live.unit(), Verb::memory_read);
+OrderResult read_registers(Encoder& encoder, const Between& between) {
+  const Command& command = *find_command(encoder.unit(), Verb::memory_read);
   Json registers = Json::array();
   Json failed = Json::object();
-  Questions questions(live, between);
-  for (const RegisterInfo& one : live.unit().registers) {
+  OptionalReads questions(encoder, between);
+  for (const RegisterInfo& one : encoder.unit().registers) {
     if (!one.readable) continue;
     const std::optional<Answer> answer =
         questions.ask(command.name, role_arguments(command, {{Role::address, one.address}}));
@@ -161,8 +164,8 @@ Done read_registers(Encoder& live, const Between& between) {
   return questions.done(Json::object().set("ok", true).set("registers", registers).set("failed", failed));
 }
 
-Done read_memory(Encoder& live, const MemoryImage& addresses, const Between& between) {
-  const MemoryImage image = live.memory().read(addresses, [&](std::size_t done, std::size_t all) {
+OrderResult read_memory(Encoder& encoder, const MemoryImage& addresses, const Between& between) {
+  const MemoryImage image = encoder.memory().read(addresses, [&](std::size_t done, std::size_t all) {
     if (done < all) between();
   });
   const Json parts = Json::list(runs(image), [](const MemoryRun& run) {
@@ -194,7 +197,7 @@ std::string_view Order::name() const {
 Json shown_values(const Answer& answer) {
   Json rows = Json::array();
   for (std::size_t i = 0; i < answer.columns.size(); ++i) {
-    if (!answer.columns[i].look.is_exchange) rows.append(shown_row(answer.columns[i], answer.values[i]));
+    if (!answer.columns[i].look.is_exchange) rows.append(row_for_people(answer.columns[i], answer.values[i]));
   }
   return rows;
 }
@@ -242,15 +245,15 @@ Order examination_order() {
   return order;
 }
 
-Done carry_out(Encoder& live, const Order& order, const Between& between) {
+OrderResult carry_out(Encoder& encoder, const Order& order, const Between& between) {
   switch (order.kind) {
     case Order::Kind::settings:
-      return read_settings(live, order.command, between);
+      return read_settings(encoder, order.command, between);
     case Order::Kind::memory:
-      if (order.addresses.empty()) return read_registers(live, between);
-      return read_memory(live, order.addresses, between);
+      if (order.addresses.empty()) return read_registers(encoder, between);
+      return read_memory(encoder, order.addresses, between);
     default:
-      return do_command(live, order);
+      return run_command(encoder, order);
   }
 }
 

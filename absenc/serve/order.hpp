@@ -15,7 +15,7 @@
 namespace absenc::serve {
 
 /// Result of an order.
-struct Done {
+struct OrderResult {
   bool good = false;
   std::string text{};
   client::Json json{};  // for a command: the fields of the reply
@@ -35,8 +35,8 @@ struct Order {
   std::vector<std::int64_t> arguments{};
   client::MemoryImage addresses{};
   std::string who{};
-  std::function<void(const Done&)> done{};  // called once in the encoder's thread, after the event about the order was
-                                            // added
+  std::function<void(const OrderResult&)> done{};  // called once in the encoder's thread, after the event about the
+                                                   // order was added
 
   /// Returns the name for messages: "zero", "doctor".
   [[nodiscard]] std::string_view name() const;
@@ -52,7 +52,7 @@ struct Order {
 
 /// Carries out any order but an examination. `between` is called between two requests of an order that reads, and may
 /// read the position. Throws the exceptions of the encoder and its port.
-[[nodiscard]] Done carry_out(client::Encoder& live, const Order& order, const std::function<void()>& between);
+[[nodiscard]] OrderResult carry_out(client::Encoder& encoder, const Order& order, const std::function<void()>& between);
 
 /// Returns the fields of a reply for people as a list of {"field","value","meaning"}, without fields of the exchange
 /// itself; an invalid value is null.

@@ -15,11 +15,10 @@ namespace absenc::serve {
 /// One good reading. Members without a valid value are empty.
 struct OutgoingReading {
   std::int64_t at_us = 0;                         // calendar time at which the encoder latched the position
-  std::optional<double> place{};                  // continued past the end of a turn; degrees, for linear encoders mm
-  std::optional<client::Estimate> speed{};        // rpm, for linear encoders mm/s
-  std::optional<double> joint{};                  // degrees, for linear encoders mm; only if the settings describe the
-                                                  // joint
-  std::optional<client::Estimate> joint_speed{};  // rpm, for linear encoders mm/s
+  std::optional<double> place{};                  // position past the end of a turn; degrees, for linear encoders mm
+  std::optional<client::Estimate> speed{};        // speed; rpm, for linear encoders mm/s
+  std::optional<double> joint{};                  // position of the joint, if the settings describe it; degrees or mm
+  std::optional<client::Estimate> joint_speed{};  // speed of the joint; rpm, for linear encoders mm/s
   std::optional<double> electrical_deg{};
   std::optional<std::uint64_t> counts{};
   std::optional<std::int64_t> turns{};
@@ -32,7 +31,7 @@ class Outbox {
   static constexpr std::size_t most = 2048;
 
   struct Taken {
-    std::vector<OutgoingReading> readings{};  // oldest first
+    std::vector<OutgoingReading> readings{};  // taken readings, oldest first
     std::uint64_t dropped = 0;                // number of dropped readings before these
   };
 

@@ -28,10 +28,10 @@ constexpr std::array<std::string_view, 10> mqtt_names{"broker",   "login_file", 
 constexpr std::array<std::string_view, 1> udp_names{"to"};
 
 /// The settings of one section of the file, overridden by options.
-class Given {
+class SectionValues {
  public:
-  Given(std::string_view section, std::span<const std::string_view> known, const std::vector<FileSection>& sections,
-        const std::vector<OutletOption>& options) {
+  SectionValues(std::string_view section, std::span<const std::string_view> known,
+                const std::vector<FileSection>& sections, const std::vector<OutletOption>& options) {
     for (const FileSection& one : sections) {
       if (one.name == section) take(one, known);
     }
@@ -84,47 +84,47 @@ class Given {
   std::map<std::string_view, Value> values_;
 };
 
-struct Place {
+struct HostAndPort {
   std::string host;
   std::optional<std::uint16_t> port;
 };
 
 // Parses "HOST:PORT", "HOST" or "[IPV6]:PORT".
-std::optional<Place> host_and_port(std::string_view written) {
+std::optional<HostAndPort> host_and_port(std::string_view written) {
   const std::size_t bracket = written.rfind(']');
   const std::size_t colon = written.find(':', bracket == std::string_view::npos ? 0 : bracket);
   std::string_view host = written.substr(0, colon);
   if (host.size() > 2 && host.front() == '[') host = host.substr(1, host.size() - 2);
   if (host.empty()) return {};
-  if (colon == std::string_view::npos) return Place{std::string(host), {}};
+  if (colon == std::string_view::npos) return HostAndPort{std::string(host), {}};
   const Result<std::int64_t> port = parse_number(written.substr(colon + 1));
   if (!port || *port < 1 || *port > 65535) return {};
-  return Place{std::string(host), static_cast<std::uint16_t>(*port)};
+  return HostAndPort{std::string(host), static_cast<std::uint16_t>(*port)};
 }
 
-Broker broker_of(const Given& given) {
+Broker broker_of(const SectionValues& values) {
   Broker broker;
-  const std::string text = given.text("broker");
+  const std::string text = values.text("broker");
   std::string_view written = text;
   const std::size_t scheme = written.find("://");
   broker.tls = written.starts_with("mqtts://");
   if (scheme != std::string_view::npos) {
-    if (!broker.tls && !written.starts_with("mqtt://")) given.refuse("broker", "only mqtt:// and mqtts:// are known");
+    if (!broker.tls && !written.starts_with("mqtt://")) values.refuse("broker", "only mqtt:// and mqtts:// are known");
     written.remove_prefix(scheme + 3);
   }
-  const std::optional<Place> place = host_and_port(written);
-  if (!place) given.refuse("broker", "must be mqtt://HOST:PORT, or mqtts:// for TLS");
+  const std::optional<HostAndPort> place = host_and_port(written);
+  if (!place) values.refuse("broker", "must be mqtt://HOST:PORT, or mqtts:// for TLS");
   broker.host = place->host;
   broker.port = place->port.value_or(broker.tls ? 8883 : 1883);
-  broker.login_file = given.text("login_file");
-  broker.ca_file = given.text("ca_file");
-  broker.cert_file = given.text("cert_file");
-  broker.key_file = given.text("key_file");
+  broker.login_file = values.text("login_file");
+  broker.ca_file = values.text("ca_file");
+  broker.cert_file = values.text("cert_file");
+  broker.key_file = values.text("key_file");
   for (const std::string_view file : {"ca_file", "cert_file", "key_file"}) {
-    if (given.has(file) && !broker.tls) given.refuse(file, "the broker is one without TLS: write mqtts://");
+    if (values.has(file) && !broker.tls) values.refuse(file, "the broker is one without TLS: write mqtts://");
   }
-  if (given.has("cert_file") && !given.has("key_file")) given.refuse("cert_file", "key_file is missing");
-  if (given.has("key_file") && !given.has("cert_file")) given.refuse("key_file", "cert_file is missing");
+  if (values.has("cert_file") && !values.has("key_file")) values.refuse("cert_file", "key_file is missing");
+  if (values.has("key_file") && !values.has("cert_file")) values.refuse("key_file", "cert_file is missing");
   return broker;
 }
 
@@ -137,33 +137,33 @@ std::string usual_prefix() {
   return "absenc/" + text;
 }
 
-void check_prefix(const Given& given, std::string_view name, std::string_view prefix) {
+void check_prefix(const SectionValues& values, std::string_view name, std::string_view prefix) {
   const bool good = !prefix.empty() && prefix.size() <= 256 && prefix.front() != '/' && prefix.front() != '$' &&
                     prefix.back() != '/' && prefix.find("//") == std::string_view::npos &&
                     prefix.find_first_of("+#") == std::string_view::npos &&
                     std::all_of(prefix.begin(), prefix.end(), [](unsigned char c) { return c >= 0x20 && c != 0x7F; });
-  if (!good) given.refuse(name, "must be words with / between them, without + and #");
+  if (!good) values.refuse(name, "must be words with / between them, without + and #");
 }
 
-MqttSettings mqtt_of(const Given& given) {
+MqttSettings mqtt_of(const SectionValues& values) {
   MqttSettings settings;
-  if (!given.has("broker")) throw UsageError("[serve.mqtt] needs a broker: broker = \"mqtt://HOST\"");
-  settings.broker = broker_of(given);
-  settings.prefix = given.text("prefix", usual_prefix());
-  if (given.has("prefix")) check_prefix(given, "prefix", settings.prefix);
-  settings.spool = given.has("spool") ? given.text("spool") : state_file("mqtt-spool", "spool in [serve.mqtt]");
-  settings.spool_bytes = given.number("spool_mb", 256, 1, 1'000'000) * 1'000'000;
-  settings.batch = std::chrono::milliseconds(given.number("batch_ms", 100, 10, 60'000));
-  settings.home_assistant = given.text("home_assistant");
+  if (!values.has("broker")) throw UsageError("[serve.mqtt] needs a broker: broker = \"mqtt://HOST\"");
+  settings.broker = broker_of(values);
+  settings.prefix = values.text("prefix", usual_prefix());
+  if (values.has("prefix")) check_prefix(values, "prefix", settings.prefix);
+  settings.spool = values.has("spool") ? values.text("spool") : state_file("mqtt-spool", "spool in [serve.mqtt]");
+  settings.spool_bytes = values.number("spool_mb", 256, 1, 1'000'000) * 1'000'000;
+  settings.batch = std::chrono::milliseconds(values.number("batch_ms", 100, 10, 60'000));
+  settings.home_assistant = values.text("home_assistant");
   if (settings.home_assistant == "true") settings.home_assistant = "homeassistant";
   if (settings.home_assistant == "false") settings.home_assistant.clear();
-  if (!settings.home_assistant.empty()) check_prefix(given, "home_assistant", settings.home_assistant);
+  if (!settings.home_assistant.empty()) check_prefix(values, "home_assistant", settings.home_assistant);
   return settings;
 }
 
-UdpSettings udp_of(const Given& given) {
-  const std::optional<Place> place = host_and_port(given.text("to"));
-  if (!place || !place->port) given.refuse("to", "must be HOST:PORT");
+UdpSettings udp_of(const SectionValues& values) {
+  const std::optional<HostAndPort> place = host_and_port(values.text("to"));
+  if (!place || !place->port) values.refuse("to", "must be HOST:PORT");
   return {place->host, *place->port};
 }
 
@@ -179,8 +179,8 @@ Outlets read_outlets(const std::vector<OutletOption>& options) {
         fmt::format("{}: there is no section [serve.{}]{}", one.place, one.name, suggestion(one.name, known)));
   }
   Outlets outlets;
-  if (const Given mqtt("mqtt", mqtt_names, sections, options); !mqtt.empty()) outlets.mqtt = mqtt_of(mqtt);
-  if (const Given udp("udp", udp_names, sections, options); !udp.empty()) outlets.udp = udp_of(udp);
+  if (const SectionValues mqtt("mqtt", mqtt_names, sections, options); !mqtt.empty()) outlets.mqtt = mqtt_of(mqtt);
+  if (const SectionValues udp("udp", udp_names, sections, options); !udp.empty()) outlets.udp = udp_of(udp);
   return outlets;
 }
 

@@ -9,37 +9,35 @@ namespace absenc::serve {
 
 std::string Sending::change_to(const Outlets& outlets) {
   std::string changed;
-  if (outlets.mqtt != now_.mqtt) {
+  if (outlets.mqtt != current_.mqtt) {
     std::shared_ptr<Mqtt> old;
     {
       const std::lock_guard lock(mutex_);
       old = std::exchange(mqtt_, nullptr);
     }
     old.reset();  // the new object may use the same spool, which is locked
-    now_.mqtt.reset();
+    current_.mqtt.reset();
     std::shared_ptr<Mqtt> next;
     if (outlets.mqtt) next = std::make_shared<Mqtt>(*outlets.mqtt, *fleet_, *server_events_);
-    now_.mqtt = outlets.mqtt;
-    if (!outlets.mqtt)
-      stop_passing(Watch::Outlet::mqtt);  // with MQTT still on, queued readings wait for the new
-                                          // object
+    current_.mqtt = outlets.mqtt;
+    if (!outlets.mqtt) stop_outgoing(Watch::Outlet::mqtt);  // else queued readings wait for the new one
     changed += fmt::format("; MQTT: {}", outlets.mqtt ? outlets.mqtt->broker.text() : "none");
     const std::lock_guard lock(mutex_);
     mqtt_ = std::move(next);
   }
-  if (outlets.udp != now_.udp) {
+  if (outlets.udp != current_.udp) {
     udp_.reset();
-    now_.udp.reset();
+    current_.udp.reset();
     if (outlets.udp) udp_ = std::make_unique<UdpSender>(*outlets.udp, *fleet_);
-    now_.udp = outlets.udp;
-    if (!outlets.udp) stop_passing(Watch::Outlet::udp);
+    current_.udp = outlets.udp;
+    if (!outlets.udp) stop_outgoing(Watch::Outlet::udp);
     changed += fmt::format("; UDP: {}", outlets.udp ? outlets.udp->host : "none");
   }
   return changed;
 }
 
-void Sending::stop_passing(Watch::Outlet outlet) {
-  for (const auto& watch : fleet_->all()) watch->stop_passing(outlet);
+void Sending::stop_outgoing(Watch::Outlet outlet) {
+  for (const auto& watch : fleet_->all()) watch->stop_outgoing(outlet);
 }
 
 std::shared_ptr<Mqtt> Sending::mqtt() const {

@@ -32,11 +32,11 @@ class Sending {
 
  private:
   [[nodiscard]] std::shared_ptr<Mqtt> mqtt() const;
-  void stop_passing(Watch::Outlet outlet);
+  void stop_outgoing(Watch::Outlet outlet);
 
   const Fleet* fleet_;
   ServerEvents* server_events_;
-  Outlets now_;
+  Outlets current_;
   mutable std::mutex mutex_;  // guards the pointers below
   std::shared_ptr<Mqtt> mqtt_;
   std::unique_ptr<UdpSender> udp_;

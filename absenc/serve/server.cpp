@@ -25,7 +25,7 @@ using namespace std::chrono_literals;
 
 constexpr Time between_points = 33ms;
 constexpr Time between_states = 200ms;
-constexpr Time between_large_states = 1s;  // for more encoders than a screen shows
+constexpr Time between_large_states = 1s;  // between states of more than `large` encoders
 constexpr std::size_t large = 50;
 
 std::string url_of(const std::string& host, std::uint16_t port) {
@@ -51,21 +51,21 @@ struct Server::Parts {
     http.emplace(
         std::move(listener), [this](const Request& request, const Reply& reply) { api->answer(request, reply); },
         std::vector<std::string>{"/healthz", "/metrics"});
-    tell_ports();
-    teller = std::jthread([this](const std::stop_token& stop) { tell(stop); });
+    publish_ports();
+    publisher = std::jthread([this](const std::stop_token& stop) { publish(stop); });
   }
 
   ~Parts() {
-    teller.request_stop();
-    teller.join();
+    publisher.request_stop();
+    publisher.join();
     http.reset();  // stops requests before the parts that they use
     fleet.end();   // before write_events, for the events of its last commands
-    write_events();
+    distribute_events();
     sending.change_to({});
   }
 
   // Publishes the ports in use, so that a program that finds one of them busy can name this server.
-  void tell_ports() {
+  void publish_ports() {
     std::vector<std::string> ports;
     for (const std::shared_ptr<Watch>& watch : fleet.all()) {
       if (!watch->address().path.empty()) ports.push_back(watch->address().path);
@@ -73,37 +73,37 @@ struct Server::Parts {
     served_ports.set(ports);
   }
 
-  void tell(const std::stop_token& stop) {
+  void publish(const std::stop_token& stop) {
     Time next_state{};
     Time next_second{};
     while (!stop.stop_requested()) {
       const Time now = os::now();
-      write_events();
-      tell_points();
+      distribute_events();
+      send_points();
       if (now >= next_state) {
         next_state = now + (fleet.all().size() > large ? between_large_states : between_states);
         streams.tidy();
-        if (streams.count() != 0) streams.tell("state", state_json(fleet, chronicler ? &*chronicler : nullptr));
+        if (streams.count() != 0) streams.send("state", state_json(fleet, chronicler ? &*chronicler : nullptr));
       }
       if (now >= next_second) {
         next_second = now + 1s;
-        http->end_half_sent();
+        http->end_incomplete_requests();
       }
       std::unique_lock lock(mutex);
       changed.wait_for(lock, stop, between_points - std::min(os::now() - now, between_points), [] { return false; });
     }
   }
 
-  void write_events() {
+  void distribute_events() {
     std::uint64_t added = 0;
     const std::vector<ServerEvent> taken = server_events.take(added);
     if (taken.empty()) return;
     if (chronicler) chronicler->add(taken, added);
     sending.add(taken);
-    for (const ServerEvent& one : taken) streams.tell("happening", one.json());
+    for (const ServerEvent& one : taken) streams.send("happening", one.json());
   }
 
-  void tell_points() {
+  void send_points() {
     const std::set<std::string> wanted = streams.traced();
     for (const std::string& name : traced) {
       const std::shared_ptr<Watch> watch = wanted.contains(name) ? nullptr : fleet.find(name);
@@ -115,7 +115,7 @@ struct Server::Parts {
       if (watch == nullptr) continue;
       watch->trace(true);
       const std::vector<Point> taken = watch->take_points();
-      if (!taken.empty()) streams.tell_traced(name, "points", points(*watch, taken));
+      if (!taken.empty()) streams.send_traced(name, "points", points(*watch, taken));
     }
   }
 
@@ -131,10 +131,10 @@ struct Server::Parts {
   Worker worker;
   std::optional<Api> api;
   std::optional<HttpServer> http;
-  std::set<std::string> traced;  // used by the teller thread only
+  std::set<std::string> traced;  // used by the publisher thread only
   std::mutex mutex;
   std::condition_variable_any changed;
-  std::jthread teller;
+  std::jthread publisher;
 };
 
 Server::Server(const Choices& choices) : parts_(std::make_unique<Parts>(choices)), outlets_(choices.outlets) {}
@@ -147,14 +147,14 @@ std::string Server::history_trouble() const {
 std::size_t Server::encoders() const { return parts_->fleet.all().size(); }
 
 std::string Server::reload() {
-  const Outlets outlets = read_outlets(outlets_);  // before any change, because it may throw
+  const Outlets outlets = read_outlets(outlets_);  // read before any change, because this may throw
   try {
     parts_->access.reload();
   } catch (const client::Failure& failure) {
     throw client::UsageError(failure.what());
   }
   std::string changed = parts_->fleet.reload();
-  parts_->tell_ports();
+  parts_->publish_ports();
   changed += parts_->sending.change_to(outlets);
   parts_->server_events.add({calendar_ms(), "", "change", "absenc.toml was read again: " + changed});
   return changed;

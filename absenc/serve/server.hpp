@@ -14,13 +14,13 @@
 namespace absenc::serve {
 
 struct Choices {
-  std::vector<std::string> encoders{};  // as for `absenc read`; empty: all of absenc.toml
+  std::vector<std::string> encoders{};  // addresses as for `absenc read`; empty: all of absenc.toml
   double rate = 50;                     // readings per second of encoders without rate_hz in absenc.toml; 0: as fast as
                                         // possible
   std::string host = "127.0.0.1";
-  std::uint16_t port = 8420;  // 0: any free port
+  std::uint16_t port = 8420;  // TCP port; 0: any free one
   std::string public_url{};   // URL of a proxy; "": no proxy
-  std::string token_file{};   // "": no tokens
+  std::string token_file{};   // file with tokens; "": none
   std::string history{};      // path of the history file; "": no history
   HistoryLimits limits{};
   std::vector<OutletOption> outlets{};  // override the settings of MQTT and UDP in absenc.toml

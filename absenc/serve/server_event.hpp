@@ -23,7 +23,7 @@ namespace absenc::serve {
 
 struct ServerEvent {
   std::int64_t at_ms = 0;
-  std::string encoder{};  // "": the server itself
+  std::string encoder{};  // name of the encoder; "": the server itself
   // One of alarm, alarm_over, acknowledged, failing, silent, lost, back, restarted, ended, examined, command, change,
   // history, mqtt, access.
   std::string kind{};

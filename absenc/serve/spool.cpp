@@ -17,7 +17,7 @@ namespace fs = std::filesystem;
 
 namespace {
 
-constexpr std::size_t bytes_of_a_write = 65536;  // small writes, because a nearly full disk may still accept one
+constexpr std::size_t write_size = 65536;  // small writes, because a nearly full disk may still accept one
 
 std::int64_t memory_bytes(std::int64_t most) { return std::clamp<std::int64_t>(most / 16, 64'000, 4'000'000); }
 
@@ -53,7 +53,7 @@ Spool::Spool(std::string path, std::int64_t bytes) : path_(std::move(path)), mos
     fail(failure.what());
   }
   if (facts_.source.empty()) facts_.source = random_text();
-  show();
+  update_counts();
 }
 
 std::map<std::string, std::uint64_t> Spool::next_numbers() {
@@ -76,13 +76,13 @@ void Spool::add(const std::vector<Message>& messages, const std::map<std::string
   }
   for (const auto& [name, next] : next_numbers) facts_.next_numbers[name] = unwritten_numbers_[name] = next;
   try {
-    look_at_folder();
+    check_folder();
     write_waiting();
   } catch (const os::Failure& failure) {
     fail(failure.what());
   }
   drop_for_room();
-  show();
+  update_counts();
 }
 
 void Spool::write_waiting() {
@@ -105,7 +105,7 @@ bool Spool::write_some() {
   std::vector<std::size_t> offsets;
   const std::size_t start = newest_->log().size();
   for (const Message& one : memory_) {
-    if (!offsets.empty() && bytes.size() > bytes_of_a_write) break;
+    if (!offsets.empty() && bytes.size() > write_size) break;
     offsets.push_back(start + bytes.size());
     bytes += spool_record(one);
   }
@@ -156,10 +156,10 @@ std::vector<Message> Spool::after(std::int64_t id, std::size_t most) {
     Part& part = parts_[i];
     if (part.waiting.messages == 0 || part.last_id <= id) continue;
     try {
-      collect_of(part, id, most, found);
+      collect_from(part, id, most, found);
     } catch (const os::Failure&) {
       std::error_code error;
-      if (fs::exists(path_of(part.number), error)) break;  // the file exists: the next call tries again
+      if (fs::exists(path_of(part.number), error)) break;  // a temporary error: the next call tries again
       drop_part(i--, fmt::format("{} was removed", path_of(part.number)));
     }
   }
@@ -168,21 +168,21 @@ std::vector<Message> Spool::after(std::int64_t id, std::size_t most) {
     places_[one->id] = {0, 0, one->readings, spool_bytes(*one)};
     found.push_back(*one);
   }
-  show();
+  update_counts();
   return found;
 }
 
-void Spool::collect_of(Part& part, std::int64_t id, std::size_t most, std::vector<Message>& found) {
+void Spool::collect_from(Part& part, std::int64_t id, std::size_t most, std::vector<Message>& found) {
   const SpoolFile& file = file_of(part);
-  const bool goes_on = read_to_.part == part.number && read_to_.id <= id;
-  std::size_t offset = goes_on ? read_to_.offset : 0;
+  const bool continues = read_position_.part == part.number && read_position_.id <= id;
+  std::size_t offset = continues ? read_position_.offset : 0;
   while (found.size() < most) {
-    std::optional<SpoolFile::Found> one = file.next(offset, nullptr);
+    std::optional<SpoolFile::StoredMessage> one = file.next(offset, nullptr);
     if (!one) {
-      if (offset < part.bytes && !part.damaged) count_again(part);
+      if (offset < part.bytes && !part.damaged) recount(part);
       return;
     }
-    read_to_ = {part.number, one->message.id, offset};
+    read_position_ = {part.number, one->message.id, offset};
     if (one->arrived || one->message.id <= id || unmarked_.contains(one->message.id)) continue;
     places_[one->message.id] = {part.number, one->offset, one->message.readings, spool_bytes(one->message)};
     found.push_back(std::move(one->message));
@@ -194,14 +194,14 @@ void Spool::remove(const std::vector<std::int64_t>& ids) {
   for (const std::int64_t id : ids) {
     const auto place = places_.find(id);
     if (place == places_.end()) continue;  // the message was dropped meanwhile
-    settle_one(id, place->second);
+    remove_one(id, place->second);
     places_.erase(id);
   }
   tidy();
-  show();
+  update_counts();
 }
 
-void Spool::settle_one(std::int64_t id, const Place& place) {
+void Spool::remove_one(std::int64_t id, const Place& place) {
   if (place.part == 0) {
     const auto found = std::find_if(memory_.begin(), memory_.end(), [&](const Message& one) { return one.id == id; });
     if (found == memory_.end()) return;
@@ -247,27 +247,27 @@ void Spool::drop(const Counts& counts, const std::string& why) {
   dropped_.why = why;
 }
 
-void Spool::show() {
-  Counts held = memory_counts_;
+void Spool::update_counts() {
+  Counts stored = memory_counts_;
   std::int64_t bytes = memory_bytes_;
   for (const Part& part : parts_) {
-    held += part.waiting;
+    stored += part.waiting;
     bytes += part.waiting_bytes;
   }
   const std::lock_guard lock(shown_mutex_);
-  held_ = held;
-  held_bytes_ = bytes;
+  stored_ = stored;
+  stored_bytes_ = bytes;
   condition_.in_memory = !memory_.empty();
 }
 
-Spool::Counts Spool::held() const {
+Spool::Counts Spool::stored() const {
   const std::lock_guard lock(shown_mutex_);
-  return held_;
+  return stored_;
 }
 
-std::int64_t Spool::held_bytes() const {
+std::int64_t Spool::stored_bytes() const {
   const std::lock_guard lock(shown_mutex_);
-  return held_bytes_;
+  return stored_bytes_;
 }
 
 Spool::Condition Spool::condition() const {

@@ -57,8 +57,8 @@ class Spool {
   /// Forgets the next reading number of an encoder.
   void forget(const std::string& encoder);
 
-  [[nodiscard]] Counts held() const;
-  [[nodiscard]] std::int64_t held_bytes() const;
+  [[nodiscard]] Counts stored() const;
+  [[nodiscard]] std::int64_t stored_bytes() const;
 
   struct Condition {
     std::string trouble{};   // why messages cannot be written to disk; "" without an error
@@ -94,16 +94,16 @@ class Spool {
   void open_folder();
   void load();
   void load_part(std::int64_t number);
-  void look_at_folder();
+  void check_folder();
   void rescue_newest();
   void write_waiting();
   bool write_some();
   void begin_part();
   void drop_for_room();
   void drop_part(std::size_t index, const std::string& why);
-  void collect_of(Part& part, std::int64_t id, std::size_t most, std::vector<Message>& found);
-  void count_again(Part& part);
-  void settle_one(std::int64_t id, const Place& place);
+  void collect_from(Part& part, std::int64_t id, std::size_t most, std::vector<Message>& found);
+  void recount(Part& part);
+  void remove_one(std::int64_t id, const Place& place);
   void tidy();
   SpoolFile& file_of(const Part& part);
   [[nodiscard]] Part* find_part(std::int64_t number);
@@ -111,7 +111,7 @@ class Spool {
   void set_aside(const std::string& path);
   void fail(const std::string& why);
   void drop(const Counts& counts, const std::string& why);
-  void show();
+  void update_counts();
 
   std::string path_;
   std::int64_t most_bytes_;
@@ -121,7 +121,7 @@ class Spool {
   SpoolFacts facts_;
   std::map<std::string, std::uint64_t> unwritten_numbers_;
   std::optional<os::OwnedFolder> folder_;
-  std::deque<Part> parts_;             // oldest first
+  std::deque<Part> parts_;             // files of the spool, oldest first
   std::unique_ptr<SpoolFile> newest_;  // file of the last part, which is appended to; null if there is none
   std::int64_t next_part_ = 1;
   std::size_t part_limit_ = 0;
@@ -130,7 +130,7 @@ class Spool {
   struct {
     std::int64_t part = 0, id = 0;
     std::size_t offset = 0;
-  } read_to_;                   // where the last call of `after` stopped reading
+  } read_position_;             // where the last call of `after` stopped reading
   std::deque<Message> memory_;  // messages that are not on disk; newer than those in `parts_`
   Counts memory_counts_{};
   std::int64_t memory_bytes_ = 0;
@@ -138,8 +138,8 @@ class Spool {
   std::set<std::int64_t> unmarked_;  // acknowledged, but the disk did not store the mark
 
   mutable std::mutex shown_mutex_;  // guards all members below, so that reading them never waits for the disk
-  Counts held_{};
-  std::int64_t held_bytes_ = 0;
+  Counts stored_{};
+  std::int64_t stored_bytes_ = 0;
   Condition condition_{};
   Dropped dropped_{};
   std::vector<std::string> notes_;

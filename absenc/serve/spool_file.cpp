@@ -75,7 +75,7 @@ SpoolFile::SpoolFile(const std::string& path, const SpoolFacts& facts) : log_(pa
 
 SpoolFile::SpoolFile(const std::string& path) : log_(path, os::LogFile::Open::existing) {}
 
-std::optional<SpoolFile::Found> SpoolFile::next(std::size_t& offset, SpoolFacts* facts) const {
+std::optional<SpoolFile::StoredMessage> SpoolFile::next(std::size_t& offset, SpoolFacts* facts) const {
   try {
     for (;;) {
       const std::string head = log_.read(offset, head_bytes);
@@ -89,7 +89,7 @@ std::optional<SpoolFile::Found> SpoolFile::next(std::size_t& offset, SpoolFacts*
       const std::size_t at = offset;
       FieldReader fields(body);
       if (head[kind_at] == kind_message) {
-        Found found{{}, at, head[arrived_at] == has_arrived};
+        StoredMessage found{{}, at, head[arrived_at] == has_arrived};
         found.message.id = static_cast<std::int64_t>(fields.long_number());
         found.message.readings = fields.long_number();
         found.message.topic = fields.text();

@@ -50,15 +50,15 @@ class SpoolFile {
   [[nodiscard]] os::LogFile& log() { return log_; }
   [[nodiscard]] const os::LogFile& log() const { return log_; }
 
-  struct Found {
+  struct StoredMessage {
     Message message{};
-    std::size_t offset = 0;  // offset of its record
+    std::size_t offset = 0;  // offset of the record in the file
     bool arrived = false;
   };
   /// Returns the next message at or after `offset` and moves `offset` behind it. Facts before it are merged into
   /// `facts`, unless that is null. Returns nothing at the end of the file, and at a damaged record: then `offset` stays
   /// before the end. Throws os::Failure.
-  [[nodiscard]] std::optional<Found> next(std::size_t& offset, SpoolFacts* facts) const;
+  [[nodiscard]] std::optional<StoredMessage> next(std::size_t& offset, SpoolFacts* facts) const;
   /// Marks the message as acknowledged. Returns 0 or the errno of the write.
   [[nodiscard]] int mark_arrived(std::size_t offset) const;
 

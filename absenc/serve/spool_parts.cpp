@@ -52,7 +52,7 @@ void Spool::load_part(std::int64_t number) {
     const SpoolFile file(path_of(number));
     Part part{number};
     std::size_t offset = 0;
-    while (const std::optional<SpoolFile::Found> one = file.next(offset, &facts_)) {
+    while (const std::optional<SpoolFile::StoredMessage> one = file.next(offset, &facts_)) {
       if (part.first_id == 0) part.first_id = one->message.id;
       part.last_id = one->message.id;
       facts_.next_id = std::max(facts_.next_id, one->message.id + 1);
@@ -78,7 +78,7 @@ void Spool::load_part(std::int64_t number) {
 
 // Handles files that were removed or moved while open. The newest file is still open and can be read; the messages of
 // the others are lost.
-void Spool::look_at_folder() {
+void Spool::check_folder() {
   if (folder_ && folder_->is_there() && (newest_ == nullptr || newest_->log().is_there())) return;
   if (folder_) {
     if (newest_ != nullptr) rescue_newest();
@@ -104,7 +104,7 @@ void Spool::rescue_newest() {
   std::size_t offset = 0;
   const std::int64_t number = parts_.back().number;
   try {
-    while (std::optional<SpoolFile::Found> one = newest_->next(offset, nullptr)) {
+    while (std::optional<SpoolFile::StoredMessage> one = newest_->next(offset, nullptr)) {
       if (!one->arrived && !unmarked_.contains(one->message.id)) rescued.push_back(std::move(one->message));
     }
   } catch (const os::Failure&) {  // a disk error: the remaining messages are lost
@@ -149,11 +149,11 @@ void Spool::drop_part(std::size_t index, const std::string& why) {
 }
 
 // Counts the messages that are still readable; the others are reported as dropped.
-void Spool::count_again(Part& part) {
+void Spool::recount(Part& part) {
   Counts readable;
   std::int64_t bytes = 0;
   std::size_t offset = 0;
-  while (const std::optional<SpoolFile::Found> one = file_of(part).next(offset, nullptr)) {
+  while (const std::optional<SpoolFile::StoredMessage> one = file_of(part).next(offset, nullptr)) {
     if (one->arrived || unmarked_.contains(one->message.id)) continue;
     readable += {1, one->message.readings};
     bytes += spool_bytes(one->message);
@@ -176,7 +176,7 @@ void Spool::tidy() {
       unwritten_numbers_.clear();
       parts_.back() = {parts_.back().number};
       parts_.back().bytes = newest_->log().size();
-      read_to_ = {};
+      read_position_ = {};
     }
   }
   for (std::size_t i = 0; i + 1 < parts_.size();) {

@@ -50,7 +50,7 @@ struct SpoolTest : testing::Test {
 
 }  // namespace
 
-TEST_F(SpoolTest, KeepsWhatHasNotArrivedOverARestart) {
+TEST_F(SpoolTest, KeepsUnacknowledgedMessagesAcrossRestart) {
   std::string source;
   {
     Spool spool(path, million);
@@ -62,13 +62,13 @@ TEST_F(SpoolTest, KeepsWhatHasNotArrivedOverARestart) {
   Spool spool(path, million);
   EXPECT_EQ(spool.source(), source);
   EXPECT_EQ(ids(spool.after(0, 100)), (std::vector<std::int64_t>{1, 2, 4, 5}));
-  EXPECT_EQ(spool.held().messages, 4U);
-  EXPECT_EQ(spool.held().readings, 8U);
+  EXPECT_EQ(spool.stored().messages, 4U);
+  EXPECT_EQ(spool.stored().readings, 8U);
   EXPECT_EQ(spool.next_id(), 6);
   EXPECT_EQ(spool.next_numbers().at("elbow"), 11U);
 }
 
-TEST_F(SpoolTest, KeepsNumbersWhenAllFilesThatHadThemAreDeleted) {
+TEST_F(SpoolTest, KeepsReadingNumbersWhenTheirFilesAreDeleted) {
   {
     Spool spool(path, million);
     spool.add(messages(1, 1), {{"elbow", 11}, {"wrist", 7}});
@@ -79,25 +79,25 @@ TEST_F(SpoolTest, KeepsNumbersWhenAllFilesThatHadThemAreDeleted) {
     ASSERT_EQ(all.size(), 399U);
     spool.remove(all);
     EXPECT_EQ(files(), 1U);
-    EXPECT_EQ(spool.held_bytes(), 0);
+    EXPECT_EQ(spool.stored_bytes(), 0);
   }
   Spool spool(path, million);
   EXPECT_EQ(spool.next_numbers(), (std::map<std::string, std::uint64_t>{{"elbow", 11}}));
   EXPECT_EQ(spool.next_id(), 400);
 }
 
-TEST_F(SpoolTest, DropsTheOldestBeyondItsSizeAndCountsThem) {
+TEST_F(SpoolTest, DropsAndCountsOldestMessagesBeyondSizeLimit) {
   Spool spool(path, million);
   for (std::int64_t id = 1; id <= 2000; ++id) spool.add(messages(id, 1, 1000), {});
   const Spool::Dropped dropped = spool.take_dropped();
-  EXPECT_EQ(dropped.counts.messages + spool.held().messages, 2000U);
-  EXPECT_EQ(dropped.counts.readings + spool.held().readings, 4000U);
-  EXPECT_LE(spool.held_bytes(), million);
+  EXPECT_EQ(dropped.counts.messages + spool.stored().messages, 2000U);
+  EXPECT_EQ(dropped.counts.readings + spool.stored().readings, 4000U);
+  EXPECT_LE(spool.stored_bytes(), million);
   EXPECT_EQ(spool.after(0, 1).front().id, static_cast<std::int64_t>(dropped.counts.messages) + 1);
   EXPECT_EQ(spool.take_dropped().counts.messages, 0U);
 }
 
-TEST_F(SpoolTest, FindsTheSameAfterAnyIdInAnyOrder) {
+TEST_F(SpoolTest, ReturnsMessagesAfterAnyIdInAnyOrder) {
   Spool spool(path, million);
   for (std::int64_t id = 1; id <= 300; ++id) spool.add(messages(id, 1, 500), {});
   for (const std::int64_t id : {200, 0, 299, 150, 151, 10, 300}) {
@@ -107,7 +107,7 @@ TEST_F(SpoolTest, FindsTheSameAfterAnyIdInAnyOrder) {
   }
 }
 
-TEST_F(SpoolTest, ReadsWhatIsBeforeAnyDamage) {
+TEST_F(SpoolTest, ReadsMessagesBeforeDamage) {
   {
     Spool spool(path, million);
     spool.add(messages(1, 20), {{"elbow", 11}});
@@ -128,12 +128,12 @@ TEST_F(SpoolTest, ReadsWhatIsBeforeAnyDamage) {
       for (std::size_t i = 0; i < found.size(); ++i) ASSERT_EQ(found[i], static_cast<std::int64_t>(i) + 1) << at;
       spool.remove(found);
       spool.add(messages(spool.next_id(), 1), {});
-      ASSERT_EQ(spool.held().messages, 1U) << at;
+      ASSERT_EQ(spool.stored().messages, 1U) << at;
     }
   }
 }
 
-TEST_F(SpoolTest, IsForOneProcess) {
+TEST_F(SpoolTest, RefusesSecondProcess) {
   const Spool spool(path, million);
   EXPECT_THROW(Spool(path, million), client::Failure);
   EXPECT_THROW(Spool(path / "none" / "spool", million), client::Failure);

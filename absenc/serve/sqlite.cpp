@@ -8,14 +8,14 @@ namespace absenc::serve {
 
 namespace {
 
-constexpr int patience_ms = 2000;  // how long to wait for a lock of another program
+constexpr int lock_timeout_ms = 2000;  // how long to wait for a lock of another program
 
 }  // namespace
 
 Sqlite::Sqlite(const std::string& title, const std::string& path, For what) : title_(title + " " + path) {
   const int flags = what == For::writing ? SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE : SQLITE_OPEN_READONLY;
   if (::sqlite3_open_v2(path.c_str(), &handle_, flags | SQLITE_OPEN_NOMUTEX, nullptr) == SQLITE_OK) {
-    ::sqlite3_busy_timeout(handle_, patience_ms);
+    ::sqlite3_busy_timeout(handle_, lock_timeout_ms);
     return;
   }
   const std::string why = handle_ == nullptr ? "no memory" : ::sqlite3_errmsg(handle_);
@@ -41,7 +41,7 @@ std::int64_t Sqlite::number(const std::string& sql) {
   return statement.next() ? statement.integer(0) : 0;
 }
 
-void Sqlite::leave_log() { ::sqlite3_db_config(handle_, SQLITE_DBCONFIG_NO_CKPT_ON_CLOSE, 1, nullptr); }
+void Sqlite::keep_log_on_close() { ::sqlite3_db_config(handle_, SQLITE_DBCONFIG_NO_CKPT_ON_CLOSE, 1, nullptr); }
 
 bool Sqlite::in_transaction() const { return ::sqlite3_get_autocommit(handle_) == 0; }
 

@@ -35,7 +35,7 @@ class Sqlite {
   /// Returns whether a transaction is open. After an error, such as a full disk, SQLite may have ended it.
   [[nodiscard]] bool in_transaction() const;
   /// Leaves the write-ahead log unchanged on close: it is neither written into the database nor deleted.
-  void leave_log();
+  void keep_log_on_close();
 
  private:
   friend class Statement;

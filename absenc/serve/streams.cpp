@@ -31,17 +31,17 @@ std::shared_ptr<Stream> Streams::open(const std::string& trace, const std::strin
 bool Streams::make_room(const std::string& peer) {
   std::map<std::string, std::size_t> counts;
   for (const Open& one : open_) ++counts[one.peer];
-  if (counts[peer] >= most_of_address) return break_off_slowest(peer, os::now() - patience);
+  if (counts[peer] >= most_of_address) return abort_slowest(peer, os::now() - stall_time);
   if (open_.size() < most) return true;
   const auto busiest =
       std::max_element(counts.begin(), counts.end(), [](const auto& a, const auto& b) { return a.second < b.second; });
-  if (busiest->second > counts[peer] + 1) return break_off_slowest(busiest->first, never);
-  return break_off_slowest(peer, os::now() - patience);
+  if (busiest->second > counts[peer] + 1) return abort_slowest(busiest->first, never);
+  return abort_slowest(peer, os::now() - stall_time);
 }
 
 // Closes the slowest of the streams whose client received nothing since `taken_before`. Returns false without such a
 // stream.
-bool Streams::break_off_slowest(const std::string& peer, Time taken_before) {
+bool Streams::abort_slowest(const std::string& peer, Time taken_before) {
   auto slowest = open_.end();
   for (auto one = open_.begin(); one != open_.end(); ++one) {
     const Time at = one->stream->taken_at();
@@ -51,19 +51,19 @@ bool Streams::break_off_slowest(const std::string& peer, Time taken_before) {
     }
   }
   if (slowest == open_.end()) return false;
-  slowest->stream->break_off();
+  slowest->stream->abort();
   dropped_before_ += slowest->stream->dropped();
   open_.erase(slowest);
   return true;
 }
 
-void Streams::tell(std::string_view event, const client::Json& data) {
+void Streams::send(std::string_view event, const client::Json& data) {
   const Stream::Text text = event_text(event, data);
   const std::lock_guard lock(mutex_);
   for (const Open& one : open_) one.stream->push(text);
 }
 
-void Streams::tell_traced(const std::string& encoder, std::string_view event, const client::Json& data) {
+void Streams::send_traced(const std::string& encoder, std::string_view event, const client::Json& data) {
   const Stream::Text text = event_text(event, data);
   const std::lock_guard lock(mutex_);
   for (const Open& one : open_) {

@@ -19,17 +19,17 @@ class Streams {
  public:
   static constexpr std::size_t most = 300;
   static constexpr std::size_t most_of_address = 200;
-  static constexpr Time patience = std::chrono::seconds(5);  // a client that received nothing for this time may lose
-                                                             // its stream to a new one
+  static constexpr Time stall_time = std::chrono::seconds(5);  // a client that received nothing for this time may lose
+                                                               // its stream to a new one
 
   /// Opens a stream. `trace`: the encoder whose points it sends; "": none. `peer`: IP address of the client. Returns
   /// null at the limit. At the limit, the address with the most streams loses one to an address with fewer.
   [[nodiscard]] std::shared_ptr<Stream> open(const std::string& trace, const std::string& peer);
 
   /// Sends a server-sent event to all streams.
-  void tell(std::string_view event, const client::Json& data);
+  void send(std::string_view event, const client::Json& data);
   /// Sends an event to the streams that trace this encoder.
-  void tell_traced(const std::string& encoder, std::string_view event, const client::Json& data);
+  void send_traced(const std::string& encoder, std::string_view event, const client::Json& data);
 
   /// Removes streams whose client has disconnected.
   void tidy();
@@ -45,7 +45,7 @@ class Streams {
     std::string peer;
   };
   bool make_room(const std::string& peer);
-  bool break_off_slowest(const std::string& peer, Time taken_before);
+  bool abort_slowest(const std::string& peer, Time taken_before);
 
   mutable std::mutex mutex_;
   std::vector<Open> open_;

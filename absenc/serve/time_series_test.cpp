@@ -10,7 +10,7 @@ constexpr std::int64_t begin_s = 1'000'000;
 constexpr std::int64_t begin_ms = 1000 * begin_s;
 
 // The history takes each second as soon as it is over, often before the next reading.
-TEST(TimeSeries, TheLastMinuteHasTheSecondsThatTheHistoryHasTaken) {
+TEST(TimeSeries, LastMinuteIncludesSecondsTakenByHistory) {
   TimeSeries series;
   for (std::int64_t i = 0; i < 100; ++i) {
     series.count_reading(begin_ms + 1000 * i, static_cast<double>(i), {});
@@ -24,7 +24,7 @@ TEST(TimeSeries, TheLastMinuteHasTheSecondsThatTheHistoryHasTaken) {
   EXPECT_EQ(minute.back().last_place, 99);
 }
 
-TEST(TimeSeries, ASecondThatIsNotOverIsNotTaken) {
+TEST(TimeSeries, DoesNotTakeUnfinishedSecond) {
   TimeSeries series;
   series.count_reading(begin_ms, 1, client::Estimate{60, 0.5});
   series.count_reading(begin_ms + 10, 3, {});
@@ -39,7 +39,7 @@ TEST(TimeSeries, ASecondThatIsNotOverIsNotTaken) {
   EXPECT_TRUE(series.take_seconds(begin_s + 2).empty());
 }
 
-TEST(TimeSeries, ErrorsOfTheLastMinute) {
+TEST(TimeSeries, CountsErrorsOfLastMinute) {
   TimeSeries series;
   for (std::int64_t i = 0; i < 90; ++i) series.count_errors(begin_ms + 1000 * i, 1);
   EXPECT_EQ(series.errors_last_minute(begin_s + 89), 60u);
@@ -48,7 +48,7 @@ TEST(TimeSeries, ErrorsOfTheLastMinute) {
   EXPECT_TRUE(series.last_minute().empty());  // no second had a reading
 }
 
-TEST(TimeSeries, PointsAreKeptWhileSomebodyLooks) {
+TEST(TimeSeries, StoresPointsOnlyWhileTraced) {
   TimeSeries series;
   series.count_reading(begin_ms, 1, {});
   EXPECT_TRUE(series.take_points().empty());
@@ -63,7 +63,7 @@ TEST(TimeSeries, PointsAreKeptWhileSomebodyLooks) {
   EXPECT_TRUE(series.take_points().empty());
 }
 
-TEST(TimeSeries, RecentPointsAreThoseOfTwentySecondsAndOfAClockThatIsSetBack) {
+TEST(TimeSeries, RecentPointsCoverTwentySecondsAndRestartWhenClockIsSetBack) {
   TimeSeries series;
   for (std::int64_t i = 0; i < 30'000; ++i) series.count_reading(begin_ms + i, 0, {});
   const std::vector<Point> recent = series.recent_points();

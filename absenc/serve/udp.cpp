@@ -42,7 +42,7 @@ UdpSender::~UdpSender() {
 void UdpSender::work(const std::stop_token& stop) {
   while (!stop.stop_requested()) {
     for (const auto& watch : fleet_->all()) {
-      for (const OutgoingReading& one : watch->take_passing(Watch::Outlet::udp).readings) {
+      for (const OutgoingReading& one : watch->take_outgoing(Watch::Outlet::udp).readings) {
         static_cast<void>(socket_.send(datagram(watch->name(), one).line()));
       }
     }

@@ -24,9 +24,9 @@ namespace {
 
 using namespace std::chrono_literals;
 
-constexpr Time between_summaries = 1s;
-constexpr Time between_tellings = 1s;    // between two events about failures, which may occur with each reading
-constexpr Time before_another_try = 5s;  // before the next attempt to read an encoder in state `ended`
+constexpr Time summary_interval = 1s;
+constexpr Time failure_report_interval = 1s;  // between two events about failures, which may occur with each reading
+constexpr Time retry_pause = 5s;              // before the next attempt to read an encoder in state `ended`
 
 // Converts a time of os::now, which is the steady clock.
 std::chrono::steady_clock::time_point to_time_point(Time time) {
@@ -39,7 +39,7 @@ double place_of(const Sample& sample) {
   return std::ldexp(360.0 * static_cast<double>(sample.position), -static_cast<int>(reading.singleturn_bits));
 }
 
-std::string trouble_words(const Trouble& trouble) {
+std::string trouble_text(const Trouble& trouble) {
   std::string words = fmt::format("{}: {}", text_of(trouble.error).name, trouble.message);
   if (!trouble.advice.empty()) words += fmt::format(". Try: {}", trouble.advice);
   return words;
@@ -58,7 +58,7 @@ Watch::Watch(std::string name, const EncoderAddress& address, double rate, Time 
       rate_(rate),
       offset_(offset),
       server_events_(&server_events),
-      known_at_(os::now()),
+      current_since_(os::now()),
       thread_([this](const std::stop_token& stop) { work(stop); }) {}
 
 Watch::~Watch() {
@@ -70,7 +70,7 @@ void Watch::wait() {
   if (thread_.joinable()) thread_.join();
   {
     const std::lock_guard lock(mutex_);
-    over_ = true;
+    has_ended_ = true;
   }
   refuse_order("it was not done: the server no longer reads this encoder");
 }
@@ -88,14 +88,14 @@ void Watch::refuse_order(const std::string& why) {
 State Watch::state_now(Time age) const {
   const Time period = rate_ > 0 ? Time(static_cast<std::int64_t>(1e9 / rate_)) : Time{};
   const bool old = age > std::max<Time>(3 * period, 500ms);
-  return known_.state == State::live && old ? State::silent : known_.state;
+  return current_.state == State::live && old ? State::silent : current_.state;
 }
 
 Snapshot Watch::snapshot() const {
   const std::int64_t now_s = calendar_ms() / 1000;
   const std::lock_guard lock(mutex_);
-  Snapshot snapshot = known_;
-  snapshot.age = os::now() - known_at_;
+  Snapshot snapshot = current_;
+  snapshot.age = os::now() - current_since_;
   snapshot.state = state_now(snapshot.age);
   snapshot.errors_last_minute = series_.errors_last_minute(now_s);
   return snapshot;
@@ -121,12 +121,12 @@ std::vector<Point> Watch::recent_points() const {
   return series_.recent_points();
 }
 
-Outbox::Taken Watch::take_passing(Outlet outlet) {
+Outbox::Taken Watch::take_outgoing(Outlet outlet) {
   const std::lock_guard lock(mutex_);
   return outboxes_[static_cast<std::size_t>(outlet)].take();
 }
 
-void Watch::stop_passing(Outlet outlet) {
+void Watch::stop_outgoing(Outlet outlet) {
   const std::lock_guard lock(mutex_);
   outboxes_[static_cast<std::size_t>(outlet)].close();
 }
@@ -146,7 +146,7 @@ std::string Watch::acknowledge(std::string_view alarm, const std::string& token,
     const std::lock_guard lock(mutex_);
     std::vector<std::string_view> names;
     bool is_raised = false;
-    for (RaisedAlarm& one : known_.raised) {
+    for (RaisedAlarm& one : current_.raised) {
       names.push_back(one.name);
       if (one.name != alarm) continue;
       is_raised = true;
@@ -155,26 +155,26 @@ std::string Watch::acknowledge(std::string_view alarm, const std::string& token,
     }
     if (!is_raised) return fmt::format("the alarm \"{}\" is not raised{}", alarm, suggestion(alarm, names));
   }
-  tell("acknowledged", std::string(alarm), who);
+  add_event("acknowledged", std::string(alarm), who);
   return "";
 }
 
 std::string_view Watch::give(Order order) {
   const std::lock_guard lock(mutex_);
-  if (over_) return "the server no longer reads this encoder";
-  if (examines_) return "the encoder is being examined: try again afterwards";
+  if (has_ended_) return "the server no longer reads this encoder";
+  if (is_examining_) return "the encoder is being examined: try again afterwards";
   if (order_) return "another order for this encoder is waiting: try again when it is done";
   order_ = std::move(order);
   changed_.notify_all();
   return "";
 }
 
-void Watch::take_orders(bool on) {
+void Watch::accept_orders(bool on) {
   const std::lock_guard lock(mutex_);
-  examines_ = !on;
+  is_examining_ = !on;
 }
 
-void Watch::tell(std::string_view kind, std::string text, std::string who) {
+void Watch::add_event(std::string_view kind, std::string text, std::string who) {
   server_events_->add({calendar_ms(), name_, std::string(kind), std::move(text), std::move(who)});
 }
 
@@ -187,11 +187,11 @@ void Watch::work(const std::stop_token& stop) {
     } catch (const os::Ended&) {  // the end was requested while the line was busy
       return;
     } catch (const std::exception& error) {
-      become(State::ended, error.what());
+      set_state(State::ended, error.what());
       refuse_order(error.what());
     }
     std::unique_lock lock(mutex_);
-    changed_.wait_until(lock, stop, to_time_point(os::now() + before_another_try), [&] { return order_.has_value(); });
+    changed_.wait_until(lock, stop, to_time_point(os::now() + retry_pause), [&] { return order_.has_value(); });
   }
 }
 
@@ -225,21 +225,21 @@ void Watch::read_on(const std::stop_token& stop) {
   }
 }
 
-void Watch::become(State state, const std::string& message) {
+void Watch::set_state(State state, const std::string& message) {
   const bool is_new = [&] {
     const std::lock_guard lock(mutex_);
-    const bool changed = known_.state != state || (state == State::ended && known_.message != message);
-    known_.state = state;
-    known_.message = message;
+    const bool changed = current_.state != state || (state == State::ended && current_.message != message);
+    current_.state = state;
+    current_.message = message;
     return changed;
   }();
   if (!is_new) return;
   if (state == State::failing) {
-    if (os::now() < next_told_) return;
-    next_told_ = os::now() + between_tellings;
+    if (os::now() < next_failure_report_) return;
+    next_failure_report_ = os::now() + failure_report_interval;
   }
-  if (state != State::live) return tell(name_of(state), message);
-  tell("back", "readings arrive again");
+  if (state != State::live) return add_event(name_of(state), message);
+  add_event("back", "readings arrive again");
 }
 
 void Watch::publish(const Encoder& live, const Sample& sample) {
@@ -247,27 +247,27 @@ void Watch::publish(const Encoder& live, const Sample& sample) {
     case Sample::Kind::reading: {
       {
         const std::lock_guard lock(mutex_);
-        known_.has_reading = true;
-        known_.last = sample;
-        if (sample.position_valid) known_.place = place_of(sample);
-        known_at_ = sample.at;
-        ++known_.readings;
+        current_.has_reading = true;
+        current_.last = sample;
+        if (sample.position_valid) current_.place = place_of(sample);
+        current_since_ = sample.at;
+        ++current_.readings;
       }
-      become(State::live, "");
-      if (sample.restarted && !restarted_) tell("restarted", sample.message);
+      set_state(State::live, "");
+      if (sample.restarted && !restarted_) add_event("restarted", sample.message);
       restarted_ = sample.restarted;
-      tell_alarms(sample.reading);
+      report_alarms(sample.reading);
       break;
     }
     case Sample::Kind::failed:
-      become(State::failing, trouble_words(sample.trouble));
+      set_state(State::failing, trouble_text(sample.trouble));
       break;
     case Sample::Kind::lost:
-      become(State::lost, sample.message);
+      set_state(State::lost, sample.message);
       break;
     case Sample::Kind::absent: {
       const std::lock_guard lock(mutex_);
-      known_.message = sample.message;
+      current_.message = sample.message;
       break;
     }
     case Sample::Kind::back:
@@ -281,7 +281,7 @@ void Watch::summarize(const Encoder& live, const Sample& sample) {
   const std::uint64_t bad = encoder.counters().bad();
   const Time now = os::now();
   const std::lock_guard lock(mutex_);
-  const std::uint64_t before = known_.counters.bad();
+  const std::uint64_t before = current_.counters.bad();
   const std::uint64_t errors = bad < before ? bad : bad - before;  // the counters start at 0 when the encoder was
                                                                    // opened again
   const std::int64_t at_ms = calendar_ms();
@@ -290,46 +290,46 @@ void Watch::summarize(const Encoder& live, const Sample& sample) {
     series_.count_reading(at_ms, sample.position_valid ? std::optional(place_of(sample)) : std::nullopt,
                           sample.measured_speed());
   }
-  pass_on(sample);
+  queue_outgoing(sample);
   if (errors != 0) details_.bad = live.bad_exchanges();
-  known_.counters = encoder.counters();
-  known_.losses = live.losses();
-  known_.restarts = live.restarts();
+  current_.counters = encoder.counters();
+  current_.losses = live.losses();
+  current_.restarts = live.restarts();
   if (now < next_summary_) return;
-  next_summary_ = now + between_summaries;
+  next_summary_ = now + summary_interval;
   if (sample.kind == Sample::Kind::reading) {
     AnswerSink sink;
     encoder.report(sink);
     details_.fields = to_json(sink.answer.row());
     details_.reply = shown_values(sink.answer);
   }
-  known_.rate = live.rate();
+  current_.rate = live.rate();
   const host::Latencies& latencies = encoder.latencies();
-  known_.latency = {latencies.percentile(0.5),        latencies.percentile(0.99), latencies.longest(),
-                    latencies.within(latency_limits), latencies.count(),          latencies.sum()};
+  current_.latency = {latencies.percentile(0.5),        latencies.percentile(0.99), latencies.longest(),
+                      latencies.within(latency_limits), latencies.count(),          latencies.sum()};
 }
 
-void Watch::pass_on(const Sample& sample) {
+void Watch::queue_outgoing(const Sample& sample) {
   const auto is_wanted = [](const Outbox& one) { return one.wanted(); };
   if (sample.kind != Sample::Kind::reading || std::none_of(outboxes_.begin(), outboxes_.end(), is_wanted)) return;
   const Reading& reading = sample.reading;
-  OutgoingReading passing;
-  passing.at_us = calendar_us() - std::chrono::duration_cast<std::chrono::microseconds>(os::now() - sample.at).count();
-  if (sample.position_valid) passing.place = place_of(sample);
-  passing.speed = sample.measured_speed();
+  OutgoingReading outgoing;
+  outgoing.at_us = calendar_us() - std::chrono::duration_cast<std::chrono::microseconds>(os::now() - sample.at).count();
+  if (sample.position_valid) outgoing.place = place_of(sample);
+  outgoing.speed = sample.measured_speed();
   const client::JointAngles& angles = sample.angles;
-  passing.joint = angles.joint_mm ? angles.joint_mm : angles.joint_deg;
-  passing.joint_speed = angles.joint_speed_mm_s ? angles.joint_speed_mm_s : angles.joint_speed_rpm;
-  passing.electrical_deg = angles.electrical_deg;
-  if (reading.ready && reading.singleturn_valid()) passing.counts = reading.singleturn;
-  if (reading.multiturn_bits != 0 && reading.multiturn_valid) passing.turns = reading.turns();
+  outgoing.joint = angles.joint_mm ? angles.joint_mm : angles.joint_deg;
+  outgoing.joint_speed = angles.joint_speed_mm_s ? angles.joint_speed_mm_s : angles.joint_speed_rpm;
+  outgoing.electrical_deg = angles.electrical_deg;
+  if (reading.ready && reading.singleturn_valid()) outgoing.counts = reading.singleturn;
+  if (reading.multiturn_bits != 0 && reading.multiturn_valid) outgoing.turns = reading.turns();
   for (Outbox& outbox : outboxes_) {
-    if (outbox.wanted()) outbox.put(passing);
+    if (outbox.wanted()) outbox.put(outgoing);
   }
 }
 
 // Adds events for alarms that changed. An alarm stays raised until the encoder reports it as cleared.
-void Watch::tell_alarms(const Reading& reading) {
+void Watch::report_alarms(const Reading& reading) {
   const std::uint32_t alarms = reading.alarms | (alarms_ & ~reading.alarms_reported);
   if (alarms == alarms_) return;
   const Unit& unit = *address_.unit;
@@ -351,11 +351,11 @@ void Watch::tell_alarms(const Reading& reading) {
       if (raised && !flag.action.empty()) words += fmt::format(". What to do: {}", flag.action);
       {
         const std::lock_guard lock(mutex_);
-        std::erase_if(known_.raised,
+        std::erase_if(current_.raised,
                       [&](const RaisedAlarm& one) { return one.channel == field.name && one.name == flag.name; });
-        if (raised) known_.raised.push_back({field.name, flag.name, calendar_ms(), {}, 0});
+        if (raised) current_.raised.push_back({field.name, flag.name, calendar_ms(), {}, 0});
       }
-      tell(raised ? "alarm" : "alarm_over", words);
+      add_event(raised ? "alarm" : "alarm_over", words);
     }
   }
 }
@@ -367,7 +367,7 @@ void Watch::carry_out(Encoder& live, const Order& order, const std::function<voi
   const std::string_view name = order.name();
   const bool is_examination = order.kind == Order::Kind::examination;
   const bool is_told = is_examination || order.kind == Order::Kind::command;
-  Done done;
+  OrderResult done;
   bool has_begun = false;
   const auto note = [&](const std::exception& failure) {
     if (const Change* change = change_of(failure)) done.change = change->state;
@@ -378,8 +378,8 @@ void Watch::carry_out(Encoder& live, const Order& order, const std::function<voi
       done.text += fmt::format("; {}", live.change().note);
     }
     command_runs_ = false;
-    take_orders(true);
-    if (is_told) tell("command", done.text, order.who);
+    accept_orders(true);
+    if (is_told) add_event("command", done.text, order.who);
     order.done(done);
   };
   const auto end = [&](std::string_view advice) {
@@ -388,7 +388,7 @@ void Watch::carry_out(Encoder& live, const Order& order, const std::function<voi
     finish();
   };
   command_runs_ = order.kind == Order::Kind::command;
-  take_orders(!is_examination);
+  accept_orders(!is_examination);
   try {
     if (!is_examination && !live.connection().connected()) live.connect();
     has_begun = true;
@@ -409,15 +409,15 @@ void Watch::carry_out(Encoder& live, const Order& order, const std::function<voi
     done.text = fmt::format("{} failed: {}", name, error.what());
   }
   if (order.changes_encoder()) live.forget_position();
-  if (is_examination) open_again(live);
+  if (is_examination) reconnect(live);
   finish();
 }
 
 // The examination opens the port itself, and tries other settings if no encoder replies. A virtual encoder would be a
 // new one if it were opened again, so it is examined as it is.
-Done Watch::examine(Encoder& live, const std::stop_token& stop) {
+OrderResult Watch::examine(Encoder& live, const std::stop_token& stop) {
   const std::string words = "the encoder is being examined, readings continue afterwards";
-  become(State::examined, words);
+  set_state(State::examined, words);
   const EncoderAddress address = live.connection().uri();
   Surroundings surroundings;
   if (address.place == client::Place::sim) {
@@ -428,18 +428,18 @@ Done Watch::examine(Encoder& live, const std::stop_token& stop) {
     live.connection().disconnect();
   }
   DoctorChoices choices;
-  choices.progress = [&](const std::string& what) { become(State::examined, fmt::format("{}: {}", words, what)); };
+  choices.progress = [&](const std::string& what) { set_state(State::examined, fmt::format("{}: {}", words, what)); };
   choices.over = [&] { return stop.stop_requested(); };
   const Examination examination = client::examine(address, choices, surroundings);
   return {true, fmt::format("doctor: {}", examination.verdict()), to_json(examination)};
 }
 
-void Watch::open_again(Encoder& live) {
+void Watch::reconnect(Encoder& live) {
   if (live.connection().connected()) return;
   try {
     live.connect();
   } catch (const os::Failure& failure) {
-    become(State::lost, failure.what());
+    set_state(State::lost, failure.what());
   }
 }
 

@@ -113,9 +113,9 @@ class Watch {
 
   /// Takes all good readings since the last call. Each outlet has its own queue.
   enum class Outlet : std::uint8_t { mqtt, udp };
-  [[nodiscard]] Outbox::Taken take_passing(Outlet outlet);
+  [[nodiscard]] Outbox::Taken take_outgoing(Outlet outlet);
   /// Stops storing readings for an outlet.
-  void stop_passing(Outlet outlet);
+  void stop_outgoing(Outlet outlet);
 
   /// Gives an order to the thread. Returns "" or why the order is refused: another order waits, an examination runs, or
   /// the thread has ended.
@@ -134,17 +134,17 @@ class Watch {
   void read_on(const std::stop_token& stop);
   void publish(const client::Encoder& live, const client::Sample& sample);
   void summarize(const client::Encoder& live, const client::Sample& sample);
-  void pass_on(const client::Sample& sample);
-  void tell_alarms(const Reading& reading);
-  void become(State state, const std::string& message);
+  void queue_outgoing(const client::Sample& sample);
+  void report_alarms(const Reading& reading);
+  void set_state(State state, const std::string& message);
   void carry_out(client::Encoder& live, const Order& order, const std::function<void()>& between,
                  const std::stop_token& stop);
-  [[nodiscard]] Done examine(client::Encoder& live, const std::stop_token& stop);
-  void open_again(client::Encoder& live);
+  [[nodiscard]] OrderResult examine(client::Encoder& live, const std::stop_token& stop);
+  void reconnect(client::Encoder& live);
   void refuse_order(const std::string& why);
-  void take_orders(bool on);
+  void accept_orders(bool on);
   [[nodiscard]] State state_now(Time age) const;
-  void tell(std::string_view kind, std::string text, std::string who = {});
+  void add_event(std::string_view kind, std::string text, std::string who = {});
 
   std::string name_;
   client::EncoderAddress address_;
@@ -154,18 +154,18 @@ class Watch {
 
   mutable std::mutex mutex_;  // guards all members below
   std::condition_variable_any changed_;
-  Snapshot known_;
+  Snapshot current_;
   Details details_;
-  Time known_at_{};  // time of the last reading, or of the last change of state
+  Time current_since_{};  // time of the last reading, or of the last change of state
   std::optional<Order> order_;
-  bool over_ = false;      // no more orders are accepted
-  bool examines_ = false;  // an examination runs; no orders are accepted meanwhile
+  bool has_ended_ = false;     // no more orders are accepted
+  bool is_examining_ = false;  // an examination runs; no orders are accepted meanwhile
   TimeSeries series_;
   std::array<Outbox, 2> outboxes_;  // index: Outlet
 
-  // The members below are used by the thread only.
+  // The members below are used by the reading thread only.
   Time next_summary_{};
-  Time next_told_{};  // when the next failure may be reported
+  Time next_failure_report_{};  // when the next failure may be reported
   std::uint32_t alarms_ = 0;
   bool restarted_ = false;
   bool command_runs_ = false;  // the running command must not be interrupted

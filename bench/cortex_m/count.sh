@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
 # usage: bench/cortex_m/count.sh [FOLDER]
-# Instructions that a BiSS frame costs on a Cortex-M0+ and a Cortex-M4, counted by QEMU, and the code and constants of the
-# whole program. FOLDER has other people's code: bissc_extract.h of mjbots/moteus (its fw). Needs the packages
+# Counts, with QEMU, the instructions for decoding a BiSS frame on a Cortex-M0+ and a Cortex-M4, and prints the size of
+# code and constants of the whole program. FOLDER has bissc_extract.h of mjbots/moteus (folder fw). Needs the packages
 # gcc-arm-none-eabi, libstdc++-arm-none-eabi-newlib and qemu-user.
 set -euo pipefail
 peers=${1:+$(realpath "$1")}
@@ -11,7 +11,7 @@ cd "$(dirname "$0")/../.."
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 
-# executed CPU OPTIMISATION WAY FRAMES
+# executed CPU OPTIMISATION WAY FRAMES prints the number of executed instructions.
 executed() {
   arm-none-eabi-g++ -std=c++20 "$2" -DNDEBUG -DWAY="$3" -DFRAMES="$4" -mcpu="$1" -mthumb -ffreestanding -fno-exceptions -fno-rtti \
     -fno-threadsafe-statics -ffunction-sections -fdata-sections -Wl,--gc-sections -nostartfiles -I. ${peers:+-I"$peers"} \

@@ -12,7 +12,7 @@ constexpr std::uint32_t start_receiver = uart + 0x000, start_transmitter = uart 
                         data_in = uart + 0x518, data_out = uart + 0x51C, set_enable = 0xE000'E100;
 constexpr std::uint32_t received_bit = 1u << 2, sent_bit = 1u << 7, uart_number = 2;
 
-Bytes unsent{};  // the first byte is in the transmitter
+Bytes unsent{};  // unsent bytes; the first one is in the transmitter
 }  // namespace
 
 const Frequency frequency{16'000'000, 125, 2};

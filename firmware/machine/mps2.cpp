@@ -11,7 +11,7 @@ constexpr std::uint32_t data = uart, state = uart + 0x04, control = uart + 0x08,
 constexpr std::uint32_t receiver_is_full = 2, sent_bit = 1, received_bit = 2;
 constexpr std::uint32_t receiver_number = 0, transmitter_number = 1;
 
-Bytes unsent{};  // the first byte is in the transmitter
+Bytes unsent{};  // unsent bytes; the first one is in the transmitter
 }  // namespace
 
 const Frequency frequency{25'000'000, 40, 1};

@@ -24,7 +24,7 @@ namespace absenc::machine {
   asm volatile(
       ".option push\n"
       ".option norvc\n"
-      ".balign 16\n"  // in one page
+      ".balign 16\n"  // all in one page of memory
       "slli zero, zero, 0x1f\n"
       "ebreak\n"
       "srai zero, zero, 7\n"

@@ -14,7 +14,7 @@ int main() {
   for (ByteStep step = read.next(now); step.kind != ByteStep::Kind::done; step = read.next(now)) {
     now += std::chrono::microseconds(50);
     if (step.kind == ByteStep::Kind::transfer) {
-      read.feed({.kind = ByteEvent::Kind::sent, .at = now});  // step.out counts as sent
+      read.feed({.kind = ByteEvent::Kind::sent, .at = now});  // step.out was sent
     } else {
       read.feed({.kind = ByteEvent::Kind::received, .at = now, .items = reply});
     }

@@ -7,7 +7,7 @@
         print(encoder.read().angle_deg)
         for sample in encoder.samples(rate=100, count=1000):
             print(sample.time_s, sample.position, sample.speed_rpm)
-        encoder.record("log.h5", seconds=60)   # also .csv and .jsonl
+        encoder.record("log.h5", seconds=60)   # other formats: .csv, .jsonl
 
     with absenc.emulate("tformat", motion="rpm=60") as virtual:
         virtual.raise_alarm("over_heat")       # the drive under test opens virtual.path

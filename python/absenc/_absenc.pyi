@@ -57,7 +57,7 @@ class Sample:
 
     @property
     def kind(self) -> str:
-        """ "reading"; "failed": see `error`; "lost": the port has just disappeared; "absent"; "back"."""
+        """Kind of sample: "reading"; "failed": see `error`; "lost": the port has just disappeared; "absent"; "back"."""
     @property
     def time_s(self) -> float:
         """Seconds of time.monotonic(); for a reading, when its position was latched."""

@@ -26,7 +26,7 @@ def texts(options: Mapping[str, Value]) -> list[str]:
     """Converts `singleturn=5, alarm=["a", "b"]` to "singleturn=5", "alarm=a", "alarm=b"; None is omitted."""
     settings = []
     for name, value in options.items():
-        if value is None:  # the default of a keyword
+        if value is None:  # None is the default of keywords
             continue
         if isinstance(value, bool):
             settings.append(f"{name}={str(value).lower()}")

@@ -22,7 +22,7 @@ class Column(NamedTuple):
     """Description of a column."""
 
     name: str
-    unit: str  #: "s", "deg", "us" ...; "": a plain number or text
+    unit: str  #: unit of the values: "s", "deg", "us" ...; "": none
     dtype: str
     meaning: str
 

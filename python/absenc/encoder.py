@@ -22,11 +22,11 @@ Alarm = Flag
 class Info(NamedTuple):
     """Identification of an encoder, and its replies to commands without arguments."""
 
-    address: str  #: "tformat:/dev/ttyUSB0"
-    unit: str  #: "tformat"
+    address: str  #: address: "tformat:/dev/ttyUSB0"
+    unit: str  #: id of the protocol: "tformat"
     name: str  #: maker and protocol, for people
-    model: Optional[str]  #: None: no model has these options
-    options: list[str]  #: "name=value"
+    model: Optional[str]  #: name of the model; None: no model has these options
+    options: list[str]  #: options: "name=value"
     answers: dict[str, dict[str, Field]]  #: replies, by command
     failures: dict[str, EncoderError]  #: errors of commands that failed, by command
 

@@ -13,8 +13,8 @@ class Found(NamedTuple):
     unit: str
     settings: list[str]  #: the fewest settings that explain the frames: "model=23-bit"
     address: str  #: address for `absenc.open`
-    encoder: str  #: "address=3", if several encoders share the line
-    line: str  #: "RS-485 half duplex, 2.5 Mbit/s"
+    encoder: str  #: which encoder, if several share the line: "address=3"
+    line: str  #: kind of line: "RS-485 half duplex, 2.5 Mbit/s"
     tried: int  #: number of exchanges
     explained: int  #: number of exchanges that this encoder explains
     log10_chance: float  #: log10 of the probability that noise explains as many exchanges

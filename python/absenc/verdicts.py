@@ -16,9 +16,9 @@ from .errors import UsageError
 class Finding(NamedTuple):
     """A fault, a warning or a note about an encoder or its line."""
 
-    id: str  #: "reply_late", see docs/doctor.md
+    id: str  #: kind of finding: "reply_late", see docs/doctor.md
     severity: str  #: "note"; "warning": may fail soon; "fault": does not work
-    evidence: str  #: observation
+    evidence: str  #: observation that led to the finding
     cause: str  #: most likely cause
     action: str  #: recommended action
 
@@ -37,8 +37,8 @@ class Examination(NamedTuple):
     readings_per_second: Optional[float] = None
     echo: Optional[str] = None  #: whether the adapter receives its own transmission
     latency_ms: Optional[float] = None  #: latency that adapter and driver add, if known
-    quickest_reply_ms: Optional[float] = None  #: from the end of a request to the end of its reply; None: unknown
-    slowest_reply_ms: Optional[float] = None
+    quickest_reply_ms: Optional[float] = None  #: shortest time from a request to the end of its reply
+    slowest_reply_ms: Optional[float] = None  #: longest time from a request to the end of its reply
 
 
 class Clause(NamedTuple):
@@ -48,7 +48,7 @@ class Clause(NamedTuple):
     document: str
     paragraph: str
     words: str
-    verdict: str  #: "kept", "broken", "untested"
+    verdict: str  #: verdict on the clause: "kept", "broken", "untested"
     evidence: str  #: observations and their number, or why it is untested
 
 
@@ -96,16 +96,16 @@ class Waved(NamedTuple):
 class Port(NamedTuple):
     """A port of this computer, as `absenc ports --json` prints it. None: unknown, or not applicable to this kind."""
 
-    port: str  #: "/dev/ttyUSB0", "can0", "/dev/spidev0.0"
-    kind: str  #: "serial", "can", "spi"
-    lasting_name: Optional[str] = None  #: "/dev/serial/by-id/...", independent of other adapters
+    port: str  #: name of the port: "/dev/ttyUSB0", "can0", "/dev/spidev0.0"
+    kind: str  #: kind of port: "serial", "can", "spi"
+    lasting_name: Optional[str] = None  #: name that other adapters do not change: "/dev/serial/by-id/..."
     maker: Optional[str] = None
     adapter: Optional[str] = None
     serial_number: Optional[str] = None
     chip: Optional[str] = None
     driver: Optional[str] = None
     latency_timer_ms: Optional[int] = None  #: how long the adapter may delay received bytes
-    highest_rate: Optional[int] = None  #: bits per second
+    highest_rate: Optional[int] = None  #: highest bit rate, bits per second
     may_open: Optional[bool] = None
     refusal: Optional[str] = None  #: why the port may not be opened
     in_use_by: Optional[str] = None  #: process that uses the port: "absenc serve (process 4711)"

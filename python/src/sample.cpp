@@ -98,9 +98,9 @@ void bind_sample(py::module_& module) {
       .def(py::pickle(&state_of, &reading_of))
       .def("__repr__", &PyReading::text);
   py::class_<PySample>(module, "Sample", "Result of one attempt to read.")
-      .def_property_readonly(
-          "kind", &PySample::kind,
-          "\"reading\"; \"failed\": see `error`; \"lost\": the port has just disappeared; \"absent\"; \"back\".")
+      .def_property_readonly("kind", &PySample::kind,
+                             "Kind of sample: \"reading\"; \"failed\": see `error`; \"lost\": the port has just "
+                             "disappeared; \"absent\"; \"back\".")
       .def_property_readonly(
           "time_s", [](const PySample& one) { return seconds(one.sample.at); },
           "Seconds of time.monotonic(); for a reading, when its position was latched.")

@@ -191,7 +191,7 @@ def test_asyncio_timeout_cancels_wait(absenc_emulate):
                 async with asyncio.timeout(0.2):
                     async for _ in encoder.samples(rate=0.001):
                         pass
-            return encoder.read().valid  # still usable
+            return encoder.read().valid  # the encoder is still usable
 
     assert asyncio.run(read())
 
@@ -225,7 +225,7 @@ with absenc.open("tformat:{os.ttyname(slave)}?latency=50000") as encoder:
     tty.setraw(slave)
     with subprocess.Popen([sys.executable, "-c", program], stdout=subprocess.PIPE, text=True) as process:
         try:
-            assert select.select([master], [], [], 40)[0]  # wait for the request
+            assert select.select([master], [], [], 40)[0]  # waits for the request
             os.kill(process.pid, signal.SIGINT)
             assert process.communicate(timeout=40)[0] == "interrupted\n"
         finally:

@@ -2,7 +2,7 @@
 // Selects the view from the address and passes the server's events to it.
 import {askToken} from "./dialog.js";
 import {setText} from "./dom.js";
-import {One} from "./encoder.js";
+import {EncoderPage} from "./encoder.js";
 import {notify, notifyLoss} from "./notify.js";
 import {Overview} from "./overview.js";
 import {Events, tokenInfo} from "./server.js";
@@ -83,7 +83,7 @@ function route() {
   view?.close();
   shown = encoder;
   bar.replaceChildren();
-  view = encoder === null ? new Overview(main, bar) : new One(main, bar, encoder, values);
+  view = encoder === null ? new Overview(main, bar) : new EncoderPage(main, bar, encoder, values);
   document.title = encoder === null ? "absenc" : `${encoder} – absenc`;
   events = new Events(view.trace, {onEvent: take, onLost: explain});
 }
@@ -92,7 +92,7 @@ async function greet() {
   try {
     tokenButton.hidden = !(await tokenInfo()).tokens;
   } catch {
-    // the event stream reports that the server is unreachable
+    // ignored: the event stream reports an unreachable server
   }
 }
 

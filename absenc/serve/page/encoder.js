@@ -6,9 +6,9 @@ import {Examine} from "./examine.js";
 import {figureNode, showParts, showState, stateNode} from "./overview.js";
 import {Trace, isMarked, markText, quantities} from "./plots.js";
 import {download, pathOf, request, tokenInfo} from "./server.js";
-import {SHAPES, belowFigure, clock, condition, duration, fieldName, fieldText, figure, forPeople, happened, lastText, microseconds, numberText, plain, sentence, valueText, wrongs} from "./words.js";
+import {SHAPES, belowFigure, clock, condition, duration, fieldName, fieldText, figure, forPeople, eventKind, lastText, microseconds, numberText, plain, sentence, valueText, faultLines} from "./words.js";
 
-const LIVE_MS = 20000;      // the server stores points for this time
+const LIVE_MS = 20000;      // the server stores the points of this time
 const LOST_SHARE = .15;     // share of a lost encoder's plot that shows the time without readings
 const MOST_POINTS = 2500;
 const REFRESH_MS = 1000;
@@ -35,7 +35,7 @@ function latencyRows(buckets) {
     .map(({at_most: limit, count}) => [limit === null ? "longer" : `to ${limitText(limit)}`, count]);
 }
 
-export class One {
+export class EncoderPage {
   constructor(main, bar, name, values) {
     this.name = name;
     this.trace = name;
@@ -133,7 +133,7 @@ export class One {
   go(values) {
     this.values = new Map(values);
     this.showTab();
-    if (this.one !== undefined) this.showChoices();
+    if (this.encoder !== undefined) this.showChoices();
     this.loadPast();
     this.changed = true;
   }
@@ -158,17 +158,17 @@ export class One {
 
   /** Shows the buttons for range and unit, and restarts the plot if the selection has changed. */
   showChoices() {
-    const all = quantities(this.one);
-    const possible = Object.entries(all).filter(([, one]) => !one.past || this.range !== "live");
+    const all = quantities(this.encoder);
+    const possible = Object.entries(all).filter(([, quantity]) => !quantity.past || this.range !== "live");
     const wanted = this.values.get("unit");
     const unit = possible.some(([key]) => key === wanted) ? wanted : possible[0][0];
-    const key = JSON.stringify([this.range, unit, this.hasHistory, this.one.counts_in_all, this.one.has_turns]);
+    const key = JSON.stringify([this.range, unit, this.hasHistory, this.encoder.counts_in_all, this.encoder.has_turns]);
     if (key === this.shownChoices) return;
     this.shownChoices = key;
     const focused = document.activeElement?.dataset?.value;
     const ranges = Object.entries(RANGES).map(([value, [text]]) => [value, text]);
     this.ranges.replaceChildren(this.hasHistory ? choice("range", ranges, this.range, (value) => this.set("range", value)) : element("p", {class: "faint"}, "The latest readings. The server stores no history: see --history."));
-    this.units.replaceChildren(choice("unit", possible.map(([value, one]) => [value, one.text]), unit, (value) => this.set("unit", value)));
+    this.units.replaceChildren(choice("unit", possible.map(([value, quantity]) => [value, quantity.text]), unit, (value) => this.set("unit", value)));
     if (focused) this.node(`[data-value="${focused}"]`)?.focus();
     this.quantity = all[unit];
     this.graph?.close();
@@ -189,46 +189,46 @@ export class One {
       this.points.unshift(...body.points.filter(([at]) => at < first));
       this.changed = true;
     } catch {
-      // the event stream reports that the server is unreachable
+      // ignored: the event stream reports an unreachable server
     }
   }
 
   show(state) {
-    const one = state.encoders.find((other) => other.encoder === this.name);
-    this.isServed = one !== undefined;
+    const encoder = state.encoders.find((other) => other.encoder === this.name);
+    this.isServed = encoder !== undefined;
     if (!this.isServed) return this.lose("this encoder is no longer served", "not served");
-    const first = this.one === undefined || !this.known;
-    const changed = this.one?.state !== one.state;
-    this.one = one;
+    const first = this.encoder === undefined || !this.known;
+    const changed = this.encoder?.state !== encoder.state;
+    this.encoder = encoder;
     this.known = true;
     this.at_ms = state.at_ms;
     this.hasHistory = state.history !== null;
-    this.condition = condition(one);
+    this.condition = condition(encoder);
     showState(this.state, this.condition);
-    const address = one.address === this.name ? "" : ` · ${one.address}`;
+    const address = encoder.address === this.name ? "" : ` · ${encoder.address}`;
     if (this.about.dataset.shown !== address) {
       this.about.dataset.shown = address;
-      this.about.replaceChildren(...breakable(one.protocol_name + address));
+      this.about.replaceChildren(...breakable(encoder.protocol_name + address));
     }
-    this.figure.show(one);
-    this.dial.node.toggleAttribute("hidden", one.linear);
-    this.dial.turn(one.angle_deg);
-    const scaled = one.linear && one.length_mm !== null;
+    this.figure.show(encoder);
+    this.dial.node.toggleAttribute("hidden", encoder.linear);
+    this.dial.turn(encoder.angle_deg);
+    const scaled = encoder.linear && encoder.length_mm !== null;
     this.scale.node.toggleAttribute("hidden", !scaled);
-    if (scaled) this.scale.move(one.position_mm === null ? null : one.position_mm / one.length_mm, `${numberText(one.length_mm)} mm`);
-    const counts = one.counts === null ? [] : [`${numberText(one.counts)} ${one.counts_in_all === null ? "counts" : `of ${numberText(one.counts_in_all)} counts`}`];
-    showParts(this.below, [...belowFigure(one, state.at_ms), ...counts]);
+    if (scaled) this.scale.move(encoder.position_mm === null ? null : encoder.position_mm / encoder.length_mm, `${numberText(encoder.length_mm)} mm`);
+    const counts = encoder.counts === null ? [] : [`${numberText(encoder.counts)} ${encoder.counts_in_all === null ? "counts" : `of ${numberText(encoder.counts_in_all)} counts`}`];
+    showParts(this.below, [...belowFigure(encoder, state.at_ms), ...counts]);
     // No command can reach the encoder in these states; the doctor finds the reason.
-    for (const button of this.commands.querySelectorAll("[data-command]")) button.disabled = AWAY.includes(one.state);
+    for (const button of this.commands.querySelectorAll("[data-command]")) button.disabled = AWAY.includes(encoder.state);
     this.showWrong();
     this.showChoices();
-    this.examine.show(one);
+    this.examine.show(encoder);
     if (first) {
       this.seed();
       this.refresh();
       this.loadPast();
     }
-    if (changed || one.state !== "live") this.changed = true;
+    if (changed || encoder.state !== "live") this.changed = true;
   }
 
   /** Acknowledges an alarm: the server stores the user; the alarm stays raised. */
@@ -244,16 +244,16 @@ export class One {
   }
 
   showWrong() {
-    const one = this.one;
-    const list = wrongs(one).map(([kind, strong, text], i) => {
-      const alarm = one.alarms?.[i];
+    const encoder = this.encoder;
+    const list = faultLines(encoder).map(([kind, strong, text], i) => {
+      const alarm = encoder.alarms?.[i];
       const since = alarm?.since_ms ? `Since ${clock(alarm.since_ms)}. ` : "";
       return [kind, strong, since + text, this.mayChange && alarm && !alarm.acknowledged ? alarm.name : null];
     });
-    if (one.state !== "live" && one.state !== "examined" && one.last_reading !== null) {
-      list.push(["bad", "No reading", `since ${clock(one.last_reading.at_ms)}${lastText(one.last_reading) && `: then it was at ${lastText(one.last_reading)}`}.`]);
+    if (encoder.state !== "live" && encoder.state !== "examined" && encoder.last_reading !== null) {
+      list.push(["bad", "No reading", `since ${clock(encoder.last_reading.at_ms)}${lastText(encoder.last_reading) && `: then it was at ${lastText(encoder.last_reading)}`}.`]);
     }
-    if (one.errors_last_minute > 0) list.push(["warn", `${numberText(one.errors_last_minute)} ${one.errors_last_minute === 1 ? "error" : "errors"}`, "in the last minute: see Exchanges."]);
+    if (encoder.errors_last_minute > 0) list.push(["warn", `${numberText(encoder.errors_last_minute)} ${encoder.errors_last_minute === 1 ? "error" : "errors"}`, "in the last minute: see Exchanges."]);
     if (list.length === 0) list.push(["good", "Nothing.", "All alarms are reported clear, no reply failed in the last minute."]);
     const text = JSON.stringify(list);
     if (text === this.shownWrong) return;
@@ -266,15 +266,15 @@ export class One {
   lose(why = "no connection to the server", word = "not known") {
     this.loss += 1;
     this.known = false;
-    if (this.one !== undefined) {
-      const last = this.one.state === "live" ? {...this.one, at_ms: this.at_ms} : this.one.last_reading;
-      this.one = {...this.one, state: "unknown", angle_deg: null, position_mm: null, counts: null, turns: null, speed: null, alarms: null,
+    if (this.encoder !== undefined) {
+      const last = this.encoder.state === "live" ? {...this.encoder, at_ms: this.at_ms} : this.encoder.last_reading;
+      this.encoder = {...this.encoder, state: "unknown", angle_deg: null, position_mm: null, counts: null, turns: null, speed: null, alarms: null,
                   status: null, errors_last_minute: null, message: why, last_reading: last};
-      this.condition = condition(this.one);
-      this.figure.show(this.one);
+      this.condition = condition(this.encoder);
+      this.figure.show(this.encoder);
       this.dial.turn(null);
       this.scale.move(null, "");
-      showParts(this.below, belowFigure(this.one, Date.now()));
+      showParts(this.below, belowFigure(this.encoder, Date.now()));
       this.showWrong();
     } else {
       setText(this.noTrace, sentence(why));
@@ -330,16 +330,16 @@ export class One {
     if (this.quantity === undefined) return;
     const rows = this.rows();
     const newest = rows.at(-1)?.[0];
-    const isLive = this.one.state === "live";
+    const isLive = this.encoder.state === "live";
     const none = newest === undefined || rows.every((row) => row[2] === null);
     this.plot.toggleAttribute("hidden", none);
     if (none) {
-      const never = this.one.last_reading === null && !isLive;
+      const never = this.encoder.last_reading === null && !isLive;
       return setText(this.noTrace, this.range !== "live" ? "The history has no data for this time." : never ? "There has been no reading since the server started." : "There is no data to plot yet.");
     }
     setText(this.noTrace, "");
     this.graph ??= new Trace(this.plot, this.quantity);
-    const lostAt = isLive ? null : this.one.last_reading?.at_ms ?? newest;
+    const lostAt = isLive ? null : this.encoder.last_reading?.at_ms ?? newest;
     const from = this.range === "live" ? LIVE_MS : RANGES[this.range][1] * 1000;
     const now = this.at_ms;
     // The plot of a lost encoder ends after the loss, so that the loss is visible.
@@ -358,46 +358,46 @@ export class One {
     try {
       answer = await request(pathOf(this.name));
     } catch {
-      return;  // the event stream reports that the server is unreachable
+      return;  // ignored: the event stream reports an unreachable server
     }
     if (this.closed || this.loss !== loss || answer.status !== 200) return;
-    const one = answer.body;
-    this.examine.describe(one.readable);
+    const encoder = answer.body;
+    this.examine.describe(encoder.readable);
     for (const key of ["settings", "memory"]) this.tabs[key].hidden = !this.examine.has[key];
     this.showTab();
-    this.showLine(one);
-    this.offer(one);
+    this.showLine(encoder);
+    this.offer(encoder);
     this.changed = true;
-    const missing = one.singleturn_valid === false || one.multiturn_valid === false ? "INVALID" : "unknown";
-    setChildren(this.fields, one.reply === null ? element("p", {class: "faint"}, "no recent reply") : table(["field", "value", "meaning"], one.reply,
+    const missing = encoder.singleturn_valid === false || encoder.multiturn_valid === false ? "INVALID" : "unknown";
+    setChildren(this.fields, encoder.reply === null ? element("p", {class: "faint"}, "no recent reply") : table(["field", "value", "meaning"], encoder.reply,
       ({field, value, meaning}) => [fieldName(field), element("strong", {}, valueText(value, missing)), forPeople(meaning)], "last reply"));
-    const errors = Object.entries(one.errors).sort(([, a], [, b]) => b - a).map(([name, count]) => [plain(name), count]);
-    const latencies = latencyRows(one.latency_us.buckets);
-    setChildren(this.latencies, latencies.length === 0 || one.readings === 0 ? element("p", {class: "faint"}, "no reply yet") : histogram(["latency", "replies"], latencies, "replies by latency"));
+    const errors = Object.entries(encoder.errors).sort(([, a], [, b]) => b - a).map(([name, count]) => [plain(name), count]);
+    const latencies = latencyRows(encoder.latency_us.buckets);
+    setChildren(this.latencies, latencies.length === 0 || encoder.readings === 0 ? element("p", {class: "faint"}, "no reply yet") : histogram(["latency", "replies"], latencies, "replies by latency"));
     setChildren(this.errors, errors.length === 0 ? element("p", {class: "faint"}, "none") : histogram(["error", "attempts"], errors, "failed attempts by kind"));
-    setChildren(this.bad, one.bad_exchanges.length === 0 ? element("p", {class: "faint"}, "none") : table(
-      ["ago", "what", "sent", "received"], one.bad_exchanges,
+    setChildren(this.bad, encoder.bad_exchanges.length === 0 ? element("p", {class: "faint"}, "none") : table(
+      ["ago", "what", "sent", "received"], encoder.bad_exchanges,
       (bad) => [duration(bad.age_s), `${plain(bad.error)}: ${bad.meaning}`, element("code", {}, bad.sent), element("code", {}, bad.received || "nothing")],
       "last bad exchanges"));
   }
 
-  showLine(one) {
-    const latency = one.latency_us;
-    const live = one.state === "live";
+  showLine(encoder) {
+    const latency = encoder.latency_us;
+    const live = encoder.state === "live";
     setChildren(this.line, terms([
-      ["readings", `${live ? numberText(one.rate_hz, one.rate_hz < 10 ? 1 : 0) : 0} /s`],
-      ["reply after", one.readings === 0 ? "no reply yet" : `${microseconds(latency.p50)}, at most ${microseconds(latency.max)}`],
-      ["errors, last minute", numberText(one.errors_last_minute)],
-      ["errors of all readings", `${numberText(Object.values(one.errors).reduce((sum, count) => sum + count, 0))} of ${numberText(one.readings)}`],
-      ["requests repeated", numberText(one.repeated)],
-      ["port lost", one.losses === 1 ? "once" : `${numberText(one.losses)} times`],
+      ["readings", `${live ? numberText(encoder.rate_hz, encoder.rate_hz < 10 ? 1 : 0) : 0} /s`],
+      ["reply after", encoder.readings === 0 ? "no reply yet" : `${microseconds(latency.p50)}, at most ${microseconds(latency.max)}`],
+      ["errors, last minute", numberText(encoder.errors_last_minute)],
+      ["errors of all readings", `${numberText(Object.values(encoder.errors).reduce((sum, count) => sum + count, 0))} of ${numberText(encoder.readings)}`],
+      ["requests repeated", numberText(encoder.repeated)],
+      ["port lost", encoder.losses === 1 ? "once" : `${numberText(encoder.losses)} times`],
     ]));
   }
 
   /** Creates the command buttons. Commands that change the encoder come first. */
-  async offer(one) {
+  async offer(encoder) {
     if (this.offered !== undefined) return;
-    this.offered = one.commands;
+    this.offered = encoder.commands;
     let info;
     try {
       info = await tokenInfo();
@@ -414,7 +414,7 @@ export class One {
     }
     const first = ["clear_alarms", "zero", "reset_multiturn", "config_set"];
     const rank = (command) => (first.indexOf(command.verb) + 1 || 9) + (command.changes_encoder ? 0 : 10);
-    const sorted = [...one.commands].sort((a, b) => rank(a) - rank(b));
+    const sorted = [...encoder.commands].sort((a, b) => rank(a) - rank(b));
     const button = (command) => {
       const title = plain(command.name).replace(/^./, (letter) => letter.toUpperCase());
       return element("button", {type: "button", title: command.meaning, "data-command": command.name, onclick: () => this.run({...command, title})}, `${title}…`);
@@ -428,17 +428,17 @@ export class One {
   }
 
   alarmsText() {
-    const alarms = (this.one.alarms ?? []).map((alarm) => plain(alarm.name)).join(", ");
-    return alarms || (this.one.alarms === null ? "alarms not reported" : "no alarms");
+    const alarms = (this.encoder.alarms ?? []).map((alarm) => plain(alarm.name)).join(", ");
+    return alarms || (this.encoder.alarms === null ? "alarms not reported" : "no alarms");
   }
 
   /** Returns the current value that the command would change; "" if there is none. Reads settings and memory bytes. */
   async now(command, values) {
     if (command.verb === "zero") {
-      const {text, unit} = figure(this.one);
+      const {text, unit} = figure(this.encoder);
       return `${text}${unit === "mm" ? " mm" : unit}`;
     }
-    if (command.verb === "reset_multiturn") return this.one.turns === null ? `turns unknown; ${this.alarmsText()}` : `${numberText(this.one.turns)} turns; ${this.alarmsText()}`;
+    if (command.verb === "reset_multiturn") return this.encoder.turns === null ? `turns unknown; ${this.alarmsText()}` : `${numberText(this.encoder.turns)} turns; ${this.alarmsText()}`;
     if (command.verb === "clear_alarms") return this.alarmsText();
     if (command.reads_back) {
       const {status, body} = await request(pathOf(this.name, "settings"), {setting: command.reads_back});
@@ -451,13 +451,13 @@ export class One {
     if (Number.isNaN(address)) return "the byte at the address";
     const {status, body} = await request(pathOf(this.name, "memory"), {page: page || 0});
     if (status !== 200) return `not known: ${body.error}`;
-    const run = (body.memory ?? []).find((one) => address >= one.address && address < one.address + one.data.length / 2);
+    const run = (body.memory ?? []).find((part) => address >= part.address && address < part.address + part.data.length / 2);
     return run === undefined ? "not known" : byteText(parseInt(run.data.substr(2 * (address - run.address), 2), 16));
   }
 
   async run(command) {
     const then = (values) => {
-      if (command.verb === "zero") return this.one.linear ? "0.0000 mm" : "0.000°";
+      if (command.verb === "zero") return this.encoder.linear ? "0.0000 mm" : "0.000°";
       if (command.verb === "reset_multiturn") return "0 turns";
       if (command.verb === "clear_alarms") return "alarms whose cause is gone are cleared";
       if (command.verb === "memory_write") return byteText(Number(values[command.arguments.findIndex((argument) => argument.role === "value")] || NaN));
@@ -490,7 +490,7 @@ export class One {
   }
 
   async loadPast() {
-    if (this.closed || this.loading || this.one === undefined) return;
+    if (this.closed || this.loading || this.encoder === undefined) return;
     this.csv.hidden = !this.hasHistory;
     if (!this.hasHistory) return setText(this.past, "The server stores no history: start it without --history none.");
     this.loading = true;
@@ -508,7 +508,7 @@ export class One {
       }
       this.changed = true;
     } catch {
-      // the event stream reports that the server is unreachable
+      // ignored: the event stream reports an unreachable server
     } finally {
       this.loading = false;
     }
@@ -521,7 +521,7 @@ export class One {
     this.shownEvents = text;
     this.eventTable.replaceChildren(this.events.length === 0 ? element("p", {class: "faint"}, "No events in this time.") : table(
       ["when", "what", "details", "who"], this.events, (event) => {
-        const [kind, words] = happened(event.kind);
+        const [kind, words] = eventKind(event.kind);
         return [element("span", {class: "nowrap"}, clock(event.at_ms)), element("span", {class: `nowrap ${kind}`}, `${SHAPES[kind]} ${words}`), element("span", {}, ...rich(event.text.replace(/^\w+(?=:)/, plain))), event.who];
       }, "events"));
   }

@@ -30,7 +30,7 @@ function failures(failed) {
 }
 
 /** A panel with a button, a status line, and the response. */
-class Asked {
+class ReadPanel {
   constructor(title, text, ...before) {
     this.button = element("button", {type: "button", onclick: () => this.run()}, text);
     this.status = element("p", {class: "status", role: "status"});
@@ -41,69 +41,69 @@ class Asked {
   async ask(doing, path, values, method) {
     if (this.button.disabled) return;
     this.button.disabled = true;
-    this.wiped = null;
-    this.tell(doing);
+    this.clearedText = null;
+    this.showStatus(doing);
     this.result.replaceChildren();
     try {
       const {status, body} = await request(path, values, method);
-      if (status !== 200) this.tell(body.error);
-      else if (this.wiped !== null) this.tell(this.wiped);
+      if (status !== 200) this.showStatus(body.error);
+      else if (this.clearedText !== null) this.showStatus(this.clearedText);
       else this.take(body);
     } catch (error) {
-      this.tell(`no response arrived: ${error.message}`);
+      this.showStatus(`no response arrived: ${error.message}`);
     } finally {
       this.button.disabled = false;
     }
   }
 
-  tell(words, good = false) {
-    this.said = words;
+  showStatus(words, good = false) {
+    this.statusText = words;
     this.status.classList.toggle("good", good);
     setText(this.status, words);
   }
 
   /** Removes a result that may have become invalid. */
-  wipe(why) {
-    this.wiped = `the result is no longer shown: ${why}`;
+  clearResult(why) {
+    this.clearedText = `the result is no longer shown: ${why}`;
     if (this.result.childElementCount === 0) return;
     this.result.replaceChildren();
-    this.tell(this.wiped);
+    this.showStatus(this.clearedText);
   }
 
   show(state) {
-    if (GONE.has(state)) this.wipe(`the encoder is ${state}`);
+    if (GONE.has(state)) this.clearResult(`the encoder is ${state}`);
     const old = !THERE.has(state) && this.result.childElementCount !== 0;
     this.result.classList.toggle("stale", old);
-    if (this.said) setText(this.status, old ? `${this.said}. The encoder does not reply now: this is the old result` : this.said);
+    if (this.statusText) setText(this.status, old ? `${this.statusText}. The encoder does not reply now: this is the old result` : this.statusText);
   }
 }
 
-class Doctor extends Asked {
+class Doctor extends ReadPanel {
   constructor(name) {
     super("Doctor", "Examine", element("span", {}, "Finds faults of the encoder or its line. It interrupts the readings for some seconds and writes nothing to the encoder. "));
     this.run = () => this.ask("the examination begins", pathOf(name, "doctor"), {}, "POST");
   }
 
-  progress(one) {
-    if (this.button.disabled && one.state === "examined") this.tell(one.message);
+  progress(encoder) {
+    if (this.button.disabled && encoder.state === "examined") this.showStatus(encoder.message);
   }
 
   take(found) {
-    this.tell(`At ${clock()}: ${found.verdict}`, found.ok);
-    this.result.replaceChildren(...found.findings.map((one) => element("div", {class: `finding ${one.severity}`},
-      element("h4", {}, `${plain(one.severity)}: ${plain(one.id)}`),
-      terms([["seen", sentence(one.evidence)], ["likely", sentence(one.cause)], ["try", sentence(one.action)]]))));
+    this.showStatus(`At ${clock()}: ${found.verdict}`, found.ok);
+    this.result.replaceChildren(...found.findings.map((finding) => element("div", {class: `finding ${finding.severity}`},
+      element("h4", {}, `${plain(finding.severity)}: ${plain(finding.id)}`),
+      terms([["seen", sentence(finding.evidence)], ["likely", sentence(finding.cause)], ["try", sentence(finding.action)]]))));
   }
 }
 
-class Settings extends Asked {
+class Settings extends ReadPanel {
   constructor(name) {
     super("Settings", "Read the settings", "The identity of the encoder and its settings. ");
     this.run = () => this.ask("the settings are being read", pathOf(name, "settings"), {});
   }
 
   take(found) {
-    this.tell(`read at ${clock()}`);
+    this.showStatus(`read at ${clock()}`);
     const names = [...new Set(found.rows.map((row) => row.setting))];
     this.result.replaceChildren(...names.flatMap((name) => {
       const own = found.rows.filter((row) => row.setting === name);
@@ -113,7 +113,7 @@ class Settings extends Asked {
   }
 }
 
-class Memory extends Asked {
+class Memory extends ReadPanel {
   constructor(name) {
     const part = element("select", {});
     super("Memory", "Read the memory", element("label", {}, "Part ", part), " ");
@@ -135,9 +135,9 @@ class Memory extends Asked {
 
   take(found) {
     const registers = found.registers;
-    this.tell(`${registers ? `${registers.length} registers` : `${found.bytes} bytes`} read at ${clock()}`);
+    this.showStatus(`${registers ? `${registers.length} registers` : `${found.bytes} bytes`} read at ${clock()}`);
     const body = registers
-      ? table(["register", "address", "value"], registers, (one) => [one.name, "0x" + hex(one.address, 2), one.value], "registers")
+      ? table(["register", "address", "value"], registers, (register) => [register.name, "0x" + hex(register.address, 2), register.value], "registers")
       : table(["page", "address", "bytes", "characters"], found.memory.flatMap(dumpLines), (line) => line, "memory");
     body.classList.add("dump");
     this.result.replaceChildren(body, ...failures(found.failed));
@@ -149,7 +149,7 @@ export class Examine {
     this.doctor = new Doctor(name);
     this.settings = new Settings(name);
     this.memory = new Memory(name);
-    this.has = {settings: false, memory: false};  // until `describe` is called
+    this.has = {settings: false, memory: false};  // set by `describe`
   }
 
   /** Sets which settings and memory the encoder has. */
@@ -160,12 +160,12 @@ export class Examine {
     this.memory.describe(readable.memory, readable.registers);
   }
 
-  show(one) {
-    this.doctor.progress(one);
-    for (const other of [this.settings, this.memory]) other.show(one.state);
+  show(encoder) {
+    this.doctor.progress(encoder);
+    for (const panel of [this.settings, this.memory]) panel.show(encoder.state);
   }
 
   lose(why) {
-    for (const one of [this.settings, this.memory]) one.wipe(why);
+    for (const panel of [this.settings, this.memory]) panel.clearResult(why);
   }
 }

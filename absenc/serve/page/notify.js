@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Browser notifications of alarms and losses, if the user allows them.
 import {setText} from "./dom.js";
-import {happened, plain} from "./words.js";
+import {eventKind, plain} from "./words.js";
 
 const button = document.getElementById("notify");
 const KINDS = ["alarm", "lost", "ended"];
@@ -26,7 +26,7 @@ async function toggle() {
   show();
 }
 
-function tell(title, body, tag, hash) {
+function showNotification(title, body, tag, hash) {
   if (!isWanted()) return;
   const note = new Notification(title, {body, tag, icon: "icon.svg"});
   note.onclick = () => {
@@ -39,11 +39,11 @@ function tell(title, body, tag, hash) {
 /** Notifies about an event; the name of the alarm or the kind of loss is the title. */
 export function notify({kind, encoder, text}) {
   if (!KINDS.includes(kind)) return;
-  const [name, ...rest] = kind === "alarm" ? text.split(": ") : [happened(kind)[1], text];
-  tell(`${encoder}: ${plain(name)}`, rest.join(": "), `${encoder} ${kind} ${name}`, `#encoder=${encodeURIComponent(encoder)}`);
+  const [name, ...rest] = kind === "alarm" ? text.split(": ") : [eventKind(kind)[1], text];
+  showNotification(`${encoder}: ${plain(name)}`, rest.join(": "), `${encoder} ${kind} ${name}`, `#encoder=${encodeURIComponent(encoder)}`);
 }
 
-export const notifyLoss = (why) => tell("absenc: no connection to the server", why, "server", "#");
+export const notifyLoss = (why) => showNotification("absenc: no connection to the server", why, "server", "#");
 
 button.addEventListener("click", toggle);
 show();

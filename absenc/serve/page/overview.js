@@ -2,9 +2,9 @@
 // Overview: a card for each encoder, faulty ones first, with filter and counts in the bar.
 import {breakable, dial, element, rich, scale, setClass, setHidden, setText, spark, toggleClass} from "./dom.js";
 import {request} from "./server.js";
-import {GROUPS, GROUP_WORDS, MORE_WORDS, SHAPES, belowFigure, condition, figure, numberText, wrongs} from "./words.js";
+import {GROUPS, GROUP_WORDS, MORE_WORDS, SHAPES, belowFigure, condition, figure, numberText, faultLines} from "./words.js";
 
-const MANY = 30;           // with more encoders the cards are small
+const MANY = 30;           // number of encoders above which the cards are small
 const FEW = 3;
 const DRAW_MS = 5;         // minimum time per encoder between two redraws, so that the load stays constant with many encoders
 const ORDER_MS = 2000;     // minimum time between two reorderings of the cards
@@ -21,11 +21,11 @@ export function figureNode() {
   let most = 0;
   return {
     node,
-    show(one) {
-      const {text, unit: name, width} = figure(one);
+    show(encoder) {
+      const {text, unit: name, width} = figure(encoder);
       setText(digits, text);
       setText(unit, name);
-      const wanted = `--digits: ${width}; --beside: ${one.linear ? "0rem" : "var(--dial)"}`;
+      const wanted = `--digits: ${width}; --beside: ${encoder.linear ? "0rem" : "var(--dial)"}`;
       if (wanted !== sizes) node.setAttribute("style", sizes = wanted);
       if (name !== "" && text.length > most) {
         most = text.length;
@@ -85,30 +85,30 @@ class Card {
       this.scale.node, this.words, this.trace, element("p", {class: "foot faint"}, this.rate, this.errors));
   }
 
-  show(one, at_ms, isSmall) {
-    this.one = one;
-    this.condition = condition(one);
+  show(encoder, at_ms, isSmall) {
+    this.encoder = encoder;
+    this.condition = condition(encoder);
     setClass(this.node, `card ${this.condition.kind}`);
-    if (this.node.dataset.state !== one.state) this.node.dataset.state = one.state;
+    if (this.node.dataset.state !== encoder.state) this.node.dataset.state = encoder.state;
     showState(this.state, this.condition);
-    setText(this.kindName, one.protocol_name);
-    this.figure.show(one);
-    setHidden(this.dial.node, one.linear);
-    this.dial.turn(one.angle_deg);
-    setHidden(this.scale.node, !one.linear || one.length_mm === null);
-    if (one.linear && one.length_mm !== null) {
-      this.scale.move(one.position_mm === null ? null : one.position_mm / one.length_mm, `${numberText(one.length_mm)} mm`);
+    setText(this.kindName, encoder.protocol_name);
+    this.figure.show(encoder);
+    setHidden(this.dial.node, encoder.linear);
+    this.dial.turn(encoder.angle_deg);
+    setHidden(this.scale.node, !encoder.linear || encoder.length_mm === null);
+    if (encoder.linear && encoder.length_mm !== null) {
+      this.scale.move(encoder.position_mm === null ? null : encoder.position_mm / encoder.length_mm, `${numberText(encoder.length_mm)} mm`);
     }
-    showParts(this.below, belowFigure(one, at_ms, isSmall));
-    this.showWords(wrongs(one));
-    const live = one.state === "live";
-    setText(this.rate, live ? `${numberText(one.rate_hz, one.rate_hz < 10 ? 1 : 0)} readings/s` : "0 readings/s");
-    setText(this.errors, one.errors_last_minute === null ? "" : `${numberText(one.errors_last_minute)} ${one.errors_last_minute === 1 ? "error" : "errors"}/min`);
-    setClass(this.errors, one.errors_last_minute > 0 ? "warn" : "");
+    showParts(this.below, belowFigure(encoder, at_ms, isSmall));
+    this.showWords(faultLines(encoder));
+    const live = encoder.state === "live";
+    setText(this.rate, live ? `${numberText(encoder.rate_hz, encoder.rate_hz < 10 ? 1 : 0)} readings/s` : "0 readings/s");
+    setText(this.errors, encoder.errors_last_minute === null ? "" : `${numberText(encoder.errors_last_minute)} ${encoder.errors_last_minute === 1 ? "error" : "errors"}/min`);
+    setClass(this.errors, encoder.errors_last_minute > 0 ? "warn" : "");
     const second = Math.floor(at_ms / 1000);
     if (second === this.second) return;
     this.second = second;
-    if (live && one.continued_position !== null) this.points.push([second, one.continued_position, one.speed]);
+    if (live && encoder.continued_position !== null) this.points.push([second, encoder.continued_position, encoder.speed]);
     while (this.points.length > MINUTE_S + 5) this.points.shift();
     this.drawTrace(second, live);
   }
@@ -131,16 +131,16 @@ class Card {
   }
 
   drawTrace(now, live) {
-    const column = sparkColumn(this.points, this.one.linear);
+    const column = sparkColumn(this.points, this.encoder.linear);
     // Continues the position of a single-turn encoder across the step from 360 to 0 degrees.
     let turns = 0;
     const unwrapped = this.points.map((row, i) => {
       const step = i > 0 ? row[1] - this.points[i - 1][1] : 0;
-      if (column === 1 && !this.one.linear && Math.abs(step) > 180) turns -= Math.round(step / 360);
+      if (column === 1 && !this.encoder.linear && Math.abs(step) > 180) turns -= Math.round(step / 360);
       return [row[0], row[column] === null ? null : row[column] + (column === 1 ? 360 * turns : 0)];
     });
-    const unit = column === 2 ? this.one.speed_unit : this.one.linear ? "mm" : "°";
-    const least = column === 2 ? 1 : this.one.linear ? .1 : .5;
+    const unit = column === 2 ? this.encoder.speed_unit : this.encoder.linear ? "mm" : "°";
+    const least = column === 2 ? 1 : this.encoder.linear ? .1 : .5;
     const range = this.spark.draw(unwrapped, now, least, live);
     this.trace.toggleAttribute("hidden", range === null);
     if (range === null) return;
@@ -183,9 +183,9 @@ export class Overview {
   async seed() {
     try {
       const {status, body} = await request("api/minute");
-      if (status === 200) this.minutes = new Map(body.encoders.map((one) => [one.encoder, one.seconds]));
+      if (status === 200) this.minutes = new Map(body.encoders.map((encoder) => [encoder.encoder, encoder.seconds]));
     } catch {
-      // the event stream reports that the server is unreachable
+      // ignored: the event stream reports an unreachable server
     }
     for (const card of this.cards.values()) this.seedCard(card);
   }
@@ -207,13 +207,13 @@ export class Overview {
 
   draw(state) {
     this.drawn = performance.now();
-    this.given = state.encoders.map((one) => one.encoder);
+    this.given = state.encoders.map((encoder) => encoder.encoder);
     const changed = this.given.join("\n") !== [...this.cards.keys()].join("\n");
     if (changed) {
       this.cards = new Map(this.given.map((name) => [name, this.cards.get(name) ?? new Card(name)]));
       for (const card of this.cards.values()) this.seedCard(card);
     }
-    for (const one of state.encoders) this.cards.get(one.encoder).show(one, state.at_ms, this.given.length > MANY);
+    for (const encoder of state.encoders) this.cards.get(encoder.encoder).show(encoder, state.at_ms, this.given.length > MANY);
     this.none.toggleAttribute("hidden", this.given.length > 0);
     this.list.classList.toggle("many", this.given.length > MANY);
     this.list.classList.toggle("few", this.given.length <= FEW);
@@ -260,7 +260,7 @@ export class Overview {
     if (this.order.value === "name") cards.sort((a, b) => a.name.localeCompare(b.name, "en", {numeric: true}));
     const written = this.filter.value.trim().toLowerCase();
     const matches = (card) => (this.group === null || card.condition.group === this.group) &&
-      `${card.name} ${card.one.protocol_name}`.toLowerCase().includes(written);
+      `${card.name} ${card.encoder.protocol_name}`.toLowerCase().includes(written);
     const shown = cards.filter(matches);
     this.noMatch.toggleAttribute("hidden", shown.length > 0 || cards.length === 0);
     const nodes = shown.map((card) => card.node);
@@ -278,8 +278,8 @@ export class Overview {
   lose() {
     clearTimeout(this.later);
     for (const card of this.cards.values()) {
-      const last = card.one.state === "live" ? {...card.one, at_ms: Date.now() - card.one.age_s * 1000} : card.one.last_reading;
-      card.show({...card.one, state: "unknown", angle_deg: null, position_mm: null, turns: null, speed: null, alarms: null, status: null,
+      const last = card.encoder.state === "live" ? {...card.encoder, at_ms: Date.now() - card.encoder.age_s * 1000} : card.encoder.last_reading;
+      card.show({...card.encoder, state: "unknown", angle_deg: null, position_mm: null, turns: null, speed: null, alarms: null, status: null,
                  errors_last_minute: null, message: null, last_reading: last}, Date.now());
     }
     this.showPills();

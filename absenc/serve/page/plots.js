@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Plot of one encoder, from live points or the history.
 /* global Dygraph */
-import {happened, plain, clock} from "./words.js";
+import {eventKind, plain, clock} from "./words.js";
 
 const style = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 // Scales a size in pixels, given for the usual font size of 16 pixels, to the font size of the page.
@@ -9,20 +9,20 @@ const scaled = (pixels) => pixels * parseFloat(getComputedStyle(document.documen
 const NONE = [NaN, NaN, NaN];
 
 /** Returns the quantities that can be plotted: unit, value of [position, speed], smallest range; `past`: history only. */
-export function quantities(one) {
-  if (one.linear) {
+export function quantities(encoder) {
+  if (encoder.linear) {
     return {
       mm: {text: "mm", unit: " mm", of: (place) => place, least: .1},
       "mm/s": {text: "mm/s", unit: " mm/s", of: (place, speed) => speed, least: 1},
       errors: {text: "errors", unit: "", past: true, least: 4},
     };
   }
-  const turn = one.counts_in_all ?? 0;
+  const turn = encoder.counts_in_all ?? 0;
   const within = (place) => place - 360 * Math.floor(place / 360);
   return {
-    degrees: {text: "degrees", unit: "°", of: (place) => place, turn: 360, within, wraps: !one.has_turns, least: .1, narrow: true},
-    ...(one.has_turns ? {turns: {text: "turns", unit: "", of: (place) => place / 360, least: .01}} : {}),
-    ...(turn > 0 ? {counts: {text: "counts", unit: "", of: (place) => place / 360 * turn, turn, wraps: !one.has_turns, within: (value) => value - turn * Math.floor(value / turn), least: 10}} : {}),
+    degrees: {text: "degrees", unit: "°", of: (place) => place, turn: 360, within, wraps: !encoder.has_turns, least: .1, narrow: true},
+    ...(encoder.has_turns ? {turns: {text: "turns", unit: "", of: (place) => place / 360, least: .01}} : {}),
+    ...(turn > 0 ? {counts: {text: "counts", unit: "", of: (place) => place / 360 * turn, turn, wraps: !encoder.has_turns, within: (value) => value - turn * Math.floor(value / turn), least: 10}} : {}),
     rpm: {text: "rpm", unit: " rpm", of: (place, speed) => speed, least: 1, narrow: false},
     errors: {text: "errors", unit: "", past: true, least: 4},
   };
@@ -47,14 +47,14 @@ function gridLines(quantity) {
 // Draws events as marks. A label that would overlap others is omitted; the history tab lists all events.
 const MARKED = ["alarm", "lost", "silent", "ended", "restarted"];
 export const isMarked = (event) => MARKED.includes(event.kind);
-export const markText = (event) => (event.kind === "alarm" ? plain(event.text.split(":")[0]) : happened(event.kind)[1]);
+export const markText = (event) => (event.kind === "alarm" ? plain(event.text.split(":")[0]) : eventKind(event.kind)[1]);
 
 function drawMarks(canvas, area, graph, marks) {
   const free = [area.x, area.x, area.x];  // right end of the labels in each of three lines
   for (const event of marks) {
     const x = Math.round(graph.toDomXCoord(event.at_ms)) + .5;
     if (x < area.x || x > area.x + area.w) continue;
-    const bad = happened(event.kind)[0] === "bad";
+    const bad = eventKind(event.kind)[0] === "bad";
     canvas.fillStyle = canvas.strokeStyle = style(bad ? "--bad" : "--warn");
     canvas.setLineDash(event.kind === "alarm" ? [] : [4, 3]);
     canvas.beginPath();

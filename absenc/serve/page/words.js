@@ -45,13 +45,13 @@ export const sentence = (text) => {
 };
 
 /** Returns the large figure as {text, unit, width}; `width` is the digits of the greatest value, so the layout is stable. */
-export function figure(one) {
-  const whole = one.length_mm === null ? 6 : numberText(one.length_mm).length;
-  const width = one.linear ? whole + 5 : 7;
-  if (one.angle_deg !== null) return {text: one.angle_deg.toFixed(3), unit: "°", width};
-  if (one.position_mm !== null) return {text: numberText(one.position_mm, 4), unit: "mm", width};
-  if (one.state !== "live") return {text: NOTHING, unit: "", width};
-  return {text: one.singleturn_valid === null ? "unknown" : "INVALID", unit: "", width};
+export function figure(encoder) {
+  const whole = encoder.length_mm === null ? 6 : numberText(encoder.length_mm).length;
+  const width = encoder.linear ? whole + 5 : 7;
+  if (encoder.angle_deg !== null) return {text: encoder.angle_deg.toFixed(3), unit: "°", width};
+  if (encoder.position_mm !== null) return {text: numberText(encoder.position_mm, 4), unit: "mm", width};
+  if (encoder.state !== "live") return {text: NOTHING, unit: "", width};
+  return {text: encoder.singleturn_valid === null ? "unknown" : "INVALID", unit: "", width};
 }
 
 /** Returns "12.0 ± 0.3": digits as the uncertainty permits, and the uncertainty rounded up. */
@@ -70,28 +70,28 @@ export function lastText(last) {
 
 /** Returns the texts below the large figure. `isSmall`: a card with room for turns and speed only; the page of the
  *  encoder shows the rest. */
-export function belowFigure(one, now, isSmall = false) {
-  if (one.state !== "live") {
-    if (one.last_reading === null) return ["no reading yet"];
-    const last = lastText(one.last_reading);
-    return [last ? `last ${last}` : "last reading", `${duration(Math.max(0, (now - one.last_reading.at_ms) / 1000))} ago`];
+export function belowFigure(encoder, now, isSmall = false) {
+  if (encoder.state !== "live") {
+    if (encoder.last_reading === null) return ["no reading yet"];
+    const last = lastText(encoder.last_reading);
+    return [last ? `last ${last}` : "last reading", `${duration(Math.max(0, (now - encoder.last_reading.at_ms) / 1000))} ago`];
   }
   const parts = [];
-  if (one.turns !== null) parts.push(`${numberText(one.turns)} ${Math.abs(one.turns) === 1 ? "turn" : "turns"}`);
-  else if (one.has_turns) parts.push(one.multiturn_valid === false ? "turns INVALID" : "turns unknown");
-  else if (!one.linear) parts.push("single-turn");
+  if (encoder.turns !== null) parts.push(`${numberText(encoder.turns)} ${Math.abs(encoder.turns) === 1 ? "turn" : "turns"}`);
+  else if (encoder.has_turns) parts.push(encoder.multiturn_valid === false ? "turns INVALID" : "turns unknown");
+  else if (!encoder.linear) parts.push("single-turn");
   if (isSmall) {
-    if (one.speed !== null) parts.push(`${numberText(one.speed, 1)} ${one.speed_unit}`);
+    if (encoder.speed !== null) parts.push(`${numberText(encoder.speed, 1)} ${encoder.speed_unit}`);
     return parts;
   }
-  if (one.speed !== null) parts.push(`${measuredText(one.speed, one.speed_uncertainty)} ${one.speed_unit}`);
-  if (one.has_joint) {
-    if (one.joint_deg !== null) parts.push(`joint ${numberText(one.joint_deg, 3)}°`);
-    else if (one.joint_mm !== null) parts.push(`joint ${numberText(one.joint_mm, 4)} mm`);
+  if (encoder.speed !== null) parts.push(`${measuredText(encoder.speed, encoder.speed_uncertainty)} ${encoder.speed_unit}`);
+  if (encoder.has_joint) {
+    if (encoder.joint_deg !== null) parts.push(`joint ${numberText(encoder.joint_deg, 3)}°`);
+    else if (encoder.joint_mm !== null) parts.push(`joint ${numberText(encoder.joint_mm, 4)} mm`);
     else parts.push("joint unknown");
-    if (one.joint_speed !== null) parts.push(`joint ${measuredText(one.joint_speed, one.joint_speed_uncertainty)} ${one.speed_unit}`);
+    if (encoder.joint_speed !== null) parts.push(`joint ${measuredText(encoder.joint_speed, encoder.joint_speed_uncertainty)} ${encoder.speed_unit}`);
   }
-  if (one.has_motor) parts.push(one.electrical_deg === null ? "electrical unknown" : `electrical ${numberText(one.electrical_deg, 1)}°`);
+  if (encoder.has_motor) parts.push(encoder.electrical_deg === null ? "electrical unknown" : `electrical ${numberText(encoder.electrical_deg, 1)}°`);
   return parts;
 }
 
@@ -101,18 +101,18 @@ export const SHAPES = {bad: "▲", warn: "◆", good: "●", plain: "○"};
 /** Groups of encoders in display order, faulty ones first. */
 export const GROUPS = ["unknown", "lost", "alarm", "errors", "waiting", "live", "good"];
 /** Returns {group, kind, word} for the state and alarms of an encoder; `kind` selects color and shape. */
-export function condition(one) {
-  const age = one.state === "unknown" ? "" : ` ${duration(one.age_s)}`;
-  if (one.state in GONE) return {group: one.state === "unknown" ? "unknown" : "lost", kind: "bad", word: GONE[one.state] + age};
-  if (one.state === "opening") return {group: "waiting", kind: "warn", word: "port missing"};
-  if (one.state === "examined") return {group: "waiting", kind: "warn", word: "examined"};
-  const count = one.alarms?.length ?? 0;
-  const isSeen = count > 0 && one.alarms.every((alarm) => alarm.acknowledged);
+export function condition(encoder) {
+  const age = encoder.state === "unknown" ? "" : ` ${duration(encoder.age_s)}`;
+  if (encoder.state in GONE) return {group: encoder.state === "unknown" ? "unknown" : "lost", kind: "bad", word: GONE[encoder.state] + age};
+  if (encoder.state === "opening") return {group: "waiting", kind: "warn", word: "port missing"};
+  if (encoder.state === "examined") return {group: "waiting", kind: "warn", word: "examined"};
+  const count = encoder.alarms?.length ?? 0;
+  const isSeen = count > 0 && encoder.alarms.every((alarm) => alarm.acknowledged);
   if (count > 0) return {group: "alarm", kind: "bad", isSeen, word: `${count === 1 ? "alarm" : `${count} alarms`}${isSeen ? ", seen" : ""}`};
-  if (one.singleturn_valid === false || one.multiturn_valid === false) return {group: "alarm", kind: "bad", word: "invalid"};
-  if (one.alarms === null && one.status?.length) return {group: "alarm", kind: "bad", word: "warning"};
-  if (one.errors_last_minute > 0) return {group: "errors", kind: "warn", word: "errors"};
-  return one.alarms === null ? {group: "live", kind: "plain", word: "live"} : {group: "good", kind: "good", word: "good"};
+  if (encoder.singleturn_valid === false || encoder.multiturn_valid === false) return {group: "alarm", kind: "bad", word: "invalid"};
+  if (encoder.alarms === null && encoder.status?.length) return {group: "alarm", kind: "bad", word: "warning"};
+  if (encoder.errors_last_minute > 0) return {group: "errors", kind: "warn", word: "errors"};
+  return encoder.alarms === null ? {group: "live", kind: "plain", word: "live"} : {group: "good", kind: "good", word: "good"};
 }
 
 /** Texts of the bar for the number of encoders in a group. */
@@ -125,18 +125,18 @@ export const GROUP_WORDS = {
 export const MORE_WORDS = {live: ", alarms not reported"};
 
 /** Returns [kind, bold text, text] for each line that describes a fault. */
-export function wrongs(one) {
+export function faultLines(encoder) {
   const list = [];
-  for (const alarm of one.alarms ?? []) {
+  for (const alarm of encoder.alarms ?? []) {
     const seen = alarm.acknowledged ? `Acknowledged by ${alarm.acknowledged.who}, ${clock(alarm.acknowledged.at_ms)}. ` : "";
     list.push(["bad", sentence(plain((alarm.channel ? alarm.channel + " " : "") + alarm.name)), `${seen}${sentence(alarm.meaning)}${alarm.action ? " " + sentence(alarm.action) : ""}`]);
   }
-  if (one.state === "live") {
-    if (one.singleturn_valid === false && one.alarms?.length !== undefined) list.push(["bad", "Position invalid.", "The encoder reports that its position is invalid."]);
-    if (one.alarms === null && one.status?.length) list.push(["bad", `Status: ${one.status.map(plain).join(", ")}.`, ""]);
-    if (one.alarms === null) list.push(["faint", "", "Alarms not reported."]);
+  if (encoder.state === "live") {
+    if (encoder.singleturn_valid === false && encoder.alarms?.length !== undefined) list.push(["bad", "Position invalid.", "The encoder reports that its position is invalid."]);
+    if (encoder.alarms === null && encoder.status?.length) list.push(["bad", `Status: ${encoder.status.map(plain).join(", ")}.`, ""]);
+    if (encoder.alarms === null) list.push(["faint", "", "Alarms not reported."]);
   }
-  if (one.message) list.push([one.state === "examined" ? "warn" : "bad", "", sentence(one.message)]);
+  if (encoder.message) list.push([encoder.state === "examined" ? "warn" : "bad", "", sentence(encoder.message)]);
   return list;
 }
 
@@ -147,9 +147,9 @@ export function fieldText(value, missing = "INVALID") {
 }
 
 /** Severity and text of each kind of event. */
-const HAPPENED = {
+const EVENT_KINDS = {
   alarm: ["bad", "alarm raised"], alarm_over: ["good", "alarm over"], acknowledged: ["plain", "acknowledged"], lost: ["bad", "lost"], silent: ["warn", "no reply"],
   failing: ["warn", "replies fail"], back: ["good", "back"], restarted: ["warn", "position restarted"], ended: ["bad", "stopped"],
   examined: ["plain", "examined"], command: ["plain", "command"], change: ["plain", "change"],
 };
-export const happened = (kind) => HAPPENED[kind] ?? ["plain", plain(kind)];
+export const eventKind = (kind) => EVENT_KINDS[kind] ?? ["plain", plain(kind)];
