@@ -28,7 +28,8 @@ def numbers(text):
 
 
 class Vectors(Case):
-    """The command prints a list of a vector as text. Fields of a channel or of a safety word have a prefix."""
+    """Compares every vector with `decode`. The command prints a vector's lists as text, and prefixes the fields of a
+    channel or of a safety word."""
 
     def check(self, vector, answer, fields):
         if "error" in vector:
@@ -356,7 +357,7 @@ def wires_of(path):
 
 
 def level_at(wire, time):
-    """Returns the level just before `time`."""
+    """Returns the level of a wire just before `time`."""
     return wire[bisect.bisect_left(wire, (time, "")) - 1][1]
 
 
@@ -592,7 +593,7 @@ class ControlFrames(Case):
             fields = answer["fields"]
             self.assertEqual((fields["operation"], fields["slave_id"], fields["address"], fields["data"]),
                              ("write" if write else "read", slave, address, data.hex()))
-            reported = numbers(fields["start_delay"])  # the field has room for at least 48 of them
+            reported = numbers(fields["start_delay"])  # the start_delay field has room for at least 48 delays
             self.assertEqual(reported, delays[:max(48, len(reported))])
             self.assertTrue(fields["next_address_accepted"])
         for slaves, command in ((0, 0), (0, 1), (1, 0), (0b101, 1), (0xFF, 3)):

@@ -11,7 +11,7 @@ import unittest
 
 from command_support import ABSENC, PATIENCE, Case, absenc, json_lines
 
-BIT = 400  # ns, at 2.5 Mbit/s
+BIT = 400  # bit time in ns at 2.5 Mbit/s
 
 
 def exchange(position, turns=0, alarms=0):
@@ -206,7 +206,7 @@ class Text(Case):
         self.assert_wrong_usage(absenc("decode", "e201", capture, "--bits"), "does not say where")
 
     def test_bit_positions_of_one_frame(self):
-        # The field is big-endian, so its low byte comes last.
+        # A big-endian field has its low byte last.
         result = absenc("decode", "raa38", "--hex", "ff81017f00", "--bits", "--option", "bits=14")
         self.assert_good(result)
         self.assertRegex(result.stdout, r"singleturn +383 counts +bits 16-21 24-31")

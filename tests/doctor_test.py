@@ -247,7 +247,8 @@ class Named(EncoderCase):
             doctor(f"tformat:{line.path}")
         self.assertTrue(requests)
         self.assertIn(b"\x1A", requests)
-        changing = {0xBA, 0xC2, 0x62, 0x32}  # resets of alarms, position and turns; EEPROM write
+        # first bytes of changing requests: resets of alarms, position and turns, EEPROM write
+        changing = {0xBA, 0xC2, 0x62, 0x32}
         self.assertEqual({request[0] for request in requests} & changing, set())
 
     def test_refuses_wrong_usage(self):

@@ -134,7 +134,7 @@ class EmulateCase(Case):
 
 
 class Gap(EmulateCase):
-    """The pause that ends a request."""
+    """Tests the pause that ends a request (--gap)."""
 
     def trickle(self, client, request, pause):
         """Writes byte by byte, and returns as many received bytes as were sent, or fewer after PATIENCE."""
@@ -200,7 +200,7 @@ class DataIds(EmulateCase):
         client = self.client("--alarm", "over_speed", "--multiturn", "7")
         self.reset(client, 0x7, 9)
         self.assertEqual(client.exchange(3)[9], 0x01)
-        self.reset(client, 0x7, 9)  # another request has restarted the count
+        self.reset(client, 0x7, 9)  # another request in between restarts the count of resets
         self.assertEqual(client.exchange(3)[9], 0x01)
         self.reset(client, 0xC, 5)
         self.reset(client, 0x7, 5)
@@ -239,7 +239,7 @@ class DataIds(EmulateCase):
         client.write_memory(5, 0x5A)
         reply = client.write_memory(6, 0x77)
         client.wait_until_written(5)
-        if reply[1] & 0x80:  # unless this machine needed more than 18 ms
+        if reply[1] & 0x80:  # still busy, unless this machine took more than 18 ms
             self.assertEqual(reply[2], 0)
             self.assertEqual(client.read_memory(6), (False, 0))
 
@@ -259,7 +259,7 @@ class DataIds(EmulateCase):
         client.select_page(7)
         self.assertEqual(client.read_memory(5), (False, 35))
         self.assertEqual(client.read_memory(4), (False, 0xDA))
-        client.write_memory(4, 0x80 + 20)  # the encoder's temperature is 35 degC
+        client.write_memory(4, 0x80 + 20)  # sets the threshold to 20 degC, below the encoder's 35 degC
         client.wait_until_written(4)
         self.assertEqual(client.exchange(3)[9], 0x10)
 
@@ -267,15 +267,15 @@ class DataIds(EmulateCase):
         """Most invalid requests are answered like ID 3. A wrong sync code is not answered at all."""
         client = self.client()
         everything = client.exchange(3)
-        self.assertEqual(client.exchange(0x4, length=11), everything)  # unknown id
-        client.send([0x9A])  # wrong parity
+        self.assertEqual(client.exchange(0x4, length=11), everything)  # an unknown data ID
+        client.send([0x9A])  # a request with a wrong parity bit
         self.assertEqual(client.receive(11)[:2], bytes([0x1A, 0x40]))
-        client.send([0xEA, 5, 0])  # wrong CRC
+        client.send([0xEA, 5, 0])  # a request with a wrong CRC
         self.assertEqual(client.receive(11), everything)
-        self.assertEqual(client.exchange(0x6, 127, 6, length=11), everything)  # closed page
-        client.send([0xEA])  # truncated
+        self.assertEqual(client.exchange(0x6, 127, 6, length=11), everything)  # a write to a closed page
+        client.send([0xEA])  # a truncated request
         self.assertEqual(client.receive(11), everything)
-        client.send([0x19, 0x1A])  # no sync code, then a request
+        client.send([0x19, 0x1A])  # a byte that is no sync code, then a request
         self.assertEqual(client.receive(12, patience=0.05), everything)
 
 
@@ -355,7 +355,7 @@ class Behaviour(EmulateCase):
         port = int(line.rsplit(":", 1)[1])
         with socket.create_connection(("127.0.0.1", port), timeout=PATIENCE) as connection:
             ends = [Client(connection.fileno()), Client.open(emulator.path)]
-            for asking, listening in (ends, ends[::-1]):  # clients share one line: both receive the reply
+            for asking, listening in (ends, ends[::-1]):  # both TCP clients share one line and receive the reply
                 self.assert_reply(asking.exchange(0), 0, 0, [5, 0, 0])
                 self.assert_reply(listening.receive(6), 0, 0, [5, 0, 0])
             ends[1].__exit__()
@@ -516,7 +516,7 @@ class Console(EmulateCase):
     def test_closed_output_does_not_end_emulator(self):
         emulator, _ = self.console()
         emulator.process.stdout.close()
-        emulator.process.stdout = open(os.devnull, "rb")  # `end` reads it
+        emulator.process.stdout = open(os.devnull, "rb")  # gives `end` an output to read
         emulator.process.stdin.write(b"temperature=50\ntemperature=60\n")
         place = f"tformat:{emulator.path}?latency=300"
         deadline = time.monotonic() + PATIENCE
@@ -606,7 +606,7 @@ class SerialPort(EmulateCase):
         for _ in range(4):
             reply = client.exchange(0)
             self.assert_reply(reply, 0, 0, [0xE8, 0x03, 0])
-            client.send(reply)  # this reply begins like a request
+            client.send(reply)  # this reply begins with the byte of a request
         _, _, err = emulator.end()
         self.assertIn("4 requests answered", err)
         self.assertNotIn("rules", err)
@@ -727,7 +727,7 @@ class Lifecycle(EmulateCase):
         with Client.open(emulator.path) as client:
             client.send([0xEA, 0x05, 0xEF])
             client.receive(11, 0.2)
-        self.assertIn("3 request_corrupt", emulator.end()[2])  # one per byte
+        self.assertIn("3 request_corrupt", emulator.end()[2])  # the help says that each damaged byte counts
 
     def test_reports_violations(self):
         emulator = self.emulator()
@@ -837,7 +837,7 @@ class MemoryFile(EmulateCase):
     def test_lock_survives_save_and_ends_with_emulator(self):
         with Emulator(self.directory, "--memory", self.file("memory")) as emulator:
             with Client.open(emulator.path) as client:
-                client.write_memory(0, 0xAB)  # replaces the file
+                client.write_memory(0, 0xAB)  # the write replaces the memory file
                 client.wait_until_written(0)
             result = absenc("emulate", "tformat", "--memory", self.file("memory"), "--for", "60")
             self.assert_failed(result, "another emulator keeps its memory")
@@ -859,7 +859,7 @@ class MemoryFile(EmulateCase):
         with Client.open(emulator.path) as client:
             shutil.rmtree(self.file("sub"))
             client.send(bytes.fromhex("32 05 5a 6d"))
-            self.assertEqual(client.receive(4), b"")  # until the emulator has ended
+            self.assertEqual(client.receive(4), b"")  # nothing arrives until the emulator has ended
         self.assertEqual(emulator.process.wait(PATIENCE), 1)
         self.assert_sentence(emulator.end()[2], "memory file", "No such file")
 

@@ -14,7 +14,7 @@ from decode_file_test import Wave
 POSITION, QUICK, TEMPERATURE, READ, WRITE = 0x1, 0x5, 0x9, 0xE, 0xF
 LENGTH = {POSITION: 18, QUICK: 6, TEMPERATURE: 4, READ: 4, WRITE: 4}
 READY, CHANNEL_2 = 0x40, 0x20
-REQUEST = "0875"  # ID 1, address 0
+REQUEST = "0875"  # request with ID 1 to address 0
 REPLY = "084000efcdab34125646b3086000abd6cd84"
 # The same reply with another profile, and with one wrong bit in channel 2.
 MSB_REQUEST, MSB_REPLY = "0857", "084000efcdab341255277e086000abd57f67"
@@ -47,7 +47,7 @@ def crc16(data, initial):
 
 
 class Client:
-    """The host's end of the line."""
+    """The host's end of a line with ESL encoders."""
 
     def __init__(self, path):
         self.descriptor = os.open(path, os.O_RDWR | os.O_NOCTTY)
@@ -96,13 +96,14 @@ class EslCase(EncoderCase):
 
 class VirtualEncoder(EslCase):
     def check_position(self, reply, singleturn, multiturn, address=0, alarms=0):
-        """Checks both channels, alone and against each other. Returns both sequence counters."""
+        """Checks both channels of a position reply, alone and against each other. Returns both sequence counters."""
         self.assertEqual(len(reply), 18, reply.hex(" "))
         one, two = reply[:11], reply[11:]
         self.assertEqual(one[9:], crc16(one[:9], 0x0000), reply.hex(" "))
         self.assertEqual(two[5:], crc16(two[:5], 0xFFFF), reply.hex(" "))
         self.assertEqual((one[0], two[0]), (control_field(POSITION, address),) * 2)
-        self.assertEqual((one[1] & ~0x0C, two[1] & ~0x0C), (READY, READY | CHANNEL_2))  # apart from the error bits
+        # compares the status without its error bits
+        self.assertEqual((one[1] & ~0x0C, two[1] & ~0x0C), (READY, READY | CHANNEL_2))
         self.assertEqual((one[2], two[2]), (alarms, alarms))
         self.assertEqual(int.from_bytes(one[3:6], "little"), singleturn)
         self.assertEqual(int.from_bytes(one[6:8], "little"), multiturn)
@@ -178,7 +179,8 @@ class VirtualEncoder(EslCase):
             self.check_position(client.exchange(POSITION, address=3), 70000, 7, address=3)
             self.check_position(client.exchange(POSITION, address=5), 0, 0, address=5, alarms=2)
             clash = client.exchange(QUICK, address=6)
-            self.assertEqual(clash[:5], bytes([control_field(QUICK, 6), READY, 0, 0, 0]))  # 0x5555 AND 0xAAAA
+            # two encoders with one address reply at once: 0x5555 AND 0xAAAA
+            self.assertEqual(clash[:5], bytes([control_field(QUICK, 6), READY, 0, 0, 0]))
             self.assertNotEqual(clash[5:], crc8(clash[:5]))
 
 
@@ -366,7 +368,7 @@ class Probe(EslCase):
 
 
 class ErrorMessages(EslCase):
-    """Messages about bad replies."""
+    """Tests the error messages about bad replies."""
 
     def fake(self, *replies):
         fake = FakeEncoder({reply[0]: reply for reply in replies})
@@ -419,7 +421,7 @@ class SafePositions(EslCase):
                                   "--rate", "0", "--json").stdout)
         self.assertEqual([one["singleturn"] for one in lines], [5] * 20)
         self.assertTrue(all(one["singleturn_valid"] for one in lines))
-        self.assertTrue(all("multiturn" not in one for one in lines), lines[0])  # a safe position has no turns
+        self.assertTrue(all("multiturn" not in one for one in lines), lines[0])  # a safe position reply has no turns
 
     def test_stuck_counter_is_an_error_each_time(self):
         encoder = "sim:esl?condition=ch1_sequence=5&condition=ch2_sequence=5&command=safe-position"
@@ -572,13 +574,13 @@ class SharedLine(EslCase):
                             "address=6&singleturn=0xAAAA", latency=20)
         names = [line, f"{line}&address=3", f"{line}&address=6", f"{line}&address=7"]
         result, last = self.lines(*names, "--rate", "0", seconds=6)
-        self.assertEqual(result.returncode, 1)  # two encoders were never read
+        self.assertEqual(result.returncode, 1)  # the readings of two encoders failed, so the status is 1
         self.assertEqual([one["state"] for one in last], ["live", "live", "failing", "failing"])
         self.assertEqual([one["reading"]["singleturn"] for one in last[:2]], [0, 70000])
         self.assertEqual([one["errors"] for one in last[:2]], [{}, {}])
         self.assertEqual(set(last[3]["errors"]), {"timeout"})
         least, most = sorted(one["readings"] for one in last[:2])
-        self.assertGreater(least, 10)  # timeouts of absent encoders take time
+        self.assertGreater(least, 10)  # timeouts of the other encoders limit the number of readings
         self.assertLess(most, 2 * least + 10)
 
     def test_names_of_one_bus(self):
@@ -625,7 +627,8 @@ class SharedLine(EslCase):
         for command in (["memory", "read", "elbow", "0"], ["memory", "write", "elbow", "0", "1", "--yes"]):
             self.assert_failed(absenc(*command, env=env), "unsupported", "several encoders on the line", "nothing was sent")
         result = json.loads(absenc("run", "elbow", "led-or-lissajous", "--json", env=env).stdout)["fields"]
-        self.assertEqual((result["led_error"], result["lissajous_error"]), (False, False))  # reported by SF, without memory
+        # the flags come from SF, without a memory access
+        self.assertEqual((result["led_error"], result["lissajous_error"]), (False, False))
         self.assert_good(absenc("memory", "read", "knee", "0", env=env))
         self.assert_failed(absenc("memory", "read", "elbow?bus=false", "0", env=env), "timeout")
         summary = emulator.end()[2]

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The first lines of docs/firmware.md read a position, and keep the last one when a reply is missing.
+// Tests the first program of docs/firmware.md: it reads a position, and keeps the last one if a reply is missing.
 #include "firmware/hookup/first_reading.cpp"
 
 #include <gtest/gtest.h>

@@ -60,7 +60,7 @@ class FirstMinutes(Case):
             self.assert_failed(result, "which encoder is on", "nothing came back")
 
     def test_doctor_reports_uncertain_protocol(self):
-        with Emulator(self.directory, protocol="raa38") as emulator:  # a standing shaft repeats the same frame
+        with Emulator(self.directory, protocol="raa38") as emulator:  # the shaft stands, so the same frame repeats
             result = absenc("doctor", emulator.path)
             self.assert_failed(result, "It may be raa38", "may be chance")
             command = shlex.split(re.search(r"`absenc (doctor [^`]*)`", result.stderr).group(1))

@@ -48,10 +48,10 @@ def usual(unit, settings):
     return "?" + "&".join(texts) if texts else ""
 
 
-# Other links (clocked, SPI) need an SPI controller.
+# Clocked and SPI encoders are excluded, because they need an SPI controller.
 ENCODERS = [(unit, *case) for unit in UNITS if unit["link"] not in ("exchange", "clocked") for case in cases(unit)]
 
-SEARCH = 300  # seconds per search on a busy machine; alone a search takes ten
+SEARCH = 300  # time limit of a search in seconds, for a busy machine; alone it takes ten
 
 
 def identify(*arguments, **settings):
@@ -73,7 +73,8 @@ class IdentifyOnLine(EncoderCase):
             # The latency allows for a busy machine that delays the emulator.
             verb, encoder = found["candidates"][0]["command"].replace('"', "").split()[1:3]
             again = absenc(verb, encoder + ("&" if "?" in encoder else "?") + "latency=1000", "--json")
-            # A pseudo-terminal has no rate. Only encoders that are too slow for the default rate show another one.
+            # A pseudo-terminal has no baud rate. Another rate is only visible if it makes replies too slow for the
+            # default rate.
             at_usual_rate = absenc("read", f"{protocol}:{place}{usual(unit, settings)}", "--json").returncode == 0
             return found["candidates"], again, at_usual_rate
 
@@ -197,7 +198,7 @@ class UnknownLine(Case):
     def test_interrupt_ends_it(self):
         process = subprocess.Popen([ABSENC, "identify", self.path], stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
                                    stderr=subprocess.PIPE)
-        os.read(self.master, 1)  # the search has sent its first byte
+        os.read(self.master, 1)  # wait for the first byte of the search
         status, _, err = end(process, signal.SIGINT)
         self.assertEqual(status, 1)
         self.assertIn("interrupted", err)
@@ -217,7 +218,7 @@ class SeveralEncoders(EncoderCase):
 
     def test_streaming_can_node_is_found_by_its_number(self):
         with Emulator(self.directory, "--option", "node=0x21", "--option", "cyclic=100", protocol="raa38-can") as emulator:
-            _, found = identify(f"slcan:{emulator.path}", "--for", "0.4")  # too short to send a request
+            _, found = identify(f"slcan:{emulator.path}", "--for", "0.4")  # 0.4 s is too short to send a request
         self.assertEqual({one["options"]["node"] for one in found["candidates"]}, {0x21})
 
 

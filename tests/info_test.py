@@ -142,14 +142,14 @@ class Alarms(EncoderCase):
             "  battery_alarm: the battery is below 3.1 V. What to do: replace the battery with the encoder switched on; "
             "without a battery set battery=false\n"
             "status:\n"
-            # without the advice to read the alarms
+            # the text omits the advice to read the alarms
             "  alarm: over-heat, multi-turn error, battery error or battery alarm\n")
 
     def test_status_refers_to_alarms_only_if_not_shown(self):
         address = self.encoder("--alarm", "over_heat")
         status = json.loads(absenc("alarms", address, "--json").stdout)["status"]
         self.assertEqual([(flag["name"], flag["action"]) for flag in status], [("alarm", "")])
-        alone = absenc("run", address, "encoder-id")  # its reply has no alarms
+        alone = absenc("run", address, "encoder-id")  # the reply to encoder-id has no alarms
         self.assertIn("battery error or battery alarm: `absenc alarms` names the cause", alone.stdout)
         both = absenc("decode", "tformat", "--request", "1a", "--hex", "1a2000000011000000103b")
         self.assertIn("let it cool, then `absenc clear-alarms`", both.stdout)

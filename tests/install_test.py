@@ -19,7 +19,7 @@ BUILD = Path(os.environ["ABSENC"]).parent.parent
 VERSION = re.search(r"^project\(absenc VERSION ([\d.]+)", (SOURCE / "CMakeLists.txt").read_text(), re.MULTILINE)[1]
 
 BY_NAME = SOURCE / "examples/read_by_name.cpp"
-BY_NAME_SAYS = r"^(0\.0000 degrees\n)+0\.0 rpm, within \d"  # the speed appears as soon as its window is long enough
+BY_NAME_SAYS = r"^(0\.0000 degrees\n)+0\.0 rpm, within \d"  # the speed appears as soon as its averaging window is full
 # A firmware-like program: a conversation with a virtual encoder at 7.25 turns.
 FIRMWARE = """
 #include <cstdint>
@@ -224,7 +224,7 @@ class Installed(Case):
         for header in (self.root / "include").rglob("*.hpp"):
             text = header.read_text()
             for included in re.findall(r"^#include <(.+)>", text, re.MULTILINE):
-                # C++ headers only: no other library, no operating system
+                # standard C++ headers only: no other library, no operating system
                 self.assertRegex(included, r"^(\w+|bits/chrono\.h)$", header)
             for included in re.findall(r'^#include "(.+)"', text, re.MULTILINE):
                 self.assertTrue((self.root / "include" / included).is_file(), f"{header}: {included}")

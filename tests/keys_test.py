@@ -46,7 +46,7 @@ class Keys(Case):
         # A recording has the columns of `read` in the same order, then speed and lost readings.
         self.assertEqual([name for name in columns if name in shown], shown)
         with open(self.recorded(encoder, "jsonl"), encoding="utf-8") as file:
-            rows = [row for row in map(json.loads, file) if row.get("ok")]  # the other rows describe events
+            rows = [row for row in map(json.loads, file) if row.get("ok")]  # rows that are not ok describe events
         self.assertEqual(len(rows), 3)
         computed = set(columns) - set(shown) - ONLY_IN_ROWS
         for row in rows:

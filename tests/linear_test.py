@@ -142,7 +142,8 @@ class Monitor(Case):
         self.assertNotIn("speed_rpm", shown)
 
     def test_screen(self):
-        terminal = Terminal(self, "sim:biss?model=linear-26-1um&singleturn=33554432")  # the middle of the scale
+        # the carriage is in the middle of the scale
+        terminal = Terminal(self, "sim:biss?model=linear-26-1um&singleturn=33554432")
         screen = terminal.wait_for(r"live +33554\.43")
         self.assertRegex(screen, r"state +mm +turns +mm/s +a second")
         self.assertIn("33554.432 mm", screen)

@@ -246,7 +246,7 @@ class Screen(MonitorCase):
         self.assertNotRegex(screen, r"(?m)^  .*\bsingleturn \d")
         terminal.resize(64, 16)
         screen = terminal.wait_for(rf"\A(.*\n){{15}}{KEYS}")
-        self.assertRegex(screen.splitlines()[14], r"^ +\d+\.\d{3}  ")  # the trace keeps its line
+        self.assertRegex(screen.splitlines()[14], r"^ +\d+\.\d{3}  ")  # the trace stays in its line of the screen
         terminal.press("e")
         terminal.wait_for("no exchange has failed")
 

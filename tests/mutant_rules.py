@@ -340,7 +340,7 @@ class Finder:
                 continue
             for j in range(body, source.partner[body]):
                 end = source.right(j + 1, {";"})
-                if source[j] == "return" and end > j + 2 and not self.left_alone[j]:  # more than a name
+                if source[j] == "return" and end > j + 2 and not self.left_alone[j]:  # returns more than a name
                     self._times(j + 1, end)
                     for k in range(j, end):
                         self.left_alone[k] = True
@@ -410,7 +410,7 @@ class Finder:
                 return False
             index = begin - 1
             if source[index - 1] in (")", ":", "const", "noexcept"):
-                return False  # inside a function
+                return False  # a value inside a function is no constant
         return False
 
     def _around(self, index):

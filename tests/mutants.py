@@ -185,7 +185,8 @@ class Tree:
         allow it."""
         functions = {}
         for path, name in {(path, mutant.constant) for mutant, path, _ in numbered.values() if mutant.constant}:
-            folder = path.parent.parent if path.parent.name == "author" else path.parent  # all units depend on author
+            # every unit depends on the folder author
+            folder = path.parent.parent if path.parent.name == "author" else path.parent
             users = [*folder.rglob("*.hpp"), *folder.rglob("*.cpp")] if path.suffix == ".hpp" else [path]
             users = [user for user in users if re.search(rf"\b{name}\b", user.read_text(encoding="utf-8"))]
             if all(mutant_rules.as_functions(user.read_text(encoding="utf-8"), {name}) is not None for user in users):
@@ -287,7 +288,7 @@ class Tree:
             first = []
             if outcome := self.killed(program):
                 if program.is_own:
-                    self.last_own = program  # it often kills neighbouring mutants too
+                    self.last_own = program  # a program that kills one mutant often kills the next ones
                 return outcome, program.name
         return "survived", ""
 

@@ -8,8 +8,8 @@ import unittest
 
 from command_support import BabblingLine, Case, absenc
 
-LIMIT = 40.0  # seconds on a busy machine; alone the slowest command takes about ten
-AT_ONCE = 8  # commands in parallel, because they mostly wait
+LIMIT = 40.0  # time limit in seconds, for a busy machine; alone the slowest command takes about ten
+AT_ONCE = 8  # number of commands that run in parallel, because they mostly wait
 
 
 def units():

@@ -151,7 +151,7 @@ class EspIdf(Case):
         self.assertGreaterEqual(packed, sources() | {"CMakeLists.txt", "cmake/sources.cmake", "packages/esp-idf.cmake"})
         self.assertFalse([path for path in packed if path.startswith(("absenc/os", "absenc/sim", "tools", "tests"))])
 
-    # The mock of idf_component_register creates a library, as the real one does.
+    # The fake idf_component_register creates a library, as the real one does.
     PROJECT = f"""
 cmake_minimum_required(VERSION 3.16)
 project(esp LANGUAGES CXX)

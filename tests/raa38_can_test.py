@@ -116,7 +116,7 @@ class CanBus(Case):
         again = absenc("config", "set", address + "&node=0x42", "node", "0x42", "--yes")
         self.assert_good(again)
         self.assertIn("nothing was sent, because it is so already", again.stderr)
-        self.assert_no_rule_broken()  # nothing was written twice
+        self.assert_no_rule_broken()  # no setting was written twice
 
     def test_force_writes_node_again(self):
         address = self.bus()
@@ -204,7 +204,7 @@ class CanBus(Case):
             self.assertRegex(answered, r"^\(1\d{9}\.\d{6}\) adapter 120#4726000000000000$")
         times = [float(re.match(r"\(([\d.]+)\)", line)[1]) for line in lines]
         self.assertEqual(times, sorted(times))
-        self.assert_failed(absenc("read", f"{address}&log={log}"), log)  # nothing is overwritten
+        self.assert_failed(absenc("read", f"{address}&log={log}"), log)  # the existing log is not overwritten
 
     def test_survives_faults(self):
         address = self.bus("--fault", "silence=0.2", "--fault", "drop=0.1", "--fault", "repeat=0.1", "--singleturn", "9",
@@ -219,7 +219,7 @@ class CanBus(Case):
         """Garbage, and frames of another program, arrive on the line."""
         address = self.bus("--singleturn", "9799")
         with open(self.node.path, "wb", buffering=0) as other:
-            other.write(b"garbage\rt22")  # an incomplete frame
+            other.write(b"garbage\rt22")  # the other program sends garbage and an incomplete frame
         self.assertEqual(self.singleturn(address), 9799)
 
     def test_bench(self):

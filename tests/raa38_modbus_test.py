@@ -204,7 +204,7 @@ class Settings(ModbusCase):
         emulator = self.emulator("--also", "address=2")
         result = absenc("config", "set", self.uri(emulator), "address", "2", "--yes")
         self.assert_failed(result, "invalid_argument", "answers at that address already", "nothing was sent")
-        self.set(self.uri(emulator), "address", "3")  # A0 identifies no address with two encoders on the line
+        self.set(self.uri(emulator), "address", "3")  # with two encoders on the line, the A0 request identifies none
         self.assert_good(absenc("read", self.uri(emulator, "&address=2")))
         self.assertEqual(self.violations(emulator), [])
 
@@ -286,7 +286,7 @@ class Frames(ModbusCase):
     def test_silence_and_noise(self):
         with FakeEncoder({0x01: b""}) as encoder:
             self.assert_failed(absenc("read", f"raa38-modbus:{encoder.path}"), "timeout", "nobody answers", "scan")
-        with FakeEncoder({0x01: REQUEST_1}) as encoder:  # only the adapter's echo
+        with FakeEncoder({0x01: REQUEST_1}) as encoder:  # only the echo of the request comes back
             self.assert_failed(absenc("read", f"raa38-modbus:{encoder.path}"), "request itself came back")
 
     def test_decode_without_request(self):

@@ -10,7 +10,7 @@ import unittest
 
 from command_support import BabblingLine, Emulator, EncoderCase, FakeEncoder, absenc, json_lines
 
-FRAME = bytes.fromhex("ff81017f00")  # 3.1.1: 383 of 14 bits
+FRAME = bytes.fromhex("ff81017f00")  # the manual's example (3.1.1): position 383 of 14 bits
 
 
 def frame(value, data_bytes=2, second=0x81):

@@ -152,7 +152,8 @@ class Simulator(EncoderCase):
         self.assertEqual(len(readings), 6)
         for one in readings:
             away = min(one["singleturn"], 4096 - one["singleturn"])
-            self.assertTrue(not one["confirmed"] or away <= 4, one)  # counts; random words may agree that closely
+            # counts within which damaged words may agree by chance
+            self.assertTrue(not one["confirmed"] or away <= 4, one)
         doubtful = [one for one in readings if not one["confirmed"]]
         self.assertTrue(doubtful)
         for one in doubtful:
@@ -267,7 +268,7 @@ class ErrorMessages(EncoderCase):
 
     def test_nothing_listens_on_tcp_port(self):
         with socket.socket() as listener:
-            listener.bind(("127.0.0.1", 0))  # reserved, but not listening
+            listener.bind(("127.0.0.1", 0))  # the port is reserved, but not listening
             result = absenc("read", f"tformat:tcp:127.0.0.1:{listener.getsockname()[1]}")
         self.assert_failed(result, "nothing listens on 127.0.0.1")
 

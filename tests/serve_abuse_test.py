@@ -98,7 +98,7 @@ class Abuse(ServeCase):
             with self.subTest(request):
                 answer, connection = self.raw(request)
                 self.assertIn(b" 400 ", answer.split(b"\r\n")[0])
-                while connection.recv(4096):  # until the server closes it
+                while connection.recv(4096):  # read until the server closes the connection
                     pass
 
     def test_answers_long_requests(self):
@@ -154,13 +154,15 @@ class Abuse(ServeCase):
                 self.connect(f"127.0.1.{i + 1}")
         begin = time.monotonic()
         self.assertEqual([self.status("/api/encoders", f"127.0.2.{i + 1}") for i in range(20)], [200] * 20)
-        self.assertLess(time.monotonic() - begin, 5)  # sooner than idle connections end by themselves, after 10 s
+        # limit in seconds; idle connections would end by themselves after 10 s
+        self.assertLess(time.monotonic() - begin, 5)
 
     def test_unread_streams_leave_room_for_other_addresses(self):
         statuses = self.open_streams(300)
         self.assertEqual((statuses.count(200), statuses.count(503)), (200, 100))
         self.assertEqual(self.open_streams(100, "127.0.0.2"), [200] * 100)
-        self.assertEqual(self.open_streams(20, "127.0.0.3"), [200] * 20)  # although 300 streams are open
+        # accepted, because the limit is per address
+        self.assertEqual(self.open_streams(20, "127.0.0.3"), [200] * 20)
         self.assertEqual(self.status(address="127.0.0.4"), 200)
 
     def test_many_requests_for_same_encoder(self):

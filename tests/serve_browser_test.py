@@ -120,7 +120,7 @@ class Page(ServeCase):
         wait_until(lambda: self.browser.execute_script(cards) == 5, "all are shown")
 
     def test_grid_labels_are_distinct(self):
-        name = "sim:encolink?multiturn=60000&motion=rpm=0.5"  # many turns, of which few change
+        name = "sim:encolink?multiturn=60000&motion=rpm=0.5"  # an encoder with many turns, of which few change
         served = self.without_history(name)
         self.window.go(served.url, encoder=name, unit="turns")
 
@@ -128,7 +128,7 @@ class Page(ServeCase):
             return self.browser.execute_script("""
                 return Array.from(document.querySelectorAll('.dygraph-axis-label-y'), (label) => label.textContent);""")
         wait_until(lambda: any(float(one) > 59000 for one in labels()), "the turns are drawn")
-        for _ in range(20):  # while the range grows
+        for _ in range(20):  # repeat while the range of the graph grows
             texts = labels()
             self.assertEqual(len(set(texts)), len(texts), texts)
         cut = """return Array.from(document.querySelectorAll('.dygraph-axis-label-y'))
@@ -384,7 +384,7 @@ class Page(ServeCase):
         wait_until(lambda: "acknowledged" in self.text("#panel-history"), "the history has it")
         self.assertIn("anna from 127.0.0.1", self.text("#panel-history"))
         self.browser.get("about:blank")
-        self.open()  # another page
+        self.open()  # opens the page anew
         self.wait_for("Acknowledged by anna", self.card(name) + " .words")
         self.assertEqual(self.text(self.card(name) + " .state"), "▲ alarm, seen")
         self.assert_no_errors()

@@ -57,7 +57,7 @@ class DisturbedFile(ServeCase):
 
     def reported_event(self, words):
         status, body = self.served.ask("/api/events")
-        if status == 503:  # while the history is being reopened
+        if status == 503:  # the history is being reopened
             return None
         events = [event for event in json.loads(body)["events"] if event["kind"] == "history"]
         return next((one for one in events if words in one["text"] and one["at_ms"] > 1000 * self.disturbed_at), None)
@@ -148,7 +148,7 @@ class DisturbedFile(ServeCase):
             database.commit()
             database.execute("VACUUM")
         self.records_again_after(lambda: shutil.copyfile(copy, self.path), f"the history {self.path} ")
-        if recorded := glob.glob(self.path + ".damaged-*Z"):  # otherwise the mixed file is valid
+        if recorded := glob.glob(self.path + ".damaged-*Z"):  # the file is set aside only if the mixture is invalid
             self.assertEqual(seconds_in(copy), seconds_in(recorded[0]))
         self.assertTrue(seconds_in(self.path))
 
@@ -207,7 +207,8 @@ class UnusableFile(ServeCase):
         self.assert_well_again(server)
 
     def test_unwritable_folder(self):
-        self.assert_failing("/sys/absenc-history.sqlite", "/sys/absenc-history.sqlite")  # not writable even by root
+        # not even root can create this file
+        self.assert_failing("/sys/absenc-history.sqlite", "/sys/absenc-history.sqlite")
 
     def test_full_disk(self):
         def limit():
@@ -295,9 +296,9 @@ class WrongSystemClock(ServeCase):
         self.wrong_by(-600)
         self.wait_for_event(server, "the clock went back by 10 minutes")
         self.wait_for_readings(server)
-        self.wrong_by(-602)  # too small to be reported: some seconds occur twice
+        self.wrong_by(-602)  # a step too small to be reported: some seconds occur twice
         readings = self.wait_for_readings(server)
-        self.wait_for_readings(server)  # the second in progress is then over
+        self.wait_for_readings(server)  # wait until the second in progress is over
         end(server.process)
         self.assertGreaterEqual(self.recorded(), readings)
 

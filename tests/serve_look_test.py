@@ -229,7 +229,7 @@ class Look(ServeCase):
               done([same, drawings]);
             })();""")
         self.assertEqual(same, 0)
-        self.assertIn(often, range(1, 6))  # twice a second, of 60 states
+        self.assertIn(often, range(1, 6))  # the state arrives twice a second, 60 times
 
     def test_one_encoder_and_none(self):
         path = self.file("absenc.toml", config({"elbow": ("tformat", "motion=rpm=60")}))

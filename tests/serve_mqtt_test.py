@@ -116,7 +116,7 @@ class State(MqttCase):
         server.process.kill()
         self.assertEqual(receiver.until("state", lambda one: one["state"] == "offline")["why"],
                          "the connection was lost")
-        late = self.receiver(broker, "plant/hall/state")  # the message is retained
+        late = self.receiver(broker, "plant/hall/state")  # a later subscriber gets the retained message
         self.assertEqual(late.until("state")["state"], "offline")
         self.assertTrue(late.messages[0][2])
         self.sender(broker.url, ONE)
@@ -342,7 +342,7 @@ class Access(MqttCase):
         broker = self.broker("allow_anonymous true", f"acl_file {closed}")
         server = self.sender(broker.url, ONE)
         wait_until(lambda: "refuses a message" in self.mqtt(server)["trouble"], "it says so")
-        self.assertIn("(plant/hall/", self.mqtt(server)["trouble"])  # and names the topic
+        self.assertIn("(plant/hall/", self.mqtt(server)["trouble"])  # the message names the topic
         self.assertGreater(self.mqtt(server)["waiting"], 0)
         self.assertEqual(self.mqtt(server)["sent"], 0)
         pathlib.Path(closed).write_text(pathlib.Path(rules).read_text(encoding="utf-8"), encoding="utf-8")

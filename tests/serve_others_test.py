@@ -151,7 +151,8 @@ class Prometheus(ServeCase):
         dashboard = json.loads((SOURCE / "docs/grafana-dashboard.json").read_text(encoding="utf-8"))
         for panel in dashboard["panels"]:
             for target in panel["targets"]:
-                query = target["expr"].replace("$encoder", ".*").replace("$__range", "5m")  # as Grafana replaces them
+                # replace the variables of the query as Grafana does
+                query = target["expr"].replace("$encoder", ".*").replace("$__range", "5m")
                 self.assertNotIn("$", query)
                 found = wait_until(lambda q=query: ask(q), f"{panel['title']}: {query} has values")
                 for label in re.findall(r"\{\{(\w+)\}\}", target["legendFormat"]):

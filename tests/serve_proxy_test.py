@@ -117,7 +117,8 @@ class Proxy(ServeCase):
             begin = time.time()
             lines = iter(connection.getresponse().readline, b"")
             state = json.loads(next(line for line in lines if b'"encoders"' in line)[6:])
-            self.assertLess(abs(state["at_ms"] / 1000 - begin), 1 + BUSY)  # the proxy does not buffer the stream
+            # limit in seconds: the proxy must not buffer the stream
+            self.assertLess(abs(state["at_ms"] / 1000 - begin), 1 + BUSY)
         own = {**GOOD, "Origin": f"https://{SITE}", "Sec-Fetch-Site": "same-origin"}
         self.assertEqual(self.zero({**own, "Authorization": "Bearer " + "x" * 20})[0], 401)
         for evil in ({"Origin": "https://evil.example"}, {"Origin": f"http://{SITE}.evil.example"}, {"Sec-Fetch-Site": "cross-site"}):
@@ -141,7 +142,7 @@ class Proxy(ServeCase):
         self.assert_page_and_commands_work("caddy", False)
 
     def test_page_in_browser(self):
-        port = free_port()  # part of the browser's origin
+        port = free_port()  # the port is part of the browser's Origin header
         served = self.server(NAME, "--history", "none", "--token-file", self.tokens(), "--public-url", f"https://{SITE}:{port}")
         with unittest.mock.patch(f"{__name__}.free_port", return_value=port):
             self.start("nginx", False, served)

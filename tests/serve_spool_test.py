@@ -61,7 +61,8 @@ class FullDisk(SpoolCase):
         with open(f"{seen}/others", "wb", buffering=0) as others, self.assertRaises(OSError):
             while True:
                 others.write(bytes(65536))  # another program fills the rest of the disk
-        # The spool buffers 4 MB in memory at 45 kB/s; the test checks the readings on disk.
+        # The spool keeps 4 MB of messages in memory when the disk is full, at 45 kB/s. The test only checks the
+        # messages on disk.
         wait_until(lambda: "No space left" in self.mqtt(server)["trouble"], "it says that the disk is full")
         self.assertEqual(server.json("/healthz")["mqtt"], "failing")
         self.assertFalse(server.json("/healthz")["ok"])
@@ -142,7 +143,8 @@ class Damage(SpoolCase):
         wait_until(lambda: os.path.exists(self.spool()), "it is made anew")
         wait_until(lambda: self.taken(server) > goal + 50, "it goes on")
         end(server.process, signal.SIGKILL)
-        first = next(one["first"] for one in waiting_in(self.spool()) if "first" in one)  # events are interspersed
+        # events may come before the readings
+        first = next(one["first"] for one in waiting_in(self.spool()) if "first" in one)
         self.assertEqual(first, 1, "what the open file had was written again")
 
     def test_garbage_file_in_place_of_spool_is_set_aside(self):

@@ -211,7 +211,7 @@ class EncoderValues(ServeCase):
         steps = sorted(after - before for before, after in zip(times, times[1:]))
         self.assertGreaterEqual(steps[0], 10)
         self.assertLess(steps[len(steps) // 2], 50)
-        turned = points[-1][1] - points[0][1]  # at 360 degrees per second
+        turned = points[-1][1] - points[0][1]  # the shaft turns at 360 degrees per second
         self.assertAlmostEqual(turned / 360, (times[-1] - times[0]) / 1000, delta=0.1 * BUSY)
 
     def test_reads_single_setting(self):
@@ -289,7 +289,8 @@ class ApiDescription(ServeCase):
 
     def check(self, server, method, path, values, kind, schema):
         if kind == "text/event-stream":
-            data = self.stream(server).until(lambda event, _: event == "state")  # other events may come first
+            # the stream may begin with other events
+            data = self.stream(server).until(lambda event, _: event == "state")
             self.assertTrue(data["encoders"])
             return
         status, got, body = server.answer(path, method, {"Authorization": f"Bearer {TOKEN}"}, **values)
@@ -538,7 +539,7 @@ class AccessRights(ServeCase):
     def test_removed_token_is_refused(self):
         path = self.tokens()
         server = self.without_history(self.name, "--token-file", path)
-        good = {"Authorization": f"bearer {TOKEN}"}  # the scheme ignores case
+        good = {"Authorization": f"bearer {TOKEN}"}  # the name of the authorization scheme ignores case
         self.assertEqual(self.command(server, good)[0], 200)
         with open(path, "w", encoding="utf-8") as file:
             file.write("berta another-secret-of-hers\n")
@@ -559,7 +560,7 @@ class AccessRights(ServeCase):
         self.assertEqual([self.command(server, wrong)[0] for _ in range(13)], [401] * 10 + [429] * 3)
         self.assertEqual(self.command(server, {"Authorization": f"Bearer {TOKEN}"})[0], 200)
         self.assertIn("absenc_wrong_tokens_total{} 13\n", server.ask("/metrics")[1])
-        # a limited address learns nothing about a token
+        # a client with too many wrong tokens must not learn whether one is right
         self.assertEqual(server.ask("/api/token", headers=wrong)[0], 429)
         self.assertIn("absenc_wrong_tokens_total{} 14\n", server.ask("/metrics")[1])
 
@@ -767,7 +768,7 @@ class EncoderAccess(ServeCase):
         answers = []
 
         def ask():
-            with contextlib.suppress(OSError, ValueError):  # the server may end
+            with contextlib.suppress(OSError, ValueError):  # the server may end before it replies
                 answers.append(self.post(server, name))
         client = threading.Thread(target=ask)
         client.start()

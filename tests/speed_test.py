@@ -10,7 +10,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 from command_support import ABSENC, Busy, Emulator, EncoderCase, absenc
 
-SPEEDS = (1, 12, 60, 3000)  # rpm
+SPEEDS = (1, 12, 60, 3000)  # tested speeds in rpm
 # Options of units that are not tested with their defaults only, such as streaming encoders.
 OPTIONS = {"encolink": ("", "stream_rate=500&resolution=20"), "raa38": ("mode=bus", "mode=timing")}
 
@@ -46,7 +46,7 @@ class Speed(EncoderCase):
             self.assertEqual(speed is None, uncertainty is None, row)
             if speed is None:
                 continue
-            self.assertLessEqual(abs(speed - rpm), uncertainty * 1.001 + 1e-9, row)  # allows for rounding
+            self.assertLessEqual(abs(speed - rpm), uncertainty * 1.001 + 1e-9, row)  # the printed figures are rounded
             pairs.append((speed, uncertainty))
         return pairs
 

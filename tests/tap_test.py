@@ -190,7 +190,7 @@ class Output(TapCase):
         self.assertEqual(result.returncode, 0, result.stderr)
 
     def test_exchange_is_shown_at_once(self):
-        """An exchange must not wait for the next one."""
+        """An exchange must be printed before the next one arrives."""
         with subprocess.Popen([ABSENC, "tap", "-", "tformat", "--json"], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
                               stderr=subprocess.DEVNULL, bufsize=0) as process:
             for _ in range(20):

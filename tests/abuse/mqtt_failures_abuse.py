@@ -63,7 +63,7 @@ class Failures(MqttCase):
         os.mkdir(folder)
         os.chmod(folder, 0o777)
         broker = self.broker("allow_anonymous true", "persistence true", f"persistence_location {folder}/")
-        # MQTT 5 would end the session with its connection
+        # an MQTT 5 session would end with its connection
         receiver = self.receiver(broker, version=paho.MQTTv311, client_id="keeps")
         server = self.sender(broker.url, ONE, "--rate", "200")
         for round_ in range(ROUNDS):

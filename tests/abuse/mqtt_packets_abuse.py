@@ -20,7 +20,7 @@ CONVERSATIONS = often(150, 10_000)
 SERVERS = often(20, 60)  # each pauses for up to 5 s between two conversations
 NOBODYS = 60_000  # a number that no message has: they count from 1 in each conversation
 KNOWN = [bytes.fromhex(one) for one in ("20050000027f00", "4006000100027f00", "e00487027f00", "30050001615859")]
-KINDS = (CONNACK, PUBACK, 9, PUBLISH, DISCONNECT, PINGRESP, 15)  # 9: SUBACK, 15: AUTH
+KINDS = (CONNACK, PUBACK, 9, PUBLISH, DISCONNECT, PINGRESP, 15)  # packet types: 9 is SUBACK, 15 is AUTH
 
 
 def properties(random_):
@@ -48,18 +48,18 @@ def bad_packet(random_, kind, number):
         return random_.choice(KNOWN)
     if way == 1:
         return random_.randbytes(random_.randrange(1, 64))
-    if way == 2:  # properties
+    if way == 2:  # random properties
         start = {CONNACK: b"\0\0", PUBACK: number.to_bytes(2, "big") + b"\0", PUBLISH: b"\0\1a", 9: b"\0\1"}
         return packet(kind, start.get(kind, b"\0") + properties(random_))
-    if way == 3:  # truncated, so that the next packet is taken for its rest
+    if way == 3:  # a truncated packet, so that the next one is taken for its rest
         whole = packet(kind, good + properties(random_))
         return whole[:random_.randrange(1, len(whole))]
-    if way == 4:  # a wrong size: too large, 256 MB, or five bytes long
+    if way == 4:  # a packet with a wrong size: too large, 256 MB, or five bytes long
         size = random_.choice((b"\x7f", b"\xff\xff\xff\x7f", b"\xff\xff\xff\xff\x7f", b"\0"))
         return bytes((kind << 4,)) + size + good
-    if way == 5:  # flags
+    if way == 5:  # wrong flags
         return packet(kind, good, random_.randrange(16))
-    if way == 6:  # many repetitions
+    if way == 6:  # a packet repeated many times
         return packet(kind, good) * random_.randrange(2, 2000)
     mutated = bytearray(packet(kind, good + random_.choice((b"", properties(random_)))))
     for _ in range(random_.randrange(1, 4)):
@@ -176,7 +176,7 @@ class Packets(ServeCase):
             late = time.monotonic() + 90 + PATIENCE
             while not (new := self.broker.after(topic, len(messages))):
                 self.assertLess(time.monotonic(), late, f"reading {goal} comes after {last}: {server.json('/api/mqtt')}")
-                time.sleep(0.05)  # polling interval
+                time.sleep(0.05)  # polling interval in seconds
             messages += new
             last = max([last, *numbers(new, ONE)])
         return messages

@@ -19,7 +19,8 @@ BUS = "vcan0"
 # The latency allows for a busy machine; the speed limit keeps the turns known across a late reading.
 ENCODER = f"raa38-can:{BUS}?latency=2000&max_rpm=60"
 HASTY = f"raa38-can:{BUS}"
-ASKING, ANSWER = "220#8020000000000000", "120#4726000000000000"  # 9799
+# a position request to node 20 and its reply, position 9799
+ASKING, ANSWER = "220#8020000000000000", "120#4726000000000000"
 NODE = 0x120
 
 
@@ -83,7 +84,8 @@ class VirtualBus(EncoderCase):
 
     def add(self, interface):
         run("ip", "link", "add", interface, "type", "vcan")
-        self.addCleanup(subprocess.run, ["ip", "link", "del", interface], capture_output=True)  # may be deleted already
+        # the test may have deleted the interface already
+        self.addCleanup(subprocess.run, ["ip", "link", "del", interface], capture_output=True)
         self.up(interface)
 
     def up(self, interface=BUS):
@@ -229,7 +231,7 @@ class Library(VirtualBus):
         self.assertEqual(self.line(process), "raa38-can:can8 9799")
         run("ip", "link", "del", "can8")
         process.stdin.write(b"\n")
-        self.assertEqual(self.line(process), "switched")  # works also without its interface
+        self.assertEqual(self.line(process), "switched")  # the program works also while its interface is down
         self.add("can8")
         wait_until(lambda: receivers("can8") > 0, "the encoder to come back")
         self.assertEqual(self.singleturn("raa38-can:can8?latency=2000"), 9799)
@@ -291,7 +293,7 @@ class CanUtils(VirtualBus):
         self.assertIsNone(cangen.poll(), "cangen has ended")
         self.assertGreater(load, 50)
         self.assertEqual([line["singleturn"] for line in json_lines(result.stdout)], 200 * [9799])
-        self.assertRegex(emulator.end()[2], r"^absenc: 20[0-2] requests answered")  # no request was repeated
+        self.assertRegex(emulator.end()[2], r"^absenc: 20[0-2] requests answered")  # no position request was repeated
 
     @staticmethod
     def frames():

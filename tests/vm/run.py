@@ -14,7 +14,7 @@ import time
 import image
 
 ABSENC = os.path.abspath(os.environ.get("ABSENC", "build/release/bin/absenc"))
-PATIENCE = 600  # seconds; all tests take far less
+PATIENCE = 600  # time limit of the machine, in seconds; all tests take far less
 SKIPPED = 77
 BUSY = "no_timer_check"  # otherwise a busy computer delays the timer so much that the kernel panics
 
@@ -41,7 +41,7 @@ def boot(kernel, initramfs, folder):
             output, _ = machine.communicate()
             trouble = f"the machine did not end within {PATIENCE} s"
         finally:
-            machine.kill()  # has no effect on a machine that has ended
+            machine.kill()  # does nothing if the machine has ended
     return output.decode(errors="replace").replace("\r", ""), trouble
 
 

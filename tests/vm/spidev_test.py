@@ -238,7 +238,7 @@ class Command(SpidevCase):
                 while now == before and time.monotonic() < deadline:
                     with open("/tmp/spidev-memory", encoding="utf-8") as file:
                         now = file.read()
-                self.assertNotEqual(now, before)  # while the emulator runs
+                self.assertNotEqual(now, before)  # the file is saved while the emulator runs
             reading = self.reading("encolink:spi:/dev/spidev9.0")
             self.assertEqual((reading["singleturn"], reading["multiturn"]), (0, 9))
             self.summary(process, signal.SIGTERM)
@@ -346,7 +346,7 @@ class Lifecycle(SpidevCase):
 
             def slow():
                 try:
-                    spi.exchange(bytes(1000), speed=100)  # 80 s
+                    spi.exchange(bytes(1000), speed=100)  # the transfer takes 80 s
                 except OSError as error:
                     errors.append(error.errno)
 
@@ -498,7 +498,7 @@ class SpidevInterface(SpidevCase):
         self.assertEqual(self.spi.get(RD_SPEED, "I"), 250_000)
         os.close(self.spi.descriptor)
         self.spi.descriptor = os.open("/dev/spidev9.0", os.O_RDWR)
-        self.assertEqual(self.spi.get(RD_SPEED, "I"), 1_000_000)  # closing the last other descriptor restored it
+        self.assertEqual(self.spi.get(RD_SPEED, "I"), 1_000_000)  # closing the other descriptor restored the speed
         self.assertEqual(self.spi.get(RD_MODE, "B"), 1)
 
     def test_spi_tools(self):
