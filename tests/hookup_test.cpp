@@ -46,7 +46,7 @@ struct Uart {
   void set_rate(std::uint32_t) {}
 
   // Delivers bytes from the encoder. Returns whether the DMA buffer is full.
-  bool come(Bytes bytes) {
+  bool deliver(Bytes bytes) {
     EXPECT_FALSE(drives);
     for (const std::uint8_t byte : bytes) {
       EXPECT_LT(count, buffer.size()) << "nobody takes it";
@@ -73,23 +73,23 @@ struct UartDmaTest : testing::Test {
   }
 };
 
-TEST_F(UartDmaTest, AWholeReplyEndsTheTransfer) {
-  EXPECT_TRUE(uart.come(reply));  // full with the last character, before the line becomes idle
+TEST_F(UartDmaTest, WholeReplyEndsTransfer) {
+  EXPECT_TRUE(uart.deliver(reply));  // full with the last character, before the line becomes idle
   line.arrived(56us);
   expect_position();
 }
 
-TEST_F(UartDmaTest, PiecesAreToldByTheIdleLine) {
-  EXPECT_FALSE(uart.come(std::span(reply).first(4)));
+TEST_F(UartDmaTest, AssemblesReplyFromPiecesAtIdleLine) {
+  EXPECT_FALSE(uart.deliver(std::span(reply).first(4)));
   line.arrived(30us);
   EXPECT_TRUE(line.is_busy());
-  EXPECT_FALSE(uart.come(std::span(reply).subspan(4)));
+  EXPECT_FALSE(uart.deliver(std::span(reply).subspan(4)));
   line.arrived(60us);
   expect_position();
 }
 
-TEST_F(UartDmaTest, AShortReplyIsNone) {
-  EXPECT_FALSE(uart.come(std::span(reply).first(10)));
+TEST_F(UartDmaTest, RejectsShortReply) {
+  EXPECT_FALSE(uart.deliver(std::span(reply).first(10)));
   line.arrived(52us);
   line.tick(1s);
   EXPECT_FALSE(line.is_busy());
@@ -108,7 +108,7 @@ struct Spi {
   }
   void set_rate(std::uint32_t) {}
   // Fills the buffer with `idle` ones, then with these bits, then with ones.
-  void come(Bytes bytes, unsigned idle) {
+  void deliver(Bytes bytes, unsigned idle) {
     for (std::size_t bit = 0; bit < 8 * buffer.size(); ++bit) {
       const std::size_t at = bit - idle;
       const bool one = bit < idle || at >= 8 * bytes.size() || (bytes[at / 8] >> (7 - at % 8) & 1) != 0;
@@ -127,7 +127,7 @@ void read_by_spi(Read& read, const LineSettings& settings, Bytes bits) {
     line.tick(now);
     if (spi.transfers == 0) continue;
     spi.transfers = 0;
-    spi.come(bits, settings.idle_clocks);
+    spi.deliver(bits, settings.idle_clocks);
     line.done(now);
   }
   EXPECT_FALSE(line.is_busy());
@@ -140,7 +140,7 @@ TEST(SpiDmaTest, ReadsBiss) {
 }
 
 // The bits exclude the idle level, which the stub delivers in the first clock.
-TEST(SpiDmaTest, ReadsSsiBehindTheIdleClock) {
+TEST(SpiDmaTest, ReadsSsiAfterIdleClock) {
   constexpr auto bits = std::to_array<std::uint8_t>({0x1E, 0xF0, 0x00, 0x00});
   ssi::ReadPosition read{ssi::Format{}};
   read_by_spi(read, ssi::line_settings, bits);
@@ -166,7 +166,7 @@ struct Can {
   void set_rate(std::uint32_t) {}
 };
 
-TEST(CanFifoTest, ReadsAPositionAmongOthersFrames) {
+TEST(CanFifoTest, ReadsPositionAmongOtherFrames) {
   Can can;
   CanFifo<Can> line{can, 1ms};
   raa38::can::Read read{raa38::can::Format{}, raa38::can::Read::Way::ask};

@@ -46,7 +46,7 @@ struct Lateness {
   double share;  // share of the replies that are late, 0 to 1
 };
 
-struct Shown {
+struct Outcomes {
   unsigned good = 0;
   unsigned failed = 0;
   unsigned stale = 0;
@@ -56,9 +56,9 @@ struct Shown {
 constexpr double rpm = 6;
 
 template <class Item>
-class Bench {
+class DelayedSession {
  public:
-  Bench(const Kind& kind, std::function<Time()> delay)
+  DelayedSession(const Kind& kind, std::function<Time()> delay)
       : unit(*find_unit(kind.unit)),
         options(resolve(kind)),
         device(*make_device()),
@@ -67,18 +67,18 @@ class Bench {
         session(unit, options, port, host_storage, host::EchoMode::automatic) {}
 
   /// Runs one command that reports a position, and counts the outcome.
-  void read(const Command& command, bool confirmed, Shown& shown) {
+  void read(const Command& command, bool confirmed, Outcomes& outcomes) {
     const Conversation<Item>* ended = confirmed ? session.read(command) : session.run(command);
     if (ended->error() != Error::none) {
-      ++shown.failed;
+      ++outcomes.failed;
       return;
     }
     const Reading* reading = ended->reading();
     if (reading == nullptr || (confirmed && !session.confirmed())) return;
-    ++shown.good;
+    ++outcomes.good;
     const Time age = age_of(*reading);
-    shown.oldest = std::max(shown.oldest, age);
-    if (age > 3ms) ++shown.stale;
+    outcomes.oldest = std::max(outcomes.oldest, age);
+    if (age > 3ms) ++outcomes.stale;
   }
 
   /// Returns how long before its timestamp the reading's position was really sampled. The shaft's true motion gives
@@ -131,47 +131,47 @@ bool is_on_can(const Kind& kind) { return find_unit(kind.unit)->link == LinkKind
 
 /// Reads at a fixed period while a share of the replies is late.
 template <class Item>
-Shown run_on(const Kind& kind, const Lateness& lateness, Time period, unsigned count) {
+Outcomes run_at_period(const Kind& kind, const Lateness& lateness, Time period, unsigned count) {
   sim::Random random(1);
-  Bench<Item> bench(kind, [&] { return random.chance(lateness.share) ? lateness.time : Time{}; });
-  const Command& command = *find_command(bench.unit, Verb::read);
-  Shown shown;
+  DelayedSession<Item> delayed(kind, [&] { return random.chance(lateness.share) ? lateness.time : Time{}; });
+  const Command& command = *find_command(delayed.unit, Verb::read);
+  Outcomes outcomes;
   Time due{};
   for (unsigned i = 0; i < count; ++i) {
-    bench.read(command, true, shown);
-    due = std::max(due + period, bench.port.now());
-    bench.port.rest(due);
+    delayed.read(command, true, outcomes);
+    due = std::max(due + period, delayed.port.now());
+    delayed.port.rest(due);
   }
-  return shown;
+  return outcomes;
 }
 
-Shown run(const Kind& kind, const Lateness& lateness, Time period, unsigned count) {
-  return is_on_can(kind) ? run_on<CanFrame>(kind, lateness, period, count)
-                         : run_on<std::uint8_t>(kind, lateness, period, count);
+Outcomes run(const Kind& kind, const Lateness& lateness, Time period, unsigned count) {
+  return is_on_can(kind) ? run_at_period<CanFrame>(kind, lateness, period, count)
+                         : run_at_period<std::uint8_t>(kind, lateness, period, count);
 }
 
 /// Runs random commands that report a position and change nothing, with random pauses. Some replies are late by 10 us
 /// to 10 s.
 template <class Item>
-Shown run_anything(const Kind& kind, unsigned count, std::uint64_t seed) {
+Outcomes run_random_commands(const Kind& kind, unsigned count, std::uint64_t seed) {
   sim::Random random(seed);
   const auto any_time = [&] { return Time(static_cast<std::int64_t>(1e4 * std::pow(10.0, 6 * fraction(random)))); };
   double share = 0.1;
-  Bench<Item> bench(kind, [&] { return random.chance(share) ? any_time() : Time{}; });
+  DelayedSession<Item> delayed(kind, [&] { return random.chance(share) ? any_time() : Time{}; });
   std::vector<const Command*> commands;
-  for (const Command& command : bench.unit.commands) {
+  for (const Command& command : delayed.unit.commands) {
     const bool reads = command.verb == Verb::read || command.verb == Verb::read_part;
     if (!reads || command.changes_encoder || !command.arguments.empty()) continue;
     commands.push_back(&command);
   }
-  Shown shown;
+  Outcomes outcomes;
   for (unsigned i = 0; i < count; ++i) {
     if (random.chance(0.01)) share = random.chance(0.5) ? fraction(random) : 0.1 * fraction(random);
     const Command& command = *commands[random.chance(0.7) ? 0 : random.below(commands.size())];
-    bench.read(command, &command == commands[0] && random.chance(0.5), shown);
-    if (random.chance(0.5)) bench.port.rest(bench.port.now() + any_time());
+    delayed.read(command, &command == commands[0] && random.chance(0.5), outcomes);
+    if (random.chance(0.5)) delayed.port.rest(delayed.port.now() + any_time());
   }
-  return shown;
+  return outcomes;
 }
 
 class LateReply : public ::testing::TestWithParam<std::size_t> {
@@ -180,7 +180,7 @@ class LateReply : public ::testing::TestWithParam<std::size_t> {
 };
 
 // Covers delays from 1 ms to 5 s, some of which make a late reply arrive exactly when the next one is due.
-TEST_P(LateReply, IsNeverShownForALaterRequest) {
+TEST_P(LateReply, NeverAnswersLaterRequest) {
   constexpr unsigned readings = 40;
   for (const Time period : {Time{}, Time{1ms}, Time{10ms}, Time{100ms}, Time{500ms}, Time{2s}}) {
     for (const Lateness& lateness : std::initializer_list<Lateness>{{"0", 0ms, 0},
@@ -196,29 +196,29 @@ TEST_P(LateReply, IsNeverShownForALaterRequest) {
                                                                     {"2 s", 2s, 1},
                                                                     {"2 s", 2s, 0.1},
                                                                     {"5 s", 5s, 0.1}}) {
-      const Shown shown = run(kind, lateness, period, readings);
+      const Outcomes outcomes = run(kind, lateness, period, readings);
       std::printf(
           "%-15s every %5lld ms, %3.0f %% of the replies %-6s late: %3u good, %3u failed, %3u stale, oldest %.1f ms\n",
-          name_of(kind).c_str(), static_cast<long long>(period / 1ms), 100 * lateness.share, lateness.name, shown.good,
-          shown.failed, shown.stale, static_cast<double>(shown.oldest.count()) / 1e6);
-      EXPECT_EQ(shown.stale, 0u) << lateness.name << " " << lateness.share << " every " << period / 1ms << " ms";
+          name_of(kind).c_str(), static_cast<long long>(period / 1ms), 100 * lateness.share, lateness.name,
+          outcomes.good, outcomes.failed, outcomes.stale, static_cast<double>(outcomes.oldest.count()) / 1e6);
+      EXPECT_EQ(outcomes.stale, 0u) << lateness.name << " " << lateness.share << " every " << period / 1ms << " ms";
       if (lateness.share == 0) {
-        EXPECT_EQ(shown.good, readings);
+        EXPECT_EQ(outcomes.good, readings);
       }
     }
   }
 }
 
-TEST_P(LateReply, OfAnyTimeIsNeverShownForALaterRequest) {
+TEST_P(LateReply, WithRandomDelayNeverAnswersLaterRequest) {
   constexpr unsigned conversations = 3000;
-  Shown all;
+  Outcomes all;
   for (std::uint64_t seed = 1; seed <= 3; ++seed) {
-    const Shown shown = is_on_can(kind) ? run_anything<CanFrame>(kind, conversations, seed)
-                                        : run_anything<std::uint8_t>(kind, conversations, seed);
-    all.good += shown.good;
-    all.failed += shown.failed;
-    all.stale += shown.stale;
-    all.oldest = std::max(all.oldest, shown.oldest);
+    const Outcomes outcomes = is_on_can(kind) ? run_random_commands<CanFrame>(kind, conversations, seed)
+                                              : run_random_commands<std::uint8_t>(kind, conversations, seed);
+    all.good += outcomes.good;
+    all.failed += outcomes.failed;
+    all.stale += outcomes.stale;
+    all.oldest = std::max(all.oldest, outcomes.oldest);
   }
   std::printf("%-15s anything: %5u good, %5u failed, %3u stale, oldest %.1f ms\n", name_of(kind).c_str(), all.good,
               all.failed, all.stale, static_cast<double>(all.oldest.count()) / 1e6);
@@ -229,46 +229,46 @@ TEST_P(LateReply, OfAnyTimeIsNeverShownForALaterRequest) {
 /// Reads over a line that stalls for two seconds of every seven. After a stall, either all delayed replies arrive or
 /// only the first.
 template <class Item>
-Shown run_with_stalls(const Kind& kind, bool one_comes, Time& longest_silence) {
+Outcomes run_with_stalls(const Kind& kind, bool only_first_arrives, Time& longest_silence) {
   constexpr Time stall = 2s;
   constexpr Time cycle = 7s;
-  Bench<Item>* running = nullptr;
+  DelayedSession<Item>* session_in_use = nullptr;
   Time last_stall = -cycle;
   const auto delay = [&] {
-    const Time now = running->port.now();
+    const Time now = session_in_use->port.now();
     const Time into = now % cycle;
     if (now < cycle || into >= stall) return Time{};
     const bool first = now - into != std::exchange(last_stall, now - into);
-    return first || !one_comes ? stall - into : never;
+    return first || !only_first_arrives ? stall - into : never;
   };
-  Bench<Item> bench(kind, delay);
-  running = &bench;
-  const Command& command = *find_command(bench.unit, Verb::read);
-  Shown shown;
+  DelayedSession<Item> delayed(kind, delay);
+  session_in_use = &delayed;
+  const Command& command = *find_command(delayed.unit, Verb::read);
+  Outcomes outcomes;
   Time last_good{};
-  for (Time due{}; due < 10 * cycle; due = std::max(due + 10ms, bench.port.now())) {
-    bench.port.rest(due);
-    const unsigned good = shown.good;
-    bench.read(command, true, shown);
-    if (shown.good == good) continue;
-    const Time now = bench.port.now();
+  for (Time due{}; due < 10 * cycle; due = std::max(due + 10ms, delayed.port.now())) {
+    delayed.port.rest(due);
+    const unsigned good = outcomes.good;
+    delayed.read(command, true, outcomes);
+    if (outcomes.good == good) continue;
+    const Time now = delayed.port.now();
     longest_silence = std::max(longest_silence, now - last_good);
     last_good = now;
   }
-  return shown;
+  return outcomes;
 }
 
-TEST_P(LateReply, AfterAStallOfTwoSecondsReadingsGoOnWithinOne) {
-  for (const bool one_comes : {true, false}) {
+TEST_P(LateReply, ReadingsResumeSoonAfterStall) {
+  for (const bool only_first_arrives : {true, false}) {
     Time silence{};
-    const Shown shown = is_on_can(kind) ? run_with_stalls<CanFrame>(kind, one_comes, silence)
-                                        : run_with_stalls<std::uint8_t>(kind, one_comes, silence);
+    const Outcomes outcomes = is_on_can(kind) ? run_with_stalls<CanFrame>(kind, only_first_arrives, silence)
+                                              : run_with_stalls<std::uint8_t>(kind, only_first_arrives, silence);
     std::printf("%-15s stalls, then %s: %5u good, %5u failed, %3u stale, silent for %.2f s\n", name_of(kind).c_str(),
-                one_comes ? "one reply " : "all of them", shown.good, shown.failed, shown.stale,
+                only_first_arrives ? "one reply " : "all of them", outcomes.good, outcomes.failed, outcomes.stale,
                 static_cast<double>(silence.count()) / 1e9);
-    EXPECT_EQ(shown.stale, 0u);
+    EXPECT_EQ(outcomes.stale, 0u);
     // If only one reply was delayed, the host cannot distinguish it from replies that are always that late.
-    if (one_comes && !is_on_can(kind)) {
+    if (only_first_arrives && !is_on_can(kind)) {
       EXPECT_LT(silence, 3s);
     }
   }

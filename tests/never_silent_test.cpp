@@ -19,7 +19,7 @@ namespace {
 using namespace std::chrono_literals;
 
 /// Returns the next byte on the line; gets the last request.
-using Babble = std::function<std::uint8_t(Bytes request)>;
+using ByteSource = std::function<std::uint8_t(Bytes request)>;
 
 struct Outcome {
   bool ended = false;
@@ -28,7 +28,7 @@ struct Outcome {
 
 /// Runs the conversation on a line with a byte every `period`. The simulated port would report silence only after a
 /// longer pause. If a byte and a timer are due together, the byte comes first.
-Outcome run(Conversation<std::uint8_t>& conversation, Time period, const Babble& babble) {
+Outcome run(Conversation<std::uint8_t>& conversation, Time period, const ByteSource& byte_source) {
   constexpr unsigned most_bytes = 2'000'000;
   Time now = 1s;
   const Time begin = now;
@@ -50,7 +50,7 @@ Outcome run(Conversation<std::uint8_t>& conversation, Time period, const Babble&
       now = next_byte;
       next_byte += period;
       ++bytes;
-      const std::uint8_t byte = babble(request);
+      const std::uint8_t byte = byte_source(request);
       conversation.feed({.kind = ByteEvent::Kind::received, .at = now, .items = {&byte, 1}});
     }
   }
@@ -61,7 +61,7 @@ constexpr std::string_view echo = "the request again";
 
 struct Kind {
   std::string_view name;
-  Babble babble;
+  ByteSource byte_source;
 };
 
 std::vector<Kind> kinds() {
@@ -109,7 +109,7 @@ class NeverSilent : public ::testing::TestWithParam<const Unit*> {
     for (const Command& command : unit.commands) {
       const Any<Conversation> made = unit.host(options, command, least_arguments(command), storage_);
       if (made.bytes == nullptr) continue;
-      const Outcome outcome = run(*made.bytes, period, kind.babble);
+      const Outcome outcome = run(*made.bytes, period, kind.byte_source);
       const auto what = [&] {
         return std::string(unit.id) + " " + std::string(command.name) + ", " + std::string(kind.name) + " every " +
                std::to_string(period / 1us) + " us: ";
@@ -134,7 +134,7 @@ TEST_P(NeverSilent, EveryCommandEnds) {
   }
 }
 
-TEST_P(NeverSilent, WithEveryOption) {
+TEST_P(NeverSilent, EveryCommandEndsWithEveryOption) {
   for (const Options& options : all_options(unit)) expect_ends(options, 5ms, kinds().front());
 }
 

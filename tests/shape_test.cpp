@@ -23,7 +23,7 @@ using Kind = Event<Byte>::Kind;
 struct RequestReply : testing::Test {
   sim::Line<Byte> line{LinkKind::half_duplex, {.rate = 2'500'000}};
   std::vector<Byte> answer{0x1A, 0x00, 0x55};
-  std::string due;  // `expect` of every wait
+  std::string expected_counts;  // `expect` of every wait, one digit each
   std::size_t missing = 3;
   ByteToy device{[this](ByteToy& self, const Event<Byte>& event) {
     if (event.kind == Kind::received) self.send(answer, event.at + microseconds(3));
@@ -31,7 +31,7 @@ struct RequestReply : testing::Test {
   ByteToy host{[this](ByteToy& self, const Event<Byte>& event) {
     if (event.kind == Kind::received) missing -= event.items.size();
     self.idle.expect = missing;
-    due += std::to_string(missing);
+    expected_counts += std::to_string(missing);
     if (missing == 0 || event.kind == Kind::silence) self.finish();
   }};
 
@@ -41,29 +41,29 @@ struct RequestReply : testing::Test {
     host.idle.gap = microseconds(6);
     host.send({0x1A});
     EXPECT_TRUE(line.run(line.attach(Role::host, host)));
-    line.run_until(line.now());  // the device's `sent` event has the same time
+    line.run_until(line.now());  // runs the device's `sent` event, which has the same time
   }
 };
 
-TEST_F(RequestReply, TimesAreExactAndBytesAreCountedOneByOne) {
+TEST_F(RequestReply, ReportsEachByteWithExactTime) {
   begin(true);
   EXPECT_EQ(host.log, "4000 sent, 11000 received 1A, 15000 received 00, 19000 received 55");
   EXPECT_EQ(device.log, "4000 received 1A, 19000 sent");
-  EXPECT_EQ(due, "3210");
+  EXPECT_EQ(expected_counts, "3210");
 }
 
-TEST_F(RequestReply, SilenceWhenNobodyAnswers) {
+TEST_F(RequestReply, ReportsSilenceWithoutReply) {
   begin(false);
   EXPECT_EQ(host.log, "4000 sent, 14000 silence");
 }
 
-TEST_F(RequestReply, SilenceWhenTheReplyStops) {
+TEST_F(RequestReply, ReportsSilenceWhenReplyStops) {
   answer.resize(2);
   begin(true);
   EXPECT_EQ(host.log, "4000 sent, 11000 received 1A, 15000 received 00, 21000 silence");
 }
 
-TEST_F(RequestReply, CharacterThatHasBegunIsNoSilence) {
+TEST_F(RequestReply, WaitsForCharacterThatHasBegun) {
   host.idle.at = microseconds(9);  // the timer fires while a character is being received
   line.attach(Role::device, device);
   host.idle.answer = microseconds(4);
@@ -73,7 +73,7 @@ TEST_F(RequestReply, CharacterThatHasBegunIsNoSilence) {
 }
 
 // (b) An endless stream: the device sends without requests, and the caller ends the conversation.
-TEST(Stream, ManyResultsWithoutARequest) {
+TEST(Stream, EmitsResultsWithoutRequest) {
   sim::Line<Byte> line(LinkKind::full_duplex, {.rate = 1'000'000});
   Byte count = 0;
   ByteToy device([&](ByteToy& self, const Event<Byte>& event) {
@@ -113,7 +113,7 @@ class SpiDevice final : public Machine<Byte> {
       frame_ = {position, static_cast<Byte>(~position), register_byte_};
       selected_ = true;
     } else if (event.kind == Kind::received) {
-      hear(event.items[1]);
+      receive_byte(event.items[1]);
     }
   }
   Step<Byte> next(Time) override {
@@ -122,9 +122,9 @@ class SpiDevice final : public Machine<Byte> {
   }
 
  private:
-  void hear(Byte request) {
+  void receive_byte(Byte request) {
     if (register_byte_ == 0x88) {
-      register_byte_ = static_cast<Byte>(address_ + 0x40);  // value of the register
+      register_byte_ = static_cast<Byte>(address_ + 0x40);  // value of the requested register
     } else if (previous_ == 0xCD) {
       address_ = request;
       register_byte_ = 0x88;  // code for "read ready"
@@ -176,14 +176,14 @@ class SpiHost final : public Machine<Byte> {
   bool value_next_ = false;
 };
 
-TEST(Spi, RegisterAccessRidesInPositionFrames) {
+TEST(Spi, ReadsRegisterWithinPositionFrames) {
   sim::Line<Byte> line(LinkKind::spi, {.rate = 1'000'000, .spi_mode = 1});
   SpiDevice device;
   SpiHost host;
   std::string results;
   line.attach(Role::device, device);
   const auto node = line.attach(Role::host, host, [&] {
-    if (host.position == 50) host.read_register(0x4C);  // requested while the stream continues
+    if (host.position == 50) host.read_register(0x4C);  // requests a register while the stream continues
     results += std::to_string(line.now().count()) + (host.good ? " good " : " bad ") + std::to_string(host.position) +
                ' ' + std::to_string(host.value) + '\n';
     return host.value < 0;
@@ -213,19 +213,19 @@ struct Clocked : testing::Test {
   }
 };
 
-TEST_F(Clocked, WordIsPackedMsbFirstAndLeftAligned) {
+TEST_F(Clocked, PacksWordMsbFirstLeftAligned) {
   clock(13);
   EXPECT_EQ(host.log, "53000 sent, 53000 received 91 A0");
   EXPECT_EQ(device.log, "1000 selected 4000, 53000 sent 13");
   EXPECT_EQ(notes, "");
 }
 
-TEST_F(Clocked, ReaderClocksOnToCompare) {
+TEST_F(Clocked, RepeatsWordWithMoreClocks) {
   clock(26);
   EXPECT_EQ(host.log, "105000 sent, 105000 received 91 A4 8D 00");
 }
 
-TEST_F(Clocked, DeviceNoticesTooFewClocks) {
+TEST_F(Clocked, ReportsTooFewClocksToDevice) {
   clock(8);
   EXPECT_EQ(host.log, "33000 sent, 33000 received 91");
   EXPECT_EQ(notes, "too few clocks: 8");
@@ -249,7 +249,7 @@ struct Can : testing::Test {
   }
 };
 
-TEST_F(Can, StartCommandThenCyclicFramesByArbitration) {
+TEST_F(Can, ArbitratesCyclicFramesByIdentifier) {
   CanToy high(cyclic(0x121, 0xB0));
   // begins at the same nanosecond, comes later in the list of nodes, and wins the arbitration
   CanToy low(cyclic(0x120, 0xA0));
@@ -264,7 +264,7 @@ TEST_F(Can, StartCommandThenCyclicFramesByArbitration) {
   EXPECT_EQ(high.log, "240000 received 200:01, 1472000 received 120:A0, 1696000 sent, 2472000 received 120:A0");
 }
 
-TEST_F(Can, SameIdentifierWithOtherDataIsALineError) {
+TEST_F(Can, ReportsErrorForSameIdentifierWithOtherData) {
   CanToy one(cyclic(0x120, 0xA0));
   CanToy two(cyclic(0x120, 0xA1));
   CanToy host;
@@ -276,7 +276,7 @@ TEST_F(Can, SameIdentifierWithOtherDataIsALineError) {
   for (CanToy* device : {&one, &two}) EXPECT_EQ(device->log, "240000 received 200:01, 1472000 error, 1472000 sent");
 }
 
-TEST_F(Can, StandardFrameWinsAgainstExtendedOneWithTheSameBeginning) {
+TEST_F(Can, StandardFrameWinsOverExtendedFrameWithSamePrefix) {
   CanToy extended;
   extended.send({CanFrame{.id = 0x120u << 18, .extended = true}}, microseconds(10));
   CanToy standard;
@@ -288,7 +288,7 @@ TEST_F(Can, StandardFrameWinsAgainstExtendedOneWithTheSameBeginning) {
 }
 
 // (f) A pulse on a separate wire requests each frame: 10 us wide, the reply begins 30 us after its edge.
-TEST(Trigger, PulseBeforeEachFrame) {
+TEST(Trigger, RequestsEachFrameWithLongEnoughPulse) {
   sim::Line<Byte> line(LinkKind::half_duplex, {.rate = 1'000'000});
   ByteToy device([](ByteToy& self, const Event<Byte>& event) {
     if (event.kind == Kind::triggered && event.width >= microseconds(10))
@@ -298,7 +298,8 @@ TEST(Trigger, PulseBeforeEachFrame) {
     toy.push({.kind = Step<Byte>::Kind::pulse, .wire = ExtraWire::trigger, .at = at, .width = width});
   };
   ByteToy host([&](ByteToy& self, const Event<Byte>& event) {
-    if (event.kind == Kind::received) pulse(self, event.at + microseconds(60), microseconds(9));  // too short
+    // a pulse that is too short
+    if (event.kind == Kind::received) pulse(self, event.at + microseconds(60), microseconds(9));
     if (event.kind == Kind::silence) self.finish();
   });
   host.idle.answer = microseconds(40);
@@ -335,11 +336,11 @@ struct BaudChange : testing::Test {
   }
 };
 
-TEST_F(BaudChange, TalkGoesOn) {
+TEST_F(BaudChange, ContinuesIfBothEndsFollow) {
   EXPECT_EQ(talk(true), "10000 sent, 25000 received 19, 35000 sent, 45000 received 01");
 }
 
-TEST_F(BaudChange, ParityAndStopBitsAreNotItsBusiness) {
+TEST_F(BaudChange, KeepsParityAndStopBits) {
   const LineSettings with_parity{.rate = 1'000'000, .parity = Parity::odd, .stop_bits = 2};
   sim::Line<Byte> parity_line{LinkKind::half_duplex, with_parity};
   ByteToy follows([this](ByteToy& self, const Event<Byte>& event) {
@@ -356,7 +357,7 @@ TEST_F(BaudChange, ParityAndStopBitsAreNotItsBusiness) {
   EXPECT_EQ(listens.log, "12000 error, 18000 received 01");
 }
 
-TEST_F(BaudChange, HostThatDoesNotFollowGetsLineErrors) {
+TEST_F(BaudChange, ReportsLineErrorsIfHostDoesNotFollow) {
   EXPECT_EQ(talk(false), "10000 sent, 25000 received 19, 40000 sent, 50000 error");
   EXPECT_EQ(device.log, "10000 received 19, 25000 sent, 40000 error");
 }
@@ -383,21 +384,21 @@ struct Collision : testing::Test {
   }
 };
 
-TEST_F(Collision, BytesAreTheAnd) {
+TEST_F(Collision, DeliversBitwiseAnd) {
   EXPECT_EQ(ask(answer({0xF3, 0x0F}, microseconds(3)), answer({0x35}, microseconds(3)), false),
             "11000 sent, 24000 received 31, 34000 received 0F");
 }
 
-TEST_F(Collision, OverlapInTheMiddleOfACharacter) {
+TEST_F(Collision, DeliversAndOfPartlyOverlappingCharacters) {
   EXPECT_EQ(ask(answer({0xF3, 0x7E}, microseconds(3)), answer({0x3D}, microseconds(7)), false),
             "11000 sent, 24000 received 31, 34000 received 3C");
 }
 
-TEST_F(Collision, EchoComesBeforeSent) {
+TEST_F(Collision, DeliversEchoBeforeSent) {
   EXPECT_EQ(ask(answer({0x07}, microseconds(3)), {}, true), "11000 received 1A, 11000 sent, 24000 received 07");
 }
 
-TEST_F(Collision, DeviceHearsARequestDuringItsOwnTransmission) {
+TEST_F(Collision, DeviceReceivesWhileSending) {
   ByteToy device(answer({0x01, 0x02, 0x03}, microseconds(3)));
   ByteToy host([](ByteToy& self, const Event<Byte>& event) {
     if (event.kind == Kind::received && event.items[0] == 0x01) self.send({0x77}, event.at + microseconds(4));
@@ -409,7 +410,7 @@ TEST_F(Collision, DeviceHearsARequestDuringItsOwnTransmission) {
   EXPECT_EQ(device.log, "10000 received 1A, 37000 received 02, 43000 sent");
 }
 
-TEST_F(Collision, TransferDuringOnesOwnTransferIsABugOfTheMachine) {
+TEST_F(Collision, RejectsTransferDuringTransfer) {
   ByteToy host;
   host.send({0x01});
   host.send({0x02});

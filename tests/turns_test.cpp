@@ -25,15 +25,15 @@ using Settings = std::vector<OptionText>;
 struct Case {
   const Unit* unit;
   std::string_view model{};
-  Settings encoder{};  // options of the virtual encoder
-  Settings known{};    // options that the host uses
+  Settings encoder_options{};  // options of the virtual encoder
+  Settings host_options{};     // options that the host uses
   Take take = Take::newest;
   unsigned turn_bits = 0;  // turn bits that the encoder really counts
 };
 
 void PrintTo(const Case& one, std::ostream* out) {
   *out << one.unit->id << " " << one.model;
-  for (const OptionText& setting : one.encoder) *out << " " << setting.name << "=" << setting.value;
+  for (const OptionText& setting : one.encoder_options) *out << " " << setting.name << "=" << setting.value;
   if (one.take == Take::every) *out << " every";
 }
 
@@ -51,8 +51,10 @@ std::vector<Case> cases() {
       all.push_back({.unit = unit, .model = model.name, .turn_bits = turns});
     }
   }
-  const auto add = [&](std::string_view unit, const Settings& encoder, const Settings& known, Take take) {
-    all.push_back({.unit = find_unit(unit), .encoder = encoder, .known = known, .take = take});
+  const auto add = [&](std::string_view unit, const Settings& encoder_options, const Settings& host_options,
+                       Take take) {
+    all.push_back(
+        {.unit = find_unit(unit), .encoder_options = encoder_options, .host_options = host_options, .take = take});
   };
   // The identity says that the encoder counts no turns. Without an option the host would expect 16 bits of turns.
   for (const std::string_view unit : {"encolink", "encolink-spi"})
@@ -69,8 +71,8 @@ std::vector<Case> cases() {
 
 /// A shaft that turns at a constant speed. It stands still for the first millisecond, because some encoders must be
 /// switched on at rest.
-struct Spinning final : Shaft {
-  explicit Spinning(double speed) : rpm(speed) {}
+struct SpinningShaft final : Shaft {
+  explicit SpinningShaft(double speed) : rpm(speed) {}
   [[nodiscard]] ShaftState at(Time time) const override {
     const double turned = rpm / 60 * std::chrono::duration<double>(std::max(time - Time(1ms), Time{})).count();
     const auto position = (std::int64_t{7} << 32) + static_cast<std::int64_t>(std::ldexp(turned, 32));
@@ -81,15 +83,15 @@ struct Spinning final : Shaft {
 
 /// A turning virtual encoder with the host session that reads it.
 template <class Item>
-class Bench {
+class TurningEncoder {
  public:
-  Bench(const Case& one, double rpm)
+  TurningEncoder(const Case& one, double rpm)
       : case_(one),
         shaft_(rpm),
-        known_(options_of(*one.unit, one.model, one.known)),
+        known_(options_of(*one.unit, one.model, one.host_options)),
         device_storage_(one.unit->device_storage),
         host_storage_(one.unit->host_storage) {
-    const Options built = options_of(*one.unit, one.model, one.encoder);
+    const Options built = options_of(*one.unit, one.model, one.encoder_options);
     device_ = one.unit->device(built, shaft_, device_storage_).template of<Item>();
     device_->power_on(Time{}, Device<Item>::PowerOn::skip);
     const LineSettings line = line_settings(*one.unit, built);
@@ -109,20 +111,20 @@ class Bench {
     EXPECT_EQ(reading->multiturn_bits, case_.turn_bits);
     const std::int64_t before = unwrapper_.position();
     const Joined joined = unwrapper_.add(*reading);
-    const std::int64_t place = shaft_.at(reading->latched).position;
+    const std::int64_t shaft_position = shaft_.at(reading->latched).position;
     if (joined == Joined::continued) {
-      const double way =
+      const double distance =
           std::ldexp(static_cast<double>(unwrapper_.position() - before), -int(reading->singleturn_bits));
-      const double truth = std::ldexp(static_cast<double>(place - place_), -32);
-      EXPECT_NEAR(way, truth, 0.45);
+      const double truth = std::ldexp(static_cast<double>(shaft_position - last_shaft_position_), -32);
+      EXPECT_NEAR(distance, truth, 0.45);
     }
-    place_ = place;
+    last_shaft_position_ = shaft_position;
     return joined;
   }
 
  private:
   const Case& case_;
-  Spinning shaft_;
+  SpinningShaft shaft_;
   Options known_;
   std::vector<std::byte> device_storage_;
   std::vector<std::byte> host_storage_;
@@ -130,13 +132,13 @@ class Bench {
   std::unique_ptr<sim::SimPort<Item>> port_;
   std::unique_ptr<Session<Item>> session_;
   Unwrapper unwrapper_;
-  std::int64_t place_ = 0;
+  std::int64_t last_shaft_position_ = 0;
 };
 
 // For a linear encoder the measuring range replaces the revolution: its speed in metres per second is the value of
 // `rpm` / 1000.
 double speed_of(const Case& one, double rpm) {
-  const Resolution resolution = one.unit->resolution(options_of(*one.unit, one.model, one.known));
+  const Resolution resolution = one.unit->resolution(options_of(*one.unit, one.model, one.host_options));
   if (resolution.unit_um == 0) return rpm;
   return 60 * rpm * 1000 / std::ldexp(resolution.unit_um, static_cast<int>(resolution.singleturn_bits));
 }
@@ -144,9 +146,9 @@ double speed_of(const Case& one, double rpm) {
 class Turns : public ::testing::TestWithParam<Case> {
  protected:
   template <class Item>
-  void follow() {
+  void read_across_pauses() {
     for (const double rpm : {60.0, -600.0, 600.0, 6000.0, -6000.0}) {
-      Bench<Item> bench(GetParam(), speed_of(GetParam(), rpm));
+      TurningEncoder<Item> bench(GetParam(), speed_of(GetParam(), rpm));
       bench.pause(2ms);
       for (const Time pause : {Time(100ms), Time(310ms), Time(1040ms), Time(2500ms), Time(10s)}) {
         SCOPED_TRACE(std::to_string(rpm) + " rpm, " + std::to_string(pause / 1ms) + " ms");
@@ -166,11 +168,11 @@ class Turns : public ::testing::TestWithParam<Case> {
   }
 };
 
-TEST_P(Turns, AreNeverWrongAcrossAPause) {
+TEST_P(Turns, ContinuesAcrossPauseOnlyIfCorrect) {
   if (GetParam().unit->link == LinkKind::can) {
-    follow<CanFrame>();
+    read_across_pauses<CanFrame>();
   } else {
-    follow<std::uint8_t>();
+    read_across_pauses<std::uint8_t>();
   }
 }
 

@@ -39,8 +39,8 @@ const std::vector<std::vector<Configuration>>& all_configurations() {
   return all;
 }
 
-Held as_frame(const Unit& unit, Bytes bytes) {
-  Held frame{.link = unit.link};
+OwnedFrame as_frame(const Unit& unit, Bytes bytes) {
+  OwnedFrame frame{.link = unit.link};
   if (bytes.empty()) return frame;
   frame.bytes.assign(bytes.begin(), bytes.end());
   if (unit.link == LinkKind::clocked) frame.bits = 8 * bytes.size() - (bytes.back() & 7);
@@ -54,8 +54,8 @@ Held as_frame(const Unit& unit, Bytes bytes) {
 // With an error no field may be reported; a good frame must report at least one.
 void decode(const Unit& unit, const Options& options, Bytes input) {
   for (std::size_t split = 0; split <= input.size() && split <= 16; ++split) {
-    const Held request = as_frame(unit, input.first(split));
-    const Held reply = as_frame(unit, input.subspan(split));
+    const OwnedFrame request = as_frame(unit, input.first(split));
+    const OwnedFrame reply = as_frame(unit, input.subspan(split));
     Fields fields;
     const Error error = unit.decode(options, request.frame(), reply.frame(), fields);
     require((error == Error::none) == (fields.count > 0) && fields.readings <= (error == Error::none ? 1u : 0u));
@@ -188,8 +188,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   if (size < 3) return 0;
   const std::size_t number = data[0] % all_units().size();
   const Unit& unit = *all_units()[number];
-  const std::vector<Configuration>& ways = all_configurations()[number];
-  const Options& options = ways[data[1] % ways.size()].options;
+  const std::vector<Configuration>& setups = all_configurations()[number];
+  const Options& options = setups[data[1] % setups.size()].options;
   const Command& command = unit.commands[data[2] % unit.commands.size()];
   const Bytes input(data + 3, size - 3);
   decode(unit, options, input);

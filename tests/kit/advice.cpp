@@ -14,7 +14,7 @@ namespace {
 // ---- Commands named in a text
 
 /// A command line quoted in a text.
-struct Named {
+struct NamedCommand {
   std::string text;                  // for example "absenc run ... reset"
   const Command* command = nullptr;  // the unit's command; null if valid for every unit or `unknown`
   bool unknown = false;
@@ -64,12 +64,12 @@ const Command* find_named(const Unit& unit, std::string_view words) {
   return found != nullptr && gets != (found->verb == Verb::config_get) ? nullptr : found;
 }
 
-std::vector<Named> commands_in(const Unit& unit, std::string_view text) {
+std::vector<NamedCommand> commands_in(const Unit& unit, std::string_view text) {
   constexpr std::string_view tool = "absenc ";
-  std::vector<Named> all;
+  std::vector<NamedCommand> all;
   for (std::size_t begin = text.find('`'); begin != std::string_view::npos; begin = text.find('`', begin)) {
     const std::size_t end = text.find('`', begin + 1);
-    Named one{.text = std::string(text.substr(begin + 1, end - begin - 1))};
+    NamedCommand one{.text = std::string(text.substr(begin + 1, end - begin - 1))};
     const std::string_view words = std::string_view(one.text).substr(std::min(tool.size(), one.text.size()));
     one.command = find_named(unit, words);
     const bool for_all = std::find(for_all_units.begin(), for_all_units.end(), words) != for_all_units.end();
@@ -94,7 +94,7 @@ std::string unquoted(std::string_view text) {
 // ---- Rules for every advice
 
 /// Phrases that send the reader back to the alarms which the advice explains.
-constexpr auto circular =
+constexpr auto circular_phrases =
     std::to_array<std::string_view>({"read the alarms", "look at the alarms", "the other alarms", "see the alarms"});
 
 /// Checks one advice. `what` names the alarm or error that it belongs to.
@@ -102,7 +102,7 @@ void check_words(const Unit& unit, const std::string& what, std::string_view adv
   const auto require = [&](bool holds, std::string_view text) {
     findings.require(holds, [&] { return what + " is advised \"" + std::string(advice) + "\": " + std::string(text); });
   };
-  for (const Named& one : commands_in(unit, advice)) {
+  for (const NamedCommand& one : commands_in(unit, advice)) {
     require(!one.unknown, "`" + one.text + "` is no command of this unit, or not written \"absenc ...\"");
   }
   const std::string rest = unquoted(advice);
@@ -111,7 +111,8 @@ void check_words(const Unit& unit, const std::string& what, std::string_view adv
     const bool is_word = command.name.find('-') == std::string_view::npos;
     require(is_word || rest.find(command.name) == std::string::npos, "a command that it names is not in backquotes");
   }
-  for (const std::string_view words : circular) require(rest.find(words) == std::string::npos, "that is circular");
+  for (const std::string_view words : circular_phrases)
+    require(rest.find(words) == std::string::npos, "that is circular");
 }
 
 /// Splits a message into lower-case clauses at ": " and "; ".
@@ -132,21 +133,21 @@ std::vector<std::string> clauses_of(std::string_view text) {
 // ---- Alarms and status
 
 template <class Item>
-class Sick {
+class AlarmedEncoder {
  public:
-  Sick(const Unit& unit, const Configuration& way, std::uint32_t alarms)
-      : unit_(unit), alarms_(alarms), world_(unit, way.options, 1) {
+  AlarmedEncoder(const Unit& unit, const Configuration& configuration, std::uint32_t alarms)
+      : unit_(unit), alarms_(alarms), world_(unit, configuration.options, 1) {
     if (world_.made()) world_.device().raise_alarms(alarms);
   }
   [[nodiscard]] bool made() const { return world_.made(); }
   [[nodiscard]] World<Item>& world() { return world_; }
-  [[nodiscard]] Ended read() {
+  [[nodiscard]] ConversationResult read() {
     const Command& command = *find_command(unit_, Verb::read);
     return world_.run(command, least_arguments(command));
   }
   /// Returns whether the reading shows every alarm that this encoder has raised.
-  [[nodiscard]] bool is_ill() {
-    const Ended now = read();
+  [[nodiscard]] bool shows_alarms() {
+    const ConversationResult now = read();
     return now.seen.reading && (now.seen.reading->alarms & alarms_) == alarms_;
   }
 
@@ -157,31 +158,32 @@ class Sick {
 };
 
 // Returns whether the command's result has a field that the reading lacks.
-bool tells_more(const Seen& told, const Seen& reading) {
-  return std::any_of(told.fields.begin(), told.fields.end(),
+bool reports_more(const ReportedFields& result, const ReportedFields& reading) {
+  return std::any_of(result.fields.begin(), result.fields.end(),
                      [&](const auto& field) { return !reading.fields.contains(field.first); });
 }
 
 /// Runs the commands that this alarm's advice names, in order. Returns whether the alarm has ended.
 template <class Item>
-bool follow_advice(const Unit& unit, const Configuration& way, std::size_t bit, Findings& findings) {
+bool follow_advice(const Unit& unit, const Configuration& configuration, std::size_t bit, Findings& findings) {
   const FlagInfo& flag = unit.alarms->flags[bit];
-  const std::vector<Named> named = commands_in(unit, flag.action);
-  Sick<Item> sick(unit, way, std::uint32_t{1} << bit);
-  if (!sick.made() || !sick.is_ill()) return false;
-  const Seen before = sick.read().seen;
+  const std::vector<NamedCommand> named = commands_in(unit, flag.action);
+  AlarmedEncoder<Item> alarmed(unit, configuration, std::uint32_t{1} << bit);
+  if (!alarmed.made() || !alarmed.shows_alarms()) return false;
+  const ReportedFields before = alarmed.read().seen;
   bool explained = false;
-  bool told_more = false;
-  for (const Named& one : named) {
+  bool reported_more = false;
+  for (const NamedCommand& one : named) {
     if (one.command == nullptr) continue;
-    const Ended ended = sick.world().run(*one.command, least_arguments(*one.command));
+    const ConversationResult ended = alarmed.world().run(*one.command, least_arguments(*one.command));
     explained = explained || (!ended.good() && !ended.detail.empty());
-    told_more = told_more || (ended.good() && !one.command->changes_encoder && tells_more(ended.seen, before));
+    reported_more =
+        reported_more || (ended.good() && !one.command->changes_encoder && reports_more(ended.seen, before));
   }
-  sick.world().pass(std::chrono::seconds(1));  // the encoder may be writing its memory
-  const bool gone = !sick.is_ill();
-  findings.require(named.empty() || gone || explained || told_more, [&] {
-    return way.text + ", alarm " + std::string(flag.name) + ": whoever does \"" + std::string(flag.action) +
+  alarmed.world().pass(std::chrono::seconds(1));  // the encoder may be writing its memory
+  const bool gone = !alarmed.shows_alarms();
+  findings.require(named.empty() || gone || explained || reported_more, [&] {
+    return configuration.text + ", alarm " + std::string(flag.name) + ": whoever does \"" + std::string(flag.action) +
            "\" changes nothing, and is not told why";
   });
   return gone;
@@ -192,14 +194,14 @@ void check_alarms(const Unit& unit, Findings& findings) {
   for (std::size_t bit = 0; unit.alarms != nullptr && bit < unit.alarms->flags.size(); ++bit) {
     const FlagInfo& flag = unit.alarms->flags[bit];
     if (flag.name.empty()) continue;
-    const std::vector<Named> named = commands_in(unit, flag.action);
+    const std::vector<NamedCommand> named = commands_in(unit, flag.action);
     const std::string what = "alarm " + std::string(flag.name);
     findings.require(flag.action != read_the_alarms, [&] { return what + " sends to the alarms, among which it is"; });
     bool goes_once = false;
-    for (const Configuration& way : configurations(unit)) {
-      if (way.is_model) goes_once = follow_advice<Item>(unit, way, bit, findings) || goes_once;
+    for (const Configuration& configuration : configurations(unit)) {
+      if (configuration.is_model) goes_once = follow_advice<Item>(unit, configuration, bit, findings) || goes_once;
     }
-    const bool should_go = std::any_of(named.begin(), named.end(), [](const Named& one) {
+    const bool should_go = std::any_of(named.begin(), named.end(), [](const NamedCommand& one) {
       return one.command != nullptr && one.command->changes_encoder;
     });
     findings.require(goes_once || !should_go, [&] { return what + " stays whatever is done of its advice"; });
@@ -208,18 +210,18 @@ void check_alarms(const Unit& unit, Findings& findings) {
 
 /// Checks that a reading whose status flag refers to the alarms reports an alarm.
 template <class Item>
-void check_status(const Unit& unit, const Configuration& way, Findings& findings) {
+void check_status(const Unit& unit, const Configuration& configuration, Findings& findings) {
   if (unit.alarms == nullptr || unit.status == nullptr) return;
   for (std::size_t alarm = 0; alarm < unit.alarms->flags.size(); ++alarm) {
     if (unit.alarms->flags[alarm].name.empty()) continue;
-    Sick<Item> sick(unit, way, std::uint32_t{1} << alarm);
-    if (!sick.made()) return;
-    const std::optional<Reading> reading = sick.read().seen.reading;
+    AlarmedEncoder<Item> alarmed(unit, configuration, std::uint32_t{1} << alarm);
+    if (!alarmed.made()) return;
+    const std::optional<Reading> reading = alarmed.read().seen.reading;
     for (std::size_t bit = 0; reading && bit < unit.status->flags.size(); ++bit) {
       const FlagInfo& flag = unit.status->flags[bit];
       if ((reading->status >> bit & 1) == 0 || flag.action != read_the_alarms) continue;
       findings.require(reading->alarms != 0, [&] {
-        return way.text + ", status " + std::string(flag.name) + " sends to the alarms, and there is none";
+        return configuration.text + ", status " + std::string(flag.name) + " sends to the alarms, and there is none";
       });
     }
   }
@@ -227,22 +229,22 @@ void check_status(const Unit& unit, const Configuration& way, Findings& findings
 
 // ---- Errors
 
-void check_message(const Unit& unit, const std::string& what, const Command& command, const Ended& ended,
+void check_message(const Unit& unit, const std::string& what, const Command& command, const ConversationResult& ended,
                    Findings& findings) {
   const ErrorText& text = text_of(ended.error);
   const bool callers_fault = ended.error <= Error::buffer_too_small;
   const std::string advice = ended.advice.empty() && !callers_fault ? std::string(text.advice) : ended.advice;
   check_words(unit, what, advice, findings);
-  const std::vector<Named> named = commands_in(unit, advice);
+  const std::vector<NamedCommand> named = commands_in(unit, advice);
   findings.require(named.empty() || named[0].command != &command || !advice.starts_with('`'),
                    [&] { return what + ": the advice is only to do the same again"; });
   findings.require(!command.changes_encoder || advice.find("read again") == std::string::npos,
                    [&] { return what + ": \"read again\" is no advice of a command that changes the encoder"; });
-  std::set<std::string> said;
+  std::set<std::string> seen_clauses;
   for (const std::string_view part :
        {std::string_view(text.description), std::string_view(ended.detail), std::string_view(advice)}) {
     for (const std::string& clause : clauses_of(part)) {
-      findings.require(clause.size() < 12 || said.insert(clause).second,
+      findings.require(clause.size() < 12 || seen_clauses.insert(clause).second,
                        [&] { return what + " says twice \"" + clause + "\""; });
     }
   }
@@ -250,7 +252,7 @@ void check_message(const Unit& unit, const std::string& what, const Command& com
 
 /// Calls `use(name, spoil)` for each problem that an encoder can have: alarms, conditions and line faults.
 template <class Item, class Use>
-void each_trouble(const Unit& unit, Use use) {
+void for_each_problem(const Unit& unit, Use use) {
   use(std::string("nothing"), [](World<Item>&) {});
   use(std::string("all alarms"), [](World<Item>& world) { world.device().raise_alarms(~std::uint32_t{0}); });
   for (std::size_t i = 0; i < unit.conditions.size(); ++i) {
@@ -271,18 +273,19 @@ void each_trouble(const Unit& unit, Use use) {
 
 // Time limit of one conversation. A host that polls ten thousand times a second is slow to simulate, and a failure
 // shows early.
-constexpr Time patience = std::chrono::milliseconds(100);
+constexpr Time time_limit = std::chrono::milliseconds(100);
 
 template <class Item>
-void check_errors(const Unit& unit, const Configuration& way, Findings& findings) {
-  each_trouble<Item>(unit, [&](const std::string& trouble, const auto& spoil) {
+void check_errors(const Unit& unit, const Configuration& configuration, Findings& findings) {
+  for_each_problem<Item>(unit, [&](const std::string& problem, const auto& spoil) {
     for (const Command& command : unit.commands) {
-      World<Item> world(unit, way.options, 1);
+      World<Item> world(unit, configuration.options, 1);
       if (!world.made()) return;
       spoil(world);
-      const Ended ended = world.run(command, least_arguments(command), patience);
+      const ConversationResult ended = world.run(command, least_arguments(command), time_limit);
       if (!ended.made || !ended.ended || ended.error == Error::none) continue;
-      check_message(unit, way.text + ", " + trouble + ", " + std::string(command.name), command, ended, findings);
+      check_message(unit, configuration.text + ", " + problem + ", " + std::string(command.name), command, ended,
+                    findings);
     }
   });
 }
@@ -293,21 +296,21 @@ void check_explanations(const Unit& unit, Findings& findings) {
   for (const Vector& vector : unit.vectors) {
     const std::optional<Options> options = options_of(unit, vector.options);
     if (vector.error == Error::none || !options) continue;
-    const Held request = held(unit, vector.request);
-    const Held reply = held(unit, vector.reply);
-    const Explanation said = unit.explain(*options, vector.error, request.frame(), reply.frame());
-    check_words(unit, std::string(vector.id), said.advice, findings);
+    const OwnedFrame request = frame_of(unit, vector.request);
+    const OwnedFrame reply = frame_of(unit, vector.reply);
+    const Explanation seen_clauses = unit.explain(*options, vector.error, request.frame(), reply.frame());
+    check_words(unit, std::string(vector.id), seen_clauses.advice, findings);
   }
 }
 
 template <class Item>
 void check_all(const Unit& unit, Findings& findings) {
   check_alarms<Item>(unit, findings);
-  const std::vector<Configuration> ways = configurations(unit);
-  for (const Configuration& way : ways) {
-    if (way.is_model) check_status<Item>(unit, way, findings);
+  const std::vector<Configuration> setups = configurations(unit);
+  for (const Configuration& configuration : setups) {
+    if (configuration.is_model) check_status<Item>(unit, configuration, findings);
   }
-  check_errors<Item>(unit, ways.front(), findings);
+  check_errors<Item>(unit, setups.front(), findings);
 }
 
 }  // namespace

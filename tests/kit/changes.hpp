@@ -48,7 +48,7 @@ namespace absenc::kit {
 /// Applies the new setting to the host as well, for a setting (such as a baud rate or an address) that the host needs
 /// to reach the encoder.
 template <class Item>
-void follow(World<Item>& world, const Unit& unit, const Command& setter, Arguments arguments) {
+void apply_to_host(World<Item>& world, const Unit& unit, const Command& setter, Arguments arguments) {
   if (setter.changes_option.empty()) return;
   Options options = world.options();
   for (std::size_t i = 0; i < unit.options.size(); ++i) {
@@ -67,8 +67,8 @@ void follow(World<Item>& world, const Unit& unit, const Command& setter, Argumen
 /// Runs the command up to four times until it succeeds. A session repeats it too, because an unsolicited frame of the
 /// encoder may interrupt it.
 template <class Item>
-Ended run_repeated(World<Item>& world, const Command& command, Arguments arguments) {
-  Ended result = world.run(command, arguments);
+ConversationResult run_repeated(World<Item>& world, const Command& command, Arguments arguments) {
+  ConversationResult result = world.run(command, arguments);
   for (unsigned more = 0; more < 3 && result.made && !result.good(); ++more) {
     world.pass(std::chrono::microseconds(700));
     result = world.run(command, arguments);
@@ -78,13 +78,13 @@ Ended run_repeated(World<Item>& world, const Command& command, Arguments argumen
 
 /// Returns the fields that the setting's getter reports, or nothing if the setting cannot be read.
 template <class Item>
-Seen read_setting(World<Item>& world, const Unit& unit, const Command& setter) {
+ReportedFields read_setting(World<Item>& world, const Unit& unit, const Command& setter) {
   const Command* getter = find_command(unit, setter.reads_back);
-  return getter == nullptr ? Seen{} : run_repeated(world, *getter, least_arguments(*getter)).seen;
+  return getter == nullptr ? ReportedFields{} : run_repeated(world, *getter, least_arguments(*getter)).seen;
 }
 
 /// Returns whether any field has this value, as a number or as text.
-[[nodiscard]] inline bool shows(const Seen& seen, std::int64_t value) {
+[[nodiscard]] inline bool shows(const ReportedFields& seen, std::int64_t value) {
   return std::any_of(seen.fields.begin(), seen.fields.end(), [&](const auto& field) {
     return field.second.number == value || field.second.bytes == std::to_string(value);
   });
@@ -94,7 +94,7 @@ Seen read_setting(World<Item>& world, const Unit& unit, const Command& setter) {
 /// line must have no faults.
 template <class Item>
 std::string broken_promise(World<Item>& world, const Unit& unit, const Command& command, Values values,
-                           const Seen& written) {
+                           const ReportedFields& written) {
   const Command* read = find_command(unit, Verb::read);
   const auto position = [&] { return world.run(*read, least_arguments(*read)).seen.reading; };
   switch (command.verb) {
@@ -118,11 +118,11 @@ std::string broken_promise(World<Item>& world, const Unit& unit, const Command& 
     case Verb::memory_write: {
       const Command* reader = find_command(unit, Verb::memory_read);
       if (reader == nullptr) return {};
-      Values asked = least_arguments(*reader);
+      Values read_arguments = least_arguments(*reader);
       for (const Role role : {Role::address, Role::page}) {
-        if (std::int64_t* one = argument(*reader, asked, role)) *one = *argument(command, values, role);
+        if (std::int64_t* one = argument(*reader, read_arguments, role)) *one = *argument(command, values, role);
       }
-      const Ended now = world.run(*reader, asked);
+      const ConversationResult now = world.run(*reader, read_arguments);
       if (!now.good()) return "it cannot be read: " + std::string(text_of(now.error).name);
       const std::int64_t byte = *argument(command, values, Role::value);
       const bool is = std::any_of(now.seen.fields.begin(), now.seen.fields.end(), [&](const auto& field) {
@@ -133,7 +133,7 @@ std::string broken_promise(World<Item>& world, const Unit& unit, const Command& 
       return is ? "" : "the byte is " + to_text(now.seen.fields);
     }
     case Verb::config_set: {
-      const Seen now = read_setting(world, unit, command);
+      const ReportedFields now = read_setting(world, unit, command);
       if (!command.reads_back.empty() && now.fields.empty()) return "it cannot be read";
       for (const auto& [name, value] : now.fields) {
         // A numbered field is one of several frames, and a position field depends on the shaft: neither must match.
@@ -142,8 +142,8 @@ std::string broken_promise(World<Item>& world, const Unit& unit, const Command& 
         if (found != written.fields.end() && !(found->second == value)) return name + " reads as another";
       }
       // Text in place of a number means that the encoder cannot report this setting.
-      const auto told = now.fields.find(std::string(command.reads_back));
-      const bool in_words = told != now.fields.end() && !told->second.bytes.empty();
+      const auto setting = now.fields.find(std::string(command.reads_back));
+      const bool in_words = setting != now.fields.end() && !setting->second.bytes.empty();
       if (!now.fields.empty() && !values.empty() && !in_words && !shows(now, values[0])) {
         return "what is read does not show it: " + to_text(now.fields);
       }

@@ -23,20 +23,20 @@ bool is_refused(const Command& command, Error error) {
 // Runs every command that does not change the encoder. An unusual option (such as a reply time of one second) may make
 // a command fail, but must never make its result wrong.
 template <class Item>
-void run_commands(const Unit& unit, const Configuration& way, Findings& findings) {
+void run_commands(const Unit& unit, const Configuration& configuration, Findings& findings) {
   sim::Random random(7);
   for (const Command& command : unit.commands) {
     if (command.changes_encoder) continue;
-    World<Item> world(unit, way.options, 1);
+    World<Item> world(unit, configuration.options, 1);
     if (!world.made()) return;
-    const auto what = [&] { return way.text + ", " + std::string(command.name) + ": "; };
+    const auto what = [&] { return configuration.text + ", " + std::string(command.name) + ": "; };
     for (unsigned i = 0; i < (command.verb == Verb::read ? 10 : 1); ++i) {
       world.move(static_cast<std::int64_t>(random.next()));
-      const Ended result = world.run(command, least_arguments(command));
+      const ConversationResult result = world.run(command, least_arguments(command));
       if (!result.made) break;
       findings.require(result.ended, [&] { return what() + "hangs"; });
-      findings.require(!result.unfounded, [&] { return what() + "has a reading of nothing"; });
-      const bool may_fail = !way.is_model || !is_plain(command) || is_refused(command, result.error);
+      findings.require(!result.premature_reading, [&] { return what() + "has a reading of nothing"; });
+      const bool may_fail = !configuration.is_model || !is_plain(command) || is_refused(command, result.error);
       findings.require(result.good() || may_fail,
                        [&] { return what() + std::string(text_of(result.error).name) + " " + result.detail; });
       if (!result.good()) break;
@@ -52,7 +52,7 @@ void run_commands(const Unit& unit, const Configuration& way, Findings& findings
         findings.require(command.verb != Verb::read, [&] { return what() + "has no reading"; });
       }
     }
-    findings.require(world.device().violation_count() == 0 || !way.is_model, [&] {
+    findings.require(world.device().violation_count() == 0 || !configuration.is_model, [&] {
       return what() + "the host broke a rule: " + std::string(world.device().violations()[0].rule);
     });
   }
@@ -62,11 +62,11 @@ void run_commands(const Unit& unit, const Configuration& way, Findings& findings
 
 Findings check_commands(const Unit& unit) {
   Findings findings;
-  for (const Configuration& way : configurations(unit)) {
+  for (const Configuration& configuration : configurations(unit)) {
     if (unit.link == LinkKind::can) {
-      run_commands<CanFrame>(unit, way, findings);
+      run_commands<CanFrame>(unit, configuration, findings);
     } else {
-      run_commands<std::uint8_t>(unit, way, findings);
+      run_commands<std::uint8_t>(unit, configuration, findings);
     }
   }
   return findings;

@@ -14,10 +14,10 @@ constexpr std::int64_t some_turns = 0x5'6000'0000;  // 5.375 turns in units of 2
 
 /// A virtual encoder with one condition set, and the host that reads it.
 template <class Item>
-class Setting {
+class ConditionedEncoder {
  public:
-  Setting(const Unit& unit, const Configuration& way, std::size_t condition, std::int64_t value)
-      : world_(unit, way.options, 1) {
+  ConditionedEncoder(const Unit& unit, const Configuration& configuration, std::size_t condition, std::int64_t value)
+      : world_(unit, configuration.options, 1) {
     if (!made()) return;
     world_.device().set_condition(condition, value, now());
     move();
@@ -34,7 +34,7 @@ class Setting {
   }
   void raise(std::uint32_t alarms) { world_.device().raise_alarms(alarms); }
   [[nodiscard]] std::string ask(const Command& command) {
-    const Ended result = world_.run(command, least_arguments(command));
+    const ConversationResult result = world_.run(command, least_arguments(command));
     return std::string(text_of(result.error).name) + " " + to_text(result.seen.fields);
   }
 
@@ -55,36 +55,36 @@ std::uint32_t all_alarms(const Unit& unit) {
 // Returns whether two encoders ever report different results when both are treated equally: at once, after a power
 // cycle, with all alarms raised, and after resets.
 template <class Item>
-bool differ(const Unit& unit, Setting<Item>&& one, Setting<Item>&& other) {
+bool reports_differ(const Unit& unit, ConditionedEncoder<Item>&& one, ConditionedEncoder<Item>&& other) {
   if (!one.made()) return false;
-  const auto asked = [&](const Command& command) { return one.ask(command) != other.ask(command); };
-  const auto seen = [&] {
+  const auto differs_after = [&](const Command& command) { return one.ask(command) != other.ask(command); };
+  const auto any_differs = [&] {
     return std::any_of(unit.commands.begin(), unit.commands.end(), [&](const Command& command) {
-      return !command.changes_encoder && command.verb != Verb::scan && asked(command);
+      return !command.changes_encoder && command.verb != Verb::scan && differs_after(command);
     });
   };
   const auto both = [&](auto&& act) {
     act(one);
     act(other);
-    return seen();
+    return any_differs();
   };
-  if (seen() || both([](auto& it) { it.lose_power(); })) return true;
+  if (any_differs() || both([](auto& it) { it.lose_power(); })) return true;
   if (both([&](auto& it) { it.raise(all_alarms(unit)); })) return true;
   return std::any_of(unit.commands.begin(), unit.commands.end(), [&](const Command& command) {
     const bool resets =
         command.verb == Verb::clear_alarms || command.verb == Verb::reset_multiturn || command.verb == Verb::zero;
-    return resets && (asked(command) || both([](auto& it) { it.move(); }));
+    return resets && (differs_after(command) || both([](auto& it) { it.move(); }));
   });
 }
 
 template <class Item>
 bool is_seen(const Unit& unit, std::size_t index) {
   const Condition& condition = unit.conditions[index];
-  const std::vector<Configuration> ways = configurations(unit);
-  return std::any_of(ways.begin(), ways.end(), [&](const Configuration& way) {
+  const std::vector<Configuration> setups = configurations(unit);
+  return std::any_of(setups.begin(), setups.end(), [&](const Configuration& configuration) {
     const auto differs = [&](std::int64_t value) {
-      return value != condition.normal &&
-             differ<Item>(unit, {unit, way, index, condition.normal}, {unit, way, index, value});
+      return value != condition.normal && reports_differ<Item>(unit, {unit, configuration, index, condition.normal},
+                                                               {unit, configuration, index, value});
     };
     return differs(condition.minimum) || differs(condition.maximum);
   });

@@ -19,7 +19,7 @@ bool takes(const Command* command, Role role, std::uint32_t least, std::uint32_t
 void declared_memory(const Unit& unit, Findings& findings) {
   const Command* reads = find_command(unit, Verb::memory_read);
   const Command* writes = find_command(unit, Verb::memory_write);
-  std::uint64_t after = 0;  // end of the previous area
+  std::uint64_t previous_end = 0;  // end of the previous area
   for (const MemoryArea& area : unit.memory) {
     const auto require = [&](bool holds, const char* text) {
       findings.require(
@@ -27,8 +27,8 @@ void declared_memory(const Unit& unit, Findings& findings) {
     };
     const std::uint32_t last = area.first + area.count - 1;
     const std::uint64_t begin = std::uint64_t{area.page} << 32 | area.first;
-    require(begin >= after, "overlaps, or is out of order");
-    after = begin + area.count;
+    require(begin >= previous_end, "overlaps, or is out of order");
+    previous_end = begin + area.count;
     require(area.count > 0, "is empty");
     require(area.writable || area.write_life == 0, "has a life though it cannot be written");
     for (const Command* command : {reads, writes}) {
@@ -129,22 +129,24 @@ void declared_roles(const Unit& unit, Findings& findings) {
   }
 }
 
-void request_of(const Unit& unit, const Configuration& way, const Command& command, const Values& values,
+void request_of(const Unit& unit, const Configuration& configuration, const Command& command, const Values& values,
                 Findings& findings) {
-  const auto what = [&] { return way.text + ", " + std::string(command.name) + to_text(Arguments(values)) + ": "; };
-  const Result<Wire> request = encoded(unit, way.options, command, values);
+  const auto what = [&] {
+    return configuration.text + ", " + std::string(command.name) + to_text(Arguments(values)) + ": ";
+  };
+  const Result<Wire> request = encoded(unit, configuration.options, command, values);
   if (!request) {
-    const bool told = request.error() == Error::unsupported || request.error() == Error::invalid_argument;
-    return findings.require(told, [&] { return what() + std::string(text_of(request.error()).name); });
+    const bool is_expected_error = request.error() == Error::unsupported || request.error() == Error::invalid_argument;
+    return findings.require(is_expected_error, [&] { return what() + std::string(text_of(request.error()).name); });
   }
   if (request->empty()) {  // the request consists of clocks only
     return findings.require(unit.link == LinkKind::clocked, [&] { return what() + "is sent without a byte"; });
   }
   Wire small(request->size() - 1);
-  findings.require(unit.encode(way.options, command, values, small).error() == Error::buffer_too_small,
+  findings.require(unit.encode(configuration.options, command, values, small).error() == Error::buffer_too_small,
                    [&] { return what() + "fits into less than it has"; });
-  Seen seen;
-  const Error error = unit.decode(way.options, held(unit, *request).frame(), {}, seen);
+  ReportedFields seen;
+  const Error error = unit.decode(configuration.options, frame_of(unit, *request).frame(), {}, seen);
   if (error == Error::invalid_argument) return;  // no encoder has this combination of options
   findings.require(error == Error::none && !seen.fields.empty(),
                    [&] { return what() + "is " + std::string(text_of(error).name); });
@@ -159,14 +161,15 @@ void request_of(const Unit& unit, const Configuration& way, const Command& comma
 }
 
 // Checks that a value outside its range, a missing argument and an extra argument are all refused.
-void refused_arguments(const Unit& unit, const Configuration& way, const Command& command, Findings& findings) {
+void refused_arguments(const Unit& unit, const Configuration& configuration, const Command& command,
+                       Findings& findings) {
   std::vector<std::byte> storage(unit.host_storage);
   const auto refused = [&](const Values& values) {
     const auto what = [&] { return std::string(command.name) + to_text(Arguments(values)) + ": "; };
-    const Result<Wire> request = encoded(unit, way.options, command, values);
+    const Result<Wire> request = encoded(unit, configuration.options, command, values);
     findings.require(!request && (request.error() == Error::invalid_argument || request.error() == Error::unsupported),
                      [&] { return what() + "has a request"; });
-    const Any<Conversation> host = unit.host(way.options, command, values, storage);
+    const Any<Conversation> host = unit.host(configuration.options, command, values, storage);
     const auto is_refused = [](const auto* made) {
       return made == nullptr || (made->error() == Error::invalid_argument || made->error() == Error::unsupported);
     };
@@ -214,15 +217,15 @@ Findings check_declarations(const Unit& unit) {
 Findings check_requests(const Unit& unit, std::uint64_t seed) {
   Findings findings;
   sim::Random random(seed);
-  for (const Configuration& way : configurations(unit)) {
-    Seen seen;
-    findings.require(unit.decode(way.options, {}, {}, seen) != Error::none,
-                     [&] { return way.text + ": nothing at all is a frame"; });
+  for (const Configuration& configuration : configurations(unit)) {
+    ReportedFields seen;
+    findings.require(unit.decode(configuration.options, {}, {}, seen) != Error::none,
+                     [&] { return configuration.text + ": nothing at all is a frame"; });
     for (const Command& command : unit.commands) {
       for (unsigned i = 0; i < (command.arguments.empty() ? 1 : 100); ++i) {
-        request_of(unit, way, command, random_arguments(command, random), findings);
+        request_of(unit, configuration, command, random_arguments(command, random), findings);
       }
-      refused_arguments(unit, way, command, findings);
+      refused_arguments(unit, configuration, command, findings);
     }
   }
   return findings;

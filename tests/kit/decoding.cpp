@@ -13,7 +13,7 @@ class Decoding {
       : unit_(unit), vector_(vector), options_(options), findings_(findings) {}
 
   void whole() {
-    Seen seen;
+    ReportedFields seen;
     const Error error = decode(reply_, seen);
     require(error == vector_.error, [&] { return "is " + std::string(text_of(error).name); });
     require(seen.fields == expected_fields(vector_), [&] { return "decodes to " + to_text(seen.fields); });
@@ -47,14 +47,14 @@ class Decoding {
   // Checks that a truncated or extended request is refused without any field.
   void good_request() {
     if (request_.empty() || request_.can || unit_.link == LinkKind::clocked) return;
-    const auto unknown = [&](const Held& request, std::string_view what) {
-      Seen seen;
+    const auto unknown = [&](const OwnedFrame& request, std::string_view what) {
+      ReportedFields seen;
       const Error error = unit_.decode(options_, request.frame(), {}, seen);
       require(error != Error::none && seen.fields.empty(),
               [&] { return "its request " + std::string(what) + " is accepted"; });
     };
     for (std::size_t size = 1; size < request_.elements(); ++size) {
-      const Held begin = request_.cut(size);
+      const OwnedFrame begin = request_.cut(size);
       const FrameEnd end = unit_.frame_end(options_, Direction::request, begin.bytes);
       if (end.kind != FrameEnd::Kind::complete) unknown(begin, "cut after " + std::to_string(size));
     }
@@ -87,19 +87,19 @@ class Decoding {
     findings_.require(holds, [&] { return std::string(vector_.id) + " " + text(); });
   }
 
-  Error decode(const Held& reply, FieldSink& sink) const {
+  Error decode(const OwnedFrame& reply, FieldSink& sink) const {
     return unit_.decode(options_, request_.frame(), reply.frame(), sink);
   }
 
   // Checks that the frame is refused and that no field or reading is reported with the error.
   template <class Text>
-  void refused(const Held& reply, Text&& text) {
-    Seen seen;
+  void refused(const OwnedFrame& reply, Text&& text) {
+    ReportedFields seen;
     const Error error = decode(reply, seen);
     require(error != Error::none && seen.fields.empty() && !seen.reading, [&] { return text() + " is accepted"; });
   }
 
-  void reading_shows(const Seen& seen) {
+  void reading_shows(const ReportedFields& seen) {
     const Reading& reading = *seen.reading;
     const auto is = [&](Role role, std::int64_t number) {
       return seen.numbers(role) == std::vector<std::int64_t>{number};
@@ -111,7 +111,7 @@ class Decoding {
   }
 
   void ends() {
-    const Held with_more = reply_.between({}, std::array<std::uint8_t, 1>{0});
+    const OwnedFrame with_more = reply_.between({}, std::array<std::uint8_t, 1>{0});
     const FrameEnd whole = unit_.frame_end(options_, Direction::reply, with_more.bytes);
     require(whole.kind == FrameEnd::Kind::complete && whole.size == reply_.bytes.size(),
             [] { return "does not end where it ends, with another byte behind it"; });
@@ -125,15 +125,15 @@ class Decoding {
   // tried only if the request names the node.
   void other_frames() {
     for (unsigned bit = 0; bit < 11 && !request_.empty(); ++bit) {
-      Held other = reply_;
+      OwnedFrame other = reply_;
       other.can->id ^= 1u << bit;
       if (is_of_a_vector(other.can->id)) continue;
       refused(other, [&] { return "with bit " + std::to_string(bit) + " of its identifier flipped"; });
     }
-    Held extended = reply_;
+    OwnedFrame extended = reply_;
     extended.can->extended = true;
     refused(extended, [] { return std::string("with an identifier of 29 bits"); });
-    Held remote = reply_;
+    OwnedFrame remote = reply_;
     remote.can->remote = true;
     refused(remote, [] { return std::string("as a remote frame"); });
   }
@@ -142,7 +142,7 @@ class Decoding {
   // identifiers.
   [[nodiscard]] bool is_of_a_vector(std::uint32_t id) const {
     return std::any_of(unit_.vectors.begin(), unit_.vectors.end(), [&](const Vector& one) {
-      const Held reply = held(unit_, one.reply);
+      const OwnedFrame reply = frame_of(unit_, one.reply);
       return reply.can && reply.can->id == id && one.error == Error::none;
     });
   }
@@ -151,8 +151,8 @@ class Decoding {
   const Vector& vector_;
   Options options_;
   Findings& findings_;
-  Held request_ = held(unit_, vector_.request);
-  Held reply_ = held(unit_, vector_.reply);
+  OwnedFrame request_ = frame_of(unit_, vector_.request);
+  OwnedFrame reply_ = frame_of(unit_, vector_.reply);
 };
 
 }  // namespace

@@ -8,17 +8,17 @@
 #include "absenc/sim/place.hpp"
 #include "tests/kit/changes.hpp"
 #include "tests/kit/kit.hpp"
-#include "tests/kit/weight.hpp"
+#include "tests/kit/undetected_damage.hpp"
 #include "tests/kit/world.hpp"
 
 namespace absenc::kit {
 namespace {
 
 constexpr unsigned places = 8;
-constexpr std::uint64_t exchanges_each = 4000;  // exchanges per virtual encoder
-constexpr unsigned changes_each = 2;            // runs of each changing command per virtual encoder
+constexpr std::uint64_t exchanges_per_encoder = 4000;  // exchanges per virtual encoder
+constexpr unsigned runs_per_change = 2;                // runs of each changing command per virtual encoder
 
-bool may_be_asked_often(const Command& command) {
+bool is_repeatable(const Command& command) {
   return !command.changes_encoder &&
          (command.verb == Verb::read || command.verb == Verb::read_part || command.verb == Verb::info ||
           command.verb == Verb::temperature || command.verb == Verb::config_get || command.verb == Verb::memory_read);
@@ -29,23 +29,23 @@ struct Tally {
   std::uint64_t exchanges = 0;
   std::uint64_t conversations = 0;
   std::uint64_t accepted = 0;
-  std::uint64_t damaged = 0;      // faults that changed bytes
-  std::uint64_t wrong = 0;        // wrong results of conversations with damaged bytes
-  std::uint64_t broken = 0;       // rule violations by the host after a fault
-  std::uint64_t misheard = 0;     // damaged bytes of requests
-  std::uint64_t changes = 0;      // conversations that change the encoder
-  std::uint64_t changed = 0;      // changes that the host reported as successful
-  std::uint64_t not_changed = 0;  // successful changes that had no effect
-  std::string promise{};
-  std::string rule{};
+  std::uint64_t damaged = 0;                // faults that changed bytes
+  std::uint64_t wrong = 0;                  // wrong results of conversations with damaged bytes
+  std::uint64_t rule_violations = 0;        // rule violations by the host after a fault
+  std::uint64_t damaged_request_bytes = 0;  // damaged bytes of requests
+  std::uint64_t changes = 0;                // conversations that change the encoder
+  std::uint64_t changed = 0;                // changes that the host reported as successful
+  std::uint64_t failed_changes = 0;         // successful changes that had no effect
+  std::string broken_promise_text{};
+  std::string violated_rule{};
   /// Counters of one command.
   struct Command {
-    std::optional<Weight> weight{};
-    std::uint64_t trials = 0;       // damaged replies
-    std::uint64_t misplaced = 0;    // accepted replies with a wrong position
-    std::uint64_t mistaken = 0;     // accepted replies with another wrong value
-    std::uint64_t cost = 0;         // exchanges per conversation
-    std::optional<bool> unchecked;  // whether one of its replies has no check; empty if not yet known
+    std::optional<UndetectedDamage> undetected{};
+    std::uint64_t damaged_reply_count = 0;  // damaged replies
+    std::uint64_t wrong_positions = 0;      // accepted replies with a wrong position
+    std::uint64_t wrong_values = 0;         // accepted replies with another wrong value
+    std::uint64_t cost = 0;                 // exchanges per conversation
+    std::optional<bool> unchecked;          // whether one of its replies has no check; empty if not yet known
   };
   std::map<std::string, Command> commands{};
 };
@@ -59,53 +59,57 @@ struct Difference {
 template <class Item>
 class Campaign {
  public:
-  Campaign(const Unit& unit, const Configuration& way, const ExchangeTest& wanted, std::uint64_t seed, Tally& tally,
-           Findings& findings)
-      : unit_(unit), way_(way), random_(seed), world_(unit, way.options, seed), tally_(tally), findings_(findings) {
-    rates_ = rates_for(unit, way.options, wanted);
+  Campaign(const Unit& unit, const Configuration& configuration, const ExchangeTest& test, std::uint64_t seed,
+           Tally& tally, Findings& findings)
+      : unit_(unit),
+        configuration_(configuration),
+        random_(seed),
+        world_(unit, configuration.options, seed),
+        tally_(tally),
+        findings_(findings) {
+    rates_ = rates_for(unit, configuration.options, test);
   }
 
   [[nodiscard]] bool is_possible() { return world_.made(); }
 
   void run(std::uint64_t exchanges) {
     raise_an_alarm();
-    learn();
-    if (asked_.empty()) return;
+    record_truth();
+    if (queries_.empty()) return;
     const std::uint64_t end = world_.device().answer_count() + exchanges;
     const std::uint64_t begin = world_.device().answer_count();
     for (unsigned idle = 0; world_.device().answer_count() < end && findings_.count() == 0 && idle < 10'000; ++idle)
-      one();
-    if (way_.is_model) change();
+      run_conversation();
+    if (configuration_.is_model) change();
     tally_.exchanges += world_.device().answer_count() - begin;
-    tally_.misheard += world_.faulty().counts()[static_cast<std::size_t>(sim::FaultKind::request_corrupt)];
+    tally_.damaged_request_bytes += world_.faulty().counts()[static_cast<std::size_t>(sim::FaultKind::request_corrupt)];
   }
 
  private:
   /// Results of one command on an undamaged line at each shaft position.
-  struct Asked {
+  struct Query {
     const Command* command;
     Values arguments;
-    std::array<std::optional<Seen>, places> truth{};
+    std::array<std::optional<ReportedFields>, places> truth{};
     std::uint64_t cost = 0;              // exchanges per conversation
     std::vector<std::string> varying{};  // fields whose values vary between two runs at the same position
   };
 
-  static sim::FaultRates rates_for(const Unit& unit, const Options& options, const ExchangeTest& wanted) {
+  static sim::FaultRates rates_for(const Unit& unit, const Options& options, const ExchangeTest& test) {
     using sim::FaultKind;
     sim::FaultRates rates = sim::testing::damaged_replies(0.1);
     if (unit.link == LinkKind::spi) rates = {};                        // the host clocks as many bits as it expects
     rates[FaultKind::corrupt] = unit.link == LinkKind::can ? 0 : 0.1;  // CAN's own checksum detects that
-    if (wanted.requests_too) rates[FaultKind::request_corrupt] = 0.02;
+    if (test.requests_too) rates[FaultKind::request_corrupt] = 0.02;
     // With odd seeds, replies are delayed beyond the host's timeout. Unsolicited frames are excluded, because a host
     // cannot determine their age.
     const bool unsolicited = unit.link == LinkKind::can || (unit.streams != nullptr && unit.streams(options));
-    if (wanted.seed % 2 == 1 && !wanted.requests_too && !unsolicited)
-      rates.delay = unit.timing.turnaround_limit * 3 / 2;
+    if (test.seed % 2 == 1 && !test.requests_too && !unsolicited) rates.delay = unit.timing.turnaround_limit * 3 / 2;
     return rates;
   }
 
-  [[nodiscard]] std::string where(const Asked& asked) const {
-    return way_.text + ", " + std::string(asked.command->name) + to_text(Arguments(asked.arguments)) + ": ";
+  [[nodiscard]] std::string where(const Query& query) const {
+    return configuration_.text + ", " + std::string(query.command->name) + to_text(Arguments(query.arguments)) + ": ";
   }
 
   void raise_an_alarm() {
@@ -116,104 +120,105 @@ class Campaign {
 
   // Records the results of each command on an undamaged line. The true position is the shaft's, whatever the encoder
   // reports.
-  void learn() {
+  void record_truth() {
     for (std::int64_t& place : places_) place = static_cast<std::int64_t>(random_.next());
     for (const Command& command : unit_.commands) {
-      if (!may_be_asked_often(command)) continue;
+      if (!is_repeatable(command)) continue;
       std::uint64_t& cost = tally_.commands[std::string(command.name)].cost;
       if (cost > 20 && !random_.chance(0.1)) continue;
-      Asked asked{&command,
+      Query query{&command,
                   command.verb == Verb::memory_read ? least_arguments(command) : random_arguments(command, random_)};
       // The other positions are recorded on first use, because some commands take a hundred exchanges.
-      if (!learn_at(asked, 0)) continue;
-      cost = asked.cost;
+      if (!record_truth_at(query, 0)) continue;
+      cost = query.cost;
       if (command.verb == Verb::read) {
-        for (unsigned place = 1; place < places; ++place) learn_at(asked, place);
+        for (unsigned place = 1; place < places; ++place) record_truth_at(query, place);
       }
-      if (command.verb == Verb::read) reads_.push_back(asked_.size());
-      asked_.push_back(std::move(asked));
+      if (command.verb == Verb::read) reads_.push_back(queries_.size());
+      queries_.push_back(std::move(query));
     }
-    findings_.require(!way_.is_model || !reads_.empty(), [&] { return way_.text + ": no position can be read"; });
+    findings_.require(!configuration_.is_model || !reads_.empty(),
+                      [&] { return configuration_.text + ": no position can be read"; });
   }
 
-  bool learn_at(Asked& asked, unsigned place) {
+  bool record_truth_at(Query& query, unsigned place) {
     world_.move(places_[place]);
     for (unsigned twice = 0; twice < 2; ++twice) {
-      const Ended result = world_.run(*asked.command, asked.arguments);
+      const ConversationResult result = world_.run(*query.command, query.arguments);
       if (!result.good()) return false;
       if (result.seen.reading) {
         findings_.require(sim::is_at(*result.seen.reading, places_[place]),
-                          [&] { return where(asked) + "another position than the shaft's, on a good line"; });
+                          [&] { return where(query) + "another position than the shaft's, on a good line"; });
       }
-      asked.cost = std::max(asked.cost, result.asked);
+      query.cost = std::max(query.cost, result.request_count);
       if (twice == 0) {
-        asked.truth[place] = result.seen;
+        query.truth[place] = result.seen;
         continue;
       }
       for (const auto& [name, value] : result.seen.fields) {
-        const auto first = asked.truth[place]->fields.find(name);
-        if (first != asked.truth[place]->fields.end() && first->second == value) continue;
+        const auto first = query.truth[place]->fields.find(name);
+        if (first != query.truth[place]->fields.end() && first->second == value) continue;
         findings_.require(!is_of_reading(value.role),
-                          [&, &changed = name] { return where(asked) + changed + " changes though the shaft stands"; });
-        asked.varying.push_back(name);
+                          [&, &changed = name] { return where(query) + changed + " changes though the shaft stands"; });
+        query.varying.push_back(name);
       }
     }
     return true;
   }
 
-  void one() {
+  void run_conversation() {
     const bool reads = !reads_.empty() && random_.chance(0.95);
-    Asked* chosen = &asked_[reads ? reads_[random_.below(reads_.size())] : random_.below(asked_.size())];
+    Query* chosen = &queries_[reads ? reads_[random_.below(reads_.size())] : random_.below(queries_.size())];
     // A command with many exchanges is chosen correspondingly less often.
     if (chosen->cost > 4 && !reads_.empty() && !random_.chance(4.0 / static_cast<double>(chosen->cost))) {
-      chosen = &asked_[reads_[random_.below(reads_.size())]];
+      chosen = &queries_[reads_[random_.below(reads_.size())]];
     }
-    Asked& asked = *chosen;
-    place_ = asked.cost > 20 ? 1 - std::min(place_, 1u)
+    Query& query = *chosen;
+    place_ = query.cost > 20 ? 1 - std::min(place_, 1u)
                              : (place_ + 1 + static_cast<unsigned>(random_.below(places - 1))) % places;
-    if (!asked.truth[place_]) {
+    if (!query.truth[place_]) {
       world_.set_rates({});
       world_.pass(std::chrono::seconds(1));
-      (void)world_.run(*asked.command, asked.arguments);  // absorb replies that were late
-      if (!learn_at(asked, place_)) return;
+      (void)world_.run(*query.command, query.arguments);  // absorbs replies that were late
+      if (!record_truth_at(query, place_)) return;
     }
     world_.move(places_[place_]);
     world_.set_rates(rates_);
     const std::uint32_t rules = world_.device().violation_count();
-    const Ended result = world_.run(*asked.command, asked.arguments);
-    judge_rules(asked, result.faults != 0, rules);
+    const ConversationResult result = world_.run(*query.command, query.arguments);
+    judge_rules(query, result.faults != 0, rules);
     ++tally_.conversations;
     tally_.damaged += result.damaged;
-    findings_.require(result.ended, [&] { return where(asked) + "hangs"; });
-    if (result.damaged != 0) weigh(asked, result.damaged);
-    findings_.require(!result.unfounded, [&] { return where(asked) + "has a reading of nothing"; });
+    findings_.require(result.ended, [&] { return where(query) + "hangs"; });
+    if (result.damaged != 0) measure_check(query, result.damaged);
+    findings_.require(!result.premature_reading, [&] { return where(query) + "has a reading of nothing"; });
     if (!result.good()) return;
     ++tally_.accepted;
     // info sends several requests, and a fault may lose one
-    const bool may_miss = asked.command->verb == Verb::info && result.faults != 0;
-    const Difference wrong = difference(asked, result, may_miss);
+    const bool may_miss = query.command->verb == Verb::info && result.faults != 0;
+    const Difference wrong = difference(query, result, may_miss);
     if (wrong.text.empty()) return;
-    if (result.damaged == 0 && rates_[sim::FaultKind::request_corrupt] > 0 && is_so_now(asked, result.seen)) return;
+    if (result.damaged == 0 && rates_[sim::FaultKind::request_corrupt] > 0 && is_true_now(query, result.seen)) return;
     // A reply without a check accepts any bytes, also those of a previous reply.
-    const bool unchecked = is_unchecked(asked);
-    findings_.require(result.damaged != 0 || (unchecked && !quiet_),
-                      [&] { return where(asked) + wrong.text + ", though no byte was damaged"; });
+    const bool unchecked = is_unchecked(query);
+    findings_.require(result.damaged != 0 || (unchecked && !faultless_),
+                      [&] { return where(query) + wrong.text + ", though no byte was damaged"; });
     if (unchecked) return;
     ++tally_.wrong;
-    Tally::Command& command = tally_.commands[called(asked)];
-    ++(wrong.position ? command.misplaced : command.mistaken);
+    Tally::Command& command = tally_.commands[counter_key(query)];
+    ++(wrong.position ? command.wrong_positions : command.wrong_values);
   }
 
   // Returns whether the encoder now really reports these fields. A damaged request may have changed the encoder; the
   // recorded truth is then discarded.
-  bool is_so_now(const Asked& asked, const Seen& seen) {
+  bool is_true_now(const Query& query, const ReportedFields& seen) {
     world_.set_rates({});
-    const Ended now = world_.run(*asked.command, asked.arguments);
+    const ConversationResult now = world_.run(*query.command, query.arguments);
     if (!now.good()) return false;
     for (const auto& [name, value] : seen.fields) {
       if (!now.seen.fields.contains(name) || !(now.seen.fields.at(name) == value)) return false;
     }
-    for (Asked& one : asked_) one.truth = {};
+    for (Query& recorded : queries_) recorded.truth = {};
     return true;
   }
 
@@ -222,7 +227,7 @@ class Campaign {
   void change() {
     for (const Command& command : unit_.commands) {
       if (!command.changes_encoder || command.verb == Verb::run) continue;
-      for (unsigned i = 0; i < changes_each && findings_.count() == 0; ++i) {
+      for (unsigned i = 0; i < runs_per_change && findings_.count() == 0; ++i) {
         // Every second run has fewer faults, because some changes need a hundred good exchanges in a row.
         sim::FaultRates rates = rates_;
         for (double& rate : rates.rates) rate *= i % 2 == 0 ? 1 : 0.03;
@@ -236,34 +241,36 @@ class Campaign {
     if (!values) return;
     world_.set_rates({});
     world_.device().lower_alarms(0xFFFF'FFFF);
-    world_.pass(std::chrono::seconds(2));  // let delayed replies arrive
+    world_.pass(std::chrono::seconds(2));  // waits for delayed replies
     world_.move(static_cast<std::int64_t>(random_.next()));
     world_.set_rates(rates);
-    const Ended result = world_.run(command, *values);
+    const ConversationResult result = world_.run(command, *values);
     world_.set_rates({});
     world_.pass(std::chrono::seconds(2));
-    const auto what = [&] { return way_.text + ", " + std::string(command.name) + to_text(Arguments(*values)) + ": "; };
+    const auto what = [&] {
+      return configuration_.text + ", " + std::string(command.name) + to_text(Arguments(*values)) + ": ";
+    };
     findings_.require(result.ended || !result.made, [&] { return what() + "hangs"; });
     if (!result.made || result.error == Error::invalid_argument || result.error == Error::unsupported) return;
     ++tally_.changes;
     if (!result.good()) return;
     ++tally_.changed;
-    follow(world_, unit_, command, *values);
+    apply_to_host(world_, unit_, command, *values);
     const std::string broken = broken_promise(world_, unit_, command, *values, result.seen);
     if (broken.empty()) return;
     findings_.require(result.damaged != 0, [&] { return what() + broken + ", though no byte was damaged"; });
-    ++tally_.not_changed;
-    if (tally_.promise.empty()) tally_.promise = what() + broken;
+    ++tally_.failed_changes;
+    if (tally_.broken_promise_text.empty()) tally_.broken_promise_text = what() + broken;
   }
 
-  [[nodiscard]] Difference difference(const Asked& asked, const Ended& result, bool may_miss) const {
-    const Seen& truth = *asked.truth[place_];
-    const Seen& seen = result.seen;
+  [[nodiscard]] Difference difference(const Query& query, const ConversationResult& result, bool may_miss) const {
+    const ReportedFields& truth = *query.truth[place_];
+    const ReportedFields& seen = result.seen;
     if (seen.reading.has_value() != truth.reading.has_value()) return {"has another reading"};
     if (seen.reading && !sim::is_at(*seen.reading, places_[place_])) return {"another position than the shaft's", true};
     if (seen.reading && is_part_of(*seen.reading, *truth.reading)) return {};
     for (const auto& [name, value] : truth.fields) {
-      if (std::find(asked.varying.begin(), asked.varying.end(), name) != asked.varying.end()) continue;
+      if (std::find(query.varying.begin(), query.varying.end(), name) != query.varying.end()) continue;
       const auto found = seen.fields.find(name);
       if (found == seen.fields.end() && may_miss) continue;
       if (found == seen.fields.end()) return {"no " + name};
@@ -282,28 +289,28 @@ class Campaign {
   }
 
   // Returns the key of the command's counters. It includes the options, because they may select the frame check.
-  [[nodiscard]] std::string called(const Asked& asked) const {
-    return std::string(asked.command->name) + (way_.is_model ? "" : " " + way_.text);
+  [[nodiscard]] std::string counter_key(const Query& query) const {
+    return std::string(query.command->name) + (configuration_.is_model ? "" : " " + configuration_.text);
   }
 
   // Measures the command's frame check once, with the frames that the conversation exchanges.
-  void weigh(const Asked& asked, std::uint64_t damaged) {
-    Tally::Command& command = tally_.commands[called(asked)];
-    command.trials += damaged;
-    if (command.weight) return;
-    command.weight.emplace();
-    for (const auto& [request, reply] : frames_of(asked)) {
-      command.weight->add(weight_of(unit_, world_.options(), request, reply, rates_,
-                                    asked.command->verb == Verb::read ? 20'000 : 4'000));
+  void measure_check(const Query& query, std::uint64_t damaged) {
+    Tally::Command& command = tally_.commands[counter_key(query)];
+    command.damaged_reply_count += damaged;
+    if (command.undetected) return;
+    command.undetected.emplace();
+    for (const auto& [request, reply] : frames_of(query)) {
+      command.undetected->add(measure_undetected_damage(unit_, world_.options(), request, reply, rates_,
+                                                        query.command->verb == Verb::read ? 20'000 : 4'000));
     }
   }
 
   // Returns whether no bit of one of the command's replies is covered by a check.
-  bool is_unchecked(const Asked& asked) {
-    std::optional<bool>& unchecked = tally_.commands[called(asked)].unchecked;
+  bool is_unchecked(const Query& query) {
+    std::optional<bool>& unchecked = tally_.commands[counter_key(query)].unchecked;
     if (unchecked) return *unchecked;
-    const auto frames = frames_of(asked);
-    const auto open = [&](const std::pair<Held, Held>& one) {
+    const auto frames = frames_of(query);
+    const auto open = [&](const std::pair<OwnedFrame, OwnedFrame>& one) {
       if (unit_.is_checked == nullptr) return false;
       for (std::size_t bit = 0; bit < one.second.bit_count(); ++bit) {
         if (unit_.is_checked(world_.options(), one.first.frame(), one.second.frame(), bit)) return false;
@@ -314,21 +321,22 @@ class Campaign {
     return *unchecked;
   }
 
-  [[nodiscard]] std::vector<std::pair<Held, Held>> frames_of(const Asked& asked);
+  [[nodiscard]] std::vector<std::pair<OwnedFrame, OwnedFrame>> frames_of(const Query& query);
 
   // Counts the rules that the host violated. Before the first fault any violation is a finding.
-  void judge_rules(const Asked& asked, bool struck, std::uint32_t before) {
-    const std::uint32_t broken = world_.device().violation_count() - before;
-    quiet_ = quiet_ && !struck;
-    if (broken == 0 || !way_.is_model) return;  // unusual options allow what no host supports
-    tally_.broken += broken;
+  void judge_rules(const Query& query, bool had_faults, std::uint32_t before) {
+    const std::uint32_t new_violations = world_.device().violation_count() - before;
+    faultless_ = faultless_ && !had_faults;
+    if (new_violations == 0 || !configuration_.is_model) return;  // unusual options allow what no host supports
+    tally_.rule_violations += new_violations;
     const std::span<const Violation> rules = world_.device().violations();
-    if (tally_.rule.empty() && !rules.empty()) tally_.rule = where(asked) + std::string(rules.back().rule);
-    findings_.require(!quiet_, [&] { return "the host broke a rule: " + tally_.rule; });
+    if (tally_.violated_rule.empty() && !rules.empty())
+      tally_.violated_rule = where(query) + std::string(rules.back().rule);
+    findings_.require(!faultless_, [&] { return "the host broke a rule: " + tally_.violated_rule; });
   }
 
   const Unit& unit_;
-  const Configuration& way_;
+  const Configuration& configuration_;
   sim::Random random_;
   World<Item> world_;
   Tally& tally_;
@@ -336,17 +344,17 @@ class Campaign {
   sim::FaultRates rates_;
   std::array<std::int64_t, places> places_{};
   unsigned place_ = 0;
-  bool quiet_ = true;  // no fault has occurred yet; later the reply guard may repeat a request whose reply was late
-  std::vector<Asked> asked_;
+  bool faultless_ = true;  // no fault has occurred yet; later the reply guard may repeat a request whose reply was late
+  std::vector<Query> queries_;
   std::vector<std::size_t> reads_;  // indexes of the commands that read the position
 };
 
 /// Returns the requests of a conversation without faults, each with its reply.
 template <class Item>
-std::vector<std::pair<Held, Held>> Campaign<Item>::frames_of(const Asked& asked) {
-  World<Item> world(unit_, way_.options, 1);
+std::vector<std::pair<OwnedFrame, OwnedFrame>> Campaign<Item>::frames_of(const Query& query) {
+  World<Item> world(unit_, configuration_.options, 1);
   world.move(places_[place_]);
-  std::vector<std::pair<Held, Held>> frames;
+  std::vector<std::pair<OwnedFrame, OwnedFrame>> frames;
   bool answering = true;
   const auto next = [&](bool by_host) {
     if (by_host && std::exchange(answering, false)) frames.push_back({{.link = unit_.link}, {.link = unit_.link}});
@@ -356,7 +364,7 @@ std::vector<std::pair<Held, Held>> Campaign<Item>::frames_of(const Asked& asked)
   world.line().observe([&](std::size_t sender, Time, Time, const Item& item) {
     const bool by_host = world.line().role(sender) == sim::Role::host;
     next(by_host);
-    Held& frame = by_host ? frames.back().first : frames.back().second;
+    OwnedFrame& frame = by_host ? frames.back().first : frames.back().second;
     if constexpr (World<Item>::is_can) {
       frame.can = item;
     } else {
@@ -366,74 +374,78 @@ std::vector<std::pair<Held, Held>> Campaign<Item>::frames_of(const Asked& asked)
   world.line().observe_transfers([&](const typename World<Item>::Line::Transfer& transfer) {
     if constexpr (!World<Item>::is_can) {
       const bool clocked = unit_.link == LinkKind::clocked;
-      Held reply{.link = unit_.link, .bytes = Wire(transfer.in.begin(), transfer.in.end())};
+      OwnedFrame reply{.link = unit_.link, .bytes = Wire(transfer.in.begin(), transfer.in.end())};
       if (clocked) reply.bits = transfer.bits;
-      Held request{.link = unit_.link};
+      OwnedFrame request{.link = unit_.link};
       if (!clocked) request.bytes.assign(transfer.out.begin(), transfer.out.end());
       frames.push_back({request, reply});
     }
   });
-  (void)world.run(*asked.command, asked.arguments);
+  (void)world.run(*query.command, query.arguments);
   std::erase_if(frames, [](const auto& one) { return one.second.empty(); });
   if (frames.size() > 4) frames.resize(4);
   return frames;
 }
 
-void judge_weights(const Tally& tally, Findings& findings) {
+void judge_undetected_damage(const Tally& tally, Findings& findings) {
   for (const auto& [name, command] : tally.commands) {
-    if (!command.weight) continue;
-    const auto judge = [&, &called = name, &all = command](std::uint64_t taken, const Share& share, const char* what) {
-      const std::uint64_t allowed = share.allowed(all.trials);
+    if (!command.undetected) continue;
+    const auto judge = [&, &counter_key = name, &all = command](std::uint64_t taken, const DamageCount& share,
+                                                                const char* what) {
+      const std::uint64_t allowed = share.allowed(all.damaged_reply_count);
       const auto text = [&] {
-        return called + ": of " + std::to_string(all.trials) + " damaged replies " + std::to_string(taken) +
-               " were taken for good with another " + what + "; the check lets " + std::to_string(allowed) + " pass";
+        return counter_key + ": of " + std::to_string(all.damaged_reply_count) + " damaged replies " +
+               std::to_string(taken) + " were taken for good with another " + what + "; the check lets " +
+               std::to_string(allowed) + " pass";
       };
       findings.require(taken <= allowed, text);
       if (taken > 0) findings.note(text());
     };
-    judge(command.misplaced, command.weight->position, "position");
-    judge(command.mistaken, command.weight->others, "value");
+    judge(command.wrong_positions, command.undetected->position, "position");
+    judge(command.wrong_values, command.undetected->others, "value");
   }
 }
 
 template <class Item>
-void exchange(const Unit& unit, const ExchangeTest& wanted, Tally& tally, Findings& findings) {
-  const std::vector<Configuration> ways = configurations(unit);
-  for (std::uint64_t round = 0; tally.exchanges < wanted.count && findings.count() == 0; ++round) {
-    if (round > 100 + wanted.count / 100) {
+void exchange(const Unit& unit, const ExchangeTest& test, Tally& tally, Findings& findings) {
+  const std::vector<Configuration> setups = configurations(unit);
+  for (std::uint64_t round = 0; tally.exchanges < test.count && findings.count() == 0; ++round) {
+    if (round > 100 + test.count / 100) {
       findings.add("exchanges do not come together");
       break;
     }
     // Every even round uses a model, every odd round any configuration.
-    const Configuration& way =
-        round % 2 == 0 ? ways[round / 2 % std::max<std::size_t>(1, unit.models.size())] : ways[round / 2 % ways.size()];
-    Campaign<Item> campaign(unit, way, wanted, 1000 * wanted.seed + round, tally, findings);
+    const Configuration& configuration = round % 2 == 0
+                                             ? setups[round / 2 % std::max<std::size_t>(1, unit.models.size())]
+                                             : setups[round / 2 % setups.size()];
+    Campaign<Item> campaign(unit, configuration, test, 1000 * test.seed + round, tally, findings);
     if (!campaign.is_possible()) continue;
     try {
-      campaign.run(std::min(exchanges_each, wanted.count - tally.exchanges));
+      campaign.run(std::min(exchanges_per_encoder, test.count - tally.exchanges));
     } catch (const std::logic_error& error) {
-      findings.add(way.text + ": " + error.what());
+      findings.add(configuration.text + ": " + error.what());
     }
   }
 }
 
 }  // namespace
 
-Findings check_exchanges(const Unit& unit, const ExchangeTest& wanted) {
+Findings check_exchanges(const Unit& unit, const ExchangeTest& test) {
   Findings findings;
   Tally tally;
   if (unit.link == LinkKind::can) {
-    exchange<CanFrame>(unit, wanted, tally, findings);
+    exchange<CanFrame>(unit, test, tally, findings);
   } else {
-    exchange<std::uint8_t>(unit, wanted, tally, findings);
+    exchange<std::uint8_t>(unit, test, tally, findings);
   }
-  judge_weights(tally, findings);
+  judge_undetected_damage(tally, findings);
   // A damaged request may itself violate a rule.
-  findings.require(tally.broken <= tally.misheard,
-                   [&] { return std::to_string(tally.broken) + " rules broken: " + tally.rule; });
+  findings.require(tally.rule_violations <= tally.damaged_request_bytes,
+                   [&] { return std::to_string(tally.rule_violations) + " rules broken: " + tally.violated_rule; });
   // A host reads a written value back, so a false success needs two damaged replies that both look good.
-  findings.require(tally.not_changed == 0,
-                   [&] { return std::to_string(tally.not_changed) + " changes were not made: " + tally.promise; });
+  findings.require(tally.failed_changes == 0, [&] {
+    return std::to_string(tally.failed_changes) + " changes were not made: " + tally.broken_promise_text;
+  });
   findings.note(std::to_string(tally.changed) + " of " + std::to_string(tally.changes) + " changes were made");
   findings.require(tally.accepted > tally.conversations / 50, [&] {
     return "only " + std::to_string(tally.accepted) + " of " + std::to_string(tally.conversations) + " ended well";

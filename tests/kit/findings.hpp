@@ -19,7 +19,7 @@ class Findings {
   /// Adds a finding if `holds` is false. `text()` is called only in that case.
   template <class Text>
   void require(bool holds, Text&& text) {
-    ++looks_;
+    ++check_count_;
     if (!holds) add(text());
   }
   void note(std::string text) { notes_.push_back(std::move(text)); }
@@ -27,7 +27,7 @@ class Findings {
   [[nodiscard]] const std::vector<std::string>& texts() const { return texts_; }
   [[nodiscard]] std::uint64_t count() const { return count_; }
   /// Number of requirements checked, so that a test can detect a check which checked nothing.
-  [[nodiscard]] std::uint64_t looks() const { return looks_; }
+  [[nodiscard]] std::uint64_t check_count() const { return check_count_; }
   /// Measured figures that a test prints, such as the number of exchanges.
   [[nodiscard]] const std::vector<std::string>& notes() const { return notes_; }
 
@@ -35,7 +35,7 @@ class Findings {
   std::vector<std::string> texts_;
   std::vector<std::string> notes_;
   std::uint64_t count_ = 0;
-  std::uint64_t looks_ = 0;
+  std::uint64_t check_count_ = 0;
 };
 
 }  // namespace absenc::kit

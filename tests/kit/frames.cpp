@@ -8,18 +8,18 @@
 
 namespace absenc::kit {
 
-std::size_t Held::elements() const {
+std::size_t OwnedFrame::elements() const {
   if (can) return can->size;
   return link == LinkKind::clocked ? bits : bytes.size();
 }
 
-std::size_t Held::bit_count() const {
+std::size_t OwnedFrame::bit_count() const {
   if (can) return std::size_t{8} * can->size;
   return link == LinkKind::clocked ? bits : 8 * bytes.size();
 }
 
-Held Held::cut(std::size_t count) const {
-  Held shorter = *this;
+OwnedFrame OwnedFrame::cut(std::size_t count) const {
+  OwnedFrame shorter = *this;
   if (can) {
     shorter.can->size = static_cast<std::uint8_t>(count);
     std::fill(shorter.can->data.begin() + static_cast<std::ptrdiff_t>(count), shorter.can->data.end(), std::uint8_t{0});
@@ -33,22 +33,22 @@ Held Held::cut(std::size_t count) const {
   return shorter;
 }
 
-Held Held::flipped(std::size_t bit) const {
-  Held other = *this;
+OwnedFrame OwnedFrame::flipped(std::size_t bit) const {
+  OwnedFrame other = *this;
   std::uint8_t& byte = can ? other.can->data[bit / 8] : other.bytes[bit / 8];
   byte = static_cast<std::uint8_t>(byte ^ (link == LinkKind::clocked ? 0x80u >> bit % 8 : 1u << bit % 8));
   return other;
 }
 
-Held Held::between(Bytes before, Bytes after) const {
-  Held longer = *this;
+OwnedFrame OwnedFrame::between(Bytes before, Bytes after) const {
+  OwnedFrame longer = *this;
   longer.bytes.insert(longer.bytes.begin(), before.begin(), before.end());
   longer.bytes.insert(longer.bytes.end(), after.begin(), after.end());
   return longer;
 }
 
-Held held(const Unit& unit, Bytes text) {
-  Held frame{.link = unit.link};
+OwnedFrame frame_of(const Unit& unit, Bytes text) {
+  OwnedFrame frame{.link = unit.link};
   if (text.empty()) return frame;
   if (unit.link == LinkKind::can) {
     frame.can = can_frame_of_text(text);
@@ -64,7 +64,7 @@ Held held(const Unit& unit, Bytes text) {
   return frame;
 }
 
-void Seen::put(const FieldValue& value) {
+void ReportedFields::put(const FieldValue& value) {
   std::string name(value.info->name);
   for (unsigned number = 2; fields.contains(name); ++number) {
     name = std::string(value.info->name) + "#" + std::to_string(number);
@@ -73,9 +73,9 @@ void Seen::put(const FieldValue& value) {
                   value.info->role};
 }
 
-bool Seen::has_position() const { return !numbers(Role::position).empty() || !numbers(Role::turns).empty(); }
+bool ReportedFields::has_position() const { return !numbers(Role::position).empty() || !numbers(Role::turns).empty(); }
 
-std::vector<std::int64_t> Seen::numbers(Role role) const {
+std::vector<std::int64_t> ReportedFields::numbers(Role role) const {
   std::vector<std::int64_t> found;
   for (const auto& [name, value] : fields) {
     if (value.role == role) found.push_back(value.number);
@@ -176,7 +176,7 @@ std::string to_text(Bytes bytes) {
   return text;
 }
 
-std::string to_text(const Held& frame) {
+std::string to_text(const OwnedFrame& frame) {
   if (!frame.can) return to_text(Bytes(frame.bytes));
   return std::to_string(frame.can->id) + ":" + to_text(frame.can->bytes());
 }

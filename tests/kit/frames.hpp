@@ -18,7 +18,7 @@ using Wire = std::vector<std::uint8_t>;
 
 /// A frame of any link type that owns its bytes. Its elements, counted by `elements`, are bytes, or bits on a clocked
 /// link.
-struct Held {
+struct OwnedFrame {
   LinkKind link{};
   Wire bytes{};
   std::size_t bits = 0;
@@ -29,15 +29,15 @@ struct Held {
   [[nodiscard]] std::size_t elements() const;
   [[nodiscard]] std::size_t bit_count() const;
   /// Returns the first `count` elements of the frame.
-  [[nodiscard]] Held cut(std::size_t count) const;
+  [[nodiscard]] OwnedFrame cut(std::size_t count) const;
   /// Returns the frame with one bit inverted. Bits are numbered as for `Unit::is_checked`.
-  [[nodiscard]] Held flipped(std::size_t bit) const;
+  [[nodiscard]] OwnedFrame flipped(std::size_t bit) const;
   /// Returns the frame with extra bytes before and after it. Only for links that carry bytes.
-  [[nodiscard]] Held between(Bytes before, Bytes after) const;
+  [[nodiscard]] OwnedFrame between(Bytes before, Bytes after) const;
 };
 
 /// Returns the frame that a vector's request or reply describes.
-[[nodiscard]] Held held(const Unit& unit, Bytes text);
+[[nodiscard]] OwnedFrame frame_of(const Unit& unit, Bytes text);
 
 /// Value of one field. A real number is a float, so that values which differ only by rounding are equal.
 struct Value {
@@ -53,7 +53,7 @@ struct Value {
 
 /// Stores every field that a decoder reports, by name. A repeated name, as in a scan, gets a number from the second
 /// time on.
-struct Seen final : FieldSink {
+struct ReportedFields final : FieldSink {
   void put(const FieldValue& value) override;
   void put_reading(const Reading& one) override {
     reading = one;
@@ -94,7 +94,7 @@ using Values = std::vector<std::int64_t>;
 [[nodiscard]] Result<Wire> encoded(const Unit& unit, const Options& options, const Command& command, Arguments values);
 
 [[nodiscard]] std::string to_text(Bytes bytes);
-[[nodiscard]] std::string to_text(const Held& frame);
+[[nodiscard]] std::string to_text(const OwnedFrame& frame);
 [[nodiscard]] std::string to_text(const std::map<std::string, Value>& fields);
 [[nodiscard]] std::string to_text(Arguments values);
 

@@ -12,13 +12,13 @@ namespace {
 /// Result of a conversation with a supplied reply.
 struct Outcome {
   bool ended = false;
-  unsigned asked = 0;
+  unsigned tested_requests = 0;
   Error error = Error::none;
-  Seen seen;
+  ReportedFields seen;
 };
 
 /// Feeds the reply of one vector to a command that sends the vector's request.
-struct Feeding {
+struct VectorReplay {
   const Unit& unit;
   const Vector& vector;
   const Options& options;
@@ -26,8 +26,8 @@ struct Feeding {
   const Values arguments;
   Findings& findings;
 
-  const Held request = held(unit, vector.request);
-  const Held reply = held(unit, vector.reply);
+  const OwnedFrame request = frame_of(unit, vector.request);
+  const OwnedFrame reply = frame_of(unit, vector.reply);
   const bool streams = unit.streams != nullptr && unit.streams(options);
 
   template <class Text>
@@ -38,17 +38,17 @@ struct Feeding {
   }
 
   template <class Item>
-  Outcome converse(const std::vector<Item>& asks, const typename Player<Item>::Reply& comes,
+  Outcome converse(const std::vector<Item>& requests, const typename Player<Item>::Reply& reply_to_request,
                    const std::function<void(const Conversation<Item>&)>& on_emit = {}) const {
     std::vector<std::byte> storage(unit.host_storage);
     Conversation<Item>* conversation = unit.host(options, command, arguments, storage).template of<Item>();
     if (conversation == nullptr) return {};
     Player<Item> player(unit, options);
     Outcome outcome;
-    outcome.ended = player.run(*conversation, asks, comes, [&] {
+    outcome.ended = player.run(*conversation, requests, reply_to_request, [&] {
       if (on_emit) on_emit(*conversation);
     });
-    outcome.asked = player.asked();
+    outcome.tested_requests = player.tested_requests();
     outcome.error = conversation->error();
     conversation->report(outcome.seen);
     if (conversation->reading() != nullptr) outcome.seen.reading = *conversation->reading();
@@ -61,7 +61,7 @@ struct Feeding {
     return converse<std::uint8_t>(request.bytes, [&](std::size_t) { return pieces; });
   }
 
-  Error decoded(const Held& frame, Seen& seen) const {
+  Error decoded(const OwnedFrame& frame, ReportedFields& seen) const {
     return unit.decode(options, request.frame(), frame.frame(), seen);
   }
 
@@ -81,7 +81,7 @@ struct Feeding {
     }
     require(shared > 0 || (!reads && !outcome.seen.fields.empty()),
             [&] { return "reports " + to_text(outcome.seen.fields); });
-    Seen frame;
+    ReportedFields frame;
     const bool has_reading = decoded(reply, frame) == Error::none && frame.reading.has_value();
     require(!reads || outcome.seen.reading.has_value() == has_reading, [] { return "has another reading"; });
     if (!reads || !has_reading || !outcome.seen.reading) return;
@@ -105,7 +105,7 @@ struct Feeding {
 
   void characters() const {
     const Outcome whole = converse({reply.bytes});
-    require(request.empty() || whole.asked > 0, [] { return "is not asked"; });
+    require(request.empty() || whole.tested_requests > 0, [] { return "is not asked"; });
     // Longer procedures may continue after a good reply, and may repeat the request after a bad one.
     if (is_one_question()) {
       require(whole.error == vector.error, [&] { return "ends with " + std::string(text_of(whole.error).name); });
@@ -145,8 +145,8 @@ struct Feeding {
 
   // Checks that the frame is refused in one piece and, if `in_pieces`, byte by byte.
   template <class Text>
-  void refused(const Held& frame, Text&& text, bool in_pieces = true) const {
-    Seen ignored;
+  void refused(const OwnedFrame& frame, Text&& text, bool in_pieces = true) const {
+    ReportedFields ignored;
     if (decoded(frame, ignored) == Error::none) return;  // the changed byte is not covered by a check
     require(converse({frame.bytes}).error != Error::none, text);
     if (!in_pieces) return;
@@ -173,7 +173,7 @@ struct Feeding {
   }
   // Returns the number of positions found.
   template <class Text>
-  unsigned stream_with(const Held& odd, Text&& text) const {
+  unsigned stream_with(const OwnedFrame& odd, Text&& text) const {
     unsigned good = 0;
     for (const bool in_bytes : {false, true}) {
       Wire all;
@@ -189,7 +189,7 @@ struct Feeding {
           [&](const Conversation<std::uint8_t>& now) {
             if (now.error() != Error::none) return;
             ++good;
-            Seen seen;
+            ReportedFields seen;
             now.report(seen);
             for (const auto& [name, value] : expected_fields(vector)) {
               require(seen.fields.contains(name) && seen.fields[name] == value,
@@ -208,10 +208,10 @@ struct Feeding {
     for (std::size_t bit = 0; bit < reply.bits; ++bit) same_as_decoded(reply.flipped(bit));
     return taken;
   }
-  bool same_as_decoded(const Held& frame) const {
+  bool same_as_decoded(const OwnedFrame& frame) const {
     bool taken = false;
     for (const std::uint8_t idle : std::to_array<std::uint8_t>({0x00, 0xFF})) {
-      Held clocked{.link = unit.link};
+      OwnedFrame clocked{.link = unit.link};
       const Outcome outcome = converse<std::uint8_t>(request.bytes, [&](std::size_t clocks) {
         clocked.bytes.assign((clocks + 7) / 8, idle);
         clocked.bits = clocks;
@@ -222,7 +222,7 @@ struct Feeding {
         }
         return std::vector<Wire>{clocked.bytes};
       });
-      Seen seen;
+      ReportedFields seen;
       const Error error = decoded(clocked, seen);
       // A conversation may check more than a frame, such as a life counter that must advance.
       const bool as_decoded = error == Error::none && outcome.seen.fields == seen.fields;
@@ -238,10 +238,10 @@ struct Feeding {
   // ---- CAN
 
   void frames() const {
-    std::vector<CanFrame> asks;
-    if (request.can) asks.push_back(*request.can);
+    std::vector<CanFrame> requests;
+    if (request.can) requests.push_back(*request.can);
     const auto converse_with = [&](const std::vector<CanFrame>& frames) {
-      return converse<CanFrame>(asks, [&](std::size_t) {
+      return converse<CanFrame>(requests, [&](std::size_t) {
         Player<CanFrame>::Pieces pieces;
         for (const CanFrame& frame : frames) pieces.push_back({frame});
         return pieces;
@@ -249,7 +249,7 @@ struct Feeding {
     };
     if (vector.error != Error::none) return;  // other nodes send such frames, and this conversation ignores them
     const CanFrame other{.id = 0x7A5, .size = 8, .data = {1, 2, 3, 4, 5, 6, 7, 8}};
-    std::vector<CanFrame> echo = asks;
+    std::vector<CanFrame> echo = requests;
     echo.push_back(*reply.can);
     for (const std::vector<CanFrame>& frames :
          {std::vector{*reply.can}, std::vector{other, *reply.can}, std::vector{*reply.can, other}, echo}) {
@@ -257,7 +257,7 @@ struct Feeding {
       require(outcome.error == Error::none, [&] { return "ends with " + std::string(text_of(outcome.error).name); });
       if (outcome.error == Error::none) require_report(outcome);
     }
-    for (const std::vector<CanFrame>& frames : {std::vector<CanFrame>{}, std::vector{other}, asks}) {
+    for (const std::vector<CanFrame>& frames : {std::vector<CanFrame>{}, std::vector{other}, requests}) {
       require(converse_with(frames).error == Error::timeout, [] { return "does not wait for its reply"; });
     }
     for (std::uint8_t size = 0; size < reply.can->size; ++size) {
@@ -270,12 +270,12 @@ struct Feeding {
 /// Returns the arguments with which the command sends this vector's request, or nothing if it never does.
 std::optional<Values> arguments_for(const Unit& unit, const Options& options, const Command& command,
                                     const Vector& vector) {
-  Seen asked;
+  ReportedFields request_fields;
   Values values = least_arguments(command);
   if (!vector.request.empty() && !values.empty()) {
-    (void)unit.decode(options, held(unit, vector.request).frame(), {}, asked);
+    (void)unit.decode(options, frame_of(unit, vector.request).frame(), {}, request_fields);
     for (std::size_t i = 0; i < values.size(); ++i) {
-      for (const auto& [name, value] : asked.fields) {
+      for (const auto& [name, value] : request_fields.fields) {
         if (name == command.arguments[i].name) values[i] = value.number;
       }
     }
@@ -291,8 +291,8 @@ std::optional<Values> arguments_for(const Unit& unit, const Options& options, co
 
 // Returns whether the vector contains a reading. Some frames only occur in captures, and no conversation accepts them.
 bool has_reading(const Unit& unit, const Options& options, const Vector& vector) {
-  Seen seen;
-  return unit.decode(options, held(unit, vector.request).frame(), held(unit, vector.reply).frame(), seen) ==
+  ReportedFields seen;
+  return unit.decode(options, frame_of(unit, vector.request).frame(), frame_of(unit, vector.reply).frame(), seen) ==
              Error::none &&
          seen.reading.has_value();
 }
@@ -304,7 +304,7 @@ void feed_vector(const Unit& unit, const Vector& vector, const Options& options,
     const std::optional<Values> arguments = arguments_for(unit, options, command, vector);
     if (!arguments) continue;
     if (unit.link == LinkKind::can && command.verb != Verb::read) continue;
-    const Feeding feeding{unit, vector, options, command, *arguments, findings};
+    const VectorReplay feeding{unit, vector, options, command, *arguments, findings};
     bool taken = command.verb == Verb::read && has_reading(unit, options, vector);
     if (unit.link == LinkKind::can) {
       feeding.frames();
@@ -346,9 +346,9 @@ std::optional<Time> wait_for_reply(const Unit& unit, const Options& options) {
 // Checks that the time after which a capture calls a reply late is within a third of the longest timeout of any host.
 void compare_limits(const Unit& unit, Findings& findings) {
   std::optional<Time> longest;
-  for (const Configuration& way : configurations(unit)) {
-    longest = std::max(longest, unit.link == LinkKind::can ? wait_for_reply<CanFrame>(unit, way.options)
-                                                           : wait_for_reply<std::uint8_t>(unit, way.options));
+  for (const Configuration& configuration : configurations(unit)) {
+    longest = std::max(longest, unit.link == LinkKind::can ? wait_for_reply<CanFrame>(unit, configuration.options)
+                                                           : wait_for_reply<std::uint8_t>(unit, configuration.options));
   }
   if (!longest || unit.link == LinkKind::spi || unit.link == LinkKind::clocked) return;
   const Time limit = unit.timing.turnaround_limit;
@@ -360,12 +360,12 @@ void compare_limits(const Unit& unit, Findings& findings) {
 
 // Checks that every command has a request in some configuration, or states that it has none.
 void find_requests(const Unit& unit, Findings& findings) {
-  const std::vector<Configuration> ways = configurations(unit);
+  const std::vector<Configuration> setups = configurations(unit);
   for (const Command& command : unit.commands) {
     Error error = Error::none;
-    const bool any = std::any_of(ways.begin(), ways.end(), [&](const Configuration& way) {
+    const bool any = std::any_of(setups.begin(), setups.end(), [&](const Configuration& configuration) {
       for (const Values& values : {least_arguments(command), most_arguments(command)}) {
-        const Result<Wire> request = encoded(unit, way.options, command, values);
+        const Result<Wire> request = encoded(unit, configuration.options, command, values);
         if (request) return true;
         error = request.error();
       }

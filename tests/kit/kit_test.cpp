@@ -31,54 +31,54 @@ class Kit : public ::testing::TestWithParam<const Unit*> {
   const Unit& unit = *GetParam();
 };
 
-TEST_P(Kit, DecodesItsVectors) {
+TEST_P(Kit, DecodesVectors) {
   const Findings findings = check_decoding(unit);
-  EXPECT_GT(findings.looks(), unit.vectors.size());
+  EXPECT_GT(findings.check_count(), unit.vectors.size());
   expect_none(findings);
 }
 
-TEST_P(Kit, FieldsStandWhereItSays) {
+TEST_P(Kit, BitPositionsGiveFieldValues) {
   const Findings findings = check_places(unit);
-  EXPECT_EQ(findings.looks() > 100, unit.bits != nullptr);
+  EXPECT_EQ(findings.check_count() > 100, unit.bits != nullptr);
   expect_none(findings);
 }
 
-TEST_P(Kit, HostsTakeWhatVectorsSay) {
+TEST_P(Kit, HostsReadVectorReplies) {
   const Findings findings = check_hosts(unit);
-  EXPECT_GT(findings.looks(), 100u);
+  EXPECT_GT(findings.check_count(), 100u);
   expect_none(findings);
 }
 
-TEST_P(Kit, SilenceIsATimeout) {
+TEST_P(Kit, SilenceEndsWithTimeout) {
   const Findings findings = check_silence(unit);
-  EXPECT_EQ(findings.looks() > 1, unit.link != LinkKind::clocked && unit.link != LinkKind::spi);
+  EXPECT_EQ(findings.check_count() > 1, unit.link != LinkKind::clocked && unit.link != LinkKind::spi);
   expect_none(findings);
 }
 
-TEST_P(Kit, CommandsEndWell) {
+TEST_P(Kit, CommandsSucceedOnGoodLine) {
   const Findings findings = check_commands(unit);
-  EXPECT_GT(findings.looks(), 10u);
+  EXPECT_GT(findings.check_count(), 10u);
   expect_none(findings);
 }
 
 TEST_P(Kit, AlarmsHaveThreeStates) {
   const Findings findings = check_states(unit);
-  EXPECT_EQ(findings.looks() > 20, unit.alarms != nullptr) << findings.looks();
+  EXPECT_EQ(findings.check_count() > 20, unit.alarms != nullptr) << findings.check_count();
   expect_none(findings);
 }
 
-TEST_P(Kit, DeclaresWhatIsThere) { expect_none(check_declarations(unit)); }
-TEST_P(Kit, RequestsHaveTheirArguments) { expect_none(check_requests(unit, 1)); }
-TEST_P(Kit, StorageIsEnough) { expect_none(check_storage(unit)); }
-TEST_P(Kit, ChangesAreMade) { expect_none(check_settings(unit)); }
-TEST_P(Kit, ConditionsAreSeen) { expect_none(check_conditions(unit)); }
+TEST_P(Kit, DeclarationsNameExistingCommands) { expect_none(check_declarations(unit)); }
+TEST_P(Kit, RequestsContainTheirArguments) { expect_none(check_requests(unit, 1)); }
+TEST_P(Kit, DeclaredStorageSuffices) { expect_none(check_storage(unit)); }
+TEST_P(Kit, SettingsReadBackAsWritten) { expect_none(check_settings(unit)); }
+TEST_P(Kit, ConditionsAreVisibleToHost) { expect_none(check_conditions(unit)); }
 TEST_P(Kit, AdviceCanBeFollowed) {
   const Findings findings = check_advice(unit);
-  EXPECT_GT(findings.looks(), 50u);
+  EXPECT_GT(findings.check_count(), 50u);
   expect_none(findings);
 }
-TEST_P(Kit, NoZeroIsSetOfAPositionThatDoesNotHold) { expect_none(check_zero(unit)); }
-TEST_P(Kit, MemoryKeepsItsBytes) { expect_none(check_memory(unit)); }
+TEST_P(Kit, ZeroIsRefusedForInvalidPosition) { expect_none(check_zero(unit)); }
+TEST_P(Kit, MemoryReadsBackAsWritten) { expect_none(check_memory(unit)); }
 
 /// Parameters of a campaign: the number of the fault series and the unit. Sanitizer builds run only the first series
 /// (CMakePresets.json).
@@ -86,14 +86,14 @@ using Series = std::tuple<unsigned, const Unit*>;
 
 class KitExchanges : public ::testing::TestWithParam<Series> {};
 
-TEST_P(KitExchanges, NothingWrongIsTaken) {
+TEST_P(KitExchanges, RejectsWrongResults) {
   const auto [series, unit] = GetParam();
   expect_none(check_exchanges(*unit, {.count = test_cases(125'000), .seed = series}));
 }
 
 class KitDamagedRequests : public KitExchanges {};
 
-TEST_P(KitDamagedRequests, NothingWrongIsTaken) {
+TEST_P(KitDamagedRequests, RejectsWrongResults) {
   const auto [series, unit] = GetParam();
   expect_none(check_exchanges(*unit, {.count = 10'000, .seed = series, .requests_too = true}));
 }

@@ -10,13 +10,13 @@
 namespace absenc::kit {
 namespace {
 
-bool bit_of(const Held& frame, std::size_t bit) {
+bool bit_of(const OwnedFrame& frame, std::size_t bit) {
   const std::span<const std::uint8_t> bytes = frame.can ? frame.can->bytes() : Bytes(frame.bytes);
   return (bytes[bit / 8] & (frame.link == LinkKind::clocked ? 0x80u >> bit % 8 : 1u << bit % 8)) != 0;
 }
 
 /// Returns the value of these bits and their number in `width`, at most 64.
-std::uint64_t cut_out(const Held& frame, const BitRanges& ranges, unsigned& width) {
+std::uint64_t bits_at(const OwnedFrame& frame, const BitRanges& ranges, unsigned& width) {
   std::uint64_t value = 0;
   width = 0;
   for (const BitRange& range : ranges.view()) {
@@ -34,7 +34,7 @@ class Places final : public FieldSink {
   Places(const Unit& unit, Findings& findings) : unit_(unit), findings_(findings) {}
 
   /// Checks the frame's fields. Returns whether the frame is valid.
-  bool look(const Options& options, const Held& request, const Held& reply) {
+  bool check_frame(const Options& options, const OwnedFrame& request, const OwnedFrame& reply) {
     if (unit_.check(options, request.frame(), reply.frame()) != Error::none) return false;
     options_ = &options;
     request_ = &request;
@@ -59,7 +59,7 @@ class Places final : public FieldSink {
     require(is_number, "is no number, and yet has bits");
     if (!inside || !is_number) return;
     unsigned width = 0;
-    const std::uint64_t bits = cut_out(*reply_, ranges, width);
+    const std::uint64_t bits = bits_at(*reply_, ranges, width);
     require(bits == (static_cast<std::uint64_t>(value.number) & low_mask(width)), "stands elsewhere");
     const bool fits = value.number < 0 || (static_cast<std::uint64_t>(value.number) & ~low_mask(width)) == 0;
     require(fits, "has more bits");
@@ -67,7 +67,7 @@ class Places final : public FieldSink {
   }
 
   /// Checks that at least one frame had bit positions for its position field.
-  void conclude() {
+  void require_position() {
     findings_.require(placed_.contains(Role::position), [] { return "no frame says where the position stands"; });
   }
 
@@ -75,35 +75,35 @@ class Places final : public FieldSink {
   const Unit& unit_;
   Findings& findings_;
   const Options* options_ = nullptr;
-  const Held* request_ = nullptr;
-  const Held* reply_ = nullptr;
+  const OwnedFrame* request_ = nullptr;
+  const OwnedFrame* reply_ = nullptr;
   std::set<Role> placed_;
 };
 
 // Checks all vectors, and each vector with one bit flipped if it is still valid.
-void look_at_vectors(const Unit& unit, Places& places) {
+void check_vectors(const Unit& unit, Places& places) {
   for (const Vector& vector : unit.vectors) {
     const std::optional<Options> options = options_of(unit, vector.options);
-    const Held request = held(unit, vector.request);
-    const Held reply = held(unit, vector.reply);
-    if (!options || reply.empty() || !places.look(*options, request, reply)) continue;
-    for (std::size_t bit = 0; bit < reply.bit_count(); ++bit) places.look(*options, request, reply.flipped(bit));
+    const OwnedFrame request = frame_of(unit, vector.request);
+    const OwnedFrame reply = frame_of(unit, vector.reply);
+    if (!options || reply.empty() || !places.check_frame(*options, request, reply)) continue;
+    for (std::size_t bit = 0; bit < reply.bit_count(); ++bit) places.check_frame(*options, request, reply.flipped(bit));
   }
 }
 
 // Checks replies of the virtual encoder at random shaft positions.
-void look_at_exchanges(const Unit& unit, Places& places) {
+void check_exchange_replies(const Unit& unit, Places& places) {
   sim::Random random(11);
-  for (const Configuration& way : configurations(unit)) {
-    World<std::uint8_t> world(unit, way.options, 1);
+  for (const Configuration& configuration : configurations(unit)) {
+    World<std::uint8_t> world(unit, configuration.options, 1);
     if (!world.made()) continue;
     for (const Command& command : unit.commands) {
       for (unsigned i = 0; i < 20 && !command.changes_encoder && command.verb != Verb::scan; ++i) {
         world.move(static_cast<std::int64_t>(random.next()));
-        const Ended result = world.run(command, least_arguments(command));
+        const ConversationResult result = world.run(command, least_arguments(command));
         if (!result.good()) break;
-        const Held sent{.link = unit.link, .bytes = result.sent};
-        places.look(way.options, sent, {.link = unit.link, .bytes = result.received});
+        const OwnedFrame sent{.link = unit.link, .bytes = result.sent};
+        places.check_frame(configuration.options, sent, {.link = unit.link, .bytes = result.received});
       }
     }
   }
@@ -115,9 +115,9 @@ Findings check_places(const Unit& unit) {
   Findings findings;
   if (unit.bits == nullptr) return findings;
   Places places(unit, findings);
-  look_at_vectors(unit, places);
-  if (unit.link != LinkKind::can && unit.link != LinkKind::clocked) look_at_exchanges(unit, places);
-  places.conclude();
+  check_vectors(unit, places);
+  if (unit.link != LinkKind::can && unit.link != LinkKind::clocked) check_exchange_replies(unit, places);
+  places.require_position();
   return findings;
 }
 

@@ -57,18 +57,18 @@ class Player {
       const std::size_t clocks = step.bits != 0 ? step.bits : step.expect;
       now_ = std::max(now_, step.at);
       conversation.feed({.kind = Kind::sent, .at = now_});
-      ++sent_;
+      ++request_count_;
       const bool tested = sent == request;
-      if (tested) ++asked_;
+      if (tested) ++tested_requests_;
       unsolicited = false;
       play(conversation, tested ? reply(clocks) : Pieces{ask_device(sent)});
     }
     return false;
   }
   /// Number of times the host sent the request under test.
-  [[nodiscard]] unsigned asked() const { return asked_; }
+  [[nodiscard]] unsigned tested_requests() const { return tested_requests_; }
   /// Number of requests that the host sent.
-  [[nodiscard]] unsigned sent() const { return sent_; }
+  [[nodiscard]] unsigned request_count() const { return request_count_; }
 
  private:
   void play(Conversation<Item>& conversation, const Pieces& pieces) {
@@ -94,8 +94,8 @@ class Player {
   Still still_;
   std::vector<std::byte> device_storage_;
   Device<Item>* device_ = nullptr;
-  unsigned asked_ = 0;
-  unsigned sent_ = 0;
+  unsigned tested_requests_ = 0;
+  unsigned request_count_ = 0;
 };
 
 }  // namespace absenc::kit

@@ -8,17 +8,17 @@ namespace {
 
 // Runs a command on a line without an encoder. It must end with a timeout.
 template <class Item>
-void meet_silence(const Unit& unit, const Configuration& way, const Command& command, Findings& findings) {
+void meet_silence(const Unit& unit, const Configuration& configuration, const Command& command, Findings& findings) {
   std::vector<std::byte> storage(unit.host_storage);
   Conversation<Item>* conversation =
-      unit.host(way.options, command, least_arguments(command), storage).template of<Item>();
+      unit.host(configuration.options, command, least_arguments(command), storage).template of<Item>();
   if (conversation == nullptr) return;
   Player<Item> player;
   constexpr unsigned every_address = 100'000;  // steps, enough for a scan of every address
   const bool ended = player.run(
       *conversation, {}, [](std::size_t) { return typename Player<Item>::Pieces{}; }, [] {}, every_address);
-  if (ended && player.sent() == 0) return;  // this configuration lacks the command
-  const auto where = [&] { return std::string(command.name) + " of \"" + way.text + "\" in silence: "; };
+  if (ended && player.request_count() == 0) return;  // this configuration lacks the command
+  const auto where = [&] { return std::string(command.name) + " of \"" + configuration.text + "\" in silence: "; };
   findings.require(ended, [&] { return where() + "does not end"; });
   // A command without a reply succeeds. A command that stops a stream succeeds when no byte arrives.
   const bool wants_none = command.verb == Verb::run && conversation->reading() == nullptr;
@@ -34,12 +34,12 @@ Findings check_silence(const Unit& unit) {
   // On clocked links the host always reads some level, even without an encoder.
   const bool can_be_silent = unit.link != LinkKind::clocked && unit.link != LinkKind::spi;
   if (!can_be_silent) return findings;
-  for (const Configuration& way : configurations(unit)) {
+  for (const Configuration& configuration : configurations(unit)) {
     for (const Command& command : unit.commands) {
       if (unit.link == LinkKind::can) {
-        meet_silence<CanFrame>(unit, way, command, findings);
+        meet_silence<CanFrame>(unit, configuration, command, findings);
       } else {
-        meet_silence<std::uint8_t>(unit, way, command, findings);
+        meet_silence<std::uint8_t>(unit, configuration, command, findings);
       }
     }
   }

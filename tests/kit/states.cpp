@@ -24,7 +24,8 @@ std::uint32_t named(const FieldInfo& field) {
   return mask;
 }
 
-std::vector<Flags> both(const FieldInfo* first, const FieldInfo* second, std::uint32_t bits, std::uint32_t reported) {
+std::vector<Flags> channels_of(const FieldInfo* first, const FieldInfo* second, std::uint32_t bits,
+                               std::uint32_t reported) {
   std::vector<Flags> flags;
   if (first != nullptr) flags.push_back({first, bits, reported});
   if (second != nullptr) flags.push_back({second, bits >> first->flags.size(), reported >> first->flags.size()});
@@ -32,40 +33,41 @@ std::vector<Flags> both(const FieldInfo* first, const FieldInfo* second, std::ui
 }
 
 std::vector<Flags> alarms_of(const Unit& unit, const Reading& reading) {
-  return both(unit.alarms, unit.second_alarms, reading.alarms, reading.alarms_reported);
+  return channels_of(unit.alarms, unit.second_alarms, reading.alarms, reading.alarms_reported);
 }
 std::vector<Flags> status_of(const Unit& unit, const Reading& reading) {
-  return both(unit.status, unit.second_status, reading.status, reading.status_reported);
+  return channels_of(unit.status, unit.second_status, reading.status, reading.status_reported);
 }
 
 /// A command's live reading, and the fields of its last reply decoded as from a capture.
-struct Said {
+struct LiveAndCaptured {
   std::optional<Reading> live;
-  Seen captured;
+  ReportedFields captured;
 };
 
 /// A virtual encoder with at most one raised alarm.
 template <class Item>
-class Raised {
+class EncoderWithAlarm {
  public:
-  Raised(const Unit& unit, const Options& options, std::uint32_t alarm) : unit_(unit), world_(unit, options, 1) {
+  EncoderWithAlarm(const Unit& unit, const Options& options, std::uint32_t alarm)
+      : unit_(unit), world_(unit, options, 1) {
     if (made()) world_.device().raise_alarms(alarm);
     if (made()) world_.move(0x4000'0000);
   }
   [[nodiscard]] bool made() const { return world_.made(); }
 
-  [[nodiscard]] Said ask(const Command& command) {
-    Said said;
-    const Ended result = world_.run(command, least_arguments(command));
-    if (!result.good()) return said;
-    said.live = result.seen.reading;
-    if (result.received.empty()) return said;
+  [[nodiscard]] LiveAndCaptured execute(const Command& command) {
+    LiveAndCaptured outcome;
+    const ConversationResult result = world_.run(command, least_arguments(command));
+    if (!result.good()) return outcome;
+    outcome.live = result.seen.reading;
+    if (result.received.empty()) return outcome;
     const std::size_t bits = unit_.link == LinkKind::clocked ? 8 * result.received.size() : 0;
     if (unit_.decode(world_.options(), {.bytes = result.sent}, {.bytes = result.received, .bits = bits},
-                     said.captured) != Error::none) {
-      said.captured = {};
+                     outcome.captured) != Error::none) {
+      outcome.captured = {};
     }
-    return said;
+    return outcome;
   }
 
  private:
@@ -76,24 +78,24 @@ class Raised {
 template <class Item>
 class States {
  public:
-  States(const Unit& unit, const Configuration& way, Findings& findings)
-      : unit_(unit), way_(way), findings_(findings) {}
+  States(const Unit& unit, const Configuration& configuration, Findings& findings)
+      : unit_(unit), configuration_(configuration), findings_(findings) {}
 
-  void look() {
+  void check() {
     const Command& whole = *find_command(unit_, Verb::read);
     for (const Command& command : unit_.commands) {
       if (command.changes_encoder || command.verb == Verb::scan) continue;
-      Raised<Item> normal(unit_, way_.options, 0);
+      EncoderWithAlarm<Item> normal(unit_, configuration_.options, 0);
       if (!normal.made()) return;
-      const Said before = normal.ask(whole);
-      const Said clear = normal.ask(command);
+      const LiveAndCaptured before = normal.execute(whole);
+      const LiveAndCaptured clear = normal.execute(command);
       for (std::size_t bit = 0; bit < unit_.alarms->flags.size(); ++bit) {
         if (unit_.alarms->flags[bit].name.empty()) continue;
-        what_ = std::string(command.name) + ", " + std::string(unit_.alarms->flags[bit].name);
-        look(before, clear, bit, false);
-        Raised<Item> alarmed(unit_, way_.options, 1u << bit);
-        const Said before_raised = alarmed.ask(whole);
-        look(before_raised, alarmed.ask(command), bit, true);
+        context_ = std::string(command.name) + ", " + std::string(unit_.alarms->flags[bit].name);
+        check(before, clear, bit, false);
+        EncoderWithAlarm<Item> alarmed(unit_, configuration_.options, 1u << bit);
+        const LiveAndCaptured before_raised = alarmed.execute(whole);
+        check(before_raised, alarmed.execute(command), bit, true);
       }
     }
   }
@@ -101,16 +103,16 @@ class States {
  private:
   template <class Text>
   void require(bool holds, Text&& text) {
-    findings_.require(holds, [&] { return way_.text + ", " + what_ + ": " + std::string(text); });
+    findings_.require(holds, [&] { return configuration_.text + ", " + context_ + ": " + std::string(text); });
   }
 
-  void look(const Said& whole, const Said& said, std::size_t bit, bool is_raised) {
-    judge(said.live, bit, is_raised);
-    judge(said.captured.reading, bit, is_raised);
-    carries(said.captured);
-    promises(said.live, whole.live);
-    promises(said.captured.reading, whole.live);
-    completed(whole, said, bit, is_raised);
+  void check(const LiveAndCaptured& whole, const LiveAndCaptured& outcome, std::size_t bit, bool is_raised) {
+    judge(outcome.live, bit, is_raised);
+    judge(outcome.captured.reading, bit, is_raised);
+    check_carried_flags(outcome.captured);
+    check_part(outcome.live, whole.live);
+    check_part(outcome.captured.reading, whole.live);
+    check_completed(whole, outcome, bit, is_raised);
   }
 
   void judge(const std::optional<Reading>& reading, std::size_t bit, bool is_raised) {
@@ -144,7 +146,7 @@ class States {
   }
 
   // Checks that a reading reports the flags that its reply carries as fields.
-  void carries(const Seen& seen) {
+  void check_carried_flags(const ReportedFields& seen) {
     if (!seen.reading) return;
     const auto agrees = [&](const Flags& state) {
       const auto field = seen.fields.find(std::string(state.field->name));
@@ -158,7 +160,7 @@ class States {
     for (const Flags& state : status_of(unit_, *seen.reading)) agrees(state);
   }
 
-  void promises(const std::optional<Reading>& part, const std::optional<Reading>& whole) {
+  void check_part(const std::optional<Reading>& part, const std::optional<Reading>& whole) {
     if (!part || !whole) return;
     const auto is_more = [](Validity one, Validity all) { return one == Validity::valid && all == Validity::invalid; };
     require(!is_more(part->singleturn_validity(), whole->singleturn_validity()), "a part says that the position holds");
@@ -166,20 +168,20 @@ class States {
   }
 
   // Checks a captured reading that is completed with the alarms of the previous reply to `read`.
-  void completed(const Said& before, const Said& now, std::size_t bit, bool is_raised) {
+  void check_completed(const LiveAndCaptured& before, const LiveAndCaptured& now, std::size_t bit, bool is_raised) {
     if (unit_.remembered == nullptr || !before.captured.reading || !now.captured.reading) return;
     const Reading reading = unit_.remembered(*before.captured.reading, *now.captured.reading);
     judge(reading, bit, is_raised);
     const std::uint32_t known = before.captured.reading->alarms_reported;
     require((known & ~reading.alarms_reported) == 0, "what an earlier reply reported is forgotten");
     require(reading.singleturn_known && reading.multiturn_known, "what an earlier reply reported does not count");
-    promises(reading, before.captured.reading);
+    check_part(reading, before.captured.reading);
   }
 
   const Unit& unit_;
-  const Configuration& way_;
+  const Configuration& configuration_;
   Findings& findings_;
-  std::string what_;
+  std::string context_;
 };
 
 }  // namespace
@@ -187,11 +189,11 @@ class States {
 Findings check_states(const Unit& unit) {
   Findings findings;
   if (unit.alarms == nullptr) return findings;
-  for (const Configuration& way : configurations(unit)) {
+  for (const Configuration& configuration : configurations(unit)) {
     if (unit.link == LinkKind::can) {
-      States<CanFrame>(unit, way, findings).look();
+      States<CanFrame>(unit, configuration, findings).check();
     } else {
-      States<std::uint8_t>(unit, way, findings).look();
+      States<std::uint8_t>(unit, configuration, findings).check();
     }
   }
   return findings;

@@ -11,29 +11,31 @@ namespace {
 // ---- Settings, zero, turns, alarms
 
 template <class Item>
-void change(const Unit& unit, const Configuration& way, const Command& command, Findings& findings) {
+void change(const Unit& unit, const Configuration& configuration, const Command& command, Findings& findings) {
   sim::Random random(3);
   unsigned good = 0;
   bool refused = false;
   std::set<std::string> read;
   std::set<std::int64_t> set;
   for (unsigned i = 0; i < 5; ++i) {
-    World<Item> world(unit, way.options, 1);
+    World<Item> world(unit, configuration.options, 1);
     if (!world.made()) return;
     world.move(static_cast<std::int64_t>(random.next()));
     Values values = i == 0   ? least_arguments(command)
                     : i == 1 ? most_arguments(command)
                              : random_arguments(command, random);
     if (std::int64_t* force = argument(command, values, Role::force)) *force = 0;
-    const auto what = [&] { return way.text + ", " + std::string(command.name) + to_text(Arguments(values)) + ": "; };
+    const auto what = [&] {
+      return configuration.text + ", " + std::string(command.name) + to_text(Arguments(values)) + ": ";
+    };
     const std::string before = to_text(read_setting(world, unit, command).fields);
-    const Ended result = world.run(command, values);
+    const ConversationResult result = world.run(command, values);
     if (!result.made) continue;
     findings.require(result.ended, [&] { return what() + "hangs"; });
     refused = refused || result.error == Error::unsupported || result.error == Error::invalid_argument;
     if (!result.good()) continue;
     ++good;
-    follow(world, unit, command, values);
+    apply_to_host(world, unit, command, values);
     const std::string broken = broken_promise(world, unit, command, values, result.seen);
     findings.require(broken.empty(), [&] { return what() + broken; });
     // A setting that cannot be read may already have the new value. Writing it again violates the rules of some
@@ -46,7 +48,7 @@ void change(const Unit& unit, const Configuration& way, const Command& command, 
     read.insert(now);
   }
   findings.require(good > 0 || refused,
-                   [&] { return way.text + ", " + std::string(command.name) + ": never ends well"; });
+                   [&] { return configuration.text + ", " + std::string(command.name) + ": never ends well"; });
   // At least two values were set, so at least two must be read back.
   findings.require(set.size() < 2 || read.size() > 1,
                    [&] { return std::string(command.name) + ": whatever is set, the same is read"; });
@@ -55,20 +57,20 @@ void change(const Unit& unit, const Configuration& way, const Command& command, 
 // ---- Memory
 
 template <class Item>
-void try_memory(const Unit& unit, const Configuration& way, Findings& findings) {
+void try_memory(const Unit& unit, const Configuration& configuration, Findings& findings) {
   const Command* write = find_command(unit, Verb::memory_write);
   const Command* reads = find_command(unit, Verb::memory_read);
   if (reads == nullptr) return;
-  World<Item> world(unit, way.options, 1);
+  World<Item> world(unit, configuration.options, 1);
   for (const MemoryArea& area : unit.memory) {
     for (const std::uint32_t address : {area.first, area.first + area.count - 1}) {
       const auto what = [&] { return "memory " + std::to_string(area.page) + "/" + std::to_string(address) + " "; };
-      const Ended before = world.run(*reads, memory_arguments(*reads, area, address, 0));
+      const ConversationResult before = world.run(*reads, memory_arguments(*reads, area, address, 0));
       findings.require(before.good(), [&] { return what() + "cannot be read: " + before.detail; });
       if (write == nullptr) continue;
       for (const std::uint8_t byte : {std::uint8_t{0x5A}, std::uint8_t{0x25}}) {
         const Values values = memory_arguments(*write, area, address, byte);
-        const Ended written = world.run(*write, values);
+        const ConversationResult written = world.run(*write, values);
         if (!area.writable) {
           findings.require(!written.good(), [&] { return what() + "is written, though it cannot be"; });
           continue;
@@ -90,12 +92,12 @@ void try_memory(const Unit& unit, const Configuration& way, Findings& findings) 
 }
 
 template <class Item>
-void try_registers(const Unit& unit, const Configuration& way, Findings& findings) {
+void try_registers(const Unit& unit, const Configuration& configuration, Findings& findings) {
   const Command* reads = find_command(unit, Verb::memory_read);
   for (const RegisterInfo& one : unit.registers) {
-    World<Item> world(unit, way.options, 1);
+    World<Item> world(unit, configuration.options, 1);
     const MemoryArea place{.page = 0, .first = one.address, .count = 1, .meaning = {}};
-    const Ended read = world.run(*reads, memory_arguments(*reads, place, one.address, 0));
+    const ConversationResult read = world.run(*reads, memory_arguments(*reads, place, one.address, 0));
     findings.require(read.good() == one.readable, [&] {
       return "register " + std::string(one.name) + (one.readable ? " cannot" : " can") + " be read " + read.detail;
     });
@@ -119,11 +121,11 @@ struct Fenced {
 };
 
 template <class Item>
-void store(const Unit& unit, const Configuration& way, const Command& command, Findings& findings) {
+void store(const Unit& unit, const Configuration& configuration, const Command& command, Findings& findings) {
   const Values values = least_arguments(command);
   const auto made = [&](std::size_t size) {
     Fenced storage(size, unit.host_storage + unit.device_storage);
-    const bool is = unit.host(way.options, command, values, storage.given()).template of<Item>() != nullptr;
+    const bool is = unit.host(configuration.options, command, values, storage.given()).template of<Item>() != nullptr;
     findings.require(storage.is_whole(), [&] { return std::string(command.name) + ": made beyond its storage"; });
     return is;
   };
@@ -140,9 +142,9 @@ void store(const Unit& unit, const Configuration& way, const Command& command, F
     (made(middle) ? needed : none) = middle;
   }
   const auto end = [&](std::size_t size) {
-    World<Item> world(unit, way.options, 1);
+    World<Item> world(unit, configuration.options, 1);
     Fenced storage(size, unit.host_storage + unit.device_storage);
-    const Ended result = world.run_in(storage.given(), command, values);
+    const ConversationResult result = world.run_in(storage.given(), command, values);
     findings.require(storage.is_whole(), [&] { return std::string(command.name) + ": writes beyond its storage"; });
     return std::pair(result.error, result.seen.fields);
   };
@@ -154,11 +156,11 @@ void store(const Unit& unit, const Configuration& way, const Command& command, F
 }
 
 template <class Item>
-void store_device(const Unit& unit, const Configuration& way, Findings& findings) {
-  const Hand shaft;
+void store_device(const Unit& unit, const Configuration& configuration, Findings& findings) {
+  const SettableShaft shaft;
   const auto made = [&](std::size_t size) {
     Fenced storage(size, unit.host_storage + unit.device_storage);
-    const bool is = unit.device(way.options, shaft, storage.given()).template of<Item>() != nullptr;
+    const bool is = unit.device(configuration.options, shaft, storage.given()).template of<Item>() != nullptr;
     findings.require(storage.is_whole(), [] { return "the virtual encoder is made beyond its storage"; });
     return is;
   };
@@ -169,7 +171,7 @@ void store_device(const Unit& unit, const Configuration& way, Findings& findings
 }
 
 template <class Check>
-void of_its_items(const Unit& unit, Check&& check) {
+void for_item_type(const Unit& unit, Check&& check) {
   if (unit.link == LinkKind::can) {
     check.template operator()<CanFrame>();
   } else {
@@ -181,32 +183,32 @@ void of_its_items(const Unit& unit, Check&& check) {
 
 Findings check_settings(const Unit& unit) {
   Findings findings;
-  const Configuration way = configurations(unit).front();
+  const Configuration configuration = configurations(unit).front();
   for (const Command& command : unit.commands) {
     const bool promises = command.verb == Verb::config_set || command.verb == Verb::zero ||
                           command.verb == Verb::reset_multiturn || command.verb == Verb::clear_alarms;
-    if (promises) of_its_items(unit, [&]<class Item>() { change<Item>(unit, way, command, findings); });
+    if (promises) for_item_type(unit, [&]<class Item>() { change<Item>(unit, configuration, command, findings); });
   }
   return findings;
 }
 
 Findings check_memory(const Unit& unit) {
   Findings findings;
-  const Configuration way = configurations(unit).front();
-  of_its_items(unit, [&]<class Item>() {
-    try_memory<Item>(unit, way, findings);
-    try_registers<Item>(unit, way, findings);
+  const Configuration configuration = configurations(unit).front();
+  for_item_type(unit, [&]<class Item>() {
+    try_memory<Item>(unit, configuration, findings);
+    try_registers<Item>(unit, configuration, findings);
   });
   return findings;
 }
 
 Findings check_storage(const Unit& unit) {
   Findings findings;
-  for (const Configuration& way : configurations(unit)) {
-    if (!way.is_model) continue;
-    of_its_items(unit, [&]<class Item>() {
-      for (const Command& command : unit.commands) store<Item>(unit, way, command, findings);
-      store_device<Item>(unit, way, findings);
+  for (const Configuration& configuration : configurations(unit)) {
+    if (!configuration.is_model) continue;
+    for_item_type(unit, [&]<class Item>() {
+      for (const Command& command : unit.commands) store<Item>(unit, configuration, command, findings);
+      store_device<Item>(unit, configuration, findings);
     });
   }
   return findings;

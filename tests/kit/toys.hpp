@@ -13,24 +13,24 @@ namespace absenc::kit::toy {
 
 enum class Mistake : std::uint8_t {
   none,
-  parity,          // no mistake: a weak check that accepts a quarter of wrong words
-  takes_two,       // the host takes the first two bytes for the reply
-  takes_anything,  // the host ignores the checksum
-  takes_more,      // the host accepts bytes that begin with a good reply and leaves the rest for the next command
-  says_nothing,    // the host reports no field
-  has_no_request,  // `encode` fails
-  no_vector,       // no command sends the request of the vectors
-  is_stale,        // the virtual encoder returns the position of the previous request
-  is_wrong,        // the virtual encoder's position is one count too high
-  wants_more,      // `host_storage` is smaller than the host needs
-  overflows,       // the host is constructed even if the storage is too small
-  flips_pass,      // `decode` ignores the last byte
-  misplaced,       // the stated bit positions cover only a part of the position
-  no_condition,    // the virtual encoder ignores its condition
-  never_ends,      // the host waits for ever if no byte arrives
-  takes_all,       // `encode` accepts any arguments
-  gives_up_late,   // captures wait longer for a reply than any host does
-  zeroes_blindly,  // the position is never valid, and the zero command ignores that
+  weak_check,           // no mistake: a weak check that accepts a quarter of wrong words
+  accepts_two_bytes,    // the host takes the first two bytes for the reply
+  ignores_checksum,     // the host ignores the checksum
+  accepts_excess,       // the host accepts bytes that begin with a good reply and leaves the rest for the next command
+  reports_nothing,      // the host reports no field
+  has_no_request,       // `encode` fails
+  unread_vectors,       // no command sends the request of the vectors
+  stale_reply,          // the virtual encoder returns the position of the previous request
+  wrong_position,       // the virtual encoder's position is one count too high
+  needs_more_storage,   // `host_storage` is smaller than the host needs
+  overflows_storage,    // the host is constructed even if the storage is too small
+  ignores_last_byte,    // `decode` ignores the last byte
+  wrong_bit_positions,  // the stated bit positions cover only a part of the position
+  ignores_condition,    // the virtual encoder ignores its condition
+  never_ends,           // the host waits for ever if no byte arrives
+  accepts_all_arguments,    // `encode` accepts any arguments
+  late_capture_timeout,     // captures wait longer for a reply than any host does
+  zeroes_invalid_position,  // the position is never valid, and the zero command ignores that
 };
 
 inline constexpr std::uint8_t ask = 0x5A;
@@ -58,7 +58,7 @@ inline constexpr std::array<FieldInfo, 1> fields{
 
 template <Mistake mistake>
 struct Toy {
-  static constexpr bool weak = mistake == Mistake::parity;
+  static constexpr bool weak = mistake == Mistake::weak_check;
   static constexpr std::size_t length = weak ? 2 : 4;
   static constexpr unsigned bits = weak ? 14 : 16;
 
@@ -76,7 +76,7 @@ struct Toy {
     if (reply.size() != length) return Error::wrong_length;
     const unsigned position = (reply[0] | unsigned{reply[1]} << 8) & low_mask(bits);
     const auto wanted = encoded(position);
-    const std::size_t checked = mistake == Mistake::flips_pass ? length - 1 : length;
+    const std::size_t checked = mistake == Mistake::ignores_last_byte ? length - 1 : length;
     for (std::size_t i = 0; i < checked; ++i) {
       if (reply[i] != wanted[i]) return Error::bad_checksum;
     }
@@ -85,21 +85,22 @@ struct Toy {
   static Reading reading_of(unsigned position) {
     return {.singleturn = position,
             .singleturn_bits = bits,
-            .singleturn_valid_bits = mistake == Mistake::zeroes_blindly ? 0 : bits};
+            .singleturn_valid_bits = mistake == Mistake::zeroes_invalid_position ? 0 : bits};
   }
 
   class Host final : public Conversation<std::uint8_t> {
    public:
     void feed(const Event<std::uint8_t>& event) override {
       using Kind = Event<std::uint8_t>::Kind;
-      if (event.kind == Kind::sent) state_ = State::hearing;
-      if (state_ != State::hearing) return;
+      if (event.kind == Kind::sent) state_ = State::receiving;
+      if (state_ != State::receiving) return;
       if (event.kind == Kind::received) {
         for (const std::uint8_t byte : event.items) {
-          if (size_ < heard_.size()) heard_[size_++] = byte;
+          if (size_ < received_bytes_.size()) received_bytes_[size_++] = byte;
         }
-        if (mistake == Mistake::takes_two && size_ >= 2) take(heard_[0] | unsigned{heard_[1]} << 8);
-        if (mistake == Mistake::takes_more && size_ >= length) conclude(length);
+        if (mistake == Mistake::accepts_two_bytes && size_ >= 2)
+          take(received_bytes_[0] | unsigned{received_bytes_[1]} << 8);
+        if (mistake == Mistake::accepts_excess && size_ >= length) conclude(length);
       }
       if (event.kind == Kind::silence && !(mistake == Mistake::never_ends && size_ == 0)) conclude(size_);
     }
@@ -114,7 +115,7 @@ struct Toy {
     [[nodiscard]] Error error() const override { return error_; }
     [[nodiscard]] const Reading* reading() const override {
       const bool good = state_ == State::done && error_ == Error::none;
-      return good && mistake != Mistake::says_nothing ? &reading_ : nullptr;
+      return good && mistake != Mistake::reports_nothing ? &reading_ : nullptr;
     }
     void report(FieldSink& sink) const override {
       if (reading() == nullptr) return;
@@ -123,7 +124,7 @@ struct Toy {
     [[nodiscard]] Exchange<std::uint8_t> exchange() const override { return {}; }
 
    private:
-    enum class State : std::uint8_t { ready, sending, hearing, done };
+    enum class State : std::uint8_t { ready, sending, receiving, done };
 
     void take(unsigned position) {
       reading_ = reading_of(position);
@@ -134,8 +135,9 @@ struct Toy {
       state_ = State::done;
       error_ = Error::timeout;
       if (size == 0) return;
-      if (mistake == Mistake::takes_anything && size >= 2) return take(heard_[0] | unsigned{heard_[1]} << 8);
-      const Result<unsigned> position = position_of(Bytes(heard_).first(size));
+      if (mistake == Mistake::ignores_checksum && size >= 2)
+        return take(received_bytes_[0] | unsigned{received_bytes_[1]} << 8);
+      const Result<unsigned> position = position_of(Bytes(received_bytes_).first(size));
       if (position) return take(*position);
       error_ = position.error();
     }
@@ -143,7 +145,7 @@ struct Toy {
     State state_ = State::ready;
     Error error_ = Error::none;
     Reading reading_{};
-    std::array<std::uint8_t, 16> heard_{};
+    std::array<std::uint8_t, 16> received_bytes_{};
     std::size_t size_ = 0;
   };
 
@@ -154,25 +156,26 @@ struct Toy {
       using Kind = Event<std::uint8_t>::Kind;
       if (event.kind == Kind::received && event.items[0] == ask) {
         const auto now = static_cast<unsigned>(sim::counts_at(shaft_.at(event.at).position, bits));
-        said_ = mistake == Mistake::is_stale ? before_ : now + off_ + (mistake == Mistake::is_wrong ? 1 : 0);
-        before_ = now;
-        at_ = event.at + std::chrono::microseconds(3);
-        speaks_ = true;
+        sent_position_ = mistake == Mistake::stale_reply ? previous_position_
+                                                         : now + offset_ + (mistake == Mistake::wrong_position ? 1 : 0);
+        previous_position_ = now;
+        reply_at_ = event.at + std::chrono::microseconds(3);
+        reply_due_ = true;
         ++answer_count_;
       }
     }
     Step<std::uint8_t> next(Time) override {
-      if (!speaks_) return {};
-      speaks_ = false;
-      reply_ = encoded(static_cast<unsigned>(said_ & low_mask(bits)));
-      return {.kind = Step<std::uint8_t>::Kind::transfer, .out = reply_, .at = at_};
+      if (!reply_due_) return {};
+      reply_due_ = false;
+      reply_ = encoded(static_cast<unsigned>(sent_position_ & low_mask(bits)));
+      return {.kind = Step<std::uint8_t>::Kind::transfer, .out = reply_, .at = reply_at_};
     }
     void power_on(Time, PowerOn) override {}
     void power_off(Time) override {}
     void raise_alarms(std::uint32_t) override {}
     void lower_alarms(std::uint32_t) override {}
     void set_condition(std::size_t, std::int64_t value, Time) override {
-      if (mistake != Mistake::no_condition) off_ = static_cast<unsigned>(value);
+      if (mistake != Mistake::ignores_condition) offset_ = static_cast<unsigned>(value);
     }
     [[nodiscard]] MutableBytes memory() override { return {}; }
     [[nodiscard]] std::uint32_t memory_version() const override { return 0; }
@@ -182,11 +185,11 @@ struct Toy {
 
    private:
     const Shaft& shaft_;
-    unsigned said_ = 0;
-    unsigned off_ = 0;  // the condition: offset of the position, in counts
-    unsigned before_ = 0;
-    Time at_{};
-    bool speaks_ = false;
+    unsigned sent_position_ = 0;
+    unsigned offset_ = 0;  // the condition: offset of the position, in counts
+    unsigned previous_position_ = 0;
+    Time reply_at_{};
+    bool reply_due_ = false;
     std::uint64_t answer_count_ = 0;
     std::array<std::uint8_t, length> reply_{};
   };
@@ -204,7 +207,7 @@ struct Toy {
     sink.put_reading(reading_of(*position));
     return Error::none;
   }
-  static bool takes(Arguments arguments) { return arguments.empty() || mistake == Mistake::takes_all; }
+  static bool takes(Arguments arguments) { return arguments.empty() || mistake == Mistake::accepts_all_arguments; }
   static Result<std::size_t> encode(const Options&, const Command&, Arguments arguments, MutableBytes request) {
     if (mistake == Mistake::has_no_request || !takes(arguments)) return Error::invalid_argument;
     if (request.empty()) return Error::buffer_too_small;
@@ -217,12 +220,12 @@ struct Toy {
   }
   static BitRanges places(const Options&, Frame, Frame, const FieldInfo& field) {
     BitRanges ranges;
-    if (&field == &fields[0]) ranges.push_back({0, mistake == Mistake::misplaced ? bits - 4 : bits});
+    if (&field == &fields[0]) ranges.push_back({0, mistake == Mistake::wrong_bit_positions ? bits - 4 : bits});
     return ranges;
   }
   static Any<Conversation> host(const Options&, const Command&, Arguments arguments, std::span<std::byte> storage) {
     if (!takes(arguments)) return {};
-    if (mistake == Mistake::overflows) return {.bytes = new (storage.data()) Host};
+    if (mistake == Mistake::overflows_storage) return {.bytes = new (storage.data()) Host};
     return make_host<Host>(storage);
   }
   static Any<Device> device(const Options&, const Shaft& shaft, std::span<std::byte> storage) {
@@ -236,10 +239,11 @@ struct Toy {
       {{"position", Verb::read, 0, "position"}, {"zero", Verb::zero, 0, "zero", {}, true, false}}};
   static constexpr std::array<Condition, 1> conditions{{{"eccentricity", "counts", "beside its shaft", 0, 100, 0}}};
   static constexpr std::array<Expected, 1> expected{{{"singleturn", weak ? 8619 : 0x1234}}};
-  static constexpr std::array<std::uint8_t, 1> asks{mistake == Mistake::no_vector ? std::uint8_t{0x5B} : ask};
-  static constexpr std::array<std::uint8_t, length> says = encoded(weak ? 8619 : 0x1234);
-  static_assert(!weak || (says[0] == 0xAB && says[1] == 0x61));
-  static constexpr std::array<Vector, 1> vectors{{{"toy-1", "", "", "", asks, says, expected}}};
+  static constexpr std::array<std::uint8_t, 1> request_bytes{mistake == Mistake::unread_vectors ? std::uint8_t{0x5B}
+                                                                                                : ask};
+  static constexpr std::array<std::uint8_t, length> reply_bytes = encoded(weak ? 8619 : 0x1234);
+  static_assert(!weak || (reply_bytes[0] == 0xAB && reply_bytes[1] == 0x61));
+  static constexpr std::array<Vector, 1> vectors{{{"toy-1", "", "", "", request_bytes, reply_bytes, expected}}};
 };
 
 template <Mistake mistake>
@@ -249,13 +253,13 @@ inline constexpr Unit unit = [] {
   made.id = "toy";
   made.link = LinkKind::half_duplex;
   made.line = {.rate = 1'000'000};
-  made.timing = {.turnaround_limit = mistake == Mistake::gives_up_late ? 10 * answer_limit : answer_limit};
+  made.timing = {.turnaround_limit = mistake == Mistake::late_capture_timeout ? 10 * answer_limit : answer_limit};
   made.models = Made::models;
   made.fields = fields;
-  made.commands = std::span(Made::commands).first(mistake == Mistake::zeroes_blindly ? 2 : 1);
+  made.commands = std::span(Made::commands).first(mistake == Mistake::zeroes_invalid_position ? 2 : 1);
   made.conditions = Made::conditions;
   made.vectors = Made::vectors;
-  made.host_storage = sizeof(typename Made::Host) - (mistake == Mistake::wants_more ? 8 : 0);
+  made.host_storage = sizeof(typename Made::Host) - (mistake == Mistake::needs_more_storage ? 8 : 0);
   made.device_storage = sizeof(typename Made::Encoder);
   made.decode = Made::decode;
   made.encode = Made::encode;
@@ -271,17 +275,18 @@ inline constexpr Unit unit = [] {
 /// while every name is present.
 template <Role forgotten>
 struct Declared {
-  static constexpr Role kept(Role role) { return role == forgotten ? Role::other : role; }
+  static constexpr Role unless_forgotten(Role role) { return role == forgotten ? Role::other : role; }
   using enum FieldInfo::Kind;
   static constexpr std::array<FieldInfo, 4> fields{
-      {{"singleturn", number, "counts", "position", {}, kept(Role::position)},
-       {"encoder", number, "", "who answers", {}, kept(Role::encoder)},
-       {"clash", boolean, "", "two of them do", {}, kept(Role::clash)},
-       {"value", number, "", "a byte", {}, kept(Role::value)}}};
+      {{"singleturn", number, "counts", "position", {}, unless_forgotten(Role::position)},
+       {"encoder", number, "", "who answers", {}, unless_forgotten(Role::encoder)},
+       {"clash", boolean, "", "two of them do", {}, unless_forgotten(Role::clash)},
+       {"value", number, "", "a byte", {}, unless_forgotten(Role::value)}}};
   static constexpr std::array<Option, 1> options{
-      {{.name = "encoder", .meaning = "", .default_value = 0, .maximum = 7, .role = kept(Role::encoder)}}};
-  static constexpr std::array<Argument, 2> arguments{{{"address", "of a byte", 0, 255, 0, true, kept(Role::address)},
-                                                      {"value", "of a byte", 0, 255, 0, true, kept(Role::value)}}};
+      {{.name = "encoder", .meaning = "", .default_value = 0, .maximum = 7, .role = unless_forgotten(Role::encoder)}}};
+  static constexpr std::array<Argument, 2> arguments{
+      {{"address", "of a byte", 0, 255, 0, true, unless_forgotten(Role::address)},
+       {"value", "of a byte", 0, 255, 0, true, unless_forgotten(Role::value)}}};
   static constexpr std::array<Command, 4> commands{
       {{"position", Verb::read, 0, "position"},
        {"scan", Verb::scan, 1, "who answers"},

@@ -29,90 +29,91 @@ void expect_no_finding() {
   }
 }
 
-TEST(KitToys, WithoutAMistakeNothingIsFound) { expect_no_finding<Mistake::none>(); }
+TEST(KitToys, ReportsNothingForCorrectUnit) { expect_no_finding<Mistake::none>(); }
 
 // The reply may begin with any byte, and its weak check accepts some wrong replies. The kit must accept their expected
 // number.
-TEST(KitToys, AWeakCheckIsNoMistake) {
-  expect_no_finding<Mistake::parity>();
-  EXPECT_THAT(check_exchanges(toy::unit<Mistake::parity>, few).notes(),
+TEST(KitToys, AllowsWeakFrameCheck) {
+  expect_no_finding<Mistake::weak_check>();
+  EXPECT_THAT(check_exchanges(toy::unit<Mistake::weak_check>, few).notes(),
               Contains(HasSubstr("taken for good with another position")));
 }
 
-TEST(KitToys, AHostThatTakesTwoBytes) {
-  const Unit& unit = toy::unit<Mistake::takes_two>;
+TEST(KitToys, FindsHostThatAcceptsShortReply) {
+  const Unit& unit = toy::unit<Mistake::accepts_two_bytes>;
   EXPECT_THAT(check_hosts(unit).texts(), Contains(HasSubstr("takes a reply cut after 2")));
   EXPECT_THAT(check_exchanges(unit, few).texts(), Not(IsEmpty()));
 }
 
-TEST(KitToys, AHostThatLooksAtNoCheck) {
-  const Unit& unit = toy::unit<Mistake::takes_anything>;
+TEST(KitToys, FindsHostThatIgnoresChecksum) {
+  const Unit& unit = toy::unit<Mistake::ignores_checksum>;
   EXPECT_THAT(check_hosts(unit).texts(), Contains(HasSubstr("bit 0 flipped")));
   EXPECT_THAT(check_exchanges(unit, few).texts(), Contains(HasSubstr("taken for good with another position")));
 }
 
-TEST(KitToys, AHostThatLeavesAFrameToTheNext) {
-  EXPECT_THAT(check_hosts(toy::unit<Mistake::takes_more>).texts(), Contains(HasSubstr("comes twice")));
+TEST(KitToys, FindsHostThatLeavesExcessBytes) {
+  EXPECT_THAT(check_hosts(toy::unit<Mistake::accepts_excess>).texts(), Contains(HasSubstr("comes twice")));
 }
 
-TEST(KitToys, AHostThatReportsNothing) {
-  const Unit& unit = toy::unit<Mistake::says_nothing>;
+TEST(KitToys, FindsHostThatReportsNothing) {
+  const Unit& unit = toy::unit<Mistake::reports_nothing>;
   EXPECT_THAT(check_hosts(unit).texts(), Contains(HasSubstr("singleturn is not reported")));
   EXPECT_THAT(check_commands(unit).texts(), Contains(HasSubstr("has no reading")));
 }
 
-TEST(KitToys, ACommandWhoseRequestCannotBeMade) {
+TEST(KitToys, FindsCommandWithoutRequest) {
   const Unit& unit = toy::unit<Mistake::has_no_request>;
   EXPECT_THAT(check_hosts(unit).texts(), Contains("position has no request: invalid_argument"));
   EXPECT_THAT(check_hosts(unit).texts(), Contains("no vector's position is read by a command"));
 }
 
-TEST(KitToys, VectorsThatNoCommandReads) {
-  EXPECT_THAT(check_hosts(toy::unit<Mistake::no_vector>).texts(),
+TEST(KitToys, FindsVectorsThatNoCommandReads) {
+  EXPECT_THAT(check_hosts(toy::unit<Mistake::unread_vectors>).texts(),
               Contains("no vector's position is read by a command"));
 }
 
-TEST(KitToys, RepliesToTheRequestBefore) {
-  const Unit& unit = toy::unit<Mistake::is_stale>;
+TEST(KitToys, FindsStaleReplies) {
+  const Unit& unit = toy::unit<Mistake::stale_reply>;
   EXPECT_THAT(check_exchanges(unit, few).texts(), Contains(HasSubstr("another position than the shaft's")));
   EXPECT_THAT(check_commands(unit).texts(), Contains(HasSubstr("another position than the shaft's")));
 }
 
-TEST(KitToys, AnEncoderBesideItsShaft) {
-  EXPECT_THAT(check_commands(toy::unit<Mistake::is_wrong>).texts(), Contains(HasSubstr("another position")));
+TEST(KitToys, FindsEncoderWithWrongPosition) {
+  EXPECT_THAT(check_commands(toy::unit<Mistake::wrong_position>).texts(), Contains(HasSubstr("another position")));
 }
 
-TEST(KitToys, StorageThatIsNotEnough) {
-  EXPECT_THAT(check_storage(toy::unit<Mistake::wants_more>).texts(),
+TEST(KitToys, FindsTooSmallStorage) {
+  EXPECT_THAT(check_storage(toy::unit<Mistake::needs_more_storage>).texts(),
               Contains(HasSubstr("needs more than host_storage")));
-  EXPECT_THAT(check_storage(toy::unit<Mistake::overflows>).texts(), Contains(HasSubstr("made beyond its storage")));
+  EXPECT_THAT(check_storage(toy::unit<Mistake::overflows_storage>).texts(),
+              Contains(HasSubstr("made beyond its storage")));
 }
 
-TEST(KitToys, ADecoderThatOverlooksAByte) {
-  EXPECT_THAT(check_decoding(toy::unit<Mistake::flips_pass>).texts(),
+TEST(KitToys, FindsDecoderThatIgnoresByte) {
+  EXPECT_THAT(check_decoding(toy::unit<Mistake::ignores_last_byte>).texts(),
               Contains(HasSubstr("bit 31 flipped is accepted")));
 }
 
-TEST(KitToys, AFieldThatStandsElsewhere) {
-  EXPECT_THAT(check_places(toy::unit<Mistake::misplaced>).texts(), Contains(HasSubstr("has more bits")));
+TEST(KitToys, FindsWrongBitPositions) {
+  EXPECT_THAT(check_places(toy::unit<Mistake::wrong_bit_positions>).texts(), Contains(HasSubstr("has more bits")));
 }
 
-TEST(KitToys, CapturesThatWaitForLongerThanHosts) {
-  EXPECT_THAT(check_hosts(toy::unit<Mistake::gives_up_late>).texts(),
+TEST(KitToys, FindsCaptureTimeoutLongerThanHosts) {
+  EXPECT_THAT(check_hosts(toy::unit<Mistake::late_capture_timeout>).texts(),
               ElementsAre("captures wait 2000000 ns for a reply, hosts 200000 ns"));
 }
 
-TEST(KitToys, AConditionThatNothingShows) {
-  EXPECT_THAT(check_conditions(toy::unit<Mistake::no_condition>).texts(),
+TEST(KitToys, FindsInvisibleCondition) {
+  EXPECT_THAT(check_conditions(toy::unit<Mistake::ignores_condition>).texts(),
               ElementsAre("condition eccentricity is not seen by any host, whatever it is"));
 }
 
-TEST(KitToys, AZeroThatDoesNotLook) {
-  EXPECT_THAT(check_zero(toy::unit<Mistake::zeroes_blindly>).texts(),
+TEST(KitToys, FindsZeroOfInvalidPosition) {
+  EXPECT_THAT(check_zero(toy::unit<Mistake::zeroes_invalid_position>).texts(),
               Contains(HasSubstr("as it is: zero is set of a position that does not hold")));
 }
 
-TEST(KitToys, AdviceThatNobodyCanFollow) {
+TEST(KitToys, FindsAdviceThatCannotBeFollowed) {
   const auto findings_of = [](std::string_view action) {
     const std::array<FlagInfo, 1> flags{{{"too_hot", "it is too hot", action}}};
     const std::array<FieldInfo, 2> fields{
@@ -130,12 +131,12 @@ TEST(KitToys, AdviceThatNobodyCanFollow) {
   EXPECT_THAT(findings_of("then `read`"), ElementsAre(HasSubstr("not written \"absenc ...\"")));
 }
 
-TEST(KitToys, AConversationThatDoesNotEnd) {
+TEST(KitToys, FindsConversationThatNeverEnds) {
   EXPECT_THAT(check_exchanges(toy::unit<Mistake::never_ends>, few).texts(), Contains(HasSubstr("hangs")));
 }
 
-TEST(KitToys, ArgumentsThatNobodyAskedFor) {
-  const std::vector<std::string> texts = check_requests(toy::unit<Mistake::takes_all>, 1).texts();
+TEST(KitToys, FindsAcceptedSurplusArguments) {
+  const std::vector<std::string> texts = check_requests(toy::unit<Mistake::accepts_all_arguments>, 1).texts();
   EXPECT_THAT(texts, Contains("position 0: has a request"));
   EXPECT_THAT(texts, Contains("position 0: has a conversation"));
 }
@@ -145,7 +146,7 @@ std::vector<std::string> findings_without() {
   return check_declarations(toy::Declared<forgotten>::unit).texts();
 }
 
-TEST(KitToys, ARoleThatIsForgotten) {
+TEST(KitToys, FindsMissingRole) {
   EXPECT_THAT(findings_without<Role::other>(), IsEmpty());
   EXPECT_THAT(findings_without<Role::position>(), ElementsAre("position needs a field of the role position"));
   EXPECT_THAT(findings_without<Role::encoder>(),
@@ -157,7 +158,7 @@ TEST(KitToys, ARoleThatIsForgotten) {
                                                            "memory-write needs an argument of the role value"));
 }
 
-TEST(KitToys, ARoleThatTwoHave) {
+TEST(KitToys, FindsDuplicateRole) {
   const std::array two{toy::Declared<Role::other>::options[0], toy::Declared<Role::other>::options[0]};
   Unit unit = toy::Declared<Role::other>::unit;
   unit.options = two;

@@ -19,24 +19,24 @@
 namespace absenc::kit {
 
 /// A shaft whose position the test sets.
-struct Hand final : Shaft {
+struct SettableShaft final : Shaft {
   [[nodiscard]] ShaftState at(Time) const override { return {.position = position}; }
   std::int64_t position = 0;
 };
 
 /// Result of one conversation.
-struct Ended {
+struct ConversationResult {
   bool made = false;   // the unit supports this command
   bool ended = false;  // ended before the time limit
   Error error = Error::none;
-  bool unfounded = false;  // had a reading before any byte arrived, or together with an error
+  bool premature_reading = false;  // had a reading before any byte arrived, or together with an error
   std::string detail{};
   std::string advice{};
-  Seen seen{};              // every reported field and reading, in order
-  std::uint64_t damaged{};  // faults that changed bytes during the conversation
-  std::uint64_t faults{};   // faults of any kind during the conversation
-  std::uint64_t asked{};    // requests that the encoder answered during the conversation
-  Wire sent{};              // the last exchange, on links that carry bytes
+  ReportedFields seen{};          // every reported field and reading, in order
+  std::uint64_t damaged{};        // faults that changed bytes during the conversation
+  std::uint64_t faults{};         // faults of any kind during the conversation
+  std::uint64_t request_count{};  // requests that the encoder answered during the conversation
+  Wire sent{};                    // the last exchange, on links that carry bytes
   Wire received{};
 
   [[nodiscard]] bool good() const { return made && ended && error == Error::none; }
@@ -88,16 +88,16 @@ class World {
   }
 
   /// Runs one conversation to its end, or a streaming one up to its first result.
-  Ended run(const Command& command, Arguments arguments, Time limit = std::chrono::seconds(100)) {
+  ConversationResult run(const Command& command, Arguments arguments, Time limit = std::chrono::seconds(100)) {
     return run_in(host_storage_, command, arguments, limit);
   }
-  Ended run_in(std::span<std::byte> storage, const Command& command, Arguments arguments,
-               Time limit = std::chrono::seconds(100)) {
-    Ended result;
+  ConversationResult run_in(std::span<std::byte> storage, const Command& command, Arguments arguments,
+                            Time limit = std::chrono::seconds(100)) {
+    ConversationResult result;
     Conversation<Item>* conversation = unit_.host(options_, command, arguments, storage).template of<Item>();
     if (conversation == nullptr) return result;
     result.made = true;
-    result.unfounded = conversation->reading() != nullptr;
+    result.premature_reading = conversation->reading() != nullptr;
     const std::uint64_t changed = changed_bytes();
     const std::uint64_t faults = all_faults();
     const std::uint64_t answered = device_->answer_count();
@@ -118,11 +118,11 @@ class World {
     if (result.error == Error::none) conversation->report(result.seen);
     if (conversation->reading() != nullptr) {
       result.seen.reading = *conversation->reading();
-      result.unfounded = result.unfounded || result.error != Error::none;
+      result.premature_reading = result.premature_reading || result.error != Error::none;
     }
     result.damaged = changed_bytes() - changed;
     result.faults = all_faults() - faults;
-    result.asked = device_->answer_count() - answered;
+    result.request_count = device_->answer_count() - answered;
     if constexpr (!is_can) {
       const auto exchange = conversation->exchange();
       result.sent.assign(exchange.sent.begin(), exchange.sent.end());
@@ -196,7 +196,7 @@ class World {
 
   const Unit& unit_;
   Options options_;
-  Hand shaft_;
+  SettableShaft shaft_;
   std::vector<std::byte> device_storage_;
   std::vector<std::byte> host_storage_;
   Device<Item>* device_;

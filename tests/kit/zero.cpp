@@ -17,19 +17,21 @@ std::optional<Reading> read_position(World<Item>& world, const Unit& unit) {
 
 /// Tries to set the zero. `spoil` makes the position invalid, `mend` reverses that.
 template <class Item, class Spoil, class Mend>
-void try_zero(const Unit& unit, const Configuration& way, const std::string& what, Spoil spoil, Mend mend,
+void try_zero(const Unit& unit, const Configuration& configuration, const std::string& what, Spoil spoil, Mend mend,
               Findings& findings) {
   const Command& zero = *find_command(unit, Verb::zero);
-  World<Item> world(unit, way.options, 1);
+  World<Item> world(unit, configuration.options, 1);
   if (!world.made()) return;
   world.move(some_place);
   spoil(world);
   const std::optional<Reading> before = read_position(world, unit);
   if (!before || before->singleturn_validity() != Validity::invalid) return;
   const std::uint32_t memory = world.device().memory_version();
-  const Ended result = world.run(zero, least_arguments(zero));
+  const ConversationResult result = world.run(zero, least_arguments(zero));
   if (!result.made || result.error == Error::unsupported) return;
-  const auto says = [&](const char* text) { return [&, text] { return way.text + ", " + what + ": zero " + text; }; };
+  const auto says = [&](const char* text) {
+    return [&, text] { return configuration.text + ", " + what + ": zero " + text; };
+  };
   findings.require(!result.good(), says("is set of a position that does not hold"));
   findings.require(result.good() || result.error == Error::invalid_argument,
                    says("fails for another reason than the position"));
@@ -42,15 +44,15 @@ void try_zero(const Unit& unit, const Configuration& way, const std::string& wha
 }
 
 template <class Item>
-void try_all(const Unit& unit, const Configuration& way, Findings& findings) {
+void try_all(const Unit& unit, const Configuration& configuration, Findings& findings) {
   const auto nothing = [](World<Item>&) {};
-  try_zero<Item>(unit, way, "as it is", nothing, nothing, findings);
+  try_zero<Item>(unit, configuration, "as it is", nothing, nothing, findings);
   for (std::size_t bit = 0; unit.alarms != nullptr && bit < unit.alarms->flags.size(); ++bit) {
     const std::string name(unit.alarms->flags[bit].name);
     if (name.empty()) continue;
     const std::uint32_t alarm = std::uint32_t{1} << bit;
     try_zero<Item>(
-        unit, way, name, [&](World<Item>& world) { world.device().raise_alarms(alarm); },
+        unit, configuration, name, [&](World<Item>& world) { world.device().raise_alarms(alarm); },
         [&](World<Item>& world) { world.device().lower_alarms(alarm); }, findings);
   }
   for (std::size_t i = 0; i < unit.conditions.size(); ++i) {
@@ -59,8 +61,8 @@ void try_all(const Unit& unit, const Configuration& way, Findings& findings) {
       const auto set = [i](std::int64_t to) {
         return [i, to](World<Item>& world) { world.device().set_condition(i, to, world.line().now()); };
       };
-      try_zero<Item>(unit, way, std::string(one.name) + "=" + std::to_string(value), set(value), set(one.normal),
-                     findings);
+      try_zero<Item>(unit, configuration, std::string(one.name) + "=" + std::to_string(value), set(value),
+                     set(one.normal), findings);
     }
   }
 }
@@ -70,11 +72,11 @@ void try_all(const Unit& unit, const Configuration& way, Findings& findings) {
 Findings check_zero(const Unit& unit) {
   Findings findings;
   if (find_command(unit, Verb::zero) == nullptr) return findings;
-  for (const Configuration& way : configurations(unit)) {
+  for (const Configuration& configuration : configurations(unit)) {
     if (unit.link == LinkKind::can) {
-      try_all<CanFrame>(unit, way, findings);
+      try_all<CanFrame>(unit, configuration, findings);
     } else {
-      try_all<std::uint8_t>(unit, way, findings);
+      try_all<std::uint8_t>(unit, configuration, findings);
     }
   }
   return findings;

@@ -20,7 +20,7 @@ namespace absenc::client {
 namespace {
 
 using kit::Configuration;
-using kit::Ended;
+using kit::ConversationResult;
 using kit::World;
 
 struct Message {
@@ -28,7 +28,7 @@ struct Message {
   Diagnosis diagnosis;
 };
 
-Message message_of(const Unit& unit, const Options& options, const Ended& ended) {
+Message message_of(const Unit& unit, const Options& options, const ConversationResult& ended) {
   const Diagnosis diagnosis = diagnose(unit, options, {.bytes = ended.sent}, {.bytes = ended.received});
   return {describe(unit.link, Subject::reply, ended.error, ended.detail, diagnosis), diagnosis};
 }
@@ -75,7 +75,7 @@ TEST(Diagnosis, ASettingThatWouldHelpIsNamedOnce) {
         world.move(0x2'4567'89AB);
         world.set_options(here);
         const Command& read = *find_command(*unit, Verb::read);
-        const Ended ended = world.run(read, kit::least_arguments(read), std::chrono::milliseconds(100));
+        const ConversationResult ended = world.run(read, kit::least_arguments(read), std::chrono::milliseconds(100));
         if (!ended.made || !ended.ended || ended.error == Error::none) continue;
         const auto& [text, diagnosis] = message_of(*unit, here, ended);
         EXPECT_EQ(repeated_clauses(text), std::set<std::string>{}) << unit->id;
@@ -99,7 +99,8 @@ TEST(Diagnosis, AMessageSaysNothingTwice) {
         sim::FaultRates rates;
         rates.rates[kind] = 1;
         world.set_rates(rates);
-        const Ended ended = world.run(command, kit::least_arguments(command), std::chrono::milliseconds(20));
+        const ConversationResult ended =
+            world.run(command, kit::least_arguments(command), std::chrono::milliseconds(20));
         if (!ended.made || !ended.ended || ended.error == Error::none) continue;
         const std::string text = message_of(*unit, options, ended).text;
         EXPECT_EQ(repeated_clauses(text), std::set<std::string>{}) << unit->id << " " << command.name;

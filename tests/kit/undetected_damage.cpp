@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "tests/kit/weight.hpp"
+#include "tests/kit/undetected_damage.hpp"
 
 #include <algorithm>
 
@@ -10,28 +10,28 @@ namespace {
 
 /// Sends the same reply to every request.
 template <class Item>
-class Parrot final : public Machine<Item> {
+class FixedReplyDevice final : public Machine<Item> {
  public:
-  explicit Parrot(std::vector<Item> reply, std::size_t bits) : reply_(std::move(reply)), bits_(bits) {}
+  explicit FixedReplyDevice(std::vector<Item> reply, std::size_t bits) : reply_(std::move(reply)), bits_(bits) {}
   void feed(const Event<Item>& event) override {
     using Kind = typename Event<Item>::Kind;
-    if (event.kind == Kind::received) speaks_ = true;
-    if (event.kind == Kind::sent) speaks_ = false;
+    if (event.kind == Kind::received) reply_due_ = true;
+    if (event.kind == Kind::sent) reply_due_ = false;
   }
   Step<Item> next(Time) override {
     using Kind = typename Step<Item>::Kind;
-    if (!speaks_) return {};
+    if (!reply_due_) return {};
     return {.kind = Kind::transfer, .out = reply_, .bits = bits_};
   }
 
  private:
   std::vector<Item> reply_;
   std::size_t bits_;
-  bool speaks_ = false;
+  bool reply_due_ = false;
 };
 
 /// Kinds of wrong values that a damaged reply decoded to.
-struct Wrong {
+struct WrongValues {
   bool position = false;
   bool others = false;
 };
@@ -39,24 +39,24 @@ struct Wrong {
 struct Judge {
   const Unit& unit;
   const Options& options;
-  const Held& request;
-  const Held& reply;
-  Seen right = [this] {
-    Seen seen;
+  const OwnedFrame& request;
+  const OwnedFrame& reply;
+  ReportedFields right = [this] {
+    ReportedFields seen;
     (void)unit.decode(options, request.frame(), reply.frame(), seen);
     return seen;
   }();
 
-  void judge(const Held& frame, Wrong& wrong) const {
-    Seen seen;
+  void judge(const OwnedFrame& frame, WrongValues& wrong) const {
+    ReportedFields seen;
     if (unit.decode(options, request.frame(), frame.frame(), seen) != Error::none) return;
     const bool elsewhere = !sim::same_place(seen.reading, right.reading);
     wrong.position = wrong.position || elsewhere;
     wrong.others = wrong.others || (!elsewhere && seen.fields != right.fields);
   }
-  [[nodiscard]] Wrong judge(Bytes bytes) const {
-    Wrong wrong;
-    Held part{.link = unit.link, .bytes = Wire(bytes.begin(), bytes.end())};
+  [[nodiscard]] WrongValues judge(Bytes bytes) const {
+    WrongValues wrong;
+    OwnedFrame part{.link = unit.link, .bytes = Wire(bytes.begin(), bytes.end())};
     if (unit.link == LinkKind::clocked) {
       part.bytes.resize(reply.bytes.size(), 0xFF);
       part.bits = reply.bits;
@@ -77,10 +77,10 @@ struct Judge {
 
 }  // namespace
 
-Weight weight_of(const Unit& unit, const Options& options, const Held& request, const Held& reply,
-                 const sim::FaultRates& rates, unsigned samples) {
+UndetectedDamage measure_undetected_damage(const Unit& unit, const Options& options, const OwnedFrame& request,
+                                           const OwnedFrame& reply, const sim::FaultRates& rates, unsigned samples) {
   std::uint64_t damaged = 0;
-  Weight weight;
+  UndetectedDamage undetected;
   const Judge judge{unit, options, request, reply};
   const auto sample = [&](auto& faulty, const auto& asks, auto&& wrong) {
     Time now{};
@@ -95,29 +95,29 @@ Weight weight_of(const Unit& unit, const Options& options, const Held& request, 
         continue;
       }
       ++damaged;
-      const Wrong found = step.kind == Step<Item>::Kind::transfer ? wrong(step.out) : Wrong{};
-      weight.position.wrong += found.position ? 1 : 0;
-      weight.others.wrong += found.others ? 1 : 0;
+      const WrongValues found = step.kind == Step<Item>::Kind::transfer ? wrong(step.out) : WrongValues{};
+      undetected.position.wrong += found.position ? 1 : 0;
+      undetected.others.wrong += found.others ? 1 : 0;
       now += std::chrono::seconds(1);
       faulty.feed({.kind = Event<Item>::Kind::timer, .at = now});
       if (step.kind == Step<Item>::Kind::transfer) faulty.feed({.kind = Event<Item>::Kind::sent, .at = now});
     }
   };
   if (unit.link == LinkKind::can) {
-    Parrot<CanFrame> parrot({*reply.can}, 0);
-    sim::FaultyNode faulty(parrot, rates, 1);
+    FixedReplyDevice<CanFrame> device({*reply.can}, 0);
+    sim::FaultyNode faulty(device, rates, 1);
     sample(faulty, std::vector{request.can.value_or(CanFrame{})}, [&](std::span<const CanFrame> frames) {
-      Wrong wrong;
+      WrongValues wrong;
       for (const CanFrame& one : frames) judge.judge({.link = unit.link, .can = one}, wrong);
       return wrong;
     });
   } else {
-    Parrot<std::uint8_t> parrot(reply.bytes, reply.bits);
-    sim::FaultyDevice faulty(parrot, rates, 1);
+    FixedReplyDevice<std::uint8_t> device(reply.bytes, reply.bits);
+    sim::FaultyDevice faulty(device, rates, 1);
     sample(faulty, request.bytes.empty() ? Wire{0} : request.bytes, [&](Bytes bytes) { return judge.judge(bytes); });
   }
-  weight.position.damaged = weight.others.damaged = std::max<std::uint64_t>(damaged, 1);
-  return weight;
+  undetected.position.damaged = undetected.others.damaged = std::max<std::uint64_t>(damaged, 1);
+  return undetected;
 }
 
 }  // namespace absenc::kit

@@ -12,7 +12,7 @@
 namespace absenc::kit {
 
 /// Number of damaged replies, and of those that decoded to a wrong value.
-struct Share {
+struct DamageCount {
   std::uint64_t damaged = 1;
   std::uint64_t wrong = 0;
 
@@ -29,12 +29,12 @@ struct Share {
 };
 
 /// Rates of undetected damage: replies with another position, and replies with another value in any other field.
-struct Weight {
-  Share position{};
-  Share others{};
+struct UndetectedDamage {
+  DamageCount position{};
+  DamageCount others{};
 
   /// Combines two measurements by the worse rate of each kind.
-  void add(const Weight& other) {
+  void add(const UndetectedDamage& other) {
     if (other.position.chance() >= position.chance()) position = other.position;
     if (other.others.chance() >= others.chance()) others = other.others;
   }
@@ -42,7 +42,8 @@ struct Weight {
 
 /// Measures the rates with `samples` replies. A host may accept any prefix of the damaged bytes; where frames are sent
 /// unsolicited, any part of them.
-[[nodiscard]] Weight weight_of(const Unit& unit, const Options& options, const Held& request, const Held& reply,
-                               const sim::FaultRates& rates, unsigned samples);
+[[nodiscard]] UndetectedDamage measure_undetected_damage(const Unit& unit, const Options& options,
+                                                         const OwnedFrame& request, const OwnedFrame& reply,
+                                                         const sim::FaultRates& rates, unsigned samples);
 
 }  // namespace absenc::kit
