@@ -36,7 +36,7 @@ void esl_position(benchmark::State& state) {
   }
 }
 
-bool holds(Bytes reply, std::size_t begin, std::size_t end, Channel channel) {
+bool crc_matches(Bytes reply, std::size_t begin, std::size_t end, Channel channel) {
   CrcParameters parameters = crc16_lsb;
   parameters.init = initial_value(channel);
   std::array<std::uint8_t, reply_capacity> padded{};
@@ -49,7 +49,7 @@ void esl_position_reference(benchmark::State& state) {
   std::size_t i = 0;
   for (auto _ : state) {
     const Bytes reply = frames[i++ % frames.size()];
-    const bool both = holds(reply, 0, 9, Channel::one) && holds(reply, 11, 16, Channel::two);
+    const bool both = crc_matches(reply, 0, 9, Channel::one) && crc_matches(reply, 11, 16, Channel::two);
     if (!both) return state.SkipWithError("a good reply was refused");
     benchmark::DoNotOptimize(both);
   }

@@ -152,8 +152,8 @@ bool Access::is_from_own_page(const Request& request) const {
 
 // A proxy does not always add its header. With a configured proxy, even a read request from this computer therefore
 // needs a token.
-bool Access::needs_token(const Request& request, Right what) const {
-  if (what == Right::open || what == Right::change || !on_loopback_) return what != Right::open;
+bool Access::needs_token(const Request& request, Right right) const {
+  if (right == Right::open || right == Right::change || !on_loopback_) return right != Right::open;
   return has_tokens() && (request.is_forwarded || !public_origin_.empty());
 }
 
@@ -167,7 +167,7 @@ std::string Access::client_of(const Request& request) const {
   return last.empty() || !is_address ? request.peer : last;
 }
 
-std::optional<Response> Access::refusal(const Request& request, Right what) const {
+std::optional<Response> Access::refusal(const Request& request, Right right) const {
   if (on_loopback_ && !names_this_server(request.host)) {
     return error_response(
         403, public_origin_.empty()
@@ -176,12 +176,12 @@ std::optional<Response> Access::refusal(const Request& request, Right what) cons
                  : fmt::format("this server accepts requests to localhost, 127.0.0.1, [::1] and the name in {} only",
                                public_origin_));
   }
-  if (what >= Right::poll && !is_from_own_page(request)) {
+  if (right >= Right::poll && !is_from_own_page(request)) {
     return error_response(403,
                           "requests from other sites may not change or poll an encoder: if a proxy shows this page, "
                           "start the server with --public-url");
   }
-  if (!needs_token(request, what)) return {};
+  if (!needs_token(request, right)) return {};
   if (token_file_.empty()) {
     return error_response(403, "this server changes nothing: it was started without --token-file");
   }

@@ -41,7 +41,7 @@ class Access {
   void reload();
 
   /// Returns the response that refuses the request; nothing if the request is allowed.
-  [[nodiscard]] std::optional<Response> refusal(const Request& request, Right what) const;
+  [[nodiscard]] std::optional<Response> refusal(const Request& request, Right right) const;
   /// Returns the address of the client. Behind a proxy on this computer it is the address that the proxy reports.
   [[nodiscard]] std::string client_of(const Request& request) const;
   /// Returns the name of the token in the request; "" without a valid token.
@@ -60,7 +60,7 @@ class Access {
   [[nodiscard]] bool may_try_again(const std::string& peer) const;
   [[nodiscard]] bool names_this_server(std::string_view host) const;
   [[nodiscard]] bool is_from_own_page(const Request& request) const;
-  [[nodiscard]] bool needs_token(const Request& request, Right what) const;
+  [[nodiscard]] bool needs_token(const Request& request, Right right) const;
 
   std::string token_file_;
   std::string public_origin_;  // "https://encoders.example:8443"; "": no proxy

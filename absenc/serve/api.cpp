@@ -161,8 +161,8 @@ void Api::get(const Request& request, const Reply& reply) {
   const bool is_of_encoder = path.starts_with(encoders_path);
   const Target target = is_of_encoder ? target_of(path) : Target{};
   const bool polls = target.part == "settings" || target.part == "memory";
-  const Access::Right what = is_open ? Access::Right::open : polls ? Access::Right::poll : Access::Right::read;
-  if (const auto refused = access_->refusal(request, what)) return reply.send(*refused);
+  const Access::Right right = is_open ? Access::Right::open : polls ? Access::Right::poll : Access::Right::read;
+  if (const auto refused = access_->refusal(request, right)) return reply.send(*refused);
   if (asset != nullptr) return reply.send({200, std::string(asset->type), std::string(asset->content)});
   if (is_of_encoder) return get_of(require_encoder(*fleet_, target.name), target.part, request, reply);
   if (path == "/healthz") return reply.send(health());
@@ -204,8 +204,8 @@ void Api::get_of(const std::shared_ptr<Watch>& watch, std::string_view part, con
 void Api::post(const Request& request, const Reply& reply) {
   const bool is_of_encoder = request.path.starts_with(encoders_path);
   const Target target = is_of_encoder ? target_of(request.path) : Target{};
-  const Access::Right what = target.part == "doctor" ? Access::Right::poll : Access::Right::change;
-  if (const auto refused = access_->refusal(request, what)) return reply.send(*refused);
+  const Access::Right right = target.part == "doctor" ? Access::Right::poll : Access::Right::change;
+  if (const auto refused = access_->refusal(request, right)) return reply.send(*refused);
   if (!is_of_encoder) throw NotFound(unknown_path(request));
   const std::shared_ptr<Watch> watch = require_encoder(*fleet_, target.name);
   if (target.part == "doctor") return doctor(*watch, request, reply);

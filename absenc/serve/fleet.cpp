@@ -87,14 +87,14 @@ std::string Fleet::reload() {
   std::vector<Configured> all = configured();
   std::vector<Served> unchanged;
   Watches ending;
-  std::vector<std::string> gone;
+  std::vector<std::string> ended;
   {
     const std::lock_guard lock(mutex_);
     for (Served& one : served_) {
       const bool stays = std::any_of(all.begin(), all.end(), [&](const Configured& now) {
         return now.name == one.watch->name() && now.description == one.description;
       });
-      if (!stays) gone.push_back(one.watch->name());
+      if (!stays) ended.push_back(one.watch->name());
       if (!stays) ending.push_back(one.watch);
       if (stays) unchanged.push_back(one);
     }
@@ -123,7 +123,7 @@ std::string Fleet::reload() {
   const std::lock_guard lock(mutex_);
   served_ = std::move(next);
   return fmt::format("{} unchanged; ended: {}; begun: {}", unchanged.size(),
-                     gone.empty() ? "none" : fmt::format("{}", fmt::join(gone, ", ")),
+                     ended.empty() ? "none" : fmt::format("{}", fmt::join(ended, ", ")),
                      added.empty() ? "none" : fmt::format("{}", fmt::join(added, ", ")));
 }
 

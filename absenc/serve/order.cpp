@@ -120,13 +120,13 @@ OrderResult read_settings(Encoder& encoder, const Command* wanted, const Between
   Json settings = Json::object();
   Json rows = Json::array();
   Json failed = Json::object();
-  OptionalReads asked(encoder, between);
+  OptionalReads reads(encoder, between);
   for (const Command* getter : questions(encoder.unit())) {
     if (wanted != nullptr && wanted != getter) continue;
     const bool is_setting = getter->verb == Verb::config_get;
-    const std::optional<Answer> answer = asked.ask(getter->name, {});
+    const std::optional<Answer> answer = reads.ask(getter->name, {});
     if (!answer) {
-      if (is_setting || asked.was_sent()) failed.set(getter->name, asked.reason());
+      if (is_setting || reads.was_sent()) failed.set(getter->name, reads.reason());
       continue;
     }
     (is_setting ? settings : identity).set(getter->name, to_json(answer->row()));
@@ -138,7 +138,7 @@ OrderResult read_settings(Encoder& encoder, const Command* wanted, const Between
     }
   }
   Json json = Json::object().set("ok", true).set("identity", identity).set("settings", settings);
-  return asked.done(json.set("rows", rows).set("failed", failed));
+  return reads.done(json.set("rows", rows).set("failed", failed));
 }
 
 // Reads all readable registers. The last column of a reply has the meaning of the register.

@@ -64,11 +64,11 @@ Json status_json(const Unit& unit, const Reading& reading) {
 }
 
 void set_place(Json& json, const Reading& reading, bool live) {
-  const bool holds = live && reading.ready && reading.singleturn_valid();
+  const bool is_valid = live && reading.ready && reading.singleturn_valid();
   const bool linear = reading.unit_um > 0;
-  json.set("angle_deg", holds && !linear ? Json(degrees(reading.singleturn, reading.singleturn_bits)) : Json());
-  json.set("position_mm", holds && linear ? Json(micrometres(reading.singleturn, reading.unit_um) / 1000) : Json());
-  json.set("counts", holds ? Json(reading.singleturn) : Json());
+  json.set("angle_deg", is_valid && !linear ? Json(degrees(reading.singleturn, reading.singleturn_bits)) : Json());
+  json.set("position_mm", is_valid && linear ? Json(micrometres(reading.singleturn, reading.unit_um) / 1000) : Json());
+  json.set("counts", is_valid ? Json(reading.singleturn) : Json());
   const Validity singleturn = reading.ready ? reading.singleturn_validity() : Validity::invalid;
   json.set("singleturn_valid", live ? to_json(value_of(singleturn)) : Json());
   const bool has_turns = live && reading.multiturn_bits != 0 && reading.multiturn_valid;

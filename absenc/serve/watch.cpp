@@ -366,7 +366,7 @@ void Watch::carry_out(Encoder& live, const Order& order, const std::function<voi
                       const std::stop_token& stop) {
   const std::string_view name = order.name();
   const bool is_examination = order.kind == Order::Kind::examination;
-  const bool is_told = is_examination || order.kind == Order::Kind::command;
+  const bool is_reported = is_examination || order.kind == Order::Kind::command;
   OrderResult done;
   bool has_begun = false;
   const auto note = [&](const std::exception& failure) {
@@ -379,7 +379,7 @@ void Watch::carry_out(Encoder& live, const Order& order, const std::function<voi
     }
     command_runs_ = false;
     accept_orders(true);
-    if (is_told) add_event("command", done.text, order.who);
+    if (is_reported) add_event("command", done.text, order.who);
     order.done(done);
   };
   const auto end = [&](std::string_view advice) {

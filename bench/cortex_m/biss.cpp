@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// A program without a library that decodes FRAMES times one of 64 BiSS frames with 32 bits, for count.sh. WAY selects
+// A program without a library that decodes FRAMES times one of 64 BiSS frames with 32 bits, for count.sh. DECODER selects
 // the decoder: 0, a format known at compile time; 1, a format known at run time; 2, the peer of bench/sampled_peer.hpp;
 // 3, moteus' own function, whose header must be in an include folder. The exit status is 0 if all positions are right.
 #include "absenc/protocol/biss/frame.hpp"
 #include "bench/sampled_peer.hpp"
-#if WAY == 3
+#if DECODER == 3
 #include <bissc_extract.h>
 #endif
 
@@ -36,16 +36,16 @@ constexpr auto frames = [] {
 }();
 
 [[gnu::noinline]] std::uint32_t position(const Samples& frame) {
-  if constexpr (WAY == 0) {
+  if constexpr (DECODER == 0) {
     const auto reply = biss::decode<known>({frame.packed, samples});
     return reply ? static_cast<std::uint32_t>(reply->word.position) : 0;
-  } else if constexpr (WAY == 1) {
+  } else if constexpr (DECODER == 1) {
     static biss::Format format = known;
     asm volatile("" : : "r"(&format) : "memory");
     const auto reply = biss::decode(format, {frame.packed, samples});
     return reply ? static_cast<std::uint32_t>(reply->word.position) : 0;
-#if WAY == 3
-  } else if constexpr (WAY == 3) {
+#if DECODER == 3
+  } else if constexpr (DECODER == 3) {
     static moteus::BisscExtractConfig config{pin, 32, 6, false};
     asm volatile("" : : "r"(&config) : "memory");
     const auto result = moteus::ExtractBisscFrame(frame.sampled.data(), samples, config);

@@ -11,24 +11,24 @@ cd "$(dirname "$0")/../.."
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 
-# executed CPU OPTIMISATION WAY FRAMES prints the number of executed instructions.
+# executed CPU OPTIMISATION DECODER FRAMES prints the number of executed instructions
 executed() {
-  arm-none-eabi-g++ -std=c++20 "$2" -DNDEBUG -DWAY="$3" -DFRAMES="$4" -mcpu="$1" -mthumb -ffreestanding -fno-exceptions -fno-rtti \
+  arm-none-eabi-g++ -std=c++20 "$2" -DNDEBUG -DDECODER="$3" -DFRAMES="$4" -mcpu="$1" -mthumb -ffreestanding -fno-exceptions -fno-rtti \
     -fno-threadsafe-statics -ffunction-sections -fdata-sections -Wl,--gc-sections -nostartfiles -I. ${peers:+-I"$peers"} \
     bench/cortex_m/biss.cpp -o "$work/program"
   qemu-arm -singlestep -d exec,nochain -D "$work/log" "$work/program" || { echo 'a wrong position' >&2; exit 1; }
   grep -c '^Trace' "$work/log"
 }
 
-ways=('known at compile time' 'known at run time' 'the peer')
-[[ -z $peers ]] || ways+=("moteus' own")
+decoders=('known at compile time' 'known at run time' 'the peer')
+[[ -z $peers ]] || decoders+=("moteus' own")
 for cpu in cortex-m0plus cortex-m4; do
   for optimisation in -O2 -Os; do
-    for way in "${!ways[@]}"; do
-      none=$(executed $cpu $optimisation "$way" 0)
-      all=$(executed $cpu $optimisation "$way" 64)
+    for decoder in "${!decoders[@]}"; do
+      none=$(executed $cpu $optimisation "$decoder" 0)
+      all=$(executed $cpu $optimisation "$decoder" 64)
       size=$(arm-none-eabi-size "$work/program" | awk 'NR == 2 { print $1 }')
-      echo "$cpu $optimisation ${ways[way]}: $(((all - none) / 64)) instructions a frame, $size bytes with the frames"
+      echo "$cpu $optimisation ${decoders[decoder]}: $(((all - none) / 64)) instructions a frame, $size bytes with the frames"
     done
   done
 done
