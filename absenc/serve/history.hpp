@@ -18,8 +18,8 @@
 namespace absenc::serve {
 
 struct HistoryLimits {
-  std::int64_t seconds = 30LL * 24 * 3600;    // older rows are deleted
-  std::int64_t bytes = 1024LL * 1024 * 1024;  // size limit of the file; above it the oldest rows are deleted
+  std::int64_t seconds = 30LL * 24 * 3600;    // age in seconds above which rows are deleted
+  std::int64_t bytes = 1024LL * 1024 * 1024;  // file size above which the oldest rows are deleted
 };
 
 /// A range of calendar times in seconds, both ends included.

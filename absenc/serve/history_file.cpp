@@ -110,8 +110,8 @@ HistoryFile::State HistoryFile::check() const {
   if (!owned_file_->has_its_name()) {
     return os::identity_of(path_).number == 0 ? State::gone : State::replaced;
   }
-  // The writer was SQLite in another program, which may also write our log to the file, or `cp`, which mixes our log
-  // into the new content.
+  // SQLite in another program has changed the file, and may have written our log to it; or `cp` has overwritten it,
+  // which mixes our log into the new content.
   const bool is_changed = owned_file_->state().modified_ns != modified_ns_;
   if (!is_changed && !is_truncated()) return State::whole;
   if (!passes_quick_check()) return State::damaged;

@@ -24,7 +24,7 @@ namespace {
 constexpr unsigned most_connections = Connections::most + Connections::reserve + 64;
 constexpr std::size_t memory_for_each = 64 * 1024;  // bytes for headers and unsent output; larger headers are refused
                                                     // with status 431
-constexpr std::uint64_t most_body = 4096;           // bytes; no request needs a body
+constexpr std::uint64_t most_body = 4096;           // bytes of a request body; no request needs one
 constexpr std::uint64_t most_read = 1 << 20;        // bytes of a body of unknown length that are read before the
                                                     // connection is closed
 constexpr unsigned idle_seconds = 15;

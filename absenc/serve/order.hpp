@@ -27,7 +27,7 @@ struct Order {
     command,
     settings,     // all readable settings and identification; with `command` only this setting
     memory,       // bytes at `addresses`; for encoders with registers all readable registers
-    examination,  // like `absenc doctor`
+    examination,  // the examination of `absenc doctor`
   };
 
   Kind kind = Kind::command;

@@ -226,7 +226,7 @@ void Spool::forget(const std::string& encoder) {
   facts_.next_numbers.erase(encoder);
   unwritten_numbers_.erase(encoder);
   if (newest_ == nullptr) return;
-  // Without free space the number stays until the next file is started, which does no harm.
+  // Without free space the reading number stays in the file until the next file is started, which does no harm.
   [[maybe_unused]] const int ignored = newest_->log().append(spool_record_without(encoder));
   parts_.back().bytes = newest_->log().size();
 }

@@ -14,7 +14,7 @@ namespace absenc::serve {
 
 /// Position, continued past the end of a turn, and speed; in degrees and rpm, for linear encoders mm and mm/s.
 struct Point {
-  std::int64_t at_ms = 0;  // calendar time
+  std::int64_t at_ms = 0;  // calendar time of the reading, ms since 1970
   double place = 0;
   std::optional<client::Estimate> speed{};
 };
@@ -31,7 +31,7 @@ struct Spread {
 };
 
 struct Second {
-  std::int64_t at_s = 0;  // calendar time
+  std::int64_t at_s = 0;  // calendar time of the second, s since 1970
   std::uint64_t readings = 0;
   std::uint64_t errors = 0;
   Spread place{};

@@ -59,7 +59,7 @@ struct LatencyFigures {
 struct RaisedAlarm {
   std::string_view channel{};  // name of the field with the alarms of this channel
   std::string_view name{};
-  std::int64_t since_ms = 0;      // calendar time
+  std::int64_t since_ms = 0;      // calendar time when the alarm was raised
   std::string acknowledged_by{};  // name of the token; "": not acknowledged
   std::int64_t acknowledged_ms = 0;
 };
@@ -79,12 +79,12 @@ struct Snapshot {
   std::uint64_t errors_last_minute = 0;
   std::vector<RaisedAlarm> raised{};
   double rate = 0;           // readings per second
-  LatencyFigures latency{};  // at most one second old
+  LatencyFigures latency{};  // latencies, at most one second old
 };
 
 /// Additional data for the view of one encoder.
 struct Details {
-  std::vector<client::BadExchangeText> bad{};  // newest first
+  std::vector<client::BadExchangeText> bad{};  // bad exchanges, newest first
   client::Json fields{};                       // fields of the last reply, at most one second old
   client::Json reply{};                        // the same fields for people, as in `shown_values`
 };
@@ -161,7 +161,7 @@ class Watch {
   bool has_ended_ = false;     // no more orders are accepted
   bool is_examining_ = false;  // an examination runs; no orders are accepted meanwhile
   TimeSeries series_;
-  std::array<Outbox, 2> outboxes_;  // index: Outlet
+  std::array<Outbox, 2> outboxes_;  // queues of readings, by Outlet
 
   // The members below are used by the reading thread only.
   Time next_summary_{};

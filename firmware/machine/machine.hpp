@@ -60,7 +60,7 @@ std::uint32_t call_emulator(std::uint32_t number, const void* parameter);
 /// Frequency of SysTick's clock.
 struct Frequency {
   std::uint32_t hertz;
-  std::uint32_t nanoseconds;  // duration of `counts` counts
+  std::uint32_t nanoseconds;  // time that `counts` counts take
   std::uint32_t counts;
 };
 extern const Frequency frequency;

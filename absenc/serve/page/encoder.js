@@ -19,7 +19,7 @@ const RANGES = {live: ["Live", 0], "10m": ["10 min", 600], "1h": ["1 h", 3600], 
 const TABS = {history: "History", exchanges: "Exchanges", settings: "Settings", memory: "Memory", doctor: "Doctor"};
 const AWAY = ["opening", "lost", "examined"];
 const SHOWN_COMMANDS = 3;
-const LEAST_MS = 12;      // minimum distance of two points
+const LEAST_MS = 12;      // minimum time between two stored points
 
 const byteText = (byte) => (Number.isNaN(byte) ? "?" : `0x${byte.toString(16).toUpperCase().padStart(2, "0")} (${byte})`);
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Texts of values and conditions.
+// Converts values and states of encoders to texts for people.
 
 export const NOTHING = "—";
 const MINUS = "−";
