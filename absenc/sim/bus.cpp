@@ -91,7 +91,7 @@ ByteStep Bus::next(Time now) {
 }
 
 Time Bus::first_begin() const {
-  Time first = never - soon;  // so that it can be compared with a time to come
+  Time first = never - soon;  // never - soon: callers may add `soon` without overflow
   for (const Node& node : nodes_) {
     if (node.doing == Doing::pending) first = std::min(first, node.at);
   }

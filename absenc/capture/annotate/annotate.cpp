@@ -136,7 +136,8 @@ void Annotator::parse(Channel& channel, bool whole, bool cut) {
   at_ = last_reply_size_ = 0;
   whole_ = whole;
   cut_ = cut;
-  // Where the capture began within these, nobody knows what they are; but when they do not end, they must tell.
+  // If the capture begins within this complete run, its frame boundaries are unknown: it is reported as cut. A run that
+  // never pauses must be parsed all the same.
   if (whole && !channel.synchronised && !settings_.by_arrival) {
     const Run& run = channel.run;
     const Piece all{run.bytes(), run.begin(0), run.end()};
