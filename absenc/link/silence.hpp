@@ -16,29 +16,29 @@ class Silence {
   /// Records the end of a transfer or pulse of this end: the `answer` limit now applies.
   void sent(Time at) { *this = Silence(at); }
   /// Records a received item: the `gap` limit now applies.
-  void heard(Time at) {
+  void received(Time at) {
     busy(at);
-    heard_ = true;
-    told_ = false;
+    received_ = true;
+    reported_ = false;
   }
   /// Records activity on the line that did not reach this end as an item: the limit starts again.
   void busy(Time at) { since_ = at; }
-  void told() { told_ = true; }
+  void reported() { reported_ = true; }
 
   [[nodiscard]] Time since() const { return since_; }
-  [[nodiscard]] bool has_heard() const { return heard_; }
+  [[nodiscard]] bool has_received() const { return received_; }
 
   /// Returns when `silence` is due for a step with these limits (Step::answer and gap); `latency` is the port's delay,
   /// which is added. Returns `never` if `silence` was already reported or no limit applies.
   [[nodiscard]] Time due(Time answer, Time gap, Time latency = {}) const {
-    const Time limit = heard_ ? gap : answer;
-    return told_ || limit <= Time{} ? never : since_ + limit + latency;
+    const Time limit = received_ ? gap : answer;
+    return reported_ || limit <= Time{} ? never : since_ + limit + latency;
   }
 
  private:
-  Time since_{};        // end of the last transfer, or time of the last activity
-  bool heard_ = false;  // an item was received since the last transfer
-  bool told_ = false;
+  Time since_{};           // end of the last transfer, or time of the last activity
+  bool received_ = false;  // an item was received since the last transfer
+  bool reported_ = false;
 };
 
 }  // namespace absenc

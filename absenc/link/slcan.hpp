@@ -110,34 +110,34 @@ constexpr std::int64_t digits_of(Bytes text) {
 /// of the four letters occurs within a frame or a command.
 class LineReader {
  public:
-  enum class Found : std::uint8_t {
+  enum class LineEvent : std::uint8_t {
     nothing,
     line,     // `line()` is complete and valid until the next byte; may be empty
     refused,  // BEL
     garbage,  // bytes that cannot be a line were discarded
   };
 
-  constexpr Found feed(std::uint8_t byte) {
+  constexpr LineEvent feed(std::uint8_t byte) {
     if (complete_) line_.clear();
     complete_ = false;
-    if (byte == '\n') return Found::nothing;
-    if (byte == bell) return end(Found::refused);
-    if (byte == end_of_line) return lost_ ? end(Found::garbage) : end(Found::line);
+    if (byte == '\n') return LineEvent::nothing;
+    if (byte == bell) return end(LineEvent::refused);
+    if (byte == end_of_line) return lost_ ? end(LineEvent::garbage) : end(LineEvent::line);
     if (begins_frame(byte) && (lost_ || !line_.empty())) {
       line_.clear();
       lost_ = false;
       line_.push_back(byte);
-      return Found::garbage;
+      return LineEvent::garbage;
     }
     if (!lost_ && !line_.push_back(byte)) lost_ = true;
-    return Found::nothing;
+    return LineEvent::nothing;
   }
 
   /// Returns the last complete line, without the CR.
   [[nodiscard]] constexpr Bytes line() const { return line_; }
 
  private:
-  constexpr Found end(Found found) {
+  constexpr LineEvent end(LineEvent found) {
     complete_ = true;
     lost_ = false;
     return found;

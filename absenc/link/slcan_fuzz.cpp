@@ -36,16 +36,16 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   check({data, size});
   slcan::LineReader reader;
   for (std::size_t i = 0; i < size; ++i) {
-    if (reader.feed(data[i]) != slcan::LineReader::Found::line) continue;
+    if (reader.feed(data[i]) != slcan::LineReader::LineEvent::line) continue;
     require(reader.line().size() <= slcan::line_capacity);
     check(reader.line());
   }
   // A frame behind arbitrary bytes is found.
   const CanFrame frame{.id = 0x120, .size = 1, .data = {0x47}};
-  slcan::LineReader::Found found{};
+  slcan::LineReader::LineEvent found{};
   const slcan::LineText text = slcan::encode(frame);
   for (const std::uint8_t byte : text.view()) found = reader.feed(byte);
-  require(found == slcan::LineReader::Found::line);
+  require(found == slcan::LineReader::LineEvent::line);
   const Result<CanFrame> read = slcan::decode(reader.line());
   require(read && *read == frame);
   return 0;

@@ -80,15 +80,15 @@ std::vector<std::string> found(std::string_view stream) {
   std::vector<std::string> all;
   for (const std::uint8_t byte : bytes(stream)) {
     switch (reader.feed(byte)) {
-      case LineReader::Found::nothing:
+      case LineReader::LineEvent::nothing:
         break;
-      case LineReader::Found::line:
+      case LineReader::LineEvent::line:
         all.emplace_back(reader.line().begin(), reader.line().end());
         break;
-      case LineReader::Found::refused:
+      case LineReader::LineEvent::refused:
         all.emplace_back("refused");
         break;
-      case LineReader::Found::garbage:
+      case LineReader::LineEvent::garbage:
         all.emplace_back("garbage");
         break;
     }

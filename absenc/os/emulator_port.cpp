@@ -120,8 +120,8 @@ void EmulatorPort::listen_on(std::uint16_t port) {
 void EmulatorPort::make_link() {
   std::error_code error;
   errno = 0;
-  name_ = bind_name_of(link_);
-  const bool served = !name_ && errno == EADDRINUSE;
+  in_use_marker_ = bind_name_of(link_);
+  const bool served = !in_use_marker_ && errno == EADDRINUSE;
   if (const auto there = fs::symlink_status(link_, error); fs::exists(there)) {
     const std::string target = fs::is_symlink(there) ? fs::read_symlink(link_, error).native() : "";
     if (!target.starts_with("/dev/pts/")) {
@@ -149,7 +149,7 @@ std::size_t EmulatorPort::read_some(MutableBytes into, std::span<const int> read
       continue;
     }
     const ssize_t size = ::read(descriptor, into.data() + filled, into.size() - filled);
-    if (size > 0 && descriptor == master_.get() && !understands_terminal()) continue;
+    if (size > 0 && descriptor == master_.get() && !rate_matches_terminal()) continue;
     if (size > 0) {
       filled += static_cast<std::size_t>(size);
     } else if (descriptor != master_.get() && (size == 0 || (errno != EAGAIN && errno != EINTR))) {
@@ -166,15 +166,15 @@ std::size_t EmulatorPort::read_some(MutableBytes into, std::span<const int> read
 // matter.
 Time EmulatorPort::lateness() {
   const Time now = os::now();
-  if (now < looked_ + 500us) return late_;
-  looked_ = now;
+  if (now < delay_read_at_ + 500us) return lateness_;
+  delay_read_at_ = now;
   const Time delay = delay_.take();
-  if (delay < late_ && now < late_until_) return late_;
-  late_until_ = now + 1s;
-  return late_ = delay;
+  if (delay < lateness_ && now < lateness_until_) return lateness_;
+  lateness_until_ = now + 1s;
+  return lateness_ = delay;
 }
 
-bool EmulatorPort::understands_terminal() const {
+bool EmulatorPort::rate_matches_terminal() const {
   constexpr std::uint32_t unset = 38'400;
   if (device_rate_ == 0) return true;
   const std::uint32_t rate = terminal_rate(slave_.get());

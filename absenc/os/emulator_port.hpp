@@ -46,24 +46,24 @@ class EmulatorPort final : public StreamPort {
   void listen_on(std::uint16_t port);
   void make_link();
   void users_changed();
-  [[nodiscard]] bool understands_terminal() const;
+  [[nodiscard]] bool rate_matches_terminal() const;
   void accept_client();
   void drop_client(int descriptor);
   void write_terminal(Bytes bytes);
 
   Descriptor master_;
-  Descriptor slave_;  // kept open: the master fails while no program has the slave open
-  Descriptor name_;   // bound socket that marks the link as in use
-  Descriptor watch_;  // inotify: reports programs that open or close the slave
+  Descriptor slave_;          // kept open: the master fails while no program has the slave open
+  Descriptor in_use_marker_;  // bound socket that marks the link as in use
+  Descriptor watch_;          // inotify: reports programs that open or close the slave
   Descriptor listener_;
   std::vector<Descriptor> clients_;
   std::string terminal_;
   std::string link_;
   std::uint16_t tcp_port_ = 0;
   RunDelay delay_;
-  Time looked_{};  // time of the last look at `delay_`
-  Time late_{};
-  Time late_until_{};
+  Time delay_read_at_{};  // time of the last look at `delay_`
+  Time lateness_{};
+  Time lateness_until_{};
   std::uint64_t dropped_ = 0;
   std::uint32_t device_rate_ = 0;  // 0: the device has not set a rate
 };

@@ -11,16 +11,16 @@ namespace absenc::os {
 using namespace std::chrono_literals;
 
 namespace {
-constexpr std::size_t most_kept = 4096;  // limit for received frames that no caller has taken
+constexpr std::size_t most_pending = 4096;  // limit for received frames that no caller has taken
 }
 
-void FramePort::push(const CanFrame& frame, Time at) { push_happened({EventKind::received, at, frame}); }
+void FramePort::push(const CanFrame& frame, Time at) { push_event({EventKind::received, at, frame}); }
 
-void FramePort::push_error(Time at) { push_happened({EventKind::line_error, at}); }
+void FramePort::push_error(Time at) { push_event({EventKind::line_error, at}); }
 
-void FramePort::push_happened(const Happened& happened) {
-  if (happened_.size() == most_kept) happened_.pop_front();
-  happened_.push_back(happened);
+void FramePort::push_event(const PendingEvent& pending) {
+  if (pending_events_.size() == most_pending) pending_events_.pop_front();
+  pending_events_.push_back(pending);
 }
 
 Time FramePort::now() {
@@ -58,33 +58,33 @@ void FramePort::transfer(const Step<CanFrame>& step) {
     at = os::now();
     send(frame);
   }
-  happened_.push_back({EventKind::sent, at});
+  pending_events_.push_back({EventKind::sent, at});
 }
 
 Event<CanFrame> FramePort::wait(const Step<CanFrame>& step) {
   waiting_.begin(step, latency_);
   for (;;) {
-    if (!happened_.empty()) return tell_first();
+    if (!pending_events_.empty()) return report_first();
     collect(std::min(waiting_.due(), end_));
     const Time time = os::now();
     if (time >= end_) throw Ended{};
     // Frames go before limits: a late look by this program is not the fault of the other side.
-    if (!happened_.empty()) continue;
-    if (const std::optional<Event<CanFrame>> event = waiting_.over(time)) return *event;
+    if (!pending_events_.empty()) continue;
+    if (const std::optional<Event<CanFrame>> event = waiting_.take_due(time)) return *event;
   }
 }
 
-Event<CanFrame> FramePort::tell_first() {
-  const Happened first = happened_.front();
-  happened_.pop_front();
+Event<CanFrame> FramePort::report_first() {
+  const PendingEvent first = pending_events_.front();
+  pending_events_.pop_front();
   if (first.kind == EventKind::sent) {
     waiting_.silence.sent(first.at);
   } else {
-    waiting_.silence.heard(first.at);
+    waiting_.silence.received(first.at);
   }
-  if (first.kind != EventKind::received) return waiting_.tell({.kind = first.kind, .at = first.at});
-  told_frame_ = first.frame;
-  return waiting_.tell({.kind = EventKind::received, .at = first.at, .items = {&told_frame_, 1}});
+  if (first.kind != EventKind::received) return waiting_.report({.kind = first.kind, .at = first.at});
+  reported_frame_ = first.frame;
+  return waiting_.report({.kind = EventKind::received, .at = first.at, .items = {&reported_frame_, 1}});
 }
 
 }  // namespace absenc::os

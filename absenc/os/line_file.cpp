@@ -51,7 +51,7 @@ int rename_to_new(const std::string& from, const std::string& to) {
 
 }  // namespace
 
-OwnFile::OwnFile(const std::string& path, Appears appears) : path_(path), appeared_(appears == Appears::at_once) {
+OutputFile::OutputFile(const std::string& path, Appears appears) : path_(path), appeared_(appears == Appears::at_once) {
   if (appeared_) {
     file_ = Descriptor(::open(path.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0666));
     if (!file_) refuse(path, errno);
@@ -63,29 +63,29 @@ OwnFile::OwnFile(const std::string& path, Appears appears) : path_(path), appear
   file_ = Descriptor(::open(folder.empty() ? "." : folder.c_str(), O_TMPFILE | O_RDWR | O_CLOEXEC, 0666));
   if (file_) return;
   if (errno != EOPNOTSUPP && errno != EISDIR && errno != EINVAL) refuse(path, errno);
-  beside_ = path + "." + std::to_string(::getpid());
-  file_ = Descriptor(::open(beside_.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0666));
-  if (!file_) refuse(std::exchange(beside_, {}), errno);
+  temporary_name_ = path + "." + std::to_string(::getpid());
+  file_ = Descriptor(::open(temporary_name_.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0666));
+  if (!file_) refuse(std::exchange(temporary_name_, {}), errno);
 }
 
-OwnFile::~OwnFile() {
-  if (!beside_.empty()) ::unlink(beside_.c_str());
+OutputFile::~OutputFile() {
+  if (!temporary_name_.empty()) ::unlink(temporary_name_.c_str());
 }
 
 void BlockFile::appear() {
   int error = 0;
-  if (!beside_.empty()) {
-    error = rename_to_new(beside_, path_);
+  if (!temporary_name_.empty()) {
+    error = rename_to_new(temporary_name_, path_);
   } else if (::linkat(AT_FDCWD, ("/proc/self/fd/" + std::to_string(file_.get())).c_str(), AT_FDCWD, path_.c_str(),
                       AT_SYMLINK_FOLLOW) < 0) {
     error = errno;
   }
   if (error != 0) refuse(path_, error);
-  beside_.clear();
+  temporary_name_.clear();
   appeared_ = true;
 }
 
-void OwnFile::require_there() const {
+void OutputFile::require_there() const {
   if (!appeared_) return;
   struct stat ours {};
   struct stat there {};
@@ -103,13 +103,13 @@ void OwnFile::require_there() const {
   if (static_cast<std::uint64_t>(ours.st_size) < size_) lose("cut by another program while it was written");
 }
 
-void OwnFile::sync() {
+void OutputFile::sync() {
   require_there();
   // A pipe or /dev/null cannot be synchronised and need not be.
   if (::fsync(file_.get()) < 0 && errno != EINVAL && errno != EROFS) throw system_failure("writing " + path_, errno);
 }
 
-int OwnFile::put(std::uint64_t at, std::string_view bytes) {
+int OutputFile::put(std::uint64_t at, std::string_view bytes) {
   while (!bytes.empty()) {
     const ssize_t written = ::pwrite(file_.get(), bytes.data(), bytes.size(), static_cast<off_t>(at));
     if (written < 0 && errno == EINTR) continue;

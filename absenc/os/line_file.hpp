@@ -12,7 +12,7 @@
 namespace absenc::os {
 
 /// A new file that this process writes; it must still have its name at every write.
-class OwnFile {
+class OutputFile {
  public:
   /// Waits until the content is on the disk. Throws Failure, also as `require_there` does.
   void sync();
@@ -27,10 +27,10 @@ class OwnFile {
   enum class Appears : std::uint8_t { at_once, later };
 
   /// Creates the file. Throws Failure: `in_use` if the file exists, `no_permission`, `not_found`, `system`.
-  OwnFile(const std::string& path, Appears appears);
-  ~OwnFile();
-  OwnFile(const OwnFile&) = delete;
-  OwnFile& operator=(const OwnFile&) = delete;
+  OutputFile(const std::string& path, Appears appears);
+  ~OutputFile();
+  OutputFile(const OutputFile&) = delete;
+  OutputFile& operator=(const OutputFile&) = delete;
 
   /// Writes `bytes` at offset `at`. They survive the end of this process, and a power failure only after `sync`.
   /// Returns 0 or a value of errno.
@@ -40,22 +40,22 @@ class OwnFile {
   Descriptor file_;
   std::uint64_t size_ = 0;
   bool appeared_ = false;
-  std::string beside_;  // temporary name until `appear`, on file systems without nameless files
+  std::string temporary_name_;  // temporary name until `appear`, on file systems without nameless files
 };
 
 /// An output file of complete lines.
-class LineFile final : public OwnFile {
+class LineFile final : public OutputFile {
  public:
-  explicit LineFile(const std::string& path) : OwnFile(path, Appears::at_once) {}
+  explicit LineFile(const std::string& path) : OutputFile(path, Appears::at_once) {}
   /// Writes `lines` to the system at once, which takes a few us. If they do not all fit, none of them remains. Throws
   /// Failure, also as `require_there` does.
   void append(std::string_view lines);
 };
 
 /// An output file that is written in blocks at any offset and has no name until `appear`.
-class BlockFile final : public OwnFile {
+class BlockFile final : public OutputFile {
  public:
-  explicit BlockFile(const std::string& path) : OwnFile(path, Appears::later) {}
+  explicit BlockFile(const std::string& path) : OutputFile(path, Appears::later) {}
   /// Gives the file its name. Before this call no other process sees the file, and it disappears when the process ends.
   /// Throws Failure; `in_use` if another file has taken the name.
   void appear();

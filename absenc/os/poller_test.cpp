@@ -39,12 +39,12 @@ TEST(Poller, TellsWhereThereIsSomethingToRead) {
 }
 
 TEST(Poller, AsksWhetherItIsOver) {
-  int asked = 0;
-  const std::function<bool()> over = [&] { return ++asked == 3; };
+  int calls = 0;
+  const std::function<bool()> over = [&] { return ++calls == 3; };
   const EndQuestion question(over);
   Poller poller;
   EXPECT_THROW(static_cast<void>(poller.wait(never)), Ended);
-  EXPECT_EQ(asked, 3);
+  EXPECT_EQ(calls, 3);
 }
 
 TEST(Poller, SeesWhatIsReadyEvenAfterTheDeadline) {

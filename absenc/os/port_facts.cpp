@@ -18,7 +18,7 @@ namespace absenc::os {
 
 namespace {
 
-void ask_terminal(int descriptor, PortFacts& facts) {
+void read_terminal(int descriptor, PortFacts& facts) {
   serial_rs485 direction{};
   if (::ioctl(descriptor, TIOCGRS485, &direction) == 0) {
     facts.kernel_direction = (direction.flags & SER_RS485_ENABLED) != 0;
@@ -41,7 +41,7 @@ PortFacts port_facts(const std::string& path, const std::filesystem::path& sys) 
   facts.pseudo_terminal = is_pseudo_terminal(path);
   if (facts.pseudo_terminal) return facts;
   const Descriptor descriptor(::open(path.c_str(), O_RDONLY | O_NOCTTY | O_NONBLOCK | O_CLOEXEC));
-  if (descriptor) ask_terminal(descriptor.get(), facts);
+  if (descriptor) read_terminal(descriptor.get(), facts);
   return facts;
 }
 

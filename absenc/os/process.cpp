@@ -70,7 +70,7 @@ Time RunDelay::take() {
   char* end = text.data();
   std::strtoull(end, &end, 10);
   const Time total(static_cast<std::int64_t>(std::strtoull(end, &end, 10)));
-  return total - std::exchange(before_, total);
+  return total - std::exchange(last_total_, total);
 }
 
 int replaceable(const std::string& path) {
@@ -96,20 +96,20 @@ Descriptor open_nameless(const std::string& folder, mode_t mode) {
 
 NewFile::NewFile(const std::string& path) : path_(path), file_(open_nameless(folder_of(path), 0666)) {
   if (file_) {
-    meanwhile_ = "/proc/self/fd/" + std::to_string(file_.get());
+    temporary_path_ = "/proc/self/fd/" + std::to_string(file_.get());
     return;
   }
-  beside_ = path_ + ".XXXXXX";
-  file_ = Descriptor(::mkostemp(beside_.data(), O_CLOEXEC));
+  temporary_name_ = path_ + ".XXXXXX";
+  file_ = Descriptor(::mkostemp(temporary_name_.data(), O_CLOEXEC));
   if (!file_) throw system_failure("writing " + path_, errno);
-  meanwhile_ = beside_;
+  temporary_path_ = temporary_name_;
   const mode_t mask = ::umask(0);
   ::umask(mask);
   ::fchmod(file_.get(), 0666 & ~mask);
 }
 
 NewFile::~NewFile() {
-  if (!beside_.empty()) ::unlink(beside_.c_str());
+  if (!temporary_name_.empty()) ::unlink(temporary_name_.c_str());
 }
 
 void NewFile::write(std::string_view content) {
@@ -123,15 +123,15 @@ void NewFile::write(std::string_view content) {
 
 Descriptor NewFile::take_place(Durable durable) {
   if (durable == Durable::yes && ::fsync(file_.get()) < 0) throw system_failure("writing " + path_, errno);
-  if (beside_.empty()) {  // linkat(2) cannot replace an existing name, so the file gets a temporary one first
-    beside_ = path_ + "." + std::to_string(::getpid());
-    ::unlink(beside_.c_str());
-    if (::linkat(AT_FDCWD, meanwhile_.c_str(), AT_FDCWD, beside_.c_str(), AT_SYMLINK_FOLLOW) < 0) {
+  if (temporary_name_.empty()) {  // linkat(2) cannot replace an existing name, so the file gets a temporary one first
+    temporary_name_ = path_ + "." + std::to_string(::getpid());
+    ::unlink(temporary_name_.c_str());
+    if (::linkat(AT_FDCWD, temporary_path_.c_str(), AT_FDCWD, temporary_name_.c_str(), AT_SYMLINK_FOLLOW) < 0) {
       throw system_failure("writing " + path_, errno);
     }
   }
-  if (::rename(beside_.c_str(), path_.c_str()) < 0) throw system_failure("writing " + path_, errno);
-  beside_.clear();
+  if (::rename(temporary_name_.c_str(), path_.c_str()) < 0) throw system_failure("writing " + path_, errno);
+  temporary_name_.clear();
   return std::move(file_);
 }
 

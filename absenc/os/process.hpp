@@ -37,7 +37,7 @@ class RunDelay {
 
  private:
   Descriptor file_;
-  Time before_{};
+  Time last_total_{};
 };
 
 /// Checks whether `replace_file` may replace an existing file: a write-protected file must not be replaced, although
@@ -56,15 +56,15 @@ class NewFile {
 
   [[nodiscard]] int descriptor() const { return file_.get(); }
   /// Returns a path by which the file can be opened before `take_place`.
-  [[nodiscard]] const std::string& path() const { return meanwhile_; }
+  [[nodiscard]] const std::string& path() const { return temporary_path_; }
   void write(std::string_view content);
   /// Gives the file its final name and returns it, open. `Durable::yes` waits for the disk.
   Descriptor take_place(Durable durable);
 
  private:
   std::string path_;
-  std::string meanwhile_;
-  std::string beside_;  // temporary name, if the file has one
+  std::string temporary_path_;
+  std::string temporary_name_;  // temporary name, if the file has one
   Descriptor file_;
 };
 

@@ -203,9 +203,9 @@ void SerialPort::drive(ExtraWire wire, bool active) {
                                                 "=dtr or " + name + "=gpio:NAME");
 }
 
-Time SerialPort::pulse_width(ExtraWire wire, Time asked) const {
+Time SerialPort::pulse_width(ExtraWire wire, Time requested) const {
   const std::optional<PulseOutput>& output = pulse_output(wire);
-  return output ? output->wire().width.value_or(asked) : asked;
+  return output ? output->wire().width.value_or(requested) : requested;
 }
 
 }  // namespace absenc::os

@@ -47,7 +47,7 @@ class SerialPort final : public DescriptorPort {
 
  private:
   void drive(ExtraWire wire, bool active) override;
-  [[nodiscard]] Time pulse_width(ExtraWire wire, Time asked) const override;
+  [[nodiscard]] Time pulse_width(ExtraWire wire, Time requested) const override;
   void change_rate(std::uint32_t rate) override;
 
   [[nodiscard]] const std::optional<PulseOutput>& pulse_output(ExtraWire wire) const {

@@ -30,23 +30,25 @@ std::optional<LineSettings> set_terminal(int descriptor, const LineSettings& set
 
 /// Returns whether UARTs at the two rates understand each other: at most 1 % difference. (Each end may be 2 to 3 % off
 /// before a 10-bit character breaks; the encoder needs its share.)
-[[nodiscard]] constexpr bool rates_agree(std::uint32_t asked, std::uint32_t given) {
-  const std::uint64_t difference = asked > given ? asked - given : given - asked;
-  return difference * 100 <= asked;
+[[nodiscard]] constexpr bool rates_agree(std::uint32_t requested, std::uint32_t given) {
+  const std::uint64_t difference = requested > given ? requested - given : given - requested;
+  return difference * 100 <= requested;
 }
 
-/// Returns the rate to propose when the driver gave another rate than `asked`: `given`, or the nearest rate that
+/// Returns the rate to propose when the driver gave another rate than `requested`: `given`, or the nearest rate that
 /// divides `base` (0: unknown), the input clock of its baud generator. Drivers do not propose it: they fall back to
 /// 9600 instead of the nearest rate.
-[[nodiscard]] constexpr std::uint32_t nearest_rate(std::uint32_t asked, std::uint32_t given, std::uint32_t base) {
-  const auto distance = [asked](std::uint32_t rate) { return rate > asked ? rate - asked : asked - rate; };
+[[nodiscard]] constexpr std::uint32_t nearest_rate(std::uint32_t requested, std::uint32_t given, std::uint32_t base) {
+  const auto distance = [requested](std::uint32_t rate) {
+    return rate > requested ? rate - requested : requested - rate;
+  };
   std::uint32_t nearest = given;
-  const std::uint32_t divisor = base / asked;
+  const std::uint32_t divisor = base / requested;
   for (const std::uint32_t candidate : {divisor, divisor + 1}) {
     if (candidate == 0 || base < candidate) continue;
     const std::uint32_t rate = base / candidate;
     // If `base` promises a rate that the driver has just refused, `base` is wrong.
-    if (rates_agree(asked, rate)) return given;
+    if (rates_agree(requested, rate)) return given;
     if (distance(rate) < distance(nearest)) nearest = rate;
   }
   return nearest;

@@ -25,11 +25,11 @@ namespace {
 // A signal handler may use only lock-free variables.
 static_assert(std::atomic<int>::is_always_lock_free && std::atomic<bool>::is_always_lock_free);
 std::atomic<int> wake{-1};  // the eventfd
-std::atomic<bool> came{false};
+std::atomic<bool> signal_received{false};
 
 void on_signal(int) {
   const int saved = errno;
-  came = true;
+  signal_received = true;
   const std::uint64_t one = 1;
   [[maybe_unused]] const ssize_t written = ::write(wake, &one, sizeof one);
   errno = saved;
@@ -60,7 +60,7 @@ void catch_interrupts() {
   static_cast<void>(once);
 }
 
-bool interrupted() { return came; }
+bool interrupted() { return signal_received; }
 
 int interrupt_descriptor() { return wake.load(std::memory_order_relaxed); }
 

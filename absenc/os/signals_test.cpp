@@ -90,18 +90,18 @@ TEST_F(Signals, OfOtherKindsDoNotEndAWait) {
 }
 
 TEST(EndQuestion, EndsAWaitThatNothingElseEnds) {
-  int asked = 0;
-  const std::function<bool()> over = [&] { return ++asked == 3; };
+  int calls = 0;
+  const std::function<bool()> over = [&] { return ++calls == 3; };
   const EndQuestion question(over);
   {
     const EndQuestion none({});
     EXPECT_FALSE(wait_for({}, now() + 50ms));
-    EXPECT_EQ(asked, 0);
+    EXPECT_EQ(calls, 0);
   }
   EXPECT_THROW(wait_for({}, never), Ended);
-  EXPECT_EQ(asked, 3);
+  EXPECT_EQ(calls, 3);
   EXPECT_FALSE(wait_for({}, now() + 50ms));
-  EXPECT_GT(asked, 3);
+  EXPECT_GT(calls, 3);
 }
 
 TEST(WaitFor, SeesWhatIsReadyAfterTheDeadline) {

@@ -10,14 +10,14 @@ namespace absenc::os {
 
 using namespace std::chrono_literals;
 
-using Found = slcan::LineReader::Found;
+using LineEvent = slcan::LineReader::LineEvent;
 using Kind = Failure::Kind;
 
 namespace {
 
-constexpr Time answer_time = 300ms;  // timeout for an adapter's reply; on USB it takes 1 or 2 ms
+constexpr Time reply_timeout = 300ms;  // timeout for an adapter's reply; on USB it takes 1 or 2 ms
 constexpr Time settling_time = 20ms;
-constexpr std::size_t most_waiting = 64;  // number of frames, as many as common adapters queue
+constexpr std::size_t most_queued = 64;  // number of frames, as many as common adapters queue
 constexpr unsigned most_reads = 1024;  // limit per call, so that a line that is never silent does not block the caller
 
 Bytes bytes_of(std::string_view text) { return {reinterpret_cast<const std::uint8_t*>(text.data()), text.size()}; }
@@ -29,11 +29,11 @@ Bytes bytes_of(std::string_view text) { return {reinterpret_cast<const std::uint
 void SlcanLine::write(Bytes text) { bytes_->begin({.kind = ByteStep::Kind::transfer, .out = text}); }
 
 void SlcanLine::collect(Time deadline) {
-  collected_ = false;
+  received_any_ = false;
   deadline = reach(bytes_->now()) ? Time{} : std::min(deadline, due());
   // Without a wait all available bytes are read, in any number of reads; with a wait only until one event was received.
   const bool everything = deadline <= bytes_->now();
-  for (unsigned reads = 0; reads < most_reads && (everything || !collected_); ++reads) {
+  for (unsigned reads = 0; reads < most_reads && (everything || !received_any_); ++reads) {
     const Time now = bytes_->now();
     // A byte port reports a timer only if it is in the future; available bytes are reported before it.
     const ByteEvent event = bytes_->wait({.at = deadline <= now ? now + 1ns : deadline});
@@ -43,17 +43,17 @@ void SlcanLine::collect(Time deadline) {
     }
     if (event.kind != ByteEvent::Kind::received) continue;
     for (const std::uint8_t byte : event.items) {
-      const Found found = reader_.feed(byte);
-      if (found == Found::nothing) continue;
-      collected_ = true;
-      take(found, reader_.line(), event.at);
+      const LineEvent line_event = reader_.feed(byte);
+      if (line_event == LineEvent::nothing) continue;
+      received_any_ = true;
+      handle_line(line_event, reader_.line(), event.at);
     }
   }
 }
 
-bool SlcanLine::hears_until(Time deadline) {
+bool SlcanLine::receives_until(Time deadline) {
   collect(deadline);
-  return collected_;
+  return received_any_;
 }
 
 // ---- SlcanPort
@@ -80,20 +80,20 @@ void SlcanPort::apply(const LineSettings& settings) {
     throw Failure(Kind::bad_rate, name_ + ": the adapter has no bit rate of " + std::to_string(settings.rate) +
                                       " bit/s: 10, 20, 50, 100, 125, 250, 500, 800 kbit/s and 1 Mbit/s are there");
   }
-  static_cast<void>(ask("C\r"));  // many adapters refuse this if they are closed already
+  static_cast<void>(request("C\r"));  // many adapters refuse this if they are closed already
   settle();
   const std::string set{'S', static_cast<char>(*code), '\r'};
-  const Answer rate = ask(set);
-  if (rate == Answer::refused) {
+  const Reply rate = request(set);
+  if (rate == Reply::refused) {
     throw Failure(Kind::bad_rate, name_ + ": the adapter refused a bit rate of " + std::to_string(settings.rate) +
                                       " bit/s (S" + static_cast<char>(*code) +
                                       "): does another program have it open? Unplug it and plug it in again");
   }
-  const Answer open = ask("O\r");
-  if (open == Answer::refused) {
+  const Reply open = request("O\r");
+  if (open == Reply::refused) {
     throw Failure(Kind::system, name_ + ": the adapter refused to open the bus (O): unplug it and plug it in again");
   }
-  if (rate == Answer::none && open == Answer::none && notes_.empty()) {
+  if (rate == Reply::none && open == Reply::none && notes_.empty()) {
     notes_.push_back(name_ +
                      " does not acknowledge commands: some adapters never do; if nothing else comes, it may be no "
                      "slcan adapter, or need another baud");
@@ -103,45 +103,45 @@ void SlcanPort::apply(const LineSettings& settings) {
 // Waits until late replies have been received. Replies carry no number, so replies to earlier commands must not arrive
 // after the next command.
 void SlcanPort::settle() {
-  constexpr unsigned most_answers = 64;
-  bool heard = true;
-  for (unsigned answers = 0; heard && answers < most_answers; ++answers) {
-    heard = hears_until(os::now() + settling_time + latency());
+  constexpr unsigned most_replies = 64;
+  bool any = true;
+  for (unsigned replies = 0; any && replies < most_replies; ++replies) {
+    any = receives_until(os::now() + settling_time + latency());
   }
 }
 
-SlcanPort::Answer SlcanPort::ask(std::string_view command) {
+SlcanPort::Reply SlcanPort::request(std::string_view command) {
   collect(Time{});
-  asking_ = true;
-  answer_ = Answer::none;
+  awaiting_reply_ = true;
+  reply_ = Reply::none;
   write(bytes_of(command));
-  const Time limit = os::now() + answer_time + latency();
-  while (answer_ == Answer::none && os::now() < limit) collect(limit);
-  asking_ = false;
-  return answer_;
+  const Time limit = os::now() + reply_timeout + latency();
+  while (reply_ == Reply::none && os::now() < limit) collect(limit);
+  awaiting_reply_ = false;
+  return reply_;
 }
 
 void SlcanPort::send(const CanFrame& frame) { write(slcan::encode(frame)); }
 
-void SlcanPort::take(Found found, Bytes line, Time at) {
-  if (found == Found::line && !line.empty() && slcan::begins_frame(line[0])) {
+void SlcanPort::handle_line(LineEvent line_event, Bytes line, Time at) {
+  if (line_event == LineEvent::line && !line.empty() && slcan::begins_frame(line[0])) {
     if (const Result<CanFrame> frame = slcan::decode(line)) {
       push(*frame, at);
     } else {
       ++garbage_;
     }
-  } else if (found == Found::garbage) {
+  } else if (line_event == LineEvent::garbage) {
     ++garbage_;
-  } else if (asking_ && (found == Found::refused || line.empty())) {
-    answer_ = found == Found::refused ? Answer::refused : Answer::accepted;
-  } else if (found == Found::refused) {
+  } else if (awaiting_reply_ && (line_event == LineEvent::refused || line.empty())) {
+    reply_ = line_event == LineEvent::refused ? Reply::refused : Reply::accepted;
+  } else if (line_event == LineEvent::refused) {
     push_error(at);  // the adapter could not send the frame
   }
 }
 
 // ---- SlcanAdapter
 
-void SlcanAdapter::answer(std::string_view text) { write(bytes_of(text)); }
+void SlcanAdapter::send_reply(std::string_view text) { write(bytes_of(text)); }
 
 void SlcanAdapter::send(const CanFrame& frame) {
   if (!connected()) {
@@ -153,25 +153,25 @@ void SlcanAdapter::send(const CanFrame& frame) {
   write(with_time_ ? slcan::encode(frame, static_cast<std::uint16_t>(milliseconds)) : slcan::encode(frame));
 }
 
-void SlcanAdapter::take(Found found, Bytes line, Time at) {
-  if (found == Found::garbage || found == Found::refused) {
+void SlcanAdapter::handle_line(LineEvent line_event, Bytes line, Time at) {
+  if (line_event == LineEvent::garbage || line_event == LineEvent::refused) {
     ++garbage_;
     return;
   }
-  if (line.empty()) return answer("\r");
-  if (slcan::begins_frame(line[0])) return take_frame(line, at);
-  if (!execute(line)) answer("\a");
+  if (line.empty()) return send_reply("\r");
+  if (slcan::begins_frame(line[0])) return queue_frame(line, at);
+  if (!execute(line)) send_reply("\a");
 }
 
-void SlcanAdapter::take_frame(Bytes line, Time at) {
+void SlcanAdapter::queue_frame(Bytes line, Time at) {
   const Result<CanFrame> frame = slcan::decode(line);
   if (!frame) ++garbage_;
-  if (!frame || !open_ || listen_only_) return answer("\a");
-  if (waiting_.size() == most_waiting) {
+  if (!frame || !open_ || listen_only_) return send_reply("\a");
+  if (waiting_.size() == most_queued) {
     ++overflowed_;
-    return answer("\a");
+    return send_reply("\a");
   }
-  answer(frame->extended ? "Z\r" : "z\r");
+  send_reply(frame->extended ? "Z\r" : "z\r");
   if (!connected()) {
     ++lost_;
     return;
@@ -221,14 +221,14 @@ bool SlcanAdapter::execute(Bytes line) {
       with_time_ = line[1] == '1';
       break;
     case 'V':
-      answer("V1013\r");
+      send_reply("V1013\r");
       return true;
     case 'N':
-      answer("N0001\r");
+      send_reply("N0001\r");
       return true;
     case 'F':
       if (!open_) return false;
-      answer("F00\r");
+      send_reply("F00\r");
       return true;
     case 's':  // bit timing registers, acceptance code and mask: accepted, without effect
     case 'M':
@@ -239,7 +239,7 @@ bool SlcanAdapter::execute(Bytes line) {
       ++garbage_;
       return false;
   }
-  answer("\r");
+  send_reply("\r");
   return true;
 }
 

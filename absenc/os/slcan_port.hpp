@@ -21,18 +21,18 @@ class SlcanLine : public FramePort {
   void write(Bytes text);
   void collect(Time deadline) final;
   /// Collects until something is received or the deadline is reached. Returns whether something was received.
-  bool hears_until(Time deadline);
+  bool receives_until(Time deadline);
   /// Returns the time of the next event that does not depend on received bytes; `never` if none is due.
   [[nodiscard]] virtual Time due() const { return never; }
   /// Handles the event of `due()` if its time is reached. Returns whether an event was pushed.
   virtual bool reach(Time) { return false; }
   /// Handles a line without its CR, a refusal, or garbage.
-  virtual void take(slcan::LineReader::Found found, Bytes line, Time at) = 0;
+  virtual void handle_line(slcan::LineReader::LineEvent line_event, Bytes line, Time at) = 0;
 
  private:
   std::shared_ptr<Port<std::uint8_t>> bytes_;
   slcan::LineReader reader_;
-  bool collected_ = false;
+  bool received_any_ = false;
 };
 
 /// A CAN adapter, opened at the bit rate of `settings` and closed at the end.
@@ -47,18 +47,18 @@ class SlcanPort final : public SlcanLine {
   [[nodiscard]] const std::vector<std::string>& notes() const { return notes_; }
 
  private:
-  enum class Answer : std::uint8_t { none, accepted, refused };
+  enum class Reply : std::uint8_t { none, accepted, refused };
 
   void send(const CanFrame& frame) override;
   void apply(const LineSettings& settings) override;
-  void take(slcan::LineReader::Found found, Bytes line, Time at) override;
-  Answer ask(std::string_view command);
+  void handle_line(slcan::LineReader::LineEvent line_event, Bytes line, Time at) override;
+  Reply request(std::string_view command);
   void settle();
 
   std::string name_;
   std::vector<std::string> notes_;
-  bool asking_ = false;  // a command is outstanding: the next line is its reply, not that of a frame
-  Answer answer_ = Answer::none;
+  bool awaiting_reply_ = false;  // a command is outstanding: the next line is its reply, not that of a frame
+  Reply reply_ = Reply::none;
   unsigned garbage_ = 0;
 };
 
@@ -80,13 +80,13 @@ class SlcanAdapter final : public SlcanLine {
  private:
   void send(const CanFrame& frame) override;
   void apply(const LineSettings& settings) override { device_rate_ = settings.rate; }
-  void take(slcan::LineReader::Found found, Bytes line, Time at) override;
+  void handle_line(slcan::LineReader::LineEvent line_event, Bytes line, Time at) override;
   [[nodiscard]] Time due() const override { return waiting_.empty() ? never : bus_free_; }
   bool reach(Time now) override;
-  void take_frame(Bytes line, Time at);
+  void queue_frame(Bytes line, Time at);
   [[nodiscard]] Time duration(const CanFrame& frame) const;
   bool execute(Bytes line);
-  void answer(std::string_view text);
+  void send_reply(std::string_view text);
   [[nodiscard]] bool connected() const { return open_ && rate_ == device_rate_; }
 
   std::uint32_t device_rate_;

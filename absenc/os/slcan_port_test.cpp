@@ -26,14 +26,14 @@ const CanFrame request{.id = 0x220, .size = 8, .data = {0x80, 0x20}};
 
 FrameStep sending(const CanFrame& frame) { return {.kind = FrameStep::Kind::transfer, .out = {&frame, 1}}; }
 
-/// A byte port in memory that answers commands like an adapter, unless a test changes the replies.
+/// A byte port in memory that replies commands like an adapter, unless a test changes the replies.
 class FakeAdapter final : public Port<std::uint8_t> {
  public:
   Time now() override { return os::now(); }
   void begin(const ByteStep& step) override {
     const std::string text(step.out.begin(), step.out.end());
     written += text;
-    for (const auto& [command, answer] : answers) {
+    for (const auto& [command, answer] : replies) {
       if (text == command) coming += answer;
     }
   }
@@ -49,7 +49,7 @@ class FakeAdapter final : public Port<std::uint8_t> {
   }
   std::string written;
   std::string coming;
-  std::vector<std::pair<std::string, std::string>> answers{
+  std::vector<std::pair<std::string, std::string>> replies{
       {"C\r", "\a"}, {"S5\r", "\r"}, {"S6\r", "\r"}, {"O\r", "\r"}};
 
  private:
@@ -68,15 +68,15 @@ TEST(SlcanPort, SaysWhatAnAdapterRefuses) {
     return failure_of([&] { const SlcanPort port(adapter, "/dev/ttyACM9", settings); });
   };
   EXPECT_EQ(refusal({.rate = 123}).kind(), Failure::Kind::bad_rate);
-  adapter->answers = {{"S5\r", "\a"}};
+  adapter->replies = {{"S5\r", "\a"}};
   EXPECT_NE(std::string(refusal(bus).what()).find("refused a bit rate of 250000 bit/s (S5)"), std::string::npos);
-  adapter->answers = {{"S5\r", "\r"}, {"O\r", "\a"}};
+  adapter->replies = {{"S5\r", "\r"}, {"O\r", "\a"}};
   EXPECT_NE(std::string(refusal(bus).what()).find("refused to open"), std::string::npos);
 }
 
 TEST(SlcanPort, NotesAnAdapterThatAcknowledgesNothing) {
   const auto silent = std::make_shared<FakeAdapter>();
-  silent->answers.clear();
+  silent->replies.clear();
   EXPECT_EQ(SlcanPort(silent, "X", bus).notes().size(), 1u);
   EXPECT_TRUE(SlcanPort(std::make_shared<FakeAdapter>(), "X", bus).notes().empty());
 }
@@ -126,73 +126,73 @@ struct Adapter : ::testing::Test {
   std::shared_ptr<FakeAdapter> host = std::make_shared<FakeAdapter>();
   SlcanAdapter port{host, bus};
 
-  std::string say(const std::string& text) {
-    host->answers.clear();
+  std::string send_text(const std::string& text) {
+    host->replies.clear();
     host->written.clear();
     host->coming = text;
-    heard.clear();
+    received.clear();
     const Time until = os::now() + 1ms;
     for (;;) {
       const FrameEvent event = port.wait({.at = until});
       if (event.kind == EventKind::timer) return host->written;
-      if (event.kind == EventKind::received) heard.push_back(event.items[0]);
+      if (event.kind == EventKind::received) received.push_back(event.items[0]);
     }
   }
-  std::vector<CanFrame> heard;
+  std::vector<CanFrame> received;
 };
 
 TEST_F(Adapter, AnswersAsAdaptersDo) {
-  EXPECT_EQ(say("\r\r"), "\r\r");
-  EXPECT_EQ(say("O\r"), "\a");  // refused: no bit rate is set yet
-  EXPECT_EQ(say("S5\r"), "\r");
-  EXPECT_EQ(say("S9\r"), "\a");
-  EXPECT_EQ(say("C\r"), "\a");
-  EXPECT_EQ(say("t1200\r"), "\a");
-  EXPECT_EQ(say("V\rN\r"), "V1013\rN0001\r");
-  EXPECT_EQ(say("F\r"), "\a");
-  EXPECT_EQ(say("M00000000\rmFFFFFFFF\r"), "\r\r");
-  EXPECT_EQ(say("O\r"), "\r");
-  EXPECT_EQ(say("S6\r"), "\a");
-  EXPECT_EQ(say("F\r"), "F00\r");
-  EXPECT_EQ(say("t22088020000000000000\r"), "z\r");
-  EXPECT_EQ(heard, std::vector<CanFrame>{request});
-  EXPECT_EQ(say("T000002208\r"), "\a");  // refused: the 8 data bytes are missing
-  EXPECT_EQ(say("T000002200\r"), "Z\r");
-  EXPECT_EQ(say("r2208\r"), "z\r");
-  EXPECT_TRUE(heard[0].remote);
-  EXPECT_EQ(say("what\r"), "\a");
-  EXPECT_EQ(say("C\r"), "\r");
+  EXPECT_EQ(send_text("\r\r"), "\r\r");
+  EXPECT_EQ(send_text("O\r"), "\a");  // refused: no bit rate is set yet
+  EXPECT_EQ(send_text("S5\r"), "\r");
+  EXPECT_EQ(send_text("S9\r"), "\a");
+  EXPECT_EQ(send_text("C\r"), "\a");
+  EXPECT_EQ(send_text("t1200\r"), "\a");
+  EXPECT_EQ(send_text("V\rN\r"), "V1013\rN0001\r");
+  EXPECT_EQ(send_text("F\r"), "\a");
+  EXPECT_EQ(send_text("M00000000\rmFFFFFFFF\r"), "\r\r");
+  EXPECT_EQ(send_text("O\r"), "\r");
+  EXPECT_EQ(send_text("S6\r"), "\a");
+  EXPECT_EQ(send_text("F\r"), "F00\r");
+  EXPECT_EQ(send_text("t22088020000000000000\r"), "z\r");
+  EXPECT_EQ(received, std::vector<CanFrame>{request});
+  EXPECT_EQ(send_text("T000002208\r"), "\a");  // refused: the 8 data bytes are missing
+  EXPECT_EQ(send_text("T000002200\r"), "Z\r");
+  EXPECT_EQ(send_text("r2208\r"), "z\r");
+  EXPECT_TRUE(received[0].remote);
+  EXPECT_EQ(send_text("what\r"), "\a");
+  EXPECT_EQ(send_text("C\r"), "\r");
   EXPECT_EQ(port.garbage(), 3u);
 }
 
 TEST_F(Adapter, SendsOnlyWhileItIsOpen) {
   port.begin(sending(position));
   EXPECT_EQ(host->written, "");
-  say("S5\rO\r");
+  send_text("S5\rO\r");
   port.begin(sending(position));
   EXPECT_EQ(host->written, "\r\rt12084726000000000000\r");
-  say("C\rZ1\rO\r");
+  send_text("C\rZ1\rO\r");
   port.begin(sending(position));
   EXPECT_EQ(host->written.size(), std::string("\r\r\rt120847260000000000001234\r").size());
   EXPECT_EQ(port.lost(), 1u);
 }
 
 TEST_F(Adapter, NothingPassesAtAnotherBitRate) {
-  say("S6\rO\r");
+  send_text("S6\rO\r");
   port.begin(sending(position));
   EXPECT_EQ(host->written, "\r\r");
-  EXPECT_EQ(say("t22088020000000000000\r"), "z\r");
-  EXPECT_TRUE(heard.empty());
+  EXPECT_EQ(send_text("t22088020000000000000\r"), "z\r");
+  EXPECT_TRUE(received.empty());
   port.begin({.kind = FrameStep::Kind::configure, .rate = 500'000});
-  say("t22088020000000000000\r");
-  EXPECT_EQ(heard.size(), 1u);
+  send_text("t22088020000000000000\r");
+  EXPECT_EQ(received.size(), 1u);
   EXPECT_EQ(port.lost(), 2u);
 }
 
 constexpr Time frame_time = 111 * 4us;  // (47 + 8 * 8) bits at 250 kbit/s
 
 TEST_F(Adapter, FramesSentAtOnceComeOneAfterTheOther) {
-  say("S5\rO\r");
+  send_text("S5\rO\r");
   const Time before = os::now();
   host->coming = "t22088020000000000000\rt22088020000000000000\rt22088020000000000000\r";
   std::vector<Time> times;
@@ -207,18 +207,18 @@ TEST_F(Adapter, FramesSentAtOnceComeOneAfterTheOther) {
 }
 
 TEST_F(Adapter, RefusesAndCountsWhatItCannotKeep) {
-  say("S5\rO\r");
+  send_text("S5\rO\r");
   std::string all;
   for (unsigned i = 0; i < 100; ++i) all += "t22088020000000000000\r";
-  const std::string answers = say(all);
-  EXPECT_EQ(std::count(answers.begin(), answers.end(), 'z'), 64);
-  EXPECT_EQ(std::count(answers.begin(), answers.end(), '\a'), 36);
+  const std::string replies = send_text(all);
+  EXPECT_EQ(std::count(replies.begin(), replies.end(), 'z'), 64);
+  EXPECT_EQ(std::count(replies.begin(), replies.end(), '\a'), 36);
   EXPECT_EQ(port.overflowed(), 36u);
 }
 
 TEST_F(Adapter, ListensOnly) {
-  say("S5\rL\r");
-  EXPECT_EQ(say("t22088020000000000000\r"), "\a");
+  send_text("S5\rL\r");
+  EXPECT_EQ(send_text("t22088020000000000000\r"), "\a");
   port.begin(sending(position));
   EXPECT_NE(host->written.find("t1208"), std::string::npos);
 }

@@ -13,7 +13,7 @@ namespace {
 
 constexpr Time deselected_time = std::chrono::microseconds(10);  // pause that the kernel makes between two transfers
 
-constexpr std::size_t most_heard = 4096;  // in bytes, while a chip stays selected: no device reads more
+constexpr std::size_t most_received = 4096;  // in bytes, while a chip stays selected: no device reads more
 
 constexpr bool idles_high(std::uint8_t mode) { return (mode & 2) != 0; }
 constexpr bool samples_at_trailing_edge(std::uint8_t mode) { return (mode & 1) != 0; }
@@ -69,8 +69,8 @@ void SpiDevice::wake(Time now) {
 void SpiDevice::select(Time at, Time period) {
   selected_ = true;
   driven_.clear();
-  behind_driven_ = ByteStep{}.behind_out();
-  heard_.clear();
+  after_driven_ = ByteStep{}.behind_out();
+  received_.clear();
   clocks_ = 0;
   last_out_ = false;
   period_ = lead_ = {};
@@ -82,7 +82,7 @@ void SpiDevice::deselect(Time at) {
   if (!selected_) return;
   selected_ = false;
   if (kind_ == LinkKind::clocked) return feed({.kind = ByteEvent::Kind::sent, .at = at, .bits = clocks_});
-  feed({.kind = ByteEvent::Kind::received, .at = at, .items = heard_});
+  feed({.kind = ByteEvent::Kind::received, .at = at, .items = received_});
   feed({.kind = ByteEvent::Kind::sent, .at = at, .bits = clocks_, .width = period_, .lead = lead_});
 }
 
@@ -92,15 +92,15 @@ Time SpiDevice::clock(const SpiTransfer& transfer, Time at) {
   if (!selected_) select(at, period);
   if (clocks_ == 0) lead_ = at - selected_at_;
   period_ = period_ == Time{} ? period : std::min(period_, period);
-  heard_.resize(std::min(heard_.size() + transfer.size, most_heard));
+  received_.resize(std::min(received_.size() + transfer.size, most_received));
   std::fill(transfer.in.begin(), transfer.in.end(), std::uint8_t{0});
   // Both sides then change and sample at the same edge: the device samples the bit that was on the line before.
-  const bool heard_late = samples_at_trailing_edge(transfer.mode) && !shifts_at_leading_edge(transfer.mode);
+  const bool samples_late = samples_at_trailing_edge(transfer.mode) && !shifts_at_leading_edge(transfer.mode);
   for (std::size_t bit = 0; bit < 8 * transfer.size; ++bit, ++clocks_) {
     const std::uint8_t mask = mask_of(bit, transfer.lsb_first);
     const bool out = !transfer.out.empty() && (transfer.out[bit / 8] & mask) != 0;
-    const bool heard = heard_late ? last_out_ : out;
-    if (heard && clocks_ / 8 < heard_.size()) heard_[clocks_ / 8] |= mask_of(clocks_, false);
+    const bool received_bit = samples_late ? last_out_ : out;
+    if (received_bit && clocks_ / 8 < received_.size()) received_[clocks_ / 8] |= mask_of(clocks_, false);
     last_out_ = out;
     if (!transfer.in.empty() && driven(clocks_, transfer.mode)) transfer.in[bit / 8] |= mask;
   }
@@ -109,16 +109,16 @@ Time SpiDevice::clock(const SpiTransfer& transfer, Time at) {
 
 void SpiDevice::feed(const ByteEvent& event) {
   device_->feed(event);
-  ask(event.at);
+  run_device(event.at);
 }
 
-void SpiDevice::ask(Time now) {
+void SpiDevice::run_device(Time now) {
   for (;;) {
     const ByteStep step = device_->next(now);
     switch (step.kind) {
       case ByteStep::Kind::transfer:
         driven_.assign(step.out.begin(), step.out.end());
-        behind_driven_ = step.behind_out();
+        after_driven_ = step.behind_out();
         break;
       case ByteStep::Kind::wait:
         timer_ = step.at > now ? step.at : never;
@@ -157,7 +157,7 @@ bool SpiDevice::driven(std::size_t clock, std::uint8_t mode) const {
   }
   if (shifts < before_first_bit) return true;
   const std::size_t bit = shifts - before_first_bit;
-  if (bit >= 8 * driven_.size()) return behind_driven_ != 0;
+  if (bit >= 8 * driven_.size()) return after_driven_ != 0;
   return BitView{driven_, 8 * driven_.size()}[bit];
 }
 

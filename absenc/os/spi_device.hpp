@@ -34,7 +34,7 @@ class SpiDevice {
   SpiDevice(LinkKind kind, const LineSettings& settings, Machine<std::uint8_t>& device);
 
   /// Takes the device's first step, which every carrier does before the first event: the device may want a timer.
-  void begin(Time now) { ask(now); }
+  void begin(Time now) { run_device(now); }
   /// Processes a message and returns the time of its end. On a clocked link a pause of the clock between two transfers
   /// ends a word.
   Time message(std::span<const SpiTransfer> transfers, Time start);
@@ -58,7 +58,7 @@ class SpiDevice {
   void deselect(Time at);
   Time clock(const SpiTransfer& transfer, Time at);
   void feed(const Event<std::uint8_t>& event);
-  void ask(Time now);
+  void run_device(Time now);
   [[nodiscard]] bool suits(std::uint8_t mode) const;
   [[nodiscard]] bool driven(std::size_t clock, std::uint8_t mode) const;
   [[nodiscard]] bool shifts_at_leading_edge(std::uint8_t mode) const;
@@ -74,8 +74,8 @@ class SpiDevice {
   // State since the chip was selected or since the first clock.
   bool selected_ = false;
   std::vector<std::uint8_t> driven_;
-  std::uint8_t behind_driven_ = 0xFF;
-  std::vector<std::uint8_t> heard_;
+  std::uint8_t after_driven_ = 0xFF;
+  std::vector<std::uint8_t> received_;
   std::size_t clocks_ = 0;
   bool last_out_ = false;
   Time period_{};  // shortest clock period

@@ -41,7 +41,7 @@ struct Wires {
     for (std::size_t edge = 0; edge < 16 * sent.size(); ++edge) {
       if (edge % 16 == 0) {
         sampled.push_back(0);
-        heard.push_back(0);
+        received_bytes.push_back(0);
       }
       level = !level;
       const bool old_mosi = mosi;
@@ -54,7 +54,7 @@ struct Wires {
         mosi = bit(sent, host_shifts++);
       }
       if (chip_samples) {
-        keep(heard, old_mosi);
+        keep(received_bytes, old_mosi);
       } else {
         miso = bit(driven, chip_shifts++);
       }
@@ -68,23 +68,23 @@ struct Wires {
   std::size_t host_shifts = 0;
   std::size_t chip_shifts = 0;
   Data sampled;
-  Data heard;
+  Data received_bytes;
 };
 
-ByteToy chip(Data* heard = nullptr) {
-  return ByteToy([heard](auto& self, const ByteEvent& event) {
+ByteToy chip(Data* received_bytes = nullptr) {
+  return ByteToy([received_bytes](auto& self, const ByteEvent& event) {
     if (event.kind == ByteEvent::Kind::selected) self.send(driven);
-    if (event.kind == ByteEvent::Kind::received && heard != nullptr) *heard = data(event.items);
+    if (event.kind == ByteEvent::Kind::received && received_bytes != nullptr) *received_bytes = data(event.items);
   });
 }
 
-struct Asked {
+struct Exchange {
   Data in;
   std::string log;
   std::uint64_t wrong_modes;
 };
 
-Asked ask(LinkKind kind, const LineSettings& settings, std::vector<SpiTransfer> transfers, Time start = 1ms) {
+Exchange exchange(LinkKind kind, const LineSettings& settings, std::vector<SpiTransfer> transfers, Time start = 1ms) {
   ByteToy toy = chip();
   toy.idle.at = never;
   SpiDevice device(kind, settings, toy);
@@ -103,8 +103,8 @@ Asked ask(LinkKind kind, const LineSettings& settings, std::vector<SpiTransfer> 
 TEST(SpiDevice, EveryModeOnEveryChip) {
   for (std::uint8_t chip_mode = 0; chip_mode < 4; ++chip_mode) {
     for (std::uint8_t mode = 0; mode < 4; ++mode) {
-      Data heard;
-      ByteToy toy = chip(&heard);
+      Data received_bytes;
+      ByteToy toy = chip(&received_bytes);
       SpiDevice device(LinkKind::spi, {.rate = 1'000'000, .spi_mode = chip_mode}, toy);
       Data in(sent.size());
       const SpiTransfer transfer{.size = in.size(), .out = sent, .in = in, .rate = 1'000'000, .mode = mode};
@@ -112,11 +112,11 @@ TEST(SpiDevice, EveryModeOnEveryChip) {
       Wires wires(mode, chip_mode);
       wires.run();
       EXPECT_EQ(in, wires.sampled) << int{mode} << " on " << int{chip_mode};
-      EXPECT_EQ(heard, wires.heard) << int{mode} << " on " << int{chip_mode};
+      EXPECT_EQ(received_bytes, wires.received_bytes) << int{mode} << " on " << int{chip_mode};
       EXPECT_EQ(device.wrong_modes(), mode == chip_mode ? 0u : 1u);
       if (mode == chip_mode) {
         EXPECT_EQ(in, driven);
-        EXPECT_EQ(heard, sent);
+        EXPECT_EQ(received_bytes, sent);
       }
     }
   }
@@ -127,7 +127,7 @@ TEST(SpiDevice, EveryModeOnAClockedDevice) {
   for (std::uint8_t idle = 0; idle < 2; ++idle) {
     for (std::uint8_t mode = 0; mode < 4; ++mode) {
       const LineSettings settings{.rate = 1'000'000, .spi_mode = 3, .idle_clocks = idle};
-      const Asked asked = ask(LinkKind::clocked, settings, {{.size = 4, .rate = 1'000'000, .mode = mode}});
+      const Exchange result = exchange(LinkKind::clocked, settings, {{.size = 4, .rate = 1'000'000, .mode = mode}});
       Data expected;
       std::size_t shifts = 0;
       bool latched = false;
@@ -140,8 +140,8 @@ TEST(SpiDevice, EveryModeOnAClockedDevice) {
         if (level && latched) ++shifts;
         latched = latched || !level;
       }
-      EXPECT_EQ(asked.in, expected) << int{mode} << " idle " << int{idle};
-      EXPECT_EQ(asked.wrong_modes, mode >= 2 ? 0u : 1u) << int{mode};
+      EXPECT_EQ(result.in, expected) << int{mode} << " idle " << int{idle};
+      EXPECT_EQ(result.wrong_modes, mode >= 2 ? 0u : 1u) << int{mode};
     }
   }
 }
@@ -149,11 +149,11 @@ TEST(SpiDevice, EveryModeOnAClockedDevice) {
 TEST(SpiDevice, TellsAChipWhenItIsSelectedAndWhenNot) {
   const SpiTransfer wait{.rate = 1, .mode = 1, .delay = 5us};
   const SpiTransfer bytes{.size = 2, .rate = 500'000, .mode = 1, .delay = 3us};
-  EXPECT_EQ(ask(LinkKind::spi, chip_settings, {wait, bytes}).log,
+  EXPECT_EQ(exchange(LinkKind::spi, chip_settings, {wait, bytes}).log,
             "1000000 selected, 1040000 received 00 00, 1040000 sent 16 2000");
   SpiTransfer apart = bytes;
   apart.deselect = true;
-  EXPECT_EQ(ask(LinkKind::spi, chip_settings, {apart, bytes}).log,
+  EXPECT_EQ(exchange(LinkKind::spi, chip_settings, {apart, bytes}).log,
             "1000000 selected, 1035000 received 00 00, 1035000 sent 16 2000, 1045000 selected, "
             "1080000 received 00 00, 1080000 sent 16 2000");
 }
@@ -162,28 +162,28 @@ TEST(SpiDevice, TellsAClockedDeviceThePeriodAndThePauses) {
   const LineSettings settings{.rate = 200'000, .spi_mode = 3};
   const SpiTransfer wait{.rate = 1, .mode = 3, .delay = 5us};
   const SpiTransfer bytes{.size = 1, .rate = 200'000, .mode = 3};
-  EXPECT_EQ(ask(LinkKind::clocked, settings, {wait, bytes, bytes}).log, "1005000 selected 5000, 1085000 sent 16");
+  EXPECT_EQ(exchange(LinkKind::clocked, settings, {wait, bytes, bytes}).log, "1005000 selected 5000, 1085000 sent 16");
   SpiTransfer pausing = bytes;
   pausing.delay = 7us;
-  EXPECT_EQ(ask(LinkKind::clocked, settings, {pausing, bytes}).log,
+  EXPECT_EQ(exchange(LinkKind::clocked, settings, {pausing, bytes}).log,
             "1000000 selected 5000, 1040000 sent 8, 1047000 selected 5000, 1087000 sent 8");
   pausing.delay = {};
   pausing.deselect = true;
-  EXPECT_EQ(ask(LinkKind::clocked, settings, {pausing, bytes}).log,
+  EXPECT_EQ(exchange(LinkKind::clocked, settings, {pausing, bytes}).log,
             "1000000 selected 5000, 1040000 sent 8, 1050000 selected 5000, 1090000 sent 8");
   pausing.delay = 7us;
-  EXPECT_EQ(ask(LinkKind::clocked, settings, {pausing}).log, "1000000 selected 5000, 1040000 sent 8");
+  EXPECT_EQ(exchange(LinkKind::clocked, settings, {pausing}).log, "1000000 selected 5000, 1040000 sent 8");
 }
 
 TEST(SpiDevice, TheFastestClockOfAFrameCounts) {
   const SpiTransfer slow{.size = 1, .rate = 500'000, .mode = 1};
   const SpiTransfer fast{.size = 1, .rate = 4'000'000, .mode = 1};
-  EXPECT_THAT(ask(LinkKind::spi, chip_settings, {slow, fast, slow}).log, HasSubstr("1034000 sent 24 250"));
+  EXPECT_THAT(exchange(LinkKind::spi, chip_settings, {slow, fast, slow}).log, HasSubstr("1034000 sent 24 250"));
 }
 
 TEST(SpiDevice, AChipThatStaysSelectedGoesOn) {
-  Data heard;
-  ByteToy toy = chip(&heard);
+  Data received_bytes;
+  ByteToy toy = chip(&received_bytes);
   SpiDevice device(LinkKind::spi, chip_settings, toy);
   Data in(3);
   SpiTransfer first{
@@ -192,34 +192,34 @@ TEST(SpiDevice, AChipThatStaysSelectedGoesOn) {
   const SpiTransfer second{
       .size = 2, .out = Bytes(sent).subspan(1), .in = MutableBytes(in).subspan(1), .rate = 1'000'000, .mode = 1};
   EXPECT_EQ(device.message({&first, 1}, 1ms), 1ms + 8us);
-  EXPECT_TRUE(heard.empty());
+  EXPECT_TRUE(received_bytes.empty());
   EXPECT_EQ(device.message({&second, 1}, 2ms), 2ms + 16us);
   EXPECT_EQ(in, driven);
-  EXPECT_EQ(heard, sent);
+  EXPECT_EQ(received_bytes, sent);
 }
 
 TEST(SpiDevice, AChipThatStaysSelectedForEverIsNotKeptInMind) {
-  Data heard;
-  ByteToy toy = chip(&heard);
+  Data received_bytes;
+  ByteToy toy = chip(&received_bytes);
   SpiDevice device(LinkKind::spi, chip_settings, toy);
   const Data out(4000, 0xA5);
   SpiTransfer transfer{.size = out.size(), .out = out, .rate = 1'000'000, .mode = 1, .deselect = true};
   for (int i = 0; i < 3; ++i) device.message({&transfer, 1}, 1ms);
   transfer.deselect = false;
   device.message({&transfer, 1}, 1ms);
-  EXPECT_EQ(heard, Data(4096, 0xA5));
+  EXPECT_EQ(received_bytes, Data(4096, 0xA5));
   EXPECT_THAT(toy.log, HasSubstr("sent 128000 1000"));
 }
 
 TEST(SpiDevice, BitsInTheOtherOrder) {
-  Data heard;
-  ByteToy toy = chip(&heard);
+  Data received_bytes;
+  ByteToy toy = chip(&received_bytes);
   SpiDevice device(LinkKind::spi, chip_settings, toy);
   Data in(3);
   const SpiTransfer transfer{.size = in.size(), .out = sent, .in = in, .rate = 1'000'000, .mode = 1, .lsb_first = true};
   device.message({&transfer, 1}, 1ms);
   EXPECT_EQ(in, (Data{0xA9, 0x63, 0x48}));
-  EXPECT_EQ(heard, (Data{0xE5, 0x80, 0x01}));
+  EXPECT_EQ(received_bytes, (Data{0xE5, 0x80, 0x01}));
 }
 
 TEST(SpiDevice, WithoutBuffersNothingIsClocked) {

@@ -125,13 +125,13 @@ void SpiPort::begin(const ByteStep& step) {
 ByteEvent SpiPort::wait(const ByteStep& step) {
   waiting_.begin(step);
   if (std::exchange(sent_pending_, false)) {
-    return waiting_.tell({.kind = ByteEvent::Kind::sent, .at = sent_at_, .late = sent_late_});
+    return waiting_.report({.kind = ByteEvent::Kind::sent, .at = sent_at_, .late = sent_late_});
   }
-  if (std::exchange(heard_pending_, false)) {
-    return waiting_.tell({.kind = ByteEvent::Kind::received, .at = sent_at_, .items = in_, .idle_low = idle_low_});
+  if (std::exchange(received_pending_, false)) {
+    return waiting_.report({.kind = ByteEvent::Kind::received, .at = sent_at_, .items = in_, .idle_low = idle_low_});
   }
   sleep_until(waiting_.due());
-  return waiting_.over(std::max(os::now(), waiting_.due())).value();
+  return waiting_.take_due(std::max(os::now(), waiting_.due())).value();
 }
 
 void SpiPort::transfer(const ByteStep& step) {
@@ -144,11 +144,11 @@ void SpiPort::transfer(const ByteStep& step) {
   if (!in_.empty()) send_message(!clocked);
   sent_at_ = os::now();
   sent_late_ = sent_at_ - before;
-  if (clocked) keep_bits(step.bits);
+  if (clocked) extract_bits(step.bits);
   sent_pending_ = true;
-  heard_pending_ = !in_.empty();
+  received_pending_ = !in_.empty();
   waiting_.silence.sent(sent_at_);
-  if (heard_pending_) waiting_.silence.heard(sent_at_);
+  if (received_pending_) waiting_.silence.received(sent_at_);
 }
 
 // Sends one message: the chip stays selected from its first transfer to its last.
@@ -178,15 +178,15 @@ void SpiPort::send_message(bool with_output) {
 
 // Reduces the sampled bytes to `bits` bits: removes the idle clocks, whose level is stored, and clocks behind the last
 // bit.
-void SpiPort::keep_bits(std::size_t bits) {
+void SpiPort::extract_bits(std::size_t bits) {
   const BitView clocked{in_, in_.size() * 8};
   idle_low_ = settings_.idle_clocks > 0 && clocked.load(0, settings_.idle_clocks) == 0;
-  std::vector<std::uint8_t> kept((bits + 7) / 8);
-  for (std::size_t i = 0; i < kept.size(); ++i) {
+  std::vector<std::uint8_t> extracted((bits + 7) / 8);
+  for (std::size_t i = 0; i < extracted.size(); ++i) {
     const auto count = static_cast<unsigned>(std::min<std::size_t>(8, bits - 8 * i));
-    kept[i] = static_cast<std::uint8_t>(clocked.load(settings_.idle_clocks + 8 * i, count) << (8 - count));
+    extracted[i] = static_cast<std::uint8_t>(clocked.load(settings_.idle_clocks + 8 * i, count) << (8 - count));
   }
-  in_ = std::move(kept);
+  in_ = std::move(extracted);
 }
 
 // Applies only changed settings: a conversation may configure the line before each reading.

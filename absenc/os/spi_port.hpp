@@ -57,7 +57,7 @@ class SpiPort final : public Port<std::uint8_t> {
  private:
   void transfer(const Step<std::uint8_t>& step);
   void send_message(bool with_output);
-  void keep_bits(std::size_t bits);
+  void extract_bits(std::size_t bits);
 
   void apply(LineSettings settings);
   void change_rate(std::uint32_t rate);
@@ -78,11 +78,11 @@ class SpiPort final : public Port<std::uint8_t> {
   std::vector<std::uint8_t> out_;
   std::vector<std::uint8_t> in_;
   Waiting<std::uint8_t> waiting_;
-  Time sent_at_{};              // end of the last transfer
-  Time sent_late_{};            // duration of the system call of the last transfer
-  bool sent_pending_ = false;   // `sent` is still to be reported
-  bool heard_pending_ = false;  // `received` is still to be reported, after `sent`
-  bool idle_low_ = false;       // the data line was low before the first bit of a clocked transfer
+  Time sent_at_{};                 // end of the last transfer
+  Time sent_late_{};               // duration of the system call of the last transfer
+  bool sent_pending_ = false;      // `sent` is still to be reported
+  bool received_pending_ = false;  // `received` is still to be reported, after `sent`
+  bool idle_low_ = false;          // the data line was low before the first bit of a clocked transfer
 };
 
 /// Returns the controllers' chip selects, "/dev/spidev0.0" and so on, sorted. `sys` is a parameter for tests.

@@ -31,7 +31,7 @@ Data bytes_of(const Value& value) {
 }
 
 // The fields of spi_ioc_transfer, 0 by default.
-struct One {
+struct TransferFields {
   std::uint64_t tx_buf = 0;
   std::uint64_t rx_buf = 0;
   std::uint32_t len = 0;
@@ -43,7 +43,7 @@ struct One {
   std::uint8_t rx_nbits = 0;
   std::uint16_t rest = 0;
 };
-static_assert(sizeof(One) == sizeof(spi_ioc_transfer));
+static_assert(sizeof(TransferFields) == sizeof(spi_ioc_transfer));
 
 struct SpidevTest : ::testing::Test {
   template <class Value>
@@ -66,7 +66,7 @@ struct SpidevTest : ::testing::Test {
                           room, 1ms);
   }
   // Returns the errno of a message of one transfer.
-  int refused(const One& transfer) {
+  int refused(const TransferFields& transfer) {
     const SpidevReply reply = message(bytes_of(transfer), 1, 0);
     return -reply.result;
   }
@@ -139,9 +139,9 @@ TEST_F(SpidevTest, AsksForTheTransfersAndThenForTheirBuffers) {
   EXPECT_THAT(first.in, ElementsAre(UserMemory{0x1000, 96}));
   EXPECT_THAT(first.out, IsEmpty());
 
-  const std::array<One, 3> list{{{.tx_buf = 0x2000, .len = 1},
-                                 {.tx_buf = 0x3000, .rx_buf = 0x4000, .len = 2},
-                                 {.tx_buf = 0x5000, .rx_buf = 0x6000}}};
+  const std::array<TransferFields, 3> list{{{.tx_buf = 0x2000, .len = 1},
+                                            {.tx_buf = 0x3000, .rx_buf = 0x4000, .len = 2},
+                                            {.tx_buf = 0x5000, .rx_buf = 0x6000}}};
   Data in = bytes_of(list);
   const SpidevReply second = message(in, 3, 0);
   EXPECT_TRUE(second.again);
@@ -160,7 +160,7 @@ TEST_F(SpidevTest, AsksForTheTransfersAndThenForTheirBuffers) {
 }
 
 TEST_F(SpidevTest, AListThatChangedMeanwhileIsAskedForAgain) {
-  Data in = bytes_of(One{.tx_buf = 0x2000, .len = 5});
+  Data in = bytes_of(TransferFields{.tx_buf = 0x2000, .len = 5});
   in.insert(in.end(), {1, 2});  // bytes that were fetched for a list with a two-byte buffer
   const SpidevReply reply = message(in, 1, 0);
   EXPECT_TRUE(reply.again);
@@ -169,7 +169,7 @@ TEST_F(SpidevTest, AListThatChangedMeanwhileIsAskedForAgain) {
 }
 
 TEST_F(SpidevTest, EveryTransferMayHaveItsOwnSpeedAndDelay) {
-  const std::array<One, 2> list{
+  const std::array<TransferFields, 2> list{
       {{.tx_buf = 1, .len = 1, .speed_hz = 500'000, .delay_usecs = 3, .cs_change = 1}, {.tx_buf = 1, .len = 1}}};
   Data in = bytes_of(list);
   in.resize(in.size() + 2);
@@ -181,7 +181,7 @@ TEST_F(SpidevTest, LimitsWhatOneMessageHas) {
   EXPECT_EQ(refused({.rx_buf = 1, .len = 4097}), EMSGSIZE);
   EXPECT_EQ(refused({.rx_buf = 1, .len = 4096}), 0);
   EXPECT_EQ(refused({.len = 0x8000'0000}), EMSGSIZE);
-  const auto refused_all = [this](std::size_t count, const One& transfer) {
+  const auto refused_all = [this](std::size_t count, const TransferFields& transfer) {
     Data in;
     for (std::size_t i = 0; i < count; ++i) {
       const Data one = bytes_of(transfer);

@@ -41,7 +41,7 @@ void StreamPort::begin(const ByteStep& step) {
 
 void StreamPort::transfer(const ByteStep& step) {
   // The first comparison saves most transfers a read of the clock.
-  if (step.at > waiting_.told() + send_slack_ && step.at > os::now() + send_slack_) reach(step.at);
+  if (step.at > waiting_.known_time() + send_slack_ && step.at > os::now() + send_slack_) reach(step.at);
   const Time before = os::now();
   if (!step.out.empty()) write_all(step.out);
   const Time written = read_at_once_ ? before : os::now();
@@ -50,10 +50,10 @@ void StreamPort::transfer(const ByteStep& step) {
 }
 
 ByteEvent StreamPort::wait(const ByteStep& step) {
-  const bool is_idle = waiting_.silence.has_heard() && step.expect == 0;
+  const bool is_idle = waiting_.silence.has_received() && step.expect == 0;
   waiting_.begin(step, is_idle ? std::min(latency_, idle_latency_) : latency_);
   if (std::exchange(sent_pending_, false)) {
-    return waiting_.tell({.kind = ByteEvent::Kind::sent, .at = sent_at_, .late = sent_late_});
+    return waiting_.report({.kind = ByteEvent::Kind::sent, .at = sent_at_, .late = sent_late_});
   }
   for (;;) {
     const std::span<const int> ready = poller_.wait(std::min(waiting_.due(), end_));
@@ -63,11 +63,11 @@ ByteEvent StreamPort::wait(const ByteStep& step) {
       // Bytes go before limits: a late look by this program is not the fault of the other side.
       if (const std::size_t size = read_some(buffer_, ready); size > 0) {
         const Time at = std::max(time, sent_at_);  // an echo is received before the computed end of sending
-        waiting_.silence.heard(at);
-        return waiting_.tell(
+        waiting_.silence.received(at);
+        return waiting_.report(
             {.kind = ByteEvent::Kind::received, .at = at, .items = {buffer_.data(), size}, .late = lateness()});
       }
-    } else if (const std::optional<ByteEvent> event = waiting_.over(time)) {
+    } else if (const std::optional<ByteEvent> event = waiting_.take_due(time)) {
       return *event;
     }
   }
@@ -103,7 +103,7 @@ void StreamPort::drive(ExtraWire, bool) {
   throw Failure(Failure::Kind::unsupported, "this kind of port has no trigger and clear wires: use a serial port");
 }
 
-Time StreamPort::pulse_width(ExtraWire, Time asked) const { return asked; }
+Time StreamPort::pulse_width(ExtraWire, Time requested) const { return requested; }
 
 void StreamPort::change_rate(std::uint32_t rate) {
   throw Failure(Failure::Kind::unsupported,

@@ -71,8 +71,8 @@ class StreamPort : public Port<std::uint8_t> {
   /// Both throw `unsupported` unless overridden.
   virtual void drive(ExtraWire wire, bool active);
   virtual void change_rate(std::uint32_t rate);
-  /// Returns the duration of a pulse: `asked`, unless overridden.
-  [[nodiscard]] virtual Time pulse_width(ExtraWire wire, Time asked) const;
+  /// Returns the duration of a pulse: `requested`, unless overridden.
+  [[nodiscard]] virtual Time pulse_width(ExtraWire wire, Time requested) const;
 
  private:
   void reach(Time time);

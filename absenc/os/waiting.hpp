@@ -21,36 +21,36 @@ class Waiting {
   Silence silence;
 
   /// Returns the time known to the machine: that of `now` or of its last event.
-  [[nodiscard]] Time told() const { return told_; }
-  Time now() { return told_ = os::now(); }
+  [[nodiscard]] Time known_time() const { return known_time_; }
+  Time now() { return known_time_ = os::now(); }
   /// Returns `event` and records its time as known to the machine: a timer later than this time is still to be
   /// reported, even if the event is reported late.
-  Event<Item> tell(const Event<Item>& event) {
-    told_ = event.at;
+  Event<Item> report(const Event<Item>& event) {
+    known_time_ = event.at;
     return event;
   }
 
   /// Starts a wait with this step. A timer stays due if another event occurred at the same time and the machine
   /// requests the timer again.
   void begin(const Step<Item>& step, Time latency = {}) {
-    timer_ = step.at > told_ || step.at == timer_ ? step.at : never;
+    timer_ = step.at > known_time_ || step.at == timer_ ? step.at : never;
     silence_ = silence.due(step.answer, step.gap, latency);
   }
   [[nodiscard]] Time due() const { return std::min(timer_, silence_); }
   /// Returns the timer or silence event that is due at `time`, or nothing.
-  std::optional<Event<Item>> over(Time time) {
+  std::optional<Event<Item>> take_due(Time time) {
     using Kind = typename Event<Item>::Kind;
     if (time < due()) return {};
     if (timer_ <= silence_) {
       timer_ = never;
-      return tell({.kind = Kind::timer, .at = time});
+      return report({.kind = Kind::timer, .at = time});
     }
-    silence.told();
-    return tell({.kind = Kind::silence, .at = time});
+    silence.reported();
+    return report({.kind = Kind::silence, .at = time});
   }
 
  private:
-  Time told_{};
+  Time known_time_{};
   Time timer_ = never;    // requested timer that was not reported yet
   Time silence_ = never;  // time at which silence is due in this wait
 };

@@ -24,38 +24,38 @@ Bus::Bus(const std::vector<Machine<std::uint8_t>*>& devices, Time character) : c
 }
 
 void Bus::feed(const ByteEvent& event) {
-  if (event.kind == ByteEvent::Kind::sent) return all_sent(event);
+  if (event.kind == ByteEvent::Kind::sent) return report_sent(event);
   for (Node& node : nodes_) {
-    if (node.doing == Doing::done) continue;
+    if (node.send_state == SendState::done) continue;
     if (event.kind == ByteEvent::Kind::timer) {
       if (event.at < node.timer) continue;
       node.timer = never;
     }
-    if (event.kind == ByteEvent::Kind::silence && node.doing != Doing::waiting) continue;
+    if (event.kind == ByteEvent::Kind::silence && node.send_state != SendState::waiting) continue;
     node.device->feed(event);
     serve(node, event.at);
   }
 }
 
 // The line is idle behind a transfer, so every device gets `silence` at once instead of waiting for its limit.
-void Bus::all_sent(const ByteEvent& event) {
+void Bus::report_sent(const ByteEvent& event) {
   sending_ = false;
   for (Node& node : nodes_) {
-    if (node.doing == Doing::done) continue;
-    if (node.doing == Doing::sending) {
-      node.doing = Doing::waiting;
+    if (node.send_state == SendState::done) continue;
+    if (node.send_state == SendState::sending) {
+      node.send_state = SendState::waiting;
       node.device->feed(event);
     } else {
       node.device->feed({.kind = ByteEvent::Kind::received, .at = event.at, .items = out_});
       serve(node, event.at);
-      if (node.doing == Doing::waiting) node.device->feed({.kind = ByteEvent::Kind::silence, .at = event.at});
+      if (node.send_state == SendState::waiting) node.device->feed({.kind = ByteEvent::Kind::silence, .at = event.at});
     }
     serve(node, event.at);
   }
 }
 
 void Bus::serve(Node& node, Time now) {
-  while (node.doing != Doing::done) {
+  while (node.send_state != SendState::done) {
     const ByteStep step = node.device->next(now);
     switch (step.kind) {
       case ByteStep::Kind::wait:
@@ -63,14 +63,14 @@ void Bus::serve(Node& node, Time now) {
         node.timer = step.at > now ? step.at : never;
         return;
       case ByteStep::Kind::transfer:
-        if (node.doing != Doing::waiting)
+        if (node.send_state != SendState::waiting)
           throw std::logic_error("a device began a transfer before its last one was sent");
-        node.doing = Doing::pending;
+        node.send_state = SendState::pending;
         node.at = std::max(step.at, now);
         node.out.assign(step.out.begin(), step.out.end());
         break;
       case ByteStep::Kind::done:
-        node.doing = Doing::done;
+        node.send_state = SendState::done;
         return;
       case ByteStep::Kind::emit:
       case ByteStep::Kind::pulse:
@@ -93,7 +93,7 @@ ByteStep Bus::next(Time now) {
 Time Bus::first_begin() const {
   Time first = never - soon;  // never - soon: callers may add `soon` without overflow
   for (const Node& node : nodes_) {
-    if (node.doing == Doing::pending) first = std::min(first, node.at);
+    if (node.send_state == SendState::pending) first = std::min(first, node.at);
   }
   return first;
 }
@@ -102,7 +102,7 @@ Time Bus::first_begin() const {
 void Bus::merge() {
   std::vector<Node*> pending;
   for (Node& node : nodes_) {
-    if (node.doing == Doing::pending) pending.push_back(&node);
+    if (node.send_state == SendState::pending) pending.push_back(&node);
   }
   std::stable_sort(pending.begin(), pending.end(),
                    [](const Node* one, const Node* other) { return one->at < other->at; });
@@ -112,7 +112,7 @@ void Bus::merge() {
     if (node != pending.front() && offset >= out_.size()) break;
     out_.resize(std::max(out_.size(), offset + node->out.size()), 0xFF);
     for (std::size_t i = 0; i < node->out.size(); ++i) out_[offset + i] &= node->out[i];
-    node->doing = Doing::sending;
+    node->send_state = SendState::sending;
   }
   sending_ = true;
 }
@@ -120,10 +120,10 @@ void Bus::merge() {
 ByteStep Bus::wait_step() const {
   ByteStep step{.at = never};
   for (const Node& node : nodes_) {
-    if (node.doing == Doing::done) continue;
+    if (node.send_state == SendState::done) continue;
     step.at = std::min(step.at, node.timer);
-    if (node.doing == Doing::pending && !sending_) step.at = std::min(step.at, node.at);
-    if (node.doing != Doing::waiting) continue;
+    if (node.send_state == SendState::pending && !sending_) step.at = std::min(step.at, node.at);
+    if (node.send_state != SendState::waiting) continue;
     step.answer = shorter(step.answer, node.wait.answer);
     step.gap = shorter(step.gap, node.wait.gap);
     if (node.wait.gap > Time{}) step.expect = std::max(step.expect, node.wait.expect);

@@ -23,7 +23,7 @@ class Bus final : public Machine<std::uint8_t> {
   Step<std::uint8_t> next(Time now) override;
 
  private:
-  enum class Doing : std::uint8_t {
+  enum class SendState : std::uint8_t {
     waiting,
     pending,  // has a transfer that has not begun
     sending,
@@ -31,14 +31,14 @@ class Bus final : public Machine<std::uint8_t> {
   };
   struct Node {
     Machine<std::uint8_t>* device;
-    Doing doing = Doing::waiting;
+    SendState send_state = SendState::waiting;
     Step<std::uint8_t> wait{};        // last wait step of the device
     Time timer = never;               // time of the device's next `timer` event
     Time at{};                        // pending: time at which the transfer begins
     std::vector<std::uint8_t> out{};  // pending, sending: the bytes of the transfer
   };
 
-  void all_sent(const Event<std::uint8_t>& event);
+  void report_sent(const Event<std::uint8_t>& event);
   void serve(Node& node, Time now);
   void merge();
   [[nodiscard]] Time first_begin() const;

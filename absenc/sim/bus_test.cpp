@@ -18,15 +18,15 @@ using Wire = std::vector<std::uint8_t>;
 constexpr LineSettings settings{.rate = 1'000'000};
 
 /// Sends `reply` at `after` behind its `key`, if the key is the first byte after silence.
-struct Answerer final : Machine<std::uint8_t> {
-  Answerer(std::uint8_t its_key, Wire its_reply, Time its_after = 5us)
+struct Responder final : Machine<std::uint8_t> {
+  Responder(std::uint8_t its_key, Wire its_reply, Time its_after = 5us)
       : key(its_key), reply(std::move(its_reply)), after(its_after) {}
 
   void feed(const ByteEvent& event) override {
     switch (event.kind) {
       case ByteEvent::Kind::received:
         for (const std::uint8_t item : event.items) {
-          heard.push_back(item);
+          received_bytes.push_back(item);
           if (idle && item == key) begin = event.at + after;
           idle = false;
         }
@@ -55,59 +55,59 @@ struct Answerer final : Machine<std::uint8_t> {
   Wire reply;
   Time after;
   Time begin = never;
-  Wire heard;
+  Wire received_bytes;
   unsigned sent = 0;
   bool idle = true;
 };
 
 /// Sends one request byte after the other, each when the line has been idle long enough for all devices.
-struct Asker final : Machine<std::uint8_t> {
-  explicit Asker(const Wire& all) : questions(all.begin(), all.end()) {}
+struct Requester final : Machine<std::uint8_t> {
+  explicit Requester(const Wire& all) : requests(all.begin(), all.end()) {}
 
   void feed(const ByteEvent& event) override {
     if (event.kind == ByteEvent::Kind::received) {
-      answers.back().insert(answers.back().end(), event.items.begin(), event.items.end());
+      replies.back().insert(replies.back().end(), event.items.begin(), event.items.end());
     }
-    if (event.kind == ByteEvent::Kind::silence) asking = false;
+    if (event.kind == ByteEvent::Kind::silence) awaiting_reply = false;
   }
   ByteStep next(Time) override {
-    if (asking) return {.at = never, .answer = 300us, .gap = 25us};
-    if (questions.empty()) return {.kind = ByteStep::Kind::done};
-    now_asked = {questions.front()};
-    questions.pop_front();
-    answers.emplace_back();
-    asking = true;
-    return {.kind = ByteStep::Kind::transfer, .out = now_asked};
+    if (awaiting_reply) return {.at = never, .answer = 300us, .gap = 25us};
+    if (requests.empty()) return {.kind = ByteStep::Kind::done};
+    request = {requests.front()};
+    requests.pop_front();
+    replies.emplace_back();
+    awaiting_reply = true;
+    return {.kind = ByteStep::Kind::transfer, .out = request};
   }
 
-  std::deque<std::uint8_t> questions;
-  Wire now_asked;
-  std::vector<Wire> answers;
-  bool asking = false;
+  std::deque<std::uint8_t> requests;
+  Wire request;
+  std::vector<Wire> replies;
+  bool awaiting_reply = false;
 };
 
-std::vector<Wire> ask(const Wire& questions, const std::vector<Machine<std::uint8_t>*>& on_the_line) {
+std::vector<Wire> run_requests(const Wire& requests, const std::vector<Machine<std::uint8_t>*>& on_the_line) {
   Line<std::uint8_t> line(LinkKind::half_duplex, settings);
   for (Machine<std::uint8_t>* device : on_the_line) line.attach(Role::device, *device);
-  Asker asker(questions);
-  const auto host = line.attach(Role::host, asker);
+  Requester requester(requests);
+  const auto host = line.attach(Role::host, requester);
   EXPECT_TRUE(line.run(host, 1s));
-  return asker.answers;
+  return requester.replies;
 }
 
 TEST(Bus, HearsAsALineDoes) {
   const auto devices = [] {
-    std::vector<std::unique_ptr<Answerer>> made;
-    made.push_back(std::make_unique<Answerer>(1, Wire{0x11, 0x22, 0x33}));
-    made.push_back(std::make_unique<Answerer>(2, Wire{0xF0, 0xAA, 0x55}));
-    made.push_back(std::make_unique<Answerer>(2, Wire{0x3C, 0xFF}));  // answers the same request at the same time
+    std::vector<std::unique_ptr<Responder>> made;
+    made.push_back(std::make_unique<Responder>(1, Wire{0x11, 0x22, 0x33}));
+    made.push_back(std::make_unique<Responder>(2, Wire{0xF0, 0xAA, 0x55}));
+    made.push_back(std::make_unique<Responder>(2, Wire{0x3C, 0xFF}));  // replies the same request at the same time
     return made;
   };
-  const Wire questions{1, 2, 9, 1};
+  const Wire requests{1, 2, 9, 1};
   const auto alone = devices();
   std::vector<Machine<std::uint8_t>*> pointers;
   for (const auto& device : alone) pointers.push_back(device.get());
-  const std::vector<Wire> wanted = ask(questions, pointers);
+  const std::vector<Wire> wanted = run_requests(requests, pointers);
   EXPECT_EQ(wanted[1], (Wire{0x30, 0xAA, 0x55}));
   EXPECT_TRUE(wanted[2].empty());
 
@@ -115,34 +115,36 @@ TEST(Bus, HearsAsALineDoes) {
   pointers.clear();
   for (const auto& device : behind) pointers.push_back(device.get());
   Bus bus(pointers, settings.character());
-  EXPECT_EQ(ask(questions, {&bus}), wanted);
+  EXPECT_EQ(run_requests(requests, {&bus}), wanted);
   for (std::size_t i = 0; i < behind.size(); ++i) EXPECT_EQ(behind[i]->sent, alone[i]->sent) << i;
-  EXPECT_EQ(behind[0]->heard, (Wire{1, 2, 0x30, 0xAA, 0x55, 9, 1}));
+  EXPECT_EQ(behind[0]->received_bytes, (Wire{1, 2, 0x30, 0xAA, 0x55, 9, 1}));
 }
 
 TEST(Bus, WhatOverlapsIsMergedAndTheRestComesLater) {
-  Answerer first(1, {0x81, 0x7E});
-  Answerer second(1, {0x0F, 0x0F}, 5us + 12us);  // starts about one character later
-  Answerer late(1, {0x77}, 50ms);
+  Responder first(1, {0x81, 0x7E});
+  Responder second(1, {0x0F, 0x0F}, 5us + 12us);  // starts about one character later
+  Responder late(1, {0x77}, 50ms);
   Bus bus({&second, &first, &late}, settings.character());
   Line<std::uint8_t> line(LinkKind::half_duplex, settings);
   line.attach(Role::device, bus);
   struct Quiet final : Machine<std::uint8_t> {
-    void feed(const ByteEvent& event) override { heard.insert(heard.end(), event.items.begin(), event.items.end()); }
+    void feed(const ByteEvent& event) override {
+      received_bytes.insert(received_bytes.end(), event.items.begin(), event.items.end());
+    }
     ByteStep next(Time) override {
-      if (asked) return {.at = never};
-      asked = true;
+      if (requested) return {.at = never};
+      requested = true;
       return {.kind = ByteStep::Kind::transfer, .out = question};
     }
     Wire question{1};
-    Wire heard;
-    bool asked = false;
+    Wire received_bytes;
+    bool requested = false;
   } host;
   line.attach(Role::host, host);
   line.run_until(10ms);
-  EXPECT_EQ(host.heard, (Wire{0x81, 0x0E, 0x0F}));
+  EXPECT_EQ(host.received_bytes, (Wire{0x81, 0x0E, 0x0F}));
   line.run_until(60ms);
-  EXPECT_EQ(host.heard, (Wire{0x81, 0x0E, 0x0F, 0x77}));
+  EXPECT_EQ(host.received_bytes, (Wire{0x81, 0x0E, 0x0F, 0x77}));
 }
 
 }  // namespace

@@ -37,20 +37,20 @@ void FaultyDevice::feed(const Event<std::uint8_t>& event) {
   switch (event.kind) {
     case Kind::received:
       // A request that began while the device ignored the line is ignored to its end.
-      if (deaf_ || event.at - unheard_at_ <= 2 * device_gap_) {
-        unheard_at_ = event.at;
+      if (ignores_line_ || event.at - last_ignored_at_ <= 2 * device_gap_) {
+        last_ignored_at_ = event.at;
       } else {
-        hear(event);
+        receive(event);
       }
       return;
     case Kind::line_error:
-      if (deaf_) return;
+      if (ignores_line_) return;
       break;
     case Kind::silence:
       if (silent_until_ != never) return;  // the device expects `sent`: its suppressed reply still lasts
       break;
     case Kind::sent:
-      deaf_ = false;
+      ignores_line_ = false;
       break;
     case Kind::timer:
       if (silent_until_ <= event.at) {
@@ -67,18 +67,18 @@ void FaultyDevice::feed(const Event<std::uint8_t>& event) {
   device_.feed(event);
 }
 
-void FaultyDevice::hear(const Event<std::uint8_t>& event) {
+void FaultyDevice::receive(const Event<std::uint8_t>& event) {
   constexpr std::size_t longest_request = 256;
-  heard_.assign(event.items.begin(), event.items.end());
-  for (std::uint8_t& byte : heard_) {
+  received_.assign(event.items.begin(), event.items.end());
+  for (std::uint8_t& byte : received_) {
     if (request_.size() < longest_request) request_.push_back(byte);
     if (strikes(FaultKind::request_corrupt)) {
       flip_bits({&byte, 1});
-      misheard_ = true;
+      request_damaged_ = true;
     }
   }
   Event<std::uint8_t> changed = event;
-  changed.items = heard_;
+  changed.items = received_;
   device_.feed(changed);
 }
 
@@ -133,12 +133,12 @@ bool FaultyDevice::damage(Step<std::uint8_t>& reply, Time now) {
     if (!request.empty() && strikes(FaultKind::echo)) reply_.insert(reply_.begin(), request.begin(), request.end());
     if (!reply_.empty() && strikes(FaultKind::delay)) {
       reply.at = std::max(reply.at, now) + rates_.delay;
-      deaf_ = true;
+      ignores_line_ = true;
     }
   }
   if (counts_ != faults_before) ++damaged_replies_;
-  const bool misheard = std::exchange(misheard_, false);
-  if (reply_.size() > reply.out.size() || (misheard && !reply_.empty())) deaf_ = true;
+  const bool damaged = std::exchange(request_damaged_, false);
+  if (reply_.size() > reply.out.size() || (damaged && !reply_.empty())) ignores_line_ = true;
   reply.out = reply_;
   return !reply_.empty();
 }

@@ -73,7 +73,7 @@ class FaultyDevice final : public Machine<std::uint8_t> {
   bool strikes(FaultKind kind);
   bool damage(Step<std::uint8_t>& reply, Time now);
   void flip_bits(std::span<std::uint8_t> bytes);
-  void hear(const Event<std::uint8_t>& event);
+  void receive(const Event<std::uint8_t>& event);
 
   Machine<std::uint8_t>& device_;
   FaultRates rates_;
@@ -83,14 +83,14 @@ class FaultyDevice final : public Machine<std::uint8_t> {
 
   std::vector<std::uint8_t> request_;  // bytes received since the last reply
   std::vector<std::uint8_t> reply_;
-  std::vector<std::uint8_t> heard_;  // bytes passed on to the device
-  bool misheard_ = false;            // the request was damaged, so the device may answer while the host still sends
-  bool deaf_ = false;  // the device receives nothing: a stretched reply, or one to a damaged request, is pending or
-                       // being sent
-  Time unheard_at_ = -std::chrono::hours(1);  // time of the last byte received while `deaf_`
-  Time device_gap_{};                         // pause after which the device considers a request complete
-  Time silent_until_ = never;                 // time at which a suppressed reply counts as sent
-  Time device_timer_ = never;                 // time of the timer that the device requested
+  std::vector<std::uint8_t> received_;  // bytes passed on to the device
+  bool request_damaged_ = false;        // the request was damaged, so the device may answer while the host still sends
+  bool ignores_line_ = false;  // the device receives nothing: a stretched reply, or one to a damaged request, is
+                               // pending or being sent
+  Time last_ignored_at_ = -std::chrono::hours(1);  // time of the last byte received while `ignores_line_`
+  Time device_gap_{};                              // pause after which the device considers a request complete
+  Time silent_until_ = never;                      // time at which a suppressed reply counts as sent
+  Time device_timer_ = never;                      // time of the timer that the device requested
 };
 
 }  // namespace absenc::sim

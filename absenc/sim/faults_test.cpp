@@ -34,8 +34,8 @@ class Device final : public Machine<std::uint8_t> {
     if (event.kind == Kind::silence && sending) ++violations;
     if (event.kind != Kind::received) return;
     if (sending) ++violations;
-    heard.insert(heard.end(), event.items.begin(), event.items.end());
-    if (sending || heard.size() % 2 != 0) return;
+    received.insert(received.end(), event.items.begin(), event.items.end());
+    if (sending || received.size() % 2 != 0) return;
     pending_ = sending = true;
     at_ = event.at + microseconds(3);
   }
@@ -50,7 +50,7 @@ class Device final : public Machine<std::uint8_t> {
   int timers = 0;
   Time timer_at{};
   Time gap = microseconds(2);
-  ByteVector heard;
+  ByteVector received;
 
  private:
   bool pending_ = false;
@@ -61,17 +61,17 @@ class Device final : public Machine<std::uint8_t> {
 class Host final : public Machine<std::uint8_t> {
  public:
   void feed(const Event<std::uint8_t>& event) override {
-    if (event.kind == Kind::received && heard.empty()) first_at = event.at;
-    heard.insert(heard.end(), event.items.begin(), event.items.end());
+    if (event.kind == Kind::received && received.empty()) first_at = event.at;
+    received.insert(received.end(), event.items.begin(), event.items.end());
   }
   Step<std::uint8_t> next(Time) override {
-    if (!ask) return {};
-    ask = false;
-    return {.kind = StepKind::transfer, .out = asked};
+    if (!send_now) return {};
+    send_now = false;
+    return {.kind = StepKind::transfer, .out = request_bytes};
   }
-  ByteVector asked = request;
-  bool ask = false;
-  ByteVector heard;
+  ByteVector request_bytes = request;
+  bool send_now = false;
+  ByteVector received;
   Time first_at{};
 };
 
@@ -91,12 +91,12 @@ struct Faults : testing::Test {
     node = line.attach(Role::host, host);
   }
   // Sends one request and returns the bytes received within 1 ms.
-  ByteVector ask() {
-    host.heard.clear();
-    host.ask = true;
+  ByteVector exchange() {
+    host.received.clear();
+    host.send_now = true;
     line.wake(node);
     line.run_until(line.now() + microseconds(1000));
-    return host.heard;
+    return host.received;
   }
 };
 
@@ -108,7 +108,7 @@ int different_bits(const ByteVector& a, const ByteVector& b) {
 
 TEST_F(Faults, NoneLeavesEverythingAsItIs) {
   damage(FaultKind::drop, 0);
-  for (int i = 0; i < 5; ++i) EXPECT_EQ(ask(), reply);
+  for (int i = 0; i < 5; ++i) EXPECT_EQ(exchange(), reply);
   EXPECT_EQ(host.first_at % microseconds(1000), microseconds(33));
   EXPECT_EQ(faulty->damaged_replies(), 0u);
 }
@@ -118,7 +118,7 @@ TEST_F(Faults, DropLosesOneByte) {
   bool first_lost = false;
   bool last_lost = false;
   for (int i = 0; i < 50; ++i) {
-    const ByteVector damaged = ask();
+    const ByteVector damaged = exchange();
     EXPECT_EQ(damaged.size(), 3u);
     first_lost = first_lost || damaged.front() != reply.front();
     last_lost = last_lost || damaged.back() != reply.back();
@@ -132,7 +132,7 @@ TEST_F(Faults, CorruptFlipsOneToThreeBits) {
   damage(FaultKind::corrupt);
   std::array<int, 4> seen{};
   for (int i = 0; i < 100; ++i) {
-    const ByteVector damaged = ask();
+    const ByteVector damaged = exchange();
     ASSERT_EQ(damaged.size(), reply.size());
     ++seen.at(static_cast<std::size_t>(different_bits(damaged, reply)));
   }
@@ -144,7 +144,7 @@ TEST_F(Faults, TruncateKeepsTheBeginning) {
   damage(FaultKind::truncate);
   std::array<int, 4> seen{};
   for (int i = 0; i < 50; ++i) {
-    const ByteVector damaged = ask();
+    const ByteVector damaged = exchange();
     ASSERT_TRUE(!damaged.empty() && damaged.size() < reply.size());
     EXPECT_TRUE(std::equal(damaged.begin(), damaged.end(), reply.begin()));
     ++seen.at(damaged.size());
@@ -154,24 +154,24 @@ TEST_F(Faults, TruncateKeepsTheBeginning) {
 
 TEST_F(Faults, DelayComesLate) {
   damage(FaultKind::delay);
-  EXPECT_EQ(ask(), reply);
+  EXPECT_EQ(exchange(), reply);
   EXPECT_EQ(host.first_at, microseconds(20 + 3 + 200 + 10));
 }
 
 TEST_F(Faults, EchoAndRepeatLengthenTheReply) {
   damage(FaultKind::echo);
-  for (int i = 0; i < 3; ++i) EXPECT_EQ(ask(), (ByteVector{0x32, 0x05, 0x11, 0x22, 0x33, 0x44}));
+  for (int i = 0; i < 3; ++i) EXPECT_EQ(exchange(), (ByteVector{0x32, 0x05, 0x11, 0x22, 0x33, 0x44}));
   FaultRates rates;
   rates[FaultKind::repeat] = 1;
   faulty->set_rates(rates);
-  EXPECT_EQ(ask(), (ByteVector{0x11, 0x22, 0x33, 0x44, 0x11, 0x22, 0x33, 0x44}));
+  EXPECT_EQ(exchange(), (ByteVector{0x11, 0x22, 0x33, 0x44, 0x11, 0x22, 0x33, 0x44}));
 }
 
 TEST_F(Faults, GarbageComesBeforeTheReply) {
   damage(FaultKind::garbage);
   std::array<int, 5> seen{};
   for (int i = 0; i < 50; ++i) {
-    const ByteVector damaged = ask();
+    const ByteVector damaged = exchange();
     ASSERT_TRUE(damaged.size() > 4 && damaged.size() <= 8);
     EXPECT_TRUE(std::equal(reply.begin(), reply.end(), damaged.end() - 4));
     ++seen.at(damaged.size() - 4);
@@ -182,19 +182,19 @@ TEST_F(Faults, GarbageComesBeforeTheReply) {
 TEST_F(Faults, SilentDeviceGoesOn) {
   damage(FaultKind::silence);
   device.timer_at = microseconds(500);  // timers of the device still run
-  EXPECT_TRUE(ask().empty());
+  EXPECT_TRUE(exchange().empty());
   EXPECT_FALSE(device.sending);
   EXPECT_EQ(device.timers, 1);
   EXPECT_EQ(device.violations, 0);
   faulty->set_rates({});
-  EXPECT_EQ(ask(), reply);
+  EXPECT_EQ(exchange(), reply);
   EXPECT_EQ(faulty->damaged_replies(), 1u);
 }
 
 TEST_F(Faults, RequestCorruptReachesTheDeviceOnly) {
   damage(FaultKind::request_corrupt);
-  EXPECT_EQ(ask(), reply);
-  const int bits = different_bits(device.heard, request);
+  EXPECT_EQ(exchange(), reply);
+  const int bits = different_bits(device.received, request);
   EXPECT_TRUE(bits >= 2 && bits <= 6) << bits;
   EXPECT_EQ(faulty->count(FaultKind::request_corrupt), 2u);
 }
@@ -207,10 +207,10 @@ TEST_F(Faults, StretchedReplyIsNotTheHostsFault) {
     rates[kind] = 1;
     faulty->set_rates(rates);
     for (const int again_after : {150, 70}) {
-      host.ask = true;
+      host.send_now = true;
       line.wake(node);
       line.run_until(line.now() + microseconds(again_after));
-      host.ask = true;
+      host.send_now = true;
       line.wake(node);
       line.run_until(line.now() + microseconds(1000));
       EXPECT_FALSE(device.sending);
@@ -222,9 +222,9 @@ TEST_F(Faults, StretchedReplyIsNotTheHostsFault) {
 // The device takes half of a damaged request for a whole one and answers while the host still sends.
 TEST_F(Faults, MisheardRequestIsNotTheHostsFault) {
   damage(FaultKind::request_corrupt);
-  host.asked = {1, 2, 3, 4};
-  (void)ask();
-  EXPECT_EQ(device.heard.size(), 2u);
+  host.request_bytes = {1, 2, 3, 4};
+  (void)exchange();
+  EXPECT_EQ(device.received.size(), 2u);
   EXPECT_EQ(device.violations, 0);
   EXPECT_FALSE(device.sending);
 }
@@ -235,20 +235,20 @@ TEST_F(Faults, RequestWhoseBeginningIsNotHeardIsNotHeardAtAll) {
   device.gap = microseconds(15);
   for (const int begin : {0, 90}) {
     line.run_until(microseconds(begin));
-    host.ask = true;
+    host.send_now = true;
     line.wake(node);
   }
   line.run_until(microseconds(1000));
-  EXPECT_EQ(device.heard.size(), 2u);
-  EXPECT_EQ(ask().size(), 8u);  // the next request is answered again
+  EXPECT_EQ(device.received.size(), 2u);
+  EXPECT_EQ(exchange().size(), 8u);  // the next request is answered again
 }
 
 TEST_F(Faults, EarlyRequestIsTheHostsFault) {
   damage(FaultKind::corrupt);
-  host.ask = true;
+  host.send_now = true;
   line.wake(node);
   line.run_until(microseconds(40));  // the reply has begun
-  host.ask = true;
+  host.send_now = true;
   line.wake(node);
   line.run_until(microseconds(1000));
   EXPECT_GT(device.violations, 0);

@@ -16,14 +16,14 @@ bool FaultyNode::strikes(FaultKind kind) {
 
 void FaultyNode::feed(const Event<CanFrame>& event) {
   if (event.kind != Event<CanFrame>::Kind::received || event.items.empty()) return device_.feed(event);
-  last_heard_ = event.items.back();
-  heard_ = true;
-  std::vector<CanFrame> heard(event.items.begin(), event.items.end());
-  for (CanFrame& frame : heard) {
+  last_received_ = event.items.back();
+  has_received_ = true;
+  std::vector<CanFrame> damaged(event.items.begin(), event.items.end());
+  for (CanFrame& frame : damaged) {
     if (frame.size > 0 && strikes(FaultKind::request_corrupt)) flip_bits(frame);
   }
   Event<CanFrame> changed = event;
-  changed.items = heard;
+  changed.items = damaged;
   device_.feed(changed);
 }
 
@@ -55,7 +55,7 @@ void FaultyNode::damage(const CanFrame& frame) {
     for (std::uint8_t& byte : garbage.data) byte = static_cast<std::uint8_t>(random_.below(256));
     out_.push_back(garbage);
   }
-  if (heard_ && strikes(FaultKind::echo)) out_.push_back(last_heard_);
+  if (has_received_ && strikes(FaultKind::echo)) out_.push_back(last_received_);
   out_.push_back(sent);
   if (strikes(FaultKind::repeat)) out_.push_back(sent);
 }

@@ -36,8 +36,8 @@ class FaultyNode final : public Machine<CanFrame> {
   Random random_;
   FaultCounts counts_{};
   std::uint64_t damaged_ = 0;
-  CanFrame last_heard_{};
-  bool heard_ = false;
+  CanFrame last_received_{};
+  bool has_received_ = false;
   std::vector<CanFrame> out_;
 };
 

@@ -20,7 +20,7 @@ const CanFrame answer{.id = 0x120, .size = 8, .data = {0x47, 0x26}};
 struct Result {
   std::vector<CanFrame> frames;
   Time at{};
-  std::string heard;
+  std::string received_frames;
   std::uint64_t count = 0;
   std::uint64_t damaged = 0;
 };
@@ -72,7 +72,7 @@ TEST(FaultyNode, ASuppressedFrameWasSentAsFarAsTheDeviceKnows) {
 
 TEST(FaultyNode, HearsWrong) {
   const Result result = exchange(FaultKind::request_corrupt);
-  EXPECT_EQ(result.heard.find("220:8020000000000000"), std::string::npos);
+  EXPECT_EQ(result.received_frames.find("220:8020000000000000"), std::string::npos);
   EXPECT_EQ(result.frames, std::vector<CanFrame>{answer});
 }
 

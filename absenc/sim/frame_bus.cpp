@@ -16,9 +16,9 @@ FrameBus::FrameBus(const std::vector<Machine<CanFrame>*>& nodes, std::uint32_t r
 }
 
 void FrameBus::feed(const FrameEvent& event) {
-  if (event.kind == FrameEvent::Kind::sent) return all_sent(event.at);
+  if (event.kind == FrameEvent::Kind::sent) return report_sent(event.at);
   for (Node& node : nodes_) {
-    if (node.doing == Doing::done) continue;
+    if (node.send_state == SendState::done) continue;
     const bool from_bus = event.kind == FrameEvent::Kind::received || event.kind == FrameEvent::Kind::line_error;
     if (from_bus && node.rate != rate_) continue;
     if (event.kind == FrameEvent::Kind::timer) {
@@ -30,35 +30,35 @@ void FrameBus::feed(const FrameEvent& event) {
   }
 }
 
-void FrameBus::all_sent(Time at) {
+void FrameBus::report_sent(Time at) {
   Node* const sender = std::exchange(sender_, nullptr);
   if (sender == nullptr) return;
   for (Node& node : nodes_) {
-    if (&node == sender || node.doing == Doing::done || node.rate != rate_) continue;
+    if (&node == sender || node.send_state == SendState::done || node.rate != rate_) continue;
     node.machine->feed({.kind = FrameEvent::Kind::received, .at = at, .items = {&out_, 1}});
     serve(node, at);
   }
   sender->out.pop_front();
   if (!sender->out.empty()) {
-    sender->doing = Doing::pending;
+    sender->send_state = SendState::pending;
     return;
   }
-  sender->doing = Doing::waiting;
+  sender->send_state = SendState::waiting;
   sender->machine->feed({.kind = FrameEvent::Kind::sent, .at = at});
   serve(*sender, at);
 }
 
 void FrameBus::serve(Node& node, Time now) {
-  while (node.doing != Doing::done) {
+  while (node.send_state != SendState::done) {
     const FrameStep step = node.machine->next(now);
     switch (step.kind) {
       case FrameStep::Kind::wait:
         node.timer = step.at > now ? step.at : never;
         return;
       case FrameStep::Kind::transfer:
-        if (node.doing != Doing::waiting)
+        if (node.send_state != SendState::waiting)
           throw std::logic_error("a node began a transfer before its last one was sent");
-        node.doing = Doing::pending;
+        node.send_state = SendState::pending;
         node.at = std::max(step.at, now);
         node.out.assign(step.out.begin(), step.out.end());
         break;
@@ -71,7 +71,7 @@ void FrameBus::serve(Node& node, Time now) {
         }
         break;
       case FrameStep::Kind::done:
-        node.doing = Doing::done;
+        node.send_state = SendState::done;
         return;
       case FrameStep::Kind::emit:
       case FrameStep::Kind::pulse:
@@ -83,7 +83,7 @@ void FrameBus::serve(Node& node, Time now) {
 FrameBus::Node* FrameBus::first_to_send() {
   Node* first = nullptr;
   for (Node& node : nodes_) {
-    if (node.doing != Doing::pending || node.rate != rate_) continue;
+    if (node.send_state != SendState::pending || node.rate != rate_) continue;
     if (first == nullptr || std::tie(node.at, node.out.front().id) < std::tie(first->at, first->out.front().id)) {
       first = &node;
     }
@@ -102,13 +102,13 @@ FrameStep FrameBus::next(Time now) {
   Node* const first = sender_ == nullptr ? first_to_send() : nullptr;
   if (first != nullptr && first->at <= now) {
     sender_ = first;
-    first->doing = Doing::sending;
+    first->send_state = SendState::sending;
     out_ = first->out.front();
     return {.kind = FrameStep::Kind::transfer, .out = {&out_, 1}};
   }
   if (first != nullptr) step.at = first->at;
   for (const Node& node : nodes_) {
-    if (node.doing != Doing::done) step.at = std::min(step.at, node.timer);
+    if (node.send_state != SendState::done) step.at = std::min(step.at, node.timer);
   }
   return step;
 }

@@ -23,7 +23,7 @@ class FrameBus final : public Machine<CanFrame> {
   Step<CanFrame> next(Time now) override;
 
  private:
-  enum class Doing : std::uint8_t {
+  enum class SendState : std::uint8_t {
     waiting,
     pending,  // has a frame that has not begun
     sending,
@@ -32,14 +32,14 @@ class FrameBus final : public Machine<CanFrame> {
   struct Node {
     Machine<CanFrame>* machine;
     std::uint32_t rate;
-    Doing doing = Doing::waiting;
+    SendState send_state = SendState::waiting;
     Time timer = never;
     Time at{};                   // pending: time at which the frame begins
     std::deque<CanFrame> out{};  // pending, sending: frames not yet sent
   };
 
   void serve(Node& node, Time now);
-  void all_sent(Time at);
+  void report_sent(Time at);
   [[nodiscard]] Node* first_to_send();
 
   std::vector<Node> nodes_;

@@ -20,7 +20,7 @@ class LatePort final : public Port<Item> {
 
   Time now() override {
     time_ = std::max(time_, inner_->now());
-    told_ = time_;
+    last_event_at_ = time_;
     return time_;
   }
 
@@ -29,7 +29,7 @@ class LatePort final : public Port<Item> {
       // The line's time may be behind this port's time: the transfer begins now.
       rest(std::max(time_, step.at));
       quiet_since_ = time_;
-      heard_ = silence_told_ = false;
+      received_ = silence_reported_ = false;
       answering_ = false;
     }
     inner_->begin(step);
@@ -37,30 +37,30 @@ class LatePort final : public Port<Item> {
 
   Event<Item> wait(const Step<Item>& step) override {
     using Kind = typename Event<Item>::Kind;
-    const Time armed = step.at > told_ ? step.at : never;
+    const Time armed = step.at > last_event_at_ ? step.at : never;
     for (;;) {
-      const Time limit = heard_ ? step.gap : step.answer;
-      const Time quiet_end = limit > Time{} && !silence_told_ ? quiet_since_ + limit : never;
-      const Time due = std::min({armed, quiet_end, held_.empty() ? never : held_.front().at});
-      if (!held_.empty() && held_.front().at <= time_) {
-        told_items_ = std::move(held_.front().items);
-        held_.pop_front();
-        heard_ = true;
-        silence_told_ = false;
+      const Time limit = received_ ? step.gap : step.answer;
+      const Time quiet_end = limit > Time{} && !silence_reported_ ? quiet_since_ + limit : never;
+      const Time due = std::min({armed, quiet_end, delayed_.empty() ? never : delayed_.front().at});
+      if (!delayed_.empty() && delayed_.front().at <= time_) {
+        reported_items_ = std::move(delayed_.front().items);
+        delayed_.pop_front();
+        received_ = true;
+        silence_reported_ = false;
         quiet_since_ = time_;
-        return tell({.kind = Kind::received, .at = time_, .items = told_items_});
+        return report({.kind = Kind::received, .at = time_, .items = reported_items_});
       }
       if (due <= time_) {
-        if (armed <= quiet_end) return tell({.kind = Kind::timer, .at = time_});
-        silence_told_ = true;
-        return tell({.kind = Kind::silence, .at = time_});
+        if (armed <= quiet_end) return report({.kind = Kind::timer, .at = time_});
+        silence_reported_ = true;
+        return report({.kind = Kind::silence, .at = time_});
       }
       const Event<Item> event = inner_->wait({.at = due == never ? time_ + std::chrono::hours(1) : due});
       time_ = std::max(time_, event.at);
-      if (event.kind == Kind::received) hold(event);
+      if (event.kind == Kind::received) enqueue(event);
       if (event.kind == Kind::sent) {
         quiet_since_ = event.at;
-        return tell(event);
+        return report(event);
       }
     }
   }
@@ -70,38 +70,38 @@ class LatePort final : public Port<Item> {
     while (time_ < until) {
       const Event<Item> event = inner_->wait({.at = until});
       time_ = std::max(time_, event.at);
-      if (event.kind == Event<Item>::Kind::received) hold(event);
+      if (event.kind == Event<Item>::Kind::received) enqueue(event);
     }
   }
 
  private:
-  struct Held {
+  struct DelayedItems {
     Time at;
     std::vector<Item> items;
   };
 
-  void hold(const Event<Item>& event) {
+  void enqueue(const Event<Item>& event) {
     if (!std::exchange(answering_, true)) late_ = delay_();
     if (late_ == never) return;
-    const Time at = std::max(event.at + late_, held_.empty() ? Time{} : held_.back().at);
-    held_.push_back({at, {event.items.begin(), event.items.end()}});
+    const Time at = std::max(event.at + late_, delayed_.empty() ? Time{} : delayed_.back().at);
+    delayed_.push_back({at, {event.items.begin(), event.items.end()}});
   }
 
-  Event<Item> tell(const Event<Item>& event) {
-    told_ = event.at;
+  Event<Item> report(const Event<Item>& event) {
+    last_event_at_ = event.at;
     return event;
   }
 
   SimPort<Item>* inner_;
   std::function<Time()> delay_;
-  std::deque<Held> held_;
-  std::vector<Item> told_items_;
+  std::deque<DelayedItems> delayed_;
+  std::vector<Item> reported_items_;
   Time time_{};
-  Time told_{};
+  Time last_event_at_{};
   Time quiet_since_{};
   Time late_{};
-  bool heard_ = false;
-  bool silence_told_ = false;
+  bool received_ = false;
+  bool silence_reported_ = false;
   bool answering_ = false;  // an item was received since the last request
 };
 

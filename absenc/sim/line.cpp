@@ -36,7 +36,7 @@ void Line<Item>::replace(Node node, Machine<Item>& machine) {
   State& state = *nodes_[node];
   state.machine = &machine;
   state.done = false;
-  state.doing = Step<Item>::Kind::wait;
+  state.active_step = Step<Item>::Kind::wait;
   ++state.begin_generation;
   state.on_wire = 0;
   state.silence = Silence(now_);
@@ -92,15 +92,15 @@ template <class Item>
 Time Line<Item>::next_event() const {
   if (nodes_.empty()) return never;
   const Time due = nodes_[next_deadline()]->due;
-  return happenings_.empty() ? due : std::min(due, happenings_.top().at);
+  return scheduled_.empty() ? due : std::min(due, scheduled_.top().at);
 }
 
 template <class Item>
 Time Line<Item>::settled() const {
   Time time = now_;
   for (const auto& node : nodes_) {
-    if (node->doing != Step<Item>::Kind::transfer) continue;
-    if (!node->begun && node->hold_low) time = std::min(time, node->taken_up);
+    if (node->active_step != Step<Item>::Kind::transfer) continue;
+    if (!node->begun && node->hold_low) time = std::min(time, node->accepted_at);
     if (!node->begun) continue;
     time = std::min(time, node->start + node->each * static_cast<std::int64_t>(node->index));
   }
@@ -109,7 +109,7 @@ Time Line<Item>::settled() const {
 
 template <class Item>
 void Line<Item>::schedule(typename ScheduledEvent::Kind kind, Time at, Node node) {
-  happenings_.push({kind, std::max(at, now_), order_++, node, nodes_[node]->begin_generation});
+  scheduled_.push({kind, std::max(at, now_), order_++, node, nodes_[node]->begin_generation});
 }
 
 template <class Item>
@@ -120,13 +120,13 @@ bool Line<Item>::step() {
   now_ = time;
   // At equal times deadlines come after events that end then (a character has arrived) and before the arbitration.
   const Node late = next_deadline();
-  if (happenings_.empty() || happenings_.top().at > time ||
-      (happenings_.top().kind == Kind::arbitrate && nodes_[late]->due == time)) {
+  if (scheduled_.empty() || scheduled_.top().at > time ||
+      (scheduled_.top().kind == Kind::arbitrate && nodes_[late]->due == time)) {
     deadline(late);
     return true;
   }
-  const ScheduledEvent happening = happenings_.top();
-  happenings_.pop();
+  const ScheduledEvent happening = scheduled_.top();
+  scheduled_.pop();
   const Node node = happening.node;
   const bool current = happening.generation == nodes_[node]->begin_generation;
   switch (happening.kind) {
@@ -200,7 +200,7 @@ void Line<Item>::serve(Node node) {
         break;
       case Kind::transfer:
       case Kind::pulse:
-        take_up(node, step);
+        accept_step(node, step);
         break;
     }
   }
@@ -209,15 +209,15 @@ void Line<Item>::serve(Node node) {
 
 // Accepts a transfer or pulse; it begins now or at its time.
 template <class Item>
-void Line<Item>::take_up(Node node, const Step<Item>& step) {
+void Line<Item>::accept_step(Node node, const Step<Item>& step) {
   State& state = *nodes_[node];
   // A device selected by chip select or clock answers into the transfer in progress.
   const bool driven = state.role == Role::device && step.kind == Step<Item>::Kind::transfer &&
                       (kind_ == LinkKind::spi || kind_ == LinkKind::clocked);
-  if (!driven && state.doing != Step<Item>::Kind::wait) {
+  if (!driven && state.active_step != Step<Item>::Kind::wait) {
     throw std::logic_error("a machine began a transfer or pulse before its last one was sent");
   }
-  state.doing = step.kind;
+  state.active_step = step.kind;
   state.begun = false;
   state.out.assign(step.out.begin(), step.out.end());
   state.on_wire = 0;
@@ -227,7 +227,7 @@ void Line<Item>::take_up(Node node, const Step<Item>& step) {
   state.behind_out = step.behind_out();
   state.pulse_wire = step.wire;
   state.hold_low = step.hold_low;
-  state.taken_up = now_;
+  state.accepted_at = now_;
   ++state.begin_generation;
   // Scheduled instead of begun at once, so that every node served or attached at this time is handled first, in any
   // order.
@@ -237,7 +237,7 @@ void Line<Item>::take_up(Node node, const Step<Item>& step) {
 template <class Item>
 void Line<Item>::arm(State& state) {
   state.due = state.timer_due;
-  if (state.doing != Step<Item>::Kind::wait) return;
+  if (state.active_step != Step<Item>::Kind::wait) return;
   state.due = std::min(state.due, std::max(now_, state.silence.due(state.waiting.answer, state.waiting.gap)));
 }
 
@@ -254,14 +254,14 @@ void Line<Item>::deadline(Node node) {
     state.due = std::min(now_ + state.settings.character(), state.timer_due);
     return;
   }
-  state.silence.told();
+  state.silence.reported();
   feed(node, {.kind = Event<Item>::Kind::silence, .at = now_});
 }
 
 template <class Item>
 void Line<Item>::finish(Node node) {
   State& state = *nodes_[node];
-  state.doing = Step<Item>::Kind::wait;
+  state.active_step = Step<Item>::Kind::wait;
   state.silence.sent(now_);
   feed(node, {.kind = Event<Item>::Kind::sent, .at = now_});
 }

@@ -97,7 +97,7 @@ class Line {
 
   void schedule(typename ScheduledEvent::Kind kind, Time at, Node node);
   void serve(Node node);
-  void take_up(Node node, const Step<Item>& step);
+  void accept_step(Node node, const Step<Item>& step);
   void feed(Node node, const Event<Item>& event);
   void arm(State& state);
   [[nodiscard]] Node next_deadline() const;
@@ -108,12 +108,12 @@ class Line {
   void begin_characters(Node node);
   void frame_character(Node sender);
   void end_character(Node node);
-  void hear(Node node, Node sender, const Item& item, bool garbled);
+  void deliver(Node node, Node sender, const Item& item, bool garbled);
   void begin_transfer(Node node);
   void end_transfer(Node node);
   void arbitrate();
   void end_frame(Node node);
-  [[nodiscard]] bool hears(const State& receiver, const State& sender) const;
+  [[nodiscard]] bool receives_from(const State& receiver, const State& sender) const;
   [[nodiscard]] bool busy_towards(const State& node) const;
 
   LinkKind kind_;
@@ -121,7 +121,7 @@ class Line {
   Time now_{};
   std::uint64_t order_ = 0;
   std::vector<std::unique_ptr<State>> nodes_;
-  std::priority_queue<ScheduledEvent, std::vector<ScheduledEvent>, std::greater<>> happenings_;
+  std::priority_queue<ScheduledEvent, std::vector<ScheduledEvent>, std::greater<>> scheduled_;
   Observer observer_;
   TransferObserver transfer_observer_;
   PulseObserver pulse_observer_;

@@ -33,17 +33,17 @@ struct Line<Item>::State {
   Time framed_from = never;
   Time framed_until{};
 
-  typename Step<Item>::Kind doing = Step<Item>::Kind::wait;  // kind of the transfer or pulse that is pending or in
-                                                             // progress
-  std::uint64_t begin_generation = 0;                        // number of transfers and pulses so far
-  bool begun = false;                                        // false while the transfer's `at` lies in the future
+  typename Step<Item>::Kind active_step = Step<Item>::Kind::wait;  // kind of the transfer or pulse that is pending or
+                                                                   // in progress
+  std::uint64_t begin_generation = 0;  // number of transfers and pulses so far
+  bool begun = false;                  // false while the transfer's `at` lies in the future
   std::vector<Item> out;
   std::size_t bits = 0;
   std::size_t expect = 0;
   Time width{};
   std::uint8_t behind_out = 0xFF;  // clocked link: byte that the host samples after `out` has ended
   bool hold_low = false;           // clocked: the host holds the clock line low before the transfer
-  Time taken_up{};                 // time at which the machine requested the transfer
+  Time accepted_at{};              // time at which the machine requested the transfer
   Time lead{};                     // spi: time from chip select to the first clock
   ExtraWire pulse_wire{};
   Time start{};             // start of the transfer; CAN: start of the frame
@@ -52,7 +52,7 @@ struct Line<Item>::State {
   Time each{};              // duration of one character
 
   [[nodiscard]] bool frame_pending() const {
-    return doing == Step<Item>::Kind::transfer && begun && index < out.size();
+    return active_step == Step<Item>::Kind::transfer && begun && index < out.size();
   }
 
   // Returns `item` combined with all characters of this node that overlap [from, to).

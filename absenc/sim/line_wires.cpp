@@ -14,7 +14,7 @@ namespace {
 
 // Returns whether two UART settings are compatible. A UART samples the stop bit in its middle, so two clocks may differ
 // by at most 5 %.
-bool understand(const LineSettings& a, const LineSettings& b) {
+bool compatible(const LineSettings& a, const LineSettings& b) {
   const std::uint64_t larger = std::max(a.rate, b.rate);
   const std::uint64_t difference = larger - std::min(a.rate, b.rate);
   return difference * 20 <= larger && a.parity == b.parity;
@@ -38,7 +38,7 @@ void Line<Item>::begin(Node node) {
   state.begun = true;
   state.start = now_;
   state.index = 0;
-  if (state.doing == Step<Item>::Kind::pulse) {
+  if (state.active_step == Step<Item>::Kind::pulse) {
     schedule(ScheduledEvent::Kind::finished, now_ + state.width, node);
     if (pulse_observer_) pulse_observer_(state.pulse_wire, now_, now_ + state.width);
     for (Node other = 0; other < nodes_.size(); ++other) {
@@ -57,7 +57,7 @@ void Line<Item>::begin(Node node) {
 }
 
 template <class Item>
-bool Line<Item>::hears(const State& receiver, const State& sender) const {
+bool Line<Item>::receives_from(const State& receiver, const State& sender) const {
   if (&receiver == &sender) return sender.echo;
   return kind_ != LinkKind::full_duplex || receiver.role != sender.role;
 }
@@ -65,8 +65,8 @@ bool Line<Item>::hears(const State& receiver, const State& sender) const {
 template <class Item>
 bool Line<Item>::busy_towards(const State& node) const {
   return std::any_of(nodes_.begin(), nodes_.end(), [&](const auto& other) {
-    return other.get() != &node && other->on_wire > 0 && other->doing == Step<Item>::Kind::transfer &&
-           hears(node, *other);
+    return other.get() != &node && other->on_wire > 0 && other->active_step == Step<Item>::Kind::transfer &&
+           receives_from(node, *other);
   });
 }
 
@@ -83,7 +83,7 @@ void Line<Item>::begin_characters(Node node) {
 template <class Item>
 void Line<Item>::frame_character(Node sender) {
   for (const auto& receiver : nodes_) {
-    if (!hears(*receiver, *nodes_[sender]) || now_ < receiver->framed_until) continue;
+    if (!receives_from(*receiver, *nodes_[sender]) || now_ < receiver->framed_until) continue;
     receiver->framed_sender = sender;
     receiver->framed_from = now_;
     receiver->framed_until = now_ + nodes_[sender]->each;
@@ -109,9 +109,9 @@ void Line<Item>::end_character(Node node) {
   }
   for (Node other = 0; other < nodes_.size(); ++other) {
     State& receiver = *nodes_[other];
-    if (!hears(receiver, sender)) continue;
+    if (!receives_from(receiver, sender)) continue;
     if (receiver.framed_sender == node && receiver.framed_from == from) {
-      hear(other, node, item, false);
+      deliver(other, node, item, false);
     } else {  // part of another sender's character, but not silence either
       receiver.silence.busy(now_);
       if (!receiver.done) arm(receiver);
@@ -121,10 +121,10 @@ void Line<Item>::end_character(Node node) {
 }
 
 template <class Item>
-void Line<Item>::hear(Node node, Node sender, const Item& item, bool garbled) {
+void Line<Item>::deliver(Node node, Node sender, const Item& item, bool garbled) {
   State& state = *nodes_[node];
-  state.silence.heard(now_);
-  if (garbled || !understand(state.settings, nodes_[sender]->settings)) {
+  state.silence.received(now_);
+  if (garbled || !compatible(state.settings, nodes_[sender]->settings)) {
     feed(node, {.kind = Event<Item>::Kind::line_error, .at = now_});
   } else {
     feed(node, {.kind = Event<Item>::Kind::received, .at = now_, .items = {&item, 1}});
@@ -139,7 +139,7 @@ void Line<Item>::begin_transfer(Node node) {
   if (kind_ == LinkKind::spi) host.bits = host.expect * 8;
   for (Node other = 0; other < nodes_.size(); ++other) {
     if (nodes_[other]->role == Role::host) continue;
-    nodes_[other]->doing = Step<Item>::Kind::wait;
+    nodes_[other]->active_step = Step<Item>::Kind::wait;
     nodes_[other]->out.clear();
     nodes_[other]->width = {};
     nodes_[other]->behind_out = 0xFF;
@@ -169,11 +169,11 @@ void Line<Item>::end_transfer(Node node) {
     const std::size_t bits = host.bits;
     if (transfer_observer_ && bits > 0) {
       transfer_observer_(
-          {host.start, now_, bits, out, in, host.lead, host.hold_low ? host.taken_up : never, low_after});
+          {host.start, now_, bits, out, in, host.lead, host.hold_low ? host.accepted_at : never, low_after});
     }
     for (Node other = 0; other < nodes_.size(); ++other) {
       if (nodes_[other]->role == Role::host) continue;
-      nodes_[other]->doing = Step<Item>::Kind::wait;
+      nodes_[other]->active_step = Step<Item>::Kind::wait;
       if (kind_ == LinkKind::spi) {
         feed(other, {.kind = Event<Item>::Kind::received, .at = now_, .items = out});
       }
@@ -181,7 +181,7 @@ void Line<Item>::end_transfer(Node node) {
       feed(other, {.kind = Event<Item>::Kind::sent, .at = now_, .bits = bits, .width = period, .lead = host.lead});
     }
     finish(node);
-    host.silence.heard(now_);
+    host.silence.received(now_);
     feed(node, {.kind = Event<Item>::Kind::received, .at = now_, .items = in});
   }
 }
@@ -232,14 +232,14 @@ void Line<Item>::end_frame(Node node) {
     }
     for (Node other = 0; other < nodes_.size(); ++other) {
       const bool sent_it = std::find(senders.begin(), senders.end(), other) != senders.end();
-      if (clash || !sent_it || (other == node && sender.echo)) hear(other, node, frame, clash);
+      if (clash || !sent_it || (other == node && sender.echo)) deliver(other, node, frame, clash);
     }
   }
 }
 
 // line.cpp instantiates the class; these members are defined here and must be instantiated explicitly.
 template void Line<std::uint8_t>::begin(Node);
-template bool Line<std::uint8_t>::hears(const State&, const State&) const;
+template bool Line<std::uint8_t>::receives_from(const State&, const State&) const;
 template bool Line<std::uint8_t>::busy_towards(const State&) const;
 template void Line<std::uint8_t>::begin_characters(Node);
 template void Line<std::uint8_t>::frame_character(Node);
@@ -248,9 +248,9 @@ template void Line<std::uint8_t>::begin_transfer(Node);
 template void Line<std::uint8_t>::end_transfer(Node);
 template void Line<std::uint8_t>::arbitrate();
 template void Line<std::uint8_t>::end_frame(Node);
-template void Line<std::uint8_t>::hear(Node, Node, const std::uint8_t&, bool);
+template void Line<std::uint8_t>::deliver(Node, Node, const std::uint8_t&, bool);
 template void Line<CanFrame>::begin(Node);
-template bool Line<CanFrame>::hears(const State&, const State&) const;
+template bool Line<CanFrame>::receives_from(const State&, const State&) const;
 template bool Line<CanFrame>::busy_towards(const State&) const;
 template void Line<CanFrame>::begin_characters(Node);
 template void Line<CanFrame>::frame_character(Node);
@@ -259,6 +259,6 @@ template void Line<CanFrame>::begin_transfer(Node);
 template void Line<CanFrame>::end_transfer(Node);
 template void Line<CanFrame>::arbitrate();
 template void Line<CanFrame>::end_frame(Node);
-template void Line<CanFrame>::hear(Node, Node, const CanFrame&, bool);
+template void Line<CanFrame>::deliver(Node, Node, const CanFrame&, bool);
 
 }  // namespace absenc::sim

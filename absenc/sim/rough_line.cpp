@@ -42,7 +42,7 @@ void RoughLine<Item>::set_rates(const RoughRates& rates) {
 
 template <class Item>
 Time RoughLine<Item>::now() {
-  told_ = time_;
+  last_event_at_ = time_;
   return time_;
 }
 
@@ -56,18 +56,18 @@ void RoughLine<Item>::begin(const Step<Item>& step) {
   if (step.kind == Kind::pulse) {
     feed({.kind = Event<Item>::Kind::triggered, .at = time_, .wire = step.wire, .width = step.width});
     run_until(time_ + step.width);
-  } else if (driven()) {
+  } else if (host_is_clock()) {
     transfer(step);
   } else {
     copy(step.out, request_);
     if constexpr (std::is_same_v<Item, CanFrame>) {
       for (const CanFrame& frame : request_) {
         run_until(time_ + settings_.bits(can_bits(frame).size() + can_intermission_bits));
-        let_hear({&frame, 1});
+        deliver_request({&frame, 1});
       }
     } else if (!request_.empty()) {
       run_until(time_ + character_ * static_cast<std::int64_t>(request_.size()));
-      let_hear(request_);
+      deliver_request(request_);
     }
   }
   sent_due_ = true;
@@ -76,13 +76,13 @@ void RoughLine<Item>::begin(const Step<Item>& step) {
 
 template <class Item>
 void RoughLine<Item>::set_rate(std::uint32_t& end, std::uint32_t rate) {
-  if (driven()) return;
+  if (host_is_clock()) return;
   end = settings_.rate = rate;
   character_ = settings_.character();
 }
 
 template <class Item>
-void RoughLine<Item>::let_hear(std::span<const Item> request) {
+void RoughLine<Item>::deliver_request(std::span<const Item> request) {
   using Kind = typename Event<Item>::Kind;
   if (host_rate_ != device_rate_) return feed({.kind = Kind::line_error, .at = time_});
   feed({.kind = Kind::received, .at = time_, .items = request});
@@ -108,7 +108,7 @@ void RoughLine<Item>::transfer(const Step<Item>& step) {
     out_.resize(size, behind_out_);
     const std::size_t unclocked = size * 8 - bits_;
     if (unclocked != 0) out_.back() = static_cast<Item>(out_.back() >> unclocked << unclocked);
-    hold(start, time_, time_, out_);
+    enqueue(start, time_, time_, out_);
     if (!clocked) feed({.kind = Kind::received, .at = time_, .items = request_});
     feed({.kind = Kind::sent, .at = time_, .bits = bits_, .width = clocked ? Time{} : period, .lead = lead});
   }
@@ -117,13 +117,13 @@ void RoughLine<Item>::transfer(const Step<Item>& step) {
 template <class Item>
 Event<Item> RoughLine<Item>::wait(const Step<Item>& step) {
   using Kind = typename Event<Item>::Kind;
-  if (std::exchange(sent_due_, false)) return tell({.kind = Kind::sent, .at = time_});
-  const Time timer = step.at > told_ ? step.at : never;
+  if (std::exchange(sent_due_, false)) return report({.kind = Kind::sent, .at = time_});
+  const Time timer = step.at > last_event_at_ ? step.at : never;
   for (;;) {
     Time quiet = silence_.due(step.answer, step.gap);
-    const Time arrival = front_ != back_ ? held_[front_].at : never;
+    const Time arrival = front_ != back_ ? in_transit_[front_].at : never;
     // the item is being received, so the line is not silent
-    if (arrival != never && held_[front_].first <= quiet) quiet = never;
+    if (arrival != never && in_transit_[front_].first <= quiet) quiet = never;
     const Time mine = std::min(timer, quiet);
     const Time next = due();
     if (next != never && next <= std::min(mine, arrival)) {
@@ -137,9 +137,9 @@ Event<Item> RoughLine<Item>::wait(const Step<Item>& step) {
     }
     if (mine == never) throw std::logic_error("a wait on a line for what can never happen");
     time_ = std::max(time_, mine);
-    if (timer <= quiet) return tell({.kind = Kind::timer, .at = time_});
-    silence_.told();
-    return tell({.kind = Kind::silence, .at = time_});
+    if (timer <= quiet) return report({.kind = Kind::timer, .at = time_});
+    silence_.reported();
+    return report({.kind = Kind::silence, .at = time_});
   }
 }
 
@@ -150,7 +150,7 @@ void RoughLine<Item>::rest(Time until) {
 
 template <class Item>
 void RoughLine<Item>::drop() {
-  while (front_ != back_ && held_[front_].at <= time_) ++front_;
+  while (front_ != back_ && in_transit_[front_].at <= time_) ++front_;
   if (front_ == back_) front_ = back_ = 0;
 }
 
@@ -161,21 +161,21 @@ void RoughLine<Item>::mark() {
 }
 
 template <class Item>
-Event<Item> RoughLine<Item>::tell(const Event<Item>& event) {
-  told_ = event.at;
+Event<Item> RoughLine<Item>::report(const Event<Item>& event) {
+  last_event_at_ = event.at;
   return event;
 }
 
 template <class Item>
 Event<Item> RoughLine<Item>::deliver() {
   using Kind = typename Event<Item>::Kind;
-  Held& held = held_[front_++];
-  if (held.sent < mark_) old_.push_back(held.sent);
-  std::swap(told_items_, held.items);
+  InTransit& arrived = in_transit_[front_++];
+  if (arrived.sent < mark_) old_.push_back(arrived.sent);
+  std::swap(reported_items_, arrived.items);
   if (front_ == back_) front_ = back_ = 0;
-  silence_.heard(time_);
-  if (told_items_.empty()) return tell({.kind = Kind::line_error, .at = time_});
-  return tell({.kind = Kind::received, .at = time_, .items = told_items_});
+  silence_.received(time_);
+  if (reported_items_.empty()) return report({.kind = Kind::line_error, .at = time_});
+  return report({.kind = Kind::received, .at = time_, .items = reported_items_});
 }
 
 // ---- Device side
@@ -204,7 +204,7 @@ void RoughLine<Item>::run_device() {
     side_.timer = never;
     feed({.kind = Kind::timer, .at = time_});
   } else {
-    side_.silence.told();
+    side_.silence.reported();
     feed({.kind = Kind::silence, .at = time_});
   }
 }
@@ -212,7 +212,7 @@ void RoughLine<Item>::run_device() {
 template <class Item>
 void RoughLine<Item>::feed(const Event<Item>& event) {
   using Kind = typename Event<Item>::Kind;
-  if (event.kind == Kind::received || event.kind == Kind::line_error) side_.silence.heard(event.at);
+  if (event.kind == Kind::received || event.kind == Kind::line_error) side_.silence.received(event.at);
   if (event.kind == Kind::sent) side_.silence.sent(event.at);
   device_.feed(event);
   serve_device();
@@ -245,7 +245,7 @@ template <class Item>
 void RoughLine<Item>::send(const Step<Item>& step) {
   copy(step.out, out_);
   behind_out_ = step.behind_out();
-  if (driven()) return;
+  if (host_is_clock()) return;
   const Time start = std::max(step.at, time_);
   side_.sending = true;
   side_.end = start;
@@ -253,28 +253,28 @@ void RoughLine<Item>::send(const Step<Item>& step) {
     for (const CanFrame& frame : out_) {
       const Time begun = side_.end;
       side_.end += settings_.bits(can_bits(frame).size() + can_intermission_bits);
-      hold(begun, side_.end, side_.end, {&frame, 1});
+      enqueue(begun, side_.end, side_.end, {&frame, 1});
     }
   } else {
     side_.end += character_ * static_cast<std::int64_t>(out_.size());
-    hold(start, start + character_, side_.end, out_);
+    enqueue(start, start + character_, side_.end, out_);
   }
 }
 
 template <class Item>
-void RoughLine<Item>::hold(Time start, Time first, Time end, std::span<const Item> items) {
+void RoughLine<Item>::enqueue(Time start, Time first, Time end, std::span<const Item> items) {
   ++counts_.replies;
-  if (back_ == held_.size()) held_.emplace_back();
-  Held& held = held_[back_];
-  copy(items, held.items);
-  damage(held.items);
-  if (host_rate_ != device_rate_) held.items.clear();
-  const Time late = driven() ? Time{} : lateness();
+  if (back_ == in_transit_.size()) in_transit_.emplace_back();
+  InTransit& arrived = in_transit_[back_];
+  copy(items, arrived.items);
+  damage(arrived.items);
+  if (host_rate_ != device_rate_) arrived.items.clear();
+  const Time late = host_is_clock() ? Time{} : lateness();
   // A line keeps the order of its frames.
-  const Time before = back_ != front_ ? held_[back_ - 1].at : Time{};
-  held.sent = start;
-  held.at = std::max(end + late, before);
-  held.first = std::max(first + late, std::min(before, held.at));
+  const Time before = back_ != front_ ? in_transit_[back_ - 1].at : Time{};
+  arrived.sent = start;
+  arrived.at = std::max(end + late, before);
+  arrived.first = std::max(first + late, std::min(before, arrived.at));
   ++back_;
 }
 
@@ -328,9 +328,9 @@ bool RoughLine<Item>::flip_bits(std::vector<Item>& items, std::size_t count) {
 }
 
 template <class Item>
-void RoughLine<Item>::double_one(std::vector<Item>& items, std::size_t count) {
+void RoughLine<Item>::double_item(std::vector<Item>& items, std::size_t count) {
   if constexpr (std::is_same_v<Item, std::uint8_t>) {
-    if (!driven()) {
+    if (!host_is_clock()) {
       const auto which = items.begin() + static_cast<std::ptrdiff_t>(random_.below(items.size()));
       items.insert(which, *which);
       return;
@@ -345,7 +345,7 @@ void RoughLine<Item>::double_one(std::vector<Item>& items, std::size_t count) {
 }
 
 template <class Item>
-void RoughLine<Item>::talk_over(std::vector<Item>& items) {
+void RoughLine<Item>::add_other_sender(std::vector<Item>& items) {
   if constexpr (std::is_same_v<Item, std::uint8_t>) {
     const std::size_t size = items.size();
     const std::size_t first = random_.below(size);
@@ -354,7 +354,7 @@ void RoughLine<Item>::talk_over(std::vector<Item>& items) {
       const auto other = static_cast<Item>(random_.below(256));
       if (i < items.size()) {
         items[i] = static_cast<Item>(items[i] & other);
-      } else if (!driven()) {
+      } else if (!host_is_clock()) {
         items.push_back(other);
       }
     }
@@ -370,13 +370,13 @@ void RoughLine<Item>::damage(std::vector<Item>& items) {
   if (count == 0) return;
   bool struck = flip_bits(items, count);
   const bool talked = rates_.talker > 0 && random_.chance(rates_.talker);
-  if (talked) talk_over(items);
+  if (talked) add_other_sender(items);
   struck = struck || talked;
   if constexpr (std::is_same_v<Item, CanFrame>) {
     if (struck) items.clear();  // the controllers detect the damage, and no node receives the frame
   }
   if (rates_.doubled > 0 && random_.chance(rates_.doubled) && !items.empty()) {
-    double_one(items, count);
+    double_item(items, count);
     // On CAN the sender repeats a frame when the acknowledge bit is lost.
     if constexpr (std::is_same_v<Item, CanFrame>) items.push_back(items.front());
     struck = true;

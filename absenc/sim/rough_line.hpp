@@ -67,7 +67,7 @@ class RoughLine final : public Port<Item> {
 
  private:
   // A frame in transit to the host. No items: characters that cannot be read (a `line_error`).
-  struct Held {
+  struct InTransit {
     Time sent;   // time at which its transmission began
     Time first;  // arrival time of the first item
     Time at;     // arrival time of the whole frame
@@ -83,10 +83,10 @@ class RoughLine final : public Port<Item> {
     Time end{};
   };
 
-  [[nodiscard]] bool driven() const { return kind_ == LinkKind::spi || kind_ == LinkKind::clocked; }
+  [[nodiscard]] bool host_is_clock() const { return kind_ == LinkKind::spi || kind_ == LinkKind::clocked; }
   [[nodiscard]] Time due() const;
   void set_rate(std::uint32_t& end, std::uint32_t rate);
-  void let_hear(std::span<const Item> request);
+  void deliver_request(std::span<const Item> request);
   void run_device();
   void run_until(Time limit);
   void feed(const Event<Item>& event);
@@ -94,15 +94,15 @@ class RoughLine final : public Port<Item> {
   bool carry_out(const Step<Item>& step);
   void send(const Step<Item>& step);
   void transfer(const Step<Item>& step);
-  void hold(Time start, Time first, Time end, std::span<const Item> items);
+  void enqueue(Time start, Time first, Time end, std::span<const Item> items);
   Event<Item> deliver();
-  Event<Item> tell(const Event<Item>& event);
+  Event<Item> report(const Event<Item>& event);
 
   void damage(std::vector<Item>& items);
   void flip(std::vector<Item>& items, std::size_t bit);
   bool flip_bits(std::vector<Item>& items, std::size_t count);
-  void double_one(std::vector<Item>& items, std::size_t count);
-  void talk_over(std::vector<Item>& items);
+  void double_item(std::vector<Item>& items, std::size_t count);
+  void add_other_sender(std::vector<Item>& items);
   void draw_skip();
   [[nodiscard]] Time lateness();
 
@@ -115,7 +115,7 @@ class RoughLine final : public Port<Item> {
   std::uint64_t skip_ = ~std::uint64_t{0};  // number of good bits before the next flipped bit
 
   Time time_{};
-  Time told_{};
+  Time last_event_at_{};
   Time character_;
   std::uint32_t host_rate_;
   std::uint32_t device_rate_;
@@ -124,10 +124,10 @@ class RoughLine final : public Port<Item> {
   std::vector<Item> out_;  // items that the device sent last
   std::uint8_t behind_out_ = 0xFF;
   std::size_t bits_ = 0;
-  std::vector<Held> held_;  // frames from front_ to back_ are in transit; entries before front_ are reused
+  std::vector<InTransit> in_transit_;  // frames from front_ to back_ are in transit; entries before front_ are reused
   std::size_t front_ = 0;
   std::size_t back_ = 0;
-  std::vector<Item> told_items_;
+  std::vector<Item> reported_items_;
   // State of the host's end of the line.
   bool sent_due_ = false;
   Silence silence_;

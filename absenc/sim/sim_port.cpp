@@ -7,19 +7,19 @@
 namespace absenc::sim {
 
 template <class Item>
-void SimPort<Item>::Hand::feed(const Event<Item>& event) {
+void SimPort<Item>::HostEnd::feed(const Event<Item>& event) {
   if (event.kind == Event<Item>::Kind::sent) sending = false;
-  heard.push_back({event, {event.items.begin(), event.items.end()}});
+  queue.push_back({event, {event.items.begin(), event.items.end()}});
 }
 
 template <class Item>
-Step<Item> SimPort<Item>::Hand::next(Time) {
+Step<Item> SimPort<Item>::HostEnd::next(Time) {
   return beginning != nullptr ? *std::exchange(beginning, nullptr) : waiting;
 }
 
 template <class Item>
 SimPort<Item>::SimPort(LinkKind kind, LineSettings settings, Machine<Item>& device, RealTime real_time)
-    : real_time_(std::move(real_time)), line_(kind, settings), host_node_(line_.attach(Role::host, hand_)) {
+    : real_time_(std::move(real_time)), line_(kind, settings), host_node_(line_.attach(Role::host, host_end_)) {
   line_.attach(Role::device, device);
   if (!real_time_.now != !real_time_.sleep_until) {
     throw std::invalid_argument("a simulated port needs both now and sleep_until, or neither");
@@ -36,8 +36,8 @@ void SimPort<Item>::keep_pace() {
 template <class Item>
 Time SimPort<Item>::now() {
   keep_pace();
-  told_ = line_.now();
-  return told_;
+  last_event_at_ = line_.now();
+  return last_event_at_;
 }
 
 template <class Item>
@@ -45,24 +45,25 @@ void SimPort<Item>::begin(const Step<Item>& step) {
   keep_pace();
   using Kind = typename Step<Item>::Kind;
   if (step.kind == Kind::transfer || step.kind == Kind::pulse) {
-    run_until([&] { return !hand_.sending; });
-    std::erase_if(hand_.heard, [](const Heard& heard) { return heard.event.kind == Event<Item>::Kind::sent; });
-    hand_.sending = true;
+    run_until([&] { return !host_end_.sending; });
+    std::erase_if(host_end_.queue,
+                  [](const QueuedEvent& queue) { return queue.event.kind == Event<Item>::Kind::sent; });
+    host_end_.sending = true;
   }
-  hand_.beginning = &step;
+  host_end_.beginning = &step;
   line_.wake(host_node_);
 }
 
 template <class Item>
 Event<Item> SimPort<Item>::wait(const Step<Item>& step) {
   // With a real-time clock the line may already have passed the timer's time.
-  const bool is_past = step.at > told_ && step.at <= line_.now();
-  if (hand_.heard.empty() && is_past) hand_.feed({.kind = Event<Item>::Kind::timer, .at = step.at});
-  if (hand_.heard.empty()) advance(step);
-  Event<Item> event = hand_.heard.front().event;
-  told_ = event.at;
-  items_ = std::move(hand_.heard.front().items);
-  hand_.heard.pop_front();
+  const bool is_past = step.at > last_event_at_ && step.at <= line_.now();
+  if (host_end_.queue.empty() && is_past) host_end_.feed({.kind = Event<Item>::Kind::timer, .at = step.at});
+  if (host_end_.queue.empty()) advance(step);
+  Event<Item> event = host_end_.queue.front().event;
+  last_event_at_ = event.at;
+  items_ = std::move(host_end_.queue.front().items);
+  host_end_.queue.pop_front();
   event.items = items_;
   return event;
 }
@@ -73,14 +74,14 @@ void SimPort<Item>::advance(const Step<Item>& step) {
   struct Disarm {
     SimPort& port;
     ~Disarm() {
-      port.hand_.waiting = {};
+      port.host_end_.waiting = {};
       port.line_.wake(port.host_node_);
     }
   };
-  hand_.waiting = step;
+  host_end_.waiting = step;
   line_.wake(host_node_);
   const Disarm disarm{*this};
-  run_until([&] { return !hand_.heard.empty(); });
+  run_until([&] { return !host_end_.queue.empty(); });
 }
 
 template <class Item>

@@ -38,12 +38,12 @@ class SimPort final : public Port<Item> {
   void set_echo(bool echo) { line_.set_echo(host_node_, echo); }
 
  private:
-  struct Heard {
+  struct QueuedEvent {
     Event<Item> event;
     std::vector<Item> items;
   };
   // The machine at the host's end: passes on the steps of the port's user and queues the events.
-  class Hand final : public Machine<Item> {
+  class HostEnd final : public Machine<Item> {
    public:
     void feed(const Event<Item>& event) override;
     Step<Item> next(Time now) override;
@@ -51,7 +51,7 @@ class SimPort final : public Port<Item> {
     Step<Item> waiting{};
     const Step<Item>* beginning = nullptr;
     bool sending = false;
-    std::deque<Heard> heard;
+    std::deque<QueuedEvent> queue;
   };
 
   void keep_pace();
@@ -60,10 +60,10 @@ class SimPort final : public Port<Item> {
   void run_until(const Done& done);
 
   RealTime real_time_;
-  Time start_{};  // start of virtual time, on the caller's clock
-  Time told_{};   // time of the last reported event
+  Time start_{};          // start of virtual time, on the caller's clock
+  Time last_event_at_{};  // time of the last reported event
   Line<Item> line_;
-  Hand hand_;
+  HostEnd host_end_;
   typename Line<Item>::Node host_node_;
   std::vector<Item> items_;  // items of the last returned event
 };

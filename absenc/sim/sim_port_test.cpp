@@ -17,7 +17,7 @@ using Kind = Event<std::uint8_t>::Kind;
 using StepKind = Step<std::uint8_t>::Kind;
 
 // Answers each byte with itself and its successor 3 us later.
-class Answerer final : public Machine<std::uint8_t> {
+class Responder final : public Machine<std::uint8_t> {
  public:
   void feed(const Event<std::uint8_t>& event) override {
     if (event.kind != Kind::received) return;
@@ -38,19 +38,19 @@ class Answerer final : public Machine<std::uint8_t> {
 };
 
 // Sends a given number of requests, 100 us apart, and emits every reply.
-class Asker final : public Machine<std::uint8_t> {
+class Requester final : public Machine<std::uint8_t> {
  public:
-  explicit Asker(int times) : left_(times) {}
+  explicit Requester(int times) : left_(times) {}
   void feed(const Event<std::uint8_t>& event) override {
-    if (event.kind == Kind::received) got_ += event.items.size();
+    if (event.kind == Kind::received) received_ += event.items.size();
     if (event.kind == Kind::sent) sent_at = event.at;
     last = event;
-    if (got_ == 2 || event.kind == Kind::silence) result_ = true;
+    if (received_ == 2 || event.kind == Kind::silence) result_ = true;
   }
   Step<std::uint8_t> next(Time now) override {
     if (result_) {
       result_ = false;
-      got_ = 0;
+      received_ = 0;
       --left_;
       due_ = true;
       return {.kind = StepKind::emit};
@@ -58,8 +58,8 @@ class Asker final : public Machine<std::uint8_t> {
     if (left_ == 0) return {.kind = StepKind::done};
     if (!due_) return {.answer = microseconds(50), .gap = microseconds(20)};
     due_ = false;
-    asked_at_ = std::max(now, asked_at_ + microseconds(100));
-    return {.kind = StepKind::transfer, .out = request_, .at = asked_at_};
+    requested_at_ = std::max(now, requested_at_ + microseconds(100));
+    return {.kind = StepKind::transfer, .out = request_, .at = requested_at_};
   }
   Event<std::uint8_t> last{};
   Time sent_at{};
@@ -67,21 +67,21 @@ class Asker final : public Machine<std::uint8_t> {
  private:
   static constexpr std::array<std::uint8_t, 1> request_{0x41};
   int left_;
-  std::size_t got_ = 0;
+  std::size_t received_ = 0;
   bool result_ = false;
   bool due_ = true;
-  Time asked_at_ = -microseconds(100);
+  Time requested_at_ = -microseconds(100);
 };
 
 constexpr LineSettings settings{.rate = 1'000'000};  // a character of 10 bits takes 10 us
 
 TEST(SimPort, VirtualTimeJumpsAndIsExact) {
-  Answerer device;
+  Responder device;
   SimPort<std::uint8_t> port(LinkKind::half_duplex, settings, device);
-  Asker asker(3);
+  Requester requester(3);
   std::vector<std::int64_t> times;
-  EXPECT_TRUE(host::drive(asker, port, [&] {
-    times.push_back(asker.last.at.count());
+  EXPECT_TRUE(host::drive(requester, port, [&] {
+    times.push_back(requester.last.at.count());
     return true;
   }));
   EXPECT_EQ(times, (std::vector<std::int64_t>{33'000, 133'000, 233'000}));
@@ -122,7 +122,7 @@ TEST(SimPort, WhatIsSentBehindATransferThatWasBrokenOffWaitsForIt) {
 }
 
 TEST(SimPort, ConfigureChangesTheHostsEnd) {
-  Answerer device;
+  Responder device;
   SimPort<std::uint8_t> port(LinkKind::half_duplex, settings, device);
   port.begin({.kind = StepKind::configure, .rate = 2'000'000});
   const std::array<std::uint8_t, 1> out{1};
@@ -145,16 +145,16 @@ struct SlowWorld {
 
 TEST(SimPort, KeepsPaceWithRealTimeAndStampsExactly) {
   SlowWorld world;
-  Answerer device;
+  Responder device;
   SimPort<std::uint8_t> port(LinkKind::half_duplex, settings, device, world.real_time());
-  Asker asker(50);
+  Requester requester(50);
   std::vector<Time> times;
-  EXPECT_TRUE(host::drive(asker, port, [&] {
+  EXPECT_TRUE(host::drive(requester, port, [&] {
     if (times.size() == 10) world.clock += microseconds(5000);  // the caller is busy with something else
-    EXPECT_EQ(asker.last.kind, Kind::received);
-    EXPECT_EQ(asker.last.items.back(), 0x42);
-    EXPECT_EQ(asker.last.at - asker.sent_at, microseconds(23));
-    times.push_back(asker.last.at);
+    EXPECT_EQ(requester.last.kind, Kind::received);
+    EXPECT_EQ(requester.last.items.back(), 0x42);
+    EXPECT_EQ(requester.last.at - requester.sent_at, microseconds(23));
+    times.push_back(requester.last.at);
     return true;
   }));
   ASSERT_EQ(times.size(), 50u);
@@ -167,7 +167,7 @@ TEST(SimPort, KeepsPaceWithRealTimeAndStampsExactly) {
 
 TEST(SimPort, LimitsDoNotRunWhileNobodyWaits) {
   SlowWorld world;
-  Answerer device;
+  Responder device;
   SimPort<std::uint8_t> port(LinkKind::half_duplex, settings, device, world.real_time());
   const std::array<std::uint8_t, 1> out{1};
   const Step<std::uint8_t> impatient{.answer = microseconds(50), .gap = microseconds(20)};
@@ -198,7 +198,7 @@ TEST(SimPort, ATimerThatPassedMeanwhileIsTold) {
 TEST(SimPort, BrokenOffSleepLeavesThePortUsable) {
   Time clock{};
   bool interrupt = true;
-  Answerer device;
+  Responder device;
   SimPort<std::uint8_t> port(LinkKind::half_duplex, settings, device,
                              {[&] { return clock; },
                               [&](Time until) {
@@ -213,7 +213,7 @@ TEST(SimPort, BrokenOffSleepLeavesThePortUsable) {
 }
 
 TEST(SimPort, NeedsBothFunctionsOrNone) {
-  Answerer device;
+  Responder device;
   EXPECT_THROW(SimPort<std::uint8_t>(LinkKind::half_duplex, settings, device, {[] { return Time{}; }, {}}),
                std::invalid_argument);
 }

@@ -67,7 +67,7 @@ std::vector<iovec> ranges(const std::vector<UserMemory>& memory) {
 
 /// Callbacks of libfuse. They throw nothing, because libfuse is C; requests that must wait are answered by `serve`.
 struct SpidevNodeCalls {
-  using Asked = SpidevNode::Asked;
+  using Operation = SpidevNode::Operation;
 
   static SpidevNode& node(fuse_req_t request) { return *static_cast<SpidevNode*>(fuse_req_userdata(request)); }
 
@@ -82,11 +82,11 @@ struct SpidevNodeCalls {
     fuse_reply_err(request, 0);
   }
   static void read(fuse_req_t request, std::size_t size, off_t, fuse_file_info*) {
-    node(request).pending_ = {request, node(request).spidev_->read(size, now()), Asked::read};
+    node(request).pending_ = {request, node(request).spidev_->read(size, now()), Operation::read};
   }
   static void write(fuse_req_t request, const char* bytes, std::size_t size, off_t, fuse_file_info*) {
     const Bytes out(reinterpret_cast<const std::uint8_t*>(bytes), size);
-    node(request).pending_ = {request, node(request).spidev_->write(out, now()), Asked::write};
+    node(request).pending_ = {request, node(request).spidev_->write(out, now()), Operation::write};
   }
   static void control(fuse_req_t request, int command, void* argument, fuse_file_info*, unsigned, const void* in,
                       std::size_t in_size, std::size_t room) {
@@ -94,7 +94,7 @@ struct SpidevNodeCalls {
     const Bytes bytes(static_cast<const std::uint8_t*>(in), in_size);
     const auto address = static_cast<std::uint64_t>(reinterpret_cast<std::uintptr_t>(argument));
     node(request).pending_ = {request, node(request).spidev_->control(number, address, bytes, room, now()),
-                              Asked::control};
+                              Operation::control};
   }
 
   static constexpr cuse_lowlevel_ops all{.init = nullptr,
@@ -195,9 +195,9 @@ void SpidevNode::answer() {
     fuse_reply_ioctl_retry(request, in.data(), in.size(), out.data(), out.size());
   } else if (reply.result < 0) {
     fuse_reply_err(request, -reply.result);
-  } else if (pending.asked == Asked::control) {
+  } else if (pending.operation == Operation::control) {
     fuse_reply_ioctl(request, reply.result, bytes, reply.bytes.size());
-  } else if (pending.asked == Asked::read) {
+  } else if (pending.operation == Operation::read) {
     fuse_reply_buf(request, bytes, reply.bytes.size());
   } else {
     fuse_reply_write(request, static_cast<std::size_t>(reply.result));

@@ -35,11 +35,11 @@ class SpidevNode {
   struct CloseSession {
     void operator()(fuse_session* session) const;
   };
-  enum class Asked : std::uint8_t { control, read, write };
+  enum class Operation : std::uint8_t { control, read, write };
   struct Pending {
     void* request;
     SpidevReply reply;
-    Asked asked;
+    Operation operation;
   };
 
   void process_one();
