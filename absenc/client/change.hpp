@@ -26,9 +26,10 @@ enum class ChangeState : std::uint8_t {
 
 struct Change {
   ChangeState state = ChangeState::none;
-  std::string advice{};  // unknown: how to see what the encoder is now; confirmed: how it is reached from now on, or ""
+  std::string
+      advice{};  ///< unknown: how to see what the encoder is now; confirmed: how it is reached from now on, or ""
 
-  std::string note{};  // why the journal does not have it, or ""
+  std::string note{};  ///< why the journal does not have it, or ""
 
   /// "sent, result unknown: ..."; "" of none
   [[nodiscard]] std::string text() const;

@@ -19,18 +19,18 @@ enum class Verdict : std::uint8_t {
 };
 
 struct ClauseResult {
-  std::string_view id{};  // "crc"
+  std::string_view id{};  ///< "crc"
   std::string_view document{};
   std::string_view paragraph{};
   std::string_view words{};
   Verdict verdict{};
-  std::string evidence{};  // what was seen and how often, or why nothing was
+  std::string evidence{};  ///< what was seen and how often, or why nothing was
 };
 
 struct Conformance {
   std::string protocol{};
   std::vector<ClauseResult> clauses{};
-  std::vector<std::string> left{};  // commands that put back by hand what could not be: the encoder is changed
+  std::vector<std::string> left{};  ///< commands that put back by hand what could not be: the encoder is changed
 
   [[nodiscard]] std::size_t count(Verdict verdict) const;
   /// `broken` where any clause is, or the encoder is left changed; else `kept` where any is; else `untested`: nothing
@@ -45,10 +45,10 @@ struct Conformance {
 };
 
 struct ConformChoices {
-  std::size_t readings = 100;    // at least 1
-  bool changes = false;          // also the clauses that change the encoder, which is put back as it was
-  bool resets = false;           // of these also what loses a zero, turns and alarms, which nothing brings back
-  std::function<bool()> over{};  // from the moment on in which it is true, all ends with Cancelled; empty: never
+  std::size_t readings = 100;    ///< at least 1
+  bool changes = false;          ///< also the clauses that change the encoder, which is put back as it was
+  bool resets = false;           ///< of these also what loses a zero, turns and alarms, which nothing brings back
+  std::function<bool()> over{};  ///< from the moment on in which it is true, all ends with Cancelled; empty: never
 };
 
 /// "kept", "broken", "untested"

@@ -13,10 +13,10 @@
 namespace absenc::client {
 
 struct ConformHostChoices {
-  std::size_t answers = 100;                      // so many requests are answered well, at least 2
-  Time patience = std::chrono::seconds(10);       // so long a silence of the host is its last
-  std::function<void(const Emulation&)> ready{};  // the host can connect now
-  std::function<bool()> over{};                   // from the moment on in which it is true, it is judged
+  std::size_t answers = 100;                      ///< so many requests are answered well, at least 2
+  Time patience = std::chrono::seconds(10);       ///< so long a silence of the host is its last
+  std::function<void(const Emulation&)> ready{};  ///< the host can connect now
+  std::function<bool()> over{};                   ///< from the moment on in which it is true, it is judged
 };
 
 /// Replies stay away for a while and are damaged for a while; the host has to go on. Returns when it was answered so

@@ -19,13 +19,13 @@ namespace absenc::client {
 /// What is said of a capture, and of the encoder whose frames are in it. What is left out is found in the capture, or
 /// is as the protocol has it.
 struct DecodeChoices {
-  std::vector<std::string> channels{};   // "D0", "clock=D0", or several of them with commas between
-  unsigned raw_channels = 0;             // 0: it is no file of raw samples
-  std::uint64_t samples_per_second = 0;  // 0: the file tells
+  std::vector<std::string> channels{};   ///< "D0", "clock=D0", or several of them with commas between
+  unsigned raw_channels = 0;             ///< 0: it is no file of raw samples
+  std::uint64_t samples_per_second = 0;  ///< 0: the file tells
   double baud = 0;
   std::optional<Parity> parity{};
   std::string model{};
-  std::vector<std::string> options{};  // "name=value"
+  std::vector<std::string> options{};  ///< "name=value"
 };
 
 /// An input range of rows, in the order in which they ended, while the file is read: its size does not matter. The file

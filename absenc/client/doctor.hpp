@@ -96,11 +96,11 @@ enum class Severity : std::uint8_t {
 /// Which of them, as data and in words.
 struct Finding {
   Ailment ailment{};
-  std::string_view id{};  // "only_echo"
+  std::string_view id{};  ///< "only_echo"
   Severity severity{};
-  std::string evidence{};  // what was seen
-  std::string cause{};     // what is most likely behind it
-  std::string action{};    // what to do
+  std::string evidence{};  ///< what was seen
+  std::string cause{};     ///< what is most likely behind it
+  std::string action{};    ///< what to do
 
   /// "only_echo: EVIDENCE. Likely: CAUSE. Try: ACTION", on one line.
   [[nodiscard]] std::string sentence() const;
@@ -108,30 +108,30 @@ struct Finding {
 
 /// How much the readings reported: what none of them reports cannot be called good.
 struct Reported {
-  std::size_t alarms = 0;  // readings that report every alarm of the protocol
-  std::size_t valid = 0;   // readings that report that their position holds
-  std::string missing{};   // the alarms that no reading reports, as "over_speed, over_heat"
+  std::size_t alarms = 0;  ///< readings that report every alarm of the protocol
+  std::size_t valid = 0;   ///< readings that report that their position holds
+  std::string missing{};   ///< the alarms that no reading reports, as "over_speed, over_heat"
 };
 
 /// How the readings were come by.
 struct Measured {
-  Time time{};          // from the first to the last of them
-  double failures = 1;  // the share of failures is below it, at 95 % confidence (Wilson)
-  Time quickest{};      // from the end of a request to the end of its reply; 0: not known
-  Time slowest{};       // of good ones
-  double rate = 0;      // good readings a second; 0: not known
-  std::string echo{};   // of the adapter: "echo seen", "no echo", "echo=off" as it was said; "": a line that has none
-  std::optional<Time> latency{};  // of the way, as the latency timer or latency= says; nothing: not known
-  bool turned = false;            // the position was looked at while the shaft was turned
+  Time time{};          ///< from the first to the last of them
+  double failures = 1;  ///< the share of failures is below it, at 95 % confidence (Wilson)
+  Time quickest{};      ///< from the end of a request to the end of its reply; 0: not known
+  Time slowest{};       ///< of good ones
+  double rate = 0;      ///< good readings a second; 0: not known
+  std::string echo{};   ///< of the adapter: "echo seen", "no echo", "echo=off" as it was said; "": a line that has none
+  std::optional<Time> latency{};  ///< of the way, as the latency timer or latency= says; nothing: not known
+  bool turned = false;            ///< the position was looked at while the shaft was turned
 };
 
 struct Examination {
-  std::vector<Finding> findings{};  // in the order in which they are to be mended
-  std::size_t tried = 0;            // readings
-  std::size_t good = 0;             // of them
+  std::vector<Finding> findings{};  ///< in the order in which they are to be mended
+  std::size_t tried = 0;            ///< readings
+  std::size_t good = 0;             ///< of them
   Reported reported{};
   Measured measured{};
-  bool complete = true;  // false: it was interrupted
+  bool complete = true;  ///< false: it was interrupted
 
   /// Whether nothing is to be mended.
   [[nodiscard]] bool healthy() const;
@@ -142,11 +142,11 @@ struct Examination {
 };
 
 struct DoctorChoices {
-  std::size_t readings = 100'000;        // at most
-  Time limit = std::chrono::seconds(3);  // how long it reads
-  Time turning{};                        // how long the shaft is then read while somebody turns it by hand; 0: not
-  std::function<void(const std::string& what)> progress{};  // what is done now
-  std::function<bool()> over{};  // true: it ends with Cancelled. Asked all the time. Empty: never
+  std::size_t readings = 100'000;        ///< at most
+  Time limit = std::chrono::seconds(3);  ///< how long it reads
+  Time turning{};                        ///< how long the shaft is then read while somebody turns it by hand; 0: not
+  std::function<void(const std::string& what)> progress{};  ///< what is done now
+  std::function<bool()> over{};  ///< true: it ends with Cancelled. Asked all the time. Empty: never
 };
 
 /// "note", "warning", "fault"

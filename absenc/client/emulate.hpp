@@ -16,9 +16,9 @@ namespace absenc::client {
 
 /// Where it is found.
 struct EmulateChoices {
-  std::string link{};                  // a path that leads to the pseudo-terminal; "": only that itself
-  std::optional<std::uint16_t> tcp{};  // listens there on 127.0.0.1 as well; 0: on a free port
-  std::string can{};                   // CAN: instead of an adapter this interface, "can0"
+  std::string link{};                  ///< a path that leads to the pseudo-terminal; "": only that itself
+  std::optional<std::uint16_t> tcp{};  ///< listens there on 127.0.0.1 as well; 0: on a free port
+  std::string can{};                   ///< CAN: instead of an adapter this interface, "can0"
 };
 
 /// How often the virtual encoder looked at whether its host keeps a rule of the document, which it names when it is
@@ -31,10 +31,10 @@ struct RuleCount {
 
 /// What hosts sent to the virtual encoder. Frames that are for no such encoder (CAN) are not counted.
 struct RequestCounts {
-  std::uint64_t good = 0;      // requests of the document, also for other encoders on the line
-  std::uint64_t bad = 0;       // runs of bytes that are none, and damaged characters, since the first good one
-  std::uint64_t before = 0;    // the same before it, once there was one
-  std::string first_bad = {};  // of `bad`, as it was on the wire
+  std::uint64_t good = 0;      ///< requests of the document, also for other encoders on the line
+  std::uint64_t bad = 0;       ///< runs of bytes that are none, and damaged characters, since the first good one
+  std::uint64_t before = 0;    ///< the same before it, once there was one
+  std::string first_bad = {};  ///< of `bad`, as it was on the wire
 };
 
 /// Serves in a thread of its own until it is destroyed. What is done to it is so when the call returns; any thread may.

@@ -51,23 +51,23 @@ struct Sample {
   };
 
   Kind kind = Kind::absent;
-  Time at{};  // a reading: when it was latched
+  Time at{};  ///< a reading: when it was latched
   Reading reading{};
-  bool confirmed = false;  // two readings in a row agreed
-  bool doubtful = false;   // it looked valid, but none agreed with it: it is marked invalid
+  bool confirmed = false;  ///< two readings in a row agreed
+  bool doubtful = false;   ///< it looked valid, but none agreed with it: it is marked invalid
   bool position_valid = false;
-  std::int64_t position = 0;     // counts, continued past the end of the counter
-  bool restarted = false;        // it jumped, or how far it went meanwhile is not known: `position` starts again
-  bool speed_valid = false;      // the times of the positions leave little of it open; otherwise there is none
-  double speed = 0;              // rpm, of linear encoders mm/s: the mean between two positions, as it was
-                                 // `speed_delay` before `at`
-  double speed_uncertainty = 0;  // the same unit: how far that mean can be from the true one between the instants at
-                                 // which the two were latched. From the times of requests and replies and from one
-                                 // count of each position; errors and noise of the encoder are not in it
+  std::int64_t position = 0;     ///< counts, continued past the end of the counter
+  bool restarted = false;        ///< it jumped, or how far it went meanwhile is not known: `position` starts again
+  bool speed_valid = false;      ///< the times of the positions leave little of it open; otherwise there is none
+  double speed = 0;              ///< rpm, of linear encoders mm/s: the mean between two positions, as it was
+                                 ///< `speed_delay` before `at`
+  double speed_uncertainty = 0;  ///< the same unit: how far that mean can be from the true one between the instants at
+                                 ///< which the two were latched. From the times of requests and replies and from one
+                                 ///< count of each position; errors and noise of the encoder are not in it
   Time speed_delay{};
-  JointAngles angles{};   // of joint and motor, where the address says how the encoder sits in its drive
-  Trouble trouble{};      // failed
-  std::string message{};  // lost, absent, back, restarted
+  JointAngles angles{};   ///< of joint and motor, where the address says how the encoder sits in its drive
+  Trouble trouble{};      ///< failed
+  std::string message{};  ///< lost, absent, back, restarted
 
   /// Whether `reading.singleturn` can be used. Of turns `reading.multiturn_validity()` says it, of the position that
   /// goes on past the counter's end `position_valid`.
@@ -90,9 +90,9 @@ struct EncoderAddress;
 
 /// How an encoder is to be read.
 struct SampleChoices {
-  double rate_hz = 0;       // readings a second; 0: as fast as can be
-  std::uint64_t count = 0;  // 0: without end
-  Time deadline = never;    // of os::now; the loop ends there, whatever it waits for
+  double rate_hz = 0;       ///< readings a second; 0: as fast as can be
+  std::uint64_t count = 0;  ///< 0: without end
+  Time deadline = never;    ///< of os::now; the loop ends there, whatever it waits for
 };
 
 class Samples;

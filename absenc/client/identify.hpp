@@ -18,26 +18,26 @@ namespace absenc::client {
 struct Found {
   const Unit* unit = nullptr;
   Options options{};
-  std::vector<std::string> settings{};  // the fewest that make these options: "model=23-bit"
-  std::string address{};                // of a line: to open it by, "tformat:/dev/ttyUSB0?model=23-bit"
-  std::string encoder{};                // "address=3": which of several on the line; "": the only one
-  std::string line{};                   // "RS-485 half duplex, 2.5 Mbit/s"
-  std::size_t tried = 0;                // exchanges that were looked at
-  std::size_t explained = 0;            // of them
-  double log10_chance = 0;              // of the probability that noise explains as many
-  bool sure = false;                    // it is small enough
-  Answer identity{};                    // of a line: what it says of itself, as its serial number
+  std::vector<std::string> settings{};  ///< the fewest that make these options: "model=23-bit"
+  std::string address{};                ///< of a line: to open it by, "tformat:/dev/ttyUSB0?model=23-bit"
+  std::string encoder{};                ///< "address=3": which of several on the line; "": the only one
+  std::string line{};                   ///< "RS-485 half duplex, 2.5 Mbit/s"
+  std::size_t tried = 0;                ///< exchanges that were looked at
+  std::size_t explained = 0;            ///< of them
+  double log10_chance = 0;              ///< of the probability that noise explains as many
+  bool sure = false;                    ///< it is small enough
+  Answer identity{};                    ///< of a line: what it says of itself, as its serial number
 };
 
 struct Identified {
-  std::vector<Found> found{};        // the likeliest first
-  std::vector<std::string> notes{};  // sentences: what could not be tried, or is damaged
-  bool is_complete = true;           // false: the time was over before all was tried
+  std::vector<Found> found{};        ///< the likeliest first
+  std::vector<std::string> notes{};  ///< sentences: what could not be tried, or is damaged
+  bool is_complete = true;           ///< false: the time was over before all was tried
 };
 
 struct IdentifyChoices {
-  Time limit = std::chrono::seconds(60);                    // of the whole search
-  std::function<void(const std::string& what)> progress{};  // what is tried now
+  Time limit = std::chrono::seconds(60);                    ///< of the whole search
+  std::function<void(const std::string& what)> progress{};  ///< what is tried now
 };
 
 /// Asks in every protocol that fits, at its rates and addresses, by reads that change nothing. `place` is a port with

@@ -20,12 +20,12 @@ namespace absenc::client {
 ///   joint_mm       = direction * (position_mm - offset_mm)
 ///   electrical_deg = direction * (position_mm - offset_mm) / pole_pair_mm * 360  modulo 360
 struct Joint {
-  int direction = 1;        // 1, or -1: the joint turns against the encoder
-  double offset = 0;        // degrees at the encoder where the joint is at 0; of linear encoders mm
-  double gear = 1;          // turns of the encoder for one of the joint, above 0; rotary encoders only
-  int pole_pairs = 0;       // of the motor on the encoder's shaft; 0: not set; rotary encoders only
-  double pole_pair_mm = 0;  // length of a pole pair of a linear motor; 0: not set; linear encoders only
-  bool is_set = false;      // direction, offset or gear: there is a joint to show
+  int direction = 1;        ///< 1, or -1: the joint turns against the encoder
+  double offset = 0;        ///< degrees at the encoder where the joint is at 0; of linear encoders mm
+  double gear = 1;          ///< turns of the encoder for one of the joint, above 0; rotary encoders only
+  int pole_pairs = 0;       ///< of the motor on the encoder's shaft; 0: not set; rotary encoders only
+  double pole_pair_mm = 0;  ///< length of a pole pair of a linear motor; 0: not set; linear encoders only
+  bool is_set = false;      ///< direction, offset or gear: there is a joint to show
 
   [[nodiscard]] bool has_motor() const { return pole_pairs != 0 || pole_pair_mm > 0; }
 };
@@ -35,10 +35,10 @@ struct JointAngles {
   /// Empty too where the encoder has not reported in which turn it is, unless `gear` is 1: then the angle is right up
   /// to whole turns.
   std::optional<double> joint_deg{};
-  std::optional<double> joint_mm{};  // of linear encoders
+  std::optional<double> joint_mm{};  ///< of linear encoders
   std::optional<Estimate> joint_speed_rpm{};
   std::optional<Estimate> joint_speed_mm_s{};
-  std::optional<double> electrical_deg{};  // 0 to below 360
+  std::optional<double> electrical_deg{};  ///< 0 to below 360
 };
 
 /// Degrees of the joint. `position_deg`: of the encoder, past the end of a turn.

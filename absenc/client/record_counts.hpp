@@ -8,9 +8,9 @@ namespace absenc::client {
 
 struct RecordCounts {
   std::uint64_t readings = 0;
-  std::uint64_t failures = 0;  // attempts to read
+  std::uint64_t failures = 0;  ///< attempts to read
   std::uint64_t gaps = 0;
-  std::uint64_t missed = 0;  // readings, in these gaps
+  std::uint64_t missed = 0;  ///< readings, in these gaps
 
   RecordCounts& operator+=(const RecordCounts& other) {
     readings += other.readings;

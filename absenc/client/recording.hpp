@@ -21,14 +21,14 @@ class RecordFile;
 struct RecordHeader;
 
 struct RecordingSettings {
-  std::string path;         // ending in .csv; .jsonl or .ndjson: JSON lines; .h5: HDF5. There is no such file yet
-  std::string encoder;      // what the header calls it
-  double rate_hz = 100;     // readings a second that are intended; 0: as many as can be
-  std::uint64_t every = 1;  // of so many readings one is written, and each with other alarms than the one before
-  std::uint64_t count = 0;  // written readings after which it ends; 0: without end
-  std::optional<Time> duration{};             // after which it ends
-  std::optional<std::uint64_t> part_bytes{};  // after which another file is begun
-  std::optional<Time> part_time{};            // after which another file is begun
+  std::string path;         ///< ending in .csv; .jsonl or .ndjson: JSON lines; .h5: HDF5. There is no such file yet
+  std::string encoder;      ///< what the header calls it
+  double rate_hz = 100;     ///< readings a second that are intended; 0: as many as can be
+  std::uint64_t every = 1;  ///< of so many readings one is written, and each with other alarms than the one before
+  std::uint64_t count = 0;  ///< written readings after which it ends; 0: without end
+  std::optional<Time> duration{};             ///< after which it ends
+  std::optional<std::uint64_t> part_bytes{};  ///< after which another file is begun
+  std::optional<Time> part_time{};            ///< after which another file is begun
 };
 
 /// With parts, the files are NAME-0001.csv, NAME-0002.csv ...; each has the header and can be read alone.
@@ -48,7 +48,7 @@ class Recording {
   /// Of what is in the files.
   [[nodiscard]] RecordCounts counts() const;
   [[nodiscard]] std::uint64_t bytes() const;
-  [[nodiscard]] Time start() const { return start_; }  // of os::now
+  [[nodiscard]] Time start() const { return start_; }  ///< of os::now
   /// The file, or its parts so far in their order.
   [[nodiscard]] std::vector<std::string> paths() const;
   /// "log.csv", or "log-0001.csv to log-0003.csv"

@@ -19,15 +19,15 @@ enum class Type : std::uint8_t { int64, uint64, real, boolean, flags, text, byte
 struct Column {
   /// How it is shown where all is text.
   struct Look {
-    std::string_view format{};  // of a real, as for std::format: "{:.6f}"; "": as short as it is exact
-    bool is_detail = false;     // left out where a row is a line of a table
-    bool in_hex = false;        // a number that people read in hexadecimal; tables of values have it in decimal
+    std::string_view format{};  ///< of a real, as for std::format: "{:.6f}"; "": as short as it is exact
+    bool is_detail = false;     ///< left out where a row is a line of a table
+    bool in_hex = false;        ///< a number that people read in hexadecimal; tables of values have it in decimal
     /// It repeats the request, or shows the bytes of the answer: the encoder says nothing of itself by it.
     bool is_exchange = false;
   };
 
   std::string_view name;
-  std::string_view unit;  // "" for a plain number
+  std::string_view unit;  ///< "" for a plain number
   Type type;
   std::string_view meaning;
   Look look{};
@@ -65,8 +65,8 @@ using Value = std::variant<std::monostate, std::int64_t, std::uint64_t, double, 
 [[nodiscard]] std::string to_text(const Column& column, const Value& value);
 
 struct Row {
-  std::span<const Column> columns;  // of the maker of the row
-  std::vector<Value> values;        // one for each
+  std::span<const Column> columns;  ///< of the maker of the row
+  std::vector<Value> values;        ///< one for each
 
   /// Throws UsageError when there is no such column; it names the nearest.
   [[nodiscard]] const Value& operator[](std::string_view name) const;

@@ -36,10 +36,10 @@ struct Setting {
 [[nodiscard]] Setting require_setting(const Unit& unit, std::string_view name);
 
 struct SettingChange {
-  Answer now;           // as the encoder tells when it is asked anew; of what cannot be read, as it was written
-  bool was_so = false;  // nothing was sent, because it was so already
-  ChangeState state = ChangeState::none;  // not_sent where it was so already
-  std::string note{};                     // "from now on it is reached with address=3", or ""
+  Answer now;           ///< as the encoder tells when it is asked anew; of what cannot be read, as it was written
+  bool was_so = false;  ///< nothing was sent, because it was so already
+  ChangeState state = ChangeState::none;  ///< not_sent where it was so already
+  std::string note{};                     ///< "from now on it is reached with address=3", or ""
 };
 
 class Connection;

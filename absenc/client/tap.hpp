@@ -15,12 +15,12 @@
 namespace absenc::client {
 
 struct TapChoices {
-  std::string protocol{};  // "": found out from what is received
+  std::string protocol{};  ///< "": found out from what is received
   std::string model{};
-  std::vector<std::string> options{};  // "name=value"
-  Time duration{};                     // 0: until `cancel`, or the end of the input
-  std::string record{};                // file to write all frames to, which `decode` reads; "": none
-  bool replaces = false;               // the file of `record` may be there already
+  std::vector<std::string> options{};  ///< "name=value"
+  Time duration{};                     ///< 0: until `cancel`, or the end of the input
+  std::string record{};                ///< file to write all frames to, which `decode` reads; "": none
+  bool replaces = false;               ///< the file of `record` may be there already
 };
 
 /// An input range of rows, as `Decoded` has them, in the order in which they ended, each as soon as it is whole. What

@@ -14,19 +14,19 @@
 namespace absenc::client {
 
 struct WaveChoices {
-  std::vector<std::string> commands{};   // with arguments, as "memory-read 5", one after the other; none: reads
-  std::uint64_t count = 1;               // results, at least 1
-  double rate = 1000;                    // results a second; less where the line cannot
-  std::uint64_t samples_per_second = 0;  // of .sr files, up to 1e9; 0: 16 for each bit of the line
-  bool replaces = false;                 // the file may be there already
+  std::vector<std::string> commands{};   ///< with arguments, as "memory-read 5", one after the other; none: reads
+  std::uint64_t count = 1;               ///< results, at least 1
+  double rate = 1000;                    ///< results a second; less where the line cannot
+  std::uint64_t samples_per_second = 0;  ///< of .sr files, up to 1e9; 0: 16 for each bit of the line
+  bool replaces = false;                 ///< the file may be there already
   /// Called now and then with what is done; what it throws ends it, and no file is left.
   std::function<void(const std::string& what)> progress{};
 };
 
 struct Waved {
   std::uint64_t results = 0;
-  std::uint64_t failures = 0;  // of them
-  Time time{};                 // of the whole waveform
+  std::uint64_t failures = 0;  ///< of them
+  Time time{};                 ///< of the whole waveform
   std::vector<std::string> wires{};
 };
 

@@ -18,7 +18,7 @@ namespace absenc {
 
 struct BitView {
   Bytes bytes{};
-  std::size_t size = 0;  // number of bits; `bytes` has room for them
+  std::size_t size = 0;  ///< number of bits; `bytes` has room for them
 
   [[nodiscard]] constexpr bool operator[](std::size_t index) const {
     return ((bytes[index / 8] >> (7 - index % 8)) & 1) != 0;
@@ -79,7 +79,7 @@ struct BitView {
 /// A bit sequence of up to 64 bits in one number, the first bit as the most significant. Has `load` like BitView.
 struct BitNumber {
   std::uint64_t number;
-  unsigned size;  // 1 to 64
+  unsigned size;  ///< 1 to 64
 
   [[nodiscard]] constexpr std::uint64_t load(std::size_t first, unsigned count) const {
     return count == 0 ? 0 : number >> (size - first - count) & low_mask(count);

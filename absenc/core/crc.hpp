@@ -15,7 +15,7 @@ namespace absenc {
 
 /// Parameters of a CRC. `poly` is in normal notation (the highest power left out): x8+x5+x3+x2+x+1 is 0x2F.
 struct CrcParameters {
-  unsigned width;  // 3 to 16
+  unsigned width;  ///< 3 to 16
   std::uint16_t poly;
   std::uint16_t init;
   bool refin;

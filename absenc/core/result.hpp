@@ -37,9 +37,9 @@ enum class Error : std::uint8_t {
 };
 
 struct ErrorText {
-  std::string_view name;         // as printed by the command and written in test vectors
-  std::string_view description;  // what happened, valid for every frame and link
-  std::string_view advice;       // what the user can try
+  std::string_view name;         ///< as printed by the command and written in test vectors
+  std::string_view description;  ///< what happened, valid for every frame and link
+  std::string_view advice;       ///< what the user can try
 };
 
 /// Texts of all errors, indexed by the enumerator.

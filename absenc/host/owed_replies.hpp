@@ -23,9 +23,9 @@ class OwedReplies {
   /// Equal requests.
   struct Owed {
     Request request;
-    std::size_t expect = 0;     // items of the reply, 0 where that is not known before
-    Buffer<Time, 4> sent_at{};  // of each, the oldest first
-    // After these the line was quiet for so long that their replies are lost, most likely: the first and the last.
+    std::size_t expect = 0;     ///< items of the reply, 0 where that is not known before
+    Buffer<Time, 4> sent_at{};  ///< of each, the oldest first
+    /// After these the line was quiet for so long that their replies are lost, most likely: the first and the last.
     Time lost_first{};
     Time lost_last{};
     unsigned lost = 0;

@@ -21,11 +21,11 @@
 namespace absenc::host {
 
 struct Counters {
-  std::uint64_t good = 0;       // conversations that ended well
-  std::uint64_t repeated = 0;   // attempts after an error
-  std::uint64_t late = 0;       // replies that came after their time and were dropped
-  std::uint64_t discarded = 0;  // damaged frames of streams, whether an error reported them or not
-  std::array<std::uint64_t, error_texts.size()> errors{};  // of each kind, repeated ones included
+  std::uint64_t good = 0;       ///< conversations that ended well
+  std::uint64_t repeated = 0;   ///< attempts after an error
+  std::uint64_t late = 0;       ///< replies that came after their time and were dropped
+  std::uint64_t discarded = 0;  ///< damaged frames of streams, whether an error reported them or not
+  std::array<std::uint64_t, error_texts.size()> errors{};  ///< of each kind, repeated ones included
 
   [[nodiscard]] constexpr std::uint64_t bad() const {
     std::uint64_t sum = 0;

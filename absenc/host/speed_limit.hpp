@@ -13,7 +13,7 @@ namespace absenc::host {
 struct SpeedLimit {
   /// Where nobody says more: what the fastest encoders here are specified for, and faster than linear axes go.
   std::uint32_t rpm = 10'000;
-  std::uint32_t mm_s = 20'000;  // linear encoders
+  std::uint32_t mm_s = 20'000;  ///< linear encoders
 };
 
 /// Up to so many times its limit a shaft is too fast, but has not jumped.

@@ -122,7 +122,7 @@ struct BadExchange {
   }
 
   Error error = Error::none;
-  Time at{};  // when the last item was received, or sent
+  Time at{};  ///< when the last item was received, or sent
   Buffer<Item, 64 / sizeof(Item)> sent{};
   Buffer<Item, 64 / sizeof(Item)> received{};
 };

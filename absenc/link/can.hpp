@@ -10,10 +10,10 @@
 namespace absenc {
 
 struct CanFrame {
-  std::uint32_t id = 0;  // identifier: 11 bits, or 29 when `extended`
+  std::uint32_t id = 0;  ///< identifier: 11 bits, or 29 when `extended`
   bool extended = false;
   bool remote = false;
-  std::uint8_t size = 0;  // number of data bytes, 0 to 8
+  std::uint8_t size = 0;  ///< number of data bytes, 0 to 8
   std::array<std::uint8_t, 8> data{};
 
   [[nodiscard]] constexpr Bytes bytes() const { return {data.data(), size}; }

@@ -30,14 +30,14 @@ inline constexpr std::uint32_t assumed_rate = 115'200;
 /// Settings of a line. For SPI and clocked links they describe how to configure a controller; sim draws waveforms from
 /// them.
 struct LineSettings {
-  std::uint32_t rate = 0;  // bits per second: baud rate, SPI or shift clock, CAN bit rate
+  std::uint32_t rate = 0;  ///< bits per second: baud rate, SPI or shift clock, CAN bit rate
   Parity parity = Parity::none;
   std::uint8_t stop_bits = 1;
-  std::uint8_t spi_mode = 0;       // spi, clocked: 2 * CPOL + CPHA
-  std::uint8_t idle_clocks = 0;    // clocked: number of clocks before the first bit, during which the line stays idle
-  Time select_lead{};              // spi: minimum time from chip select to the first clock
-  std::uint32_t highest_rate = 0;  // highest rate that the document allows, if a controller could be faster; 0: not
-                                   // stated
+  std::uint8_t spi_mode = 0;       ///< spi, clocked: 2 * CPOL + CPHA
+  std::uint8_t idle_clocks = 0;    ///< clocked: number of clocks before the first bit, during which the line stays idle
+  Time select_lead{};              ///< spi: minimum time from chip select to the first clock
+  std::uint32_t highest_rate = 0;  ///< highest rate that the document allows, if a controller could be faster; 0: not
+                                   ///< stated
 
   /// Returns the settings, with `assumed_rate` if `rate` is 0.
   [[nodiscard]] constexpr LineSettings with_some_rate() const {

@@ -33,20 +33,20 @@ struct Step {
   };
 
   Kind kind = Kind::wait;
-  ExtraWire wire{};             // pulse: the wire to drive
-  bool hold_low = false;        // transfer on a clocked link: the clock line, which idles high, is held low until `at`
-  std::span<const Item> out{};  // transfer: items to send; valid until the next feed
-  std::size_t expect = 0;       // transfer, wait: number of items still expected; 0: unknown, or none
-  std::size_t bits = 0;  // transfer on a clocked link: number of clocks; a device sets how many of its bits hosts read,
-                         // if it drives more
-  std::uint32_t rate = 0;  // configure: bits per second
-  Time at{};      // transfer, pulse: earliest time to begin; wait: time of the `timer` event, if it is in the future
-  Time answer{};  // transfer, wait: `silence` is reported when nothing is received for this time after `sent`; 0: no
-                  // limit
-  Time gap{};  // transfer, wait: `silence` is reported when the line is quiet for this time after an item; 0: no limit
-  Time width{};  // pulse: its duration; transfer of a device on a clocked link: after `out` the device drives the data
-                 // line low until this time after the last clock edge
-                 // of the clock, it drives the data line low
+  ExtraWire wire{};       ///< pulse: the wire to drive
+  bool hold_low = false;  ///< transfer on a clocked link: the clock line, which idles high, is held low until `at`
+  std::span<const Item> out{};  ///< transfer: items to send; valid until the next feed
+  std::size_t expect = 0;       ///< transfer, wait: number of items still expected; 0: unknown, or none
+  std::size_t bits = 0;  ///< transfer on a clocked link: number of clocks; a device sets how many of its bits hosts
+                         ///< read, if it drives more
+  std::uint32_t rate = 0;  ///< configure: bits per second
+  Time at{};      ///< transfer, pulse: earliest time to begin; wait: time of the `timer` event, if it is in the future
+  Time answer{};  ///< transfer, wait: `silence` is reported when nothing is received for this time after `sent`; 0: no
+                  ///< limit
+  Time
+      gap{};  ///< transfer, wait: `silence` is reported when the line is quiet for this time after an item; 0: no limit
+  Time width{};  ///< pulse: its duration; transfer of a device on a clocked link: after `out` the device drives the
+                 ///< data line low until this time after the last clock edge of the clock, it drives the data line low
 
   /// Transfer of a device on an SPI or clocked link: returns the byte that the host samples after `out` has ended. A
   /// line that no side drives is pulled up.
@@ -72,16 +72,17 @@ struct Event {
 
   Kind kind = Kind::timer;
   Time at{};
-  std::span<const Item> items{};  // received: the items; valid during the call
-  std::size_t bits = 0;           // sent, device side of a clocked link: number of clocks counted
-  ExtraWire wire{};               // triggered: the wire of the pulse
-  bool held_low = false;  // selected on a clocked link: the clock line was held low before the transfer, not idle
-  bool idle_low = false;  // received on a clocked link: the data line was low already before the first bit
-  Time width{};  // triggered: duration of the pulse; device side, selected on a clocked link and sent on an SPI link:
-                 // the period of the clock, 0 if not known
-  Time lead{};   // sent, device side of an SPI link: time from chip select to the first clock
-  Time late{};   // uncertainty of `at`. received: `items` may have arrived earlier by this time, because the port could
-                 // not look sooner; sent: the transfer may have ended earlier by this time; 0: none, or not known
+  std::span<const Item> items{};  ///< received: the items; valid during the call
+  std::size_t bits = 0;           ///< sent, device side of a clocked link: number of clocks counted
+  ExtraWire wire{};               ///< triggered: the wire of the pulse
+  bool held_low = false;  ///< selected on a clocked link: the clock line was held low before the transfer, not idle
+  bool idle_low = false;  ///< received on a clocked link: the data line was low already before the first bit
+  Time width{};  ///< triggered: duration of the pulse; device side, selected on a clocked link and sent on an SPI link:
+                 ///< the period of the clock, 0 if not known
+  Time lead{};   ///< sent, device side of an SPI link: time from chip select to the first clock
+  Time
+      late{};  ///< uncertainty of `at`. received: `items` may have arrived earlier by this time, because the port could
+               ///< not look sooner; sent: the transfer may have ended earlier by this time; 0: none, or not known
 };
 
 /// A protocol's side of a conversation. After each `feed`, call `next` until it returns `wait` or `done`. Call both

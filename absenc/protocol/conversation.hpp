@@ -19,14 +19,14 @@ template <class Item>
 struct Exchange {
   std::span<const Item> sent{};
   std::span<const Item> received{};
-  Time sent_at{};      // end of the last bit sent
-  Time received_at{};  // end of the last bit received; sent_at when nothing came
+  Time sent_at{};      ///< end of the last bit sent
+  Time received_at{};  ///< end of the last bit received; sent_at when nothing came
 };
 
 /// An error in words: more than its own text has. Either may be empty.
 struct Explanation {
-  std::string_view detail{};  // which step failed, what was found
-  std::string_view advice{};  // what to do, in place of the error's own advice
+  std::string_view detail{};  ///< which step failed, what was found
+  std::string_view advice{};  ///< what to do, in place of the error's own advice
 };
 
 /// What a conversation has taken from an encoder that transmits by itself.

@@ -14,12 +14,12 @@ namespace absenc {
 
 /// One bit of a status or alarm field.
 struct FlagInfo {
-  std::string_view name;     // "" when the bit has no meaning
-  std::string_view meaning;  // what has happened
+  std::string_view name;     ///< "" when the bit has no meaning
+  std::string_view meaning;  ///< what has happened
   /// What the operator must do, commands as "`absenc clear-alarms`"; "" when nothing: it is no ailment.
   std::string_view action;
-  bool optional = false;   // some encoders have no such flag: one that reports the others and not this one has none
-  std::uint32_t sums = 0;  // of a status flag: the bits of the unit's alarms that it is the sum of; 0: none
+  bool optional = false;   ///< some encoders have no such flag: one that reports the others and not this one has none
+  std::uint32_t sums = 0;  ///< of a status flag: the bits of the unit's alarms that it is the sum of; 0: none
 };
 
 /// The action of a status flag that only sums up alarms. Who shows the alarms beside it leaves it out.
@@ -37,18 +37,18 @@ struct FieldInfo {
   };
   std::string_view name;
   Kind kind;
-  std::string_view unit;  // "" for a plain number; "counts", "revolutions", "degC" ...
+  std::string_view unit;  ///< "" for a plain number; "counts", "revolutions", "degC" ...
   std::string_view meaning;
   std::span<const FlagInfo> flags{};
   Role role = Role::other;
-  bool in_hex = false;  // a number that documents write in hexadecimal: so do texts, while JSON and CSV have numbers
+  bool in_hex = false;  ///< a number that documents write in hexadecimal: so do texts, while JSON and CSV have numbers
 };
 
 struct FieldValue {
   const FieldInfo* info;
-  std::int64_t number = 0;  // number, counts, boolean, flags
+  std::int64_t number = 0;  ///< number, counts, boolean, flags
   double real = 0;
-  Bytes bytes{};  // text, bytes; valid during the call of `put`
+  Bytes bytes{};  ///< text, bytes; valid during the call of `put`
 };
 
 struct FieldSink {

@@ -31,24 +31,24 @@ struct Option {
   std::int64_t minimum = 0;
   std::int64_t maximum = 0;
   std::span<const std::string_view> choices{};
-  bool probeable = false;  // whether captured frames can tell which value is right
+  bool probeable = false;  ///< whether captured frames can tell which value is right
   unsigned decimals = 0;
-  bool describes_word = false;  // a word format says it instead: the two cannot be given together
-  std::uint32_t step = 1;       // the values are `minimum` and what is multiples of this above it
+  bool describes_word = false;  ///< a word format says it instead: the two cannot be given together
+  std::uint32_t step = 1;       ///< the values are `minimum` and what is multiples of this above it
   Role role = Role::other;
-  bool in_hex = false;   // texts show it in hexadecimal, as FieldInfo::in_hex
-  bool or_zero = false;  // 0 is a value too, below the range
+  bool in_hex = false;   ///< texts show it in hexadecimal, as FieldInfo::in_hex
+  bool or_zero = false;  ///< 0 is a value too, below the range
 };
 
 struct OptionValue {
-  std::size_t option;  // index into the unit's options
+  std::size_t option;  ///< index into the unit's options
   std::int64_t value;
 };
 
 struct Model {
   std::string_view name;
   std::string_view meaning;
-  std::uint32_t maximum_rpm;  // fastest shaft for which a position is specified
+  std::uint32_t maximum_rpm;  ///< fastest shaft for which a position is specified
   std::span<const OptionValue> values;
 };
 
@@ -60,8 +60,8 @@ inline constexpr std::string_view word_option_name = "word";
 /// The value of every option of one unit, by the index of the option.
 struct Options {
   std::array<std::int64_t, maximum_options> values{};
-  const Model* model = nullptr;  // null: no known model has these values
-  WordFormat word{};             // in place of the options that describe one; empty: they do
+  const Model* model = nullptr;  ///< null: no known model has these values
+  WordFormat word{};             ///< in place of the options that describe one; empty: they do
 
   [[nodiscard]] constexpr bool has_word() const { return word.bits() != 0; }
   [[nodiscard]] constexpr std::int64_t operator[](std::size_t option) const { return values[option]; }

@@ -50,34 +50,34 @@ using Arguments = std::span<const std::int64_t>;  // one value for each Argument
 struct Command {
   std::string_view name;
   Verb verb;
-  std::uint8_t id;  // the unit's own number for it
+  std::uint8_t id;  ///< the unit's own number for it
   std::string_view meaning;
   std::span<const Argument> arguments{};
   bool changes_encoder = false;
-  bool repeatable = true;         // whether the same request may be sent again after an error
-  std::string_view reads_back{};  // config_set: the name of the config_get command that reads this setting; "": none
-                                  // can, the setting has the name of this command, which looks at the effect itself
-  std::string_view changes_option{};  // config_set: the option that must follow its first argument; who goes on does
-                                      // so with the new value, on the same open port
-  std::string_view disturbs{};        // what its requests may do to other devices on the line, a sentence without its
-                                      // end; "": nothing. People are asked before it is sent
-  bool reads_alarms = false;  // read_part: its reading has all the alarms by name, where that of Verb::read may not
+  bool repeatable = true;         ///< whether the same request may be sent again after an error
+  std::string_view reads_back{};  ///< config_set: the name of the config_get command that reads this setting; "": none
+                                  ///< can, the setting has the name of this command, which looks at the effect itself
+  std::string_view changes_option{};  ///< config_set: the option that must follow its first argument; who goes on does
+                                      ///< so with the new value, on the same open port
+  std::string_view disturbs{};        ///< what its requests may do to other devices on the line, a sentence without its
+                                      ///< end; "": nothing. People are asked before it is sent
+  bool reads_alarms = false;  ///< read_part: its reading has all the alarms by name, where that of Verb::read may not
 };
 
 /// A run of bytes in the encoder's memory. The commands memory_read and memory_write reach it by their arguments with
 /// the roles address, page, count, value and force; memory_read reports a field with the role data, or value for a
 /// single byte.
 struct MemoryArea {
-  std::uint32_t page;  // 0 where there are no pages
+  std::uint32_t page;  ///< 0 where there are no pages
   std::uint32_t first;
   std::uint32_t count;
   std::string_view meaning;
   bool writable = true;
-  bool in_dump = true;            // whether it belongs to a copy of the memory
-  std::uint32_t write_life = 0;   // writes that the document permits; 0: not known
-  std::string_view protection{};  // why only memory_write's argument of the role force writes it; "": it needs none
-  bool life_in_total = false;     // write_life is of all bytes together; false: the document does not say of what
-  std::uint32_t pages = 1;        // this one and those behind it, which are alike and which an encoder may lack
+  bool in_dump = true;            ///< whether it belongs to a copy of the memory
+  std::uint32_t write_life = 0;   ///< writes that the document permits; 0: not known
+  std::string_view protection{};  ///< why only memory_write's argument of the role force writes it; "": it needs none
+  bool life_in_total = false;     ///< write_life is of all bytes together; false: the document does not say of what
+  std::uint32_t pages = 1;        ///< this one and those behind it, which are alike and which an encoder may lack
 
   [[nodiscard]] constexpr bool has(std::uint32_t on_page, std::uint32_t address) const {
     return on_page - page < pages && address >= first && address - first < count;
@@ -89,7 +89,7 @@ struct MemoryArea {
 struct RegisterInfo {
   std::string_view name;
   std::uint32_t address;
-  std::uint32_t size;  // bytes
+  std::uint32_t size;  ///< bytes
   bool readable = true;
   bool writable = false;
 };
@@ -97,18 +97,18 @@ struct RegisterInfo {
 /// Something around a virtual encoder that its document speaks of: a temperature, a battery, a fault of one channel.
 struct Condition {
   std::string_view name;
-  std::string_view unit;  // as of a field; "" for yes (1) or no (0) and plain numbers
+  std::string_view unit;  ///< as of a field; "" for yes (1) or no (0) and plain numbers
   std::string_view meaning;
   std::int64_t minimum;
   std::int64_t maximum;
-  std::int64_t normal;  // of a healthy installation: what it begins with
+  std::int64_t normal;  ///< of a healthy installation: what it begins with
 };
 
 /// A frame in the form its link carries.
 struct Frame {
   Bytes bytes{};
-  std::size_t bits = 0;           // clocked links: how many bits of `bytes` count
-  const CanFrame* can = nullptr;  // CAN links
+  std::size_t bits = 0;           ///< clocked links: how many bits of `bytes` count
+  const CanFrame* can = nullptr;  ///< CAN links
 
   [[nodiscard]] constexpr bool empty() const { return bytes.empty() && can == nullptr; }
 };
@@ -118,7 +118,7 @@ struct Expected {
   std::string_view field;
   std::int64_t number = 0;
   double real = 0;
-  std::string_view text{};  // of text and bytes fields: the bytes themselves
+  std::string_view text{};  ///< of text and bytes fields: the bytes themselves
 };
 
 /// A frame with what it must decode to. `options` is "name=value name=value". Clocked links: request and reply are
@@ -143,11 +143,11 @@ struct Capture {
 
 /// What captures say about one value of one option.
 struct OptionEvidence {
-  std::size_t option;  // index into the unit's options
+  std::size_t option;  ///< index into the unit's options
   std::int64_t value;
   bool possible;
-  std::size_t capture;   // not possible: the first that contradicts
-  std::string_view why;  // a sentence
+  std::size_t capture;   ///< not possible: the first that contradicts
+  std::string_view why;  ///< a sentence
 };
 
 struct EvidenceSink {
@@ -162,7 +162,7 @@ struct EvidenceSink {
 struct BitRange {
   std::size_t first = 0;
   std::size_t count = 0;
-  bool inverted = false;  // a 0 on the wire is a 1 of the value
+  bool inverted = false;  ///< a 0 on the wire is a 1 of the value
 };
 
 /// The parts of one value, the least significant first.
@@ -172,8 +172,8 @@ using BitRanges = Buffer<BitRange, 8>;
 struct Composed {
   Bytes request{};
   Bytes reply{};
-  std::uint64_t first = 0;    // number of the exchange with which it began
-  Error error = Error::none;  // what its bytes alone do not tell: it contradicts the frames that carried it
+  std::uint64_t first = 0;    ///< number of the exchange with which it began
+  Error error = Error::none;  ///< what its bytes alone do not tell: it contradicts the frames that carried it
 };
 
 /// Finds them among the good exchanges of one encoder, as a capture has them.
@@ -224,48 +224,48 @@ inline constexpr std::size_t longest_encoded = 1024;  // bytes of a request that
 struct Resolution {
   unsigned singleturn_bits = 0;
   unsigned multiturn_bits = 0;
-  double unit_um = 0;             // linear encoders: micrometres a count; 0: a rotation
-  bool multiturn_signed = false;  // turns are counted below zero
+  double unit_um = 0;             ///< linear encoders: micrometres a count; 0: a rotation
+  bool multiturn_signed = false;  ///< turns are counted below zero
 };
 
 /// Wires beside the data on which a host's pulses ask for something.
 struct ExtraWires {
-  bool trigger = false;  // each frame
-  bool clear = false;    // the zero
+  bool trigger = false;  ///< each frame
+  bool clear = false;    ///< the zero
 };
 
 /// The times of an asynchronous line by which its captures are read.
 struct LineTiming {
-  unsigned pause_bits = 15;  // a line silent for so many bits has ended the frame; shorter, the frame goes on
-  Time turnaround{};         // from the end of a request to the begin of its reply, as the document has it; 0: not told
-  Time turnaround_limit = std::chrono::milliseconds(100);  // no host waits longer for the reply to begin
+  unsigned pause_bits = 15;  ///< a line silent for so many bits has ended the frame; shorter, the frame goes on
+  Time turnaround{};  ///< from the end of a request to the begin of its reply, as the document has it; 0: not told
+  Time turnaround_limit = std::chrono::milliseconds(100);  ///< no host waits longer for the reply to begin
 };
 
 struct Unit {
   std::string_view id;
-  std::string_view name;      // maker and protocol, for people
-  std::string_view document;  // the source
+  std::string_view name;      ///< maker and protocol, for people
+  std::string_view document;  ///< the source
   /// Makers and families by which people look for it: "Tamagawa", "Smart-Abs". Its models stand in `models`.
   std::span<const std::string_view> known_as{};
   LinkKind link;
-  LineSettings line;  // rate 0: the document states none, the user must
+  LineSettings line;  ///< rate 0: the document states none, the user must
   std::span<const Option> options;
   std::span<const Model> models;
   std::span<const FieldInfo> fields;
   std::span<const Command> commands;
-  std::span<const MemoryArea> memory{};       // what the commands memory_read and memory_write reach, in order
-  std::span<const RegisterInfo> registers{};  // the same of an encoder that has registers instead of bytes
+  std::span<const MemoryArea> memory{};       ///< what the commands memory_read and memory_write reach, in order
+  std::span<const RegisterInfo> registers{};  ///< the same of an encoder that has registers instead of bytes
   std::span<const Vector> vectors;
-  const FieldInfo* status;  // the flags of Reading::status; null when the unit has none
-  const FieldInfo* alarms;  // the flags of Reading::alarms
+  const FieldInfo* status;  ///< the flags of Reading::status; null when the unit has none
+  const FieldInfo* alarms;  ///< the flags of Reading::alarms
   /// The alarms that an encoder with these options can report; null: all.
   std::uint32_t (*reportable)(const Options& options) = nullptr;
-  // Of an encoder that reports in two channels, the flags of the second. Their bits follow those of the first in one
-  // number: whoever compares alarms sees both, whoever shows them names each.
+  /// Of an encoder that reports in two channels, the flags of the second. Their bits follow those of the first in one
+  /// number: whoever compares alarms sees both, whoever shows them names each.
   const FieldInfo* second_status = nullptr;
   const FieldInfo* second_alarms = nullptr;
-  std::size_t host_storage;    // bytes that `host` needs, suitably aligned for any type
-  std::size_t device_storage;  // bytes that `device` needs
+  std::size_t host_storage;    ///< bytes that `host` needs, suitably aligned for any type
+  std::size_t device_storage;  ///< bytes that `device` needs
 
   /// Checks a reply against its request and puts its fields; with an empty reply, the fields of the request.
   Error (*decode)(const Options& options, Frame request, Frame reply, FieldSink& sink);
@@ -312,7 +312,7 @@ struct Unit {
   bool (*is_answered)(const Options& options, Frame request) = nullptr;
   /// How long after what was last heard this good request may be sent again; null: at once.
   Time (*pause)(const Options& options, Frame request) = nullptr;
-  std::span<const Condition> conditions{};  // that can be set of the virtual encoder, also while it runs
+  std::span<const Condition> conditions{};  ///< that can be set of the virtual encoder, also while it runs
   /// Clocked links whose host says a bit by the level of its clock line in each pause, 1 when it is held low: the index
   /// of the bit in this reply with which the encoder says one too. Both together are decoded as request and reply, one
   /// bit for each frame. Nothing: this reply has none. Null: no reply of the unit has.

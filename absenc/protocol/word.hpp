@@ -25,7 +25,7 @@ struct WordWith {
   std::uint64_t multiturn = 0;
   bool error = false;
   bool warning = false;
-  std::array<std::uint64_t, size> values{};  // those of Meaning::value, by the field's index
+  std::array<std::uint64_t, size> values{};  ///< those of Meaning::value, by the field's index
 
   friend constexpr bool operator==(const WordWith&, const WordWith&) = default;
 };
@@ -67,7 +67,7 @@ inline constexpr std::array<FieldInfo, 9> word_fields{{
 /// What the position counts.
 struct Scale {
   bool linear = false;
-  double unit_um = 0;  // linear: micrometres a count; 0: not known
+  double unit_um = 0;  ///< linear: micrometres a count; 0: not known
 };
 
 /// A field and its place in the word.
@@ -273,7 +273,7 @@ struct PositionBits {
 /// What a reading needs to know of its word.
 struct WordContents {
   PositionBits bits{};
-  std::uint32_t reported = 0;  // the alarms for which the word has a bit
+  std::uint32_t reported = 0;  ///< the alarms for which the word has a bit
 };
 [[nodiscard]] constexpr WordContents contents_of(const WordFormat& format) {
   WordContents contents;

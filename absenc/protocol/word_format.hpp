@@ -54,16 +54,16 @@ class WordFieldName {
 };
 
 struct WordField {
-  WordFieldName name{};  // that of the meaning unless another was given
+  WordFieldName name{};  ///< that of the meaning unless another was given
   Meaning meaning = Meaning::skip;
-  std::uint8_t bits = 0;  // 1 to 64; error, warning and parity have 1
+  std::uint8_t bits = 0;  ///< 1 to 64; error, warning and parity have 1
   bool active_low = false;
 };
 
 /// Where a text is no word: `reason` is empty when it is one.
 struct WordFormatError {
   std::string_view reason{};
-  std::size_t at = 0;  // index into the text
+  std::size_t at = 0;  ///< index into the text
 };
 
 /// A position word is data: options that describe one make it, and so does a text for an encoder nobody has a driver

@@ -35,7 +35,7 @@ using FaultCounts = std::array<std::uint64_t, fault_names.size()>;
 /// Probability of each fault, 0 to 1 per reply; `request_corrupt` per byte (CAN: per frame) received.
 struct FaultRates {
   std::array<double, fault_names.size()> rates{};
-  Time delay = std::chrono::microseconds(200);  // additional delay of a late reply
+  Time delay = std::chrono::microseconds(200);  ///< additional delay of a late reply
 
   constexpr double& operator[](FaultKind kind) { return rates[static_cast<std::size_t>(kind)]; }
   constexpr double operator[](FaultKind kind) const { return rates[static_cast<std::size_t>(kind)]; }

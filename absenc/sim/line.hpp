@@ -40,8 +40,8 @@ class Line {
     std::span<const Item> out;
     std::span<const Item> in;
     Time lead{};
-    Time held_low = never;  // clocked: time from which the clock line was held low before `start`; never: it was idle
-    Time low_after{};       // clocked: time for which the device drives the data line low after the last clock edge
+    Time held_low = never;  ///< clocked: time from which the clock line was held low before `start`; never: it was idle
+    Time low_after{};       ///< clocked: time for which the device drives the data line low after the last clock edge
   };
   /// Called at the end of every transfer of SPI bytes or clocked bits.
   using TransferObserver = std::function<void(const Transfer& transfer)>;

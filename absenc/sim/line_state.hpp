@@ -22,40 +22,40 @@ struct Line<Item>::State {
   bool echo = false;
   bool done = false;
 
-  Step<Item> waiting{};    // last wait step of the machine
-  Time timer_due = never;  // time of `timer` in the last wait step, `never` once it was reported
+  Step<Item> waiting{};    ///< last wait step of the machine
+  Time timer_due = never;  ///< time of `timer` in the last wait step, `never` once it was reported
   Silence silence;
-  Time due = never;  // time of the next `timer` or `silence` event
+  Time due = never;  ///< time of the next `timer` or `silence` event
 
-  // The sender whose character this node's receiver is synchronised to; a character that begins before its end is not
-  // received separately.
+  /// The sender whose character this node's receiver is synchronised to; a character that begins before its end is not
+  /// received separately.
   Node framed_sender = 0;
   Time framed_from = never;
   Time framed_until{};
 
-  typename Step<Item>::Kind active_step = Step<Item>::Kind::wait;  // kind of the transfer or pulse that is pending or
-                                                                   // in progress
-  std::uint64_t begin_generation = 0;  // number of transfers and pulses so far
-  bool begun = false;                  // false while the transfer's `at` lies in the future
+  typename Step<Item>::Kind active_step = Step<Item>::Kind::wait;  ///< kind of the transfer or pulse that is pending or
+                                                                   ///< in progress
+  std::uint64_t begin_generation = 0;                              ///< number of transfers and pulses so far
+  bool begun = false;  ///< false while the transfer's `at` lies in the future
   std::vector<Item> out;
   std::size_t bits = 0;
   std::size_t expect = 0;
   Time width{};
-  std::uint8_t behind_out = 0xFF;  // clocked link: byte that the host samples after `out` has ended
-  bool hold_low = false;           // clocked: the host holds the clock line low before the transfer
-  Time accepted_at{};              // time at which the machine requested the transfer
-  Time lead{};                     // spi: time from chip select to the first clock
+  std::uint8_t behind_out = 0xFF;  ///< clocked link: byte that the host samples after `out` has ended
+  bool hold_low = false;           ///< clocked: the host holds the clock line low before the transfer
+  Time accepted_at{};              ///< time at which the machine requested the transfer
+  Time lead{};                     ///< spi: time from chip select to the first clock
   ExtraWire pulse_wire{};
-  Time start{};             // start of the transfer; CAN: start of the frame
-  std::size_t index = 0;    // index of the item on the wire
-  std::size_t on_wire = 0;  // number of items of `out` that have been, are or will be on the wire
-  Time each{};              // duration of one character
+  Time start{};             ///< start of the transfer; CAN: start of the frame
+  std::size_t index = 0;    ///< index of the item on the wire
+  std::size_t on_wire = 0;  ///< number of items of `out` that have been, are or will be on the wire
+  Time each{};              ///< duration of one character
 
   [[nodiscard]] bool frame_pending() const {
     return active_step == Step<Item>::Kind::transfer && begun && index < out.size();
   }
 
-  // Returns `item` combined with all characters of this node that overlap [from, to).
+  /// Returns `item` combined with all characters of this node that overlap [from, to).
   [[nodiscard]] Item overlaid(Item item, Time from, Time to) const {
     if (each.count() == 0) return item;
     const auto first = static_cast<std::size_t>(std::max<std::int64_t>(0, (from - start) / each));

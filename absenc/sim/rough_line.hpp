@@ -15,20 +15,21 @@ namespace absenc::sim {
 /// Probability, 0 to 1, of each kind of damage to data that is sent to the host: `bit` per data bit, all others per
 /// frame. Faults of the device itself are FaultRates, applied between the device and this line.
 struct RoughRates {
-  double bit = 0;      // this bit is flipped
-  double burst = 0;    // 2 to 16 adjacent bits are damaged: the first and last are flipped, each bit between them with
-                       // probability 1/2
-  double doubled = 0;  // one byte arrives twice; where the host is the clock, one bit arrives twice and the last bit is
-                       // lost
-  double talker = 0;  // another sender sends random bytes during the frame or beyond its end; the host receives the AND
-                      // of both
-  double late = 0;  // the frame arrives 10 us to 10 s late, each decade equally likely; later frames do not overtake it
+  double bit = 0;    ///< this bit is flipped
+  double burst = 0;  ///< 2 to 16 adjacent bits are damaged: the first and last are flipped, each bit between them with
+                     ///< probability 1/2
+  double doubled = 0;  ///< one byte arrives twice; where the host is the clock, one bit arrives twice and the last bit
+                       ///< is lost
+  double talker = 0;  ///< another sender sends random bytes during the frame or beyond its end; the host receives the
+                      ///< AND of both
+  double late =
+      0;  ///< the frame arrives 10 us to 10 s late, each decade equally likely; later frames do not overtake it
 };
 
 struct RoughCounts {
-  std::uint64_t requests = 0;  // transfers and pulses of the host
-  std::uint64_t replies = 0;   // frames sent to the host
-  std::uint64_t damaged = 0;   // frames damaged by any fault except `late`
+  std::uint64_t requests = 0;  ///< transfers and pulses of the host
+  std::uint64_t replies = 0;   ///< frames sent to the host
+  std::uint64_t damaged = 0;   ///< frames damaged by any fault except `late`
   std::uint64_t late = 0;
 };
 

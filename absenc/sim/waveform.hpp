@@ -30,7 +30,7 @@ class Waveform {
  public:
   struct Wire {
     std::string_view name;
-    bool idle;  // the level before the first change
+    bool idle;  ///< the level before the first change
   };
   /// Receives level changes and comments in the order of time, as soon as their order is known.
   struct Sink {

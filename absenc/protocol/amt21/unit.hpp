@@ -24,8 +24,8 @@ struct Format {
   std::uint8_t singleturn_bits = 14;
   std::uint8_t multiturn_bits = 0;
   std::uint8_t address = 0x54;
-  std::uint8_t rate = 0;        // index into `rates`
-  bool drops_low_bits = false;  // reads an encoder of 14 bits as one of 12
+  std::uint8_t rate = 0;        ///< index into `rates`
+  bool drops_low_bits = false;  ///< reads an encoder of 14 bits as one of 12
 
   [[nodiscard]] constexpr LineSettings line() const { return {.rate = rates[rate]}; }
   [[nodiscard]] constexpr Resolution resolution() const { return {singleturn_bits, multiturn_bits, 0, true}; }

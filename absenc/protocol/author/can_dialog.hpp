@@ -28,7 +28,7 @@ class DialogOf<P> : public CanEngine, public Routine {
 
   [[nodiscard]] const Format& format() const { return format_; }
 
-  // What is heard begins with one of these.
+  /// What is heard begins with one of these.
   void ask(const CanFrame& frame, Time pause = {}) { CanEngine::ask(frame, P::host_times(format_), pause); }
   using CanEngine::ask_for;
   using CanEngine::configure;

@@ -13,8 +13,8 @@ namespace absenc::author {
 
 /// How long a host hears for an answer.
 struct CanHostTimes {
-  Time answer_limit{};  // without any frame on the bus
-  Time busy_limit{};    // on a bus that others keep busy
+  Time answer_limit{};  ///< without any frame on the bus
+  Time busy_limit{};    ///< on a bus that others keep busy
 };
 
 /// One frame and what comes behind it at a time; a subclass decides what comes next. What was under way before is not

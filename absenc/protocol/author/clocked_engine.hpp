@@ -13,8 +13,8 @@ namespace absenc::author {
 
 /// How an encoder is clocked, as its document has it.
 struct ClockedHostTimes {
-  std::uint32_t rate = 0;  // of the clock, Hz, which is set first; 0: it stays as the line has it
-  Time rest{};             // of the clock before each transfer, after which the encoder takes a new position
+  std::uint32_t rate = 0;  ///< of the clock, Hz, which is set first; 0: it stays as the line has it
+  Time rest{};             ///< of the clock before each transfer, after which the encoder takes a new position
 };
 
 /// One transfer after the other; a subclass says how many clocks each has, and what becomes of its bits. Whoever is the

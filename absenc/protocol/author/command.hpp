@@ -187,7 +187,7 @@ struct CommandOf {
   /// one that P::encode makes nothing of. Null: what it sends is not known beforehand.
   Result<Request> (*request)(const Format&, Arguments);
   Any<Conversation> (*make)(const Format&, Arguments, std::span<std::byte>);
-  std::size_t size;  // bytes of storage, without those of frames
+  std::size_t size;  ///< bytes of storage, without those of frames
   /// Why an encoder of this format does not have it; empty: it has. Null: every one has.
   std::string_view (*missing)(const Format&) = nullptr;
   /// Of formats of which `is_other` is true, in place of `make`. Null: of none.
@@ -214,7 +214,7 @@ struct CommandOf {
     one.size = std::max(size, other.size);
     return one;
   }
-  // Whether a request is made of these arguments, or the conversation says why there is none.
+  /// Whether a request is made of these arguments, or the conversation says why there is none.
   [[nodiscard]] bool can_ask(const Format& format, Arguments arguments) const {
     if constexpr (std::is_same_v<Request, NoRequest>) {
       return true;

@@ -26,18 +26,18 @@ struct Declaration {
   using Request = typename P::Request;
 
   std::string_view id{};
-  std::string_view name{};                       // maker and protocol, for people
-  std::string_view document{};                   // the source
-  std::span<const std::string_view> known_as{};  // makers and families: "Tamagawa", "Smart-Abs"
+  std::string_view name{};                       ///< maker and protocol, for people
+  std::string_view document{};                   ///< the source
+  std::span<const std::string_view> known_as{};  ///< makers and families: "Tamagawa", "Smart-Abs"
   LinkKind link{};
-  std::span<const Option> options{};           // OptionsOf::infos (option.hpp)
-  Format (*format)(const Options&) = nullptr;  // `format_of<options>` where the options are members of the format
-  std::span<const ModelText> models{};         // option.hpp
-  std::span<const FieldInfo> fields{};         // FieldsOf::infos (field.hpp)
-  std::span<const CommandOf<P>> commands{};    // command.hpp
-  std::span<const VectorText> vectors{};       // text.hpp; they hold, or it does not compile
-  bool frames_are_texts = false;               // frames of vectors are no hexadecimal; clocked ones are 0 and 1
-  std::size_t frames_size = 0;                 // bytes of storage that the procedures' frames need at the most
+  std::span<const Option> options{};           ///< OptionsOf::infos (option.hpp)
+  Format (*format)(const Options&) = nullptr;  ///< `format_of<options>` where the options are members of the format
+  std::span<const ModelText> models{};         ///< option.hpp
+  std::span<const FieldInfo> fields{};         ///< FieldsOf::infos (field.hpp)
+  std::span<const CommandOf<P>> commands{};    ///< command.hpp
+  std::span<const VectorText> vectors{};       ///< text.hpp; they hold, or it does not compile
+  bool frames_are_texts = false;               ///< frames of vectors are no hexadecimal; clocked ones are 0 and 1
+  std::size_t frames_size = 0;                 ///< bytes of storage that the procedures' frames need at the most
   Report<P, Host> report{};
 
   // ---- What depends on the format
@@ -63,8 +63,8 @@ struct Declaration {
 
   // ---- As in Unit (protocol/unit.hpp)
 
-  FrameEnd (*frame_end)(const Options&, Direction, Bytes) = nullptr;  // null: by the sizes of requests and replies
-  bool (*is_answered)(const Options&, Frame request) = nullptr;       // null: by the manner of the request
+  FrameEnd (*frame_end)(const Options&, Direction, Bytes) = nullptr;  ///< null: by the sizes of requests and replies
+  bool (*is_answered)(const Options&, Frame request) = nullptr;       ///< null: by the manner of the request
   bool (*is_checked)(const Options&, Frame request, Frame reply, std::size_t bit) = nullptr;
   BitRanges (*bits)(const Options&, Frame request, Frame reply, const FieldInfo&) = nullptr;
   bool (*probe)(Options&, std::span<const Capture>, EvidenceSink&) = nullptr;

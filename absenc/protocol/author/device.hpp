@@ -19,10 +19,10 @@ namespace absenc::author {
 
 /// The times of a virtual encoder, as its document has them.
 struct DeviceTimes {
-  Time character{};    // of its line: a pause of two ends a request that is not whole
-  Time answer_time{};  // from the end of a request to its reply
-  Time start_time{};   // from power on to the first request that is answered
-  Time gap{};          // the pause that ends a request, where it is not two characters
+  Time character{};    ///< of its line: a pause of two ends a request that is not whole
+  Time answer_time{};  ///< from the end of a request to its reply
+  Time start_time{};   ///< from power on to the first request that is answered
+  Time gap{};          ///< the pause that ends a request, where it is not two characters
   /// Full duplex with a memory for what comes while it sends: that is answered afterwards.
   bool keeps_requests = false;
 };

@@ -195,7 +195,7 @@ class DialogOf : public HostOf<P>, public Routine {
     HostOf<P>::listen(duration);
   }
   struct Heard {
-    Bytes bytes{};  // none, and it is not over: a damaged character. They are there until something is awaited
+    Bytes bytes{};  ///< none, and it is not over: a damaged character. They are there until something is awaited
     bool over = false;
   };
   [[nodiscard]] auto heard() {

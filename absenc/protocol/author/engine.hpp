@@ -15,24 +15,24 @@ namespace absenc::author {
 
 /// The times of a host on its line, as the document has them.
 struct HostTimes {
-  Time answer_limit{};          // from the end of a request to the first character of its reply, at the most
-  Time gap_limit{};             // between two characters of it, at the most
-  Time silence{};               // of the line before each request; what is heard meanwhile begins it anew
-  Time patience = noise_limit;  // a line on which something goes on for so long is never silent
-  Time pause{};                 // from a reply to the next request, at least: so short that nobody listens meanwhile
+  Time answer_limit{};          ///< from the end of a request to the first character of its reply, at the most
+  Time gap_limit{};             ///< between two characters of it, at the most
+  Time silence{};               ///< of the line before each request; what is heard meanwhile begins it anew
+  Time patience = noise_limit;  ///< a line on which something goes on for so long is never silent
+  Time pause{};                 ///< from a reply to the next request, at least: so short that nobody listens meanwhile
 };
 
 /// How one request is sent, and how its reply ends.
 struct Manner {
-  unsigned repeats = 0;          // how often it is sent again before its error counts
-  Time pause{};                  // before it is repeated: from what was last sent or heard
-  bool expects_reply = true;     // false: no reply is due, and none is waited for
-  bool ends_by_silence = false;  // a reply is taken only when silence follows: its check is too weak to trust alone
-  bool any_reply = false;  // no document says what its reply is, or whether there is one: what comes is not looked
-                           // at, and that it ends by silence is enough
-  Time answer_limit{};     // in place of that of the line; 0: that
-  Time hold{};             // after an error: so long the encoder may be busy with it all the same
-  Time pulse{};            // in place of bytes a pulse so long on `wire`, whose edge is the request
+  unsigned repeats = 0;          ///< how often it is sent again before its error counts
+  Time pause{};                  ///< before it is repeated: from what was last sent or heard
+  bool expects_reply = true;     ///< false: no reply is due, and none is waited for
+  bool ends_by_silence = false;  ///< a reply is taken only when silence follows: its check is too weak to trust alone
+  bool any_reply = false;  ///< no document says what its reply is, or whether there is one: what comes is not looked
+                           ///< at, and that it ends by silence is enough
+  Time answer_limit{};     ///< in place of that of the line; 0: that
+  Time hold{};             ///< after an error: so long the encoder may be busy with it all the same
+  Time pulse{};            ///< in place of bytes a pulse so long on `wire`, whose edge is the request
   ExtraWire wire{};
 };
 

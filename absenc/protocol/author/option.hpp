@@ -158,7 +158,7 @@ struct OptionsOf {
 struct ModelText {
   std::string_view name;
   std::string_view meaning;
-  std::uint32_t maximum_rpm;  // 0: the document states none
+  std::uint32_t maximum_rpm;  ///< 0: the document states none
   std::string_view values;
 };
 

@@ -24,10 +24,10 @@ namespace absenc::author {
 /// How a procedure ends.
 struct Outcome {
   Error error = Error::none;
-  std::string_view detail{};  // which step failed, what was found
-  std::string_view advice{};  // what to do, in place of the error's own advice
-  Time hold{};                // so long after what was last sent or heard the encoder must not be disturbed
-  bool alone = false;         // these texts say all: what the document says of the last reply is not added
+  std::string_view detail{};  ///< which step failed, what was found
+  std::string_view advice{};  ///< what to do, in place of the error's own advice
+  Time hold{};                ///< so long after what was last sent or heard the encoder must not be disturbed
+  bool alone = false;         ///< these texts say all: what the document says of the last reply is not added
 };
 
 /// `co_return done;`
@@ -121,7 +121,7 @@ struct FrameInRoutine {
   static void* operator new(std::size_t size, Routine& routine, const Parameters&...) noexcept {
     return routine.take(size);
   }
-  // The storage is the caller's: a part gives its own back, that of the procedure goes with its owner.
+  /// The storage is the caller's: a part gives its own back, that of the procedure goes with its owner.
   static void operator delete(void*, std::size_t) {}
 
   template <class... Parameters>
@@ -180,7 +180,7 @@ struct [[nodiscard]] Part {
     handle.promise().caller = caller;
     routine.go_on_with(handle);
   }
-  // By value: a reference would point into the frame, which is given back here.
+  /// By value: a reference would point into the frame, which is given back here.
   T await_resume() {
     const T result = *handle.promise().result;
     Routine& routine = handle.promise().routine;

@@ -12,7 +12,7 @@ namespace absenc::author {
 template <std::size_t addresses>
 struct Nodes {
   std::array<bool, addresses> there{};
-  std::array<bool, addresses> clash{};  // every answer was damaged: two encoders of one address, or a bad line
+  std::array<bool, addresses> clash{};  ///< every answer was damaged: two encoders of one address, or a bad line
 };
 
 /// `request_to(i)` asks the address of this index. Each that is not silent is asked twice: one answer may be noise.

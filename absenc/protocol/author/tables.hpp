@@ -43,7 +43,7 @@ struct Tables {
     return i;
   }
 
-  // What texts say lies one behind the other, and no larger than if it were written by hand.
+  /// What texts say lies one behind the other, and no larger than if it were written by hand.
   static constexpr Buffer<OptionValue, maximum_options> values_of(const ModelText& model) {
     Buffer<OptionValue, maximum_options> made;
     const bool good = for_each_value(model.values, [&](std::string_view name, std::string_view text) {

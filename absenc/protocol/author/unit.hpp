@@ -40,7 +40,7 @@ struct Descriptor {
   static_assert(Clocked<P> || declared.decode != nullptr || declared.report.put_request != nullptr,
                 "a report needs put_request");
 
-  // Requests and replies of the protocol as it is; else the unit says itself what its frames are.
+  /// Requests and replies of the protocol as it is; else the unit says itself what its frames are.
   static constexpr bool has_requests = !Clocked<P> && declared.decode == nullptr;
 
   // ---- The functions of the descriptor
@@ -99,7 +99,7 @@ struct Descriptor {
 
   static constexpr const CommandOf<P>& find(const Command& command) { return declared.commands[command.id]; }
 
-  // One for each that the command has, in its range.
+  /// One for each that the command has, in its range.
   static constexpr bool are_good(const Command& command, Arguments arguments) {
     return std::equal(
         arguments.begin(), arguments.end(), command.arguments.begin(), command.arguments.end(),
@@ -187,7 +187,7 @@ struct Descriptor {
   }
   static constexpr LineSettings settings(const Options& values) { return line_of(declared.format(values)); }
 
-  // By the manner of its request.
+  /// By the manner of its request.
   static bool is_answered(const Options& values, Frame asked) {
     const Format f = declared.format(values);
     const Result<Request> request = P::decode_request(f, asked.bytes);
@@ -201,7 +201,7 @@ struct Descriptor {
     return request ? P::manner(f, *request).pause : Time{};
   }
 
-  // As the links of the protocol carry it.
+  /// As the links of the protocol carry it.
   static constexpr std::span<const ItemOf<P>> items(const Frame& frame) {
     if constexpr (std::is_same_v<ItemOf<P>, CanFrame>) {
       return {frame.can, frame.can != nullptr ? 1u : 0u};
@@ -230,7 +230,7 @@ struct Descriptor {
     }
   }
 
-  // Whether the text is understood, which comes over a model, which comes over the defaults.
+  /// Whether the text is understood, which comes over a model, which comes over the defaults.
   static constexpr bool resolve(std::string_view text, std::span<const OptionValue> model, Options& values) {
     for (std::size_t i = 0; i < declared.options.size(); ++i) {
       values.values[i] = declared.options[i].default_value;

@@ -12,21 +12,21 @@ namespace absenc::biss {
 /// Format of a chain's frames. Slave 0 is the farthest from the host and its word comes last: channel i belongs to
 /// slave `count - 1 - i`.
 struct ChainFormat {
-  static constexpr unsigned most = 8;  // the most data channels of a frame
+  static constexpr unsigned most = 8;  ///< the most data channels of a frame
   std::array<Channel, most> channels{};
   std::uint8_t count = 2;
-  std::uint8_t slave = 0;  // the slave whose position a reading shows and whose registers are accessed
+  std::uint8_t slave = 0;  ///< the slave whose position a reading shows and whose registers are accessed
   RegisterOrder register_order = RegisterOrder::big;
   std::uint16_t register_delay_us = 0;
   bool start_sequence = false;
   Timeout timeout{};
   StopBit stop_bit = StopBit::next;
-  // These members mean the same as in Format.
+  /// These members mean the same as in Format.
   std::uint32_t ma_khz = 1000;
   Time latency = 10us;
   Time ready{};
   std::uint32_t line_delay_ns = 0;
-  Scale scale{};  // scale of all linear encoders in the chain
+  Scale scale{};  ///< scale of all linear encoders in the chain
 
   [[nodiscard]] constexpr Time period() const { return Time((1'000'000 + ma_khz / 2) / ma_khz); }
   /// Returns the channel of the slave whose position a reading shows.

@@ -16,8 +16,8 @@ inline constexpr unsigned life_counter_bits = 6;
 
 /// Check after a word. The default is used by nearly all encoders: x^6 + x + 1, inverted.
 struct Check {
-  std::uint8_t width = 6;     // bits of the CRC, 0 to 16; 0: no CRC
-  std::uint16_t poly = 0x03;  // polynomial without its highest power
+  std::uint8_t width = 6;     ///< bits of the CRC, 0 to 16; 0: no CRC
+  std::uint16_t poly = 0x03;  ///< polynomial without its highest power
   std::uint16_t init = 0;
   bool inverted = true;
   bool life_counter = false;

@@ -52,7 +52,7 @@ template <auto member>
 inline constexpr auto clock_option = author::option<member>("ma_khz", "clock, kHz", 10, 10'000);
 /// The BiSS timeout in the form of its options.
 struct TimeoutSettings {
-  std::uint16_t timeout_tenths = 0;  // fixed timeout in 0.1 us; 0: unknown
+  std::uint16_t timeout_tenths = 0;  ///< fixed timeout in 0.1 us; 0: unknown
   bool adaptive_timeout = false;
 
   [[nodiscard]] constexpr Timeout timeout_given() const {

@@ -29,10 +29,10 @@ inline constexpr Check crc4{4, 0x3};
 
 struct ControlRequest {
   enum class Operation : std::uint8_t { read, write, command } operation = Operation::read;
-  std::uint8_t slave = 0;    // slave whose register is accessed, 0 to 7
-  std::uint8_t address = 0;  // address of the first register, 0 to 127
-  std::uint8_t slaves = 0;   // slaves that receive a command: bit n is slave n; 0: all slaves, without acknowledgement
-  std::uint8_t command = 0;  // number of a command, 0 to 3
+  std::uint8_t slave = 0;    ///< slave whose register is accessed, 0 to 7
+  std::uint8_t address = 0;  ///< address of the first register, 0 to 127
+  std::uint8_t slaves = 0;  ///< slaves that receive a command: bit n is slave n; 0: all slaves, without acknowledgement
+  std::uint8_t command = 0;  ///< number of a command, 0 to 3
 
   [[nodiscard]] constexpr bool is_command() const { return operation == Operation::command; }
   friend constexpr bool operator==(const ControlRequest&, const ControlRequest&) = default;
@@ -70,12 +70,12 @@ inline constexpr unsigned header_bits = 15;  // bits after the start bit: CTS, t
 /// A control frame with the answer of the encoders.
 struct ControlFrame {
   ControlRequest request{};
-  std::uint8_t slaves = 0;   // number of slaves with an ID, from the lock bits
-  bool more_slaves = false;  // there are slaves without an ID
+  std::uint8_t slaves = 0;   ///< number of slaves with an ID, from the lock bits
+  bool more_slaves = false;  ///< there are slaves without an ID
   ByteBuffer<control_most> data;
-  Buffer<std::uint16_t, control_most> start_delay;  // number of frames by which each byte was delayed
+  Buffer<std::uint16_t, control_most> start_delay;  ///< number of frames by which each byte was delayed
   bool next_address_accepted = false;
-  std::uint8_t acknowledged = 0;  // slaves that acknowledged a command: bit n is slave n
+  std::uint8_t acknowledged = 0;  ///< slaves that acknowledged a command: bit n is slave n
   bool executed = false;
 };
 

@@ -14,10 +14,10 @@ namespace absenc::biss {
 /// Times of a virtual encoder and of the line to it.
 struct Behaviour {
   Time latency = 10us;
-  Time line_delay{};       // Delay there and back. The host samples SLO one period of MA after the edge that drives it.
-  Time edge_noise = 20ns;  // a sample this close to a delayed edge reads the old bit or the new bit, at random
-  Time register_delay{};   // time from the request for a register to its start bit
-  bool start_sequence = false;  // after power on, SLO stays idle until the start sequence
+  Time line_delay{};  ///< Delay there and back. The host samples SLO one period of MA after the edge that drives it.
+  Time edge_noise = 20ns;       ///< a sample this close to a delayed edge reads the old bit or the new bit, at random
+  Time register_delay{};        ///< time from the request for a register to its start bit
+  bool start_sequence = false;  ///< after power on, SLO stays idle until the start sequence
 };
 
 using Samples = author::DrivenBits;

@@ -53,7 +53,7 @@ class MakerName {
 };
 
 struct Found {
-  // Of a control frame.
+  /// Of a control frame.
   std::optional<std::uint8_t> slaves{};
   std::optional<bool> more_slaves{};
   std::optional<std::string_view> operation{};
@@ -71,14 +71,14 @@ struct Found {
   NumberList acknowledged;
   std::optional<bool> executed{};
   // Of procedures.
-  std::optional<bool> written{};  // false: the register had this value already, so nothing was written
-  std::optional<bool> missing{};  // true: the encoder refused the register; otherwise not set
+  std::optional<bool> written{};  ///< false: the register had this value already, so nothing was written
+  std::optional<bool> missing{};  ///< true: the encoder refused the register; otherwise not set
   std::optional<std::uint8_t> eds_bank{};
   std::optional<std::uint16_t> profile{};
   std::optional<std::uint64_t> serial_number{};
   ByteBuffer<6> device_id;
   MakerName manufacturer;
-  Reading reading{};  // stays empty: these procedures do not report a position
+  Reading reading{};  ///< stays empty: these procedures do not report a position
 };
 
 namespace shown {

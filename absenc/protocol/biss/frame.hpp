@@ -75,19 +75,19 @@ struct Format {
   WordFormat word = "position:19 error:1! warning:1!"_word;
   Check check{};
   Scale scale{};
-  std::uint16_t ma_khz = 1000;  // clock MA in kHz, 10 to 10 000
+  std::uint16_t ma_khz = 1000;  ///< clock MA in kHz, 10 to 10 000
   // The members for registers and start sequence fit into padding, so that a reader of positions needs no more memory.
-  std::uint8_t slave = 0;  // slave whose registers are accessed: 0 to 7, counted from the end of the chain
+  std::uint8_t slave = 0;  ///< slave whose registers are accessed: 0 to 7, counted from the end of the chain
   RegisterOrder register_order = RegisterOrder::big;
-  std::uint16_t register_delay_us = 0;  // virtual encoder: time in us until a requested register is ready
-  bool start_sequence = false;          // virtual encoder: SLO stays idle until the start sequence
+  std::uint16_t register_delay_us = 0;  ///< virtual encoder: time in us until a requested register is ready
+  bool start_sequence = false;          ///< virtual encoder: SLO stays idle until the start sequence
   Timeout timeout{};
-  // The longest time that the encoder needs for a position, up to 1 ms; it decides the number of clocks.
+  /// The longest time that the encoder needs for a position, up to 1 ms; it decides the number of clocks.
   Time latency = 10us;
-  // Members for the virtual encoder.
+  /// Members for the virtual encoder.
   StopBit stop_bit = StopBit::next;
   std::uint32_t line_delay_ns = 0;
-  Time ready{};  // time that the virtual encoder needs for a position; 0: as `latency`, but at most 10 us
+  Time ready{};  ///< time that the virtual encoder needs for a position; 0: as `latency`, but at most 10 us
 
   /// Returns the period of MA.
   [[nodiscard]] constexpr Time period() const { return Time((1'000'000u + ma_khz / 2u) / ma_khz); }
@@ -135,10 +135,10 @@ template <class WordType>
 struct ReplyWith {
   unsigned ack_bits = 1;
   WordType word{};
-  std::uint8_t life_counter = 0;  // life counter, if the check has one
-  bool cds = false;               // the encoder's bit of control communication
-  std::uint16_t crc = 0;          // CRC as sent
-  unsigned delay_bits = 0;        // extra idle samples: the line's delay in clocks
+  std::uint8_t life_counter = 0;  ///< life counter, if the check has one
+  bool cds = false;               ///< the encoder's bit of control communication
+  std::uint16_t crc = 0;          ///< CRC as sent
+  unsigned delay_bits = 0;        ///< extra idle samples: the line's delay in clocks
 };
 using Reply = ReplyWith<Word>;
 template <const Format& format>

@@ -23,15 +23,15 @@ struct Channel {
 struct ChannelData {
   Word word{};
   std::uint8_t life_counter = 0;
-  std::uint16_t crc = 0;  // CRC as sent
+  std::uint16_t crc = 0;  ///< CRC as sent
 };
 
 struct SafetyFormat {
   Channel cpw{.word = "position:24 error:1! warning:1!"_word};
   Channel spw{.word = "position:16 error:1! warning:1!"_word, .check = crc16};
-  std::uint8_t compare_bits = 13;          // upper bits of the position in which both words must agree (ACC_MIN)
-  std::int8_t previous_life_counter = -1;  // life counter of the frame before; -1: unknown
-  // These members mean the same as in Format.
+  std::uint8_t compare_bits = 13;          ///< upper bits of the position in which both words must agree (ACC_MIN)
+  std::int8_t previous_life_counter = -1;  ///< life counter of the frame before; -1: unknown
+  /// These members mean the same as in Format.
   std::uint32_t ma_khz = 1000;
   Time latency = 10us;
   Time ready{};

@@ -80,7 +80,7 @@ struct Format {
   Carries carries = Carries::biss;
   ssi::AfterWord after_word = ssi::AfterWord::repeat;
   Kind kind = Kind::other;
-  // Of the virtual interface and its encoder.
+  /// Of the virtual interface and its encoder.
   Version firmware{1, 16};
   Time latency = 10us;
   Time line_delay{};
@@ -97,8 +97,8 @@ struct Format {
 }
 
 struct Position {
-  unsigned ack_bits = 0;  // BiSS: clocks until the encoder was ready
-  std::uint16_t crc = 0;  // BiSS: CRC as sent
+  unsigned ack_bits = 0;  ///< BiSS: clocks until the encoder was ready
+  std::uint16_t crc = 0;  ///< BiSS: CRC as sent
   Word word{};
 };
 
@@ -127,14 +127,14 @@ struct Position {
 
 struct Request {
   std::uint8_t letter = letter::samples;
-  unsigned clock = 0;  // set_clock: the clock, 1 to 8
-  unsigned width = 0;  // set_width: the width in bits, 1 to 64
+  unsigned clock = 0;  ///< set_clock: the clock, 1 to 8
+  unsigned width = 0;  ///< set_width: the width in bits, 1 to 64
 };
 
 struct Reply {
   std::uint64_t samples = 0;
-  std::int64_t number = 0;  // number in the reply to ? > m b
-  Text text{};              // text of a reply line, trimmed
+  std::int64_t number = 0;  ///< number in the reply to ? > m b
+  Text text{};              ///< text of a reply line, trimmed
 };
 
 inline constexpr unsigned widest = 64;  // largest width of a position in bits
@@ -176,7 +176,7 @@ struct Protocol {
   using Format = e201::Format;
   using Request = e201::Request;
   using Reply = e201::Reply;
-  // No document gives the longest line; the engine stores up to three times this length.
+  /// No document gives the longest line; the engine stores up to three times this length.
   static constexpr std::size_t longest_reply = 32;
 
   static constexpr author::HostTimes host_times(const Format&) {

@@ -17,7 +17,7 @@ using Dialog = author::DialogOf<Protocol>;
 /// Results of a procedure. Values that were not requested or not answered stay empty.
 struct Found {
   Reading reading{};
-  std::uint64_t samples = 0;  // the samples from which `reading` was decoded
+  std::uint64_t samples = 0;  ///< the samples from which `reading` was decoded
   std::optional<Text> command{};
   std::optional<Text> version{};
   std::optional<Text> serial{};
@@ -25,14 +25,14 @@ struct Found {
   std::optional<std::int64_t> clock{};
   std::optional<std::int64_t> width{};
   std::optional<std::int64_t> counts{};
-  std::optional<std::string_view> advice{};  // recommended clocks, if another clock is set
+  std::optional<std::string_view> advice{};  ///< recommended clocks, if another clock is set
 
   // Results of clock-sweep.
-  unsigned frames = 0;  // frames to read at each clock
+  unsigned frames = 0;  ///< frames to read at each clock
   std::array<unsigned, clocks_khz.size()> valid{};
-  unsigned measured = 0;  // number of clocks that were completed
-  unsigned previous = 0;  // clock before the sweep; 0: unknown
-  unsigned left = 0;      // clock that was set last; 0: none
+  unsigned measured = 0;  ///< number of clocks that were completed
+  unsigned previous = 0;  ///< clock before the sweep; 0: unknown
+  unsigned left = 0;      ///< clock that was set last; 0: none
   bool restored = false;
   bool aborted = false;
 

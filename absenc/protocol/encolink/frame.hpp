@@ -84,15 +84,15 @@ enum class Generation : std::uint8_t { aksim2, aksim4 };
 
 /// Layout of an encoder's frames. Unknown members are read from the encoder's identity.
 struct Format {
-  unsigned resolution = 0;  // bits of a turn, 1 to 22; 0: unknown
-  int multiturn_bits = -1;  // bits of the turn counter, 0 to 16; -1: unknown
-  bool has_ch2 = true;      // false: frames as of an AksIM-1, without the channel 2 byte
+  unsigned resolution = 0;  ///< bits of a turn, 1 to 22; 0: unknown
+  int multiturn_bits = -1;  ///< bits of the turn counter, 0 to 16; -1: unknown
+  bool has_ch2 = true;      ///< false: frames as of an AksIM-1, without the channel 2 byte
   Interface interface = Interface::uart;
   OffsetSign offset_sign = OffsetSign::add;
   OffsetUnit offset_unit = OffsetUnit::counts;
-  std::uint32_t stream_rate = 0;  // frames per second that the encoder sends without requests; 0: it answers requests
-  Generation generation = Generation::aksim2;   // generation of the virtual encoder
-  std::uint8_t identity_size = identity_bytes;  // identity bytes of the virtual encoder on a UART, 19 or 20
+  std::uint32_t stream_rate = 0;  ///< frames per second that the encoder sends without requests; 0: it answers requests
+  Generation generation = Generation::aksim2;   ///< generation of the virtual encoder
+  std::uint8_t identity_size = identity_bytes;  ///< identity bytes of the virtual encoder on a UART, 19 or 20
 
   [[nodiscard]] constexpr bool known() const { return resolution != 0 && multiturn_bits >= 0; }
   [[nodiscard]] constexpr std::size_t turns_bytes() const { return multiturn_bits > 0 ? 2 : 0; }
@@ -127,14 +127,14 @@ inline constexpr Format virtual_format{.resolution = 20, .multiturn_bits = 16};
 struct Position {
   std::uint32_t singleturn = 0;
   std::uint16_t multiturn = 0;
-  bool error = false;    // the position is invalid
-  bool warning = false;  // the position is valid, but near its limits
+  bool error = false;    ///< the position is invalid
+  bool warning = false;  ///< the position is valid, but near its limits
   std::uint8_t channel2 = 0;
 };
 
 /// A cycle of channel 2. Each frame carries one byte of it; its position is that of the frame with its first byte.
 struct Cycle {
-  Position position{};  // its member `channel2` is unused
+  Position position{};  ///< its member `channel2` is unused
   std::uint16_t status = 0;
   std::uint8_t channel3 = 0;
 };
@@ -150,9 +150,9 @@ inline constexpr std::uint16_t signal_lost = 0x0020;
 inline constexpr std::uint16_t position_invalid = 0x0200;
 inline constexpr std::uint16_t configuration_error = 0x0400;
 inline constexpr std::uint16_t multiturn_mismatch = 0x8000;
-// Bits that are warnings: amplitude high and low, near limits, temperature.
+/// Bits that are warnings: amplitude high and low, near limits, temperature.
 inline constexpr std::uint16_t warnings = 0x21D0;
-inline constexpr std::uint16_t errors = 0xDE2F;  // bits that are errors: all but the warnings
+inline constexpr std::uint16_t errors = 0xDE2F;  ///< bits that are errors: all but the warnings
 static_assert((warnings ^ errors) == 0xFFFF);
 }  // namespace status
 
@@ -172,7 +172,7 @@ struct Identity {
   std::uint8_t protocol_version = version::aksim2;
   std::uint8_t frame_bytes = 5;
   unsigned resolution = 20;
-  std::array<std::uint8_t, 18> text{};  // all identity bytes before the checksum; text[2..17] is the part number
+  std::array<std::uint8_t, 18> text{};  ///< all identity bytes before the checksum; text[2..17] is the part number
   [[nodiscard]] constexpr Bytes part_number() const { return Bytes(text).subspan(2); }
 };
 

@@ -24,9 +24,9 @@ struct Frames {
   using Format = encolink::Format;
   struct Request {
     Ask ask = Ask::position;
-    std::uint8_t ra = 0;  // one byte of a register access
+    std::uint8_t ra = 0;  ///< one byte of a register access
   };
-  using Reply = Position;  // empty for an identity
+  using Reply = Position;  ///< empty for an identity
   static constexpr std::size_t longest_reply = identity_bytes;
 
   static constexpr author::HostTimes host_times(const Format& format) {
@@ -47,12 +47,12 @@ struct Frames {
 /// The content of successive frames: the position, and cycles of channel 2. A cycle takes one byte of each frame, from
 /// a reset of the channels until a frame is lost.
 struct Channels {
-  Reading reading{};                      // reading of the last valid frame; empty before the first
-  std::optional<std::uint16_t> status{};  // detailed status of the last valid cycle
-  std::optional<Error> ended{};           // set if the last frame completed a cycle: none, or the cycle's error
-  std::uint8_t channel3 = 0;              // channel 3 byte of the last valid cycle
-  bool in_step = false;                   // the channel 2 bytes are aligned to a cycle
-  bool silent = false;                    // all bytes of the last cycle were 0: the encoder is starting
+  Reading reading{};                      ///< reading of the last valid frame; empty before the first
+  std::optional<std::uint16_t> status{};  ///< detailed status of the last valid cycle
+  std::optional<Error> ended{};           ///< set if the last frame completed a cycle: none, or the cycle's error
+  std::uint8_t channel3 = 0;              ///< channel 3 byte of the last valid cycle
+  bool in_step = false;                   ///< the channel 2 bytes are aligned to a cycle
+  bool silent = false;                    ///< all bytes of the last cycle were 0: the encoder is starting
 
   /// Takes a valid frame. A cycle whose position is not that of its first frame ends with cross_check_failed. A cycle
   /// with an error ends the alignment.

@@ -25,28 +25,28 @@ enum class Fate : std::uint8_t {
 /// State of a procedure and its results. Without other results the position is reported.
 struct Found : Channels {
   struct Value {
-    std::size_t index;  // index of the register in the table
+    std::size_t index;  ///< index of the register in the table
     ByteBuffer<largest_register> bytes;
   };
-  std::optional<Identity> identity{};  // reported instead of the position, together with `values`
-  // Address of the register whose bytes are `data`; reported instead of the position.
+  std::optional<Identity> identity{};  ///< reported instead of the position, together with `values`
+  /// Address of the register whose bytes are `data`; reported instead of the position.
   std::optional<std::uint32_t> address{};
-  Buffer<Value, 8> values{};      // values of registers of the table
-  std::optional<bool> running{};  // whether a self-calibration is running
+  Buffer<Value, 8> values{};      ///< values of registers of the table
+  std::optional<bool> running{};  ///< whether a self-calibration is running
   bool tells_status = false;
 
-  bool emits = false;                  // each position is emitted
-  bool is_new = false;                 // the latest position was not emitted yet
-  std::uint8_t protocol_version = 0;   // version in the identity; 0: the identity was not read yet
-  unsigned lost = 0;                   // number of lost frames in a row
-  AccessBytes access{};                // all `ra` bytes of the present register access
-  bool writes = false;                 // the present access is a write
-  bool was_asked = false;              // all `ra` bytes were sent: the encoder may have executed the access
-  bool changed = false;                // a register was written and read back
-  std::uint16_t length = 0;            // bytes that the access reads
-  ByteBuffer<access_capacity> data{};  // bytes that the access has read
-  author::Outcome why{};               // why the access failed
-  bool again = false;                  // a repetition of the access can help and does no harm
+  bool emits = false;                  ///< each position is emitted
+  bool is_new = false;                 ///< the latest position was not emitted yet
+  std::uint8_t protocol_version = 0;   ///< version in the identity; 0: the identity was not read yet
+  unsigned lost = 0;                   ///< number of lost frames in a row
+  AccessBytes access{};                ///< all `ra` bytes of the present register access
+  bool writes = false;                 ///< the present access is a write
+  bool was_asked = false;              ///< all `ra` bytes were sent: the encoder may have executed the access
+  bool changed = false;                ///< a register was written and read back
+  std::uint16_t length = 0;            ///< bytes that the access reads
+  ByteBuffer<access_capacity> data{};  ///< bytes that the access has read
+  author::Outcome why{};               ///< why the access failed
+  bool again = false;                  ///< a repetition of the access can help and does no harm
 
   void begin(const RegisterRequest& request) {
     access = encode_access(request);

@@ -20,8 +20,8 @@ namespace absenc::encolink {
 namespace channel3 {
 inline constexpr std::uint8_t idle = 0x33;
 inline constexpr std::uint8_t busy = 0x66;
-inline constexpr std::uint8_t read_ready = 0x88;   // status and data follow, one byte per cycle
-inline constexpr std::uint8_t write_ready = 0x99;  // the status follows in the next cycle
+inline constexpr std::uint8_t read_ready = 0x88;   ///< status and data follow, one byte per cycle
+inline constexpr std::uint8_t write_ready = 0x99;  ///< the status follows in the next cycle
 }  // namespace channel3
 
 /// Status byte in the encoder's answer to a register access.
@@ -70,7 +70,7 @@ struct Register {
   std::uint8_t size;
   Access access;
   Content content = Content::number;
-  bool in_info = false;  // the command `info` reads it
+  bool in_info = false;  ///< the command `info` reads it
 };
 
 enum RegisterIndex : std::size_t {
@@ -143,7 +143,7 @@ inline constexpr std::uint8_t self_calibrate = 0x41;
 
 /// Bits of calibration_status.
 namespace calibration {
-inline constexpr std::uint8_t count = 0x03;  // number of finished calibrations, modulo 4
+inline constexpr std::uint8_t count = 0x03;  ///< number of finished calibrations, modulo 4
 inline constexpr std::uint8_t timed_out = 0x04;
 inline constexpr std::uint8_t out_of_range = 0x08;
 }  // namespace calibration
@@ -162,7 +162,7 @@ struct RegisterRequest {
   enum class Operation : std::uint8_t { write = 0x58, read = 0x59 } operation = Operation::read;
   std::uint32_t address = 0;
   std::uint16_t length = 0;
-  ByteBuffer<access_capacity> data{};  // written bytes, `length` of them; empty for a read
+  ByteBuffer<access_capacity> data{};  ///< written bytes, `length` of them; empty for a read
 };
 
 inline constexpr std::array<std::uint8_t, 5> access_keys{0x00, 0xCD, 0xEF, 0x89, 0xAB};

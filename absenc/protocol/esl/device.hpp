@@ -104,7 +104,7 @@ class VirtualEncoder final : public author::Responder {
     reply.temperature = static_cast<std::int8_t>(value_of(condition::temperature));
     return reply;
   }
-  // It answers from the first moment on: SF tells when it is ready.
+  /// It answers from the first moment on: SF tells when it is ready.
   void power_on(Time now, PowerOn kind) override {
     ready_at_ = kind == PowerOn::real ? now + start_up : now;
     Responder::power_on(now, kind);

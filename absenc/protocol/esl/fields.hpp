@@ -86,7 +86,7 @@ struct Shown {
   std::optional<bool> lissajous_error{};
   std::optional<std::uint32_t> safe_singleturn{};
   std::optional<std::uint8_t> page_left{};
-  bool has_turns = true;  // false: what stands in ABM is no part of the position
+  bool has_turns = true;  ///< false: what stands in ABM is no part of the position
 };
 
 namespace detail {

@@ -118,15 +118,15 @@ enum class DataId : std::uint8_t {
 namespace part {
 inline constexpr unsigned status = 0x0001;
 inline constexpr unsigned alarms = 0x0002;
-inline constexpr unsigned singleturn = 0x0004;  // 3 bytes
-inline constexpr unsigned multiturn = 0x0008;   // 2 bytes
+inline constexpr unsigned singleturn = 0x0004;  ///< 3 bytes
+inline constexpr unsigned multiturn = 0x0008;   ///< 2 bytes
 inline constexpr unsigned encoder_id = 0x0010;
 inline constexpr unsigned temperature = 0x0020;
 inline constexpr unsigned sequence = 0x0040;
-inline constexpr unsigned zero_sequence = 0x0080;          // {0, SC2}
-inline constexpr unsigned redundant_sequence = 0x0100;     // 2 bytes: RS0 {RS1, SC2}
-inline constexpr unsigned redundant_alone = 0x0200;        // 2 bytes: RS0 RS1 of ID C
-inline constexpr unsigned redundant_calibration = 0x0400;  // 2 bytes: RS0 RS1 of ID 6
+inline constexpr unsigned zero_sequence = 0x0080;          ///< {0, SC2}
+inline constexpr unsigned redundant_sequence = 0x0100;     ///< 2 bytes: RS0 {RS1, SC2}
+inline constexpr unsigned redundant_alone = 0x0200;        ///< 2 bytes: RS0 RS1 of ID C
+inline constexpr unsigned redundant_calibration = 0x0400;  ///< 2 bytes: RS0 RS1 of ID 6
 inline constexpr unsigned memory_address = 0x0800;
 inline constexpr unsigned value = 0x1000;
 inline constexpr unsigned redundant = redundant_sequence | redundant_alone | redundant_calibration;
@@ -147,7 +147,7 @@ struct Layout {
   std::uint16_t one = 0;
   std::uint16_t two = 0;
   std::uint8_t crc_bytes = 1;
-  std::uint8_t length_one = 0;  // with CF and CRC
+  std::uint8_t length_one = 0;  ///< with CF and CRC
   std::uint8_t length_two = 0;
 
  private:
@@ -232,15 +232,15 @@ inline constexpr std::array<Layout, 16> layouts = [] {
 
 struct Request {
   DataId id = DataId::position;
-  std::uint8_t encoder_address = 0;  // 0 to 7
-  std::uint8_t memory_address = 0;   // memory access: 0 to 7F
-  std::uint8_t value = 0;            // write_memory
+  std::uint8_t encoder_address = 0;  ///< 0 to 7
+  std::uint8_t memory_address = 0;   ///< memory access: 0 to 7F
+  std::uint8_t value = 0;            ///< write_memory
 };
 
 struct ChannelReply {
-  std::uint8_t status = 0;  // bits in the order of the document
+  std::uint8_t status = 0;  ///< bits in the order of the document
   std::uint8_t alarms = 0;
-  std::uint8_t sequence = 0;  // 8 bits in channel 1, 7 in channel 2
+  std::uint8_t sequence = 0;  ///< 8 bits in channel 1, 7 in channel 2
   std::uint8_t encoder_id = 0;
 };
 
@@ -252,12 +252,12 @@ struct Reply {
   ChannelReply two{.status = status::channel_2};
   std::uint32_t singleturn = 0;
   std::uint16_t multiturn = 0;
-  std::uint16_t redundant = 0;  // 9 bits; 16 of ID 6 where the profile says so
-  std::int8_t temperature = 0;  // its sign is assumed
+  std::uint16_t redundant = 0;  ///< 9 bits; 16 of ID 6 where the profile says so
+  std::int8_t temperature = 0;  ///< its sign is assumed
   std::uint8_t memory_address = 0;
   bool busy = false;
   std::uint8_t value = 0;
-  bool unused_bits = false;  // decoded: a bit that is always 0 was set
+  bool unused_bits = false;  ///< decoded: a bit that is always 0 was set
 };
 
 // ---- Bits whose place the document leaves open

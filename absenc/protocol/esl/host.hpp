@@ -16,8 +16,8 @@ using Dialog = author::DialogOf<Protocol>;
 /// What a procedure found.
 struct Found : Shown {
   Reading reading{};
-  ByteBuffer<last_address + 1> bytes{};  // of `data`
-  Sentence words{};                      // of the error
+  ByteBuffer<last_address + 1> bytes{};  ///< of `data`
+  Sentence words{};                      ///< of the error
 };
 
 /// ID 8, preceded by an ID 5, so that eight of these in a row are not eight IDs 8 in a row. Error: unexpected_reply (it
@@ -59,9 +59,9 @@ author::Procedure read_error_info(Dialog& dialog, Found& found);
 inline constexpr unsigned most_encoders = 8;  // 3 address bits
 
 struct Nodes {
-  std::array<std::optional<Reply>, most_encoders> answers{};  // the last good reply of each
+  std::array<std::optional<Reply>, most_encoders> answers{};  ///< the last good reply of each
   std::array<bool, most_encoders> disturbed{};
-  std::array<Check, most_encoders> troubles{};  // of an answer that came whole and is not good
+  std::array<Check, most_encoders> troubles{};  ///< of an answer that came whole and is not good
 };
 /// Asks every address for ID 5, never for ID 8: eight of these in a row are "dynamic addressing". An answer that is
 /// damaged every time tells of two encoders with one address, or of a bad line. One that comes whole is that of one

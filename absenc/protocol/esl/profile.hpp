@@ -46,15 +46,15 @@ struct Profile {
   ParityScope parity_scope = ParityScope::command;
   FieldOrder status_order = FieldOrder::document;
   FieldOrder memory_address_order = FieldOrder::document;
-  bool request_crc = true;  // false: only memory requests carry a CRC
+  bool request_crc = true;  ///< false: only memory requests carry a CRC
   RedundantBit idc_rs1 = RedundantBit::b7;
   Id6Redundant id6_rs = Id6Redundant::bits_16;
 
-  std::uint8_t address = 0;              // EAD, 0 to 7
-  bool turns = true;                     // false: an encoder of one turn
-  Sharing bus = sharing_automatic;       // yes: others share the line, memory cannot be reached (Figure 18)
-  bool require_forced_test = false;      // of a safe position
-  std::uint8_t redundant_tolerance = 1;  // RS against the top 9 bits of ABS, 1/512 turn, 0 to 255
+  std::uint8_t address = 0;              ///< EAD, 0 to 7
+  bool turns = true;                     ///< false: an encoder of one turn
+  Sharing bus = sharing_automatic;       ///< yes: others share the line, memory cannot be reached (Figure 18)
+  bool require_forced_test = false;      ///< of a safe position
+  std::uint8_t redundant_tolerance = 1;  ///< RS against the top 9 bits of ABS, 1/512 turn, 0 to 255
   BadRequest bad_request = BadRequest::report;
 };
 

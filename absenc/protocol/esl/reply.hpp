@@ -57,7 +57,7 @@ enum class Check : std::uint8_t {
 struct CheckText {
   Error error;
   std::string_view sentence;
-  std::string_view advice{};  // in place of the error's own
+  std::string_view advice{};  ///< in place of the error's own
 };
 
 /// Indexed by the enumerator.

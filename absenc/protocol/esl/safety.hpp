@@ -31,7 +31,7 @@ class SafePosition {
 };
 
 struct SafetyVerdict {
-  std::optional<SafePosition> position{};  // set when `failed` is Check::passed
+  std::optional<SafePosition> position{};  ///< set when `failed` is Check::passed
   Check failed = Check::passed;
 };
 

@@ -15,8 +15,8 @@ namespace absenc::raa38 {
 
 class Settings {
  public:
-  // Memory layout: number on the line, index of the bit rate, 1 if it counts down, shaft position at its zero in
-  // counts, number of writes.
+  /// Memory layout: number on the line, index of the bit rate, 1 if it counts down, shaft position at its zero in
+  /// counts, number of writes.
   static constexpr std::size_t number_at = 0;
   static constexpr std::size_t rate_at = 1;
   static constexpr std::size_t direction_at = 2;

@@ -29,20 +29,20 @@ enum class AfterWord : std::uint8_t {
 struct Format {
   WordFormat word = "position:12"_word;
   AfterWord after_word = AfterWord::repeat;
-  // Clocks after the word, for comparison; with as many as the word has bits, the word is read twice.
+  /// Clocks after the word, for comparison; with as many as the word has bits, the word is read twice.
   unsigned extra_clocks = 0;
   Scale scale{};
-  bool error_parity = false;  // the last bit is a parity that the encoder inverts if its position is wrong
-  bool padded = false;        // skipped bits of the word must be zero
-  // The word is read once more, and the shaft may have moved with this speed; 0: read once.
+  bool error_parity = false;  ///< the last bit is a parity that the encoder inverts if its position is wrong
+  bool padded = false;        ///< skipped bits of the word must be zero
+  /// The word is read once more, and the shaft may have moved with this speed; 0: read once.
   std::uint32_t confirm_rpm = 0;
-  // Values that vary by product (RAA38S6 3.5, note).
-  // Pause between two words; it must exceed the encoder's monoflop time Tm, or the old word continues.
+  /// Values that vary by product (RAA38S6 3.5, note).
+  /// Pause between two words; it must exceed the encoder's monoflop time Tm, or the old word continues.
   Time pause = 50us;
   std::uint32_t clock_khz = 200;
-  // Tm of the virtual encoder, at most `pause`; 0: equal to `pause`. Other encoders have 9 to 41 us.
+  /// Tm of the virtual encoder, at most `pause`; 0: equal to `pause`. Other encoders have 9 to 41 us.
   Time monoflop = 20us;
-  // Clock range of the virtual encoder. Tcs in the document also gives 250 kHz.
+  /// Clock range of the virtual encoder. Tcs in the document also gives 250 kHz.
   std::uint32_t slowest_khz = 100;
   std::uint32_t fastest_khz = 250;
 };

@@ -75,10 +75,10 @@ enum class DataId : std::uint8_t {
 /// Bits of the status field SF (6.3.2). The low four are information bits, always 0.
 namespace status {
 inline constexpr std::uint8_t information = 0x0F;
-inline constexpr std::uint8_t counting_error = 0x10;   // ea0
-inline constexpr std::uint8_t alarm = 0x20;            // ea1: over-heat, multi-turn error, battery error or alarm
-inline constexpr std::uint8_t parity_error = 0x40;     // ca0, of the request
-inline constexpr std::uint8_t delimiter_error = 0x80;  // ca1, of the request
+inline constexpr std::uint8_t counting_error = 0x10;   ///< ea0
+inline constexpr std::uint8_t alarm = 0x20;            ///< ea1: over-heat, multi-turn error, battery error or alarm
+inline constexpr std::uint8_t parity_error = 0x40;     ///< ca0, of the request
+inline constexpr std::uint8_t delimiter_error = 0x80;  ///< ca1, of the request
 inline constexpr std::uint8_t rejected = parity_error | delimiter_error;
 }  // namespace status
 
@@ -102,11 +102,11 @@ inline constexpr std::uint8_t without_battery = battery_error | battery_alarm;
 
 /// The contents of a model's frames, and how strictly they are checked.
 struct Format {
-  unsigned singleturn_bits = 17;  // 1 to 24
-  unsigned multiturn_bits = 16;   // 0 to 24
-  int encoder_id = -1;            // ENID, 0 to 255; -1: any
-  bool strict = true;             // also the checks that only a specification-true encoder passes
-  bool battery = true;            // false: none is connected; the turns mean nothing then (2 (1))
+  unsigned singleturn_bits = 17;  ///< 1 to 24
+  unsigned multiturn_bits = 16;   ///< 0 to 24
+  int encoder_id = -1;            ///< ENID, 0 to 255; -1: any
+  bool strict = true;             ///< also the checks that only a specification-true encoder passes
+  bool battery = true;            ///< false: none is connected; the turns mean nothing then (2 (1))
 
   [[nodiscard]] static constexpr LineSettings line() { return line_settings; }
   /// Bits of the turns that may be used.

@@ -85,8 +85,8 @@ inline constexpr std::array<Lengths, 16> lengths = [] {
 
 struct Request {
   DataId id = DataId::everything;
-  std::uint8_t address = 0;  // memory access: 0 to 127
-  std::uint8_t value = 0;    // write_memory
+  std::uint8_t address = 0;  ///< memory access: 0 to 127
+  std::uint8_t value = 0;    ///< write_memory
 };
 
 [[nodiscard]] constexpr bool selects_page(const Request& request) {

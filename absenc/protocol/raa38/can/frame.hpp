@@ -88,15 +88,15 @@ inline constexpr std::array<Rate, 3> rates{{{0, 1'000'000}, {2, 500'000}, {3, 25
 }
 
 struct Format {
-  unsigned bits = 14;         // bits of the position, 10 to 21
-  std::uint8_t node = 0x20;   // number of the node, 1 to 255
-  std::uint8_t rate = 2;      // index into `rates`
-  bool listens = false;       // host: read the positions that the node sends without a request
-  std::uint8_t positive = 0;  // values of command 22 for counting up and down; the document does not state them
+  unsigned bits = 14;         ///< bits of the position, 10 to 21
+  std::uint8_t node = 0x20;   ///< number of the node, 1 to 255
+  std::uint8_t rate = 2;      ///< index into `rates`
+  bool listens = false;       ///< host: read the positions that the node sends without a request
+  std::uint8_t positive = 0;  ///< values of command 22 for counting up and down; the document does not state them
   std::uint8_t negative = 1;
-  // Virtual encoder: positions per second that it sends without a request after power on; 0: none.
+  /// Virtual encoder: positions per second that it sends without a request after power on; 0: none.
   std::uint8_t cyclic = 10;
-  bool answers_on_7e4 = false;  // virtual encoder: answers settings on 7E4 instead of 7E5
+  bool answers_on_7e4 = false;  ///< virtual encoder: answers settings on 7E4 instead of 7E5
 
   [[nodiscard]] constexpr std::uint32_t bit_rate() const { return rates[rate].bits_per_second; }
   [[nodiscard]] constexpr std::uint32_t answer_id() const { return answers_on_7e4 ? 0x7E4 : 0x7E5; }
@@ -133,11 +133,11 @@ enum class Answer : std::uint8_t { none, position, code, error };
 /// A row of the document's command tables.
 struct OrderInfo {
   Order order;
-  std::uint8_t code;  // value of byte 0
+  std::uint8_t code;  ///< value of byte 0
   std::string_view name;
-  bool for_all;  // true: on 7E5 to all nodes; false: on 2NN with the node in byte 1
+  bool for_all;  ///< true: on 7E5 to all nodes; false: on 2NN with the node in byte 1
   Answer answer;
-  std::uint8_t value_at = 0;  // index of the byte with the order's value; 0: the order has no value
+  std::uint8_t value_at = 0;  ///< index of the byte with the order's value; 0: the order has no value
   std::uint8_t least = 0;
   std::uint8_t most = 255;
   Values::Number Values::*shown = nullptr;

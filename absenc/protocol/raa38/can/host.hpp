@@ -93,12 +93,12 @@ author::Procedure look_for_node(Dialog& dialog, Values& found);
 
 /// Frames received from one node number.
 struct Heard {
-  std::uint16_t unsolicited = 0;  // frames sent without a request
-  std::uint16_t per_second = 0;   // frames without a request in the first second
-  std::uint8_t answers = 0;       // answers to one request
-  std::uint8_t damaged = 0;       // requests during which frames were destroyed
-  bool readable = false;          // `counts` fits the format
-  std::uint32_t counts = 0;       // position in the last frame
+  std::uint16_t unsolicited = 0;  ///< frames sent without a request
+  std::uint16_t per_second = 0;   ///< frames without a request in the first second
+  std::uint8_t answers = 0;       ///< answers to one request
+  std::uint8_t damaged = 0;       ///< requests during which frames were destroyed
+  bool readable = false;          ///< `counts` fits the format
+  std::uint32_t counts = 0;       ///< position in the last frame
 
   [[nodiscard]] constexpr bool is_there() const { return unsolicited != 0 || answers != 0 || damaged > 1; }
   /// Returns whether two nodes seem to share the number: two answers to one request, or destroyed frames each time.
@@ -120,7 +120,7 @@ author::Procedure scan(Dialog& dialog, Nodes& nodes);
 
 struct Surveyed : Values {
   Nodes nodes{};
-  bool verified = false;  // the written setting was verified
+  bool verified = false;  ///< the written setting was verified
 };
 
 /// Order 11 sets the node number; the node must answer under the new number and no longer under the old one. Order 13

@@ -71,11 +71,11 @@ enum class Data : std::uint8_t {
 
 struct Format {
   std::uint8_t address = 1;
-  unsigned bits = 14;      // bits of the position, 10 to 21
-  unsigned registers = 0;  // number of registers to request, 1 or 2; 0: as many as the bits need
+  unsigned bits = 14;      ///< bits of the position, 10 to 21
+  unsigned registers = 0;  ///< number of registers to request, 1 or 2; 0: as many as the bits need
   std::size_t baud = baud_at_shipping;
   Data data = Data::four_bytes;
-  // Virtual encoder: byte order of the CRC in its reply to A0, low_first or high_first.
+  /// Virtual encoder: byte order of the CRC in its reply to A0, low_first or high_first.
   CrcOrder address_crc = CrcOrder::low_first;
 
   [[nodiscard]] constexpr unsigned asked() const { return registers != 0 ? registers : bits > 16 ? 2 : 1; }
@@ -86,8 +86,8 @@ struct Format {
 struct Request {
   std::uint8_t function = function::read;
   std::uint8_t address = 1;
-  std::uint8_t value = 0;            // set_address: the new address; set_parameter: the parameter
-  std::uint16_t first_register = 0;  // register to read first; only for the function `read`
+  std::uint8_t value = 0;            ///< set_address: the new address; set_parameter: the parameter
+  std::uint16_t first_register = 0;  ///< register to read first; only for the function `read`
   std::uint16_t registers = 1;
 };
 
@@ -140,11 +140,11 @@ using RequestBytes = ByteBuffer<8>;
 
 struct Reply {
   std::uint8_t function = function::read;
-  std::uint8_t address = 1;      // ask_address: the encoder's address; set_address: the new address
-  std::uint32_t singleturn = 0;  // position; only for the function `read`
-  std::uint8_t value = 0;        // parameter; only for the function `set_parameter`
+  std::uint8_t address = 1;      ///< ask_address: the encoder's address; set_address: the new address
+  std::uint32_t singleturn = 0;  ///< position; only for the function `read`
+  std::uint8_t value = 0;        ///< parameter; only for the function `set_parameter`
   CrcOrder order = CrcOrder::low_first;
-  std::size_t doubtful_size = 0;  // length of a reply to `read` if the CRC cannot prove this length; otherwise 0
+  std::size_t doubtful_size = 0;  ///< length of a reply to `read` if the CRC cannot prove this length; otherwise 0
 };
 
 /// Returns whether a valid reply to a read request would still be valid without its last byte, or with a 00 appended:

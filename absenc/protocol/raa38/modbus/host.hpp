@@ -42,7 +42,7 @@ struct Values {
 /// Result of a command.
 struct Found : Values {
   Reading reading{};
-  Sentence words{};  // text of the error's detail
+  Sentence words{};  ///< text of the error's detail
 };
 
 using Dialog = author::DialogOf<Protocol>;

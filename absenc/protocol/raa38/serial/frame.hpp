@@ -69,15 +69,15 @@ inline constexpr Time request_gap = 2ms;            // silence after which an in
 
 /// Configuration of an encoder, as it was ordered.
 struct Format {
-  unsigned bits = 14;  // bits of a turn, 10 to 21
+  unsigned bits = 14;  ///< bits of a turn, 10 to 21
   SecondByte second_byte = SecondByte::automatic;
   Mode mode = Mode::timing;
   std::uint8_t unit = 1;
   Zeroing zeroing = Zeroing::none;
-  std::int32_t zero_unit = -1;          // the x of Cx; -1: as in Bx
-  std::int64_t refresh_millihertz = 0;  // frames per second in 0.001 Hz; 0: unknown
-  Time acquisition{};                   // T3, or the time from a request to its reply; 0: unknown
-  Time transmission{};                  // T1 - T3, duration of a frame; 0: as long as its characters take
+  std::int32_t zero_unit = -1;          ///< the x of Cx; -1: as in Bx
+  std::int64_t refresh_millihertz = 0;  ///< frames per second in 0.001 Hz; 0: unknown
+  Time acquisition{};                   ///< T3, or the time from a request to its reply; 0: unknown
+  Time transmission{};                  ///< T1 - T3, duration of a frame; 0: as long as its characters take
 
   [[nodiscard]] constexpr std::size_t data_bytes() const { return bits <= 16 ? 2 : 3; }
   [[nodiscard]] constexpr std::size_t frame_bytes() const { return data_bytes() + 3; }
@@ -149,7 +149,7 @@ struct Request {
     trigger,     // a pulse on CLK, without bytes
     clear,       // a pulse on CLR
   } kind = Kind::read;
-  std::uint8_t unit = 0;  // number of the unit, 0 to 15
+  std::uint8_t unit = 0;  ///< number of the unit, 0 to 15
 };
 
 /// Returns the bytes of a request; empty for a pulse.

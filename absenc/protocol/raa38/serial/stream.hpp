@@ -17,7 +17,7 @@ namespace absenc::raa38::serial {
 struct Found {
   Error error = Error::none;
   std::uint32_t singleturn = 0;
-  Time at{};  // time at which its last byte was received
+  Time at{};  ///< time at which its last byte was received
 };
 
 /// While aligned, a frame is accepted where the one before it ended. A frame with an FF inside is accepted only when
