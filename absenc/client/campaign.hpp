@@ -15,20 +15,21 @@ namespace absenc::client {
 
 /// A fault of the line, or of what the encoder sends.
 struct LineFault {
-  std::string_view name;
-  std::string_view meaning;
-  double usual;  ///< its rate when none is given
+  std::string_view name;     ///< Name of the fault, as `--fault` takes it.
+  std::string_view meaning;  ///< What the fault does to the line, as a phrase.
+  double usual;              ///< its rate when none is given
 };
 
 /// Those of `emulate --fault` by the same names, and those that only a line has: bit, burst, double, talker, late.
 [[nodiscard]] std::span<const LineFault> line_faults();
 
+/// Which encoder a campaign runs, how long, and with which faults.
 struct CampaignChoices {
-  std::string model{};
+  std::string model{};                 ///< Name of a model of the unit; empty: its first.
   std::vector<std::string> options{};  ///< "address=3"
   std::vector<std::string> faults{};  ///< "bit=0.001": rates of 0 to 1, those not named 0; none: the usual rates of all
-  std::uint64_t exchanges = 100'000;
-  std::uint64_t seed = 1;
+  std::uint64_t exchanges = 100'000;  ///< Number of exchanges, at least 1.
+  std::uint64_t seed = 1;             ///< Seed of the faults; the same seed gives the same campaign.
   /// The shaft turns, so many revolutions a minute (of linear encoders so many mm/s), and positions are confirmed as
   /// `absenc read` does it; none: it is put somewhere else before every reading, and none is confirmed.
   std::optional<double> rpm{};
@@ -55,10 +56,11 @@ struct Guarded {
   double let_through = 0;  ///< computed: how many wrong ones frame checks and limit together let through
 };
 
+/// Result of a campaign: what was read, and what of it was wrong.
 struct CampaignResult {
-  std::string protocol{};
-  std::string model{};  ///< or ""
-  std::uint64_t readings = 0;
+  std::string protocol{};       ///< Identifier of the unit.
+  std::string model{};          ///< or ""
+  std::uint64_t readings = 0;   ///< Number of readings, failed ones included.
   std::uint64_t exchanges = 0;  ///< requests, or where none are sent frames
   std::uint64_t damaged = 0;    ///< replies damaged by any fault
   Share failed{};               ///< exchanges that ended with an error

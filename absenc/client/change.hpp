@@ -24,8 +24,9 @@ enum class ChangeState : std::uint8_t {
 /// "not_sent", "confirmed", "refused", "unknown"; "" of none
 [[nodiscard]] std::string_view word_of(ChangeState state);
 
+/// State of a change of the encoder, with the evidence.
 struct Change {
-  ChangeState state = ChangeState::none;
+  ChangeState state = ChangeState::none;  ///< How far the change came.
   std::string
       advice{};  ///< unknown: how to see what the encoder is now; confirmed: how it is reached from now on, or ""
 
@@ -40,9 +41,10 @@ struct Change {
 
 /// A failure that knows what became of a change.
 struct Changing {
+  /// Adds the state of the change to an exception.
   explicit Changing(Change what_became) : change(std::move(what_became)) {}
   virtual ~Changing() = default;
-  Change change;
+  Change change;  ///< The change and its state when the exception was thrown.
 };
 
 /// A failure of a changing command, caught as `Base` as ever.
@@ -52,8 +54,10 @@ class OfChange final : public Base, public Changing {
   /// `text`: all of it, as of `with_change`.
   OfChange(const Base& failure, std::string text, Change what_became)
       : Base(failure), Changing(std::move(what_became)), text_(std::move(text)) {}
+  /// Takes the text of `failure` and adds that of the change.
   OfChange(const Base& failure, const Change& what_became)
       : OfChange(failure, with_change(failure.what(), what_became), what_became) {}
+  /// Returns the text of the failure, followed by that of the change.
   [[nodiscard]] const char* what() const noexcept override { return text_.c_str(); }
 
  private:

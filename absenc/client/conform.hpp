@@ -18,20 +18,23 @@ enum class Verdict : std::uint8_t {
   untested,  // it was not seen
 };
 
+/// Result of one clause of a document.
 struct ClauseResult {
-  std::string_view id{};  ///< "crc"
-  std::string_view document{};
-  std::string_view paragraph{};
-  std::string_view words{};
-  Verdict verdict{};
-  std::string evidence{};  ///< what was seen and how often, or why nothing was
+  std::string_view id{};         ///< "crc"
+  std::string_view document{};   ///< Name of the document.
+  std::string_view paragraph{};  ///< Paragraph of the document.
+  std::string_view words{};      ///< The demand in words.
+  Verdict verdict{};             ///< Whether the encoder complies.
+  std::string evidence{};        ///< what was seen and how often, or why nothing was
 };
 
+/// Results of all clauses of a unit.
 struct Conformance {
-  std::string protocol{};
-  std::vector<ClauseResult> clauses{};
-  std::vector<std::string> left{};  ///< commands that put back by hand what could not be: the encoder is changed
+  std::string protocol{};               ///< Identifier of the unit.
+  std::vector<ClauseResult> clauses{};  ///< Results in the order of the unit's clauses.
+  std::vector<std::string> left{};      ///< commands that put back by hand what could not be: the encoder is changed
 
+  /// Returns the number of clauses with this verdict.
   [[nodiscard]] std::size_t count(Verdict verdict) const;
   /// `broken` where any clause is, or the encoder is left changed; else `kept` where any is; else `untested`: nothing
   /// was seen that could be judged.
@@ -44,6 +47,7 @@ struct Conformance {
   [[nodiscard]] std::string report() const;
 };
 
+/// What a conformance test may do and how long it lasts.
 struct ConformChoices {
   std::size_t readings = 100;    ///< at least 1
   bool changes = false;          ///< also the clauses that change the encoder, which is put back as it was

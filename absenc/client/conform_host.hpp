@@ -12,6 +12,7 @@
 
 namespace absenc::client {
 
+/// What a conformance test of a host looks at, and how long it lasts.
 struct ConformHostChoices {
   std::size_t answers = 100;                      ///< so many requests are answered well, at least 2
   Time patience = std::chrono::seconds(10);       ///< so long a silence of the host is its last

@@ -22,10 +22,10 @@ struct DecodeChoices {
   std::vector<std::string> channels{};   ///< "D0", "clock=D0", or several of them with commas between
   unsigned raw_channels = 0;             ///< 0: it is no file of raw samples
   std::uint64_t samples_per_second = 0;  ///< 0: the file tells
-  double baud = 0;
-  std::optional<Parity> parity{};
-  std::string model{};
-  std::vector<std::string> options{};  ///< "name=value"
+  double baud = 0;                       ///< Rate of the line in bits per second; 0: found in the capture.
+  std::optional<Parity> parity{};        ///< Parity of the line; without a value that of the unit.
+  std::string model{};                   ///< Name of a model of the unit; empty: none.
+  std::vector<std::string> options{};    ///< "name=value"
 };
 
 /// An input range of rows, in the order in which they ended, while the file is read: its size does not matter. The file
@@ -41,24 +41,32 @@ struct DecodeChoices {
 /// `Unknown`.
 class Decoded {
  public:
+  /// Type of the items.
   using value_type = Row;
+  /// Iterator of the range.
   using Iterator = InputIterator<Decoded>;
 
   /// As `decode`.
   Decoded(const std::string& path, std::string_view protocol, const DecodeChoices& choices);
+  /// Moves the decoder; the other one may only be destroyed or assigned to.
   Decoded(Decoded&&) noexcept;
+  /// Moves the decoder; the other one may only be destroyed or assigned to.
   Decoded& operator=(Decoded&&) noexcept;
   /// Ends the threads, also in the middle of the file.
   ~Decoded();
 
   /// Waits for the first row. Once. Throws, as each step does, UsageError, Failure.
   [[nodiscard]] Iterator begin();
+  /// Returns the end of the range.
   [[nodiscard]] static Iterator::End end() { return {}; }
+  /// Returns the row at the iterator, or null at the end. It is valid until `advance`.
   [[nodiscard]] const Row* current() const { return row_; }
+  /// Goes to the next row.
   void advance();
   /// From any thread: who waits for a row, now or later, gets Cancelled.
   void cancel();
 
+  /// Returns the columns of each row, in their order.
   [[nodiscard]] std::span<const Column> columns() const;
   /// When the range has ended: sentences about what is damaged or missing in the file, and what was found out.
   [[nodiscard]] const std::vector<std::string>& notes() const;

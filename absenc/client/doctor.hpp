@@ -95,9 +95,9 @@ enum class Severity : std::uint8_t {
 
 /// Which of them, as data and in words.
 struct Finding {
-  Ailment ailment{};
-  std::string_view id{};  ///< "only_echo"
-  Severity severity{};
+  Ailment ailment{};       ///< The fault that was found.
+  std::string_view id{};   ///< "only_echo"
+  Severity severity{};     ///< How serious it is.
   std::string evidence{};  ///< what was seen
   std::string cause{};     ///< what is most likely behind it
   std::string action{};    ///< what to do
@@ -125,13 +125,14 @@ struct Measured {
   bool turned = false;            ///< the position was looked at while the shaft was turned
 };
 
+/// Result of `doctor`: its findings, and the measurements behind them.
 struct Examination {
   std::vector<Finding> findings{};  ///< in the order in which they are to be mended
   std::size_t tried = 0;            ///< readings
   std::size_t good = 0;             ///< of them
-  Reported reported{};
-  Measured measured{};
-  bool complete = true;  ///< false: it was interrupted
+  Reported reported{};              ///< What the encoder reported about itself.
+  Measured measured{};              ///< What was measured on the line.
+  bool complete = true;             ///< false: it was interrupted
 
   /// Whether nothing is to be mended.
   [[nodiscard]] bool healthy() const;
@@ -141,6 +142,7 @@ struct Examination {
   [[nodiscard]] std::string verdict() const;
 };
 
+/// What `doctor` may do and how long it looks.
 struct DoctorChoices {
   std::size_t readings = 100'000;        ///< at most
   Time limit = std::chrono::seconds(3);  ///< how long it reads

@@ -24,9 +24,9 @@ struct EmulateChoices {
 /// How often the virtual encoder looked at whether its host keeps a rule of the document, which it names when it is
 /// broken.
 struct RuleCount {
-  std::string_view rule{};
-  std::uint64_t looked = 0;
-  std::uint64_t broken = 0;
+  std::string_view rule{};   ///< The rule, in words.
+  std::uint64_t looked = 0;  ///< Number of times that the rule was checked.
+  std::uint64_t broken = 0;  ///< Number of times that the host broke the rule.
 };
 
 /// What hosts sent to the virtual encoder. Frames that are for no such encoder (CAN) are not counted.
@@ -42,7 +42,9 @@ class Emulation {
  public:
   /// As `emulate`.
   Emulation(std::string_view text, const EmulateChoices& choices);
+  /// Moves the emulation; the other one may only be destroyed or assigned to.
   Emulation(Emulation&&) noexcept;
+  /// Moves the emulation; the other one may only be destroyed or assigned to.
   Emulation& operator=(Emulation&&) noexcept;
   ~Emulation();
 
@@ -53,14 +55,18 @@ class Emulation {
   [[nodiscard]] std::uint16_t tcp_port() const;
   /// To open it by: "tformat:/dev/pts/3", "raa38-can:slcan:/dev/pts/3", without the options.
   [[nodiscard]] std::string address() const;
+  /// Returns the unit that is emulated.
   [[nodiscard]] const Unit& unit() const;
+  /// Returns the options of the virtual encoder.
   [[nodiscard]] const Options& options() const;
 
+  /// Switches the virtual encoder off: it sends no replies until `power_on`.
   void power_off();
   /// `real`: with the document's start-up time.
   void power_on(bool real = false);
   /// By the names of the unit; throws UsageError, which names the nearest.
   void raise_alarm(std::string_view name);
+  /// Ends the cause of an alarm. An alarm that the encoder latches stays until a host clears it.
   void lower_alarm(std::string_view name);
   /// "temperature", "battery" ... as `absenc list` has them, in their units. Throws UsageError.
   void set_condition(std::string_view name, std::int64_t value);
@@ -76,9 +82,11 @@ class Emulation {
   [[nodiscard]] std::uint64_t answer_count() const;
   /// Rules of the document that the host broke, and the first of them; "": none.
   [[nodiscard]] std::uint32_t violations() const;
+  /// Returns the first rule that the host broke, in words; empty: none.
   [[nodiscard]] std::string first_violation() const;
   /// Every rule that was looked at: the host did what it is about.
   [[nodiscard]] std::vector<RuleCount> rule_counts() const;
+  /// Returns how many requests the virtual encoder received, answered and refused.
   [[nodiscard]] RequestCounts request_counts() const;
 
  private:

@@ -42,6 +42,7 @@ enum class PositionState : std::uint8_t {
 
 /// What one attempt to read has brought. Times are those of os::now.
 struct Sample {
+  /// What a sample holds.
   enum class Kind : std::uint8_t {
     reading,
     failed,  // the encoder or the line
@@ -50,12 +51,12 @@ struct Sample {
     back,    // it is there again, but nothing was read yet
   };
 
-  Kind kind = Kind::absent;
-  Time at{};  ///< a reading: when it was latched
-  Reading reading{};
-  bool confirmed = false;  ///< two readings in a row agreed
-  bool doubtful = false;   ///< it looked valid, but none agreed with it: it is marked invalid
-  bool position_valid = false;
+  Kind kind = Kind::absent;      ///< What this sample holds.
+  Time at{};                     ///< a reading: when it was latched
+  Reading reading{};             ///< The reading; default if `kind` is not a reading.
+  bool confirmed = false;        ///< two readings in a row agreed
+  bool doubtful = false;         ///< it looked valid, but none agreed with it: it is marked invalid
+  bool position_valid = false;   ///< Whether the position holds.
   std::int64_t position = 0;     ///< counts, continued past the end of the counter
   bool restarted = false;        ///< it jumped, or how far it went meanwhile is not known: `position` starts again
   bool speed_valid = false;      ///< the times of the positions leave little of it open; otherwise there is none
@@ -64,10 +65,10 @@ struct Sample {
   double speed_uncertainty = 0;  ///< the same unit: how far that mean can be from the true one between the instants at
                                  ///< which the two were latched. From the times of requests and replies and from one
                                  ///< count of each position; errors and noise of the encoder are not in it
-  Time speed_delay{};
-  JointAngles angles{};   ///< of joint and motor, where the address says how the encoder sits in its drive
-  Trouble trouble{};      ///< failed
-  std::string message{};  ///< lost, absent, back, restarted
+  Time speed_delay{};            ///< Time by which the speed lags behind the position.
+  JointAngles angles{};          ///< of joint and motor, where the address says how the encoder sits in its drive
+  Trouble trouble{};             ///< failed
+  std::string message{};         ///< lost, absent, back, restarted
 
   /// Whether `reading.singleturn` can be used. Of turns `reading.multiturn_validity()` says it, of the position that
   /// goes on past the counter's end `position_valid`.
@@ -102,7 +103,9 @@ class Encoder {
  public:
   /// Nothing is opened yet. `period` is the distance of readings that is intended; 0: as near as can be.
   Encoder(const EncoderAddress& address, Time period);
+  /// Moves the encoder; the other one may only be destroyed or assigned to.
   Encoder(Encoder&&) noexcept;
+  /// Moves the encoder; the other one may only be destroyed or assigned to.
   Encoder& operator=(Encoder&&) noexcept;
   ~Encoder();
 
@@ -125,6 +128,7 @@ class Encoder {
   /// A command of the unit by its name; of arguments that are left out the defaults count. Nobody is asked, even if it
   /// changes the encoder, but what is written is read back. Throws EncoderFailure, os::Failure, UsageError, Cancelled.
   Answer run(std::string_view command, std::span<const std::int64_t> arguments = {});
+  /// Runs a command of the unit with arguments in their order.
   Answer run(std::string_view command, std::initializer_list<std::int64_t> arguments) {
     return run(command, std::span(arguments.begin(), arguments.size()));
   }
@@ -150,7 +154,9 @@ class Encoder {
   /// The position starts again from the next reading: after a command that moves the zero.
   void forget_position();
 
+  /// Returns the unit of the encoder.
   [[nodiscard]] const Unit& unit() const;
+  /// Returns the options of the encoder.
   [[nodiscard]] const Options& options() const;
   /// How it sits in its drive, as its address says.
   [[nodiscard]] const Joint& joint() const;
@@ -176,6 +182,7 @@ class Encoder {
 
   /// Connected unless the last sample said otherwise.
   [[nodiscard]] Connection& connection() { return *connection_; }
+  /// Returns the connection, which is shared with everything that reads this encoder.
   [[nodiscard]] const Connection& connection() const { return *connection_; }
 
  private:
@@ -214,18 +221,26 @@ class Encoder {
 /// An input range of samples, at equal distances that do not drift; one that was missed is left out.
 class Samples {
  public:
+  /// Type of the items.
   using value_type = Sample;
+  /// Iterator of the range.
   using Iterator = InputIterator<Samples>;
 
+  /// Samples `encoder`, which must outlive this object.
   Samples(Encoder& encoder, const SampleChoices& choices);
+  /// Moves the samples; the other object may only be destroyed or assigned to.
   Samples(Samples&&) noexcept;
+  /// Moves the samples; the other object may only be destroyed or assigned to.
   Samples& operator=(Samples&&) noexcept;
   ~Samples();
 
   /// Takes the first sample. Once.
   [[nodiscard]] Iterator begin();
+  /// Returns the end of the range.
   [[nodiscard]] static Iterator::End end() { return {}; }
+  /// Returns the sample at the iterator, or null at the end. It is valid until `advance`.
   [[nodiscard]] const Sample* current() const { return ended_ ? nullptr : &sample_; }
+  /// Waits for the next sample.
   void advance();
 
  private:

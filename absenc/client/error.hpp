@@ -23,6 +23,7 @@ using Cancelled = os::Ended;
 
 /// The deadline of the caller has come.
 struct DeadlinePassed : Cancelled {
+  /// Returns what happened.
   [[nodiscard]] const char* what() const noexcept override { return "the deadline passed before there was a reading"; }
 };
 

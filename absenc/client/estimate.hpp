@@ -9,8 +9,8 @@ namespace absenc::client {
 
 /// A value, and how far the true one is from it at most.
 struct Estimate {
-  double value = 0;
-  double uncertainty = 0;
+  double value = 0;        ///< The estimated value.
+  double uncertainty = 0;  ///< Greatest distance of the true value from `value`.
 };
 
 /// "12.0 ± 0.3": as many digits as the uncertainty leaves, at most four behind the point. The uncertainty is rounded up

@@ -16,8 +16,8 @@ namespace absenc::client {
 
 /// A whole frame, its check included: bytes, or of a clocked line bits packed MSB first.
 struct CheckedFrame {
-  std::vector<std::uint8_t> bytes;
-  std::size_t bits = 0;  ///< 0: whole bytes
+  std::vector<std::uint8_t> bytes;  ///< The bytes, with the checksum.
+  std::size_t bits = 0;             ///< 0: whole bytes
 };
 
 /// One way to check the frames. Positions count bytes, or bits in frames of bits, from 0 on.
@@ -34,11 +34,12 @@ struct FoundCheck {
   unsigned frames_to_settle = 0;     ///< so many more, with other data, would leave no doubt
 };
 
+/// Result of a search for the checksum of frames.
 struct CheckFindings {
   std::vector<FoundCheck> checks{};  ///< the least likely to be chance first
   std::size_t shortest = 0;          ///< frame, in its positions
-  std::size_t longest = 0;
-  bool is_open = false;  ///< the frames tell too little to list all that explains them
+  std::size_t longest = 0;           ///< Length of the longest frame, in bytes.
+  bool is_open = false;              ///< the frames tell too little to list all that explains them
   std::size_t odd = 0;   ///< 1 for the first: the one frame without which a check explains the others; 0: none
   std::string advice{};  ///< a sentence about what is still open, or why there is nothing; "": nothing is
 };
@@ -49,7 +50,7 @@ struct CheckFindings {
 
 /// How a unit is told of a check.
 struct CheckOptions {
-  const Unit* unit;
+  const Unit* unit;                  ///< The unit whose checksum it is.
   std::vector<std::string> options;  ///< "crc_width=16"; none where it has this check anyhow
 };
 

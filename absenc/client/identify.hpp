@@ -16,8 +16,8 @@ namespace absenc::client {
 
 /// An encoder that explains what came.
 struct Found {
-  const Unit* unit = nullptr;
-  Options options{};
+  const Unit* unit = nullptr;           ///< The unit that explains the replies.
+  Options options{};                    ///< Options with which it does.
   std::vector<std::string> settings{};  ///< the fewest that make these options: "model=23-bit"
   std::string address{};                ///< of a line: to open it by, "tformat:/dev/ttyUSB0?model=23-bit"
   std::string encoder{};                ///< "address=3": which of several on the line; "": the only one
@@ -29,12 +29,14 @@ struct Found {
   Answer identity{};                    ///< of a line: what it says of itself, as its serial number
 };
 
+/// Result of `identify`: the units that explain what the port received.
 struct Identified {
   std::vector<Found> found{};        ///< the likeliest first
   std::vector<std::string> notes{};  ///< sentences: what could not be tried, or is damaged
   bool is_complete = true;           ///< false: the time was over before all was tried
 };
 
+/// What `identify` may send, and how long it listens.
 struct IdentifyChoices {
   Time limit = std::chrono::seconds(60);                    ///< of the whole search
   std::function<void(const std::string& what)> progress{};  ///< what is tried now

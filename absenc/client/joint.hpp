@@ -27,6 +27,7 @@ struct Joint {
   double pole_pair_mm = 0;  ///< length of a pole pair of a linear motor; 0: not set; linear encoders only
   bool is_set = false;      ///< direction, offset or gear: there is a joint to show
 
+  /// Returns whether the encoder of the motor is configured.
   [[nodiscard]] bool has_motor() const { return pole_pairs != 0 || pole_pair_mm > 0; }
 };
 
@@ -36,9 +37,10 @@ struct JointAngles {
   /// to whole turns.
   std::optional<double> joint_deg{};
   std::optional<double> joint_mm{};  ///< of linear encoders
+  /// Speed of a rotary joint in revolutions per minute; without a value if it is not known.
   std::optional<Estimate> joint_speed_rpm{};
-  std::optional<Estimate> joint_speed_mm_s{};
-  std::optional<double> electrical_deg{};  ///< 0 to below 360
+  std::optional<Estimate> joint_speed_mm_s{};  ///< Speed of a linear joint in mm/s; without a value if it is not known.
+  std::optional<double> electrical_deg{};      ///< 0 to below 360
 };
 
 /// Degrees of the joint. `position_deg`: of the encoder, past the end of a turn.

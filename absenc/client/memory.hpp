@@ -15,10 +15,13 @@
 
 namespace absenc::client {
 
+/// Place of a byte in the memory of an encoder.
 struct MemoryAddress {
-  std::uint32_t page = 0;
-  std::uint32_t address = 0;
+  std::uint32_t page = 0;     ///< Page, 0 where the memory has no pages.
+  std::uint32_t address = 0;  ///< Address within the page.
+  /// Compares page and address.
   friend constexpr bool operator==(const MemoryAddress&, const MemoryAddress&) = default;
+  /// Orders by page, then by address.
   friend constexpr bool operator<(const MemoryAddress& one, const MemoryAddress& other) {
     return one.page != other.page ? one.page < other.page : one.address < other.address;
   }
@@ -28,8 +31,8 @@ using MemoryImage = std::map<MemoryAddress, std::uint8_t>;
 
 /// Consecutive addresses of one page.
 struct MemoryRun {
-  MemoryAddress first;
-  std::vector<std::uint8_t> bytes;
+  MemoryAddress first;              ///< Place of the first byte.
+  std::vector<std::uint8_t> bytes;  ///< The bytes, all on one page.
 };
 
 /// In order; a run ends after `longest` bytes.
@@ -69,8 +72,10 @@ using MemoryProgress = std::function<void(std::size_t done, std::size_t all)>;
 /// fails, and what the port throws.
 class Memory {
  public:
+  /// Reads and writes the memory behind `connection`, which must outlive this object.
   explicit Memory(Connection& connection) : connection_(&connection) {}
 
+  /// Returns the unit of the encoder.
   [[nodiscard]] const Unit& unit() const;
 
   /// Reads the position: an encoder of another model than was said shows itself by that. Its memory does not tell, and
@@ -106,12 +111,15 @@ class MemoryChange {
   /// After a failure: asks whether the byte is there whose write was cut short.
   void settle();
 
+  /// Returns the wanted bytes.
   [[nodiscard]] const MemoryImage& wanted() const { return wanted_; }
   /// What the encoder had at the addresses of `wanted`.
   [[nodiscard]] const MemoryImage& found() const { return found_; }
   /// What it had not, as it is wanted.
   [[nodiscard]] const MemoryImage& differing() const { return differing_; }
+  /// Returns the bytes that were written and verified.
   [[nodiscard]] const MemoryImage& written() const { return written_; }
+  /// Returns the wanted bytes that were not written.
   [[nodiscard]] MemoryImage not_written() const;
   /// The state of the last byte to be written; not_sent before the first.
   [[nodiscard]] ChangeState state() const { return state_; }

@@ -14,13 +14,14 @@ namespace absenc::client {
 
 /// What one field of flags of the unit says.
 struct Flags {
-  const FieldInfo* field;
+  const FieldInfo* field;                      ///< The field that names the bits; null: none.
   std::uint32_t bits;                          ///< those that are raised
   std::uint32_t reported = ~std::uint32_t{0};  ///< the others are neither raised nor clear: nobody has said
 
   /// Whether each flag that this encoder has was reported.
   [[nodiscard]] bool is_complete() const;
 
+  /// Compares field and bits.
   friend bool operator==(const Flags&, const Flags&) = default;
 };
 

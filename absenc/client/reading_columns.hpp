@@ -16,6 +16,7 @@ class ReadingColumns {
   /// `unit` must outlive it.
   ReadingColumns(const Unit& unit, const Options& options);
 
+  /// Returns the columns of each row, in their order.
   [[nodiscard]] std::span<const Column> columns() const { return columns_; }
   /// One value for each column: nothing for what the reading does not carry. In place of a position in degrees or
   /// millimetres that does not hold there is `Invalid`, of flags that nobody has reported `Unknown`.

@@ -6,12 +6,14 @@
 
 namespace absenc::client {
 
+/// How many readings a recording has, and how many are missing.
 struct RecordCounts {
-  std::uint64_t readings = 0;
+  std::uint64_t readings = 0;  ///< Number of readings.
   std::uint64_t failures = 0;  ///< attempts to read
-  std::uint64_t gaps = 0;
-  std::uint64_t missed = 0;  ///< readings, in these gaps
+  std::uint64_t gaps = 0;      ///< Number of gaps, in which readings were due and not taken.
+  std::uint64_t missed = 0;    ///< readings, in these gaps
 
+  /// Adds the counts of another recording.
   RecordCounts& operator+=(const RecordCounts& other) {
     readings += other.readings;
     failures += other.failures;

@@ -20,6 +20,7 @@ namespace absenc::client {
 class RecordFile;
 struct RecordHeader;
 
+/// Where a recording goes, and what of the readings is kept.
 struct RecordingSettings {
   std::string path;         ///< ending in .csv; .jsonl or .ndjson: JSON lines; .h5: HDF5. There is no such file yet
   std::string encoder;      ///< what the header calls it
@@ -47,6 +48,7 @@ class Recording {
 
   /// Of what is in the files.
   [[nodiscard]] RecordCounts counts() const;
+  /// Returns the number of bytes written so far.
   [[nodiscard]] std::uint64_t bytes() const;
   [[nodiscard]] Time start() const { return start_; }  ///< of os::now
   /// The file, or its parts so far in their order.

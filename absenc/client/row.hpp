@@ -16,6 +16,7 @@ namespace absenc::client {
 
 enum class Type : std::uint8_t { int64, uint64, real, boolean, flags, text, bytes };
 
+/// Description of a value in each row.
 struct Column {
   /// How it is shown where all is text.
   struct Look {
@@ -26,22 +27,24 @@ struct Column {
     bool is_exchange = false;
   };
 
-  std::string_view name;
-  std::string_view unit;  ///< "" for a plain number
-  Type type;
-  std::string_view meaning;
-  Look look{};
+  std::string_view name;     ///< Name of the column, in `snake_case`.
+  std::string_view unit;     ///< "" for a plain number
+  Type type;                 ///< Type of the values.
+  std::string_view meaning;  ///< Meaning of the value, as a phrase.
+  Look look{};               ///< How a table for people shows it.
 };
 
 using ByteVector = std::vector<std::uint8_t>;
 
 /// In place of a value that was told but does not hold: it is never shown.
 struct Invalid {
+  /// Compares equal: there is one kind of invalid value.
   friend bool operator==(const Invalid&, const Invalid&) = default;
 };
 
 /// In place of a value that no reply has reported so far: alarms that a reply does not carry, whether a position holds.
 struct Unknown {
+  /// Compares equal: there is one kind of unknown value.
   friend bool operator==(const Unknown&, const Unknown&) = default;
 };
 
@@ -64,6 +67,7 @@ using Value = std::variant<std::monostate, std::int64_t, std::uint64_t, double, 
 /// The same with its unit: "80 degC".
 [[nodiscard]] std::string to_text(const Column& column, const Value& value);
 
+/// Values with their columns. Both are valid while their owner is unchanged.
 struct Row {
   std::span<const Column> columns;  ///< of the maker of the row
   std::vector<Value> values;        ///< one for each
@@ -82,12 +86,14 @@ struct Row {
 
 /// What a command told: a row that knows its columns.
 struct Answer {
-  std::vector<Column> columns;
-  std::vector<Value> values;
+  std::vector<Column> columns;  ///< Descriptions of the values.
+  std::vector<Value> values;    ///< Values in the order of the columns.
   /// The names of the columns: those of a word that the user described are no longer there than the encoder is.
   std::vector<std::shared_ptr<const std::string>> names;
 
+  /// Returns columns and values as a row, which is valid while this answer is.
   [[nodiscard]] Row row() const { return {columns, values}; }
+  /// Returns the value of the column `name`; throws UsageError if there is no such column.
   [[nodiscard]] const Value& operator[](std::string_view name) const;
 };
 
@@ -95,10 +101,11 @@ struct Answer {
 /// reported whether it does. A field that comes again, as in a list, has its last value.
 class AnswerSink final : public FieldSink {
  public:
+  /// Adds a column with its value.
   void put(const FieldValue& value) override;
   void put_reading(const Reading& reading) override;
 
-  Answer answer;
+  Answer answer;  ///< The columns and values so far.
 
  private:
   std::vector<FieldInfo> fields_;

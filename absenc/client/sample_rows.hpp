@@ -19,6 +19,7 @@ namespace absenc::client {
 /// what came in place of a reading.
 class SampleRows {
  public:
+  /// Whether rows also hold the motion that is computed from readings.
   enum class With : std::uint8_t { reading, motion };
 
   /// Times count from `start`, which is one of os::now.
@@ -26,6 +27,7 @@ class SampleRows {
   /// uncertainty, `electrical_deg`.
   SampleRows(const Unit& unit, const Options& options, Time start, With with, const Joint& joint = {});
 
+  /// Returns the columns of each row, in their order.
   [[nodiscard]] std::span<const Column> columns() const { return columns_; }
   /// Valid until the next.
   [[nodiscard]] const Row& of(const Sample& sample);

@@ -16,9 +16,10 @@ namespace absenc::client {
 
 /// How a setting is written and how it is read: null when nothing reads it.
 struct Setting {
-  const Command* setter;
-  const Command* getter;
+  const Command* setter;  ///< Command that writes the setting; null: read only.
+  const Command* getter;  ///< Command that reads the setting; null: write only.
 
+  /// Returns the name of the setting.
   [[nodiscard]] std::string_view name() const { return getter != nullptr ? getter->name : setter->name; }
 };
 
@@ -35,6 +36,7 @@ struct Setting {
 /// Throws UsageError, which names the nearest, when there is none of that name; and when it can only be read.
 [[nodiscard]] Setting require_setting(const Unit& unit, std::string_view name);
 
+/// A setting with its values before and after.
 struct SettingChange {
   Answer now;           ///< as the encoder tells when it is asked anew; of what cannot be read, as it was written
   bool was_so = false;  ///< nothing was sent, because it was so already
@@ -48,8 +50,10 @@ class Connection;
 /// fails, UsageError, and what the port throws.
 class Settings {
  public:
+  /// Reads and writes the settings behind `connection`, which must outlive this object.
   explicit Settings(Connection& connection) : connection_(&connection) {}
 
+  /// Returns the value of a setting.
   [[nodiscard]] Answer get(std::string_view name);
   /// Writes, and compares what the encoder is set to then, value by value. Nobody is asked. What reaches the encoder
   /// by this setting reaches it by the new one. Throws also Failure: it says what was written, as far as that is known.

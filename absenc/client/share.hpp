@@ -8,11 +8,14 @@ namespace absenc::client {
 
 /// How many of how many, with the interval of 95 % confidence in which the true rate is (Wilson).
 struct Share {
-  std::uint64_t count = 0;
-  std::uint64_t of = 0;
+  std::uint64_t count = 0;  ///< Number of hits.
+  std::uint64_t of = 0;     ///< Number of tries.
 
+  /// Returns the ratio of hits, 0 to 1; 0 without tries.
   [[nodiscard]] double rate() const { return of == 0 ? 0 : static_cast<double>(count) / static_cast<double>(of); }
+  /// Returns the lower end of the interval of 95 % probability, 0 to 1.
   [[nodiscard]] double low() const;
+  /// Returns the upper end of the interval of 95 % probability, 0 to 1.
   [[nodiscard]] double high() const;
 };
 

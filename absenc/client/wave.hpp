@@ -13,6 +13,7 @@
 
 namespace absenc::client {
 
+/// What `wave` draws, and how many times.
 struct WaveChoices {
   std::vector<std::string> commands{};   ///< with arguments, as "memory-read 5", one after the other; none: reads
   std::uint64_t count = 1;               ///< results, at least 1
@@ -23,11 +24,12 @@ struct WaveChoices {
   std::function<void(const std::string& what)> progress{};
 };
 
+/// Result of `wave`.
 struct Waved {
-  std::uint64_t results = 0;
-  std::uint64_t failures = 0;  ///< of them
-  Time time{};                 ///< of the whole waveform
-  std::vector<std::string> wires{};
+  std::uint64_t results = 0;         ///< Number of readings that were drawn.
+  std::uint64_t failures = 0;        ///< of them
+  Time time{};                       ///< of the whole waveform
+  std::vector<std::string> wires{};  ///< Names of the wires in the file.
 };
 
 /// Writes `file`, whose name ends in .vcd, .sr (sigrok) or .csv (as Saleae Logic 2). `text`: "tformat?motion=rpm=60",

@@ -30,24 +30,26 @@ struct Reading {
   unsigned singleturn_bits = 0;        ///< 0: the reply carries no single-turn position
   unsigned multiturn_bits = 0;         ///< 0: the reply carries no revolutions
   unsigned singleturn_valid_bits = 0;  ///< number of valid bits, counted from the top; 0: do not use the position
-  bool multiturn_valid = false;
-  bool singleturn_known = true;  ///< false: no reply so far reports whether the position is valid; it then counts as
-                                 ///< not valid
-  bool multiturn_known = true;        ///< false: no reply so far reports whether the turns are valid
-  bool multiturn_signed = false;      ///< the encoder counts turns below zero: `multiturn` is two's complement of
-                                      ///< `multiturn_bits`
-  double unit_um = 0;                 ///< linear encoders: micrometres per count of `singleturn`; 0: rotary encoder
-  bool ready = true;                  ///< false while the encoder reports that it is starting
-  std::uint32_t status = 0;           ///< bits named by the unit's status field, then those of its second status field
-  std::uint32_t alarms = 0;           ///< bits named by the unit's alarms field, then those of its second alarms field
+  bool multiturn_valid = false;        ///< Whether `multiturn` can be trusted.
+  bool singleturn_known = true;   ///< false: no reply so far reports whether the position is valid; it then counts as
+                                  ///< not valid
+  bool multiturn_known = true;    ///< false: no reply so far reports whether the turns are valid
+  bool multiturn_signed = false;  ///< the encoder counts turns below zero: `multiturn` is two's complement of
+                                  ///< `multiturn_bits`
+  double unit_um = 0;             ///< linear encoders: micrometres per count of `singleturn`; 0: rotary encoder
+  bool ready = true;              ///< false while the encoder reports that it is starting
+  std::uint32_t status = 0;       ///< bits named by the unit's status field, then those of its second status field
+  std::uint32_t alarms = 0;       ///< bits named by the unit's alarms field, then those of its second alarms field
   std::uint32_t status_reported = 0;  ///< bits of `status` that were reported; other bits are unknown, not clear
   std::uint32_t alarms_reported = 0;  ///< bits of `alarms` that were reported; other bits are unknown
   Time latched{};                     ///< time at which the encoder sampled the position
   Time received{};                    ///< time at which the last byte of the reply arrived
 
+  /// Returns whether all bits of the single-turn position can be trusted.
   [[nodiscard]] constexpr bool singleturn_valid() const {
     return singleturn_bits != 0 && singleturn_valid_bits == singleturn_bits;
   }
+  /// Returns whether the single-turn position can be trusted, and if not, whether the encoder reported that.
   [[nodiscard]] constexpr Validity singleturn_validity() const {
     if (singleturn_bits == 0) return Validity::absent;
     if (!singleturn_known) return Validity::unknown;
@@ -58,6 +60,7 @@ struct Reading {
     if (multiturn_signed && multiturn_bits != 0) return with_sign(multiturn, multiturn_bits);
     return static_cast<std::int64_t>(multiturn);
   }
+  /// Returns whether the turns can be trusted, and if not, whether the encoder reported that.
   [[nodiscard]] constexpr Validity multiturn_validity() const {
     if (multiturn_bits == 0) return Validity::absent;
     if (!multiturn_known) return Validity::unknown;

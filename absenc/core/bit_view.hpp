@@ -16,10 +16,12 @@
 
 namespace absenc {
 
+/// A sequence of bits in bytes, the highest bit of each byte first.
 struct BitView {
-  Bytes bytes{};
+  Bytes bytes{};         ///< The bytes that hold the bits.
   std::size_t size = 0;  ///< number of bits; `bytes` has room for them
 
+  /// Returns the bit at `index`, which is less than `size`.
   [[nodiscard]] constexpr bool operator[](std::size_t index) const {
     return ((bytes[index / 8] >> (7 - index % 8)) & 1) != 0;
   }
@@ -78,14 +80,16 @@ struct BitView {
 
 /// A bit sequence of up to 64 bits in one number, the first bit as the most significant. Has `load` like BitView.
 struct BitNumber {
-  std::uint64_t number;
-  unsigned size;  ///< 1 to 64
+  std::uint64_t number;  ///< The bits as a number, the first bit highest.
+  unsigned size;         ///< 1 to 64
 
+  /// Returns `count` bits from `first` as a number, the first bit highest.
   [[nodiscard]] constexpr std::uint64_t load(std::size_t first, unsigned count) const {
     return count == 0 ? 0 : number >> (size - first - count) & low_mask(count);
   }
 };
 
+/// A sequence of bits with room for `Capacity` of them.
 template <std::size_t Capacity>
 class BitBuffer {
  public:
@@ -100,11 +104,16 @@ class BitBuffer {
     }
     return true;
   }
+  /// Removes all bits.
   constexpr void clear() { *this = {}; }
 
+  /// Returns the number of bits.
   [[nodiscard]] constexpr std::size_t size() const { return size_; }
+  /// Returns the greatest number of bits.
   [[nodiscard]] static constexpr std::size_t capacity() { return Capacity; }
+  /// Returns the bytes that hold the bits; unused bits of the last byte are 0.
   [[nodiscard]] constexpr Bytes bytes() const { return Bytes(bytes_).first((size_ + 7) / 8); }
+  /// Returns the bits; valid while this buffer is unchanged.
   [[nodiscard]] constexpr BitView view() const { return {bytes_, size_}; }
 
  private:

@@ -35,15 +35,23 @@ class Buffer {
     return true;
   }
 
+  /// Removes all items.
   constexpr void clear() { size_ = 0; }
 
+  /// Returns the number of items.
   [[nodiscard]] constexpr std::size_t size() const { return size_; }
+  /// Returns whether there are no items.
   [[nodiscard]] constexpr bool empty() const { return size_ == 0; }
+  /// Returns the greatest number of items.
   [[nodiscard]] static constexpr std::size_t capacity() { return Capacity; }
 
+  /// Returns the item at `index`, which is less than `size()`.
   constexpr Item& operator[](std::size_t index) { return items_[index]; }
+  /// Returns the item at `index`, which is less than `size()`.
   constexpr const Item& operator[](std::size_t index) const { return items_[index]; }
+  /// Returns the items; valid while this buffer exists and is not cleared.
   [[nodiscard]] constexpr std::span<const Item> view() const { return {items_.data(), size_}; }
+  /// Returns the items, as `view` does.
   constexpr operator std::span<const Item>() const { return view(); }
 
  private:

@@ -15,13 +15,14 @@ namespace absenc {
 
 /// Parameters of a CRC. `poly` is in normal notation (the highest power left out): x8+x5+x3+x2+x+1 is 0x2F.
 struct CrcParameters {
-  unsigned width;  ///< 3 to 16
-  std::uint16_t poly;
-  std::uint16_t init;
-  bool refin;
-  bool refout;
-  std::uint16_t xorout;
+  unsigned width;        ///< 3 to 16
+  std::uint16_t poly;    ///< Polynomial without its highest term.
+  std::uint16_t init;    ///< Value of the register before the first byte.
+  bool refin;            ///< Whether each byte is processed lowest bit first.
+  bool refout;           ///< Whether the register is reflected before `xorout`.
+  std::uint16_t xorout;  ///< Value that is combined with the result by exclusive OR.
 
+  /// Compares all parameters.
   friend constexpr bool operator==(const CrcParameters&, const CrcParameters&) = default;
 };
 
@@ -56,12 +57,14 @@ class Crc {
   static_assert(parameters.width >= 3 && parameters.width <= 16, "widths from 3 to 16 bits");
 
  public:
+  /// Smallest type that holds a checksum.
   using Word = std::conditional_t<(parameters.width <= 8), std::uint8_t, std::uint16_t>;
 
   constexpr Crc() = default;
   /// Starts from `init` instead of `parameters.init`, with the same table.
   constexpr explicit Crc(std::uint16_t init) : remainder_(initial(init)) {}
 
+  /// Adds a byte.
   constexpr void update(std::uint8_t byte) {
     if constexpr (table_kind == CrcTable::byte) {
       step<8>(byte);
@@ -74,10 +77,12 @@ class Crc {
     }
   }
 
+  /// Adds bytes in their order.
   constexpr void update(Bytes bytes) {
     for (const std::uint8_t byte : bytes) update(byte);
   }
 
+  /// Returns the checksum of all bytes so far.
   [[nodiscard]] constexpr Word value() const {
     std::uint32_t result = parameters.refin ? remainder_ : remainder_ >> spare_bits;
     if constexpr (parameters.refin != parameters.refout) {
@@ -86,6 +91,7 @@ class Crc {
     return static_cast<Word>((result ^ parameters.xorout) & low_mask(parameters.width));
   }
 
+  /// Returns the checksum of `bytes`.
   [[nodiscard]] static constexpr Word of(Bytes bytes) {
     Crc crc;
     crc.update(bytes);

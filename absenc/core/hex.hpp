@@ -43,9 +43,11 @@ namespace absenc {
 /// A string literal as a template argument.
 template <std::size_t size>
 struct HexLiteral {
+  /// Takes a string literal.
   consteval HexLiteral(const char (&text)[size]) { std::copy_n(text, size, characters); }
+  /// Returns the characters without the terminating zero.
   [[nodiscard]] constexpr std::string_view view() const { return {characters, size - 1}; }
-  char characters[size]{};
+  char characters[size]{};  ///< The characters, with the terminating zero.
 };
 
 namespace detail {

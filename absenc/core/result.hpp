@@ -36,6 +36,7 @@ enum class Error : std::uint8_t {
   not_still,
 };
 
+/// The texts of an error.
 struct ErrorText {
   std::string_view name;         ///< as printed by the command and written in test vectors
   std::string_view description;  ///< what happened, valid for every frame and link
@@ -80,18 +81,30 @@ template <class T>
 class [[nodiscard]] Result {
  public:
   constexpr Result() = default;
+  /// Holds a value.
   constexpr Result(const T& value) : value_(value) {}
+  /// Holds a value.
   constexpr Result(T&& value) : value_(std::move(value)) {}
+  /// Holds an error, which is not `Error::none`.
   constexpr Result(Error error) : error_(error) {}
 
+  /// Returns whether there is a value.
   [[nodiscard]] constexpr bool has_value() const { return error_ == Error::none; }
+  /// Returns whether there is a value.
   constexpr explicit operator bool() const { return has_value(); }
+  /// Returns the value, if there is one.
   constexpr const T& operator*() const { return value_; }
+  /// Returns the value, if there is one.
   constexpr T& operator*() { return value_; }
+  /// Returns the value, if there is one.
   constexpr const T* operator->() const { return &value_; }
+  /// Returns the value, if there is one.
   constexpr T* operator->() { return &value_; }
+  /// Returns the value, if there is one.
   [[nodiscard]] constexpr const T& value() const { return value_; }
+  /// Returns the error; `Error::none` if there is a value.
   [[nodiscard]] constexpr Error error() const { return error_; }
+  /// Returns the value, or `other` if there is none.
   [[nodiscard]] constexpr T value_or(T other) const { return has_value() ? value_ : other; }
 
  private:

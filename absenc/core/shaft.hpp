@@ -8,6 +8,7 @@
 
 namespace absenc {
 
+/// Position and motion of a shaft at one time.
 struct ShaftState {
   std::int64_t position = 0;        ///< unit 2^-32 revolution; the upper 32 bits count revolutions, negative below zero
   std::int32_t speed_millirpm = 0;  ///< 1/1000 revolutions per minute, counter-clockwise positive
@@ -16,6 +17,7 @@ struct ShaftState {
 
 /// A motion as a function of time. Implementations accept any times, in any order.
 struct Shaft {
+  /// Returns position and motion at `time`.
   [[nodiscard]] virtual ShaftState at(Time time) const = 0;
 
  protected:

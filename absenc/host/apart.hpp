@@ -16,14 +16,17 @@ enum class Times : std::uint8_t { latched, arrived };
   return unit.link == LinkKind::can || (unit.streams != nullptr && unit.streams(options));
 }
 
+/// The time between readings, as they are used.
 class Apart {
  public:
+  /// Counts the times that `times` selects.
   explicit constexpr Apart(Times times) : times_(times) {}
 
   /// Readings that came together after a wait were taken during that wait, or while it was handed over, which takes
   /// less long.
   [[nodiscard]] constexpr Time since_last(Time latched) const { return has_waited(latched) ? latched - last_ : wait_; }
 
+  /// Adds a reading that was latched at this time.
   constexpr void add(Time latched) {
     if (started_ && has_waited(latched)) {
       wait_ = latched - last_;

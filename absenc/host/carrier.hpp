@@ -32,6 +32,7 @@ class Carrier {
     quiet_told_ = true;  // until something was sent
     go_on(now);
   }
+  /// Returns whether a conversation runs.
   [[nodiscard]] bool is_busy() const { return machine_ != nullptr; }
 
   /// The last bit of the transfer, or of the pulse, is out.

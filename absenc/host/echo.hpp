@@ -21,6 +21,7 @@ enum class EchoMode : std::uint8_t {
 /// Stands between a conversation and its port.
 class EchoFilter final : public Machine<std::uint8_t> {
  public:
+  /// Handles the echo of the adapter as `mode` says.
   explicit EchoFilter(EchoMode mode) : mode_(mode) {}
 
   /// By whose rules replies are judged from now on; both must outlive that. Without, by their number of bytes alone.
@@ -38,7 +39,9 @@ class EchoFilter final : public Machine<std::uint8_t> {
   /// too long looks like an echo at first.
   void conclude(bool good);
 
+  /// Takes an event of the port.
   void feed(const Event<std::uint8_t>& event) override;
+  /// Returns the next step of the port.
   Step<std::uint8_t> next(Time now) override;
 
   /// What is known: `automatic` while nothing is.

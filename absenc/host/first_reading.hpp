@@ -20,8 +20,10 @@ class FirstReading {
   /// 0: nobody says it, which counts as the usual limit of `SpeedLimit`.
   explicit constexpr FirstReading(std::uint32_t maximum_rpm)
       : FirstReading(Reach::of_shaft(maximum_rpm != 0 ? maximum_rpm : SpeedLimit{}.rpm)) {}
+  /// Accepts readings that the shaft can reach.
   explicit constexpr FirstReading(const Reach& reach) : reach_(reach) {}
 
+  /// Forgets all readings.
   constexpr void start_again() {
     last_ = {};
     has_step_ = false;
@@ -54,6 +56,7 @@ class FirstReading {
     if (!has_step_ || moved / most_excess > reached || distance(step_, place.bits) <= allowed) return false;
     return distance(step - step_, place.bits) <= least(allowed, most_told(place.bits) / 8);
   }
+  /// Returns whether the shaft can have moved to `reading` since the one before.
   [[nodiscard]] constexpr bool is_near(const Reading& reading) const {
     return is_near(reading, reading.latched - latched_);
   }

@@ -9,10 +9,12 @@ namespace absenc::host {
 
 /// The interval in which a position was latched. Between request and reply nobody knows it better.
 struct LatchTime {
-  Time earliest{};
-  Time latest{};
+  Time earliest{};  ///< Earliest time at which the position can have been latched.
+  Time latest{};    ///< Latest time at which the position can have been latched.
 
+  /// Returns the middle of the interval.
   [[nodiscard]] constexpr Time middle() const { return earliest + (latest - earliest) / 2; }
+  /// Returns the length of the interval.
   [[nodiscard]] constexpr Time width() const { return latest - earliest; }
 };
 

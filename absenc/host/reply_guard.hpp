@@ -37,11 +37,14 @@ class ReplyGuard final : public Machine<Item> {
   /// Serves this conversation from now on; `unit` and `options` must outlive it. `may_repeat`: whether each of its
   /// requests may be sent once more.
   void attach(Machine<Item>& inner, const Unit& unit, const Options& options, bool may_repeat);
+  /// Returns whether this guard belongs to `inner`.
   [[nodiscard]] bool serves(const Machine<Item>& inner) const { return inner_ == &inner; }
   /// The conversation has ended, or is not gone on with.
   void conclude() { close(); }
 
+  /// Takes an event of the port.
   void feed(const Event<Item>& event) override;
+  /// Returns the next step of the port.
   Step<Item> next(Time now) override;
 
   /// Replies that came after their time and were dropped.

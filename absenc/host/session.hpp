@@ -20,6 +20,7 @@
 
 namespace absenc::host {
 
+/// Counts of conversations and of their errors.
 struct Counters {
   std::uint64_t good = 0;       ///< conversations that ended well
   std::uint64_t repeated = 0;   ///< attempts after an error
@@ -27,6 +28,7 @@ struct Counters {
   std::uint64_t discarded = 0;  ///< damaged frames of streams, whether an error reported them or not
   std::array<std::uint64_t, error_texts.size()> errors{};  ///< of each kind, repeated ones included
 
+  /// Returns the number of conversations that failed.
   [[nodiscard]] constexpr std::uint64_t bad() const {
     std::uint64_t sum = 0;
     for (const std::uint64_t count : errors) sum += count;
@@ -52,6 +54,7 @@ enum class Take : std::uint8_t {
   every,   // the one after the last, however long ago it came
 };
 
+/// Runs the commands of one encoder over a port and counts what happened.
 template <class Item>
 class Session {
  public:
@@ -78,6 +81,7 @@ class Session {
     streaming_ = false;  // only readings go on
     return conversation;
   }
+  /// Runs a command once; returns the conversation, or null if the command does not exist for these options.
   const Conversation<Item>* run(const Command& command, Arguments arguments = {}) {
     return run(command, arguments, [](const Conversation<Item>&) { return true; });
   }
@@ -119,6 +123,7 @@ class Session {
       if (number == most || (known_ && !FirstReading::has_position(*reading))) return conversation;
     }
   }
+  /// Reads with a command; returns the conversation, or null if the command does not exist for these options.
   const Conversation<Item>* read(const Command& command, Take take = Take::newest) {
     return read(command, take, [](const Reading&) {});
   }
@@ -174,7 +179,9 @@ class Session {
   }
   /// Whether the last reading was compared with another, and agreed.
   [[nodiscard]] bool confirmed() const { return confirmed_; }
+  /// Returns the counts so far.
   [[nodiscard]] const Counters& counters() const { return counters_; }
+  /// Returns the filter of echoes.
   [[nodiscard]] const EchoFilter& echo() const { return echo_; }
 
  private:

@@ -61,6 +61,7 @@ class Reach {
     for (; factor < 0x8000'0000 && shift < 100; factor *= 2) ++shift;
     return {factor < 0xFFFF'FFFF ? static_cast<std::uint32_t>(factor) + 1 : 0xFFFF'FFFF, shift, false};
   }
+  /// Returns how far a shaft can move under `limit`, in counts of `resolution`.
   [[nodiscard]] static constexpr Reach of(const SpeedLimit& limit, const Resolution& resolution) {
     return resolution.unit_um > 0 ? of_carriage(limit.mm_s, resolution.unit_um) : of_shaft(limit.rpm);
   }

@@ -18,6 +18,7 @@ namespace absenc::host {
 /// Distribution of latencies up to 68 s in a fixed 4 kB. A percentile is at most 1/32 too long, never too short.
 class Latencies {
  public:
+  /// Adds the latency of a reply.
   constexpr void add(Time latency) {
     const std::int64_t nanoseconds = std::clamp<std::int64_t>(latency.count(), 0, most);
     ++counts_[bucket(static_cast<std::uint64_t>(nanoseconds))];
@@ -26,8 +27,11 @@ class Latencies {
     longest_ = std::max(longest_, latency);
   }
 
+  /// Returns the number of replies.
   [[nodiscard]] constexpr std::uint64_t count() const { return count_; }
+  /// Returns the longest latency.
   [[nodiscard]] constexpr Time longest() const { return longest_; }
+  /// Returns the sum of all latencies.
   [[nodiscard]] constexpr Time sum() const { return sum_; }
 
   /// For each of the rising limits, how many latencies surely do not exceed it: those of the last 1/32 below it may be
@@ -81,6 +85,7 @@ class Latencies {
 /// Events a second: a mean that forgets with a time constant of one second.
 class Rate {
  public:
+  /// Adds a reading at this time.
   constexpr void add(Time at) {
     if (seen_) {
       fade(at - last_);
@@ -116,13 +121,14 @@ class Rate {
 template <class Item>
 struct BadExchange {
   BadExchange() = default;
+  /// Keeps the beginning of what was sent and received.
   BadExchange(Error why, const Exchange<Item>& exchange) : error(why), at(exchange.received_at) {
     sent.append(exchange.sent.first(std::min(exchange.sent.size(), sent.capacity())));
     received.append(exchange.received.first(std::min(exchange.received.size(), received.capacity())));
   }
 
-  Error error = Error::none;
-  Time at{};  ///< when the last item was received, or sent
+  Error error = Error::none;  ///< Why it failed.
+  Time at{};                  ///< when the last item was received, or sent
   Buffer<Item, 64 / sizeof(Item)> sent{};
   Buffer<Item, 64 / sizeof(Item)> received{};
 };

@@ -17,6 +17,7 @@ struct CanFrame {
   std::array<std::uint8_t, 8> data{};
 
   [[nodiscard]] constexpr Bytes bytes() const { return {data.data(), size}; }
+  /// Compares all members.
   friend constexpr bool operator==(const CanFrame&, const CanFrame&) = default;
 };
 

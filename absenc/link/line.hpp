@@ -46,6 +46,7 @@ struct LineSettings {
     return settings;
   }
 
+  /// Compares all members.
   friend constexpr bool operator==(const LineSettings&, const LineSettings&) = default;
 
   /// Returns the duration of `count` bits, rounded to the nearest nanosecond. `rate` must not be 0.

@@ -37,8 +37,8 @@ struct Step {
   bool hold_low = false;  ///< transfer on a clocked link: the clock line, which idles high, is held low until `at`
   std::span<const Item> out{};  ///< transfer: items to send; valid until the next feed
   std::size_t expect = 0;       ///< transfer, wait: number of items still expected; 0: unknown, or none
-  std::size_t bits = 0;  ///< transfer on a clocked link: number of clocks; a device sets how many of its bits hosts
-                         ///< read, if it drives more
+  std::size_t bits = 0;    ///< transfer on a clocked link: number of clocks; a device sets how many of its bits hosts
+                           ///< read, if it drives more
   std::uint32_t rate = 0;  ///< configure: bits per second
   Time at{};      ///< transfer, pulse: earliest time to begin; wait: time of the `timer` event, if it is in the future
   Time answer{};  ///< transfer, wait: `silence` is reported when nothing is received for this time after `sent`; 0: no
@@ -46,7 +46,7 @@ struct Step {
   Time
       gap{};  ///< transfer, wait: `silence` is reported when the line is quiet for this time after an item; 0: no limit
   Time width{};  ///< pulse: its duration; transfer of a device on a clocked link: after `out` the device drives the
-                 ///< data line low until this time after the last clock edge of the clock, it drives the data line low
+                 ///< data line low until this time after the last clock edge
 
   /// Transfer of a device on an SPI or clocked link: returns the byte that the host samples after `out` has ended. A
   /// line that no side drives is pulled up.
@@ -89,7 +89,9 @@ struct Event {
 /// from one context: interrupts must queue events.
 template <class Item>
 struct Machine {
+  /// Takes an event of the port.
   virtual void feed(const Event<Item>& event) = 0;
+  /// Returns the next step of the port.
   virtual Step<Item> next(Time now) = 0;
 
  protected:

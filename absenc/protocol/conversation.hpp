@@ -61,6 +61,7 @@ struct Conversation : Machine<Item> {
   [[nodiscard]] virtual bool asks() const { return false; }
   /// Every named value of the result. Nothing is put when there was an error.
   virtual void report(FieldSink& sink) const = 0;
+  /// Returns the items of the last exchange.
   [[nodiscard]] virtual Exchange<Item> exchange() const = 0;
   /// Asks to end early, from the next step on: a conversation that changes the encoder for its own use leaves it as it
   /// was, ends by itself and returns true. The others ignore it: they may be left at any step.
@@ -95,11 +96,14 @@ struct Device : Machine<Item> {
     real,  // with the document's start-up time
     skip,  // ready at once
   };
+  /// Switches the encoder on.
   virtual void power_on(Time now, PowerOn kind) = 0;
+  /// Switches the encoder off.
   virtual void power_off(Time now) = 0;
   /// Raises the alarms of `bits` (of the unit's alarms field): latched ones until they are cleared by the host,
   /// the others until `lower_alarms`.
   virtual void raise_alarms(std::uint32_t bits) = 0;
+  /// Ends the cause of alarms; latched alarms stay until a host clears them.
   virtual void lower_alarms(std::uint32_t bits) = 0;
   /// Sets the unit's condition of this index to `value`, within its range.
   virtual void set_condition(std::size_t /*index*/, std::int64_t /*value*/, Time /*now*/) {}

@@ -35,7 +35,9 @@ class Sentence {
     return add(part);
   }
   void clear() { size_ = 0; }
+  /// Returns whether there is nothing.
   [[nodiscard]] bool empty() const { return size_ == 0; }
+  /// Returns the text.
   [[nodiscard]] std::string_view view() const { return {text_.data(), size_}; }
 
  private:

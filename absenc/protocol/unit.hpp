@@ -35,26 +35,28 @@ enum class Verb : std::uint8_t {
   run,   // a procedure only this unit has
 };
 
+/// Description of an argument of a command.
 struct Argument {
-  std::string_view name;
-  std::string_view meaning;
-  std::int64_t minimum;
-  std::int64_t maximum;
-  std::int64_t default_value = 0;
-  bool required = true;
-  Role role = Role::other;
+  std::string_view name;           ///< Name, as `NAME=VALUE` takes it.
+  std::string_view meaning;        ///< Meaning of the value, with its unit.
+  std::int64_t minimum;            ///< Lowest value.
+  std::int64_t maximum;            ///< Highest value.
+  std::int64_t default_value = 0;  ///< Value if the argument is not given and not `required`.
+  bool required = true;            ///< Whether the argument must be given.
+  Role role = Role::other;         ///< Role by which generic programs find it.
 };
 
 using Arguments = std::span<const std::int64_t>;  // one value for each Argument of the command, defaults filled in
 
+/// Description of a command of a unit.
 struct Command {
-  std::string_view name;
-  Verb verb;
-  std::uint8_t id;  ///< the unit's own number for it
-  std::string_view meaning;
-  std::span<const Argument> arguments{};
-  bool changes_encoder = false;
-  bool repeatable = true;         ///< whether the same request may be sent again after an error
+  std::string_view name;                  ///< Name of the command.
+  Verb verb;                              ///< The verb of the command line that runs it.
+  std::uint8_t id;                        ///< the unit's own number for it
+  std::string_view meaning;               ///< What it does, as a phrase.
+  std::span<const Argument> arguments{};  ///< Arguments in their order.
+  bool changes_encoder = false;           ///< Whether it changes anything in the encoder.
+  bool repeatable = true;                 ///< whether the same request may be sent again after an error
   std::string_view reads_back{};  ///< config_set: the name of the config_get command that reads this setting; "": none
                                   ///< can, the setting has the name of this command, which looks at the effect itself
   std::string_view changes_option{};  ///< config_set: the option that must follow its first argument; who goes on does
@@ -68,17 +70,18 @@ struct Command {
 /// the roles address, page, count, value and force; memory_read reports a field with the role data, or value for a
 /// single byte.
 struct MemoryArea {
-  std::uint32_t page;  ///< 0 where there are no pages
-  std::uint32_t first;
-  std::uint32_t count;
-  std::string_view meaning;
-  bool writable = true;
+  std::uint32_t page;             ///< 0 where there are no pages
+  std::uint32_t first;            ///< First address.
+  std::uint32_t count;            ///< Number of bytes.
+  std::string_view meaning;       ///< What the area holds, as a phrase.
+  bool writable = true;           ///< Whether hosts may write it.
   bool in_dump = true;            ///< whether it belongs to a copy of the memory
   std::uint32_t write_life = 0;   ///< writes that the document permits; 0: not known
   std::string_view protection{};  ///< why only memory_write's argument of the role force writes it; "": it needs none
   bool life_in_total = false;     ///< write_life is of all bytes together; false: the document does not say of what
   std::uint32_t pages = 1;        ///< this one and those behind it, which are alike and which an encoder may lack
 
+  /// Returns whether the area has this byte.
   [[nodiscard]] constexpr bool has(std::uint32_t on_page, std::uint32_t address) const {
     return on_page - page < pages && address >= first && address - first < count;
   }
@@ -87,70 +90,73 @@ struct MemoryArea {
 /// A register of the encoder: accessed as a whole, at its address. The commands memory_read and memory_write reach it
 /// by their arguments with the roles address and value.
 struct RegisterInfo {
-  std::string_view name;
-  std::uint32_t address;
-  std::uint32_t size;  ///< bytes
-  bool readable = true;
-  bool writable = false;
+  std::string_view name;  ///< Name of the register.
+  std::uint32_t address;  ///< Address of the register.
+  std::uint32_t size;     ///< bytes
+  bool readable = true;   ///< Whether hosts may read it.
+  bool writable = false;  ///< Whether hosts may write it.
 };
 
 /// Something around a virtual encoder that its document speaks of: a temperature, a battery, a fault of one channel.
 struct Condition {
-  std::string_view name;
-  std::string_view unit;  ///< as of a field; "" for yes (1) or no (0) and plain numbers
-  std::string_view meaning;
-  std::int64_t minimum;
-  std::int64_t maximum;
-  std::int64_t normal;  ///< of a healthy installation: what it begins with
+  std::string_view name;     ///< Name of the condition.
+  std::string_view unit;     ///< as of a field; "" for yes (1) or no (0) and plain numbers
+  std::string_view meaning;  ///< Meaning of the value, with its unit.
+  std::int64_t minimum;      ///< Lowest value.
+  std::int64_t maximum;      ///< Highest value.
+  std::int64_t normal;       ///< of a healthy installation: what it begins with
 };
 
 /// A frame in the form its link carries.
 struct Frame {
-  Bytes bytes{};
+  Bytes bytes{};                  ///< The bytes, or of a bit stream the bytes that hold it.
   std::size_t bits = 0;           ///< clocked links: how many bits of `bytes` count
   const CanFrame* can = nullptr;  ///< CAN links
 
+  /// Returns whether there is neither a byte nor a CAN frame.
   [[nodiscard]] constexpr bool empty() const { return bytes.empty() && can == nullptr; }
 };
 
 /// One expected value of a vector.
 struct Expected {
-  std::string_view field;
-  std::int64_t number = 0;
-  double real = 0;
+  std::string_view field;   ///< Name of the field.
+  std::int64_t number = 0;  ///< Wanted value of an integer field.
+  double real = 0;          ///< Wanted value of a field with a fraction.
   std::string_view text{};  ///< of text and bytes fields: the bytes themselves
 };
 
 /// A frame with what it must decode to. `options` is "name=value name=value". Clocked links: request and reply are
 /// texts of 0 and 1; CAN links: texts as "1ff:022b000000000000".
 struct Vector {
-  std::string_view id;
-  std::string_view meaning;
-  std::string_view source;
-  std::string_view options;
-  Bytes request;
-  Bytes reply;
-  std::span<const Expected> fields{};
-  Error error = Error::none;
+  std::string_view id;                 ///< Identifier of the vector, unique within the unit.
+  std::string_view meaning;            ///< What the vector shows, as a phrase.
+  std::string_view source;             ///< Document and paragraph of the frame.
+  std::string_view options;            ///< Options of the encoder, as `name=value` separated by blanks.
+  Bytes request;                       ///< Bytes of the request; empty: none.
+  Bytes reply;                         ///< Bytes of the reply.
+  std::span<const Expected> fields{};  ///< Wanted values of fields.
+  Error error = Error::none;           ///< Wanted error; `Error::none`: the reply is valid.
 };
 
 /// A reply as it was captured on a link that carries bytes, and what had been asked. Without the request the reply
 /// itself must tell; an empty reply: none came.
 struct Capture {
-  Bytes request{};
-  Bytes reply{};
+  Bytes request{};  ///< Bytes of the request; empty: none was captured.
+  Bytes reply{};    ///< Bytes of the reply; empty: none was captured.
 };
 
 /// What captures say about one value of one option.
 struct OptionEvidence {
-  std::size_t option;  ///< index into the unit's options
-  std::int64_t value;
-  bool possible;
+  std::size_t option;    ///< index into the unit's options
+  std::int64_t value;    ///< Value of the option.
+  bool possible;         ///< Whether the captured frames can come from an encoder with this value.
   std::size_t capture;   ///< not possible: the first that contradicts
   std::string_view why;  ///< a sentence
 };
 
+/// Receives the values of an option with their evidence.
 struct EvidenceSink {
+  /// Takes one value of an option.
   virtual void put(const OptionEvidence& evidence) = 0;
 
  protected:
@@ -160,8 +166,8 @@ struct EvidenceSink {
 /// Where a value, or a part of it, stands in a frame. Bits count as those of `Unit::is_checked`: on lines of characters
 /// the last of a range is the most significant, on clocked links the first.
 struct BitRange {
-  std::size_t first = 0;
-  std::size_t count = 0;
+  std::size_t first = 0;  ///< Index of the first bit.
+  std::size_t count = 0;  ///< Number of bits.
   bool inverted = false;  ///< a 0 on the wire is a 1 of the value
 };
 
@@ -170,8 +176,8 @@ using BitRanges = Buffer<BitRange, 8>;
 
 /// Frames of which several exchanges carry a byte each. They are decoded as others are.
 struct Composed {
-  Bytes request{};
-  Bytes reply{};
+  Bytes request{};            ///< Bytes of the request.
+  Bytes reply{};              ///< Bytes of the reply; empty: none.
   std::uint64_t first = 0;    ///< number of the exchange with which it began
   Error error = Error::none;  ///< what its bytes alone do not tell: it contradicts the frames that carried it
 };
@@ -193,19 +199,20 @@ enum class Direction : std::uint8_t { request, reply };
 
 /// Where a frame ends in a run of bytes.
 struct FrameEnd {
+  /// Whether the end of a frame is known.
   enum class Kind : std::uint8_t {
-    complete,    // the first `size` bytes are one frame
-    incomplete,  // a frame may have begun; at least `size` bytes in all are needed
-    no_frame,    // the first byte begins no frame
-  } kind;
-  std::size_t size = 0;
+    complete,            // the first `size` bytes are one frame
+    incomplete,          // a frame may have begun; at least `size` bytes in all are needed
+    no_frame,            // the first byte begins no frame
+  } kind;                ///< Whether the end of the frame is known.
+  std::size_t size = 0;  ///< Length of the frame in bytes, if known.
 };
 
 /// A machine of whichever item its link carries; exactly one pointer is set, or none when it could not be made.
 template <template <class> class Role>
 struct Any {
-  Role<std::uint8_t>* bytes = nullptr;
-  Role<CanFrame>* frames = nullptr;
+  Role<std::uint8_t>* bytes = nullptr;  ///< The machine, if its items are bytes; else null.
+  Role<CanFrame>* frames = nullptr;     ///< The machine, if its items are CAN frames; else null.
 
   /// Returns the machine of this item; null if there is none.
   template <class Item>
@@ -222,8 +229,8 @@ inline constexpr std::size_t longest_encoded = 1024;  // bytes of a request that
 
 /// Bits of a position; 0: it has no such part.
 struct Resolution {
-  unsigned singleturn_bits = 0;
-  unsigned multiturn_bits = 0;
+  unsigned singleturn_bits = 0;   ///< Bits of the single-turn position; 0: none.
+  unsigned multiturn_bits = 0;    ///< Bits of the turns; 0: none.
   double unit_um = 0;             ///< linear encoders: micrometres a count; 0: a rotation
   bool multiturn_signed = false;  ///< turns are counted below zero
 };
@@ -241,31 +248,32 @@ struct LineTiming {
   Time turnaround_limit = std::chrono::milliseconds(100);  ///< no host waits longer for the reply to begin
 };
 
+/// Description of a protocol. All layers above know a protocol only by this.
 struct Unit {
-  std::string_view id;
+  std::string_view id;        ///< Identifier: the part of an address before the colon.
   std::string_view name;      ///< maker and protocol, for people
   std::string_view document;  ///< the source
   /// Makers and families by which people look for it: "Tamagawa", "Smart-Abs". Its models stand in `models`.
   std::span<const std::string_view> known_as{};
-  LinkKind link;
-  LineSettings line;  ///< rate 0: the document states none, the user must
-  std::span<const Option> options;
-  std::span<const Model> models;
-  std::span<const FieldInfo> fields;
-  std::span<const Command> commands;
+  LinkKind link;                              ///< Kind of link between host and encoder.
+  LineSettings line;                          ///< rate 0: the document states none, the user must
+  std::span<const Option> options;            ///< Options that an address may set.
+  std::span<const Model> models;              ///< Models, which set several options by one name.
+  std::span<const FieldInfo> fields;          ///< Fields that replies can have.
+  std::span<const Command> commands;          ///< Commands of the encoder.
   std::span<const MemoryArea> memory{};       ///< what the commands memory_read and memory_write reach, in order
   std::span<const RegisterInfo> registers{};  ///< the same of an encoder that has registers instead of bytes
-  std::span<const Vector> vectors;
-  const FieldInfo* status;  ///< the flags of Reading::status; null when the unit has none
-  const FieldInfo* alarms;  ///< the flags of Reading::alarms
+  std::span<const Vector> vectors;            ///< Frames with their meaning, from documents.
+  const FieldInfo* status;                    ///< the flags of Reading::status; null when the unit has none
+  const FieldInfo* alarms;                    ///< the flags of Reading::alarms
   /// The alarms that an encoder with these options can report; null: all.
   std::uint32_t (*reportable)(const Options& options) = nullptr;
   /// Of an encoder that reports in two channels, the flags of the second. Their bits follow those of the first in one
   /// number: whoever compares alarms sees both, whoever shows them names each.
   const FieldInfo* second_status = nullptr;
-  const FieldInfo* second_alarms = nullptr;
-  std::size_t host_storage;    ///< bytes that `host` needs, suitably aligned for any type
-  std::size_t device_storage;  ///< bytes that `device` needs
+  const FieldInfo* second_alarms = nullptr;  ///< Field of the second alarms; null: none.
+  std::size_t host_storage;                  ///< bytes that `host` needs, suitably aligned for any type
+  std::size_t device_storage;                ///< bytes that `device` needs
 
   /// Checks a reply against its request and puts its fields; with an empty reply, the fields of the request.
   Error (*decode)(const Options& options, Frame request, Frame reply, FieldSink& sink);
@@ -278,6 +286,7 @@ struct Unit {
   /// where a host only clocks. Errors: invalid_argument, buffer_too_small, unsupported.
   Result<std::size_t> (*encode)(const Options& options, const Command& command, Arguments arguments,
                                 MutableBytes request);
+  /// Returns where the frame that begins with `bytes` ends.
   FrameEnd (*frame_end)(const Options& options, Direction direction, Bytes bytes);
   Any<Conversation> (*host)(const Options& options, const Command& command, Arguments arguments,
                             std::span<std::byte> storage);
@@ -305,7 +314,7 @@ struct Unit {
   /// What these options need beside the data, known before a port is opened: the user must say which wire it is, and a
   /// pseudo-terminal has none. Null: nothing.
   ExtraWires (*extra_wires)(const Options& options) = nullptr;
-  LineTiming timing{};
+  LineTiming timing{};  ///< Times of the line, for captures.
   /// Whether the encoder sends replies that nobody asks for; null: never. On clocked and CAN links it always may.
   bool (*streams)(const Options& options) = nullptr;
   /// Whether this request, a good one, is answered; null: every one is.
@@ -323,7 +332,7 @@ struct Unit {
   Reading (*remembered)(const Reading& before, Reading now) = nullptr;
   /// In storage of `follower_storage` bytes, aligned for any type. Null: each exchange says all that it says by itself.
   Follower* (*follower)(const Options& options, std::span<std::byte> storage) = nullptr;
-  std::size_t follower_storage = 0;
+  std::size_t follower_storage = 0;  ///< Bytes that a channel follower needs.
 };
 
 /// Whether a word format may stand in for some of its options.

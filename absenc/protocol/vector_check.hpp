@@ -12,7 +12,9 @@ namespace absenc {
 
 /// Every field that is put must be expected, in any order; real numbers to 1e-9.
 struct VectorCheck final : FieldSink {
+  /// Compares with these values.
   constexpr explicit VectorCheck(std::span<const Expected> wanted) : expected(wanted) {}
+  /// Compares the value of a field, if it is expected.
   constexpr void put(const FieldValue& value) override {
     for (const Expected& one : expected) {
       const double difference = one.real - value.real;
@@ -21,6 +23,7 @@ struct VectorCheck final : FieldSink {
     }
     ++count;
   }
+  /// Returns whether `bytes` are those of the hexadecimal `text`.
   [[nodiscard]] static constexpr bool same(std::string_view text, Bytes bytes) {
     if (text.size() != bytes.size()) return false;
     for (std::size_t i = 0; i < bytes.size(); ++i) {
@@ -28,11 +31,12 @@ struct VectorCheck final : FieldSink {
     }
     return true;
   }
+  /// Returns whether each expected field came once, with its value.
   [[nodiscard]] constexpr bool all() const { return matches == expected.size() && count == expected.size(); }
 
-  std::span<const Expected> expected;
-  std::size_t matches = 0;
-  std::size_t count = 0;
+  std::span<const Expected> expected;  ///< The wanted values.
+  std::size_t matches = 0;             ///< Number of fields with the wanted value.
+  std::size_t count = 0;               ///< Number of expected fields that came.
 };
 
 /// The frame behind the text of a vector on a clocked link; at most 256 bits, everything but 1 is 0.

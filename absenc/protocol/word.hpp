@@ -20,13 +20,14 @@ namespace absenc {
 /// Fields that the word does not carry are 0.
 template <std::size_t size>
 struct WordWith {
-  static constexpr std::size_t capacity = size;
-  std::uint64_t position = 0;
-  std::uint64_t multiturn = 0;
-  bool error = false;
-  bool warning = false;
-  std::array<std::uint64_t, size> values{};  ///< those of Meaning::value, by the field's index
+  static constexpr std::size_t capacity = size;  ///< Number of values that have room.
+  std::uint64_t position = 0;                    ///< Position in counts.
+  std::uint64_t multiturn = 0;                   ///< Turns.
+  bool error = false;                            ///< Whether the error bit reports an error.
+  bool warning = false;                          ///< Whether the warning bit reports a warning.
+  std::array<std::uint64_t, size> values{};      ///< those of Meaning::value, by the field's index
 
+  /// Compares all values.
   friend constexpr bool operator==(const WordWith&, const WordWith&) = default;
 };
 using Word = WordWith<WordFormat::maximum_fields>;
@@ -66,28 +67,30 @@ inline constexpr std::array<FieldInfo, 9> word_fields{{
 
 /// What the position counts.
 struct Scale {
-  bool linear = false;
-  double unit_um = 0;  ///< linear: micrometres a count; 0: not known
+  bool linear = false;  ///< Whether the encoder is linear.
+  double unit_um = 0;   ///< linear: micrometres a count; 0: not known
 };
 
 /// A field and its place in the word.
 struct PlacedField {
-  std::size_t index;
-  unsigned first;
-  Meaning meaning;
-  unsigned bits;
-  bool active_low;
+  std::size_t index;  ///< Index of the field in the format.
+  unsigned first;     ///< Index of its first bit in the word.
+  Meaning meaning;    ///< What the field means.
+  unsigned bits;      ///< Number of bits, 1 to 64.
+  bool active_low;    ///< Whether 0 means that a flag is set.
 };
 
 /// What the functions of a position word are written with: its format, that of the protocol around it, and a way over
 /// its fields, which calls `use` with each until it returns false.
 template <class Format>
 struct Given {
-  static constexpr bool is_known = false;
+  static constexpr bool is_known = false;  ///< Whether the format is known at compile time.
+  /// Type of the word.
   using Word = absenc::Word;
-  const Format& format;
-  const WordFormat& word;
+  const Format& format;    ///< The format of the encoder.
+  const WordFormat& word;  ///< The format of its word.
 
+  /// Calls `use` for each field, in their order, while it returns true.
   template <class Use>
   constexpr bool each(Use use) const {
     unsigned first = 0;
@@ -103,21 +106,24 @@ struct Given {
 /// The same of a format that is known when the program is written: nothing of it is left to run time.
 template <const auto& known>
 struct Known {
-  static constexpr bool is_known = true;
-  static constexpr const auto& format = known;
-  static constexpr const WordFormat& word = known.word;
-  static constexpr std::size_t size = word.fields().size();
+  static constexpr bool is_known = true;                     ///< Whether the format is known at compile time.
+  static constexpr const auto& format = known;               ///< The format of the encoder.
+  static constexpr const WordFormat& word = known.word;      ///< The format of its word.
+  static constexpr std::size_t size = word.fields().size();  ///< Number of fields.
+  /// Type of the word, without room for values that it does not have.
   using Word = WordWith<word.find(Meaning::value) == nullptr ? 0 : size>;
 
+  /// One field, with its place as constants.
   template <std::size_t i>
   struct Field {
-    static constexpr std::size_t index = i;
-    static constexpr unsigned first = word.first_of(i);
-    static constexpr Meaning meaning = word.fields()[i].meaning;
-    static constexpr unsigned bits = word.fields()[i].bits;
-    static constexpr bool active_low = word.fields()[i].active_low;
+    static constexpr std::size_t index = i;                          ///< Index of the field in the format.
+    static constexpr unsigned first = word.first_of(i);              ///< Index of its first bit in the word.
+    static constexpr Meaning meaning = word.fields()[i].meaning;     ///< What the field means.
+    static constexpr unsigned bits = word.fields()[i].bits;          ///< Number of bits, 1 to 64.
+    static constexpr bool active_low = word.fields()[i].active_low;  ///< Whether 0 means that a flag is set.
   };
 
+  /// Calls `use` for each field, in their order, while it returns true.
   template <class Use>
   static constexpr bool each(Use use) {
     return each(use, std::make_index_sequence<size>{});
@@ -265,14 +271,14 @@ constexpr void put_word(FieldSink& sink, const WordFormat& format, const Word& w
 
 /// How many bits of a word are position and turns, and which come first.
 struct PositionBits {
-  unsigned position;
-  unsigned multiturn = 0;
-  bool multiturn_first = true;
+  unsigned position;            ///< Bits of the position.
+  unsigned multiturn = 0;       ///< Bits of the turns; 0: none.
+  bool multiturn_first = true;  ///< Whether the turns stand before the position.
 };
 
 /// What a reading needs to know of its word.
 struct WordContents {
-  PositionBits bits{};
+  PositionBits bits{};         ///< Widths of position and turns.
   std::uint32_t reported = 0;  ///< the alarms for which the word has a bit
 };
 [[nodiscard]] constexpr WordContents contents_of(const WordFormat& format) {

@@ -29,15 +29,18 @@ inline constexpr std::array<std::string_view, 7> meaning_names{"position", "mult
 /// A short text that is copied with what it names.
 class WordFieldName {
  public:
-  static constexpr std::size_t capacity = 15;
+  static constexpr std::size_t capacity = 15;  ///< Greatest length of a name.
 
   constexpr WordFieldName() = default;
   /// What is longer than `capacity` is cut.
   constexpr WordFieldName(std::string_view text)
       : text_(copied(text)), size_(static_cast<std::uint8_t>(first_of(text, capacity).size())) {}
+  /// Takes a name of at most `capacity` characters.
   constexpr WordFieldName(const char* text) : WordFieldName(std::string_view(text)) {}
 
+  /// Returns the name.
   constexpr operator std::string_view() const { return {text_.data(), size_}; }
+  /// Returns whether the names are equal.
   friend constexpr bool operator==(const WordFieldName& left, std::string_view right) {
     return std::string_view(left) == right;
   }
@@ -53,25 +56,26 @@ class WordFieldName {
   std::uint8_t size_ = 0;
 };
 
+/// One field of a word.
 struct WordField {
-  WordFieldName name{};  ///< that of the meaning unless another was given
-  Meaning meaning = Meaning::skip;
-  std::uint8_t bits = 0;  ///< 1 to 64; error, warning and parity have 1
-  bool active_low = false;
+  WordFieldName name{};             ///< that of the meaning unless another was given
+  Meaning meaning = Meaning::skip;  ///< What the field means.
+  std::uint8_t bits = 0;            ///< 1 to 64; error, warning and parity have 1
+  bool active_low = false;          ///< Whether 0 means that a flag is set.
 };
 
 /// Where a text is no word: `reason` is empty when it is one.
 struct WordFormatError {
-  std::string_view reason{};
-  std::size_t at = 0;  ///< index into the text
+  std::string_view reason{};  ///< Why the text is no format; empty: it is one.
+  std::size_t at = 0;         ///< index into the text
 };
 
 /// A position word is data: options that describe one make it, and so does a text for an encoder nobody has a driver
 /// for. All that decodes and sends words takes this.
 class WordFormat {
  public:
-  static constexpr std::size_t maximum_fields = 12;
-  static constexpr unsigned maximum_bits = 128;
+  static constexpr std::size_t maximum_fields = 12;  ///< Greatest number of fields.
+  static constexpr unsigned maximum_bits = 128;      ///< Greatest number of bits of a word.
 
   constexpr WordFormat() = default;
 
@@ -89,10 +93,14 @@ class WordFormat {
     bits_ += field.bits;
     return {};
   }
+  /// Declares the position as Gray code.
   constexpr void set_gray() { gray_ = true; }
 
+  /// Returns the fields in their order.
   [[nodiscard]] constexpr std::span<const WordField> fields() const { return {fields_.data(), size_}; }
+  /// Returns the number of bits of a word.
   [[nodiscard]] constexpr unsigned bits() const { return bits_; }
+  /// Returns whether the position is Gray code.
   [[nodiscard]] constexpr bool gray() const { return gray_; }
   /// Where the field at `index` begins.
   [[nodiscard]] constexpr unsigned first_of(std::size_t index) const {

@@ -53,12 +53,13 @@ inline constexpr Option after_word_option{.name = "after_word",
 /// A format, and what options say of its word, as they are given.
 template <class Format>
 struct WordSettings : Format {
-  std::uint8_t singleturn_bits = 0;
-  std::uint8_t multiturn_bits = 0;
-  bool multiturn_first = true;
-  std::uint8_t position_bits = 0;
-  std::int64_t unit_pm = 0;
+  std::uint8_t singleturn_bits = 0;  ///< Bits of the single-turn position; 0: as the word says.
+  std::uint8_t multiturn_bits = 0;   ///< Bits of the turns; 0: none.
+  bool multiturn_first = true;       ///< Whether the turns stand before the position.
+  std::uint8_t position_bits = 0;    ///< Bits of a linear position; 0: rotary encoder.
+  std::int64_t unit_pm = 0;          ///< Picometres per count; 0: rotary encoder.
 
+  /// Returns the widths of position and turns.
   [[nodiscard]] constexpr PositionBits bits() const {
     if (position_bits != 0) return {.position = position_bits};
     return {singleturn_bits, multiturn_bits, multiturn_first};

@@ -19,7 +19,9 @@ class Bus final : public Machine<std::uint8_t> {
   /// `devices` must outlive the bus. `character` is the time of one character on the line.
   Bus(const std::vector<Machine<std::uint8_t>*>& devices, Time character);
 
+  /// Takes an event of the port.
   void feed(const Event<std::uint8_t>& event) override;
+  /// Returns the next step of the port.
   Step<std::uint8_t> next(Time now) override;
 
  private:

@@ -34,16 +34,20 @@ using FaultCounts = std::array<std::uint64_t, fault_names.size()>;
 
 /// Probability of each fault, 0 to 1 per reply; `request_corrupt` per byte (CAN: per frame) received.
 struct FaultRates {
+  /// Probability of each fault for each place where it can happen, 0 to 1.
   std::array<double, fault_names.size()> rates{};
   Time delay = std::chrono::microseconds(200);  ///< additional delay of a late reply
 
+  /// Returns the probability of a fault.
   constexpr double& operator[](FaultKind kind) { return rates[static_cast<std::size_t>(kind)]; }
+  /// Returns the probability of a fault.
   constexpr double operator[](FaultKind kind) const { return rates[static_cast<std::size_t>(kind)]; }
 };
 
+/// A fault with its probability.
 struct FaultRate {
-  FaultKind kind;
-  double rate;
+  FaultKind kind;  ///< The fault.
+  double rate;     ///< Its probability, 0 to 1.
 };
 
 /// Parses `corrupt=0.01`. Throws std::invalid_argument with a sentence that names the known kinds or the allowed range.
@@ -56,15 +60,19 @@ struct FaultRate {
 /// real one), so it does not report a protocol violation by the host.
 class FaultyDevice final : public Machine<std::uint8_t> {
  public:
+  /// Puts faults between `device` and its line. The same seed gives the same faults.
   FaultyDevice(Machine<std::uint8_t>& device, const FaultRates& rates, std::uint64_t seed);
 
+  /// Takes an event of the port.
   void feed(const Event<std::uint8_t>& event) override;
+  /// Returns the next step of the port.
   Step<std::uint8_t> next(Time now) override;
 
   /// Sets the rates, from the next reply on.
   void set_rates(const FaultRates& rates) { rates_ = rates; }
   /// Returns the number of injected faults of this kind.
   [[nodiscard]] std::uint64_t count(FaultKind kind) const { return counts_[static_cast<std::size_t>(kind)]; }
+  /// Returns how often each fault happened.
   [[nodiscard]] const FaultCounts& counts() const { return counts_; }
   /// Returns the number of replies with at least one fault.
   [[nodiscard]] std::uint64_t damaged_replies() const { return damaged_replies_; }

@@ -14,9 +14,12 @@ namespace absenc::sim {
 /// would discard frames damaged on the wire: these faults model a node with faulty software.
 class FaultyNode final : public Machine<CanFrame> {
  public:
+  /// Puts faults between `device` and its bus. The same seed gives the same faults.
   FaultyNode(Machine<CanFrame>& device, const FaultRates& rates, std::uint64_t seed);
 
+  /// Takes an event of the port.
   void feed(const Event<CanFrame>& event) override;
+  /// Returns the next step of the port.
   Step<CanFrame> next(Time now) override;
 
   /// Sets the rates, from the next frame on.

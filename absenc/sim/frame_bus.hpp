@@ -19,7 +19,9 @@ class FrameBus final : public Machine<CanFrame> {
   /// `nodes` must outlive the bus. `rate` is the bit rate of the port, until the first node changes it.
   FrameBus(const std::vector<Machine<CanFrame>*>& nodes, std::uint32_t rate);
 
+  /// Takes an event of the port.
   void feed(const Event<CanFrame>& event) override;
+  /// Returns the next step of the port.
   Step<CanFrame> next(Time now) override;
 
  private:

@@ -26,6 +26,7 @@ enum class Role : std::uint8_t { host, device };
 template <class Item>
 class Line {
  public:
+  /// Index of a machine on the line.
   using Node = std::size_t;
   /// Called at an `emit` step. Returns whether the node continues; false: it is treated as done.
   using OnEmit = std::function<bool()>;
@@ -34,12 +35,12 @@ class Line {
   /// One transfer of SPI bytes or of `bits` clocks: the items that the host sent and received, the last byte
   /// left-aligned. `lead` is the time from `start`, when the chip was selected, to the first clock.
   struct Transfer {
-    Time start;
-    Time end;
-    std::size_t bits;
-    std::span<const Item> out;
-    std::span<const Item> in;
-    Time lead{};
+    Time start;                 ///< Time of the first bit.
+    Time end;                   ///< Time after the last bit.
+    std::size_t bits;           ///< Number of bits; 0: whole items.
+    std::span<const Item> out;  ///< Items that the host sent.
+    std::span<const Item> in;   ///< Items that the host received.
+    Time lead{};                ///< Time from chip select to the first clock.
     Time held_low = never;  ///< clocked: time from which the clock line was held low before `start`; never: it was idle
     Time low_after{};       ///< clocked: time for which the device drives the data line low after the last clock edge
   };
@@ -48,6 +49,7 @@ class Line {
   /// Called at the beginning of every pulse.
   using PulseObserver = std::function<void(ExtraWire wire, Time start, Time end)>;
 
+  /// Makes a line without machines.
   Line(LinkKind kind, LineSettings settings);
   ~Line();
   Line(const Line&) = delete;
@@ -59,13 +61,20 @@ class Line {
   void replace(Node node, Machine<Item>& machine);
   /// Takes the machine's next step, after something other than an event has changed it.
   void wake(Node node);
+  /// Sets whether a node receives what it sends.
   void set_echo(Node node, bool echo);
+  /// Calls `observer` for each item on the line.
   void observe(Observer observer);
+  /// Calls `observer` for each transfer of an SPI or clocked link.
   void observe_transfers(TransferObserver observer);
+  /// Calls `observer` for each pulse on an extra wire.
   void observe_pulses(PulseObserver observer);
 
+  /// Returns the virtual time.
   [[nodiscard]] Time now() const { return now_; }
+  /// Returns whether a node is host or device.
   [[nodiscard]] Role role(Node node) const;
+  /// Returns whether the machine of a node has ended.
   [[nodiscard]] bool done(Node node) const;
   /// Returns the time before which all items that began were reported to the observers.
   [[nodiscard]] Time settled() const;

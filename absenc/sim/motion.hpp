@@ -18,10 +18,11 @@ class Motion final : public Shaft {
  public:
   /// A point of a path: position of the shaft at `time`, relative to the start position.
   struct Knot {
-    Time time;
-    std::int64_t position;
+    Time time;              ///< Time of the knot.
+    std::int64_t position;  ///< Position, unit 2^-32 revolution.
   };
 
+  /// Returns a shaft that stands at `start`, unit 2^-32 revolution.
   [[nodiscard]] static Motion still(std::int64_t start);
   /// Returns a motion at -1 000 000 to 1 000 000 revolutions per minute, rounded to 1e-6. Throws std::invalid_argument
   /// outside this range.

@@ -10,6 +10,7 @@ namespace absenc::sim {
 /// Pseudo-random numbers; not for secrets.
 class Random {
  public:
+  /// Begins a sequence; the same seed gives the same numbers.
   explicit constexpr Random(std::uint64_t seed) : state_(seed) {}
 
   /// Returns 64 random bits.

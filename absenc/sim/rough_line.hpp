@@ -20,17 +20,18 @@ struct RoughRates {
                      ///< probability 1/2
   double doubled = 0;  ///< one byte arrives twice; where the host is the clock, one bit arrives twice and the last bit
                        ///< is lost
-  double talker = 0;  ///< another sender sends random bytes during the frame or beyond its end; the host receives the
-                      ///< AND of both
+  double talker = 0;   ///< another sender sends random bytes during the frame or beyond its end; the host receives the
+                       ///< AND of both
   double late =
       0;  ///< the frame arrives 10 us to 10 s late, each decade equally likely; later frames do not overtake it
 };
 
+/// Counts of the disturbances of a rough line.
 struct RoughCounts {
   std::uint64_t requests = 0;  ///< transfers and pulses of the host
   std::uint64_t replies = 0;   ///< frames sent to the host
   std::uint64_t damaged = 0;   ///< frames damaged by any fault except `late`
-  std::uint64_t late = 0;
+  std::uint64_t late = 0;      ///< Replies that arrived late.
 };
 
 /// A damaged line that is faster than Line, which moves single characters; use Line for collisions or single
@@ -59,9 +60,11 @@ class RoughLine final : public Port<Item> {
   void mark();
   /// Returns the send time of each old frame that was reported to the host since `mark`.
   [[nodiscard]] std::span<const Time> old_frames() const { return old_; }
+  /// Returns how often each disturbance happened.
   [[nodiscard]] const RoughCounts& counts() const { return counts_; }
   /// Return the last request, and the device's reply to it (of any length) before it was damaged.
   [[nodiscard]] std::span<const Item> request() const { return request_; }
+  /// Returns the reply of the device before it was damaged.
   [[nodiscard]] std::span<const Item> reply() const { return out_; }
   /// Returns the number of bits of the last transfer on a clocked link.
   [[nodiscard]] std::size_t bits() const { return bits_; }

@@ -13,6 +13,7 @@ namespace absenc::sim {
 
 /// Holds virtual time to a clock of the caller's choice. If both functions are empty, time jumps from event to event.
 struct RealTime {
+  /// Returns the time of the computer.
   std::function<Time()> now;
   /// Sleeps until the given time. May return early, and may throw to end a wait.
   std::function<void(Time)> sleep_until;
@@ -35,6 +36,7 @@ class SimPort final : public Port<Item> {
   /// Returns the line, so that callers can observe it.
   [[nodiscard]] Line<Item>& line() { return line_; }
 
+  /// Sets whether the host receives what it sends.
   void set_echo(bool echo) { line_.set_echo(host_node_, echo); }
 
  private:

@@ -28,9 +28,10 @@ namespace absenc::sim {
 /// - CAN: `can`, recessive is 1; every frame is acknowledged
 class Waveform {
  public:
+  /// A wire of a waveform.
   struct Wire {
-    std::string_view name;
-    bool idle;  ///< the level before the first change
+    std::string_view name;  ///< Name of the wire.
+    bool idle;              ///< the level before the first change
   };
   /// Receives level changes and comments in the order of time, as soon as their order is known.
   struct Sink {
@@ -49,12 +50,16 @@ class Waveform {
   /// Draws everything on `line`, of the same kind and settings, from now on. Replaces the line's observers; must
   /// outlive the line.
   void observe(Line<std::uint8_t>& line);
+  /// Draws what happens on the line.
   void observe(Line<CanFrame>& line);
 
   /// Draws one asynchronous character.
   void character(Role sender, Time start, Time end, std::uint8_t byte);
+  /// Draws a transfer of an SPI or clocked link.
   void transfer(const Line<std::uint8_t>::Transfer& transfer);
+  /// Draws a CAN frame.
   void frame(Time start, const CanFrame& frame);
+  /// Draws a pulse on an extra wire.
   void pulse(ExtraWire wire, Time start, Time end);
 
   /// Passes everything before `time` to the sink. No item drawn later may begin before `time`.

@@ -20,6 +20,7 @@ inline constexpr std::array<Time, 5> turn_around{3us, 10'800ns, 30us, 56us, 110u
 inline constexpr Time restart_time = 200ms;
 inline constexpr unsigned turns_bits = 14;
 
+/// Format of the encoder: the values of its options.
 struct Format {
   std::uint8_t singleturn_bits = 14;
   std::uint8_t multiturn_bits = 0;
@@ -27,13 +28,16 @@ struct Format {
   std::uint8_t rate = 0;        ///< index into `rates`
   bool drops_low_bits = false;  ///< reads an encoder of 14 bits as one of 12
 
+  /// Returns the settings of the line.
   [[nodiscard]] constexpr LineSettings line() const { return {.rate = rates[rate]}; }
+  /// Returns the bits of position and turns.
   [[nodiscard]] constexpr Resolution resolution() const { return {singleturn_bits, multiturn_bits, 0, true}; }
 };
 
 /// Kind of request: the number that is added to the address. For zero and reset, which add 2, it is the second byte.
 enum class Ask : std::uint8_t { position, turns, zero = 0x5E, reset = 0x75 };
 
+/// A request of the protocol.
 struct Request {
   Ask ask = Ask::position;
   std::uint8_t address = 0x54;
@@ -53,12 +57,17 @@ struct Reply {
   return odd_parity(word & 0xAAAA) && odd_parity(word & 0x5555);
 }
 
+/// The protocol, as author layers use it: frames, lengths and times.
 struct Protocol {
+  /// Format of the encoder: the values of its options.
   using Format = amt21::Format;
+  /// A request of the protocol.
   using Request = amt21::Request;
+  /// A reply of the protocol.
   using Reply = amt21::Reply;
-  static constexpr std::size_t longest_reply = 2;
+  static constexpr std::size_t longest_reply = 2;  ///< Greatest length of a reply in bytes.
 
+  /// Returns how long a host waits for replies.
   static constexpr author::HostTimes host_times(const Format& format) {
     const Time character = format.line().character();
     return {.answer_limit = 2 * turn_around[format.rate] + 2 * character, .gap_limit = 2 * character};
@@ -68,9 +77,11 @@ struct Protocol {
     return {
         .repeats = request.is_answered() ? 2u : 0u, .expects_reply = request.is_answered(), .ends_by_silence = true};
   }
+  /// Returns the length of the request that begins with `begin`, in bytes; 0 if that is no request.
   static constexpr std::size_t request_size(const Format&, Bytes begin) {
     return std::array<std::size_t, 4>{1, 1, 2, 0}[begin[0] & 3];
   }
+  /// Returns the request as it is sent.
   static constexpr ByteBuffer<2> encode(const Format&, const Request& request) {
     ByteBuffer<2> bytes;
     const auto ask = static_cast<std::uint8_t>(request.ask);
@@ -78,6 +89,7 @@ struct Protocol {
     if (!request.is_answered()) bytes.push_back(ask);
     return bytes;
   }
+  /// Returns the request, or why it is none.
   static constexpr Result<Request> decode_request(const Format& format, Bytes bytes) {
     if (bytes.empty()) return Error::wrong_length;
     if ((bytes[0] & 3) == 3) return Error::unexpected_reply;  // reserved code
@@ -87,13 +99,17 @@ struct Protocol {
     const bool known = bytes.size() == 1 || request.ask == Ask::zero || request.ask == Ask::reset;
     return known ? Result<Request>(request) : Error::unexpected_reply;
   }
+  /// Returns the length of the reply to `request`, in bytes.
   static constexpr std::size_t reply_size(const Format&, const Request& request) {
     return request.is_answered() ? 2 : 0;
   }
+  /// Returns the length of the reply, as far as its first bytes say, in bytes; 0 if it is not known.
   static constexpr std::size_t expected(const Format& format, const Request& request, Bytes) {
     return reply_size(format, request);
   }
+  /// Returns whether a reply with this error is complete, so that no more bytes are awaited.
   static constexpr bool is_whole(const Format&, Error) { return false; }
+  /// Returns the reply as it is sent.
   static constexpr ByteBuffer<2> encode_reply(const Format& format, const Request& request, const Reply& reply) {
     const unsigned shift = request.ask == Ask::position ? 14u - format.singleturn_bits : 0u;
     auto word = static_cast<std::uint16_t>(static_cast<unsigned>(reply.value) << shift & 0x3FFF);
@@ -104,6 +120,7 @@ struct Protocol {
     bytes.push_back(static_cast<std::uint8_t>(word >> 8));
     return bytes;
   }
+  /// Returns the reply with all checks done, or the first error.
   static constexpr Result<Reply> decode(const Format& format, const Request& request, Bytes bytes) {
     if (bytes.empty() && request.is_answered()) return Error::timeout;
     if (bytes.size() != reply_size(format, request)) return Error::wrong_length;
@@ -115,11 +132,14 @@ struct Protocol {
     if ((value & ((1 << padding) - 1)) != 0 && !format.drops_low_bits) return Error::out_of_range;
     return Reply{value >> padding};
   }
+  /// Returns the position of a reply.
   static constexpr Reading reading(const Format& format, const Request& request, const Reply& reply) {
     if (request.ask == Ask::turns) return author::turns_reading(reply.value, {0, turns_bits, 0, true});
     return author::position_reading(static_cast<std::uint64_t>(reply.value), format.singleturn_bits);
   }
+  /// Returns when the encoder latched the position of a reply to a request that was sent at `sent_at`.
   static constexpr Time latched(const Format&, Time sent_at) { return sent_at; }
+  /// Returns the times of a virtual encoder.
   static constexpr author::DeviceTimes device_times(const Format& format) {
     return {format.line().character(), turn_around[format.rate], restart_time};
   }

@@ -24,8 +24,10 @@ template <class P>
 requires std::same_as<typename P::Item, CanFrame>
 class DialogOf<P> : public CanEngine, public Routine {
  public:
+  /// Format of the encoder: the values of its options.
   using Format = typename P::Format;
 
+  /// Returns the format of the encoder.
   [[nodiscard]] const Format& format() const { return format_; }
 
   /// What is heard begins with one of these.

@@ -21,13 +21,16 @@ struct CanHostTimes {
 /// told to it.
 class CanEngine : public Conversation<CanFrame> {
  public:
+  /// Takes an event of the port.
   void feed(const Event<CanFrame>& event) final;
+  /// Returns the next step of the port.
   Step<CanFrame> next(Time now) final;
   /// Nothing: see Engine.
   void report(FieldSink&) const override {}
   [[nodiscard]] Error error() const final { return outcome_.error; }
   [[nodiscard]] std::string_view detail() const override { return outcome_.detail; }
   [[nodiscard]] std::string_view advice() const override { return outcome_.advice; }
+  /// Returns the items of the last exchange.
   [[nodiscard]] Exchange<CanFrame> exchange() const final {
     return {{&request_, has_request_ ? 1u : 0u}, {&relevant_, has_relevant_ ? 1u : 0u}, sent_at_, relevant_at_};
   }

@@ -15,8 +15,11 @@ using DrivenBits = BitBuffer<512>;
 
 class ClockedDevice : public EncoderOn<std::uint8_t> {
  public:
+  /// Takes an event of the port.
   void feed(const Event<std::uint8_t>& event) final;
+  /// Returns the next step of the port.
   Step<std::uint8_t> next(Time now) final;
+  /// Switches the encoder off.
   void power_off(Time now) override;
   [[nodiscard]] MutableBytes memory() override { return {}; }
 

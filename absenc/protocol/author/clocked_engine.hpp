@@ -22,17 +22,21 @@ struct ClockedHostTimes {
 /// because somebody may have clocked just before.
 class ClockedEngine : public Conversation<std::uint8_t> {
  public:
+  /// Takes an event of the port.
   void feed(const Event<std::uint8_t>& event) final;
+  /// Returns the next step of the port.
   Step<std::uint8_t> next(Time now) override;
   [[nodiscard]] Error error() const final { return error_; }
   /// Nothing: see Engine.
   void report(FieldSink&) const override {}
+  /// Returns the items of the last exchange.
   [[nodiscard]] Exchange<std::uint8_t> exchange() const final {
     return {{}, Bytes(storage_).first(size_), sent_at_, received_at_};
   }
 
   /// The first edge of the clock in the last transfer: when it was due, or, where the rate is known, by its end.
   [[nodiscard]] Time begun_at() const { return begun_at_; }
+  /// Returns when the last item was received.
   [[nodiscard]] Time received_at() const { return received_at_; }
   /// Never: nothing comes but what is clocked out.
   [[nodiscard]] bool is_noisy() const { return false; }

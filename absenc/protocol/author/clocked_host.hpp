@@ -35,13 +35,17 @@ inline constexpr Later later{};
 template <Clocked P>
 class ClockedHostOf : public ClockedEngine {
  public:
+  /// Format of the encoder: the values of its options.
   using Format = typename P::Format;
+  /// A reply of the protocol.
   using Reply = typename P::Reply;
 
+  /// Returns the format of the encoder.
   [[nodiscard]] const Format& format() const { return format_; }
   /// The last good reply.
   [[nodiscard]] const Reply& last() const { return last_; }
   [[nodiscard]] static constexpr NoRequest request() { return {}; }
+  /// Returns the position, or null if there is none.
   [[nodiscard]] const Reading* reading() const override {
     return error() == Error::none && reading_.singleturn_bits != 0 ? &reading_ : nullptr;
   }
@@ -90,6 +94,7 @@ class ClockedHostOf : public ClockedEngine {
 template <Clocked P>
 class ReadClocked : public ClockedHostOf<P> {
  public:
+  /// Reads from an encoder of this format.
   explicit ReadClocked(const typename P::Format& format) : ClockedHostOf<P>(format) {}
 
  private:

@@ -21,11 +21,14 @@ template <class Item>
 class Refusal final : public Conversation<Item> {
  public:
   explicit Refusal(Error error, std::string_view why) : error_(error), why_(why) {}
+  /// Takes an event of the port.
   void feed(const Event<Item>&) override {}
+  /// Returns the next step of the port.
   Step<Item> next(Time) override { return {.kind = Step<Item>::Kind::done}; }
   [[nodiscard]] Error error() const override { return error_; }
   [[nodiscard]] std::string_view detail() const override { return why_; }
   void report(FieldSink&) const override {}
+  /// Returns the items of the last exchange.
   [[nodiscard]] Exchange<Item> exchange() const override { return {}; }
 
  private:
@@ -53,10 +56,15 @@ using ItemOf = typename detail::ItemOf<P>::Item;
 /// conversations of the unit derive from `Host`.
 template <class P, class Host = Conversation<ItemOf<P>>>
 struct Report {
+  /// The protocol.
   using Protocol = P;
+  /// Format of the encoder: the values of its options.
   using Format = typename P::Format;
+  /// A request of the protocol.
   using Request = typename P::Request;
+  /// A reply of the protocol.
   using Reply = typename P::Reply;
+  /// Items of the line.
   using Items = std::span<const ItemOf<P>>;
 
   /// Puts the fields of a request. `put_values<fields, values>` makes such a function.
@@ -179,7 +187,9 @@ struct NoRequest {};
 
 template <class P>
 struct CommandOf {
+  /// Format of the encoder: the values of its options.
   using Format = typename P::Format;
+  /// A request of the protocol.
   using Request = typename P::Request;
 
   Command info;

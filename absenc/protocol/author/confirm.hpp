@@ -15,6 +15,7 @@ namespace absenc::author {
 template <class P>
 class ReadConfirmed : public HostOf<P> {
  public:
+  /// Reads with this request.
   ReadConfirmed(const typename P::Format& format, const typename P::Request& request) : HostOf<P>(format) {
     this->ask(request);
   }

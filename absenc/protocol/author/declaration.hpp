@@ -20,9 +20,12 @@ namespace absenc::author {
 /// shaft): BusDevice, ClockedDevice. `Host` is that of its Report.
 template <class P, class VirtualEncoder, class Host = Conversation<ItemOf<P>>>
 struct Declaration {
+  /// The protocol.
   using Protocol = P;
   using Encoder = VirtualEncoder;
+  /// Format of the encoder: the values of its options.
   using Format = typename P::Format;
+  /// A request of the protocol.
   using Request = typename P::Request;
 
   std::string_view id{};

@@ -30,9 +30,12 @@ struct DeviceTimes {
 /// A subclass says what a request is, and what is answered. BusDevice makes one from a protocol.
 class Responder : public EncoderOn<std::uint8_t> {
  public:
+  /// Takes an event of the port.
   void feed(const Event<std::uint8_t>& event) override;
+  /// Returns the next step of the port.
   Step<std::uint8_t> next(Time now) override;
 
+  /// Switches the encoder off.
   void power_off(Time now) override;
 
  protected:
@@ -117,8 +120,11 @@ class Responder : public EncoderOn<std::uint8_t> {
 template <class P, class Derived, std::size_t memory_size>
 class BusDevice : public Responder {
  public:
+  /// Format of the encoder: the values of its options.
   using Format = typename P::Format;
+  /// A request of the protocol.
   using Request = typename P::Request;
+  /// A reply of the protocol.
   using Reply = typename P::Reply;
 
   /// Switched off until `power_on`. `shaft` must outlive the encoder.
@@ -129,6 +135,7 @@ class BusDevice : public Responder {
  protected:
   ~BusDevice() = default;
 
+  /// Returns the format of the encoder.
   [[nodiscard]] const Format& format() const { return format_; }
   [[nodiscard]] ShaftState shaft(Time at) const { return shaft_->at(at); }
   /// Counts of 2^-bits revolution since the zero that `store_zero` keeps in four bytes from this address on; they go on

@@ -36,11 +36,16 @@ namespace absenc::author {
 template <class P>
 class HostOf : public Engine {
  public:
+  /// Format of the encoder: the values of its options.
   using Format = typename P::Format;
+  /// A request of the protocol.
   using Request = typename P::Request;
+  /// A reply of the protocol.
   using Reply = typename P::Reply;
 
+  /// Returns the format of the encoder.
   [[nodiscard]] const Format& format() const { return format_; }
+  /// Returns the request.
   [[nodiscard]] const Request& request() const { return request_; }
   /// The last good one.
   [[nodiscard]] const Reply& last() const { return last_; }
@@ -88,9 +93,11 @@ class HostOf : public Engine {
 template <class P>
 class ReadPosition : public HostOf<P> {
  public:
+  /// Reads with this request.
   ReadPosition(const typename P::Format& format, const typename P::Request& request) : HostOf<P>(format) {
     this->ask(request);
   }
+  /// Returns the position, or null if there is none.
   [[nodiscard]] const Reading* reading() const final {
     return reading_.singleturn_bits + reading_.multiturn_bits != 0 ? &reading_ : nullptr;  // of a good end only
   }
@@ -108,7 +115,9 @@ class ReadPosition : public HostOf<P> {
 template <class P>
 class DialogOf : public HostOf<P>, public Routine {
  public:
+  /// A request of the protocol.
   using Request = typename P::Request;
+  /// A reply of the protocol.
   using Reply = typename P::Reply;
 
   /// `co_await`ed. With `must` the procedure ends when there is no good reply, and what is awaited is the reply;
@@ -304,6 +313,7 @@ class Run : public ProcedureDialog<P> {
   [[nodiscard]] const Found& found() const { return found_; }
   [[nodiscard]] const StreamCounts* stream() const final { return goes_on ? &counts_ : ProcedureDialog<P>::stream(); }
   [[nodiscard]] bool asks() const final { return goes_on; }
+  /// Returns the position, or null if there is none.
   [[nodiscard]] const Reading* reading() const final {
     if constexpr (requires { found_.reading; }) {
       return this->error() == Error::none && found_.reading.singleturn_bits != 0 ? &found_.reading : nullptr;

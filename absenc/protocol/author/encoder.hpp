@@ -14,16 +14,19 @@ namespace absenc::author {
 template <class Item>
 class EncoderOn : public Device<Item> {
  public:
+  /// Switches the encoder on.
   void power_on(Time now, typename Device<Item>::PowerOn kind) override {
     power_ = Power::starting;
     ready_at_ = kind == Device<Item>::PowerOn::skip ? now : now + start_time_;
     static_cast<void>(is_on(now));
   }
+  /// Switches the encoder off.
   void power_off(Time now) override {
     if (is_on(now)) stopped(now);
     power_ = Power::off;
   }
   void raise_alarms(std::uint32_t bits) override { raised_ |= bits; }
+  /// Ends the cause of alarms; latched alarms stay until a host clears them.
   void lower_alarms(std::uint32_t bits) override { raised_ &= ~bits; }
   [[nodiscard]] std::uint32_t memory_version() const final { return memory_version_; }
   [[nodiscard]] std::span<const Violation> violations() const final { return rules_.violations(); }

@@ -43,18 +43,22 @@ struct Manner {
 /// its driver. A good reply ends the exchange at once.
 class Engine : public Conversation<std::uint8_t> {
  public:
+  /// Takes an event of the port.
   void feed(const Event<std::uint8_t>& event) final;
+  /// Returns the next step of the port.
   Step<std::uint8_t> next(Time now) final;
   [[nodiscard]] Error error() const final { return error_; }
   /// Nothing: the names and texts of fields are not linked where nobody asks for them. Told (command.hpp) has them, and
   /// the words about a line that is never silent.
   void report(FieldSink&) const override {}
+  /// Returns the items of the last exchange.
   [[nodiscard]] Exchange<std::uint8_t> exchange() const final { return {out_, reply(), sent_at_, received_at_}; }
 
   /// Begin of the last request, which an SPI link answers with what holds at that time.
   [[nodiscard]] Time begun_at() const { return begun_at_; }
   /// End of the last request; of the last characters of its reply, before them that of the request.
   [[nodiscard]] Time sent_at() const { return sent_at_; }
+  /// Returns when the last item was received.
   [[nodiscard]] Time received_at() const { return received_at_; }
   /// What came since the last request, good or bad.
   [[nodiscard]] Bytes reply() const { return Bytes(storage_).first(size_); }

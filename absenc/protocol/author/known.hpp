@@ -14,22 +14,31 @@ template <class P, const typename P::Format& format, const typename P::Request& 
 struct Known {
   struct Format {};
   struct Request {};
+  /// A reply of the protocol.
   using Reply = typename P::Reply;
-  static constexpr std::size_t longest_reply = P::longest_reply;
+  static constexpr std::size_t longest_reply = P::longest_reply;  ///< Greatest length of a reply in bytes.
 
+  /// Returns how long a host waits for replies.
   static constexpr HostTimes host_times(const Format&) { return P::host_times(format); }
+  /// Returns how often the request may be repeated and how its reply ends.
   static constexpr Manner manner(const Format&, const Request&) { return P::manner(format, request); }
+  /// Returns the request as it is sent.
   static constexpr auto encode(const Format&, const Request&) { return P::encode(format, request); }
+  /// Returns the length of the reply, as far as its first bytes say, in bytes; 0 if it is not known.
   static constexpr std::size_t expected(const Format&, const Request&, Bytes so_far) {
     return P::expected(format, request, so_far);
   }
+  /// Returns the reply with all checks done, or the first error.
   [[gnu::flatten]] static constexpr Result<Reply> decode(const Format&, const Request&, Bytes bytes) {
     return P::decode(format, request, bytes);
   }
+  /// Returns whether a reply with this error is complete, so that no more bytes are awaited.
   static constexpr bool is_whole(const Format&, Error error) { return P::is_whole(format, error); }
+  /// Returns the position of a reply.
   [[gnu::flatten]] static constexpr Reading reading(const Format&, const Request&, const Reply& reply) {
     return P::reading(format, request, reply);
   }
+  /// Returns when the encoder latched the position of a reply to a request that was sent at `sent_at`.
   static constexpr Time latched(const Format&, Time sent_at) { return P::latched(format, sent_at); }
 };
 

@@ -30,7 +30,7 @@ template <class P>
 struct Looked {
   typename P::Request request{};
   typename P::Reply reply{};
-  Reading reading{};
+  Reading reading{};  ///< The position.
 };
 
 /// Asks once; `found` is what came, with its times. The result is the position in counts.

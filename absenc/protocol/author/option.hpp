@@ -40,6 +40,7 @@ struct MostDerived<One, Next, Others...>
 
 template <auto member>
 struct OptionOf {
+  /// Format of the encoder: the values of its options.
   using Format = decltype(detail::format_of(member));
   using Member = decltype(detail::member_of(member));
   Option info;
@@ -122,6 +123,7 @@ template <auto member>
 /// Members of one struct, and of what it derives from.
 template <auto... members>
 struct OptionsOf {
+  /// Format of the encoder: the values of its options.
   using Format = typename detail::MostDerived<typename OptionOf<members>::Format...>::Type;
 
   constexpr explicit OptionsOf(const OptionOf<members>&... all) : infos{all.info...} {}

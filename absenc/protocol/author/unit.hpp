@@ -28,7 +28,9 @@ template <const auto& declared>
 struct Descriptor {
   using Declared = std::remove_cvref_t<decltype(declared)>;
   using P = typename Declared::Protocol;
+  /// Format of the encoder: the values of its options.
   using Format = typename P::Format;
+  /// A request of the protocol.
   using Request = typename P::Request;
   using Made = Tables<declared>;
 
@@ -45,6 +47,7 @@ struct Descriptor {
 
   // ---- The functions of the descriptor
 
+  /// Returns the reply with all checks done, or the first error.
   static constexpr Error decode(const Options& values, Frame asked, Frame frame, FieldSink& sink) {
     if constexpr (declared.decode != nullptr) {
       return declared.decode(declared.format(values), asked, frame, sink);
@@ -106,6 +109,7 @@ struct Descriptor {
         [](std::int64_t value, const Argument& one) { return value >= one.minimum && value <= one.maximum; });
   }
 
+  /// Returns the request as it is sent.
   static Result<std::size_t> encode(const Options& values, const Command& command, Arguments arguments,
                                     MutableBytes out) {
     if (!are_good(command, arguments)) return Error::invalid_argument;
@@ -130,10 +134,12 @@ struct Descriptor {
     return bytes.size();
   }
 
+  /// Returns the length of the request that begins with `begin`, in bytes; 0 if that is no request.
   static constexpr std::size_t request_size(const Options& values, Bytes begin) {
     return P::request_size(declared.format(values), begin);
   }
 
+  /// Returns the length of the reply to `request`, in bytes.
   static constexpr std::size_t reply_size(const Options& values, Bytes begin) {
     if constexpr (declared.reply_size != nullptr) {
       return declared.reply_size(declared.format(values), begin);

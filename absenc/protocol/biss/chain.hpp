@@ -16,18 +16,19 @@ struct ChainFormat {
   std::array<Channel, most> channels{};
   std::uint8_t count = 2;
   std::uint8_t slave = 0;  ///< the slave whose position a reading shows and whose registers are accessed
-  RegisterOrder register_order = RegisterOrder::big;
-  std::uint16_t register_delay_us = 0;
-  bool start_sequence = false;
-  Timeout timeout{};
-  StopBit stop_bit = StopBit::next;
+  RegisterOrder register_order = RegisterOrder::big;  ///< Order of the bytes of registers.
+  std::uint16_t register_delay_us = 0;  ///< Time until a virtual encoder has a requested register ready, in us.
+  bool start_sequence = false;          ///< Whether SLO of a virtual encoder stays idle until the start sequence.
+  Timeout timeout{};                    ///< Timeout of the encoder.
+  StopBit stop_bit = StopBit::next;     ///< The bit P that a virtual encoder sends after each register.
   /// These members mean the same as in Format.
   std::uint32_t ma_khz = 1000;
-  Time latency = 10us;
-  Time ready{};
-  std::uint32_t line_delay_ns = 0;
-  Scale scale{};  ///< scale of all linear encoders in the chain
+  Time latency = 10us;  ///< Time that the encoder takes before its start bit.
+  Time ready{};         ///< Time that a virtual encoder needs for a position; 0: as `latency`, at most 10 us.
+  std::uint32_t line_delay_ns = 0;  ///< Delay of the line in nanoseconds.
+  Scale scale{};                    ///< scale of all linear encoders in the chain
 
+  /// Returns the period of the clock.
   [[nodiscard]] constexpr Time period() const { return Time((1'000'000 + ma_khz / 2) / ma_khz); }
   /// Returns the channel of the slave whose position a reading shows.
   [[nodiscard]] constexpr unsigned shown() const { return slave < count ? count - 1u - slave : 0u; }
@@ -51,10 +52,10 @@ struct ChainFormat {
 [[nodiscard]] constexpr unsigned passing_bits(const ChainFormat& format) { return format.count - 1u; }
 
 struct ChainReply {
-  unsigned ack_bits = 1;
+  unsigned ack_bits = 1;  ///< Number of acknowledge bits: clocks from the first edge to the start bit.
   std::array<ChannelData, ChainFormat::most> channels{};
-  unsigned delay_bits = 0;
-  bool cds = false;
+  unsigned delay_bits = 0;  ///< Extra idle samples: the delay of the line in clocks.
+  bool cds = false;         ///< Bit of control data that the encoder sent.
 };
 
 /// Decodes a frame of a chain; see decode of one word. If one word has an error, the whole frame is rejected.

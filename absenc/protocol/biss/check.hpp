@@ -24,6 +24,7 @@ struct Check {
 
   /// Returns the bits that the check adds to the word.
   [[nodiscard]] constexpr unsigned bits() const { return width + (life_counter ? life_counter_bits : 0); }
+  /// Compares all members.
   friend constexpr bool operator==(const Check&, const Check&) = default;
 };
 

@@ -35,6 +35,7 @@ struct ControlRequest {
   std::uint8_t command = 0;  ///< number of a command, 0 to 3
 
   [[nodiscard]] constexpr bool is_command() const { return operation == Operation::command; }
+  /// Compares all members.
   friend constexpr bool operator==(const ControlRequest&, const ControlRequest&) = default;
 };
 

@@ -13,8 +13,8 @@ namespace absenc::biss {
 
 /// Times of a virtual encoder and of the line to it.
 struct Behaviour {
-  Time latency = 10us;
-  Time line_delay{};  ///< Delay there and back. The host samples SLO one period of MA after the edge that drives it.
+  Time latency = 10us;  ///< Time that the encoder takes before its start bit.
+  Time line_delay{};    ///< Delay there and back. The host samples SLO one period of MA after the edge that drives it.
   Time edge_noise = 20ns;       ///< a sample this close to a delayed edge reads the old bit or the new bit, at random
   Time register_delay{};        ///< time from the request for a register to its start bit
   bool start_sequence = false;  ///< after power on, SLO stays idle until the start sequence
@@ -93,6 +93,7 @@ class VirtualRegisters final : public ControlTarget {
 
   /// `slaves`: number of slaves, 1 to `most_slaves`.
   VirtualRegisters(unsigned slaves, RegisterOrder order, StopBit stop_bit);
+  /// Switches the encoder on.
   void power_on();
   /// Sets the present time; a register that is requested now is ready `delay` later.
   void set_time(Time at, Time delay);

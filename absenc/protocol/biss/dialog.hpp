@@ -14,6 +14,7 @@ class ControlDialog : public author::ClockedHostOf<ProtocolOf<F>>, public author
   using Base = author::ClockedHostOf<ProtocolOf<F>>;
 
  public:
+  /// A reply of the protocol.
   using Reply = typename ProtocolOf<F>::Reply;
 
   /// Clocks the next frame: `const Result<Reply> reply = co_await dialog.frame()`.
@@ -41,6 +42,7 @@ class ControlDialog : public author::ClockedHostOf<ProtocolOf<F>>, public author
   /// Emits each valid position before the next frame begins.
   void emit_positions() { emits_ = true; }
 
+  /// Returns the next step of the port.
   Step<std::uint8_t> next(Time now) final {
     if (std::exchange(emitting_, false)) return {.kind = Step<std::uint8_t>::Kind::emit};
     return Base::next(now);

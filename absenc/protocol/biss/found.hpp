@@ -25,7 +25,9 @@ class NumberList {
     while ((number /= 10) != 0 && size < digits.size());
     while (size > 0) text_.push_back(digits[--size]);
   }
+  /// Returns whether there is nothing.
   [[nodiscard]] constexpr bool empty() const { return text_.empty(); }
+  /// Returns the text.
   [[nodiscard]] constexpr std::string_view view() const { return {text_.view().data(), text_.size()}; }
 
  private:
@@ -45,13 +47,16 @@ class MakerName {
       for (const char c : {'\\', 'x', hex[byte >> 4], hex[byte & 15]}) text_.push_back(c);
     }
   }
+  /// Returns whether there is nothing.
   [[nodiscard]] constexpr bool empty() const { return text_.empty(); }
+  /// Returns the text.
   [[nodiscard]] constexpr std::string_view view() const { return {text_.view().data(), text_.size()}; }
 
  private:
   Buffer<char, 8> text_;
 };
 
+/// Values that a procedure found.
 struct Found {
   /// Of a control frame.
   std::optional<std::uint8_t> slaves{};
@@ -59,7 +64,7 @@ struct Found {
   std::optional<std::string_view> operation{};
   std::optional<std::uint8_t> slave_id{};
   std::optional<std::uint8_t> bank{};
-  std::optional<std::uint8_t> address{};
+  std::optional<std::uint8_t> address{};  ///< Address.
   std::optional<std::uint8_t> value{};
   ByteBuffer<control_most> bytes;
   bool has_data = false;

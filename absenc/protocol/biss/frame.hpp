@@ -49,6 +49,7 @@ class Timeout {
     if (code_ == is_adaptive) return Time(one_and_a_half(period));
     return Time((code_ != 0 ? code_ : 40u) * 500u);
   }
+  /// Compares all members.
   friend constexpr bool operator==(const Timeout&, const Timeout&) = default;
 
  private:
@@ -71,22 +72,23 @@ inline constexpr std::array<std::string_view, 3> stop_bit_choices{"next", "zero"
 enum class RegisterOrder : std::uint8_t { big, little };
 inline constexpr std::array<std::string_view, 2> register_order_choices{"big", "little"};
 
+/// Format of the encoder: the values of its options.
 struct Format {
-  WordFormat word = "position:19 error:1! warning:1!"_word;
-  Check check{};
-  Scale scale{};
-  std::uint16_t ma_khz = 1000;  ///< clock MA in kHz, 10 to 10 000
+  WordFormat word = "position:19 error:1! warning:1!"_word;  ///< Fields of the position word.
+  Check check{};                                             ///< Checksum of the word.
+  Scale scale{};                                             ///< Length of a count of a linear encoder.
+  std::uint16_t ma_khz = 1000;                               ///< clock MA in kHz, 10 to 10 000
   // The members for registers and start sequence fit into padding, so that a reader of positions needs no more memory.
   std::uint8_t slave = 0;  ///< slave whose registers are accessed: 0 to 7, counted from the end of the chain
-  RegisterOrder register_order = RegisterOrder::big;
+  RegisterOrder register_order = RegisterOrder::big;  ///< Order of the bytes of registers.
   std::uint16_t register_delay_us = 0;  ///< virtual encoder: time in us until a requested register is ready
   bool start_sequence = false;          ///< virtual encoder: SLO stays idle until the start sequence
-  Timeout timeout{};
+  Timeout timeout{};                    ///< Timeout of the encoder.
   /// The longest time that the encoder needs for a position, up to 1 ms; it decides the number of clocks.
   Time latency = 10us;
   /// Members for the virtual encoder.
   StopBit stop_bit = StopBit::next;
-  std::uint32_t line_delay_ns = 0;
+  std::uint32_t line_delay_ns = 0;  ///< Delay of the line in nanoseconds.
   Time ready{};  ///< time that the virtual encoder needs for a position; 0: as `latency`, but at most 10 us
 
   /// Returns the period of MA.
@@ -133,7 +135,7 @@ template <class AnyFormat>
 
 template <class WordType>
 struct ReplyWith {
-  unsigned ack_bits = 1;
+  unsigned ack_bits = 1;  ///< Number of acknowledge bits: clocks from the first edge to the start bit.
   WordType word{};
   std::uint8_t life_counter = 0;  ///< life counter, if the check has one
   bool cds = false;               ///< the encoder's bit of control communication
@@ -266,8 +268,9 @@ constexpr void show(const Format& format, const ShaftState& state, std::uint32_t
 template <const Format& known>
 struct KnownFormat {
   static constexpr std::uint16_t ma_khz = known.ma_khz;
-  static constexpr Time latency = known.latency;
+  static constexpr Time latency = known.latency;  ///< Time that the encoder takes before its start bit.
   static constexpr Timeout timeout = known.timeout;
+  /// Returns the period of the clock.
   [[nodiscard]] static constexpr Time period() { return known.period(); }
 };
 template <const Format& format>

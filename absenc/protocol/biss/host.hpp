@@ -28,21 +28,28 @@ constexpr auto decoded(const F& format, BitView samples, Cds cds = Cds::zero) {
 /// BiSS-C for the engine and the virtual encoder. F: Format, or a format with several words per frame.
 template <class F>
 struct ProtocolOf {
+  /// Format of the encoder: the values of its options.
   using Format = F;
+  /// The link has no requests.
   using Request = author::NoRequest;
+  /// A reply of the protocol.
   using Reply = std::remove_cvref_t<decltype(*detail::decoded(F{}, BitView{}))>;
   using Dialog = ControlDialog<F>;
-  static constexpr unsigned most_clocks = 512;
+  static constexpr unsigned most_clocks = 512;  ///< Greatest number of clocks of a transfer.
 
+  /// Returns how long a host waits for replies.
   static constexpr author::ClockedHostTimes host_times(const F& format) {
     return {std::uint32_t{format.ma_khz} * 1000, format.timeout.of_host(format.period())};
   }
+  /// Returns the number of clocks of a transfer.
   static constexpr unsigned clocks(const F& format) { return biss::clocks(format, format.latency, format.period()); }
   /// Returns the clocks for a frame whose delay is unknown.
   static constexpr unsigned all_clocks(const F& format) {
     return std::min(most_clocks, biss::clocks(format, format.latency + longest_delay, format.period()));
   }
+  /// Returns the reply with all checks done, or the first error.
   static constexpr Result<Reply> decode(const F& format, BitView samples) { return detail::decoded(format, samples); }
+  /// Returns the position of a reply.
   static constexpr Reading reading(const F& format, const Reply& reply) { return reading_of(format, reply); }
 };
 using Protocol = ProtocolOf<Format>;

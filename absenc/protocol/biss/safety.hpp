@@ -11,8 +11,8 @@ namespace absenc::biss {
 
 /// Format of one of several words in a frame.
 struct Channel {
-  WordFormat word = "position:19 error:1! warning:1!"_word;
-  Check check{};
+  WordFormat word = "position:19 error:1! warning:1!"_word;  ///< Fields of the position word.
+  Check check{};                                             ///< Checksum of the word.
 };
 
 [[nodiscard]] constexpr unsigned data_bits(const Channel& channel) {
@@ -33,16 +33,17 @@ struct SafetyFormat {
   std::int8_t previous_life_counter = -1;  ///< life counter of the frame before; -1: unknown
   /// These members mean the same as in Format.
   std::uint32_t ma_khz = 1000;
-  Time latency = 10us;
-  Time ready{};
-  std::uint32_t line_delay_ns = 0;
-  std::uint16_t register_delay_us = 0;
-  bool start_sequence = false;
-  Timeout timeout{};
-  StopBit stop_bit = StopBit::next;
+  Time latency = 10us;  ///< Time that the encoder takes before its start bit.
+  Time ready{};         ///< Time that a virtual encoder needs for a position; 0: as `latency`, at most 10 us.
+  std::uint32_t line_delay_ns = 0;      ///< Delay of the line in nanoseconds.
+  std::uint16_t register_delay_us = 0;  ///< Time until a virtual encoder has a requested register ready, in us.
+  bool start_sequence = false;          ///< Whether SLO of a virtual encoder stays idle until the start sequence.
+  Timeout timeout{};                    ///< Timeout of the encoder.
+  StopBit stop_bit = StopBit::next;     ///< The bit P that a virtual encoder sends after each register.
   std::uint8_t slave = 0;
-  RegisterOrder register_order = RegisterOrder::big;
+  RegisterOrder register_order = RegisterOrder::big;  ///< Order of the bytes of registers.
 
+  /// Returns the period of the clock.
   [[nodiscard]] constexpr Time period() const { return Time((1'000'000 + ma_khz / 2) / ma_khz); }
 };
 
@@ -51,11 +52,11 @@ struct SafetyFormat {
 }
 
 struct SafetyReply {
-  unsigned ack_bits = 1;
+  unsigned ack_bits = 1;  ///< Number of acknowledge bits: clocks from the first edge to the start bit.
   ChannelData cpw{};
   ChannelData spw{};
-  unsigned delay_bits = 0;
-  bool cds = false;
+  unsigned delay_bits = 0;  ///< Extra idle samples: the delay of the line in clocks.
+  bool cds = false;         ///< Bit of control data that the encoder sent.
 };
 
 namespace detail {

@@ -8,6 +8,7 @@
 
 namespace absenc::e201 {
 
+/// A virtual interface with an encoder behind it.
 class VirtualInterface final : public author::Responder {
  public:
   /// Creates an interface that is off until `power_on`. `shaft` must outlive it.

@@ -74,16 +74,17 @@ enum class Kind : std::uint8_t { other, resolute };
 inline constexpr unsigned resolute_slowest = 4;  // slowest clock recommended for a Renishaw Resolute: 280 kHz
 inline constexpr unsigned resolute_fastest = 5;  // fastest clock recommended for a Renishaw Resolute: 560 kHz
 
+/// Format of the encoder: the values of its options.
 struct Format {
-  WordFormat word = biss::Format{}.word;
-  Scale scale{};
+  WordFormat word = biss::Format{}.word;  ///< Fields of the position word.
+  Scale scale{};                          ///< Length of a count of a linear encoder.
   Carries carries = Carries::biss;
   ssi::AfterWord after_word = ssi::AfterWord::repeat;
   Kind kind = Kind::other;
   /// Of the virtual interface and its encoder.
   Version firmware{1, 16};
-  Time latency = 10us;
-  Time line_delay{};
+  Time latency = 10us;  ///< Time that the encoder takes before its start bit.
+  Time line_delay{};    ///< Delay of the line.
 
   [[nodiscard]] constexpr biss::Format biss() const { return {.word = word, .scale = scale}; }
   [[nodiscard]] constexpr ssi::Format ssi() const { return {.word = word, .after_word = after_word, .scale = scale}; }
@@ -125,12 +126,14 @@ struct Position {
 
 // ---- Commands and replies
 
+/// A request of the protocol.
 struct Request {
   std::uint8_t letter = letter::samples;
   unsigned clock = 0;  ///< set_clock: the clock, 1 to 8
   unsigned width = 0;  ///< set_width: the width in bits, 1 to 64
 };
 
+/// A reply of the protocol.
 struct Reply {
   std::uint64_t samples = 0;
   std::int64_t number = 0;  ///< number in the reply to ? > m b
@@ -173,15 +176,20 @@ inline constexpr unsigned widest = 64;  // largest width of a position in bits
 
 /// The interface's commands for the engine; author/dialog.hpp explains each member.
 struct Protocol {
+  /// Format of the encoder: the values of its options.
   using Format = e201::Format;
+  /// A request of the protocol.
   using Request = e201::Request;
+  /// A reply of the protocol.
   using Reply = e201::Reply;
   /// No document gives the longest line; the engine stores up to three times this length.
   static constexpr std::size_t longest_reply = 32;
 
+  /// Returns how long a host waits for replies.
   static constexpr author::HostTimes host_times(const Format&) {
     return {.answer_limit = answer_limit, .gap_limit = gap_limit, .patience = reply_limit};
   }
+  /// Returns how often the request may be repeated and how its reply ends.
   static constexpr author::Manner manner(const Format&, const Request& request) {
     if (request.letter == letter::samples || letter::is_in(letter::answered_by_a_line, request.letter)) return {};
     return {.any_reply = true, .answer_limit = silent_limit};
@@ -200,6 +208,7 @@ struct Protocol {
     if (is_clock || is_width) text.push_back(end_of_line);
     return text;
   }
+  /// Returns the length of the request that begins with `begin`, in bytes; 0 if that is no request.
   static constexpr std::size_t request_size(const Format&, Bytes begin) {
     if (!letter::is_in(letter::all, begin[0])) return 0;
     return begin[0] == letter::set_clock ? 3 : begin[0] == letter::set_width ? 4 : 1;
@@ -221,6 +230,7 @@ struct Protocol {
     if (digits != 0 && (number < 1 || number > most)) return Error::unsupported;
     return Request{text[0], is_clock ? number : 0, is_clock ? 0 : number};
   }
+  /// Returns the length of the reply, as far as its first bytes say, in bytes; 0 if it is not known.
   static constexpr std::size_t expected(const Format&, const Request& request, Bytes reply) {
     if (request.letter == letter::samples) return samples_length;
     return letter::is_in(letter::answered_by_a_line, request.letter) ? end_of_first_line(reply) : 0;
@@ -237,10 +247,12 @@ struct Protocol {
     const Error error = decode_position(format, *samples).error();
     return error == Error::none ? Result(Reply{.samples = *samples}) : error;
   }
+  /// Returns the position of a reply.
   static constexpr Reading reading(const Format& format, const Request& request, const Reply& reply) {
     if (request.letter != letter::samples) return {};
     return to_reading(format.word, decode_position(format, reply.samples)->word, format.scale);
   }
+  /// Returns when the encoder latched the position of a reply to a request that was sent at `sent_at`.
   static constexpr Time latched(const Format&, Time sent_at) { return sent_at; }
 };
 

@@ -16,7 +16,7 @@ using Dialog = author::DialogOf<Protocol>;
 
 /// Results of a procedure. Values that were not requested or not answered stay empty.
 struct Found {
-  Reading reading{};
+  Reading reading{};          ///< The position.
   std::uint64_t samples = 0;  ///< the samples from which `reading` was decoded
   std::optional<Text> command{};
   std::optional<Text> version{};

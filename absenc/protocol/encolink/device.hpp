@@ -21,20 +21,25 @@ inline constexpr std::array<Condition, 3> conditions{{
 }};
 enum ConditionIndex : std::size_t { condition_temperature, condition_busy, condition_channels_disagree };
 
+/// A virtual encoder.
 class VirtualEncoder final : public author::Responder {
  public:
   /// Creates an encoder that is off until `power_on`. `shaft` must outlive it. Unknown members of `format` are taken
   /// from virtual_format.
   VirtualEncoder(const Format& format, const Shaft& shaft);
 
+  /// Takes an event of the port.
   void feed(const Event<std::uint8_t>& event) override;
+  /// Returns the next step of the port.
   Step<std::uint8_t> next(Time now) override;
 
+  /// Switches the encoder on.
   void power_on(Time now, PowerOn kind) override;
   void set_condition(std::size_t index, std::int64_t value, Time) override { conditions_[index] = value; }
   /// Returns the 31 bytes that `save` stores: offset, preset, lock, turns, filters, calibration range.
   [[nodiscard]] MutableBytes memory() override { return memory_; }
 
+  /// Returns the format of the encoder.
   [[nodiscard]] const Format& format() const { return format_; }
   /// Returns the position that a frame would carry at `now`.
   [[nodiscard]] Position measure(Time now) const;

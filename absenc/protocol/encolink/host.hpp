@@ -21,19 +21,25 @@ enum class Ask : std::uint8_t {
 
 /// EncoLink frames for the engine; author/dialog.hpp explains each member.
 struct Frames {
+  /// Format of the encoder: the values of its options.
   using Format = encolink::Format;
+  /// A request of the protocol.
   struct Request {
     Ask ask = Ask::position;
     std::uint8_t ra = 0;  ///< one byte of a register access
   };
-  using Reply = Position;  ///< empty for an identity
-  static constexpr std::size_t longest_reply = identity_bytes;
+  using Reply = Position;                                       ///< empty for an identity
+  static constexpr std::size_t longest_reply = identity_bytes;  ///< Greatest length of a reply in bytes.
 
+  /// Returns how long a host waits for replies.
   static constexpr author::HostTimes host_times(const Format& format) {
     return {.answer_limit = answer_limit, .gap_limit = gap_limit, .silence = pause(format)};
   }
+  /// Returns how often the request may be repeated and how its reply ends.
   static constexpr author::Manner manner(const Format&, const Request&) { return {}; }
+  /// Returns the request as it is sent.
   static std::array<std::uint8_t, request_bytes> encode(const Format&, const Request& request);
+  /// Returns the length of the reply, as far as its first bytes say, in bytes; 0 if it is not known.
   static std::size_t expected(const Format& format, const Request& request, Bytes);
   /// Decodes a reply. Errors: timeout, line_stuck (SPI: all bits alike), those of decode_position or of
   /// decode_identity.
@@ -68,6 +74,7 @@ struct Channels {
 /// is otherwise wrong, the alarms stay unknown. If `format` has unknown members, reads the identity first.
 class ReadPosition : public author::HostOf<Frames> {
  public:
+  /// Reads from an encoder of this format.
   explicit ReadPosition(const Format& format);
   [[nodiscard]] const Reading* reading() const final {
     return error() == Error::none && channels_.reading.singleturn_bits != 0 ? &channels_.reading : nullptr;

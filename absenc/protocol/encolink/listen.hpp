@@ -21,7 +21,9 @@ class Listen final : public Conversation<std::uint8_t> {
   /// bad_checksum.
   explicit Listen(const Format& format);
 
+  /// Takes an event of the port.
   void feed(const Event<std::uint8_t>& event) override;
+  /// Returns the next step of the port.
   Step<std::uint8_t> next(Time now) override;
   [[nodiscard]] const StreamCounts* stream() const override { return &counts_; }
   [[nodiscard]] Error error() const override { return error_; }
@@ -30,6 +32,7 @@ class Listen final : public Conversation<std::uint8_t> {
     return error_ == Error::none && !frame_.empty() ? &reading_ : nullptr;
   }
   void report(FieldSink& sink) const override;
+  /// Returns the items of the last exchange.
   [[nodiscard]] Exchange<std::uint8_t> exchange() const override {
     return {{}, frame_.empty() ? waiting() : frame_.view(), received_at_, received_at_};
   }

@@ -56,6 +56,7 @@ inline constexpr std::array<Condition, 16> conditions{{
     {"ch2_status_clear", "", "bits of SF of channel 2 that are stuck at 0", 0, 255, 0},
 }};
 
+/// A virtual encoder.
 class VirtualEncoder final : public author::Responder {
  public:
   /// Switched off until `power_on`. `shaft` must outlive the encoder.
@@ -86,6 +87,7 @@ class VirtualEncoder final : public author::Responder {
     latches_ |= static_cast<std::uint8_t>(bits & ~unsigned{alarms::voltage});
     forced_ |= static_cast<std::uint8_t>(bits & alarms::voltage);
   }
+  /// Ends the cause of alarms; latched alarms stay until a host clears them.
   void lower_alarms(std::uint32_t bits) override {
     latches_ &= static_cast<std::uint8_t>(~bits);
     forced_ &= static_cast<std::uint8_t>(~bits);

@@ -230,6 +230,7 @@ inline constexpr std::array<Layout, 16> layouts = [] {
 }
 [[nodiscard]] constexpr std::uint8_t address_of(std::uint8_t field) { return field & 7; }
 
+/// A request of the protocol.
 struct Request {
   DataId id = DataId::position;
   std::uint8_t encoder_address = 0;  ///< 0 to 7

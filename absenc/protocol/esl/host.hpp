@@ -15,7 +15,7 @@ using Dialog = author::DialogOf<Protocol>;
 
 /// What a procedure found.
 struct Found : Shown {
-  Reading reading{};
+  Reading reading{};                     ///< The position.
   ByteBuffer<last_address + 1> bytes{};  ///< of `data`
   Sentence words{};                      ///< of the error
 };

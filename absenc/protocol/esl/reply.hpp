@@ -346,12 +346,17 @@ constexpr unsigned unsafe_alarms(const ChannelReply& channel) {
   return request.id == DataId::write_memory && request.memory_address == page_select_address;
 }
 
+/// The protocol, as author layers use it: frames, lengths and times.
 struct Protocol {
+  /// Format of the encoder: the values of its options.
   using Format = Profile;
+  /// A request of the protocol.
   using Request = esl::Request;
+  /// A reply of the protocol.
   using Reply = esl::Reply;
-  static constexpr std::size_t longest_reply = reply_capacity;
+  static constexpr std::size_t longest_reply = reply_capacity;  ///< Greatest length of a reply in bytes.
 
+  /// Returns how long a host waits for replies.
   static constexpr author::HostTimes host_times(const Profile&) {
     return {.answer_limit = answer_limit, .gap_limit = gap_limit, .pause = request_pause};
   }
@@ -361,24 +366,29 @@ struct Protocol {
     const Time busy = selects_page(request) ? page_time : is_memory_access(request.id) ? eeprom_read_pause : Time{};
     return {.pause = busy, .hold = busy};
   }
+  /// Returns the length of the request that begins with `begin`, in bytes; 0 if that is no request.
   static constexpr std::size_t request_size(const Profile& profile, Bytes begin) {
     const std::optional<DataId> id = data_id(begin[0]);
     if (!id || begin[0] != control_field(profile, address_of(begin[0]), *id)) return 0;
     return request_length(profile, *id);
   }
+  /// Returns the length of the reply to `request`, in bytes.
   static constexpr std::size_t reply_size(const Profile&, const Request& request) { return reply_length(request.id); }
   static constexpr auto encode = encode_request;
   static constexpr auto decode_request = esl::decode_request;
-  static constexpr auto decode = decode_reply;
+  static constexpr auto decode = decode_reply;  ///< Returns the reply with all checks done, or the first error.
+  /// Returns the position of a reply.
   static constexpr Reading reading(const Profile& profile, const Request& request, const Reply& reply) {
     Reading reading = to_reading(request.id, reply);  // by the request, which may be known when the program is written
     if (!profile.turns) reading.multiturn_bits = 0;
     if (!profile.turns) reading.multiturn_valid = false;
     return reading;
   }
+  /// Returns the length of the reply, as far as its first bytes say, in bytes; 0 if it is not known.
   static constexpr std::size_t expected(const Profile& profile, const Request& request, Bytes) {
     return reply_size(profile, request);
   }
+  /// Returns whether a reply with this error is complete, so that no more bytes are awaited.
   static constexpr bool is_whole(const Profile&, Error) { return false; }
   static constexpr auto latched = latch_time;
 };

@@ -15,10 +15,14 @@ namespace absenc::modbus {
 
 class Server : public Device<std::uint8_t> {
  public:
+  /// Takes an event of the port.
   void feed(const Event<std::uint8_t>& event) final;
+  /// Returns the next step of the port.
   Step<std::uint8_t> next(Time now) final;
 
+  /// Switches the encoder on.
   void power_on(Time now, PowerOn kind) final;
+  /// Switches the encoder off.
   void power_off(Time now) final;
   [[nodiscard]] std::span<const Violation> violations() const final { return rules_.violations(); }
   [[nodiscard]] std::uint32_t violation_count() const final { return rules_.violation_count(); }

@@ -10,6 +10,7 @@
 
 namespace absenc::ssi {
 
+/// A virtual encoder.
 class VirtualEncoder final : public author::ClockedDevice {
  public:
   /// Creates an encoder that is off until `power_on`. `shaft` must outlive it.

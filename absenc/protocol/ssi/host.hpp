@@ -11,16 +11,23 @@ namespace absenc::ssi {
 
 /// SSI for the engine. The port is set to the clock rate already.
 struct Protocol {
+  /// Format of the encoder: the values of its options.
   using Format = ssi::Format;
+  /// The link has no requests.
   using Request = author::NoRequest;
+  /// A reply of the protocol.
   using Reply = Word;
-  static constexpr unsigned most_clocks = frame_capacity;
+  static constexpr unsigned most_clocks = frame_capacity;  ///< Greatest number of clocks of a transfer.
 
+  /// Returns how long a host waits for replies.
   static constexpr author::ClockedHostTimes host_times(const Format& format) {
     return {.rest = format.pause + pause_margin};
   }
+  /// Returns the number of clocks of a transfer.
   static constexpr unsigned clocks(const Format& format) { return ssi::clocks(format); }
+  /// Returns the reply with all checks done, or the first error.
   static constexpr Result<Word> decode(const Format& format, BitView bits) { return ssi::decode(format, bits); }
+  /// Returns the position of a reply.
   static constexpr Reading reading(const Format& format, const Word& word) {
     WordContents contents = contents_of(format.word);
     if (format.error_parity) contents.reported |= word_error;

@@ -19,6 +19,7 @@ inline constexpr std::array<Condition, 2> conditions{{
     {"temperature", "degC", "of the board", -20, 127, 35},
 }};
 
+/// A virtual encoder.
 class VirtualEncoder final : public author::Responder {
  public:
   /// Switched off until `power_on`. `shaft` must outlive the encoder.
@@ -37,6 +38,7 @@ class VirtualEncoder final : public author::Responder {
     latches_ |= static_cast<std::uint8_t>(bits & (alarms::latched | alarms::counting_error));
     forced_ |= static_cast<std::uint8_t>(bits & (alarms::full_absolute_status | alarms::battery_alarm));
   }
+  /// Ends the cause of alarms; latched alarms stay until a host clears them.
   void lower_alarms(std::uint32_t bits) override {
     latches_ &= static_cast<std::uint8_t>(~bits);
     forced_ &= static_cast<std::uint8_t>(~bits);
@@ -61,6 +63,7 @@ class VirtualEncoder final : public author::Responder {
     }
     return reply;
   }
+  /// Switches the encoder on.
   void power_on(Time now, PowerOn kind) override {
     if (!off_) return;
     off_ = false;
@@ -82,6 +85,7 @@ class VirtualEncoder final : public author::Responder {
     Responder::power_on(now, kind);
     if (!has_battery() && kind == PowerOn::real) restart(now + start_up_without_battery);
   }
+  /// Switches the encoder off.
   void power_off(Time now) override {
     if (off_) return;
     if (is_on(now)) update(now);

@@ -54,7 +54,7 @@ struct Values {
   std::optional<std::uint32_t> multiturn{};
   std::optional<std::uint8_t> alarms{};
   std::optional<std::uint8_t> page{};
-  std::optional<std::uint8_t> address{};
+  std::optional<std::uint8_t> address{};  ///< Address.
   std::optional<bool> busy{};
   std::optional<std::uint8_t> value{};
   std::optional<Bytes> data{};

@@ -108,9 +108,11 @@ struct Format {
   bool strict = true;             ///< also the checks that only a specification-true encoder passes
   bool battery = true;            ///< false: none is connected; the turns mean nothing then (2 (1))
 
+  /// Returns the settings of the line.
   [[nodiscard]] static constexpr LineSettings line() { return line_settings; }
   /// Bits of the turns that may be used.
   [[nodiscard]] constexpr unsigned turns_bits() const { return battery ? multiturn_bits : 0; }
+  /// Returns the bits of position and turns.
   [[nodiscard]] constexpr Resolution resolution() const { return {singleturn_bits, turns_bits()}; }
 };
 

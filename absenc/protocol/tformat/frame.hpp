@@ -83,6 +83,7 @@ inline constexpr std::array<Lengths, 16> lengths = [] {
   return request_length(id) != 0 ? std::optional(id) : std::nullopt;
 }
 
+/// A request of the protocol.
 struct Request {
   DataId id = DataId::everything;
   std::uint8_t address = 0;  ///< memory access: 0 to 127
@@ -348,12 +349,17 @@ constexpr unsigned reported_status(const Format& format, bool has_alarms) {
 
 // ---- As the engine and the virtual encoder use it
 
+/// The protocol, as author layers use it: frames, lengths and times.
 struct Protocol {
+  /// Format of the encoder: the values of its options.
   using Format = tformat::Format;
+  /// A request of the protocol.
   using Request = tformat::Request;
+  /// A reply of the protocol.
   using Reply = tformat::Reply;
-  static constexpr std::size_t longest_reply = reply_capacity;
+  static constexpr std::size_t longest_reply = reply_capacity;  ///< Greatest length of a reply in bytes.
 
+  /// Returns how long a host waits for replies.
   static constexpr author::HostTimes host_times(const Format&) {
     return {.answer_limit = answer_limit, .gap_limit = gap_limit};
   }
@@ -363,25 +369,33 @@ struct Protocol {
     if (selects_page(request)) return {.repeats = 2, .pause = memory_time, .hold = memory_time};
     return {.repeats = request.id == DataId::write_memory || is_reset(request.id) ? 0u : 2u};
   }
+  /// Returns the request as it is sent.
   static constexpr RequestBytes encode(const Format&, const Request& request) { return encode_request(request); }
+  /// Returns the length of the reply, as far as its first bytes say, in bytes; 0 if it is not known.
   static constexpr std::size_t expected(const Format&, const Request& request, Bytes so_far) {
     return reply_length(begins_rejection(request.id, so_far) ? DataId::everything : request.id);
   }
-  static constexpr auto decode = decode_reply;
+  static constexpr auto decode = decode_reply;  ///< Returns the reply with all checks done, or the first error.
   /// A refusal may be followed by the same request at once. After anything else that is wrong more may be coming, and
   /// sending while the encoder sends can destroy its driver (11).
   static constexpr bool is_whole(const Format&, Error error) { return error == Error::request_rejected; }
+  /// Returns the position of a reply.
   static constexpr Reading reading(const Format& format, const Request& request, const Reply& reply) {
     return to_reading(format, request.id, reply);  // by the request, which may be known when the program is written
   }
+  /// Returns when the encoder latched the position of a reply to a request that was sent at `sent_at`.
   static constexpr Time latched(const Format&, Time sent_at) { return sent_at; }
 
+  /// Returns the request, or why it is none.
   static constexpr Result<Request> decode_request(const Format&, Bytes bytes) { return tformat::decode_request(bytes); }
+  /// Returns the length of the request that begins with `begin`, in bytes; 0 if that is no request.
   static constexpr std::size_t request_size(const Format&, Bytes begin) {
     const std::optional<DataId> id = data_id(begin[0]);
     return id && begin[0] == control_field(*id) ? request_length(*id) : 0;
   }
+  /// Returns the length of the reply to `request`, in bytes.
   static constexpr std::size_t reply_size(const Format&, const Request& request) { return reply_length(request.id); }
+  /// Returns the times of a virtual encoder.
   static constexpr author::DeviceTimes device_times(const Format&) {
     const Time character = line_settings.character();
     return {character, answer_time, start_up_with_battery, character};  // a missing start bit ends a frame (9.2)

@@ -15,12 +15,14 @@ namespace absenc::tformat {
 /// and an alarm that newly appears in their SF is followed by one, whose reply is the result then. Nothing is repeated.
 class ReadPosition : public author::HostOf<Protocol> {
  public:
+  /// Reads from an encoder of this format.
   explicit ReadPosition(const Format& format, DataId id = DataId::everything,
                         std::optional<std::uint8_t> known_alarms = std::nullopt)
       : HostOf(format), id_(id), known_alarms_(known_alarms) {
     const bool alarms_first = (id == DataId::singleturn || id == DataId::multiturn) && !known_alarms;
     ask_for(alarms_first ? DataId::everything : id);
   }
+  /// Reads with this request.
   ReadPosition(const Format& format, const Request& request) : ReadPosition(format, request.id) {}
 
   [[nodiscard]] const Reading* reading() const final {

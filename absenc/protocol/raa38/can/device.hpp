@@ -14,12 +14,17 @@ class VirtualNode final : public Device<CanFrame> {
   VirtualNode(const Format& format, const Shaft& shaft)
       : format_(format), settings_(format.node, rates[format.rate].index, format.bits, shaft) {}
 
+  /// Takes an event of the port.
   void feed(const Event<CanFrame>& event) override;
+  /// Returns the next step of the port.
   Step<CanFrame> next(Time now) override;
 
+  /// Switches the encoder on.
   void power_on(Time now, PowerOn kind) override;
+  /// Switches the encoder off.
   void power_off(Time now) override;
   void raise_alarms(std::uint32_t) override {}
+  /// Ends the cause of alarms; latched alarms stay until a host clears them.
   void lower_alarms(std::uint32_t) override {}
   [[nodiscard]] MutableBytes memory() override { return settings_.memory(); }
   [[nodiscard]] std::uint32_t memory_version() const override { return settings_.version(); }

@@ -18,13 +18,19 @@ inline constexpr Time answer_limit = 50ms;  // timeout of a reply on a bus witho
 inline constexpr Time busy_limit = 250ms;   // timeout of a reply on a bus that others keep busy
 inline constexpr Time listening_time = 1200ms;
 
+/// The protocol, as author layers use it: frames, lengths and times.
 struct Protocol {
   using Item = CanFrame;
+  /// Format of the encoder: the values of its options.
   using Format = can::Format;
+  /// A request of the protocol.
   using Request = CanFrame;
+  /// A reply of the protocol.
   using Reply = CanFrame;
 
+  /// Returns how often the request may be repeated and how its reply ends.
   static constexpr author::Manner manner(const Format&, const CanFrame&) { return {}; }
+  /// Returns how long a host waits for replies.
   static constexpr author::CanHostTimes host_times(const Format&) { return {answer_limit, busy_limit}; }
   /// Returns the frame as text, as "220:8020000000000000".
   static constexpr ByteBuffer<4 + 2 * frame_size> encode(const Format&, const CanFrame& frame) {
@@ -51,6 +57,7 @@ class Read : public author::CanEngine {
   enum class Way : std::uint8_t { ask, start, listen };
   Read(const Format& format, Way way);
 
+  /// Returns the format of the encoder.
   [[nodiscard]] const Format& format() const { return format_; }
   [[nodiscard]] const Reading& found() const { return reading_; }
   [[nodiscard]] const Reading* reading() const final {

@@ -11,6 +11,7 @@
 
 namespace absenc::raa38::rtu {
 
+/// A virtual encoder.
 class VirtualEncoder final : public modbus::Server {
  public:
   /// Creates an encoder that is off until `power_on`. `shaft` must outlive it.
@@ -20,6 +21,7 @@ class VirtualEncoder final : public modbus::Server {
         settings_(format.address, static_cast<std::uint8_t>(format.baud), format.bits, shaft) {}
 
   void raise_alarms(std::uint32_t) override {}
+  /// Ends the cause of alarms; latched alarms stay until a host clears them.
   void lower_alarms(std::uint32_t) override {}
   [[nodiscard]] MutableBytes memory() override { return settings_.memory(); }
   [[nodiscard]] std::uint32_t memory_version() const override { return settings_.version(); }

@@ -69,6 +69,7 @@ enum class Data : std::uint8_t {
   three_as_four,  // byte count 04, three bytes
 };
 
+/// Format of the encoder: the values of its options.
 struct Format {
   std::uint8_t address = 1;
   unsigned bits = 14;      ///< bits of the position, 10 to 21
@@ -79,10 +80,13 @@ struct Format {
   CrcOrder address_crc = CrcOrder::low_first;
 
   [[nodiscard]] constexpr unsigned asked() const { return registers != 0 ? registers : bits > 16 ? 2 : 1; }
+  /// Returns the settings of the line.
   [[nodiscard]] constexpr LineSettings line() const { return {.rate = bauds[baud]}; }
+  /// Returns the bits of position and turns.
   [[nodiscard]] constexpr Resolution resolution() const { return {.singleturn_bits = bits}; }
 };
 
+/// A request of the protocol.
 struct Request {
   std::uint8_t function = function::read;
   std::uint8_t address = 1;
@@ -138,6 +142,7 @@ using RequestBytes = ByteBuffer<8>;
   return request;
 }
 
+/// A reply of the protocol.
 struct Reply {
   std::uint8_t function = function::read;
   std::uint8_t address = 1;      ///< ask_address: the encoder's address; set_address: the new address
@@ -248,31 +253,44 @@ constexpr bool is_answer(const Request& request, Bytes reply) {
 /// Timeout of a reply. The document gives no time; slaves of this kind need a few milliseconds.
 inline constexpr Time answer_limit = std::chrono::milliseconds(50);
 
+/// The protocol, as author layers use it: frames, lengths and times.
 struct Protocol {
+  /// Format of the encoder: the values of its options.
   using Format = rtu::Format;
+  /// A request of the protocol.
   using Request = rtu::Request;
+  /// A reply of the protocol.
   using Reply = rtu::Reply;
-  static constexpr std::size_t longest_reply = 9;
+  static constexpr std::size_t longest_reply = 9;  ///< Greatest length of a reply in bytes.
 
+  /// Returns how long a host waits for replies.
   static constexpr author::HostTimes host_times(const Format&, std::uint32_t rate) {
     return modbus::client_times({.rate = rate}, answer_limit);
   }
+  /// Returns how long a host waits for replies.
   static constexpr author::HostTimes host_times(const Format& format) { return host_times(format, format.line().rate); }
   /// Settings wear the memory: the engine repeats no request.
   static constexpr author::Manner manner(const Format&, const Request&) { return {}; }
+  /// Returns the request as it is sent.
   static constexpr RequestBytes encode(const Format&, const Request& request) { return encode_request(request); }
+  /// Returns the request, or why it is none.
   static constexpr Result<Request> decode_request(const Format&, Bytes bytes) { return rtu::decode_request(bytes); }
+  /// Returns the length of the reply, as far as its first bytes say, in bytes; 0 if it is not known.
   static constexpr std::size_t expected(const Format&, const Request& request, Bytes reply) {
     return reply_length(request, reply);
   }
+  /// Returns whether a reply with this error is complete, so that no more bytes are awaited.
   static constexpr bool is_whole(const Format&, Error) { return false; }
+  /// Returns the reply with all checks done, or the first error.
   static constexpr Result<Reply> decode(const Format& format, const Request& request, Bytes bytes) {
     return decode_reply(format, request, bytes);
   }
+  /// Returns the position of a reply.
   static constexpr Reading reading(const Format& format, const Request& request, const Reply& reply) {
     if (request.function != function::read) return {};
     return author::position_reading(reply.singleturn, format.bits);
   }
+  /// Returns when the encoder latched the position of a reply to a request that was sent at `sent_at`.
   static constexpr Time latched(const Format&, Time sent_at) { return sent_at; }
   static constexpr bool needs_another(const Format&, const Reply& reply) { return reply.doubtful_size != 0; }
   static constexpr Error agree(const Format&, const Reply& first, const Reply& second, Time) {

@@ -20,7 +20,7 @@ namespace absenc::raa38::rtu {
 
 /// Fields of frames and commands, in the order of the report.
 struct Values {
-  std::optional<std::uint16_t> address{};
+  std::optional<std::uint16_t> address{};  ///< Address.
   std::optional<std::uint16_t> function{};
   std::optional<std::uint16_t> first_register{};
   std::optional<std::uint16_t> registers{};
@@ -41,8 +41,8 @@ struct Values {
 
 /// Result of a command.
 struct Found : Values {
-  Reading reading{};
-  Sentence words{};  ///< text of the error's detail
+  Reading reading{};  ///< The position.
+  Sentence words{};   ///< text of the error's detail
 };
 
 using Dialog = author::DialogOf<Protocol>;

@@ -13,8 +13,11 @@ class VirtualEncoder final : public author::BusDevice<Protocol, VirtualEncoder, 
  public:
   using BusDevice::BusDevice;
 
+  /// Takes an event of the port.
   void feed(const Event<std::uint8_t>& event) override;
+  /// Returns the next step of the port.
   Step<std::uint8_t> next(Time now) override;
+  /// Switches the encoder off.
   void power_off(Time now) override;
 
   [[nodiscard]] bool is_mine(const Request& request) const;

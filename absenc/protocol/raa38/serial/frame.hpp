@@ -98,6 +98,7 @@ struct Position {
   std::uint32_t singleturn = 0;
   std::uint8_t second_byte = fixed_second_byte;
 
+  /// Compares all members.
   friend constexpr bool operator==(const Position&, const Position&) = default;
 };
 
@@ -142,6 +143,7 @@ inline constexpr int anybody = -1;
   return Position{value, bytes[1]};
 }
 
+/// A request of the protocol.
 struct Request {
   enum class Kind : std::uint8_t {
     read,        // BC AA Bx
@@ -193,17 +195,23 @@ struct Values {
           .angle = degrees(position.singleturn, format.bits)};
 }
 
+/// The protocol, as author layers use it: frames, lengths and times.
 struct Protocol {
+  /// Format of the encoder: the values of its options.
   using Format = serial::Format;
+  /// A request of the protocol.
   using Request = serial::Request;
+  /// A reply of the protocol.
   using Reply = Position;
-  static constexpr std::size_t longest_reply = frame_capacity;
+  static constexpr std::size_t longest_reply = frame_capacity;  ///< Greatest length of a reply in bytes.
 
+  /// Returns how long a host waits for replies.
   static constexpr author::HostTimes host_times(const Format& format) {
     return {.answer_limit = format.acquisition > Time{} ? format.acquisition + answer_slack : answer_limit,
             .gap_limit = std::max(format.transmission, gap_limit),
             .patience = patience};
   }
+  /// Returns how often the request may be repeated and how its reply ends.
   static constexpr author::Manner manner(const Format&, const Request& request) {
     switch (request.kind) {
       case Request::Kind::trigger:
@@ -214,29 +222,40 @@ struct Protocol {
         return {.expects_reply = request.kind == Request::Kind::read};
     }
   }
+  /// Returns the request as it is sent.
   static constexpr RequestBytes encode(const Format&, const Request& request) { return encode_request(request); }
+  /// Returns the request, or why it is none.
   static constexpr Result<Request> decode_request(const Format&, Bytes bytes) { return serial::decode_request(bytes); }
+  /// Returns the length of the request that begins with `begin`, in bytes; 0 if that is no request.
   static constexpr std::size_t request_size(const Format&, Bytes begin) {
     const RequestBytes request = encode_request({});
     return begin[0] == request[0] && (begin.size() < 2 || begin[1] == request[1]) ? request_bytes : 0;
   }
+  /// Returns the length of the reply to `request`, in bytes.
   static constexpr std::size_t reply_size(const Format& format, const Request& request) {
     return request.kind == Request::Kind::zero_clear ? 0 : format.frame_bytes();
   }
+  /// Returns the length of the reply, as far as its first bytes say, in bytes; 0 if it is not known.
   static constexpr std::size_t expected(const Format& format, const Request&, Bytes) { return format.frame_bytes(); }
+  /// Returns whether a reply with this error is complete, so that no more bytes are awaited.
   static constexpr bool is_whole(const Format&, Error) { return false; }
+  /// Returns the reply as it is sent.
   static constexpr FrameBytes encode_reply(const Format& format, const Request&, const Position& position) {
     return encode_position(format, position);
   }
+  /// Returns the reply with all checks done, or the first error.
   static constexpr Result<Position> decode(const Format& format, const Request& request, Bytes bytes) {
     // The encoder does not answer zero clearing.
     if (request.kind == Request::Kind::zero_clear) return Error::unexpected_reply;
     return decode_position(format, bytes, request.kind == Request::Kind::read ? request.unit : anybody);
   }
+  /// Returns the position of a reply.
   static constexpr Reading reading(const Format& format, const Request&, const Position& position) {
     return author::position_reading(position.singleturn, format.bits);
   }
+  /// Returns when the encoder latched the position of a reply to a request that was sent at `sent_at`.
   static constexpr Time latched(const Format&, Time sent_at) { return sent_at; }
+  /// Returns the times of a virtual encoder.
   static constexpr author::DeviceTimes device_times(const Format& format) {
     return {.answer_time = format.acquisition > Time{} ? format.acquisition : virtual_acquisition, .gap = request_gap};
   }

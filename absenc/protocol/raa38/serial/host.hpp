@@ -32,7 +32,9 @@ class Listen final : public Conversation<std::uint8_t> {
  public:
   explicit Listen(const Format& format);
 
+  /// Takes an event of the port.
   void feed(const Event<std::uint8_t>& event) override;
+  /// Returns the next step of the port.
   Step<std::uint8_t> next(Time now) override;
   [[nodiscard]] const StreamCounts* stream() const override { return &counts_; }
   [[nodiscard]] Error error() const override { return error_; }
@@ -40,6 +42,7 @@ class Listen final : public Conversation<std::uint8_t> {
   [[nodiscard]] std::string_view advice() const override { return words_.advice; }
   [[nodiscard]] const Reading* reading() const override;
   void report(FieldSink& sink) const override;
+  /// Returns the items of the last exchange.
   [[nodiscard]] Exchange<std::uint8_t> exchange() const override;
 
   [[nodiscard]] const StreamDecoder& decoder() const { return decoder_; }
