@@ -30,8 +30,9 @@ class DelayingRelay(threading.Thread):
         super().__init__(daemon=True)
         self.host, self.encoder, self.delay = host, encoder, delay
         self.requests = 0  # bursts received from the host so far
-        self.forwarded = []  # (burst that the reply answers, bursts received when it was forwarded, bytes)
-        self.delayed = []  # (time at which to forward, burst, bytes)
+        # forwarded replies: (burst that the reply answers, bursts received when it was forwarded, bytes)
+        self.forwarded = []
+        self.delayed = []  # replies that wait: (time at which to forward, burst, bytes)
         self.replies = 0
         self.stop, self.wake = os.pipe()
 

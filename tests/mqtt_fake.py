@@ -83,7 +83,7 @@ class FakeBroker:
 
     def __init__(self, answer=None):
         self.answer = answer
-        self.payloads = {}  # by topic, as JSON or None, in the order of arrival
+        self.payloads = {}  # received payloads by topic, as JSON or None, in the order of arrival
         self.connections = 0
         self.lock = threading.Lock()
         self.open = set()

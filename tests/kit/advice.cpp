@@ -103,16 +103,16 @@ void check_words(const Unit& unit, const std::string& what, std::string_view adv
     findings.require(holds, [&] { return what + " is advised \"" + std::string(advice) + "\": " + std::string(text); });
   };
   for (const NamedCommand& one : commands_in(unit, advice)) {
-    require(!one.unknown, "`" + one.text + "` is no command of this unit, or not written \"absenc ...\"");
+    require(!one.unknown, "`" + one.text + "` is not a command of this unit, or not written \"absenc ...\"");
   }
   const std::string rest = unquoted(advice);
   for (const Command& command : unit.commands) {
     // a one-word name such as "zero" may be ordinary text
     const bool is_word = command.name.find('-') == std::string_view::npos;
-    require(is_word || rest.find(command.name) == std::string::npos, "a command that it names is not in backquotes");
+    require(is_word || rest.find(command.name) == std::string::npos, "it names a command without backquotes");
   }
   for (const std::string_view words : circular_phrases)
-    require(rest.find(words) == std::string::npos, "that is circular");
+    require(rest.find(words) == std::string::npos, "it is circular");
 }
 
 /// Splits a message into lower-case clauses at ": " and "; ".
@@ -183,8 +183,8 @@ bool follow_advice(const Unit& unit, const Configuration& configuration, std::si
   alarmed.world().pass(std::chrono::seconds(1));  // the encoder may be writing its memory
   const bool gone = !alarmed.shows_alarms();
   findings.require(named.empty() || gone || explained || reported_more, [&] {
-    return configuration.text + ", alarm " + std::string(flag.name) + ": whoever does \"" + std::string(flag.action) +
-           "\" changes nothing, and is not told why";
+    return configuration.text + ", alarm " + std::string(flag.name) + ": following \"" + std::string(flag.action) +
+           "\" has no effect and no explanation";
   });
   return gone;
 }
@@ -196,7 +196,8 @@ void check_alarms(const Unit& unit, Findings& findings) {
     if (flag.name.empty()) continue;
     const std::vector<NamedCommand> named = commands_in(unit, flag.action);
     const std::string what = "alarm " + std::string(flag.name);
-    findings.require(flag.action != read_the_alarms, [&] { return what + " sends to the alarms, among which it is"; });
+    findings.require(flag.action != read_the_alarms,
+                     [&] { return what + " refers to the alarms, of which it is one"; });
     bool goes_once = false;
     for (const Configuration& configuration : configurations(unit)) {
       if (configuration.is_model) goes_once = follow_advice<Item>(unit, configuration, bit, findings) || goes_once;
@@ -204,7 +205,7 @@ void check_alarms(const Unit& unit, Findings& findings) {
     const bool should_go = std::any_of(named.begin(), named.end(), [](const NamedCommand& one) {
       return one.command != nullptr && one.command->changes_encoder;
     });
-    findings.require(goes_once || !should_go, [&] { return what + " stays whatever is done of its advice"; });
+    findings.require(goes_once || !should_go, [&] { return what + " does not end when its advice is followed"; });
   }
 }
 
@@ -221,7 +222,7 @@ void check_status(const Unit& unit, const Configuration& configuration, Findings
       const FlagInfo& flag = unit.status->flags[bit];
       if ((reading->status >> bit & 1) == 0 || flag.action != read_the_alarms) continue;
       findings.require(reading->alarms != 0, [&] {
-        return configuration.text + ", status " + std::string(flag.name) + " sends to the alarms, and there is none";
+        return configuration.text + ", status " + std::string(flag.name) + " refers to the alarms, but none is raised";
       });
     }
   }
@@ -237,15 +238,15 @@ void check_message(const Unit& unit, const std::string& what, const Command& com
   check_words(unit, what, advice, findings);
   const std::vector<NamedCommand> named = commands_in(unit, advice);
   findings.require(named.empty() || named[0].command != &command || !advice.starts_with('`'),
-                   [&] { return what + ": the advice is only to do the same again"; });
+                   [&] { return what + ": the advice only repeats the command"; });
   findings.require(!command.changes_encoder || advice.find("read again") == std::string::npos,
-                   [&] { return what + ": \"read again\" is no advice of a command that changes the encoder"; });
+                   [&] { return what + ": \"read again\" is no advice for a command that changes the encoder"; });
   std::set<std::string> seen_clauses;
   for (const std::string_view part :
        {std::string_view(text.description), std::string_view(ended.detail), std::string_view(advice)}) {
     for (const std::string& clause : clauses_of(part)) {
       findings.require(clause.size() < 12 || seen_clauses.insert(clause).second,
-                       [&] { return what + " says twice \"" + clause + "\""; });
+                       [&] { return what + " repeats \"" + clause + "\""; });
     }
   }
 }

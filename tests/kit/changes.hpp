@@ -100,20 +100,20 @@ std::string broken_promise(World<Item>& world, const Unit& unit, const Command& 
   switch (command.verb) {
     case Verb::zero: {
       const std::optional<Reading> now = position();
-      if (!now) return "nothing is read after it";
+      if (!now) return "no position can be read after it";
       const std::int64_t off = wrapped_difference(now->singleturn, 0, now->singleturn_bits);
       const std::int64_t near = std::int64_t{1} << (now->singleturn_bits - std::min(now->singleturn_bits, 10u));
       return std::abs(off) <= near ? "" : "the position is " + std::to_string(off) + " counts off";
     }
     case Verb::reset_multiturn: {
       const std::optional<Reading> now = position();
-      if (!now) return "nothing is read after it";
+      if (!now) return "no position can be read after it";
       const auto wanted = static_cast<std::uint64_t>(values.empty() ? 0 : values[0]) & low_mask(now->multiturn_bits);
       return now->multiturn == wanted ? "" : "the turns are " + std::to_string(now->multiturn);
     }
     case Verb::clear_alarms: {
       const std::optional<Reading> now = position();
-      return now && now->alarms == 0 ? "" : "there are alarms";
+      return now && now->alarms == 0 ? "" : "alarms are still raised";
     }
     case Verb::memory_write: {
       const Command* reader = find_command(unit, Verb::memory_read);
@@ -139,13 +139,13 @@ std::string broken_promise(World<Item>& world, const Unit& unit, const Command& 
         // A numbered field is one of several frames, and a position field depends on the shaft: neither must match.
         if (name.find('#') != std::string::npos || is_of_reading(value.role)) continue;
         const auto found = written.fields.find(name);
-        if (found != written.fields.end() && !(found->second == value)) return name + " reads as another";
+        if (found != written.fields.end() && !(found->second == value)) return name + " reads differently";
       }
       // Text in place of a number means that the encoder cannot report this setting.
       const auto setting = now.fields.find(std::string(command.reads_back));
       const bool in_words = setting != now.fields.end() && !setting->second.bytes.empty();
       if (!now.fields.empty() && !values.empty() && !in_words && !shows(now, values[0])) {
-        return "what is read does not show it: " + to_text(now.fields);
+        return "the value read back does not contain it: " + to_text(now.fields);
       }
       return {};
     }

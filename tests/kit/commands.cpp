@@ -35,13 +35,14 @@ void run_commands(const Unit& unit, const Configuration& configuration, Findings
       const ConversationResult result = world.run(command, least_arguments(command));
       if (!result.made) break;
       findings.require(result.ended, [&] { return what() + "hangs"; });
-      findings.require(!result.premature_reading, [&] { return what() + "has a reading of nothing"; });
+      findings.require(!result.premature_reading,
+                       [&] { return what() + "has a reading before any reply, or with an error"; });
       const bool may_fail = !configuration.is_model || !is_plain(command) || is_refused(command, result.error);
       findings.require(result.good() || may_fail,
                        [&] { return what() + std::string(text_of(result.error).name) + " " + result.detail; });
       if (!result.good()) break;
       findings.require(command.verb != Verb::scan || !result.seen.numbers(Role::encoder).empty(),
-                       [&] { return what() + "does not say who answered"; });
+                       [&] { return what() + "does not report which encoder replied"; });
       if (result.seen.reading) {
         findings.require(sim::is_at(*result.seen.reading, world.place()),
                          [&] { return what() + "another position than the shaft's"; });

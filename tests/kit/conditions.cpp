@@ -100,10 +100,11 @@ Findings check_conditions(const Unit& unit) {
     const auto require = [&](bool holds, const char* text) {
       findings.require(holds, [&] { return "condition " + std::string(one.name) + " " + text; });
     };
-    require(names.insert(one.name).second, "is there twice");
-    require(one.minimum < one.maximum && one.minimum <= one.normal && one.normal <= one.maximum, "has no such range");
+    require(names.insert(one.name).second, "occurs twice");
+    require(one.minimum < one.maximum && one.minimum <= one.normal && one.normal <= one.maximum,
+            "has an invalid range");
     require(unit.link == LinkKind::can ? is_seen<CanFrame>(unit, i) : is_seen<std::uint8_t>(unit, i),
-            "is not seen by any host, whatever it is");
+            "is invisible to every host");
   }
   return findings;
 }

@@ -50,8 +50,8 @@ void declared_registers(const Unit& unit, Findings& findings) {
     const auto require = [&](bool holds, const char* text) {
       findings.require(holds, [&] { return "register " + std::string(one.name) + " " + text; });
     };
-    require(names.insert(one.name).second, "is there twice");
-    require(one.size > 0 && (one.readable || one.writable), "is of no use");
+    require(names.insert(one.name).second, "occurs twice");
+    require(one.size > 0 && (one.readable || one.writable), "is neither readable nor writable");
     for (const Verb verb : {Verb::memory_read, Verb::memory_write}) {
       const Command* command = find_command(unit, verb);
       require(takes(command, Role::address, one.address, one.address),
@@ -68,7 +68,7 @@ void declared_settings(const Unit& unit, Findings& findings) {
     const auto require = [&](bool holds, const char* text) {
       findings.require(holds, [&] { return std::string(command.name) + " " + text; });
     };
-    require(find_command(unit, command.name) == &command, "is there twice");
+    require(find_command(unit, command.name) == &command, "occurs twice");
     if (command.verb != Verb::config_set) {
       require(command.reads_back.empty(), "sets nothing that could be read back");
       continue;
@@ -88,8 +88,9 @@ void declared_settings(const Unit& unit, Findings& findings) {
 template <class Named>
 void declared_once(std::span<const Named> all, std::string_view whose, Findings& findings) {
   for (const Named& one : all) {
-    findings.require(one.role == Role::other || find_role(all, one.role) == &one,
-                     [&] { return std::string(whose) + ": " + std::string(one.name) + " has the role of another"; });
+    findings.require(one.role == Role::other || find_role(all, one.role) == &one, [&] {
+      return std::string(whose) + ": " + std::string(one.name) + " has a role that another has";
+    });
   }
 }
 
@@ -144,7 +145,7 @@ void request_of(const Unit& unit, const Configuration& configuration, const Comm
   }
   Wire small(request->size() - 1);
   findings.require(unit.encode(configuration.options, command, values, small).error() == Error::buffer_too_small,
-                   [&] { return what() + "fits into less than it has"; });
+                   [&] { return what() + "fits into a buffer that is too small"; });
   ReportedFields seen;
   const Error error = unit.decode(configuration.options, frame_of(unit, *request).frame(), {}, seen);
   if (error == Error::invalid_argument) return;  // no encoder has this combination of options
@@ -156,7 +157,7 @@ void request_of(const Unit& unit, const Configuration& configuration, const Comm
     if (!seen.fields.contains(std::string(one.name)) || (!one.required && values[i] == one.default_value)) continue;
     const bool has = std::any_of(seen.fields.begin(), seen.fields.end(),
                                  [&](const auto& field) { return field.second.number == values[i]; });
-    findings.require(has, [&] { return what() + "has no such " + std::string(one.name); });
+    findings.require(has, [&] { return what() + "does not contain " + std::string(one.name); });
   }
 }
 
@@ -200,11 +201,11 @@ Findings check_declarations(const Unit& unit) {
   findings.require(find_command(unit, Verb::read) != nullptr, [] { return "reads no position"; });
   const auto goes_over_spi = [](const Unit& one) { return one.link == LinkKind::spi || one.link == LinkKind::clocked; };
   findings.require(unit.over_spi == nullptr || (!goes_over_spi(unit) && goes_over_spi(*unit.over_spi)),
-                   [] { return "its unit over SPI is none"; });
+                   [] { return "its unit over SPI has another link"; });
   for (const FieldInfo* field : {unit.alarms, unit.second_alarms}) {
     for (const FlagInfo& flag : field != nullptr ? field->flags : std::span<const FlagInfo>{}) {
       findings.require(flag.name.empty() || !(flag.meaning.empty() || flag.action.empty()),
-                       [&] { return "alarm " + std::string(flag.name) + " lacks its words"; });
+                       [&] { return "alarm " + std::string(flag.name) + " lacks its meaning or its advice"; });
     }
   }
   declared_memory(unit, findings);
@@ -220,7 +221,7 @@ Findings check_requests(const Unit& unit, std::uint64_t seed) {
   for (const Configuration& configuration : configurations(unit)) {
     ReportedFields seen;
     findings.require(unit.decode(configuration.options, {}, {}, seen) != Error::none,
-                     [&] { return configuration.text + ": nothing at all is a frame"; });
+                     [&] { return configuration.text + ": an empty frame is accepted"; });
     for (const Command& command : unit.commands) {
       for (unsigned i = 0; i < (command.arguments.empty() ? 1 : 100); ++i) {
         request_of(unit, configuration, command, random_arguments(command, random), findings);

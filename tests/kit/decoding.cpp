@@ -114,10 +114,10 @@ class Decoding {
     const OwnedFrame with_more = reply_.between({}, std::array<std::uint8_t, 1>{0});
     const FrameEnd whole = unit_.frame_end(options_, Direction::reply, with_more.bytes);
     require(whole.kind == FrameEnd::Kind::complete && whole.size == reply_.bytes.size(),
-            [] { return "does not end where it ends, with another byte behind it"; });
+            [] { return "ends elsewhere if another byte follows"; });
     for (std::size_t size = 0; size < reply_.bytes.size(); ++size) {
       require(unit_.frame_end(options_, Direction::reply, reply_.cut(size).bytes).kind == FrameEnd::Kind::incomplete,
-              [&] { return "seems not to go on after " + std::to_string(size); });
+              [&] { return "is taken for complete after " + std::to_string(size); });
     }
   }
 

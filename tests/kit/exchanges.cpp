@@ -99,7 +99,7 @@ class Campaign {
     using sim::FaultKind;
     sim::FaultRates rates = sim::testing::damaged_replies(0.1);
     if (unit.link == LinkKind::spi) rates = {};                        // the host clocks as many bits as it expects
-    rates[FaultKind::corrupt] = unit.link == LinkKind::can ? 0 : 0.1;  // CAN's own checksum detects that
+    rates[FaultKind::corrupt] = unit.link == LinkKind::can ? 0 : 0.1;  // CAN's own checksum detects damaged frames
     if (test.requests_too) rates[FaultKind::request_corrupt] = 0.02;
     // With odd seeds, replies are delayed beyond the host's timeout. Unsolicited frames are excluded, because a host
     // cannot determine their age.
@@ -191,7 +191,8 @@ class Campaign {
     tally_.damaged += result.damaged;
     findings_.require(result.ended, [&] { return where(query) + "hangs"; });
     if (result.damaged != 0) measure_check(query, result.damaged);
-    findings_.require(!result.premature_reading, [&] { return where(query) + "has a reading of nothing"; });
+    findings_.require(!result.premature_reading,
+                      [&] { return where(query) + "has a reading before any reply, or with an error"; });
     if (!result.good()) return;
     ++tally_.accepted;
     // info sends several requests, and a fault may lose one
@@ -411,7 +412,7 @@ void exchange(const Unit& unit, const ExchangeTest& test, Tally& tally, Findings
   const std::vector<Configuration> setups = configurations(unit);
   for (std::uint64_t round = 0; tally.exchanges < test.count && findings.count() == 0; ++round) {
     if (round > 100 + test.count / 100) {
-      findings.add("exchanges do not come together");
+      findings.add("too few exchanges per round");
       break;
     }
     // Every even round uses a model, every odd round any configuration.
@@ -450,7 +451,7 @@ Findings check_exchanges(const Unit& unit, const ExchangeTest& test) {
   findings.require(tally.accepted > tally.conversations / 50, [&] {
     return "only " + std::to_string(tally.accepted) + " of " + std::to_string(tally.conversations) + " ended well";
   });
-  findings.require(tally.damaged > tally.exchanges / 100, [] { return "hardly anything was damaged"; });
+  findings.require(tally.damaged > tally.exchanges / 100, [] { return "too few bytes were damaged"; });
   findings.note(std::to_string(tally.exchanges) + " exchanges in " + std::to_string(tally.conversations) +
                 " conversations, " + std::to_string(tally.damaged) + " damaged, " + std::to_string(tally.accepted) +
                 " ended well, " + std::to_string(tally.wrong) + " of them wrong");

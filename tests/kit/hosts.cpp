@@ -105,7 +105,7 @@ struct VectorReplay {
 
   void characters() const {
     const Outcome whole = converse({reply.bytes});
-    require(request.empty() || whole.tested_requests > 0, [] { return "is not asked"; });
+    require(request.empty() || whole.tested_requests > 0, [] { return "is not sent"; });
     // Longer procedures may continue after a good reply, and may repeat the request after a bad one.
     if (is_one_question()) {
       require(whole.error == vector.error, [&] { return "ends with " + std::string(text_of(whole.error).name); });

@@ -53,14 +53,15 @@ class Places final : public FieldSink {
     const bool inside = std::all_of(ranges.view().begin(), ranges.view().end(), [&](const BitRange& range) {
       return range.count > 0 && range.first + range.count <= reply_->bit_count();
     });
-    require(inside, "stands outside the frame");
+    require(inside, "lies outside the frame");
     const bool is_number =
         info.kind != FieldInfo::Kind::real && info.kind != FieldInfo::Kind::text && info.kind != FieldInfo::Kind::bytes;
-    require(is_number, "is no number, and yet has bits");
+    require(is_number, "has bit positions but is no number");
     if (!inside || !is_number) return;
     unsigned width = 0;
     const std::uint64_t bits = bits_at(*reply_, ranges, width);
-    require(bits == (static_cast<std::uint64_t>(value.number) & low_mask(width)), "stands elsewhere");
+    require(bits == (static_cast<std::uint64_t>(value.number) & low_mask(width)),
+            "has another value at its bit positions");
     const bool fits = value.number < 0 || (static_cast<std::uint64_t>(value.number) & ~low_mask(width)) == 0;
     require(fits, "has more bits");
     placed_.insert(info.role);
@@ -68,7 +69,7 @@ class Places final : public FieldSink {
 
   /// Checks that at least one frame had bit positions for its position field.
   void require_position() {
-    findings_.require(placed_.contains(Role::position), [] { return "no frame says where the position stands"; });
+    findings_.require(placed_.contains(Role::position), [] { return "no frame has bit positions of the position"; });
   }
 
  private:

@@ -18,7 +18,9 @@ void meet_silence(const Unit& unit, const Configuration& configuration, const Co
   const bool ended = player.run(
       *conversation, {}, [](std::size_t) { return typename Player<Item>::Pieces{}; }, [] {}, every_address);
   if (ended && player.request_count() == 0) return;  // this configuration lacks the command
-  const auto where = [&] { return std::string(command.name) + " of \"" + configuration.text + "\" in silence: "; };
+  const auto where = [&] {
+    return std::string(command.name) + " of \"" + configuration.text + "\" without an encoder: ";
+  };
   findings.require(ended, [&] { return where() + "does not end"; });
   // A command without a reply succeeds. A command that stops a stream succeeds when no byte arrives.
   const bool wants_none = command.verb == Verb::run && conversation->reading() == nullptr;

@@ -163,8 +163,10 @@ class States {
   void check_part(const std::optional<Reading>& part, const std::optional<Reading>& whole) {
     if (!part || !whole) return;
     const auto is_more = [](Validity one, Validity all) { return one == Validity::valid && all == Validity::invalid; };
-    require(!is_more(part->singleturn_validity(), whole->singleturn_validity()), "a part says that the position holds");
-    require(!is_more(part->multiturn_validity(), whole->multiturn_validity()), "a part says that the turns hold");
+    require(!is_more(part->singleturn_validity(), whole->singleturn_validity()),
+            "a part reports a valid position, the whole an invalid one");
+    require(!is_more(part->multiturn_validity(), whole->multiturn_validity()),
+            "a part reports valid turns, the whole invalid ones");
   }
 
   // Checks a captured reading that is completed with the alarms of the previous reply to `read`.
@@ -173,8 +175,8 @@ class States {
     const Reading reading = unit_.remembered(*before.captured.reading, *now.captured.reading);
     judge(reading, bit, is_raised);
     const std::uint32_t known = before.captured.reading->alarms_reported;
-    require((known & ~reading.alarms_reported) == 0, "what an earlier reply reported is forgotten");
-    require(reading.singleturn_known && reading.multiturn_known, "what an earlier reply reported does not count");
+    require((known & ~reading.alarms_reported) == 0, "the alarms of an earlier reply are lost");
+    require(reading.singleturn_known && reading.multiturn_known, "the validity of an earlier reply is lost");
     check_part(reading, before.captured.reading);
   }
 

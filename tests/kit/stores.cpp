@@ -51,7 +51,7 @@ void change(const Unit& unit, const Configuration& configuration, const Command&
                    [&] { return configuration.text + ", " + std::string(command.name) + ": never ends well"; });
   // At least two values were set, so at least two must be read back.
   findings.require(set.size() < 2 || read.size() > 1,
-                   [&] { return std::string(command.name) + ": whatever is set, the same is read"; });
+                   [&] { return std::string(command.name) + ": the same value is read whatever is set"; });
 }
 
 // ---- Memory
@@ -72,7 +72,7 @@ void try_memory(const Unit& unit, const Configuration& configuration, Findings& 
         const Values values = memory_arguments(*write, area, address, byte);
         const ConversationResult written = world.run(*write, values);
         if (!area.writable) {
-          findings.require(!written.good(), [&] { return what() + "is written, though it cannot be"; });
+          findings.require(!written.good(), [&] { return what() + "is written, though it is read-only"; });
           continue;
         }
         findings.require(written.good(), [&] { return what() + "cannot be written: " + written.detail; });
@@ -86,7 +86,8 @@ void try_memory(const Unit& unit, const Configuration& configuration, Findings& 
     const Values values = memory_arguments(*reads, area, outside, 0);
     if (other || outside > find_role(reads->arguments, Role::address)->maximum) continue;
     findings.require(!world.run(*reads, values).good(), [&] {
-      return "memory " + std::to_string(area.page) + "/" + std::to_string(outside) + " is read, though it is not there";
+      return "memory " + std::to_string(area.page) + "/" + std::to_string(outside) +
+             " is readable, though it does not exist";
     });
   }
 }
@@ -126,7 +127,8 @@ void store(const Unit& unit, const Configuration& configuration, const Command& 
   const auto made = [&](std::size_t size) {
     Fenced storage(size, unit.host_storage + unit.device_storage);
     const bool is = unit.host(configuration.options, command, values, storage.given()).template of<Item>() != nullptr;
-    findings.require(storage.is_whole(), [&] { return std::string(command.name) + ": made beyond its storage"; });
+    findings.require(storage.is_whole(),
+                     [&] { return std::string(command.name) + ": is constructed beyond its storage"; });
     return is;
   };
   if (!made(unit.host_storage)) {
@@ -136,7 +138,7 @@ void store(const Unit& unit, const Configuration& configuration, const Command& 
   }
   std::size_t none = 0;  // largest size that is too small
   std::size_t needed = unit.host_storage;
-  findings.require(!made(0), [&] { return std::string(command.name) + ": is made of nothing"; });
+  findings.require(!made(0), [&] { return std::string(command.name) + ": needs no storage"; });
   while (needed - none > 1) {
     const std::size_t middle = none + (needed - none) / 2;
     (made(middle) ? needed : none) = middle;
@@ -152,7 +154,7 @@ void store(const Unit& unit, const Configuration& configuration, const Command& 
   // A later part of a procedure may need more storage than its start. It must then report that error.
   const auto tight = needed == unit.host_storage ? roomy : end(needed);
   findings.require(tight == roomy || tight.first == Error::buffer_too_small,
-                   [&] { return std::string(command.name) + ": ends otherwise in what it needs than in more"; });
+                   [&] { return std::string(command.name) + ": ends differently in the smallest storage"; });
 }
 
 template <class Item>
@@ -161,10 +163,10 @@ void store_device(const Unit& unit, const Configuration& configuration, Findings
   const auto made = [&](std::size_t size) {
     Fenced storage(size, unit.host_storage + unit.device_storage);
     const bool is = unit.device(configuration.options, shaft, storage.given()).template of<Item>() != nullptr;
-    findings.require(storage.is_whole(), [] { return "the virtual encoder is made beyond its storage"; });
+    findings.require(storage.is_whole(), [] { return "the virtual encoder is constructed beyond its storage"; });
     return is;
   };
-  findings.require(unit.device_storage > 0, [] { return "there is no virtual encoder"; });
+  findings.require(unit.device_storage > 0, [] { return "the unit has no virtual encoder"; });
   if (unit.device_storage == 0) return;
   findings.require(made(unit.device_storage), [] { return "the virtual encoder needs more than device_storage"; });
   findings.require(!made(unit.device_storage - 1), [] { return "the virtual encoder needs less than device_storage"; });

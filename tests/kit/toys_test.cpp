@@ -86,7 +86,7 @@ TEST(KitToys, FindsTooSmallStorage) {
   EXPECT_THAT(check_storage(toy::unit<Mistake::needs_more_storage>).texts(),
               Contains(HasSubstr("needs more than host_storage")));
   EXPECT_THAT(check_storage(toy::unit<Mistake::overflows_storage>).texts(),
-              Contains(HasSubstr("made beyond its storage")));
+              Contains(HasSubstr("constructed beyond its storage")));
 }
 
 TEST(KitToys, FindsDecoderThatIgnoresByte) {
@@ -105,12 +105,12 @@ TEST(KitToys, FindsCaptureTimeoutLongerThanHosts) {
 
 TEST(KitToys, FindsInvisibleCondition) {
   EXPECT_THAT(check_conditions(toy::unit<Mistake::ignores_condition>).texts(),
-              ElementsAre("condition eccentricity is not seen by any host, whatever it is"));
+              ElementsAre("condition eccentricity is invisible to every host"));
 }
 
 TEST(KitToys, FindsZeroOfInvalidPosition) {
   EXPECT_THAT(check_zero(toy::unit<Mistake::zeroes_invalid_position>).texts(),
-              Contains(HasSubstr("as it is: zero is set of a position that does not hold")));
+              Contains(HasSubstr("as it is: zero is set from an invalid position")));
 }
 
 TEST(KitToys, FindsAdviceThatCannotBeFollowed) {
@@ -124,10 +124,10 @@ TEST(KitToys, FindsAdviceThatCannotBeFollowed) {
     return check_advice(unit).texts();
   };
   EXPECT_THAT(findings_of("let it cool, and see that with `absenc read`"), IsEmpty());
-  EXPECT_THAT(findings_of("read the alarms"), ElementsAre(HasSubstr("that is circular")));
-  EXPECT_THAT(findings_of(read_the_alarms), Contains("alarm too_hot sends to the alarms, among which it is"));
+  EXPECT_THAT(findings_of("read the alarms"), ElementsAre(HasSubstr("it is circular")));
+  EXPECT_THAT(findings_of(read_the_alarms), Contains("alarm too_hot refers to the alarms, of which it is one"));
   EXPECT_THAT(findings_of("let it cool, then `absenc clear-alarms`"),
-              Contains(HasSubstr("`absenc clear-alarms` is no command of this unit")));
+              Contains(HasSubstr("`absenc clear-alarms` is not a command of this unit")));
   EXPECT_THAT(findings_of("then `read`"), ElementsAre(HasSubstr("not written \"absenc ...\"")));
 }
 
@@ -162,7 +162,7 @@ TEST(KitToys, FindsDuplicateRole) {
   const std::array two{toy::Declared<Role::other>::options[0], toy::Declared<Role::other>::options[0]};
   Unit unit = toy::Declared<Role::other>::unit;
   unit.options = two;
-  EXPECT_THAT(check_declarations(unit).texts(), ElementsAre("toy: encoder has the role of another"));
+  EXPECT_THAT(check_declarations(unit).texts(), ElementsAre("toy: encoder has a role that another has"));
 }
 
 }  // namespace

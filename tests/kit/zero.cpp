@@ -32,11 +32,11 @@ void try_zero(const Unit& unit, const Configuration& configuration, const std::s
   const auto says = [&](const char* text) {
     return [&, text] { return configuration.text + ", " + what + ": zero " + text; };
   };
-  findings.require(!result.good(), says("is set of a position that does not hold"));
+  findings.require(!result.good(), says("is set from an invalid position"));
   findings.require(result.good() || result.error == Error::invalid_argument,
                    says("fails for another reason than the position"));
-  findings.require(result.good() || !result.detail.empty(), says("does not say why it is refused"));
-  findings.require(world.device().memory_version() == memory, says("is written"));
+  findings.require(result.good() || !result.detail.empty(), says("is refused without a reason"));
+  findings.require(world.device().memory_version() == memory, says("is written to the memory"));
   mend(world);
   const std::optional<Reading> after = read_position(world, unit);
   findings.require(!after || after->singleturn_validity() == Validity::invalid || sim::is_at(*after, world.place()),
