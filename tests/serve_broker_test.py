@@ -135,7 +135,7 @@ class RefusedMessages(BrokerCase):
         goal = self.mqtt(server)["taken"]["bad"]
         wait_until(lambda: (bad() or [0])[-1] >= goal, "it comes, too")
         self.assertEqual(bad(), list(range(1, len(bad()) + 1)))
-        wait_until(lambda: [one for one in self.events(broker) if one == "the broker takes plant/bad/readings again"],
+        wait_until(lambda: [one for one in self.events(broker) if one == "the broker accepts plant/bad/readings again"],
                    "an event says so")
         self.assertEqual(self.mqtt(server)["trouble"], "")
         self.assertEqual(self.mqtt(server)["dropped"], 0)
@@ -162,7 +162,7 @@ class RefusedMessages(BrokerCase):
                 raise Closed
             return usual
         broker, server = self.serve(answer)
-        self.check(broker, server, 6, "ends the connection")
+        self.check(broker, server, 6, "closes the connection")
 
     def test_refused_states(self):
         def answer(_broker, _connection, kind, flags, body, usual):

@@ -153,7 +153,7 @@ class Damage(SpoolCase):
         pathlib.Path(self.spool()).write_bytes(b"SQLite format 3\0" + bytes(range(256)) * 10)
         self.sender(broker.url, ONE)
         wait_until(lambda: self.numbers(receiver), "readings come")
-        self.wait_for_event(receiver, f"it is now {self.spool()}.bad")
+        self.wait_for_event(receiver, f"it was renamed to {self.spool()}.bad")
         self.assertEqual(pathlib.Path(self.spool() + ".bad").stat().st_size, 2576)
 
     def test_damaged_file_is_sent_up_to_damage_and_set_aside(self):
