@@ -129,7 +129,9 @@ struct BadExchange {
 
   Error error = Error::none;  ///< Why it failed.
   Time at{};                  ///< when the last item was received, or sent
+  /// Beginning of what was sent.
   Buffer<Item, 64 / sizeof(Item)> sent{};
+  /// Beginning of what was received.
   Buffer<Item, 64 / sizeof(Item)> received{};
 };
 
@@ -137,8 +139,9 @@ struct BadExchange {
 template <class Item>
 class Statistics {
  public:
-  static constexpr std::size_t most_kept = 8;
+  static constexpr std::size_t most_kept = 8;  ///< Number of failed exchanges that are kept, the last ones.
 
+  /// Adds a conversation that ended.
   void add(const Conversation<Item>& conversation) {
     const Exchange<Item> exchange = conversation.exchange();
     if (conversation.error() == Error::none) {
@@ -147,6 +150,7 @@ class Statistics {
       add({conversation.error(), exchange});
     }
   }
+  /// Adds a failed exchange; it replaces the oldest.
   void add(const BadExchange<Item>& bad) { bad_[bad_count_++ % most_kept] = bad; }
 
   /// From the end of the request to the end of the reply, of what ended well.

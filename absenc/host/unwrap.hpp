@@ -16,6 +16,7 @@ namespace absenc::host {
 /// readings say, whatever was expected of it. Where the fastest shaft could have turned further it starts again.
 class Unwrapper {
  public:
+  /// How a reading joins the positions before it.
   enum class Joined : std::uint8_t {
     ignored,    // the reading has no valid position
     started,    // the first one: the position is the encoder's own
@@ -23,9 +24,11 @@ class Unwrapper {
     restarted,  // too late after the one before to know how often it turned: the position is the encoder's own again
   };
 
+  /// Joins readings of a shaft that moves within `limit`.
   explicit constexpr Unwrapper(const SpeedLimit& limit = {}, Times times = Times::latched)
       : limit_(limit), times_(times), apart_(times) {}
 
+  /// Adds a reading at the time at which it was latched.
   constexpr Joined add(const Reading& reading) { return add(reading, latch_time(reading)); }
   /// A reply may be late because the encoder was: what counts is how far apart the two positions can have been latched.
   constexpr Joined add(const Reading& reading, const LatchTime& at) {

@@ -23,8 +23,8 @@ namespace absenc::host {
 /// longest time any number of counts will do, and a fourth of the speed may be open. Otherwise no speed is valid.
 class Velocity {
  public:
-  static constexpr std::size_t most_positions = 48;
-  static constexpr int longest_windows = 20;
+  static constexpr std::size_t most_positions = 48;  ///< Greatest number of positions that are kept.
+  static constexpr int longest_windows = 20;         ///< Longest window, in shortest windows.
 
   /// Where readings are farther apart than `window`, the time is one step from reading to reading.
   explicit constexpr Velocity(Time window = std::chrono::milliseconds(50)) : window_(window) {}

@@ -30,9 +30,9 @@ inline constexpr std::uint32_t assumed_rate = 115'200;
 /// Settings of a line. For SPI and clocked links they describe how to configure a controller; sim draws waveforms from
 /// them.
 struct LineSettings {
-  std::uint32_t rate = 0;  ///< bits per second: baud rate, SPI or shift clock, CAN bit rate
-  Parity parity = Parity::none;
-  std::uint8_t stop_bits = 1;
+  std::uint32_t rate = 0;          ///< bits per second: baud rate, SPI or shift clock, CAN bit rate
+  Parity parity = Parity::none;    ///< Parity of each character.
+  std::uint8_t stop_bits = 1;      ///< Number of stop bits, 1 or 2.
   std::uint8_t spi_mode = 0;       ///< spi, clocked: 2 * CPOL + CPHA
   std::uint8_t idle_clocks = 0;    ///< clocked: number of clocks before the first bit, during which the line stays idle
   Time select_lead{};              ///< spi: minimum time from chip select to the first clock
@@ -57,6 +57,7 @@ struct LineSettings {
   [[nodiscard]] constexpr unsigned character_bits() const {
     return 9u + (parity == Parity::none ? 0u : 1u) + stop_bits;
   }
+  /// Returns the duration of a character.
   [[nodiscard]] constexpr Time character() const { return bits(character_bits()); }
 };
 

@@ -11,6 +11,7 @@ namespace absenc {
 class Silence {
  public:
   Silence() = default;
+  /// Begins at time `since`.
   explicit Silence(Time since) : since_(since) {}
 
   /// Records the end of a transfer or pulse of this end: the `answer` limit now applies.
@@ -23,9 +24,12 @@ class Silence {
   }
   /// Records activity on the line that did not reach this end as an item: the limit starts again.
   void busy(Time at) { since_ = at; }
+  /// Remembers that the silence was reported.
   void reported() { reported_ = true; }
 
+  /// Returns the time since which the line is silent.
   [[nodiscard]] Time since() const { return since_; }
+  /// Returns whether an item was received.
   [[nodiscard]] bool has_received() const { return received_; }
 
   /// Returns when `silence` is due for a step with these limits (Step::answer and gap); `latency` is the port's delay,

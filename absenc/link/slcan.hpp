@@ -110,6 +110,7 @@ constexpr std::int64_t digits_of(Bytes text) {
 /// of the four letters occurs within a frame or a command.
 class LineReader {
  public:
+  /// What a byte completes.
   enum class LineEvent : std::uint8_t {
     nothing,
     line,     // `line()` is complete and valid until the next byte; may be empty
@@ -117,6 +118,7 @@ class LineReader {
     garbage,  // bytes that cannot be a line were discarded
   };
 
+  /// Adds a byte; returns what it completes.
   constexpr LineEvent feed(std::uint8_t byte) {
     if (complete_) line_.clear();
     complete_ = false;

@@ -23,6 +23,7 @@ namespace absenc {
 /// compares the time in `next` itself.
 template <class Item>
 struct Step {
+  /// What a machine wants from its port.
   enum class Kind : std::uint8_t {
     wait,       // until the next event
     transfer,   // not before `at`: send `out` (spi: and receive max(out, expect) items; clocked: clock `bits`)
@@ -32,9 +33,9 @@ struct Step {
     done,       // the conversation is over
   };
 
-  Kind kind = Kind::wait;
-  ExtraWire wire{};       ///< pulse: the wire to drive
-  bool hold_low = false;  ///< transfer on a clocked link: the clock line, which idles high, is held low until `at`
+  Kind kind = Kind::wait;  ///< What the machine wants.
+  ExtraWire wire{};        ///< pulse: the wire to drive
+  bool hold_low = false;   ///< transfer on a clocked link: the clock line, which idles high, is held low until `at`
   std::span<const Item> out{};  ///< transfer: items to send; valid until the next feed
   std::size_t expect = 0;       ///< transfer, wait: number of items still expected; 0: unknown, or none
   std::size_t bits = 0;    ///< transfer on a clocked link: number of clocks; a device sets how many of its bits hosts
@@ -60,6 +61,7 @@ struct Step {
 /// clock, so the time since `selected` does not give the clock rate.
 template <class Item>
 struct Event {
+  /// What happened at a port.
   enum class Kind : std::uint8_t {
     sent,      // the transfer is complete (device side of spi and clocked: the host has stopped clocking)
     received,  // `items` were received
@@ -70,8 +72,8 @@ struct Event {
     line_error,  // a character with a wrong stop or parity bit, or sent at another rate, was received
   };
 
-  Kind kind = Kind::timer;
-  Time at{};
+  Kind kind = Kind::timer;        ///< What happened.
+  Time at{};                      ///< Time at which it happened.
   std::span<const Item> items{};  ///< received: the items; valid during the call
   std::size_t bits = 0;           ///< sent, device side of a clocked link: number of clocks counted
   ExtraWire wire{};               ///< triggered: the wire of the pulse

@@ -13,6 +13,7 @@ namespace absenc::os {
 /// A problem with a port. `what()` reports to the user what happened and what to try.
 class Failure : public std::runtime_error {
  public:
+  /// Kind of a failure of a port.
   enum class Kind : std::uint8_t {
     not_found,      // no such port, host or listener
     no_permission,  // the port exists, but this user may not open it
@@ -29,13 +30,17 @@ class Failure : public std::runtime_error {
   /// Kind of program that holds a port in use.
   enum class Holder : std::uint8_t { unknown, program, absenc, server, modem_manager };
 
+  /// Takes the text of the failure.
   Failure(Kind kind, const std::string& sentence, Bus bus = Bus::unknown)
       : std::runtime_error(sentence), kind_(kind), bus_(bus) {}
   /// Creates a Failure `in_use`.
   Failure(const std::string& sentence, Holder holder)
       : std::runtime_error(sentence), kind_(Kind::in_use), holder_(holder) {}
+  /// Returns the kind of the failure.
   [[nodiscard]] Kind kind() const { return kind_; }
+  /// Returns the kind of bus that the port belongs to.
   [[nodiscard]] Bus bus() const { return bus_; }
+  /// Returns who holds the port, if another program does.
   [[nodiscard]] Holder holder() const { return holder_; }
 
  private:
@@ -54,12 +59,14 @@ class Failure : public std::runtime_error {
 
 /// Thrown by every wait in this folder after SIGINT or SIGTERM (os/signals.hpp).
 struct Interrupted : std::exception {
+  /// Returns what happened.
   [[nodiscard]] const char* what() const noexcept override { return "interrupted"; }
 };
 
 /// Thrown by a port when the time set by `StreamPort::set_end` is reached, and by every wait when an EndQuestion
 /// returns true.
 struct Ended : std::exception {
+  /// Returns what happened.
   [[nodiscard]] const char* what() const noexcept override { return "cancelled"; }
 };
 

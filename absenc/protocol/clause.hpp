@@ -58,7 +58,8 @@ inline constexpr Errors form_errors = any_of(Error::bad_framing, Error::unexpect
 /// A request that a clause sends beside those of readings.
 struct Ask {
   std::string_view wire{};  ///< as it stands on the wire: "a2"
-  Result<std::size_t> (*make)(const Options& options, MutableBytes request) = nullptr;  // where options matter
+  /// Writes the request, where it depends on the options; null: `wire`.
+  Result<std::size_t> (*make)(const Options& options, MutableBytes request) = nullptr;
   bool wrong_end = false;      ///< the request for a position, its last byte with a wrong bit
   std::uint32_t permille = 0;  ///< sent at this part of the rate, so that its last bit is where the stop bit should be
 };
@@ -74,26 +75,26 @@ enum class Reaction : std::uint8_t {
 /// names were sent, good replies came, a wrong bit in one of these would have been seen, a value was another before.
 /// The engine (client/conform) counts that, by the demand alone.
 struct Clause {
-  std::string_view id;         ///< unique in its unit: "crc"
-  std::string_view paragraph;  ///< of the unit's document
-  std::string_view words;
-  Demand demand;
-  std::string_view needs{};  ///< options with which the document demands it: "carries=biss", "crc_width!=0"
-  Errors errors = 0;         ///< as_drawn: those that break it; 0: form_errors
-  Ask ask{};
-  Reaction reaction = Reaction::silent;
-  std::string_view as{};      ///< the command whose reply is demanded; "": a reply to what was sent
-  std::string_view option{};  ///< with which it is read for this; "": as the user has it
-  std::int64_t value = 0;     ///< of this option, or as the demand says
-  std::uint32_t page = 0;
-  std::uint32_t address = 0;
-  std::string_view setting{};  ///< by which it is written and read, as `config set` has it
-  std::string_view field{};    ///< of the setting: the number that is its argument
-  std::int64_t other = 0;
-  Verb verb = Verb::run;
-  std::string_view command{};
-  std::string_view stop{};
-  std::string_view shown_with{};  ///< options of a virtual encoder that shows it, where its defaults do not
+  std::string_view id;                   ///< unique in its unit: "crc"
+  std::string_view paragraph;            ///< of the unit's document
+  std::string_view words;                ///< What the document demands, in words.
+  Demand demand;                         ///< Kind of the demand.
+  std::string_view needs{};              ///< options with which the document demands it: "carries=biss", "crc_width!=0"
+  Errors errors = 0;                     ///< as_drawn: those that break it; 0: form_errors
+  Ask ask{};                             ///< Request that it is about.
+  Reaction reaction = Reaction::silent;  ///< What the encoder must do.
+  std::string_view as{};                 ///< the command whose reply is demanded; "": a reply to what was sent
+  std::string_view option{};             ///< with which it is read for this; "": as the user has it
+  std::int64_t value = 0;                ///< of this option, or as the demand says
+  std::uint32_t page = 0;                ///< Page of the byte that it is about.
+  std::uint32_t address = 0;             ///< Address of the byte that it is about.
+  std::string_view setting{};            ///< by which it is written and read, as `config set` has it
+  std::string_view field{};              ///< of the setting: the number that is its argument
+  std::int64_t other = 0;                ///< A second value.
+  Verb verb = Verb::run;                 ///< Verb of the command that it is about.
+  std::string_view command{};            ///< Command that it is about.
+  std::string_view stop{};               ///< Command that ends what `command` begins; empty: none.
+  std::string_view shown_with{};         ///< options of a virtual encoder that shows it, where its defaults do not
 };
 
 /// What is looked at when a host is tested.
@@ -115,12 +116,13 @@ struct HostStep {
 };
 using HostScript = std::span<const HostStep>;
 
+/// What a document demands of the host.
 struct HostClause {
-  std::string_view id;
-  std::string_view paragraph;
-  std::string_view words;
-  HostDemand demand;
-  std::string_view rule{};  ///< as the virtual encoder calls it when it is broken; untested until it looked at it
+  std::string_view id;         ///< Identifier, unique within the unit.
+  std::string_view paragraph;  ///< Paragraph of the document.
+  std::string_view words;      ///< What the document demands, in words.
+  HostDemand demand;           ///< Kind of the demand.
+  std::string_view rule{};     ///< as the virtual encoder calls it when it is broken; untested until it looked at it
   // Where what every test tries does not do it (two commands in a row, waits that are left out, a controller that is
   // too fast, too early or in another mode):
   std::array<HostScript, 2> breaks{};  ///< two hosts that break it, and nothing else

@@ -17,10 +17,10 @@ namespace absenc {
 /// The last request and what came back, kept so that nobody has to reproduce a bad frame to see it.
 template <class Item>
 struct Exchange {
-  std::span<const Item> sent{};
-  std::span<const Item> received{};
-  Time sent_at{};      ///< end of the last bit sent
-  Time received_at{};  ///< end of the last bit received; sent_at when nothing came
+  std::span<const Item> sent{};      ///< Items that were sent.
+  std::span<const Item> received{};  ///< Items that were received.
+  Time sent_at{};                    ///< end of the last bit sent
+  Time received_at{};                ///< end of the last bit received; sent_at when nothing came
 };
 
 /// An error in words: more than its own text has. Either may be empty.
@@ -56,6 +56,7 @@ struct Conversation : Machine<Item> {
   /// Null: it ends by itself. Else each `emit` is a result like that of `done`, and the next one follows for as long as
   /// this is driven.
   [[nodiscard]] virtual const StreamCounts* stream() const { return nullptr; }
+  /// Returns whether the encoder sends without requests.
   [[nodiscard]] bool streams() const { return stream() != nullptr; }
   /// Of one that streams: whether it sends a request for each result. Then nothing came while it was not driven.
   [[nodiscard]] virtual bool asks() const { return false; }
@@ -77,12 +78,13 @@ struct Conversation : Machine<Item> {
 
 /// A timing or access rule that the host broke.
 struct Violation {
-  std::string_view rule;
-  Time at;
+  std::string_view rule;  ///< The rule, in words.
+  Time at;                ///< Time at which the host broke it.
 };
 
 /// Is told of each look at whether the host keeps a rule: it did what the rule is about.
 struct RuleWatch {
+  /// Is called for each look at a rule, with whether the host kept it.
   virtual void looked(std::string_view rule, bool kept) = 0;
 
  protected:
@@ -92,6 +94,7 @@ struct RuleWatch {
 /// Device side: a virtual encoder with its own memory, alarms and timing rules.
 template <class Item>
 struct Device : Machine<Item> {
+  /// Whether the encoder runs its start-up, or is ready at once.
   enum class PowerOn : std::uint8_t {
     real,  // with the document's start-up time
     skip,  // ready at once
@@ -113,6 +116,7 @@ struct Device : Machine<Item> {
   [[nodiscard]] virtual std::uint32_t memory_version() const = 0;
   /// The first rules broken, in order; `violation_count` goes on counting when they no longer fit.
   [[nodiscard]] virtual std::span<const Violation> violations() const = 0;
+  /// Returns how often the host broke a rule.
   [[nodiscard]] virtual std::uint32_t violation_count() const = 0;
   /// Null: nobody. `watch` must outlive the encoder.
   virtual void watch_rules(RuleWatch* /*watch*/) {}

@@ -11,8 +11,10 @@ namespace absenc {
 /// have been under way before anybody listened.
 class DiscardedFrames {
  public:
+  /// Counts frames of this length.
   explicit constexpr DiscardedFrames(std::size_t frame_bytes) : frame_bytes_(frame_bytes) {}
 
+  /// Notes bytes that belong to no frame.
   constexpr void skip(std::size_t bytes) {
     skipped_ += bytes;
     gap_ += bytes;
@@ -23,6 +25,7 @@ class DiscardedFrames {
     begun_ = true;
     gap_ = 0;
   }
+  /// Returns the number of frames that were damaged.
   [[nodiscard]] constexpr std::uint64_t count() const {
     return before_ + (gap_ + (begun_ ? frame_bytes_ - 1 : 0)) / frame_bytes_;
   }

@@ -25,7 +25,9 @@ struct FlagInfo {
 /// The action of a status flag that only sums up alarms. Who shows the alarms beside it leaves it out.
 inline constexpr std::string_view read_the_alarms = "`absenc alarms` names the cause";
 
+/// Description of a value in replies.
 struct FieldInfo {
+  /// Type of the value.
   enum class Kind : std::uint8_t {
     number,
     counts,  // a number of up to 64 bits without sign: the bits of `number`
@@ -35,23 +37,26 @@ struct FieldInfo {
     text,   // ASCII
     bytes,  // shown as hexadecimal
   };
-  std::string_view name;
-  Kind kind;
-  std::string_view unit;  ///< "" for a plain number; "counts", "revolutions", "degC" ...
-  std::string_view meaning;
-  std::span<const FlagInfo> flags{};
-  Role role = Role::other;
+  std::string_view name;              ///< Name of the field, in `snake_case`.
+  Kind kind;                          ///< Type of the value.
+  std::string_view unit;              ///< "" for a plain number; "counts", "revolutions", "degC" ...
+  std::string_view meaning;           ///< Meaning of the value, as a phrase.
+  std::span<const FlagInfo> flags{};  ///< Names of the bits, if they are flags.
+  Role role = Role::other;            ///< Role by which generic programs find it.
   bool in_hex = false;  ///< a number that documents write in hexadecimal: so do texts, while JSON and CSV have numbers
 };
 
+/// Value of a field.
 struct FieldValue {
-  const FieldInfo* info;
+  const FieldInfo* info;    ///< The field.
   std::int64_t number = 0;  ///< number, counts, boolean, flags
-  double real = 0;
-  Bytes bytes{};  ///< text, bytes; valid during the call of `put`
+  double real = 0;          ///< Value of a field with a fraction.
+  Bytes bytes{};            ///< text, bytes; valid during the call of `put`
 };
 
+/// Takes the values of fields, one by one.
 struct FieldSink {
+  /// Takes a value.
   constexpr virtual void put(const FieldValue& value) = 0;
   /// The position in a good reply that carries one, or only its turns, and what of it holds: behind the fields that
   /// show it. May come again with the same.
@@ -63,6 +68,7 @@ struct FieldSink {
 
 /// For those who ask only whether a frame is good.
 struct NoFields final : FieldSink {
+  /// Ignores the value.
   constexpr void put(const FieldValue&) override {}
 };
 

@@ -12,6 +12,7 @@
 
 namespace absenc {
 
+/// Rules that a virtual encoder watches, with those that the host broke.
 class HostRules {
  public:
   /// The host did what the rule is about. Returns `kept`.
@@ -20,8 +21,11 @@ class HostRules {
   /// The same of what only who watches is told when it is broken: a host may do so, or have had to give up.
   void note(bool kept, std::string_view rule) const;
 
+  /// Returns the first rules that the host broke.
   [[nodiscard]] std::span<const Violation> violations() const { return violations_; }
+  /// Returns how often the host broke a rule.
   [[nodiscard]] std::uint32_t violation_count() const { return count_; }
+  /// Reports each look at a rule to `watch`; null: to nobody.
   void watch(RuleWatch* watch) { watch_ = watch; }
 
  private:

@@ -9,6 +9,7 @@
 
 namespace absenc {
 
+/// A bus that is held by another sender while a request runs.
 class Interruption {
  public:
   /// The encoder begins to send.

@@ -25,31 +25,33 @@ enum Sharing : std::int64_t { sharing_automatic, sharing_yes, sharing_no };
 /// A number in a range, or one of `choices` (then the value is the index into it). With `decimals`, the user writes up
 /// to so many digits behind a point, and all values are in the unit of the last one.
 struct Option {
-  std::string_view name;
-  std::string_view meaning;
-  std::int64_t default_value;
-  std::int64_t minimum = 0;
-  std::int64_t maximum = 0;
-  std::span<const std::string_view> choices{};
-  bool probeable = false;  ///< whether captured frames can tell which value is right
-  unsigned decimals = 0;
-  bool describes_word = false;  ///< a word format says it instead: the two cannot be given together
-  std::uint32_t step = 1;       ///< the values are `minimum` and what is multiples of this above it
-  Role role = Role::other;
-  bool in_hex = false;   ///< texts show it in hexadecimal, as FieldInfo::in_hex
-  bool or_zero = false;  ///< 0 is a value too, below the range
+  std::string_view name;                        ///< Name of the option.
+  std::string_view meaning;                     ///< Meaning of the option, with its unit.
+  std::int64_t default_value;                   ///< Value if the address does not set it.
+  std::int64_t minimum = 0;                     ///< Lowest value.
+  std::int64_t maximum = 0;                     ///< Highest value.
+  std::span<const std::string_view> choices{};  ///< Words for the values from 0; none: it is a number.
+  bool probeable = false;                       ///< whether captured frames can tell which value is right
+  unsigned decimals = 0;                        ///< Number of digits behind the point that the value has.
+  bool describes_word = false;                  ///< a word format says it instead: the two cannot be given together
+  std::uint32_t step = 1;                       ///< the values are `minimum` and what is multiples of this above it
+  Role role = Role::other;                      ///< Role by which generic programs find it.
+  bool in_hex = false;                          ///< texts show it in hexadecimal, as FieldInfo::in_hex
+  bool or_zero = false;                         ///< 0 is a value too, below the range
 };
 
+/// An option with its value.
 struct OptionValue {
   std::size_t option;  ///< index into the unit's options
-  std::int64_t value;
+  std::int64_t value;  ///< The value.
 };
 
+/// A model of encoder: a name for values of options.
 struct Model {
-  std::string_view name;
-  std::string_view meaning;
-  std::uint32_t maximum_rpm;  ///< fastest shaft for which a position is specified
-  std::span<const OptionValue> values;
+  std::string_view name;                ///< Name of the model.
+  std::string_view meaning;             ///< What the model is, as a phrase.
+  std::uint32_t maximum_rpm;            ///< fastest shaft for which a position is specified
+  std::span<const OptionValue> values;  ///< Options that it sets.
 };
 
 inline constexpr std::size_t maximum_options = 68;  // twelve of biss-chain, and seven of each of its eight words
@@ -59,33 +61,36 @@ inline constexpr std::string_view word_option_name = "word";
 
 /// The value of every option of one unit, by the index of the option.
 struct Options {
-  std::array<std::int64_t, maximum_options> values{};
-  const Model* model = nullptr;  ///< null: no known model has these values
-  WordFormat word{};             ///< in place of the options that describe one; empty: they do
+  std::array<std::int64_t, maximum_options> values{};  ///< Values in the order of the unit's options.
+  const Model* model = nullptr;                        ///< null: no known model has these values
+  WordFormat word{};                                   ///< in place of the options that describe one; empty: they do
 
+  /// Returns whether the user described the position word.
   [[nodiscard]] constexpr bool has_word() const { return word.bits() != 0; }
+  /// Returns the value of an option, by its index.
   [[nodiscard]] constexpr std::int64_t operator[](std::size_t option) const { return values[option]; }
 };
 
 /// An option as the user wrote it.
 struct OptionText {
-  std::string_view name;
-  std::string_view value;
+  std::string_view name;   ///< Name of the option.
+  std::string_view value;  ///< Its value, as written.
 };
 
 /// Why options could not be resolved: `text` is the name or value at fault, `option` the one it was meant for.
 struct OptionError {
+  /// What is wrong with a text of options.
   enum class Kind : std::uint8_t {
     none,
     unknown_model,
     unknown_option,
     bad_value,
-    bad_word,     // `word` says why and where
-    beside_word,  // the option or model `text` cannot be given together with a word
-  } kind = Kind::none;
-  std::string_view text{};
-  const Option* option = nullptr;
-  WordFormatError word{};
+    bad_word,                      // `word` says why and where
+    beside_word,                   // the option or model `text` cannot be given together with a word
+  } kind = Kind::none;             ///< What is wrong.
+  std::string_view text{};         ///< The part of the text that is wrong.
+  const Option* option = nullptr;  ///< The option; null: it is unknown.
+  WordFormatError word{};          ///< What is wrong with the position word.
 };
 
 struct Unit;

@@ -10,6 +10,7 @@
 
 namespace absenc {
 
+/// A sentence that is put together without heap.
 class Sentence {
  public:
   /// What does not fit is left out.
@@ -20,6 +21,7 @@ class Sentence {
     }
     return *this;
   }
+  /// Appends a number.
   Sentence& add_number(std::uint32_t number) {
     std::array<char, 10> digits{};
     std::size_t first = digits.size();
@@ -34,6 +36,7 @@ class Sentence {
     if (!part.empty() && !empty()) add("; ");
     return add(part);
   }
+  /// Removes all text.
   void clear() { size_ = 0; }
   /// Returns whether there is nothing.
   [[nodiscard]] bool empty() const { return size_ == 0; }

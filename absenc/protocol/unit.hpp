@@ -288,8 +288,11 @@ struct Unit {
                                 MutableBytes request);
   /// Returns where the frame that begins with `bytes` ends.
   FrameEnd (*frame_end)(const Options& options, Direction direction, Bytes bytes);
+  /// Makes the conversation of a command in `storage`, which has `host_storage` bytes; none if the options contradict
+  /// it.
   Any<Conversation> (*host)(const Options& options, const Command& command, Arguments arguments,
                             std::span<std::byte> storage);
+  /// Makes a virtual encoder in `storage`, which has `device_storage` bytes; none if the options contradict each other.
   Any<Device> (*device)(const Options& options, const Shaft& shaft, std::span<std::byte> storage);
   /// What the options make of a position.
   Resolution (*resolution)(const Options& options);

@@ -22,11 +22,11 @@ inline constexpr unsigned turns_bits = 14;
 
 /// Format of the encoder: the values of its options.
 struct Format {
-  std::uint8_t singleturn_bits = 14;
-  std::uint8_t multiturn_bits = 0;
-  std::uint8_t address = 0x54;
-  std::uint8_t rate = 0;        ///< index into `rates`
-  bool drops_low_bits = false;  ///< reads an encoder of 14 bits as one of 12
+  std::uint8_t singleturn_bits = 14;  ///< Bits of the position, 12 or 14.
+  std::uint8_t multiturn_bits = 0;    ///< Bits of the turns, 14; 0: single-turn encoder.
+  std::uint8_t address = 0x54;        ///< Address of the encoder, a multiple of 4.
+  std::uint8_t rate = 0;              ///< index into `rates`
+  bool drops_low_bits = false;        ///< reads an encoder of 14 bits as one of 12
 
   /// Returns the settings of the line.
   [[nodiscard]] constexpr LineSettings line() const { return {.rate = rates[rate]}; }
@@ -39,8 +39,8 @@ enum class Ask : std::uint8_t { position, turns, zero = 0x5E, reset = 0x75 };
 
 /// A request of the protocol.
 struct Request {
-  Ask ask = Ask::position;
-  std::uint8_t address = 0x54;
+  Ask ask = Ask::position;      ///< Kind of the request.
+  std::uint8_t address = 0x54;  ///< Address of the encoder, a multiple of 4.
 
   /// Returns whether the request has a reply. The encoder executes the other two without a reply, and restarts.
   [[nodiscard]] constexpr bool is_answered() const { return ask == Ask::position || ask == Ask::turns; }
@@ -48,7 +48,7 @@ struct Request {
 
 /// Value of a reply: position in counts, or turns from -8192 to 8191.
 struct Reply {
-  std::int32_t value = 0;
+  std::int32_t value = 0;  ///< Position in counts, or turns.
 };
 
 /// Returns whether the parity bits are right: K1 and K0 make the number of ones odd among the odd and among the even

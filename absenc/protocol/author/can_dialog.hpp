@@ -20,6 +20,7 @@
 
 namespace absenc::author {
 
+/// The dialog of a protocol on CAN.
 template <class P>
 requires std::same_as<typename P::Item, CanFrame>
 class DialogOf<P> : public CanEngine, public Routine {
@@ -57,6 +58,7 @@ class DialogOf<P> : public CanEngine, public Routine {
   void keep() { CanEngine::keep(*frame_, heard_at_); }
 
  protected:
+  /// Talks to an encoder of this format; coroutines live in `arena`.
   DialogOf(const Format& format, std::span<std::byte> arena) : Routine(arena), format_(format) {}
   ~DialogOf() = default;
 

@@ -60,9 +60,11 @@ class CanEngine : public Conversation<CanFrame> {
   void listen(Time duration);
   /// Switches this end of the line, then hears for `duration`.
   void configure(std::uint32_t rate, Time duration);
+  /// Ends the conversation with this outcome.
   void finish(const Outcome& outcome);
   /// Keeps the frame as the answer, for `exchange`.
   void keep(const CanFrame& frame, Time at);
+  /// Returns whether a good reply needs no second one to be presented as good.
   [[nodiscard]] bool is_alone() const { return outcome_.alone; }
 
   /// A frame came, after what was asked. Calls one of those, or goes on hearing.

@@ -13,6 +13,7 @@ namespace absenc::author {
 /// What is driven on the line, a bit for each clock. The line idles behind them.
 using DrivenBits = BitBuffer<512>;
 
+/// A virtual encoder on a clocked link.
 class ClockedDevice : public EncoderOn<std::uint8_t> {
  public:
   /// Takes an event of the port.
@@ -24,6 +25,7 @@ class ClockedDevice : public EncoderOn<std::uint8_t> {
   [[nodiscard]] MutableBytes memory() override { return {}; }
 
  protected:
+  /// Is ready `start_time` after it was switched on.
   explicit ClockedDevice(Time start_time = {}) : EncoderOn(start_time) {}
   ~ClockedDevice() = default;
 

@@ -44,6 +44,7 @@ class ClockedHostOf : public ClockedEngine {
   [[nodiscard]] const Format& format() const { return format_; }
   /// The last good reply.
   [[nodiscard]] const Reply& last() const { return last_; }
+  /// Returns the empty request of clocked links.
   [[nodiscard]] static constexpr NoRequest request() { return {}; }
   /// Returns the position, or null if there is none.
   [[nodiscard]] const Reading* reading() const override {
@@ -55,12 +56,15 @@ class ClockedHostOf : public ClockedEngine {
   [[nodiscard]] static constexpr bool is_alone() { return false; }
 
  protected:
+  /// Begins with a transfer at once.
   explicit ClockedHostOf(const Format& format) : ClockedHostOf(format, later) { ask(); }
   /// Nothing is clocked before the subclass does.
   ClockedHostOf(const Format& format, Later) : ClockedEngine(P::host_times(format), storage_), format_(format) {}
   ~ClockedHostOf() = default;
 
+  /// Begins a transfer.
   void ask() { clock(P::clocks(format_)); }
+  /// Takes the bits of a transfer; returns the first error.
   [[nodiscard]] Error take(BitView bits) {
     const Result<Reply> reply = P::decode(format_, bits);
     if (reply) last_ = *reply;

@@ -20,6 +20,7 @@ namespace absenc::author {
 template <class Item>
 class Refusal final : public Conversation<Item> {
  public:
+  /// Ends at once with this error and its reason.
   explicit Refusal(Error error, std::string_view why) : error_(error), why_(why) {}
   /// Takes an event of the port.
   void feed(const Event<Item>&) override {}
@@ -86,9 +87,12 @@ struct Report {
 /// the format alone is not enough.
 template <class Subject, class T>
 struct Finding {
+  /// The format, or the class that the conversation derives from.
   using Of = Subject;
+  /// Type of what is found.
   using Found = T;
 
+  /// Puts the values of a finding into fields.
   void (*put)(FieldSink&, const Subject&, const T&) = nullptr;
   /// Puts the fields of what a procedure leaves behind that is broken off.
   void (*put_left)(FieldSink&, const Subject&, const T&) = nullptr;
@@ -111,6 +115,7 @@ class Reported final : public Base {
   static_assert(sizeof...(finding) == 1 || unit_report.put_reply != nullptr, "a report needs put_reply");
   static_assert(((finding.put != nullptr) && ...), "a finding needs put");
 
+  /// Puts the fields that were found.
   void report(FieldSink& sink) const override {
     if (this->error() != Error::none) return;
     if constexpr (sizeof...(finding) == 0) {
@@ -120,7 +125,9 @@ class Reported final : public Base {
     }
     if (const Reading* reading = this->reading()) sink.put_reading(*reading);
   }
+  /// Puts the fields that are found when a command ends early.
   void report_left(FieldSink& sink) const override { (put_left<finding>(sink), ...); }
+  /// Returns a sentence about the result; empty: none.
   [[nodiscard]] std::string_view detail() const override {
     words_.clear();
     const std::string_view own = Base::detail();
@@ -135,6 +142,7 @@ class Reported final : public Base {
     (words_.add_part(left<finding>()), ...);
     return words_.view();
   }
+  /// Returns what the user can try; empty: nothing.
   [[nodiscard]] std::string_view advice() const override {
     const std::string_view own = Base::advice();
     if (!own.empty()) return own;
@@ -185,6 +193,7 @@ constexpr bool asks_by_pulse(const typename P::Format& format, const typename P:
 /// The host sends nothing but clocks.
 struct NoRequest {};
 
+/// A command with the request or procedure that executes it.
 template <class P>
 struct CommandOf {
   /// Format of the encoder: the values of its options.
@@ -192,25 +201,29 @@ struct CommandOf {
   /// A request of the protocol.
   using Request = typename P::Request;
 
-  Command info;
+  Command info;  ///< Description of the command.
   /// The one request that does its work; procedures send more. Or why there is none with these arguments: an error, or
   /// one that P::encode makes nothing of. Null: what it sends is not known beforehand.
   Result<Request> (*request)(const Format&, Arguments);
+  /// Makes its conversation in storage of `size` bytes.
   Any<Conversation> (*make)(const Format&, Arguments, std::span<std::byte>);
   std::size_t size;  ///< bytes of storage, without those of frames
   /// Why an encoder of this format does not have it; empty: it has. Null: every one has.
   std::string_view (*missing)(const Format&) = nullptr;
   /// Of formats of which `is_other` is true, in place of `make`. Null: of none.
   Any<Conversation> (*make_other)(const Format&, Arguments, std::span<std::byte>) = nullptr;
+  /// Returns whether `make_other` makes the conversation for this format; null: never.
   bool (*is_other)(const Format&) = nullptr;
   /// Of formats of which this is false no conversation is made: the options contradict it. Null: of all one is.
   bool (*possible)(const Format&) = nullptr;
 
+  /// Returns this command, refused for formats of which `why` returns a reason.
   [[nodiscard]] constexpr CommandOf unless(std::string_view (*why)(const Format&)) const {
     CommandOf one = *this;
     one.missing = why;
     return one;
   }
+  /// Returns this command, made only for formats of which `is_possible` is true.
   [[nodiscard]] constexpr CommandOf only_if(bool (*is_possible)(const Format&)) const {
     CommandOf one = *this;
     one.possible = is_possible;
@@ -234,6 +247,8 @@ struct CommandOf {
       return !asked || !P::encode(format, *asked).empty() || asks_by_pulse<P>(format, *asked);
     }
   }
+  /// Makes its conversation in `storage`: one that refuses where the encoder does not have the command, none where
+  /// options or arguments contradict it.
   [[nodiscard]] Any<Conversation> run(const Format& format, Arguments arguments, std::span<std::byte> storage) const {
     const std::string_view why = missing != nullptr ? missing(format) : std::string_view{};
     if (!why.empty()) return make_host<Refusal<ItemOf<P>>>(storage, Error::unsupported, why);

@@ -22,26 +22,27 @@ template <class P, class VirtualEncoder, class Host = Conversation<ItemOf<P>>>
 struct Declaration {
   /// The protocol.
   using Protocol = P;
+  /// Its virtual encoder.
   using Encoder = VirtualEncoder;
   /// Format of the encoder: the values of its options.
   using Format = typename P::Format;
   /// A request of the protocol.
   using Request = typename P::Request;
 
-  std::string_view id{};
+  std::string_view id{};                         ///< Identifier: the part of an address before the colon.
   std::string_view name{};                       ///< maker and protocol, for people
   std::string_view document{};                   ///< the source
   std::span<const std::string_view> known_as{};  ///< makers and families: "Tamagawa", "Smart-Abs"
-  LinkKind link{};
-  std::span<const Option> options{};           ///< OptionsOf::infos (option.hpp)
-  Format (*format)(const Options&) = nullptr;  ///< `format_of<options>` where the options are members of the format
-  std::span<const ModelText> models{};         ///< option.hpp
-  std::span<const FieldInfo> fields{};         ///< FieldsOf::infos (field.hpp)
-  std::span<const CommandOf<P>> commands{};    ///< command.hpp
-  std::span<const VectorText> vectors{};       ///< text.hpp; they hold, or it does not compile
-  bool frames_are_texts = false;               ///< frames of vectors are no hexadecimal; clocked ones are 0 and 1
-  std::size_t frames_size = 0;                 ///< bytes of storage that the procedures' frames need at the most
-  Report<P, Host> report{};
+  LinkKind link{};                               ///< Kind of link between host and encoder.
+  std::span<const Option> options{};             ///< OptionsOf::infos (option.hpp)
+  Format (*format)(const Options&) = nullptr;    ///< `format_of<options>` where the options are members of the format
+  std::span<const ModelText> models{};           ///< option.hpp
+  std::span<const FieldInfo> fields{};           ///< FieldsOf::infos (field.hpp)
+  std::span<const CommandOf<P>> commands{};      ///< command.hpp
+  std::span<const VectorText> vectors{};         ///< text.hpp; they hold, or it does not compile
+  bool frames_are_texts = false;                 ///< frames of vectors are no hexadecimal; clocked ones are 0 and 1
+  std::size_t frames_size = 0;                   ///< bytes of storage that the procedures' frames need at the most
+  Report<P, Host> report{};                      ///< How requests, replies and findings are shown.
 
   // ---- What depends on the format
 
@@ -68,25 +69,34 @@ struct Declaration {
 
   FrameEnd (*frame_end)(const Options&, Direction, Bytes) = nullptr;  ///< null: by the sizes of requests and replies
   bool (*is_answered)(const Options&, Frame request) = nullptr;       ///< null: by the manner of the request
+  /// Returns whether a flip of this bit of a good reply must be noticed; null: of every bit.
   bool (*is_checked)(const Options&, Frame request, Frame reply, std::size_t bit) = nullptr;
+  /// Returns where a field stands in request and reply; null: not known.
   BitRanges (*bits)(const Options&, Frame request, Frame reply, const FieldInfo&) = nullptr;
+  /// Finds options in captured frames; null: none can be found.
   bool (*probe)(Options&, std::span<const Capture>, EvidenceSink&) = nullptr;
+  /// Returns whether the encoder sends without requests; null: never.
   bool (*streams)(const Options&) = nullptr;
+  /// Returns the wires that these options need beside the data; null: none.
   ExtraWires (*extra_wires)(const Options&) = nullptr;
+  /// Returns the index of the bit by which the encoder answers in each pause; null: no reply has one.
   std::optional<std::size_t> (*control_bit)(const Options&, Frame reply) = nullptr;
+  /// Returns the alarms that replies can report; null: all.
   std::uint32_t (*reportable)(const Options&) = nullptr;
+  /// Completes a reading with what readings before it reported; null: each is complete.
   Reading (*remembered)(const Reading& before, Reading now) = nullptr;
+  /// Makes a follower, which completes replies of a capture; null: none is needed.
   Follower* (*follower)(const Options&, std::span<std::byte>) = nullptr;
-  std::size_t follower_storage = 0;
-  const FieldInfo* status = nullptr;
-  const FieldInfo* alarms = nullptr;
-  const FieldInfo* second_status = nullptr;
-  const FieldInfo* second_alarms = nullptr;
-  std::span<const MemoryArea> memory{};
-  std::span<const RegisterInfo> registers{};
-  std::span<const Condition> conditions{};
-  LineTiming timing{};
-  const Unit* over_spi = nullptr;
+  std::size_t follower_storage = 0;           ///< Bytes that a follower needs.
+  const FieldInfo* status = nullptr;          ///< Field of the status; null: none.
+  const FieldInfo* alarms = nullptr;          ///< Field of the alarms; null: none.
+  const FieldInfo* second_status = nullptr;   ///< Field of the second status; null: none.
+  const FieldInfo* second_alarms = nullptr;   ///< Field of the second alarms; null: none.
+  std::span<const MemoryArea> memory{};       ///< Areas of the memory that hosts can reach.
+  std::span<const RegisterInfo> registers{};  ///< Registers that hosts can reach.
+  std::span<const Condition> conditions{};    ///< Conditions that a virtual encoder can be given.
+  LineTiming timing{};                        ///< Times of the line, for captures.
+  const Unit* over_spi = nullptr;             ///< The same encoder on SPI; null: none.
 };
 
 /// The format whose members the options set.

@@ -39,11 +39,13 @@ class Responder : public EncoderOn<std::uint8_t> {
   void power_off(Time now) override;
 
  protected:
+  /// Replies with these times.
   explicit Responder(const DeviceTimes& times) : EncoderOn(times.start_time), times_(times) {}
   ~Responder() = default;
 
   /// Sends what no request on a line of characters asks for: what a chip select does, or nobody.
   void transmit(Bytes bytes, Time at);
+  /// Returns whether the encoder is sending.
   [[nodiscard]] bool is_transmitting() const { return transmitting_; }
   /// When what was heard at `at` may have come: earlier than that, where the carrier was kept from looking. What a host
   /// must wait for counts from here.
@@ -56,6 +58,7 @@ class Responder : public EncoderOn<std::uint8_t> {
   [[nodiscard]] virtual std::size_t others_reply_size(Bytes request) const = 0;
   /// Whether the reply to the last request of others may begin so; if not, nobody answers it, and a request follows.
   [[nodiscard]] virtual bool begins_others_reply(std::uint8_t) const { return true; }
+  /// Whether and how a request is answered.
   enum class Answer : std::uint8_t {
     sent,
     none,
@@ -66,6 +69,7 @@ class Responder : public EncoderOn<std::uint8_t> {
   void take_longer(Time time) { longer_ = time; }
   /// A whole request. Its reply goes to `reply`.
   virtual Answer respond(Bytes request, Time at, ByteBuffer<64>& reply) = 0;
+  /// What is wrong with a request.
   enum class Flaw : std::uint8_t {
     damaged,    // a character
     unknown,    // no request begins so
@@ -130,6 +134,7 @@ class BusDevice : public Responder {
   /// Switched off until `power_on`. `shaft` must outlive the encoder.
   BusDevice(const Format& format, const Shaft& shaft)
       : Responder(P::device_times(format)), format_(format), shaft_(&shaft) {}
+  /// Returns the memory of the encoder, which outlasts power-off.
   [[nodiscard]] MutableBytes memory() final { return memory_; }
 
  protected:
@@ -137,6 +142,7 @@ class BusDevice : public Responder {
 
   /// Returns the format of the encoder.
   [[nodiscard]] const Format& format() const { return format_; }
+  /// Returns position and motion of the shaft.
   [[nodiscard]] ShaftState shaft(Time at) const { return shaft_->at(at); }
   /// Counts of 2^-bits revolution since the zero that `store_zero` keeps in four bytes from this address on; they go on
   /// from turn to turn, and are negative below zero.
@@ -150,7 +156,9 @@ class BusDevice : public Responder {
     store_little_endian(MutableBytes(memory_).subspan(zero_address, 4), here);
     change_memory();
   }
+  /// Returns a byte of the memory.
   [[nodiscard]] std::uint8_t stored(std::size_t address) const { return memory_[address]; }
+  /// Writes a byte of the memory.
   void store(std::size_t address, std::uint8_t value) {
     memory_[address] = value;
     change_memory();

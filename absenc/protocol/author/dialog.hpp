@@ -60,12 +60,15 @@ class HostOf : public Engine {
   [[nodiscard]] static constexpr bool is_alone() { return false; }
 
  protected:
+  /// Reads from an encoder of this format.
   explicit HostOf(const Format& format) : Engine(P::host_times(format), storage_), format_(format) {}
   ~HostOf() = default;
 
   /// What was not known of the encoder it has told.
   void set_format(const Format& format) { format_ = format; }
+  /// Sends a request, not before `earliest`.
   void ask(const Request& request, Time earliest = {}) { ask(request, P::manner(format_, request), earliest); }
+  /// Sends a request with a manner of its own, not before `earliest`.
   void ask(const Request& request, const Manner& manner, Time earliest = {}) {
     request_ = request;
     request_bytes_ = P::encode(format_, request);
@@ -125,6 +128,7 @@ class DialogOf : public HostOf<P>, public Routine {
   template <bool must>
   class [[nodiscard]] Question {
    public:
+    /// Belongs to this dialog.
     explicit Question(DialogOf& dialog) : dialog_(dialog) {}
     /// Not before `pause` has passed since the encoder was last heard, or asked.
     Question& after(Time pause) {
@@ -157,8 +161,11 @@ class DialogOf : public HostOf<P>, public Routine {
       return *this;
     }
 
+    /// Returns false: a reply always takes time.
     [[nodiscard]] bool await_ready() const { return false; }
+    /// Sends the request.
     void await_suspend(std::coroutine_handle<>) { dialog_.ask_it(must); }
+    /// Returns the reply.
     auto await_resume() const {
       if constexpr (must) {
         return dialog_.last();
@@ -171,10 +178,12 @@ class DialogOf : public HostOf<P>, public Routine {
     DialogOf& dialog_;
   };
 
+  /// Sends a request; the procedure ends here if no good reply comes.
   [[nodiscard]] Question<true> ask(const Request& request) {
     prepare(request);
     return Question<true>(*this);
   }
+  /// Sends a request; returns the reply or the error.
   [[nodiscard]] Question<false> attempt(const Request& request) {
     prepare(request);
     return Question<false>(*this);
@@ -203,10 +212,12 @@ class DialogOf : public HostOf<P>, public Routine {
     heard_ = {};
     HostOf<P>::listen(duration);
   }
+  /// Reply of an encoder that sends without requests.
   struct Heard {
-    Bytes bytes{};  ///< none, and it is not over: a damaged character. They are there until something is awaited
-    bool over = false;
+    Bytes bytes{};      ///< none, and it is not over: a damaged character. They are there until something is awaited
+    bool over = false;  ///< Whether no more replies come.
   };
+  /// Waits for the next reply of an encoder that sends without requests.
   [[nodiscard]] auto heard() {
     struct Hear {
       DialogOf& dialog;
@@ -218,10 +229,12 @@ class DialogOf : public HostOf<P>, public Routine {
   }
   [[nodiscard]] std::string_view detail() const override { return outcome_.detail; }
   [[nodiscard]] std::string_view advice() const override { return outcome_.advice; }
+  /// Returns whether a good reply needs no second one to be presented as good.
   [[nodiscard]] bool is_alone() const { return outcome_.alone; }
   [[nodiscard]] ChangeSent change_sent() const final { return change(); }
   /// From here on it leaves the encoder as it was when it is asked to end early; `is_aborted` tells.
   void restores(bool yes = true) { restores_ = yes; }
+  /// Returns whether the procedure was aborted from outside.
   [[nodiscard]] bool is_aborted() const { return aborted_; }
   bool abort() final {
     aborted_ = aborted_ || restores_;
@@ -229,6 +242,7 @@ class DialogOf : public HostOf<P>, public Routine {
   }
 
  protected:
+  /// Talks to an encoder of this format; coroutines live in `arena`.
   DialogOf(const typename P::Format& format, std::span<std::byte> arena) : HostOf<P>(format), Routine(arena) {}
   ~DialogOf() = default;
 
@@ -300,6 +314,7 @@ using ProcedureDialog = typename detail::ProcedureDialog<P>::Type;
 template <class P, class Found, auto procedure, auto... bound>
 class Run : public ProcedureDialog<P> {
  public:
+  /// Runs a procedure with these arguments; its coroutine lives in `arena`.
   Run(const typename P::Format& format, Arguments arguments, std::span<std::byte> arena)
       : ProcedureDialog<P>(format, arena) {
     for (const std::int64_t argument : arguments) static_cast<void>(arguments_.push_back(argument));
@@ -310,8 +325,11 @@ class Run : public ProcedureDialog<P> {
       this->begin(procedure(*this, found_, bound...).handle);
     }
   }
+  /// Returns what was found so far.
   [[nodiscard]] const Found& found() const { return found_; }
+  /// Returns the counts of a stream; null: the command does not stream.
   [[nodiscard]] const StreamCounts* stream() const final { return goes_on ? &counts_ : ProcedureDialog<P>::stream(); }
+  /// Returns whether the stream sends requests.
   [[nodiscard]] bool asks() const final { return goes_on; }
   /// Returns the position, or null if there is none.
   [[nodiscard]] const Reading* reading() const final {

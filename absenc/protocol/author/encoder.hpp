@@ -11,6 +11,7 @@
 
 namespace absenc::author {
 
+/// What virtual encoders share: power, alarms and watched rules.
 template <class Item>
 class EncoderOn : public Device<Item> {
  public:
@@ -25,13 +26,19 @@ class EncoderOn : public Device<Item> {
     if (is_on(now)) stopped(now);
     power_ = Power::off;
   }
+  /// Raises alarms.
   void raise_alarms(std::uint32_t bits) override { raised_ |= bits; }
   /// Ends the cause of alarms; latched alarms stay until a host clears them.
   void lower_alarms(std::uint32_t bits) override { raised_ &= ~bits; }
+  /// Returns a number that changes with the memory.
   [[nodiscard]] std::uint32_t memory_version() const final { return memory_version_; }
+  /// Returns the first rules that the host broke.
   [[nodiscard]] std::span<const Violation> violations() const final { return rules_.violations(); }
+  /// Returns how often the host broke a rule.
   [[nodiscard]] std::uint32_t violation_count() const final { return rules_.violation_count(); }
+  /// Reports each look at a rule to `watch`; null: to nobody.
   void watch_rules(RuleWatch* watch) final { rules_.watch(watch); }
+  /// Returns the number of replies sent.
   [[nodiscard]] std::uint64_t answer_count() const final { return answer_count_; }
 
  protected:
@@ -48,6 +55,7 @@ class EncoderOn : public Device<Item> {
     power_ = Power::starting;
     ready_at_ = until;
   }
+  /// Returns whether the encoder is switched on and ready.
   [[nodiscard]] bool is_on(Time now) {
     if (power_ == Power::starting && now >= ready_at_) {
       power_ = Power::on;
@@ -55,12 +63,16 @@ class EncoderOn : public Device<Item> {
     }
     return power_ == Power::on;
   }
+  /// Returns the raised alarms.
   [[nodiscard]] std::uint32_t raised() const { return raised_; }
+  /// Notes that the memory changed.
   void change_memory() { ++memory_version_; }
+  /// Counts a reply.
   void count_answer() { ++answer_count_; }
 
   /// Power has come, and the start-up is over, at the time at which it was.
   virtual void started(Time) {}
+  /// Is called when the encoder is switched off.
   virtual void stopped(Time) {}
 
  private:

@@ -33,7 +33,7 @@ struct Manner {
   Time answer_limit{};     ///< in place of that of the line; 0: that
   Time hold{};             ///< after an error: so long the encoder may be busy with it all the same
   Time pulse{};            ///< in place of bytes a pulse so long on `wire`, whose edge is the request
-  ExtraWire wire{};
+  ExtraWire wire{};        ///< Wire that is pulsed instead of a request.
 };
 
 /// A subclass says what a whole reply is, and what becomes of it. DialogOf makes one from a protocol. CAN and clocked
@@ -89,6 +89,7 @@ class Engine : public Conversation<std::uint8_t> {
   void listen_on() { state_ = State::listening; }
   /// The conversation is over; so long after what was last sent or heard the encoder must not be disturbed.
   void finish(Error error, Time hold = {});
+  /// Returns the manner of the request.
   [[nodiscard]] const Manner& manner() const { return manner_; }
 
   /// How many bytes the reply has that begins with `reply()`; 0: that is not known yet, or silence alone tells.
@@ -100,6 +101,7 @@ class Engine : public Conversation<std::uint8_t> {
   [[nodiscard]] virtual bool is_whole(Error error) const = 0;
   /// `none`, or why the last attempt failed. Calls `send`, `sleep` or `finish`.
   virtual void concluded(Error error) = 0;
+  /// Is called when a wait has ended.
   virtual void woken() {}
   /// While it listens; nothing: a damaged character.
   virtual void heard(Bytes) {}

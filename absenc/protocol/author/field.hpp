@@ -18,7 +18,7 @@ namespace absenc::author {
 /// `member` shows a member, or what a function makes of all: `T (*)(const Values&)`.
 template <auto member>
 struct FieldOf {
-  FieldInfo info;
+  FieldInfo info;  ///< Description of the field.
 };
 
 namespace detail {
@@ -72,8 +72,10 @@ template <auto member>
 /// The fields of `Values`, a struct whose members they show.
 template <class Values, auto... members>
 struct FieldsOf {
+  /// Takes the fields in their order.
   constexpr explicit FieldsOf(const FieldOf<members>&... all) : infos{all.info...} {}
 
+  /// Puts the values that are there.
   constexpr void put(FieldSink& sink, const Values& values) const {
     std::size_t index = 0;
     (put_one(sink, infos[index++], shown<members>(values)), ...);
@@ -87,6 +89,7 @@ struct FieldsOf {
     return &infos[index];
   }
 
+  /// Descriptions of the fields.
   std::array<FieldInfo, sizeof...(members)> infos;
 
  private:

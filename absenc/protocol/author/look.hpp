@@ -28,9 +28,9 @@ namespace absenc::author {
 /// What a look found: `Found` of procedures that show a position derive from it, or are it.
 template <class P>
 struct Looked {
-  typename P::Request request{};
-  typename P::Reply reply{};
-  Reading reading{};  ///< The position.
+  typename P::Request request{};  ///< The request.
+  typename P::Reply reply{};      ///< The reply.
+  Reading reading{};              ///< The position.
 };
 
 /// Asks once; `found` is what came, with its times. The result is the position in counts.

@@ -38,14 +38,18 @@ struct MostDerived<One, Next, Others...>
     : MostDerived<std::conditional_t<std::is_base_of_v<One, Next>, Next, One>, Others...> {};
 }  // namespace detail
 
+/// An option with the member of the format that it sets.
 template <auto member>
 struct OptionOf {
   /// Format of the encoder: the values of its options.
   using Format = decltype(detail::format_of(member));
+  /// Type of the member.
   using Member = decltype(detail::member_of(member));
-  Option info;
+  Option info;  ///< Description of the option.
 
+  /// Sets the member.
   static constexpr void put(Format& format, std::int64_t value) { format.*member = static_cast<Member>(value); }
+  /// Returns the value of the member.
   [[nodiscard]] static constexpr std::int64_t get(const Format& format) {
     return static_cast<std::int64_t>(format.*member);
   }
@@ -126,6 +130,7 @@ struct OptionsOf {
   /// Format of the encoder: the values of its options.
   using Format = typename detail::MostDerived<typename OptionOf<members>::Format...>::Type;
 
+  /// Takes the options in their order.
   constexpr explicit OptionsOf(const OptionOf<members>&... all) : infos{all.info...} {}
 
   /// What these values make of the format's own.
@@ -140,6 +145,7 @@ struct OptionsOf {
     std::size_t index = 0;
     ((index++ == option ? OptionOf<members>::put(format, value) : void()), ...);
   }
+  /// Returns the value of an option, by its index.
   [[nodiscard]] static constexpr std::int64_t get(const Format& format, std::size_t option) {
     std::size_t index = 0;
     std::int64_t value = 0;
@@ -153,15 +159,16 @@ struct OptionsOf {
     return i;
   }
 
+  /// Descriptions of the options.
   std::array<Option, sizeof...(members)> infos;
 };
 
 /// A model as text: "bits=12 turns=false".
 struct ModelText {
-  std::string_view name;
-  std::string_view meaning;
+  std::string_view name;      ///< Name of the model.
+  std::string_view meaning;   ///< What the model is, as a phrase.
   std::uint32_t maximum_rpm;  ///< 0: the document states none
-  std::string_view values;
+  std::string_view values;    ///< Options that it sets, as `name=value` separated by blanks.
 };
 
 }  // namespace absenc::author

@@ -23,7 +23,7 @@ namespace absenc::author {
 
 /// How a procedure ends.
 struct Outcome {
-  Error error = Error::none;
+  Error error = Error::none;  ///< Why it ended; `Error::none`: well.
   std::string_view detail{};  ///< which step failed, what was found
   std::string_view advice{};  ///< what to do, in place of the error's own advice
   Time hold{};                ///< so long after what was last sent or heard the encoder must not be disturbed
@@ -53,9 +53,11 @@ class Routine {
     if (used_ > most_used_) most_used_ = used_;
     return frame;
   }
+  /// Releases the frame of the coroutine that ended last.
   void give_back(void* frame) { used_ = static_cast<std::size_t>(static_cast<std::byte*>(frame) - arena_.data()); }
   /// For the coroutines themselves: `next` goes on when the present one suspends.
   void go_on_with(std::coroutine_handle<> next) { next_ = next; }
+  /// Ends the procedure with this outcome.
   void end_with(const Outcome& outcome) {
     next_ = nullptr;
     current_ = nullptr;
@@ -68,6 +70,7 @@ class Routine {
   void changes() { change_ = ChangeSent::yes; }
   /// The encoder is as it was before `changes`: it said so, or reading back shows it.
   void refused() { change_ = ChangeSent::refused; }
+  /// Returns whether a request that changes the encoder was sent.
   [[nodiscard]] ChangeSent change() const { return change_; }
 
   /// Ends the procedure from any depth: `co_await dialog.stop({Error::busy, "..."})`.
@@ -98,6 +101,7 @@ class Routine {
       current_.resume();
     }
   }
+  /// Begins with the first coroutine.
   void begin(std::coroutine_handle<> first) {
     current_ = first;
     if (!first) return ended({.error = Error::buffer_too_small, .detail = "the storage is too small for this command"});
@@ -117,6 +121,7 @@ class Routine {
 
 /// What frames of procedures and parts have in common. The first parameter of the coroutine is what carries it.
 struct FrameInRoutine {
+  /// Allocates the frame in the arena of the routine; null: there is no room.
   template <class... Parameters>
   static void* operator new(std::size_t size, Routine& routine, const Parameters&...) noexcept {
     return routine.take(size);
@@ -124,13 +129,16 @@ struct FrameInRoutine {
   /// The storage is the caller's: a part gives its own back, that of the procedure goes with its owner.
   static void operator delete(void*, std::size_t) {}
 
+  /// Belongs to this routine.
   template <class... Parameters>
   explicit FrameInRoutine(Routine& carrier, const Parameters&...) : routine(carrier) {}
 
+  /// Waits until the routine resumes it.
   [[nodiscard]] std::suspend_always initial_suspend() const noexcept { return {}; }
+  /// Is never called: the layer has no exceptions.
   void unhandled_exception() const noexcept {}
 
-  Routine& routine;
+  Routine& routine;  ///< The routine that runs this coroutine.
 };
 
 /// The result of a coroutine that is a whole command: `Procedure name(Dialog& dialog, Found& found, ...)`. Ends by
@@ -143,7 +151,7 @@ struct Procedure {
     [[nodiscard]] std::suspend_always final_suspend() const noexcept { return {}; }
     void return_value(const Outcome& outcome) { routine.end_with(outcome); }
   };
-  std::coroutine_handle<> handle{};
+  std::coroutine_handle<> handle{};  ///< The coroutine; null: there was no room.
 };
 
 /// A part of a procedure, with a result: `const Reply reply = co_await look(dialog);`. At most one of a procedure runs.
@@ -169,7 +177,9 @@ struct [[nodiscard]] Part {
     std::optional<T> result{};
   };
 
+  /// Returns false: the part always runs.
   [[nodiscard]] bool await_ready() const { return false; }
+  /// Begins the part; its caller goes on when it has ended.
   template <class Caller>
   void await_suspend(std::coroutine_handle<Caller> caller) {
     Routine& routine = caller.promise().routine;
@@ -190,7 +200,7 @@ struct [[nodiscard]] Part {
     return result;
   }
 
-  std::coroutine_handle<promise_type> handle{};
+  std::coroutine_handle<promise_type> handle{};  ///< The coroutine; null: there was no room.
 };
 
 }  // namespace absenc::author

@@ -9,9 +9,10 @@
 
 namespace absenc::author {
 
+/// Addresses at which an encoder answered.
 template <std::size_t addresses>
 struct Nodes {
-  std::array<bool, addresses> there{};
+  std::array<bool, addresses> there{};  ///< Whether an encoder answered, for each address.
   std::array<bool, addresses> clash{};  ///< every answer was damaged: two encoders of one address, or a bad line
 };
 

@@ -19,8 +19,10 @@ namespace absenc::author {
 /// The tables of a Declaration.
 template <const auto& declared>
 struct Tables {
+  /// The protocol.
   using P = typename std::remove_cvref_t<decltype(declared)>::Protocol;
 
+  /// Descriptions of the commands.
   static constexpr auto commands = [] {
     std::array<Command, declared.commands.size()> made{};
     for (std::size_t i = 0; i < made.size(); ++i) {
@@ -30,6 +32,7 @@ struct Tables {
     return made;
   }();
 
+  /// Bytes that the largest conversation needs.
   static constexpr std::size_t host_storage = [] {
     std::size_t most = sizeof(Refusal<ItemOf<P>>);
     for (const CommandOf<P>& one : declared.commands) most = std::max(most, one.size);
@@ -55,6 +58,7 @@ struct Tables {
     if (!good) this_model_has_an_option_or_a_value_that_the_unit_does_not_have();
     return made;
   }
+  /// Values of the models' options.
   static constexpr auto model_values = [] {
     constexpr std::size_t size = [] {
       std::size_t sum = 0;
@@ -65,6 +69,7 @@ struct Tables {
     for (const ModelText& text : declared.models) all.append(values_of(text));
     return all;
   }();
+  /// Descriptions of the models.
   static constexpr auto models = [] {
     std::array<Model, declared.models.size()> made{};
     std::size_t first = 0;
@@ -78,9 +83,11 @@ struct Tables {
     return made;
   }();
 
+  /// Returns the parts of a vector.
   static constexpr VectorParts parts_of(const VectorText& text) {
     return VectorParts(text, Clocked<P> || declared.frames_are_texts);
   }
+  /// Bytes and fields of all vectors.
   static constexpr auto vector_parts = [] {
     constexpr auto sizes = [] {
       std::array<std::size_t, 2> sums{};
@@ -100,6 +107,7 @@ struct Tables {
     }
     return all;
   }();
+  /// Descriptions of the vectors.
   static constexpr auto vectors = [] {
     std::array<Vector, declared.vectors.size()> made{};
     Bytes bytes = vector_parts.bytes;

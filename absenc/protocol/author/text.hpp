@@ -17,13 +17,13 @@ namespace absenc::author {
 /// whole number, a real one where it has a point, or a text. Frames are hexadecimal, or themselves where they are
 /// texts.
 struct VectorText {
-  std::string_view id;
-  std::string_view meaning;
-  std::string_view source;
-  std::string_view options;
-  std::string_view request;
-  std::string_view reply;
-  std::string_view fields;
+  std::string_view id;       ///< Identifier of the vector, unique within the unit.
+  std::string_view meaning;  ///< What the vector shows, as a phrase.
+  std::string_view source;   ///< Document and paragraph of the frame.
+  std::string_view options;  ///< Options of the encoder, as `name=value` separated by blanks.
+  std::string_view request;  ///< Bytes of the request in hexadecimal.
+  std::string_view reply;    ///< Bytes of the reply in hexadecimal.
+  std::string_view fields;   ///< Wanted values as `name=value` separated by blanks, or the wanted error.
 };
 
 // Not constexpr, and not defined: who calls one when compiling reads its name in the compiler's message.
@@ -71,6 +71,7 @@ constexpr bool to_real(std::string_view text, double& number) {
 /// compile.
 struct VectorParts {
   constexpr VectorParts() = default;
+  /// Reads the text; it does not compile if it is wrong.
   constexpr VectorParts(const VectorText& text, bool frames_are_texts) {
     append(request, text.request, frames_are_texts);
     append(reply, text.reply, frames_are_texts);
@@ -87,10 +88,10 @@ struct VectorParts {
     if (!good) fields_of_a_vector_are_name_equals_value_or_the_name_of_an_error();
   }
 
-  ByteBuffer<128> request{};
-  ByteBuffer<128> reply{};
-  Buffer<Expected, 24> fields{};
-  Error error = Error::none;
+  ByteBuffer<128> request{};      ///< Bytes of the request.
+  ByteBuffer<128> reply{};        ///< Bytes of the reply.
+  Buffer<Expected, 24> fields{};  ///< Wanted values.
+  Error error = Error::none;      ///< Wanted error.
 
  private:
   static constexpr void append(ByteBuffer<128>& bytes, std::string_view hex, bool is_text) {
@@ -112,8 +113,8 @@ struct VectorParts {
 /// The parts of all vectors of a unit, one behind the other.
 template <std::size_t byte_count, std::size_t field_count>
 struct AllParts {
-  ByteBuffer<byte_count> bytes{};
-  Buffer<Expected, field_count> fields{};
+  ByteBuffer<byte_count> bytes{};          ///< Bytes of all frames.
+  Buffer<Expected, field_count> fields{};  ///< Wanted values of all vectors.
 };
 
 }  // namespace absenc::author

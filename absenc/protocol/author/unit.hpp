@@ -26,12 +26,15 @@ namespace absenc::author {
 /// Makes the descriptor of a unit from its Declaration, which has static storage and is constexpr.
 template <const auto& declared>
 struct Descriptor {
+  /// The declaration's type.
   using Declared = std::remove_cvref_t<decltype(declared)>;
+  /// The protocol.
   using P = typename Declared::Protocol;
   /// Format of the encoder: the values of its options.
   using Format = typename P::Format;
   /// A request of the protocol.
   using Request = typename P::Request;
+  /// Tables of the declaration.
   using Made = Tables<declared>;
 
   static_assert(!declared.id.empty() && !declared.name.empty() && !declared.document.empty(),
@@ -58,11 +61,13 @@ struct Descriptor {
     }
   }
 
+  /// Returns whether options of this format go together.
   static constexpr bool is_usable(const Format& f) {
     if constexpr (declared.is_usable != nullptr) return declared.is_usable(f);
     return true;
   }
 
+  /// Decodes a transfer of a clocked link into fields.
   static constexpr Error decode_bits(const Format& f, BitView bits, FieldSink& sink) {
     if (!is_usable(f)) return Error::invalid_argument;
     const auto reply = P::decode(f, bits);
@@ -72,6 +77,7 @@ struct Descriptor {
     return Error::none;
   }
 
+  /// Decodes a reply into fields.
   static constexpr Error decode_bytes(const Format& f, Frame asked, Frame frame, FieldSink& sink) {
     const Result<Request> request = request_of(f, asked.bytes, frame.bytes);
     if (!request) return request.error();
@@ -87,6 +93,7 @@ struct Descriptor {
     return Error::none;
   }
 
+  /// Returns the request of an exchange, or one that fits the reply.
   static constexpr Result<Request> request_of(const Format& f, Bytes asked, Bytes reply) {
     static_assert(declared.guess_request != nullptr, "a unit that sends requests needs `guess_request`");
     if (asked.empty()) {
@@ -100,6 +107,7 @@ struct Descriptor {
     return request;
   }
 
+  /// Returns the declared command.
   static constexpr const CommandOf<P>& find(const Command& command) { return declared.commands[command.id]; }
 
   /// One for each that the command has, in its range.
@@ -121,6 +129,7 @@ struct Descriptor {
       return encode_bytes(declared.format(values), find(command), arguments, out);
     }
   }
+  /// Writes the request of a command; returns its length.
   static Result<std::size_t> encode_bytes(const Format& f, const CommandOf<P>& one, Arguments arguments,
                                           MutableBytes out) {
     if (one.missing != nullptr && !one.missing(f).empty()) return Error::unsupported;
@@ -148,6 +157,7 @@ struct Descriptor {
     }
   }
 
+  /// Returns where the frame that begins with `bytes` ends.
   static constexpr FrameEnd frame_end(const Options& values, Direction direction, Bytes bytes) {
     if constexpr (declared.frame_end != nullptr) {
       return declared.frame_end(values, direction, bytes);
@@ -162,6 +172,7 @@ struct Descriptor {
     }
   }
 
+  /// Makes the conversation of a command in `storage`.
   static Any<Conversation> host(const Options& values, const Command& command, Arguments arguments,
                                 std::span<std::byte> storage) {
     if (!are_good(command, arguments)) {
@@ -171,12 +182,14 @@ struct Descriptor {
     return find(command).run(declared.format(values), arguments, storage);
   }
 
+  /// Makes a virtual encoder in `storage`.
   static Any<Device> device(const Options& values, const Shaft& shaft, std::span<std::byte> storage) {
     const Format f = declared.format(values);
     if (!is_usable(f)) return {};
     return make_device<typename Declared::Encoder>(storage, f, shaft);
   }
 
+  /// Returns the bits of position and turns.
   static constexpr Resolution resolution(const Options& values) {
     if constexpr (declared.resolution != nullptr) {
       return declared.resolution(declared.format(values));
@@ -184,6 +197,7 @@ struct Descriptor {
       return declared.format(values).resolution();
     }
   }
+  /// Returns the settings of the line for a format.
   static constexpr LineSettings line_of(const Format& f) {
     if constexpr (declared.line != nullptr) {
       return declared.line(f);
@@ -191,6 +205,7 @@ struct Descriptor {
       return f.line();
     }
   }
+  /// Returns the settings of the line for options.
   static constexpr LineSettings settings(const Options& values) { return line_of(declared.format(values)); }
 
   /// By the manner of its request.
@@ -201,6 +216,7 @@ struct Descriptor {
     const Manner manner = P::manner(f, *request);
     return manner.expects_reply && !manner.any_reply;
   }
+  /// Returns how long a host waits after a request before it sends the next one.
   static Time pause(const Options& values, Frame asked) {
     const Format f = declared.format(values);
     const Result<Request> request = P::decode_request(f, asked.bytes);
@@ -216,10 +232,12 @@ struct Descriptor {
     }
   }
 
+  /// Returns what the document says about an error.
   static Explanation explain(const Options& values, Error error, Frame asked, Frame reply) {
     return declared.report.explain(declared.format(values), error, items(asked), items(reply));
   }
 
+  /// Decodes the reply of a vector.
   static constexpr Error decode_vector(const Options& values, const Vector& vector, FieldSink& sink) {
     if constexpr (std::is_same_v<ItemOf<P>, CanFrame>) {
       const CanFrame request = can_frame_of_text(vector.request);
@@ -250,11 +268,13 @@ struct Descriptor {
       return parsed.error() == Error::none;
     });
   }
+  /// Returns whether options are those of a model.
   static constexpr bool agrees(const Model& model, const Options& values) {
     return std::all_of(model.values.begin(), model.values.end(),
                        [&](const OptionValue& one) { return values.values[one.option] == one.value; });
   }
 
+  /// Returns whether a vector decodes as it says.
   static constexpr bool holds(const Vector& vector) {
     Options values;
     bool known = resolve(vector.options, {}, values);
@@ -272,6 +292,7 @@ struct Descriptor {
   static_assert(std::all_of(Made::vectors.begin(), Made::vectors.end(), holds),
                 "a vector does not decode to what it says");
 
+  /// Returns the descriptor of the unit.
   static constexpr Unit make() {
     Unit unit{.id = declared.id,
               .name = declared.name,

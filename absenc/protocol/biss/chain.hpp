@@ -12,10 +12,10 @@ namespace absenc::biss {
 /// Format of a chain's frames. Slave 0 is the farthest from the host and its word comes last: channel i belongs to
 /// slave `count - 1 - i`.
 struct ChainFormat {
-  static constexpr unsigned most = 8;  ///< the most data channels of a frame
-  std::array<Channel, most> channels{};
-  std::uint8_t count = 2;
-  std::uint8_t slave = 0;  ///< the slave whose position a reading shows and whose registers are accessed
+  static constexpr unsigned most = 8;    ///< the most data channels of a frame
+  std::array<Channel, most> channels{};  ///< Channels in the order of the line.
+  std::uint8_t count = 2;                ///< Number of channels in use.
+  std::uint8_t slave = 0;                ///< the slave whose position a reading shows and whose registers are accessed
   RegisterOrder register_order = RegisterOrder::big;  ///< Order of the bytes of registers.
   std::uint16_t register_delay_us = 0;  ///< Time until a virtual encoder has a requested register ready, in us.
   bool start_sequence = false;          ///< Whether SLO of a virtual encoder stays idle until the start sequence.
@@ -51,11 +51,12 @@ struct ChainFormat {
 
 [[nodiscard]] constexpr unsigned passing_bits(const ChainFormat& format) { return format.count - 1u; }
 
+/// A reply of several encoders in a chain.
 struct ChainReply {
   unsigned ack_bits = 1;  ///< Number of acknowledge bits: clocks from the first edge to the start bit.
-  std::array<ChannelData, ChainFormat::most> channels{};
-  unsigned delay_bits = 0;  ///< Extra idle samples: the delay of the line in clocks.
-  bool cds = false;         ///< Bit of control data that the encoder sent.
+  std::array<ChannelData, ChainFormat::most> channels{};  ///< Data of each channel.
+  unsigned delay_bits = 0;                                ///< Extra idle samples: the delay of the line in clocks.
+  bool cds = false;                                       ///< Bit of control data that the encoder sent.
 };
 
 /// Decodes a frame of a chain; see decode of one word. If one word has an error, the whole frame is rejected.

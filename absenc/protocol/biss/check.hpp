@@ -18,9 +18,9 @@ inline constexpr unsigned life_counter_bits = 6;
 struct Check {
   std::uint8_t width = 6;     ///< bits of the CRC, 0 to 16; 0: no CRC
   std::uint16_t poly = 0x03;  ///< polynomial without its highest power
-  std::uint16_t init = 0;
-  bool inverted = true;
-  bool life_counter = false;
+  std::uint16_t init = 0;     ///< Value of the CRC register before the first bit.
+  bool inverted = true;       ///< Whether the CRC is sent inverted.
+  bool life_counter = false;  ///< Whether a life counter precedes the CRC.
 
   /// Returns the bits that the check adds to the word.
   [[nodiscard]] constexpr unsigned bits() const { return width + (life_counter ? life_counter_bits : 0); }

@@ -29,9 +29,9 @@ inline constexpr std::array<Argument, 2> command_arguments{
 
 /// A register with a name and with a command that reads it.
 struct NamedRegister {
-  std::string_view name;
-  unsigned address;
-  std::string_view meaning;
+  std::string_view name;     ///< Name of the register.
+  unsigned address;          ///< Address of the register.
+  std::string_view meaning;  ///< What the register holds.
 };
 inline constexpr std::array<NamedRegister, 6> named_registers{{
     {"bank", registers::bank_select, "which bank addresses 0 to 63 mean"},
@@ -53,8 +53,9 @@ inline constexpr auto clock_option = author::option<member>("ma_khz", "clock, kH
 /// The BiSS timeout in the form of its options.
 struct TimeoutSettings {
   std::uint16_t timeout_tenths = 0;  ///< fixed timeout in 0.1 us; 0: unknown
-  bool adaptive_timeout = false;
+  bool adaptive_timeout = false;     ///< Whether the encoder adapts its timeout to the clock.
 
+  /// Returns the timeout that the options name.
   [[nodiscard]] constexpr Timeout timeout_given() const {
     if (adaptive_timeout) return Timeout::adaptive();
     return timeout_tenths == 0 ? Timeout{} : Timeout::fixed(Time(timeout_tenths * 100));

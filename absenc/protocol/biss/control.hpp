@@ -27,13 +27,17 @@ inline constexpr Check crc4{4, 0x3};
   return static_cast<std::uint8_t>(detail::crc_bit_by_bit(crc4, BitNumber{bits, count}, 0, count));
 }
 
+/// What a control frame asks for.
 struct ControlRequest {
-  enum class Operation : std::uint8_t { read, write, command } operation = Operation::read;
-  std::uint8_t slave = 0;    ///< slave whose register is accessed, 0 to 7
-  std::uint8_t address = 0;  ///< address of the first register, 0 to 127
+  /// Kind of the request.
+  enum class Operation : std::uint8_t { read, write, command };
+  Operation operation = Operation::read;  ///< Kind of the request.
+  std::uint8_t slave = 0;                 ///< slave whose register is accessed, 0 to 7
+  std::uint8_t address = 0;               ///< address of the first register, 0 to 127
   std::uint8_t slaves = 0;  ///< slaves that receive a command: bit n is slave n; 0: all slaves, without acknowledgement
   std::uint8_t command = 0;  ///< number of a command, 0 to 3
 
+  /// Returns whether it is a command.
   [[nodiscard]] constexpr bool is_command() const { return operation == Operation::command; }
   /// Compares all members.
   friend constexpr bool operator==(const ControlRequest&, const ControlRequest&) = default;
@@ -70,14 +74,14 @@ inline constexpr unsigned header_bits = 15;  // bits after the start bit: CTS, t
 
 /// A control frame with the answer of the encoders.
 struct ControlFrame {
-  ControlRequest request{};
-  std::uint8_t slaves = 0;   ///< number of slaves with an ID, from the lock bits
-  bool more_slaves = false;  ///< there are slaves without an ID
-  ByteBuffer<control_most> data;
+  ControlRequest request{};                         ///< What the frame asks for.
+  std::uint8_t slaves = 0;                          ///< number of slaves with an ID, from the lock bits
+  bool more_slaves = false;                         ///< there are slaves without an ID
+  ByteBuffer<control_most> data;                    ///< Data bytes of the frame.
   Buffer<std::uint16_t, control_most> start_delay;  ///< number of frames by which each byte was delayed
-  bool next_address_accepted = false;
-  std::uint8_t acknowledged = 0;  ///< slaves that acknowledged a command: bit n is slave n
-  bool executed = false;
+  bool next_address_accepted = false;               ///< Whether the slave accepted the next address.
+  std::uint8_t acknowledged = 0;                    ///< slaves that acknowledged a command: bit n is slave n
+  bool executed = false;                            ///< Whether the slave executed the command.
 };
 
 /// Decodes a control frame from the bits of CDM and CDS, one of each per frame. Before the start bit may be zeros or
@@ -96,6 +100,7 @@ class ControlMaster {
 
   /// Begins to read `count` registers, 1 to 64.
   void read(unsigned slave, unsigned address, std::size_t count);
+  /// Begins to write `bytes`.
   void write(unsigned slave, unsigned address, Bytes bytes);
   /// Begins a command to the slaves in the mask `slaves`; 0: to all.
   void command(std::uint8_t slaves, unsigned command);
@@ -107,9 +112,11 @@ class ControlMaster {
   /// Ends the control frame with `error` because a frame, and with it a CDS, was lost.
   void fail(Error error);
 
+  /// Returns whether the control frame has ended.
   [[nodiscard]] bool is_over() const { return over_; }
   /// Returns whether the host waits for a start bit of the encoder, which may take 20 ms.
   [[nodiscard]] bool is_waiting() const { return !over_ && state_ == State::start; }
+  /// Returns why it failed.
   [[nodiscard]] Error error() const { return error_; }
   /// Returns the control frame; after an error, with the bytes before it.
   [[nodiscard]] const ControlFrame& frame() const { return frame_; }
@@ -151,7 +158,9 @@ void append_cdm(ControlMaster master, unsigned slaves, BitBuffer<1024>& out);
 struct ControlTarget {
   /// Returns whether the register may be read, or written.
   [[nodiscard]] virtual bool allows(unsigned slave, unsigned address, bool write) const = 0;
+  /// Returns a register.
   [[nodiscard]] virtual std::uint8_t read(unsigned slave, unsigned address) = 0;
+  /// Writes a register.
   virtual void write(unsigned slave, unsigned address, std::uint8_t value) = 0;
   /// Returns the bit P after a register. `next_allowed`: whether the next register may be accessed too.
   [[nodiscard]] virtual bool stop_bit(bool next_allowed) const { return !next_allowed; }
@@ -162,6 +171,7 @@ struct ControlTarget {
   [[nodiscard]] virtual bool listens(unsigned) const { return true; }
   /// Returns whether the slave executes this command.
   [[nodiscard]] virtual bool obeys(unsigned slave, unsigned command) const = 0;
+  /// Executes a command on the slaves whose bits are set.
   virtual void execute(std::uint8_t slaves, unsigned command) = 0;
 
  protected:
@@ -171,11 +181,14 @@ struct ControlTarget {
 /// The encoders' side of control frames, for all slaves on the line.
 class ControlSlaves {
  public:
+  /// Listens as so many slaves.
   explicit ControlSlaves(unsigned count) : count_(count) {}
 
   /// Takes the CDM after the last frame; sets the CDS of the next frame, see `cds`.
   void take(bool cdm, ControlTarget& target);
+  /// Returns the bit that the slaves send next.
   [[nodiscard]] bool cds() const { return cds_; }
+  /// Begins anew, as after power-on.
   void reset() { *this = ControlSlaves(count_); }
 
  private:

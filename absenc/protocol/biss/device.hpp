@@ -25,6 +25,7 @@ using Samples = author::DrivenBits;
 /// Delays the samples by the line's delay: by whole clocks, and at random where an edge falls on a sample.
 class LineDelay {
  public:
+  /// Delays samples as a long line does.
   void apply(const Behaviour& behaviour, Time period, Samples& samples);
 
  private:
@@ -35,6 +36,7 @@ class LineDelay {
 template <class F>
 class EncoderOf {
  public:
+  /// Follows `shaft`, which must outlive it.
   EncoderOf(const F& format, const Shaft& shaft, const Behaviour& behaviour)
       : format_(format), shaft_(&shaft), behaviour_(behaviour) {}
 
@@ -63,11 +65,17 @@ class EncoderOf {
     while (samples.size() % 8 != 0) samples.append(0, 1);
   }
 
+  /// Returns the format of the encoder.
   [[nodiscard]] const F& format() const { return format_; }
+  /// Returns how the virtual encoder behaves.
   [[nodiscard]] const Behaviour& behaviour() const { return behaviour_; }
+  /// Returns the position word at this time.
   [[nodiscard]] Word word(Time at) const { return word_of(format_.word, shaft_->at(at), alarms_); }
+  /// Returns whether the encoder is switched on.
   [[nodiscard]] bool is_powered() const { return powered_; }
+  /// Switches the encoder on or off.
   void set_power(bool on) { powered_ = on; }
+  /// Sets the raised alarms.
   void set_alarms(std::uint32_t alarms) { alarms_ = alarms; }
   /// Sets the slaves whose process data are switched off: bit n is slave n.
   void set_silent(std::uint8_t slaves) { silent_ = slaves; }
@@ -87,9 +95,10 @@ using Encoder = EncoderOf<Format>;
 /// The registers of all slaves on a line. `memory` is what survives power off.
 class VirtualRegisters final : public ControlTarget {
  public:
-  static constexpr unsigned banks = 4;
+  static constexpr unsigned banks = 4;  ///< Number of banks of each slave.
+  /// Bytes of memory of each slave.
   static constexpr unsigned slave_size = banks * registers::bank_size + (registers::end - registers::bank_size);
-  static constexpr unsigned most_slaves = ChainFormat::most;
+  static constexpr unsigned most_slaves = ChainFormat::most;  ///< Greatest number of slaves.
 
   /// `slaves`: number of slaves, 1 to `most_slaves`.
   VirtualRegisters(unsigned slaves, RegisterOrder order, StopBit stop_bit);
@@ -97,18 +106,23 @@ class VirtualRegisters final : public ControlTarget {
   void power_on();
   /// Sets the present time; a register that is requested now is ready `delay` later.
   void set_time(Time at, Time delay);
+  /// Returns the memory of all slaves.
   [[nodiscard]] MutableBytes memory() { return MutableBytes(memory_).first(std::size_t{slaves_} * slave_size); }
+  /// Returns the number of writes.
   [[nodiscard]] std::uint32_t written() const { return written_; }
   /// Returns the slaves whose process data are switched off.
   [[nodiscard]] std::uint8_t silent() const { return silent_; }
 
   [[nodiscard]] bool allows(unsigned slave, unsigned address, bool write) const override;
+  /// Returns a register.
   [[nodiscard]] std::uint8_t read(unsigned slave, unsigned address) override;
+  /// Writes a register.
   void write(unsigned slave, unsigned address, std::uint8_t value) override;
   [[nodiscard]] bool stop_bit(bool next_allowed) const override;
   [[nodiscard]] bool is_ready() const override;
   [[nodiscard]] bool listens(unsigned slave) const override { return (closed_ >> slave & 1) == 0; }
   [[nodiscard]] bool obeys(unsigned slave, unsigned command) const override;
+  /// Executes a command on the slaves whose bits are set.
   void execute(std::uint8_t slaves, unsigned command) override;
 
  private:
@@ -132,6 +146,7 @@ class VirtualRegisters final : public ControlTarget {
 [[nodiscard]] constexpr unsigned slaves_of(const SafetyFormat&) { return 2; }
 [[nodiscard]] constexpr unsigned slaves_of(const ChainFormat& format) { return format.count; }
 
+/// A virtual encoder, or a chain of them.
 template <class F>
 class VirtualEncoderOf final : public author::ClockedDevice {
  public:
@@ -142,6 +157,7 @@ class VirtualEncoderOf final : public author::ClockedDevice {
                           .line_delay = Time(format.line_delay_ns),
                           .register_delay = std::chrono::microseconds(format.register_delay_us),
                           .start_sequence = format.start_sequence}) {}
+  /// Follows `shaft`, which must outlive it.
   VirtualEncoderOf(const F& format, const Shaft& shaft, const Behaviour& behaviour)
       : encoder_(format, shaft, behaviour),
         slaves_(slaves_of(format)),

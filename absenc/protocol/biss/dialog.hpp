@@ -9,6 +9,7 @@
 
 namespace absenc::biss {
 
+/// A dialog that reads positions and meanwhile carries control frames.
 template <class F>
 class ControlDialog : public author::ClockedHostOf<ProtocolOf<F>>, public author::Routine {
   using Base = author::ClockedHostOf<ProtocolOf<F>>;
@@ -31,10 +32,13 @@ class ControlDialog : public author::ClockedHostOf<ProtocolOf<F>>, public author
   void say(bool cdm) { cdm_ = cdm; }
   /// Number of clocked frames, and of those with an error.
   [[nodiscard]] std::uint32_t frames() const { return frames_; }
+  /// Returns the number of frames that failed a check.
   [[nodiscard]] std::uint32_t bad_frames() const { return bad_frames_; }
+  /// Returns the time of the last frame.
   [[nodiscard]] Time now() const { return this->received_at(); }
   [[nodiscard]] std::string_view detail() const override { return outcome_.detail; }
   [[nodiscard]] std::string_view advice() const override { return outcome_.advice; }
+  /// Returns whether a good reply needs no second one to be presented as good.
   [[nodiscard]] bool is_alone() const { return outcome_.alone; }
   [[nodiscard]] ChangeSent change_sent() const final { return this->change(); }
   /// Accepts frames without process data, which a command may have switched off: their CDS is valid.
@@ -49,6 +53,7 @@ class ControlDialog : public author::ClockedHostOf<ProtocolOf<F>>, public author
   }
 
  protected:
+  /// Talks to an encoder of this format; coroutines live in `arena`.
   ControlDialog(const F& format, std::span<std::byte> arena) : Base(format, author::later), Routine(arena) {}
   ~ControlDialog() = default;
 

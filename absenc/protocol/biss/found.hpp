@@ -17,6 +17,7 @@ namespace absenc::biss {
 /// Text of numbers, separated by spaces.
 class NumberList {
  public:
+  /// Appends a number.
   constexpr void add(unsigned number) {
     if (!empty()) text_.push_back(' ');
     std::array<char, 5> digits{};
@@ -37,6 +38,7 @@ class NumberList {
 /// Text of a manufacturer: two characters; bytes that are not printable as "\\x00".
 class MakerName {
  public:
+  /// Appends characters.
   constexpr void append(Bytes bytes) {
     constexpr std::string_view hex = "0123456789ABCDEF";
     for (const std::uint8_t byte : bytes) {
@@ -60,30 +62,30 @@ class MakerName {
 struct Found {
   /// Of a control frame.
   std::optional<std::uint8_t> slaves{};
-  std::optional<bool> more_slaves{};
-  std::optional<std::string_view> operation{};
-  std::optional<std::uint8_t> slave_id{};
-  std::optional<std::uint8_t> bank{};
-  std::optional<std::uint8_t> address{};  ///< Address.
-  std::optional<std::uint8_t> value{};
-  ByteBuffer<control_most> bytes;
-  bool has_data = false;
-  NumberList start_delay;
-  std::optional<bool> next_address_accepted{};
-  std::optional<std::uint8_t> command{};
-  std::optional<bool> broadcast{};
-  NumberList slave_ids;
-  NumberList acknowledged;
-  std::optional<bool> executed{};
+  std::optional<bool> more_slaves{};            ///< Value of the field `more_slaves`, if there is one.
+  std::optional<std::string_view> operation{};  ///< Value of the field `operation`, if there is one.
+  std::optional<std::uint8_t> slave_id{};       ///< Value of the field `slave_id`, if there is one.
+  std::optional<std::uint8_t> bank{};           ///< Value of the field `bank`, if there is one.
+  std::optional<std::uint8_t> address{};        ///< Address.
+  std::optional<std::uint8_t> value{};          ///< Value of the field `value`, if there is one.
+  ByteBuffer<control_most> bytes;               ///< Bytes of the registers.
+  bool has_data = false;                        ///< Whether `bytes` holds data.
+  NumberList start_delay;                       ///< Start delay of each slave.
+  std::optional<bool> next_address_accepted{};  ///< Value of the field `next_address_accepted`, if there is one.
+  std::optional<std::uint8_t> command{};        ///< Value of the field `command`, if there is one.
+  std::optional<bool> broadcast{};              ///< Value of the field `broadcast`, if there is one.
+  NumberList slave_ids;                         ///< Identifiers of the slaves.
+  NumberList acknowledged;                      ///< Slaves that acknowledged.
+  std::optional<bool> executed{};               ///< Value of the field `executed`, if there is one.
   // Of procedures.
-  std::optional<bool> written{};  ///< false: the register had this value already, so nothing was written
-  std::optional<bool> missing{};  ///< true: the encoder refused the register; otherwise not set
-  std::optional<std::uint8_t> eds_bank{};
-  std::optional<std::uint16_t> profile{};
-  std::optional<std::uint64_t> serial_number{};
-  ByteBuffer<6> device_id;
-  MakerName manufacturer;
-  Reading reading{};  ///< stays empty: these procedures do not report a position
+  std::optional<bool> written{};                 ///< false: the register had this value already, so nothing was written
+  std::optional<bool> missing{};                 ///< true: the encoder refused the register; otherwise not set
+  std::optional<std::uint8_t> eds_bank{};        ///< Value of the field `eds_bank`, if there is one.
+  std::optional<std::uint16_t> profile{};        ///< Value of the field `profile`, if there is one.
+  std::optional<std::uint64_t> serial_number{};  ///< Value of the field `serial_number`, if there is one.
+  ByteBuffer<6> device_id;                       ///< Device identifier.
+  MakerName manufacturer;                        ///< Name of the maker.
+  Reading reading{};                             ///< stays empty: these procedures do not report a position
 };
 
 namespace shown {

@@ -36,6 +36,7 @@ class Timeout {
   constexpr Timeout() = default;  // unknown timeout
   /// Returns a fixed timeout of 12.5 us to 40 us, in steps of 0.5 us.
   static constexpr Timeout fixed(Time length) { return Timeout(static_cast<std::uint8_t>(length / 500ns)); }
+  /// Returns the timeout that adapts to the clock.
   static constexpr Timeout adaptive() { return Timeout(is_adaptive); }
 
   /// Returns the pause that the host leaves between frames. An encoder that measures the period may be late by three of
@@ -133,10 +134,11 @@ template <class AnyFormat>
   return idle_bits + head_bits(format, latency, period) + 2 + data_bits(format);
 }
 
+/// A reply: position word, checksum and what frames the data.
 template <class WordType>
 struct ReplyWith {
-  unsigned ack_bits = 1;  ///< Number of acknowledge bits: clocks from the first edge to the start bit.
-  WordType word{};
+  unsigned ack_bits = 1;          ///< Number of acknowledge bits: clocks from the first edge to the start bit.
+  WordType word{};                ///< The position word.
   std::uint8_t life_counter = 0;  ///< life counter, if the check has one
   bool cds = false;               ///< the encoder's bit of control communication
   std::uint16_t crc = 0;          ///< CRC as sent
@@ -267,9 +269,9 @@ constexpr void show(const Format& format, const ShaftState& state, std::uint32_t
 /// A format that is known at compile time, in the form that hosts of any format use.
 template <const Format& known>
 struct KnownFormat {
-  static constexpr std::uint16_t ma_khz = known.ma_khz;
-  static constexpr Time latency = known.latency;  ///< Time that the encoder takes before its start bit.
-  static constexpr Timeout timeout = known.timeout;
+  static constexpr std::uint16_t ma_khz = known.ma_khz;  ///< Clock in kHz.
+  static constexpr Time latency = known.latency;         ///< Time that the encoder takes before its start bit.
+  static constexpr Timeout timeout = known.timeout;      ///< Timeout of the encoder.
   /// Returns the period of the clock.
   [[nodiscard]] static constexpr Time period() { return known.period(); }
 };

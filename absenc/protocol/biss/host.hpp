@@ -14,6 +14,7 @@ namespace absenc::biss {
 /// Longest extra delay of encoder and line, beyond the expected one, for which a host still searches the frame.
 inline constexpr Time longest_delay = 80us;
 
+/// A dialog that reads positions and meanwhile carries control frames.
 template <class F>
 class ControlDialog;
 
@@ -34,6 +35,7 @@ struct ProtocolOf {
   using Request = author::NoRequest;
   /// A reply of the protocol.
   using Reply = std::remove_cvref_t<decltype(*detail::decoded(F{}, BitView{}))>;
+  /// Dialog of procedures.
   using Dialog = ControlDialog<F>;
   static constexpr unsigned most_clocks = 512;  ///< Greatest number of clocks of a transfer.
 
@@ -105,6 +107,7 @@ class PositionReader : public author::ClockedHostOf<ProtocolOf<F>> {
   static constexpr unsigned most_late = 4;  // late frames that are read until two of them agree
 
  public:
+  /// Reads positions from an encoder of this format.
   explicit PositionReader(const F& format) : Base(format) {}
 
  private:

@@ -21,14 +21,15 @@ struct Channel {
 
 /// Content of a channel.
 struct ChannelData {
-  Word word{};
-  std::uint8_t life_counter = 0;
-  std::uint16_t crc = 0;  ///< CRC as sent
+  Word word{};                    ///< The position word.
+  std::uint8_t life_counter = 0;  ///< Life counter, if the check has one.
+  std::uint16_t crc = 0;          ///< CRC as sent
 };
 
+/// Format of BiSS Safety: two position words of one encoder.
 struct SafetyFormat {
-  Channel cpw{.word = "position:24 error:1! warning:1!"_word};
-  Channel spw{.word = "position:16 error:1! warning:1!"_word, .check = crc16};
+  Channel cpw{.word = "position:24 error:1! warning:1!"_word};                  ///< The control position word.
+  Channel spw{.word = "position:16 error:1! warning:1!"_word, .check = crc16};  ///< The safety position word.
   std::uint8_t compare_bits = 13;          ///< upper bits of the position in which both words must agree (ACC_MIN)
   std::int8_t previous_life_counter = -1;  ///< life counter of the frame before; -1: unknown
   /// These members mean the same as in Format.
@@ -40,7 +41,7 @@ struct SafetyFormat {
   bool start_sequence = false;          ///< Whether SLO of a virtual encoder stays idle until the start sequence.
   Timeout timeout{};                    ///< Timeout of the encoder.
   StopBit stop_bit = StopBit::next;     ///< The bit P that a virtual encoder sends after each register.
-  std::uint8_t slave = 0;
+  std::uint8_t slave = 0;               ///< Number of the slave in its chain.
   RegisterOrder register_order = RegisterOrder::big;  ///< Order of the bytes of registers.
 
   /// Returns the period of the clock.
@@ -51,10 +52,11 @@ struct SafetyFormat {
   return data_bits(format.cpw) + data_bits(format.spw);
 }
 
+/// A reply of BiSS Safety.
 struct SafetyReply {
-  unsigned ack_bits = 1;  ///< Number of acknowledge bits: clocks from the first edge to the start bit.
-  ChannelData cpw{};
-  ChannelData spw{};
+  unsigned ack_bits = 1;    ///< Number of acknowledge bits: clocks from the first edge to the start bit.
+  ChannelData cpw{};        ///< The control position word.
+  ChannelData spw{};        ///< The safety position word.
   unsigned delay_bits = 0;  ///< Extra idle samples: the delay of the line in clocks.
   bool cds = false;         ///< Bit of control data that the encoder sent.
 };

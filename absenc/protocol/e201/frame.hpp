@@ -76,17 +76,19 @@ inline constexpr unsigned resolute_fastest = 5;  // fastest clock recommended fo
 
 /// Format of the encoder: the values of its options.
 struct Format {
-  WordFormat word = biss::Format{}.word;  ///< Fields of the position word.
-  Scale scale{};                          ///< Length of a count of a linear encoder.
-  Carries carries = Carries::biss;
-  ssi::AfterWord after_word = ssi::AfterWord::repeat;
-  Kind kind = Kind::other;
+  WordFormat word = biss::Format{}.word;               ///< Fields of the position word.
+  Scale scale{};                                       ///< Length of a count of a linear encoder.
+  Carries carries = Carries::biss;                     ///< Protocol behind the interface.
+  ssi::AfterWord after_word = ssi::AfterWord::repeat;  ///< What an SSI encoder sends after its word.
+  Kind kind = Kind::other;                             ///< Kind of the encoder behind the interface.
   /// Of the virtual interface and its encoder.
   Version firmware{1, 16};
   Time latency = 10us;  ///< Time that the encoder takes before its start bit.
   Time line_delay{};    ///< Delay of the line.
 
+  /// Returns the format of a BiSS encoder.
   [[nodiscard]] constexpr biss::Format biss() const { return {.word = word, .scale = scale}; }
+  /// Returns the format of an SSI encoder.
   [[nodiscard]] constexpr ssi::Format ssi() const { return {.word = word, .after_word = after_word, .scale = scale}; }
 };
 
@@ -97,10 +99,11 @@ struct Format {
          (is_biss ? biss::idle_bits + 3 + biss::data_bits(format.biss()) : 1 + format.word.bits()) <= sample_bits;
 }
 
+/// A position that the interface reported.
 struct Position {
   unsigned ack_bits = 0;  ///< BiSS: clocks until the encoder was ready
   std::uint16_t crc = 0;  ///< BiSS: CRC as sent
-  Word word{};
+  Word word{};            ///< The position word.
 };
 
 /// Decodes the samples. Errors: invalid_argument (the word does not fit), line_stuck (all samples alike), bad_framing
@@ -128,16 +131,16 @@ struct Position {
 
 /// A request of the protocol.
 struct Request {
-  std::uint8_t letter = letter::samples;
-  unsigned clock = 0;  ///< set_clock: the clock, 1 to 8
-  unsigned width = 0;  ///< set_width: the width in bits, 1 to 64
+  std::uint8_t letter = letter::samples;  ///< Letter of the command.
+  unsigned clock = 0;                     ///< set_clock: the clock, 1 to 8
+  unsigned width = 0;                     ///< set_width: the width in bits, 1 to 64
 };
 
 /// A reply of the protocol.
 struct Reply {
-  std::uint64_t samples = 0;
-  std::int64_t number = 0;  ///< number in the reply to ? > m b
-  Text text{};              ///< text of a reply line, trimmed
+  std::uint64_t samples = 0;  ///< Number of samples.
+  std::int64_t number = 0;    ///< number in the reply to ? > m b
+  Text text{};                ///< text of a reply line, trimmed
 };
 
 inline constexpr unsigned widest = 64;  // largest width of a position in bits

@@ -16,25 +16,26 @@ using Dialog = author::DialogOf<Protocol>;
 
 /// Results of a procedure. Values that were not requested or not answered stay empty.
 struct Found {
-  Reading reading{};          ///< The position.
-  std::uint64_t samples = 0;  ///< the samples from which `reading` was decoded
-  std::optional<Text> command{};
-  std::optional<Text> version{};
-  std::optional<Text> serial{};
-  std::optional<Text> supply{};
-  std::optional<std::int64_t> clock{};
-  std::optional<std::int64_t> width{};
-  std::optional<std::int64_t> counts{};
+  Reading reading{};                         ///< The position.
+  std::uint64_t samples = 0;                 ///< the samples from which `reading` was decoded
+  std::optional<Text> command{};             ///< Value of the field `command`, if there is one.
+  std::optional<Text> version{};             ///< Value of the field `version`, if there is one.
+  std::optional<Text> serial{};              ///< Value of the field `serial`, if there is one.
+  std::optional<Text> supply{};              ///< Value of the field `supply`, if there is one.
+  std::optional<std::int64_t> clock{};       ///< Value of the field `clock`, if there is one.
+  std::optional<std::int64_t> width{};       ///< Value of the field `width`, if there is one.
+  std::optional<std::int64_t> counts{};      ///< Value of the field `counts`, if there is one.
   std::optional<std::string_view> advice{};  ///< recommended clocks, if another clock is set
 
   // Results of clock-sweep.
   unsigned frames = 0;  ///< frames to read at each clock
+  /// Number of valid frames at each clock.
   std::array<unsigned, clocks_khz.size()> valid{};
   unsigned measured = 0;  ///< number of clocks that were completed
   unsigned previous = 0;  ///< clock before the sweep; 0: unknown
   unsigned left = 0;      ///< clock that was set last; 0: none
-  bool restored = false;
-  bool aborted = false;
+  bool restored = false;  ///< Whether the clock was put back.
+  bool aborted = false;   ///< Whether the command was aborted.
 
   /// Stores the reply line to the command `asked`.
   constexpr void take(std::uint8_t asked, const Reply& reply) {

@@ -55,9 +55,10 @@ constexpr bool skip_to_digit(Bytes text, std::size_t& at) {
 
 }  // namespace detail
 
+/// Version of the interface.
 struct Version {
-  unsigned major;
-  unsigned minor;
+  unsigned major;  ///< Major number.
+  unsigned minor;  ///< Minor number.
 };
 
 /// Returns whether this firmware has the command `4` (E201-9S document: since 1.16).

@@ -19,6 +19,7 @@ namespace absenc::encolink {
 /// of the cycle's first frame.
 class ChannelFollower final : public Follower {
  public:
+  /// Follows encoders of this format.
   explicit ChannelFollower(const Format& format) : format_(format) {}
 
   void follow(std::uint64_t number, Bytes request, Bytes reply) override;

@@ -43,7 +43,9 @@ class VirtualEncoder final : public author::Responder {
   [[nodiscard]] const Format& format() const { return format_; }
   /// Returns the position that a frame would carry at `now`.
   [[nodiscard]] Position measure(Time now) const;
+  /// Returns the stored position offset.
   [[nodiscard]] std::uint32_t offset() const { return values_[position_offset]; }
+  /// Returns the raised alarms.
   [[nodiscard]] std::uint16_t alarms() const { return static_cast<std::uint16_t>(raised()); }
 
  private:

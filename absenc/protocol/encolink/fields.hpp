@@ -69,22 +69,23 @@ inline constexpr std::array<FlagInfo, 4> calibration_flags{{
 
 /// Values of frames and register accesses. Members without a value are not reported.
 struct Values {
+  /// A value that may be missing.
   template <class T>
   using Maybe = std::optional<T>;
-  Maybe<Position> position{};
-  Maybe<std::uint16_t> multiturn{};
-  Maybe<std::uint8_t> channel2{};
-  Maybe<std::uint16_t> status{};
-  Maybe<std::uint8_t> channel3{};
-  Maybe<Identity> identity{};
-  Maybe<std::uint8_t> config{};
-  Maybe<std::uint8_t> ra{};
-  Maybe<std::string_view> op{};
-  Maybe<std::string_view> name{};
-  Maybe<std::uint32_t> address{};
-  Maybe<std::size_t> length{};
-  Maybe<Bytes> data{};
-  Maybe<std::uint64_t> value{};
+  Maybe<Position> position{};        ///< Value of the field `position`, if there is one.
+  Maybe<std::uint16_t> multiturn{};  ///< Value of the field `multiturn`, if there is one.
+  Maybe<std::uint8_t> channel2{};    ///< Value of the field `channel2`, if there is one.
+  Maybe<std::uint16_t> status{};     ///< Value of the field `status`, if there is one.
+  Maybe<std::uint8_t> channel3{};    ///< Value of the field `channel3`, if there is one.
+  Maybe<Identity> identity{};        ///< Value of the field `identity`, if there is one.
+  Maybe<std::uint8_t> config{};      ///< Value of the field `config`, if there is one.
+  Maybe<std::uint8_t> ra{};          ///< Value of the field `ra`, if there is one.
+  Maybe<std::string_view> op{};      ///< Value of the field `op`, if there is one.
+  Maybe<std::string_view> name{};    ///< Value of the field `name`, if there is one.
+  Maybe<std::uint32_t> address{};    ///< Value of the field `address`, if there is one.
+  Maybe<std::size_t> length{};       ///< Value of the field `length`, if there is one.
+  Maybe<Bytes> data{};               ///< Value of the field `data`, if there is one.
+  Maybe<std::uint64_t> value{};      ///< Value of the field `value`, if there is one.
 };
 
 inline constexpr FieldInfo general_status_field{"general_status", FieldInfo::Kind::flags, "",

@@ -84,17 +84,19 @@ enum class Generation : std::uint8_t { aksim2, aksim4 };
 
 /// Layout of an encoder's frames. Unknown members are read from the encoder's identity.
 struct Format {
-  unsigned resolution = 0;  ///< bits of a turn, 1 to 22; 0: unknown
-  int multiturn_bits = -1;  ///< bits of the turn counter, 0 to 16; -1: unknown
-  bool has_ch2 = true;      ///< false: frames as of an AksIM-1, without the channel 2 byte
-  Interface interface = Interface::uart;
-  OffsetSign offset_sign = OffsetSign::add;
-  OffsetUnit offset_unit = OffsetUnit::counts;
+  unsigned resolution = 0;                      ///< bits of a turn, 1 to 22; 0: unknown
+  int multiturn_bits = -1;                      ///< bits of the turn counter, 0 to 16; -1: unknown
+  bool has_ch2 = true;                          ///< false: frames as of an AksIM-1, without the channel 2 byte
+  Interface interface = Interface::uart;        ///< Interface of the encoder.
+  OffsetSign offset_sign = OffsetSign::add;     ///< Sign of the position offset.
+  OffsetUnit offset_unit = OffsetUnit::counts;  ///< Unit of the position offset.
   std::uint32_t stream_rate = 0;  ///< frames per second that the encoder sends without requests; 0: it answers requests
   Generation generation = Generation::aksim2;   ///< generation of the virtual encoder
   std::uint8_t identity_size = identity_bytes;  ///< identity bytes of the virtual encoder on a UART, 19 or 20
 
+  /// Returns whether resolution and turns are known.
   [[nodiscard]] constexpr bool known() const { return resolution != 0 && multiturn_bits >= 0; }
+  /// Returns the number of bytes of the turns.
   [[nodiscard]] constexpr std::size_t turns_bytes() const { return multiturn_bits > 0 ? 2 : 0; }
   /// Returns the number of padding bits below the turn counter.
   [[nodiscard]] constexpr unsigned spare_turns() const {
@@ -102,7 +104,9 @@ struct Format {
   }
   /// Returns the bytes of channel 1 before its checksum.
   [[nodiscard]] constexpr std::size_t position_bytes() const { return turns_bytes() + 3; }
+  /// Returns the number of bytes of a frame.
   [[nodiscard]] constexpr std::size_t frame_bytes() const { return position_bytes() + (has_ch2 ? 2 : 1); }
+  /// Returns the number of bytes of a whole cycle.
   [[nodiscard]] constexpr std::size_t cycle_bytes() const { return position_bytes() + 4; }
 
   /// Returns the largest position offset that the register accepts.
@@ -125,31 +129,31 @@ inline constexpr Format virtual_format{.resolution = 20, .multiturn_bits = 16};
 
 /// Content of a channel 1 frame. The checksum does not cover `channel2`.
 struct Position {
-  std::uint32_t singleturn = 0;
-  std::uint16_t multiturn = 0;
-  bool error = false;    ///< the position is invalid
-  bool warning = false;  ///< the position is valid, but near its limits
-  std::uint8_t channel2 = 0;
+  std::uint32_t singleturn = 0;  ///< Position in counts.
+  std::uint16_t multiturn = 0;   ///< Turns.
+  bool error = false;            ///< the position is invalid
+  bool warning = false;          ///< the position is valid, but near its limits
+  std::uint8_t channel2 = 0;     ///< Byte of channel 2.
 };
 
 /// A cycle of channel 2. Each frame carries one byte of it; its position is that of the frame with its first byte.
 struct Cycle {
-  Position position{};  ///< its member `channel2` is unused
-  std::uint16_t status = 0;
-  std::uint8_t channel3 = 0;
+  Position position{};        ///< its member `channel2` is unused
+  std::uint16_t status = 0;   ///< Detailed status.
+  std::uint8_t channel3 = 0;  ///< Byte of channel 3.
 };
 
 /// Bits of the detailed status in a channel 2 cycle.
 namespace status {
-inline constexpr std::uint16_t acceleration = 0x0001;
-inline constexpr std::uint16_t magnetic_pattern = 0x0002;
-inline constexpr std::uint16_t system = 0x0004;
-inline constexpr std::uint16_t supply = 0x0008;
-inline constexpr std::uint16_t temperature = 0x0010;
-inline constexpr std::uint16_t signal_lost = 0x0020;
-inline constexpr std::uint16_t position_invalid = 0x0200;
-inline constexpr std::uint16_t configuration_error = 0x0400;
-inline constexpr std::uint16_t multiturn_mismatch = 0x8000;
+inline constexpr std::uint16_t acceleration = 0x0001;         ///< Status: acceleration.
+inline constexpr std::uint16_t magnetic_pattern = 0x0002;     ///< Status: magnetic pattern.
+inline constexpr std::uint16_t system = 0x0004;               ///< Status: system.
+inline constexpr std::uint16_t supply = 0x0008;               ///< Status: supply.
+inline constexpr std::uint16_t temperature = 0x0010;          ///< Status: temperature.
+inline constexpr std::uint16_t signal_lost = 0x0020;          ///< Status: signal lost.
+inline constexpr std::uint16_t position_invalid = 0x0200;     ///< Status: position invalid.
+inline constexpr std::uint16_t configuration_error = 0x0400;  ///< Status: configuration error.
+inline constexpr std::uint16_t multiturn_mismatch = 0x8000;   ///< Status: multiturn mismatch.
 /// Bits that are warnings: amplitude high and low, near limits, temperature.
 inline constexpr std::uint16_t warnings = 0x21D0;
 inline constexpr std::uint16_t errors = 0xDE2F;  ///< bits that are errors: all but the warnings
@@ -158,21 +162,23 @@ static_assert((warnings ^ errors) == 0xFFFF);
 
 /// Bits of Reading::status, from the position frame.
 namespace general {
-inline constexpr std::uint32_t error = 1;
-inline constexpr std::uint32_t warning = 2;
+inline constexpr std::uint32_t error = 1;    ///< Status: error.
+inline constexpr std::uint32_t warning = 2;  ///< Status: warning.
 }  // namespace general
 
 /// Protocol versions. Both have the same frames, but different registers.
 namespace version {
-inline constexpr std::uint8_t aksim2 = 2;
-inline constexpr std::uint8_t aksim4 = 4;
+inline constexpr std::uint8_t aksim2 = 2;  ///< Version: aksim2.
+inline constexpr std::uint8_t aksim4 = 4;  ///< Version: aksim4.
 }  // namespace version
 
+/// What an encoder says about itself.
 struct Identity {
-  std::uint8_t protocol_version = version::aksim2;
-  std::uint8_t frame_bytes = 5;
-  unsigned resolution = 20;
+  std::uint8_t protocol_version = version::aksim2;  ///< Version of the protocol.
+  std::uint8_t frame_bytes = 5;                     ///< Number of bytes of a frame.
+  unsigned resolution = 20;                         ///< Bits of the position.
   std::array<std::uint8_t, 18> text{};  ///< all identity bytes before the checksum; text[2..17] is the part number
+  /// Returns the characters of the part number.
   [[nodiscard]] constexpr Bytes part_number() const { return Bytes(text).subspan(2); }
 };
 

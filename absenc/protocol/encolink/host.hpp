@@ -25,8 +25,8 @@ struct Frames {
   using Format = encolink::Format;
   /// A request of the protocol.
   struct Request {
-    Ask ask = Ask::position;
-    std::uint8_t ra = 0;  ///< one byte of a register access
+    Ask ask = Ask::position;  ///< Kind of the request.
+    std::uint8_t ra = 0;      ///< one byte of a register access
   };
   using Reply = Position;                                       ///< empty for an identity
   static constexpr std::size_t longest_reply = identity_bytes;  ///< Greatest length of a reply in bytes.
@@ -79,6 +79,7 @@ class ReadPosition : public author::HostOf<Frames> {
   [[nodiscard]] const Reading* reading() const final {
     return error() == Error::none && channels_.reading.singleturn_bits != 0 ? &channels_.reading : nullptr;
   }
+  /// Returns what channels 2 and 3 reported.
   [[nodiscard]] const Channels& found() const { return channels_; }
 
  private:

@@ -24,16 +24,17 @@ enum class Fate : std::uint8_t {
 
 /// State of a procedure and its results. Without other results the position is reported.
 struct Found : Channels {
+  /// Value of a register.
   struct Value {
-    std::size_t index;  ///< index of the register in the table
-    ByteBuffer<largest_register> bytes;
+    std::size_t index;                   ///< index of the register in the table
+    ByteBuffer<largest_register> bytes;  ///< Bytes of the register, the lowest first.
   };
   std::optional<Identity> identity{};  ///< reported instead of the position, together with `values`
   /// Address of the register whose bytes are `data`; reported instead of the position.
   std::optional<std::uint32_t> address{};
   Buffer<Value, 8> values{};      ///< values of registers of the table
   std::optional<bool> running{};  ///< whether a self-calibration is running
-  bool tells_status = false;
+  bool tells_status = false;      ///< Whether the fields show the status.
 
   bool emits = false;                  ///< each position is emitted
   bool is_new = false;                 ///< the latest position was not emitted yet
@@ -48,16 +49,19 @@ struct Found : Channels {
   author::Outcome why{};               ///< why the access failed
   bool again = false;                  ///< a repetition of the access can help and does no harm
 
+  /// Begins with a request.
   void begin(const RegisterRequest& request) {
     access = encode_access(request);
     writes = request.operation == RegisterRequest::Operation::write;
     length = request.length;
   }
+  /// Notes how an access ended.
   Fate end(Fate fate, const author::Outcome& outcome, bool can_help = false) {
     why = outcome;
     again = can_help;
     return fate;
   }
+  /// Notes the bytes of a register.
   void tell(std::size_t index, Bytes bytes) {
     values.push_back({index, {}});
     values[values.size() - 1].bytes.append(bytes);

@@ -18,8 +18,8 @@ namespace absenc::encolink {
 
 /// State of the encoder in the channel 3 byte of a cycle.
 namespace channel3 {
-inline constexpr std::uint8_t idle = 0x33;
-inline constexpr std::uint8_t busy = 0x66;
+inline constexpr std::uint8_t idle = 0x33;         ///< Channel 3: idle.
+inline constexpr std::uint8_t busy = 0x66;         ///< Channel 3: busy.
 inline constexpr std::uint8_t read_ready = 0x88;   ///< status and data follow, one byte per cycle
 inline constexpr std::uint8_t write_ready = 0x99;  ///< the status follows in the next cycle
 }  // namespace channel3
@@ -64,13 +64,14 @@ enum class Access : std::uint8_t { read_only, read_write, write_only };
 /// How the bytes of a register are decoded; all are big endian.
 enum class Content : std::uint8_t { number, celsius, rpm, flags, text };  // celsius and rpm: signed, in tenths
 
+/// Description of a register.
 struct Register {
-  std::string_view name;
-  std::uint16_t address;
-  std::uint8_t size;
-  Access access;
-  Content content = Content::number;
-  bool in_info = false;  ///< the command `info` reads it
+  std::string_view name;              ///< Name of the register.
+  std::uint16_t address;              ///< Address of the register.
+  std::uint8_t size;                  ///< Number of bytes.
+  Access access;                      ///< Whether hosts may read or write it.
+  Content content = Content::number;  ///< What the bytes mean.
+  bool in_info = false;               ///< the command `info` reads it
 };
 
 enum RegisterIndex : std::size_t {
@@ -136,16 +137,16 @@ inline constexpr std::size_t largest_register = 20;  // bytes of the largest reg
 
 /// Values of the command register.
 namespace commands {
-inline constexpr std::uint8_t save = 0x63;
-inline constexpr std::uint8_t reset = 0x72;
-inline constexpr std::uint8_t self_calibrate = 0x41;
+inline constexpr std::uint8_t save = 0x63;            ///< Command: save.
+inline constexpr std::uint8_t reset = 0x72;           ///< Command: reset.
+inline constexpr std::uint8_t self_calibrate = 0x41;  ///< Command: self calibrate.
 }  // namespace commands
 
 /// Bits of calibration_status.
 namespace calibration {
-inline constexpr std::uint8_t count = 0x03;  ///< number of finished calibrations, modulo 4
-inline constexpr std::uint8_t timed_out = 0x04;
-inline constexpr std::uint8_t out_of_range = 0x08;
+inline constexpr std::uint8_t count = 0x03;         ///< number of finished calibrations, modulo 4
+inline constexpr std::uint8_t timed_out = 0x04;     ///< Calibration: timed out.
+inline constexpr std::uint8_t out_of_range = 0x08;  ///< Calibration: out of range.
 }  // namespace calibration
 
 /// Returns the register at `address`, or null if the table has none there.
@@ -158,11 +159,14 @@ inline constexpr std::uint8_t out_of_range = 0x08;
 
 inline constexpr std::size_t access_capacity = 100;  // most data bytes of one access; limit of the vendor's library
 
+/// A request on channel 3.
 struct RegisterRequest {
-  enum class Operation : std::uint8_t { write = 0x58, read = 0x59 } operation = Operation::read;
-  std::uint32_t address = 0;
-  std::uint16_t length = 0;
-  ByteBuffer<access_capacity> data{};  ///< written bytes, `length` of them; empty for a read
+  /// Whether it reads or writes.
+  enum class Operation : std::uint8_t { write = 0x58, read = 0x59 };
+  Operation operation = Operation::read;  ///< Whether it reads or writes.
+  std::uint32_t address = 0;              ///< Address of the register.
+  std::uint16_t length = 0;               ///< Number of bytes.
+  ByteBuffer<access_capacity> data{};     ///< written bytes, `length` of them; empty for a read
 };
 
 inline constexpr std::array<std::uint8_t, 5> access_keys{0x00, 0xCD, 0xEF, 0x89, 0xAB};

@@ -15,6 +15,7 @@ namespace absenc::esl {
 /// What can be set around the virtual encoder, and what can be wrong inside one channel, whose CRC is right all the
 /// same. Indexes of `conditions`.
 namespace condition {
+/// Index of a condition.
 enum Index : std::size_t {
   supply_voltage,
   temperature,

@@ -51,6 +51,7 @@ inline constexpr std::array<FlagInfo, 8> alarm_flags{{
 /// What is shown of a frame, or of what a procedure found: each where it is there, of a reply what its id carries.
 struct Shown {
   constexpr Shown() = default;
+  /// Shows a request.
   constexpr Shown(const Profile& profile, const Request& request)
       : data_id(request.id),
         control_field(esl::control_field(profile, request.encoder_address, request.id)),
@@ -58,8 +59,10 @@ struct Shown {
     if (is_memory_access(request.id)) memory_address = request.memory_address;
     if (request.id == DataId::write_memory) value = request.value;
   }
+  /// Shows a reply.
   constexpr explicit Shown(const Reply& one) { show(one); }
 
+  /// Adds the values of a reply.
   constexpr void show(const Reply& one) {
     data_id = one.id;
     encoder_address = one.encoder_address;
@@ -70,23 +73,23 @@ struct Shown {
     value = one.value;
   }
 
-  std::optional<DataId> data_id{};
-  std::optional<std::uint8_t> control_field{};
-  std::optional<std::uint8_t> encoder_address{};
-  std::optional<Reply> reply{};
-  std::optional<bool> clash{};
-  std::optional<std::string_view> trouble{};
-  std::optional<std::uint8_t> page{};
-  std::optional<std::uint8_t> memory_address{};
-  std::optional<bool> busy{};
-  std::optional<std::uint8_t> value{};
-  std::optional<Bytes> data{};
-  std::optional<bool> written{};
-  std::optional<bool> led_error{};
-  std::optional<bool> lissajous_error{};
-  std::optional<std::uint32_t> safe_singleturn{};
-  std::optional<std::uint8_t> page_left{};
-  bool has_turns = true;  ///< false: what stands in ABM is no part of the position
+  std::optional<DataId> data_id{};                 ///< Value of the field `data_id`, if there is one.
+  std::optional<std::uint8_t> control_field{};     ///< Value of the field `control_field`, if there is one.
+  std::optional<std::uint8_t> encoder_address{};   ///< Value of the field `encoder_address`, if there is one.
+  std::optional<Reply> reply{};                    ///< Value of the field `reply`, if there is one.
+  std::optional<bool> clash{};                     ///< Value of the field `clash`, if there is one.
+  std::optional<std::string_view> trouble{};       ///< Value of the field `trouble`, if there is one.
+  std::optional<std::uint8_t> page{};              ///< Value of the field `page`, if there is one.
+  std::optional<std::uint8_t> memory_address{};    ///< Value of the field `memory_address`, if there is one.
+  std::optional<bool> busy{};                      ///< Value of the field `busy`, if there is one.
+  std::optional<std::uint8_t> value{};             ///< Value of the field `value`, if there is one.
+  std::optional<Bytes> data{};                     ///< Value of the field `data`, if there is one.
+  std::optional<bool> written{};                   ///< Value of the field `written`, if there is one.
+  std::optional<bool> led_error{};                 ///< Value of the field `led_error`, if there is one.
+  std::optional<bool> lissajous_error{};           ///< Value of the field `lissajous_error`, if there is one.
+  std::optional<std::uint32_t> safe_singleturn{};  ///< Value of the field `safe_singleturn`, if there is one.
+  std::optional<std::uint8_t> page_left{};         ///< Value of the field `page_left`, if there is one.
+  bool has_turns = true;                           ///< false: what stands in ABM is no part of the position
 };
 
 namespace detail {

@@ -19,29 +19,29 @@ namespace absenc::esl {
 
 /// Bits of SF in the order of the document (Table 5); `status_order` tells how the wire has them.
 namespace status {
-inline constexpr std::uint8_t parity_error = 0x01;
-inline constexpr std::uint8_t stop_error = 0x02;
-inline constexpr std::uint8_t safety_error = 0x04;
-inline constexpr std::uint8_t non_safety_error = 0x08;
-inline constexpr std::uint8_t temperature_warning = 0x10;
-inline constexpr std::uint8_t channel_2 = 0x20;
-inline constexpr std::uint8_t ready = 0x40;
-inline constexpr std::uint8_t forced_test_passed = 0x80;
-inline constexpr std::uint8_t rejected = parity_error | stop_error;
+inline constexpr std::uint8_t parity_error = 0x01;                   ///< Status: parity error.
+inline constexpr std::uint8_t stop_error = 0x02;                     ///< Status: stop error.
+inline constexpr std::uint8_t safety_error = 0x04;                   ///< Status: safety error.
+inline constexpr std::uint8_t non_safety_error = 0x08;               ///< Status: non safety error.
+inline constexpr std::uint8_t temperature_warning = 0x10;            ///< Status: temperature warning.
+inline constexpr std::uint8_t channel_2 = 0x20;                      ///< Status: channel 2.
+inline constexpr std::uint8_t ready = 0x40;                          ///< Status: ready.
+inline constexpr std::uint8_t forced_test_passed = 0x80;             ///< Status: forced test passed.
+inline constexpr std::uint8_t rejected = parity_error | stop_error;  ///< Status: rejected.
 }  // namespace status
 
 /// Bits of ALM (Table 7).
 namespace alarms {
-inline constexpr std::uint8_t xc_error = 0x01;
-inline constexpr std::uint8_t multiturn_error = 0x02;
-inline constexpr std::uint8_t led_or_lissajous_error = 0x04;
-inline constexpr std::uint8_t overspeed = 0x08;
-inline constexpr std::uint8_t memory_error = 0x10;
-inline constexpr std::uint8_t singleturn_error = 0x20;
-inline constexpr std::uint8_t under_voltage = 0x40;
-inline constexpr std::uint8_t over_voltage = 0x80;
-inline constexpr std::uint8_t voltage = under_voltage | over_voltage;
-inline constexpr std::uint8_t turns_wrong = xc_error | multiturn_error;
+inline constexpr std::uint8_t xc_error = 0x01;                           ///< Alarm: xc error.
+inline constexpr std::uint8_t multiturn_error = 0x02;                    ///< Alarm: multiturn error.
+inline constexpr std::uint8_t led_or_lissajous_error = 0x04;             ///< Alarm: led or lissajous error.
+inline constexpr std::uint8_t overspeed = 0x08;                          ///< Alarm: overspeed.
+inline constexpr std::uint8_t memory_error = 0x10;                       ///< Alarm: memory error.
+inline constexpr std::uint8_t singleturn_error = 0x20;                   ///< Alarm: singleturn error.
+inline constexpr std::uint8_t under_voltage = 0x40;                      ///< Alarm: under voltage.
+inline constexpr std::uint8_t over_voltage = 0x80;                       ///< Alarm: over voltage.
+inline constexpr std::uint8_t voltage = under_voltage | over_voltage;    ///< Alarm: voltage.
+inline constexpr std::uint8_t turns_wrong = xc_error | multiturn_error;  ///< Alarm: turns wrong.
 /// Those that take a position its safety; the position within the turn is not used with them.
 inline constexpr std::uint8_t unsafe = led_or_lissajous_error | memory_error | singleturn_error | voltage;
 }  // namespace alarms
@@ -116,24 +116,27 @@ enum class DataId : std::uint8_t {
 
 /// What stands behind CF and before the CRC, in the order of the wire. One byte where no other number is given.
 namespace part {
-inline constexpr unsigned status = 0x0001;
-inline constexpr unsigned alarms = 0x0002;
-inline constexpr unsigned singleturn = 0x0004;  ///< 3 bytes
-inline constexpr unsigned multiturn = 0x0008;   ///< 2 bytes
-inline constexpr unsigned encoder_id = 0x0010;
-inline constexpr unsigned temperature = 0x0020;
-inline constexpr unsigned sequence = 0x0040;
+inline constexpr unsigned status = 0x0001;                 ///< Status.
+inline constexpr unsigned alarms = 0x0002;                 ///< Alarms.
+inline constexpr unsigned singleturn = 0x0004;             ///< 3 bytes
+inline constexpr unsigned multiturn = 0x0008;              ///< 2 bytes
+inline constexpr unsigned encoder_id = 0x0010;             ///< Encoder identifier.
+inline constexpr unsigned temperature = 0x0020;            ///< Temperature.
+inline constexpr unsigned sequence = 0x0040;               ///< Sequence bit.
 inline constexpr unsigned zero_sequence = 0x0080;          ///< {0, SC2}
 inline constexpr unsigned redundant_sequence = 0x0100;     ///< 2 bytes: RS0 {RS1, SC2}
 inline constexpr unsigned redundant_alone = 0x0200;        ///< 2 bytes: RS0 RS1 of ID C
 inline constexpr unsigned redundant_calibration = 0x0400;  ///< 2 bytes: RS0 RS1 of ID 6
-inline constexpr unsigned memory_address = 0x0800;
-inline constexpr unsigned value = 0x1000;
+inline constexpr unsigned memory_address = 0x0800;         ///< Memory address.
+inline constexpr unsigned value = 0x1000;                  ///< Memory value.
+/// Any redundant position.
 inline constexpr unsigned redundant = redundant_sequence | redundant_alone | redundant_calibration;
 }  // namespace part
 
+/// Which parts the reply of a request has, and in which order.
 struct Layout {
   constexpr Layout() = default;
+  /// Sets length of the checksum and parts of each channel.
   constexpr Layout(std::uint8_t crc, unsigned parts_one, unsigned parts_two = 0)
       : one(static_cast<std::uint16_t>(parts_one)),
         two(static_cast<std::uint16_t>(parts_two)),
@@ -141,14 +144,16 @@ struct Layout {
         length_one(length(crc, parts_one)),
         length_two(has_two() ? length(crc, parts_two) : std::uint8_t{0}) {}
 
+  /// Returns whether the reply has channel 2.
   [[nodiscard]] constexpr bool has_two() const { return two != 0; }
+  /// Returns whether the reply has one of these parts.
   [[nodiscard]] constexpr bool has(unsigned any_of) const { return ((one | two) & any_of) != 0; }
 
-  std::uint16_t one = 0;
-  std::uint16_t two = 0;
-  std::uint8_t crc_bytes = 1;
+  std::uint16_t one = 0;        ///< Parts of channel 1.
+  std::uint16_t two = 0;        ///< Parts of channel 2; 0: none.
+  std::uint8_t crc_bytes = 1;   ///< Length of the checksum in bytes.
   std::uint8_t length_one = 0;  ///< with CF and CRC
-  std::uint8_t length_two = 0;
+  std::uint8_t length_two = 0;  ///< Length of the part of channel 2 in bytes.
 
  private:
   static constexpr std::uint8_t length(unsigned crc, unsigned parts) {
@@ -232,33 +237,34 @@ inline constexpr std::array<Layout, 16> layouts = [] {
 
 /// A request of the protocol.
 struct Request {
-  DataId id = DataId::position;
+  DataId id = DataId::position;      ///< Data ID of the request.
   std::uint8_t encoder_address = 0;  ///< 0 to 7
   std::uint8_t memory_address = 0;   ///< memory access: 0 to 7F
   std::uint8_t value = 0;            ///< write_memory
 };
 
+/// What a reply says of one channel.
 struct ChannelReply {
-  std::uint8_t status = 0;  ///< bits in the order of the document
-  std::uint8_t alarms = 0;
-  std::uint8_t sequence = 0;  ///< 8 bits in channel 1, 7 in channel 2
-  std::uint8_t encoder_id = 0;
+  std::uint8_t status = 0;      ///< bits in the order of the document
+  std::uint8_t alarms = 0;      ///< Alarms of the channel.
+  std::uint8_t sequence = 0;    ///< 8 bits in channel 1, 7 in channel 2
+  std::uint8_t encoder_id = 0;  ///< Encoder identifier.
 };
 
 /// Fields that the id does not carry are 0.
 struct Reply {
-  DataId id = DataId::position;
-  std::uint8_t encoder_address = 0;
-  ChannelReply one{};
-  ChannelReply two{.status = status::channel_2};
-  std::uint32_t singleturn = 0;
-  std::uint16_t multiturn = 0;
-  std::uint16_t redundant = 0;  ///< 9 bits; 16 of ID 6 where the profile says so
-  std::int8_t temperature = 0;  ///< its sign is assumed
-  std::uint8_t memory_address = 0;
-  bool busy = false;
-  std::uint8_t value = 0;
-  bool unused_bits = false;  ///< decoded: a bit that is always 0 was set
+  DataId id = DataId::position;                   ///< Data ID of the reply.
+  std::uint8_t encoder_address = 0;               ///< Address of the encoder on its line.
+  ChannelReply one{};                             ///< Channel 1.
+  ChannelReply two{.status = status::channel_2};  ///< Channel 2.
+  std::uint32_t singleturn = 0;                   ///< Position in counts.
+  std::uint16_t multiturn = 0;                    ///< Turns.
+  std::uint16_t redundant = 0;                    ///< 9 bits; 16 of ID 6 where the profile says so
+  std::int8_t temperature = 0;                    ///< its sign is assumed
+  std::uint8_t memory_address = 0;                ///< Address of the memory byte.
+  bool busy = false;                              ///< Whether the memory is busy.
+  std::uint8_t value = 0;                         ///< Value of the memory byte.
+  bool unused_bits = false;                       ///< decoded: a bit that is always 0 was set
 };
 
 // ---- Bits whose place the document leaves open

@@ -26,7 +26,7 @@ author::Procedure read_encoder_id(Dialog& dialog, Found& found);
 
 /// What a safety reading found: each emit is one.
 struct FoundSafe : Found {
-  static constexpr bool streams = true;
+  static constexpr bool streams = true;  ///< The command streams.
 };
 /// Safe positions without end: IDs 1 and 2 until the monitor trusts the line, two exchanges when all is well, then one
 /// exchange each, so that the sequence counter is compared from reading to reading. Errors: those of the check that
@@ -58,10 +58,11 @@ author::Procedure read_error_info(Dialog& dialog, Found& found);
 
 inline constexpr unsigned most_encoders = 8;  // 3 address bits
 
+/// Addresses at which encoders answered.
 struct Nodes {
   std::array<std::optional<Reply>, most_encoders> answers{};  ///< the last good reply of each
-  std::array<bool, most_encoders> disturbed{};
-  std::array<Check, most_encoders> troubles{};  ///< of an answer that came whole and is not good
+  std::array<bool, most_encoders> disturbed{};                ///< Whether replies of an address were disturbed.
+  std::array<Check, most_encoders> troubles{};                ///< of an answer that came whole and is not good
 };
 /// Asks every address for ID 5, never for ID 8: eight of these in a row are "dynamic addressing". An answer that is
 /// damaged every time tells of two encoders with one address, or of a bad line. One that comes whole is that of one

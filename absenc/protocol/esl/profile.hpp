@@ -38,24 +38,25 @@ enum class Id6Redundant : std::uint8_t { bits_16, bits_9 };
 /// What the virtual encoder does when parity or stop bit of a request is wrong.
 enum class BadRequest : std::uint8_t { report, silent };
 
+/// Choices that the document leaves open.
 struct Profile {
-  CrcBitOrder crc_bit_order = CrcBitOrder::lsb;
-  CrcByteOrder crc16_byte_order = CrcByteOrder::low;
-  RedundantBit rs1_sc2 = RedundantBit::b7;
-  SequenceStep sequence_step = SequenceStep::change;
-  ParityScope parity_scope = ParityScope::command;
-  FieldOrder status_order = FieldOrder::document;
-  FieldOrder memory_address_order = FieldOrder::document;
-  bool request_crc = true;  ///< false: only memory requests carry a CRC
-  RedundantBit idc_rs1 = RedundantBit::b7;
-  Id6Redundant id6_rs = Id6Redundant::bits_16;
+  CrcBitOrder crc_bit_order = CrcBitOrder::lsb;            ///< Order of the bits of a CRC.
+  CrcByteOrder crc16_byte_order = CrcByteOrder::low;       ///< Order of the bytes of a CRC of 16 bits.
+  RedundantBit rs1_sc2 = RedundantBit::b7;                 ///< Bit with redundant data of single-turn and channel 2.
+  SequenceStep sequence_step = SequenceStep::change;       ///< When the sequence bit changes.
+  ParityScope parity_scope = ParityScope::command;         ///< Which bits the parity covers.
+  FieldOrder status_order = FieldOrder::document;          ///< Order of the status fields.
+  FieldOrder memory_address_order = FieldOrder::document;  ///< Order of the memory address.
+  bool request_crc = true;                                 ///< false: only memory requests carry a CRC
+  RedundantBit idc_rs1 = RedundantBit::b7;                 ///< Bit with redundant data of ID C.
+  Id6Redundant id6_rs = Id6Redundant::bits_16;             ///< Redundant data of ID 6.
 
-  std::uint8_t address = 0;              ///< EAD, 0 to 7
-  bool turns = true;                     ///< false: an encoder of one turn
-  Sharing bus = sharing_automatic;       ///< yes: others share the line, memory cannot be reached (Figure 18)
-  bool require_forced_test = false;      ///< of a safe position
-  std::uint8_t redundant_tolerance = 1;  ///< RS against the top 9 bits of ABS, 1/512 turn, 0 to 255
-  BadRequest bad_request = BadRequest::report;
+  std::uint8_t address = 0;                     ///< EAD, 0 to 7
+  bool turns = true;                            ///< false: an encoder of one turn
+  Sharing bus = sharing_automatic;              ///< yes: others share the line, memory cannot be reached (Figure 18)
+  bool require_forced_test = false;             ///< of a safe position
+  std::uint8_t redundant_tolerance = 1;         ///< RS against the top 9 bits of ABS, 1/512 turn, 0 to 255
+  BadRequest bad_request = BadRequest::report;  ///< Reaction to a bad request.
 };
 
 namespace choices {

@@ -54,9 +54,10 @@ enum class Check : std::uint8_t {
   request_not_accepted,
 };
 
+/// What a failed check says.
 struct CheckText {
-  Error error;
-  std::string_view sentence;
+  Error error;                ///< Error of the reply.
+  std::string_view sentence;  ///< The check, as a sentence.
   std::string_view advice{};  ///< in place of the error's own
 };
 
@@ -374,8 +375,8 @@ struct Protocol {
   }
   /// Returns the length of the reply to `request`, in bytes.
   static constexpr std::size_t reply_size(const Profile&, const Request& request) { return reply_length(request.id); }
-  static constexpr auto encode = encode_request;
-  static constexpr auto decode_request = esl::decode_request;
+  static constexpr auto encode = encode_request;               ///< Returns the request as it is sent.
+  static constexpr auto decode_request = esl::decode_request;  ///< Returns the request, or why it is none.
   static constexpr auto decode = decode_reply;  ///< Returns the reply with all checks done, or the first error.
   /// Returns the position of a reply.
   static constexpr Reading reading(const Profile& profile, const Request& request, const Reply& reply) {
@@ -390,7 +391,7 @@ struct Protocol {
   }
   /// Returns whether a reply with this error is complete, so that no more bytes are awaited.
   static constexpr bool is_whole(const Profile&, Error) { return false; }
-  static constexpr auto latched = latch_time;
+  static constexpr auto latched = latch_time;  ///< Returns when the encoder latched the position.
 };
 
 /// Of a profile that is known when the program is written, by a request that is: `static constexpr Profile

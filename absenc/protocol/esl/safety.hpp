@@ -16,6 +16,7 @@ class SafePosition {
  public:
   /// Counts, 0 to 2^24 - 1. Its top 9 bits are confirmed by channel 2, within the profile's tolerance.
   [[nodiscard]] constexpr std::uint32_t singleturn() const { return singleturn_; }
+  /// Returns the address of the encoder.
   [[nodiscard]] constexpr std::uint8_t encoder_address() const { return encoder_address_; }
   /// When the encoder took the position.
   [[nodiscard]] constexpr Time latched() const { return latched_; }
@@ -30,9 +31,10 @@ class SafePosition {
   Time latched_;
 };
 
+/// Verdict on a safety reply.
 struct SafetyVerdict {
   std::optional<SafePosition> position{};  ///< set when `failed` is Check::passed
-  Check failed = Check::passed;
+  Check failed = Check::passed;            ///< The check that failed.
 };
 
 /// Judges the replies of one encoder, one after the other, from the bytes as they came.
@@ -42,6 +44,7 @@ struct SafetyVerdict {
 /// IDs (`next_id`): a line that hands out each reply one cycle late shows by the wrong echo.
 class SafetyMonitor {
  public:
+  /// Judges replies of this profile.
   constexpr explicit SafetyMonitor(const Profile& profile) : profile_(profile) {}
 
   /// Which ID to ask; `wanted` once the monitor trusts the line.

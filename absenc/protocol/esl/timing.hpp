@@ -52,9 +52,9 @@ inline constexpr std::uint8_t error_info_lissajous = 0x08;
 /// too: in the EEPROM by two requests and a write of 6 ms, in the MTP alike (assumed), in registers, which are lost at
 /// power off, at once.
 namespace life {
-inline constexpr std::uint32_t eeprom = 1'000'000;
-inline constexpr std::uint32_t mtp = 100'000;
-inline constexpr std::uint32_t registers = 0;
+inline constexpr std::uint32_t eeprom = 1'000'000;  ///< Writes that the EEPROM withstands.
+inline constexpr std::uint32_t mtp = 100'000;       ///< Writes that the MTP memory withstands.
+inline constexpr std::uint32_t registers = 0;       ///< Registers that are in no memory: 0, without limit.
 }  // namespace life
 
 /// Table 11 in the order of pages. The document gives the user area 512 bytes and one page of 127: pages 1 to 3 are

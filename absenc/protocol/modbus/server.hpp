@@ -13,6 +13,7 @@
 
 namespace absenc::modbus {
 
+/// A virtual Modbus RTU server.
 class Server : public Device<std::uint8_t> {
  public:
   /// Takes an event of the port.
@@ -25,11 +26,13 @@ class Server : public Device<std::uint8_t> {
   /// Switches the encoder off.
   void power_off(Time now) final;
   [[nodiscard]] std::span<const Violation> violations() const final { return rules_.violations(); }
+  /// Returns how often the host broke a rule.
   [[nodiscard]] std::uint32_t violation_count() const final { return rules_.violation_count(); }
   void watch_rules(RuleWatch* watch) final { rules_.watch(watch); }
   [[nodiscard]] std::uint64_t answer_count() const final { return answer_count_; }
 
  protected:
+  /// Answers on a line with these settings.
   explicit Server(const LineSettings& line) : line_(line) {}
   ~Server() = default;
 

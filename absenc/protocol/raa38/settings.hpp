@@ -13,26 +13,34 @@
 
 namespace absenc::raa38 {
 
+/// Settings of a virtual encoder, in its memory.
 class Settings {
  public:
   /// Memory layout: number on the line, index of the bit rate, 1 if it counts down, shaft position at its zero in
   /// counts, number of writes.
   static constexpr std::size_t number_at = 0;
-  static constexpr std::size_t rate_at = 1;
-  static constexpr std::size_t direction_at = 2;
-  static constexpr std::size_t zero_at = 3;
-  static constexpr std::size_t writes_at = 7;
+  static constexpr std::size_t rate_at = 1;       ///< Address of the rate.
+  static constexpr std::size_t direction_at = 2;  ///< Address of the direction.
+  static constexpr std::size_t zero_at = 3;       ///< Address of the zero position.
+  static constexpr std::size_t writes_at = 7;     ///< Address of the number of writes.
 
+  /// Begins with these settings; `shaft` must outlive it.
   Settings(std::uint8_t number, std::uint8_t rate, unsigned bits, const Shaft& shaft) : bits_(bits), shaft_(&shaft) {
     memory_[number_at] = number;
     memory_[rate_at] = rate;
   }
 
+  /// Returns the memory.
   [[nodiscard]] MutableBytes memory() { return memory_; }
+  /// Returns a number that changes with the memory.
   [[nodiscard]] std::uint32_t version() const { return version_; }
+  /// Returns the address or node number.
   [[nodiscard]] std::uint8_t number() const { return memory_[number_at]; }
+  /// Returns the index of the rate.
   [[nodiscard]] std::uint8_t rate() const { return memory_[rate_at]; }
+  /// Returns whether the direction is reversed.
   [[nodiscard]] bool counts_down() const { return memory_[direction_at] != 0; }
+  /// Returns the number of writes.
   [[nodiscard]] std::uint32_t writes() const { return load(writes_at); }
 
   /// Returns the position in counts. The direction mirrors it at the zero.

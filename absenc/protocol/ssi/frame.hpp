@@ -28,8 +28,8 @@ enum class AfterWord : std::uint8_t {
 
 /// Format of the encoder: the values of its options.
 struct Format {
-  WordFormat word = "position:12"_word;  ///< Fields of the position word.
-  AfterWord after_word = AfterWord::repeat;
+  WordFormat word = "position:12"_word;      ///< Fields of the position word.
+  AfterWord after_word = AfterWord::repeat;  ///< What the encoder sends after its word.
   /// Clocks after the word, for comparison; with as many as the word has bits, the word is read twice.
   unsigned extra_clocks = 0;
   Scale scale{};              ///< Length of a count of a linear encoder.
@@ -40,12 +40,12 @@ struct Format {
   /// Values that vary by product (RAA38S6 3.5, note).
   /// Pause between two words; it must exceed the encoder's monoflop time Tm, or the old word continues.
   Time pause = 50us;
-  std::uint32_t clock_khz = 200;
+  std::uint32_t clock_khz = 200;  ///< Clock in kHz.
   /// Tm of the virtual encoder, at most `pause`; 0: equal to `pause`. Other encoders have 9 to 41 us.
   Time monoflop = 20us;
   /// Clock range of the virtual encoder. Tcs in the document also gives 250 kHz.
   std::uint32_t slowest_khz = 100;
-  std::uint32_t fastest_khz = 250;
+  std::uint32_t fastest_khz = 250;  ///< Fastest clock that the encoder allows, in kHz.
 };
 
 inline constexpr std::size_t frame_capacity = 2 * WordFormat::maximum_bits;

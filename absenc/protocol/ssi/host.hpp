@@ -54,6 +54,7 @@ using ReadPosition = author::ReadClocked<Protocol>;
 /// Reads two words and takes the second. Error also: cross_check_failed (the shaft cannot have moved that far).
 class ConfirmPosition : public author::ClockedHostOf<Protocol> {
  public:
+  /// Reads twice, and confirms the position.
   explicit ConfirmPosition(const Format& format) : ClockedHostOf(format) {}
 
  private:

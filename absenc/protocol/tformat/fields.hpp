@@ -46,23 +46,23 @@ inline constexpr std::array<FlagInfo, 8> alarm_flags{{
 
 /// What a frame or a procedure shows; in the order of the wire.
 struct Values {
-  std::optional<DataId> data_id{};
-  std::optional<std::uint8_t> control_field{};
-  std::optional<std::uint8_t> status{};
-  std::optional<std::uint32_t> singleturn{};
-  std::optional<std::uint8_t> encoder_id{};
-  std::optional<std::uint32_t> multiturn{};
-  std::optional<std::uint8_t> alarms{};
-  std::optional<std::uint8_t> page{};
-  std::optional<std::uint8_t> address{};  ///< Address.
-  std::optional<bool> busy{};
-  std::optional<std::uint8_t> value{};
-  std::optional<Bytes> data{};
-  std::optional<std::int8_t> temperature{};
-  std::optional<bool> overheat_enabled{};
-  std::optional<std::uint8_t> overheat_threshold{};
-  std::optional<bool> written{};
-  std::optional<std::uint8_t> page_left{};
+  std::optional<DataId> data_id{};                   ///< Value of the field `data_id`, if there is one.
+  std::optional<std::uint8_t> control_field{};       ///< Value of the field `control_field`, if there is one.
+  std::optional<std::uint8_t> status{};              ///< Value of the field `status`, if there is one.
+  std::optional<std::uint32_t> singleturn{};         ///< Value of the field `singleturn`, if there is one.
+  std::optional<std::uint8_t> encoder_id{};          ///< Value of the field `encoder_id`, if there is one.
+  std::optional<std::uint32_t> multiturn{};          ///< Value of the field `multiturn`, if there is one.
+  std::optional<std::uint8_t> alarms{};              ///< Value of the field `alarms`, if there is one.
+  std::optional<std::uint8_t> page{};                ///< Value of the field `page`, if there is one.
+  std::optional<std::uint8_t> address{};             ///< Address.
+  std::optional<bool> busy{};                        ///< Value of the field `busy`, if there is one.
+  std::optional<std::uint8_t> value{};               ///< Value of the field `value`, if there is one.
+  std::optional<Bytes> data{};                       ///< Value of the field `data`, if there is one.
+  std::optional<std::int8_t> temperature{};          ///< Value of the field `temperature`, if there is one.
+  std::optional<bool> overheat_enabled{};            ///< Value of the field `overheat_enabled`, if there is one.
+  std::optional<std::uint8_t> overheat_threshold{};  ///< Value of the field `overheat_threshold`, if there is one.
+  std::optional<bool> written{};                     ///< Value of the field `written`, if there is one.
+  std::optional<std::uint8_t> page_left{};           ///< Value of the field `page_left`, if there is one.
 };
 
 inline constexpr auto fields = [] {

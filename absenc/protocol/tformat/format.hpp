@@ -74,26 +74,27 @@ enum class DataId : std::uint8_t {
 
 /// Bits of the status field SF (6.3.2). The low four are information bits, always 0.
 namespace status {
-inline constexpr std::uint8_t information = 0x0F;
+inline constexpr std::uint8_t information = 0x0F;      ///< Status: information.
 inline constexpr std::uint8_t counting_error = 0x10;   ///< ea0
 inline constexpr std::uint8_t alarm = 0x20;            ///< ea1: over-heat, multi-turn error, battery error or alarm
 inline constexpr std::uint8_t parity_error = 0x40;     ///< ca0, of the request
 inline constexpr std::uint8_t delimiter_error = 0x80;  ///< ca1, of the request
-inline constexpr std::uint8_t rejected = parity_error | delimiter_error;
+inline constexpr std::uint8_t rejected = parity_error | delimiter_error;  ///< Status: rejected.
 }  // namespace status
 
 /// Bits of ALMC (Table 3).
 namespace alarms {
-inline constexpr std::uint8_t over_speed = 0x01;
-inline constexpr std::uint8_t full_absolute_status = 0x02;
-inline constexpr std::uint8_t counting_error = 0x04;
-inline constexpr std::uint8_t counter_overflow = 0x08;
-inline constexpr std::uint8_t over_heat = 0x10;
-inline constexpr std::uint8_t multiturn_error = 0x20;
-inline constexpr std::uint8_t battery_error = 0x40;
-inline constexpr std::uint8_t battery_alarm = 0x80;
+inline constexpr std::uint8_t over_speed = 0x01;            ///< Alarm: over speed.
+inline constexpr std::uint8_t full_absolute_status = 0x02;  ///< Alarm: full absolute status.
+inline constexpr std::uint8_t counting_error = 0x04;        ///< Alarm: counting error.
+inline constexpr std::uint8_t counter_overflow = 0x08;      ///< Alarm: counter overflow.
+inline constexpr std::uint8_t over_heat = 0x10;             ///< Alarm: over heat.
+inline constexpr std::uint8_t multiturn_error = 0x20;       ///< Alarm: multiturn error.
+inline constexpr std::uint8_t battery_error = 0x40;         ///< Alarm: battery error.
+inline constexpr std::uint8_t battery_alarm = 0x80;         ///< Alarm: battery alarm.
+/// Alarm: shown in status.
 inline constexpr std::uint8_t shown_in_status = over_heat | multiturn_error | battery_error | battery_alarm;
-inline constexpr std::uint8_t turns_lost = over_speed | multiturn_error | battery_error;
+inline constexpr std::uint8_t turns_lost = over_speed | multiturn_error | battery_error;  ///< Alarm: turns lost.
 /// Held until a reset request or, some of them, until power off (6.5).
 inline constexpr std::uint8_t latched = over_speed | counter_overflow | over_heat | multiturn_error | battery_error;
 /// Alarms that an encoder without a battery always shows: no fault (2 (1), 6.5).

@@ -85,9 +85,9 @@ inline constexpr std::array<Lengths, 16> lengths = [] {
 
 /// A request of the protocol.
 struct Request {
-  DataId id = DataId::everything;
-  std::uint8_t address = 0;  ///< memory access: 0 to 127
-  std::uint8_t value = 0;    ///< write_memory
+  DataId id = DataId::everything;  ///< Data ID of the request.
+  std::uint8_t address = 0;        ///< memory access: 0 to 127
+  std::uint8_t value = 0;          ///< write_memory
 };
 
 [[nodiscard]] constexpr bool selects_page(const Request& request) {
@@ -96,15 +96,15 @@ struct Request {
 
 /// Fields that the id does not carry are 0. In an order that makes it four words.
 struct Reply {
-  DataId id = DataId::everything;
-  std::uint8_t status = 0;
-  std::uint8_t address = 0;
-  bool busy = false;
-  std::uint32_t singleturn = 0;
-  std::uint32_t multiturn = 0;
-  std::uint8_t encoder_id = 0;
-  std::uint8_t alarms = 0;
-  std::uint8_t value = 0;
+  DataId id = DataId::everything;  ///< Data ID of the reply.
+  std::uint8_t status = 0;         ///< Status field.
+  std::uint8_t address = 0;        ///< Address of the memory byte.
+  bool busy = false;               ///< Whether the memory is busy.
+  std::uint32_t singleturn = 0;    ///< Position in counts.
+  std::uint32_t multiturn = 0;     ///< Turns.
+  std::uint8_t encoder_id = 0;     ///< Encoder identifier.
+  std::uint8_t alarms = 0;         ///< Alarms.
+  std::uint8_t value = 0;          ///< Value of the memory byte.
 };
 
 [[nodiscard]] constexpr RequestBytes encode_request(const Request& request) {
@@ -251,8 +251,8 @@ constexpr Error check_reply(const Format& format, const Request& request, const 
 
 /// What replies have reported of the alarms since the encoder was switched on: bits of ALMC.
 struct KnownAlarms {
-  std::uint8_t reported = 0;
-  std::uint8_t raised = 0;
+  std::uint8_t reported = 0;  ///< Alarms that were reported.
+  std::uint8_t raised = 0;    ///< Alarms that are raised.
 
   /// As an ID 3 reply reports them: all.
   [[nodiscard]] static constexpr KnownAlarms all(std::uint8_t almc) { return {0xFF, almc}; }

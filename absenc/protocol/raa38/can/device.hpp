@@ -9,8 +9,10 @@
 
 namespace absenc::raa38::can {
 
+/// A virtual encoder on a CAN bus.
 class VirtualNode final : public Device<CanFrame> {
  public:
+  /// Follows `shaft`, which must outlive it.
   VirtualNode(const Format& format, const Shaft& shaft)
       : format_(format), settings_(format.node, rates[format.rate].index, format.bits, shaft) {}
 
@@ -29,12 +31,16 @@ class VirtualNode final : public Device<CanFrame> {
   [[nodiscard]] MutableBytes memory() override { return settings_.memory(); }
   [[nodiscard]] std::uint32_t memory_version() const override { return settings_.version(); }
   [[nodiscard]] std::span<const Violation> violations() const override { return rules_.violations(); }
+  /// Returns how often the host broke a rule.
   [[nodiscard]] std::uint32_t violation_count() const override { return rules_.violation_count(); }
   void watch_rules(RuleWatch* watch) override { rules_.watch(watch); }
   [[nodiscard]] std::uint64_t answer_count() const override { return answer_count_; }
 
+  /// Returns the stored settings.
   [[nodiscard]] const Settings& settings() const { return settings_; }
+  /// Returns its node number.
   [[nodiscard]] std::uint8_t node() const { return settings_.number(); }
+  /// Returns the bit rate that is stored, in bits per second.
   [[nodiscard]] std::uint32_t rate() const { return rate_of_index(settings_.rate())->bits_per_second; }
 
  private:

@@ -68,8 +68,8 @@ inline constexpr std::array<std::string_view, 10> function_names{"NMT", "SYNC", 
 
 /// A bit rate of the document with its index in the table of CiA 305.
 struct Rate {
-  std::uint8_t index;
-  std::uint32_t bits_per_second;
+  std::uint8_t index;             ///< Number of the rate in the encoder's memory.
+  std::uint32_t bits_per_second;  ///< The rate in bits per second.
 };
 inline constexpr std::array<Rate, 3> rates{{{0, 1'000'000}, {2, 500'000}, {3, 250'000}}};
 
@@ -94,34 +94,37 @@ struct Format {
   std::uint8_t rate = 2;      ///< index into `rates`
   bool listens = false;       ///< host: read the positions that the node sends without a request
   std::uint8_t positive = 0;  ///< values of command 22 for counting up and down; the document does not state them
-  std::uint8_t negative = 1;
+  std::uint8_t negative = 1;  ///< Value of the setting for a negative direction.
   /// Virtual encoder: positions per second that it sends without a request after power on; 0: none.
   std::uint8_t cyclic = 10;
   bool answers_on_7e4 = false;  ///< virtual encoder: answers settings on 7E4 instead of 7E5
 
+  /// Returns the bit rate in bits per second.
   [[nodiscard]] constexpr std::uint32_t bit_rate() const { return rates[rate].bits_per_second; }
+  /// Returns the identifier of replies to settings.
   [[nodiscard]] constexpr std::uint32_t answer_id() const { return answers_on_7e4 ? 0x7E4 : 0x7E5; }
 };
 
 /// Fields of frames and commands, in the order of the report.
 struct Values {
+  /// A number that may be missing.
   using Number = std::optional<std::int64_t>;
-  Number node{};
-  std::optional<std::string_view> function{};
-  std::optional<Bytes> data{};
-  std::optional<std::string_view> command{};
-  Number value{};
-  Number new_node{};
-  Number bit_rate{};
-  std::optional<bool> clash{};
-  Number readings_per_s{};
-  Number singleturn{};
-  std::optional<double> angle{};
-  std::optional<bool> written{};
-  std::optional<bool> answered{};
-  std::optional<bool> mirrored{};
-  Number before{};
-  Number after{};
+  Number node{};                               ///< Value of the field `node`, if there is one.
+  std::optional<std::string_view> function{};  ///< Value of the field `function`, if there is one.
+  std::optional<Bytes> data{};                 ///< Value of the field `data`, if there is one.
+  std::optional<std::string_view> command{};   ///< Value of the field `command`, if there is one.
+  Number value{};                              ///< Value of the field `value`, if there is one.
+  Number new_node{};                           ///< Value of the field `new_node`, if there is one.
+  Number bit_rate{};                           ///< Value of the field `bit_rate`, if there is one.
+  std::optional<bool> clash{};                 ///< Value of the field `clash`, if there is one.
+  Number readings_per_s{};                     ///< Value of the field `readings_per_s`, if there is one.
+  Number singleturn{};                         ///< Value of the field `singleturn`, if there is one.
+  std::optional<double> angle{};               ///< Value of the field `angle`, if there is one.
+  std::optional<bool> written{};               ///< Value of the field `written`, if there is one.
+  std::optional<bool> answered{};              ///< Value of the field `answered`, if there is one.
+  std::optional<bool> mirrored{};              ///< Value of the field `mirrored`, if there is one.
+  Number before{};                             ///< Value of the field `before`, if there is one.
+  Number after{};                              ///< Value of the field `after`, if there is one.
 };
 
 // ---- Orders to a node
@@ -133,15 +136,15 @@ enum class Answer : std::uint8_t { none, position, code, error };
 
 /// A row of the document's command tables.
 struct OrderInfo {
-  Order order;
-  std::uint8_t code;  ///< value of byte 0
-  std::string_view name;
-  bool for_all;  ///< true: on 7E5 to all nodes; false: on 2NN with the node in byte 1
-  Answer answer;
-  std::uint8_t value_at = 0;  ///< index of the byte with the order's value; 0: the order has no value
-  std::uint8_t least = 0;
-  std::uint8_t most = 255;
-  Values::Number Values::*shown = nullptr;
+  Order order;                              ///< The order.
+  std::uint8_t code;                        ///< value of byte 0
+  std::string_view name;                    ///< Name of the order.
+  bool for_all;                             ///< true: on 7E5 to all nodes; false: on 2NN with the node in byte 1
+  Answer answer;                            ///< How the encoder answers it.
+  std::uint8_t value_at = 0;                ///< index of the byte with the order's value; 0: the order has no value
+  std::uint8_t least = 0;                   ///< Lowest value.
+  std::uint8_t most = 255;                  ///< Highest value.
+  Values::Number Values::*shown = nullptr;  ///< Member that shows the value; null: none.
 };
 inline constexpr std::array<OrderInfo, 8> orders{{
     {Order::start, 0x01, "start", false, Answer::position},

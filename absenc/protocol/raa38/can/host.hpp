@@ -20,6 +20,7 @@ inline constexpr Time listening_time = 1200ms;
 
 /// The protocol, as author layers use it: frames, lengths and times.
 struct Protocol {
+  /// Item of the line.
   using Item = CanFrame;
   /// Format of the encoder: the values of its options.
   using Format = can::Format;
@@ -54,11 +55,14 @@ struct Protocol {
 /// Reads one position: requested (orders 80 and 01), or the next that the node sends without a request.
 class Read : public author::CanEngine {
  public:
+  /// Whether positions are asked for, or come by themselves.
   enum class Way : std::uint8_t { ask, start, listen };
+  /// Reads positions in this way.
   Read(const Format& format, Way way);
 
   /// Returns the format of the encoder.
   [[nodiscard]] const Format& format() const { return format_; }
+  /// Returns the last position.
   [[nodiscard]] const Reading& found() const { return reading_; }
   [[nodiscard]] const Reading* reading() const final {
     return reading_.singleturn_bits != 0 ? &reading_ : nullptr;  // set only after a successful end
@@ -107,6 +111,7 @@ struct Heard {
   bool readable = false;          ///< `counts` fits the format
   std::uint32_t counts = 0;       ///< position in the last frame
 
+  /// Returns whether a node is there.
   [[nodiscard]] constexpr bool is_there() const { return unsolicited != 0 || answers != 0 || damaged > 1; }
   /// Returns whether two nodes seem to share the number: two answers to one request, or destroyed frames each time.
   [[nodiscard]] constexpr bool clash() const {
@@ -114,8 +119,9 @@ struct Heard {
   }
 };
 
+/// Nodes that were received.
 struct Nodes {
-  std::array<Heard, 256> at{};
+  std::array<Heard, 256> at{};  ///< What was received from each node.
 
   /// Returns how many node numbers are in use.
   [[nodiscard]] unsigned count() const;
@@ -125,8 +131,9 @@ struct Nodes {
 /// Error: timeout if no node is found.
 author::Procedure scan(Dialog& dialog, Nodes& nodes);
 
+/// Result of a survey of the bus.
 struct Surveyed : Values {
-  Nodes nodes{};
+  Nodes nodes{};          ///< Nodes that were received.
   bool verified = false;  ///< the written setting was verified
 };
 

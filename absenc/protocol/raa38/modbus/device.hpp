@@ -26,8 +26,11 @@ class VirtualEncoder final : public modbus::Server {
   [[nodiscard]] MutableBytes memory() override { return settings_.memory(); }
   [[nodiscard]] std::uint32_t memory_version() const override { return settings_.version(); }
 
+  /// Returns the stored settings.
   [[nodiscard]] const Settings& settings() const { return settings_; }
+  /// Returns its address.
   [[nodiscard]] std::uint8_t address() const { return settings_.number(); }
+  /// Returns the stored rate in bits per second.
   [[nodiscard]] std::uint32_t baud() const { return bauds[settings_.rate()]; }
 
  private:

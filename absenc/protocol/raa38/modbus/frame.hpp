@@ -71,14 +71,15 @@ enum class Data : std::uint8_t {
 
 /// Format of the encoder: the values of its options.
 struct Format {
-  std::uint8_t address = 1;
-  unsigned bits = 14;      ///< bits of the position, 10 to 21
-  unsigned registers = 0;  ///< number of registers to request, 1 or 2; 0: as many as the bits need
-  std::size_t baud = baud_at_shipping;
-  Data data = Data::four_bytes;
+  std::uint8_t address = 1;             ///< Address of the encoder, 1 to 247.
+  unsigned bits = 14;                   ///< bits of the position, 10 to 21
+  unsigned registers = 0;               ///< number of registers to request, 1 or 2; 0: as many as the bits need
+  std::size_t baud = baud_at_shipping;  ///< Index of the rate.
+  Data data = Data::four_bytes;         ///< Data of a reply.
   /// Virtual encoder: byte order of the CRC in its reply to A0, low_first or high_first.
   CrcOrder address_crc = CrcOrder::low_first;
 
+  /// Returns the number of registers that are requested.
   [[nodiscard]] constexpr unsigned asked() const { return registers != 0 ? registers : bits > 16 ? 2 : 1; }
   /// Returns the settings of the line.
   [[nodiscard]] constexpr LineSettings line() const { return {.rate = bauds[baud]}; }
@@ -88,11 +89,11 @@ struct Format {
 
 /// A request of the protocol.
 struct Request {
-  std::uint8_t function = function::read;
-  std::uint8_t address = 1;
-  std::uint8_t value = 0;            ///< set_address: the new address; set_parameter: the parameter
-  std::uint16_t first_register = 0;  ///< register to read first; only for the function `read`
-  std::uint16_t registers = 1;
+  std::uint8_t function = function::read;  ///< Code of the function.
+  std::uint8_t address = 1;                ///< Address of the encoder.
+  std::uint8_t value = 0;                  ///< set_address: the new address; set_parameter: the parameter
+  std::uint16_t first_register = 0;        ///< register to read first; only for the function `read`
+  std::uint16_t registers = 1;             ///< Number of registers.
 };
 
 using RequestBytes = ByteBuffer<8>;
@@ -144,11 +145,11 @@ using RequestBytes = ByteBuffer<8>;
 
 /// A reply of the protocol.
 struct Reply {
-  std::uint8_t function = function::read;
-  std::uint8_t address = 1;      ///< ask_address: the encoder's address; set_address: the new address
-  std::uint32_t singleturn = 0;  ///< position; only for the function `read`
-  std::uint8_t value = 0;        ///< parameter; only for the function `set_parameter`
-  CrcOrder order = CrcOrder::low_first;
+  std::uint8_t function = function::read;  ///< Code of the function.
+  std::uint8_t address = 1;                ///< ask_address: the encoder's address; set_address: the new address
+  std::uint32_t singleturn = 0;            ///< position; only for the function `read`
+  std::uint8_t value = 0;                  ///< parameter; only for the function `set_parameter`
+  CrcOrder order = CrcOrder::low_first;    ///< Order of the bytes of the CRC.
   std::size_t doubtful_size = 0;  ///< length of a reply to `read` if the CRC cannot prove this length; otherwise 0
 };
 
@@ -292,7 +293,9 @@ struct Protocol {
   }
   /// Returns when the encoder latched the position of a reply to a request that was sent at `sent_at`.
   static constexpr Time latched(const Format&, Time sent_at) { return sent_at; }
+  /// Returns whether a second reply must confirm this one.
   static constexpr bool needs_another(const Format&, const Reply& reply) { return reply.doubtful_size != 0; }
+  /// Returns whether two replies agree.
   static constexpr Error agree(const Format&, const Reply& first, const Reply& second, Time) {
     return differ_doubtfully(first, second) ? Error::wrong_length : Error::none;
   }

@@ -20,23 +20,23 @@ namespace absenc::raa38::rtu {
 
 /// Fields of frames and commands, in the order of the report.
 struct Values {
-  std::optional<std::uint16_t> address{};  ///< Address.
-  std::optional<std::uint16_t> function{};
-  std::optional<std::uint16_t> first_register{};
-  std::optional<std::uint16_t> registers{};
-  std::optional<std::uint32_t> singleturn{};
-  std::optional<double> angle{};
-  std::optional<std::uint16_t> new_address{};
-  std::optional<std::uint16_t> parameter{};
-  std::optional<std::string_view> setting{};
-  std::optional<std::string_view> crc_order{};
-  std::optional<std::uint32_t> baud{};
-  std::optional<std::string_view> direction{};
-  std::optional<std::string_view> effect{};
-  std::optional<bool> written{};
-  std::optional<std::uint16_t> encoder_address{};
-  std::optional<bool> clash{};
-  std::optional<bool> refuses{};
+  std::optional<std::uint16_t> address{};          ///< Address.
+  std::optional<std::uint16_t> function{};         ///< Value of the field `function`, if there is one.
+  std::optional<std::uint16_t> first_register{};   ///< Value of the field `first_register`, if there is one.
+  std::optional<std::uint16_t> registers{};        ///< Value of the field `registers`, if there is one.
+  std::optional<std::uint32_t> singleturn{};       ///< Value of the field `singleturn`, if there is one.
+  std::optional<double> angle{};                   ///< Value of the field `angle`, if there is one.
+  std::optional<std::uint16_t> new_address{};      ///< Value of the field `new_address`, if there is one.
+  std::optional<std::uint16_t> parameter{};        ///< Value of the field `parameter`, if there is one.
+  std::optional<std::string_view> setting{};       ///< Value of the field `setting`, if there is one.
+  std::optional<std::string_view> crc_order{};     ///< Value of the field `crc_order`, if there is one.
+  std::optional<std::uint32_t> baud{};             ///< Value of the field `baud`, if there is one.
+  std::optional<std::string_view> direction{};     ///< Value of the field `direction`, if there is one.
+  std::optional<std::string_view> effect{};        ///< Value of the field `effect`, if there is one.
+  std::optional<bool> written{};                   ///< Value of the field `written`, if there is one.
+  std::optional<std::uint16_t> encoder_address{};  ///< Value of the field `encoder_address`, if there is one.
+  std::optional<bool> clash{};                     ///< Value of the field `clash`, if there is one.
+  std::optional<bool> refuses{};                   ///< Value of the field `refuses`, if there is one.
 };
 
 /// Result of a command.
@@ -67,8 +67,9 @@ author::Procedure find_baud(Dialog& dialog, Found& found);
 /// the first argument to the second. If all replies of an address are damaged, two encoders share it or the line is
 /// bad. Error: timeout if no slave answers.
 struct Slaves {
+  /// What was received from an address.
   enum class Kind : std::uint8_t { none, answers, clash, refuses };
-  std::array<Kind, modbus::last_address + 1> at{};
+  std::array<Kind, modbus::last_address + 1> at{};  ///< What was received from each address.
 };
 author::Procedure scan(Dialog& dialog, Slaves& found, Arguments arguments);
 

@@ -20,7 +20,9 @@ class VirtualEncoder final : public author::BusDevice<Protocol, VirtualEncoder, 
   /// Switches the encoder off.
   void power_off(Time now) override;
 
+  /// Returns whether a request is for this encoder.
   [[nodiscard]] bool is_mine(const Request& request) const;
+  /// Returns the reply to a request; none: it is not answered.
   std::optional<Position> answer(const Request& request, Time at);
 
  private:

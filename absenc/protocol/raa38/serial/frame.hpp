@@ -69,22 +69,25 @@ inline constexpr Time request_gap = 2ms;            // silence after which an in
 
 /// Configuration of an encoder, as it was ordered.
 struct Format {
-  unsigned bits = 14;  ///< bits of a turn, 10 to 21
-  SecondByte second_byte = SecondByte::automatic;
-  Mode mode = Mode::timing;
-  std::uint8_t unit = 1;
-  Zeroing zeroing = Zeroing::none;
-  std::int32_t zero_unit = -1;          ///< the x of Cx; -1: as in Bx
-  std::int64_t refresh_millihertz = 0;  ///< frames per second in 0.001 Hz; 0: unknown
-  Time acquisition{};                   ///< T3, or the time from a request to its reply; 0: unknown
-  Time transmission{};                  ///< T1 - T3, duration of a frame; 0: as long as its characters take
+  unsigned bits = 14;                              ///< bits of a turn, 10 to 21
+  SecondByte second_byte = SecondByte::automatic;  ///< Meaning of the second byte.
+  Mode mode = Mode::timing;                        ///< Mode of the encoder.
+  std::uint8_t unit = 1;                           ///< Unit number of the encoder.
+  Zeroing zeroing = Zeroing::none;                 ///< How the zero is set.
+  std::int32_t zero_unit = -1;                     ///< the x of Cx; -1: as in Bx
+  std::int64_t refresh_millihertz = 0;             ///< frames per second in 0.001 Hz; 0: unknown
+  Time acquisition{};                              ///< T3, or the time from a request to its reply; 0: unknown
+  Time transmission{};                             ///< T1 - T3, duration of a frame; 0: as long as its characters take
 
+  /// Returns the number of data bytes.
   [[nodiscard]] constexpr std::size_t data_bytes() const { return bits <= 16 ? 2 : 3; }
+  /// Returns the length of a frame in bytes.
   [[nodiscard]] constexpr std::size_t frame_bytes() const { return data_bytes() + 3; }
   /// Returns the time between two frames in timing mode; 0: unknown.
   [[nodiscard]] constexpr Time period() const {
     return refresh_millihertz > 0 ? Time(1'000'000'000'000 / refresh_millihertz) : Time{};
   }
+  /// Returns the unit number for a request that sets zero.
   [[nodiscard]] constexpr std::uint8_t zeroed_unit() const {
     return zero_unit < 0 ? unit : static_cast<std::uint8_t>(zero_unit);
   }
@@ -94,9 +97,10 @@ struct Format {
   }
 };
 
+/// A position that the encoder sent.
 struct Position {
-  std::uint32_t singleturn = 0;
-  std::uint8_t second_byte = fixed_second_byte;
+  std::uint32_t singleturn = 0;                  ///< Position in counts.
+  std::uint8_t second_byte = fixed_second_byte;  ///< The second byte of the frame.
 
   /// Compares all members.
   friend constexpr bool operator==(const Position&, const Position&) = default;
@@ -145,12 +149,13 @@ inline constexpr int anybody = -1;
 
 /// A request of the protocol.
 struct Request {
+  /// Kind of the request.
   enum class Kind : std::uint8_t {
-    read,        // BC AA Bx
-    zero_clear,  // BC AA Cx
-    trigger,     // a pulse on CLK, without bytes
-    clear,       // a pulse on CLR
-  } kind = Kind::read;
+    read,                 // BC AA Bx
+    zero_clear,           // BC AA Cx
+    trigger,              // a pulse on CLK, without bytes
+    clear,                // a pulse on CLR
+  } kind = Kind::read;    ///< Kind of the request.
   std::uint8_t unit = 0;  ///< number of the unit, 0 to 15
 };
 
@@ -178,15 +183,15 @@ struct Request {
 
 /// Fields of frames and commands, in the order of the report.
 struct Values {
-  std::optional<std::uint8_t> encoder_address{};
-  std::optional<bool> clash{};
-  std::optional<std::uint32_t> before{};
-  std::optional<std::uint32_t> singleturn{};
-  std::optional<std::uint8_t> second_byte{};
-  std::optional<double> angle{};
-  std::optional<std::string_view> command{};
-  std::optional<std::uint8_t> unit{};
-  std::optional<std::uint64_t> skipped{};
+  std::optional<std::uint8_t> encoder_address{};  ///< Value of the field `encoder_address`, if there is one.
+  std::optional<bool> clash{};                    ///< Value of the field `clash`, if there is one.
+  std::optional<std::uint32_t> before{};          ///< Value of the field `before`, if there is one.
+  std::optional<std::uint32_t> singleturn{};      ///< Value of the field `singleturn`, if there is one.
+  std::optional<std::uint8_t> second_byte{};      ///< Value of the field `second_byte`, if there is one.
+  std::optional<double> angle{};                  ///< Value of the field `angle`, if there is one.
+  std::optional<std::string_view> command{};      ///< Value of the field `command`, if there is one.
+  std::optional<std::uint8_t> unit{};             ///< Value of the field `unit`, if there is one.
+  std::optional<std::uint64_t> skipped{};         ///< Value of the field `skipped`, if there is one.
 };
 
 [[nodiscard]] constexpr Values values_of(const Format& format, const Position& position) {

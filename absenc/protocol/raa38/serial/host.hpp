@@ -30,6 +30,7 @@ inline constexpr auto fields = author::fields_of<Values>(
 /// error. Ends when no valid frame arrives any more: timeout, bad_framing, out_of_range.
 class Listen final : public Conversation<std::uint8_t> {
  public:
+  /// Listens to an encoder of this format.
   explicit Listen(const Format& format);
 
   /// Takes an event of the port.
@@ -45,6 +46,7 @@ class Listen final : public Conversation<std::uint8_t> {
   /// Returns the items of the last exchange.
   [[nodiscard]] Exchange<std::uint8_t> exchange() const override;
 
+  /// Returns the decoder of the stream.
   [[nodiscard]] const StreamDecoder& decoder() const { return decoder_; }
 
  private:

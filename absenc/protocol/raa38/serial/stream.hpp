@@ -15,9 +15,9 @@ namespace absenc::raa38::serial {
 
 /// A frame, or the error that ended the alignment. Each loss of alignment is reported once.
 struct Found {
-  Error error = Error::none;
-  std::uint32_t singleturn = 0;
-  Time at{};  ///< time at which its last byte was received
+  Error error = Error::none;     ///< Error of the frame.
+  std::uint32_t singleturn = 0;  ///< Position in counts.
+  Time at{};                     ///< time at which its last byte was received
 };
 
 /// While aligned, a frame is accepted where the one before it ended. A frame with an FF inside is accepted only when
