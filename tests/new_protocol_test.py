@@ -64,7 +64,7 @@ class NewProtocol(unittest.TestCase):
                              capture_output=True, text=True)
         self.assertEqual(kit.returncode, 1)
         failed = [line for line in kit.stdout.splitlines() if line.startswith("[  FAILED  ]")]
-        self.assertEqual({line.split()[3] for line in failed} - {"1"}, {"ProtocolName.IsNoLongerTheInventedOne"})
+        self.assertEqual({line.split()[3] for line in failed} - {"1"}, {"ProtocolName.DocumentIsNotTheInventedOne"})
 
     def test_example_in_contributing_is_from_template(self):
         """The template's code is compiled by the test above."""

@@ -7,7 +7,7 @@ namespace absenc::protocol_name {
 namespace {
 
 // The kit (tests/kit) tests the behaviour that all units share; add tests here for the contents of this document.
-TEST(ProtocolName, IsNoLongerTheInventedOne) {
+TEST(ProtocolName, DocumentIsNotTheInventedOne) {
   EXPECT_NE(unit.document, "title of the document") << "put the document's own frames in place of the invented ones";
 }
 

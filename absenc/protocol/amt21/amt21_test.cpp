@@ -10,7 +10,7 @@ namespace {
 using Bench = author::testing::UnitBench<32>;
 constexpr const char* with_turns = "multiturn_bits=14";
 
-TEST(Amt21, AnswersInTheTimesOfItsDatasheet) {
+TEST(Amt21, RepliesAfterTheTurnAroundTimeOfEachRate) {
   constexpr std::array<const char*, 5> names{"rate=2000000", "rate=115200", "rate=38400", "rate=19200", "rate=9600"};
   constexpr std::array<Time, 5> times{3us, 10'800ns, 30us, 56us, 110us};
   for (std::size_t i = 0; i < names.size(); ++i) {
@@ -19,7 +19,7 @@ TEST(Amt21, AnswersInTheTimesOfItsDatasheet) {
     EXPECT_EQ(host.first_byte_at - host.sent_at, times[i] + LineSettings{.rate = rates[i]}.character());
   }
 }
-TEST(Amt21, RestartsFor200MsAfterItsTwoExtendedCommands) {
+TEST(Amt21, RestartsFor200MsAfterZeroAndReset) {
   for (const std::uint8_t code : std::to_array<std::uint8_t>({0x5E, 0x75, 0x5F})) {
     Bench bench(unit, "");
     EXPECT_TRUE(bench.raw({0x56, code}, 100us).reply.empty());
@@ -29,7 +29,7 @@ TEST(Amt21, RestartsFor200MsAfterItsTwoExtendedCommands) {
     EXPECT_EQ(bench.raw({0x54}, 100us).reply.size(), 2u);
   }
 }
-TEST(Amt21, ZeroIsWhereTheShaftStandsStill) {
+TEST(Amt21, ZeroNeedsShaftAtRestAndIsVerified) {
   Bench bench(unit, "");
   bench.shaft.put(3, 0x4000'0000);
   EXPECT_EQ(bench.run("zero").error, Error::none);
@@ -44,7 +44,7 @@ TEST(Amt21, ZeroIsWhereTheShaftStandsStill) {
   EXPECT_EQ(refused.error, Error::not_still);
   EXPECT_EQ(refused.frames, 2u);
 }
-TEST(Amt21, TurnsAreLostWithoutABatteryAndCannotBeZeroed) {
+TEST(Amt21, LosesTurnsWithoutBatteryAndRefusesZeroWithTurns) {
   Bench bench(unit, with_turns);
   bench.shaft.put(-5, 100);
   EXPECT_EQ(bench.run("zero").error, Error::unsupported);
@@ -58,7 +58,7 @@ TEST(Amt21, TurnsAreLostWithoutABatteryAndCannotBeZeroed) {
     EXPECT_EQ(bench.run("turns").numbers["multiturn"], battery * -5);
   }
 }
-TEST(Amt21, TurnsBelongToTheirSideOfZero) {
+TEST(Amt21, ReadsTurnsThatMatchThePositionAtZeroCrossing) {
   Bench bench(unit, with_turns);
   bench.shaft.spin(600, Time{});
   for (int i = 0; i < 100; ++i) {
@@ -69,19 +69,19 @@ TEST(Amt21, TurnsBelongToTheirSideOfZero) {
   }
 }
 
-TEST(Amt21, ScanFindsItsAddressAmongSilence) {
+TEST(Amt21, ScanFindsSingleEncoder) {
   Bench bench(unit, "address=0x58");
   const author::testing::Told found = bench.run("scan");
   EXPECT_EQ(found.error, Error::none);
   EXPECT_EQ(found.numbers.at("encoder_address"), 0x58);
 }
 
-TEST(Amt21, ReservedRequestIsUnexpected) {
+TEST(Amt21, RejectsReservedRequest) {
   for (const std::uint8_t reserved : std::to_array<std::uint8_t>({0x57, 0x03, 0xFF})) {
     EXPECT_EQ(Protocol::decode_request({}, std::array{reserved}).error(), Error::unexpected_reply);
   }
 }
-TEST(Amt21, NothingIsNoRequest) { EXPECT_EQ(Protocol::decode_request({}, {}).error(), Error::wrong_length); }
+TEST(Amt21, RejectsEmptyRequest) { EXPECT_EQ(Protocol::decode_request({}, {}).error(), Error::wrong_length); }
 
 }  // namespace
 }  // namespace absenc::amt21

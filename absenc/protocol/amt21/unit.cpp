@@ -17,7 +17,7 @@ using Dialog = DialogOf<Protocol>;
 
 // ---- Procedures
 
-struct Found : Looked<Protocol> {
+struct PositionAndTurns : Looked<Protocol> {
   std::optional<std::int32_t> turns{};
 };
 
@@ -29,7 +29,7 @@ constexpr Request request_to(std::size_t node) { return {Ask::position, static_c
 constexpr std::size_t addresses = 64;
 
 // Reads position, turns and position. If both positions are on the same side of zero, the turns belong to them.
-Procedure read_both(Dialog& dialog, Found& found) {
+Procedure read_both(Dialog& dialog, PositionAndTurns& found) {
   const Format format = dialog.format();
   std::uint64_t before = co_await look(dialog, found, request<Ask::position>(format));
   for (int tries = 0; tries < 3; ++tries) {
@@ -49,18 +49,18 @@ Procedure read_both(Dialog& dialog, Found& found) {
   co_return {Error::cross_check_failed, "the shaft passed zero between position and turns, three times"};
 }
 
-Procedure restart(Dialog& dialog, Found& found, Ask act) {
-  if (act == Ask::zero) {
+Procedure restart(Dialog& dialog, PositionAndTurns& found, Ask command_kind) {
+  if (command_kind == Ask::zero) {
     co_await may_set_zero(dialog, found, request<Ask::position>(dialog.format()));
   } else {
     co_await look(dialog, found, request<Ask::position>(dialog.format()));
   }
-  co_await dialog.ask({act, dialog.format().address}).changes();
+  co_await dialog.ask({command_kind, dialog.format().address}).changes();
   co_await dialog.rest(restart_time + between_looks);
   const Result<Reply> answer = co_await dialog.attempt(request<Ask::position>(dialog.format()));
   if (!answer) co_return {answer.error(), "it was sent, but whether the encoder obeyed could not be read"};
   const std::uint64_t now = co_await look(dialog, found, request<Ask::position>(dialog.format()));
-  if (act == Ask::zero && !is_near(now, 0, dialog.format().singleturn_bits)) {
+  if (command_kind == Ask::zero && !is_near(now, 0, dialog.format().singleturn_bits)) {
     co_return {Error::cross_check_failed, "the position is still not zero",
                "hold the shaft still, then `absenc zero` again"};
   }
@@ -78,7 +78,7 @@ class Encoder final : public BusDevice<Protocol, Encoder, 4> {  // its memory is
     const unsigned bits = format().singleturn_bits;
     if (asked.ask == Ask::position) return Reply{static_cast<std::int32_t>(counts(at, bits, 0) & ((1 << bits) - 1))};
     if (asked.ask == Ask::turns) {
-      return Reply{static_cast<std::int32_t>(wrapped_difference(turns(at) - lost_, 0, turns_bits))};
+      return Reply{static_cast<std::int32_t>(wrapped_difference(turns(at) - lost_turns_, 0, turns_bits))};
     }
     if (asked.ask == Ask::zero) {
       if (!expect(format().multiturn_bits == 0, "zero sent to an encoder with turns", at)) return std::nullopt;
@@ -91,12 +91,12 @@ class Encoder final : public BusDevice<Protocol, Encoder, 4> {  // its memory is
 
  private:
   void started(Time at) override {
-    if (!battery_) lost_ = turns(at);
+    if (!battery_) lost_turns_ = turns(at);
   }
   [[nodiscard]] std::uint64_t turns(Time at) const { return static_cast<std::uint64_t>(counts(at, 0, 0)); }
 
   bool battery_ = true;
-  std::uint64_t lost_ = 0;  // turns at the last start without a battery, which are lost
+  std::uint64_t lost_turns_ = 0;  // turns at the last start without a battery, which are lost
 };
 
 // ---- Options and fields
@@ -150,7 +150,7 @@ constexpr Values values_of_reply(const Format& format, const Request& asked, con
   (asked.ask == Ask::turns ? all.multiturn : all.singleturn) = reply.value;
   return all;
 }
-constexpr Values values_of_found(const Format& format, const Found& found) {
+constexpr Values values_of_found(const Format& format, const PositionAndTurns& found) {
   Values all = values_of_reply(format, found.request, found.reply);
   all.multiturn = found.turns;
   return all;
@@ -160,7 +160,7 @@ void put_nodes(FieldSink& sink, const Format&, const Nodes<addresses>& nodes) {
     if (nodes.there[i]) fields.put(sink, {.encoder_address = request_to(i).address, .clash = nodes.clash[i]});
   }
 }
-BitRanges place_of(const Options& values, Frame, Frame, const FieldInfo& field) {
+BitRanges bits_of_field(const Options& values, Frame, Frame, const FieldInfo& field) {
   const unsigned singleturn = options.format(values).singleturn_bits;
   if (&field == fields.of<&Values::singleturn>()) return bits_of(0, 14 - singleturn, singleturn);
   return bits_of(0, 0, &field == fields.of<&Values::multiturn>() ? turns_bits : 0);
@@ -170,7 +170,7 @@ constexpr Report<Protocol> report{
     .put_request = put_values<fields, values_of_request>,
     .put_reply = put_values<fields, values_of_reply>,
 };
-constexpr Finding<Format, Found> found{.put = put_values<fields, values_of_found>};
+constexpr Finding<Format, PositionAndTurns> found{.put = put_values<fields, values_of_found>};
 constexpr Finding<Format, Nodes<addresses>> nodes{.put = put_nodes};
 
 // ---- Commands
@@ -238,7 +238,7 @@ constexpr Declaration<Protocol, Encoder> declaration{
     .frames_size = 1500,
     .report = report,
     .guess_request = guess_request,
-    .bits = place_of,
+    .bits = bits_of_field,
     .conditions = conditions,
     .timing = {.turnaround = turn_around[0],
                // of the slowest rate

@@ -53,7 +53,7 @@ struct Reply {
 
 /// Returns whether the parity bits are right: K1 and K0 make the number of ones odd among the odd and among the even
 /// bits.
-[[nodiscard]] constexpr bool checks(std::uint16_t word) {
+[[nodiscard]] constexpr bool parity_is_right(std::uint16_t word) {
   return odd_parity(word & 0xAAAA) && odd_parity(word & 0x5555);
 }
 
@@ -125,7 +125,7 @@ struct Protocol {
     if (bytes.empty() && request.is_answered()) return Error::timeout;
     if (bytes.size() != reply_size(format, request)) return Error::wrong_length;
     const auto word = static_cast<std::uint16_t>(bytes[0] | bytes[1] << 8);
-    if (!checks(word)) return Error::bad_checksum;
+    if (!parity_is_right(word)) return Error::bad_checksum;
     const std::int32_t value = word & 0x3FFF;
     if (request.ask == Ask::turns) return Reply{(value ^ 0x2000) - 0x2000};
     const unsigned padding = 14u - format.singleturn_bits;

@@ -49,7 +49,7 @@ struct ChainFormat {
   return bits;
 }
 
-[[nodiscard]] constexpr unsigned passing_bits(const ChainFormat& format) { return format.count - 1u; }
+[[nodiscard]] constexpr unsigned relay_bits(const ChainFormat& format) { return format.count - 1u; }
 
 /// A reply of several encoders in a chain.
 struct ChainReply {

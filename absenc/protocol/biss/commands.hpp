@@ -89,11 +89,11 @@ inline constexpr auto start_sequence_option = author::option<member>(
     "start_sequence", "virtual encoder: after power on it shows nothing before the start sequence");
 
 template <class F>
-constexpr void put_registers(FieldSink& sink, const F&, const Found& found) {
+constexpr void put_registers(FieldSink& sink, const F&, const ControlResults& found) {
   register_fields.put(sink, found);
 }
 template <class F>
-inline constexpr author::Finding<F, Found> registers_found{.put = put_registers<F>};
+inline constexpr author::Finding<F, ControlResults> control_results{.put = put_registers<F>};
 
 /// Returns the commands of a unit: read a position, access registers.
 template <const auto& report, class F>
@@ -101,7 +101,7 @@ template <const auto& report, class F>
   constexpr auto request = no_request<F>;
   const auto setting = [is_readable]<std::size_t index>(std::integral_constant<std::size_t, index>) {
     constexpr NamedRegister one = named_registers[index];
-    return author::command<report, registers_found<F>, read_setting<F>, request, one.address>(
+    return author::command<report, control_results<F>, read_setting<F>, request, one.address>(
                {one.name, Verb::config_get, 0, one.meaning})
         .only_if(is_readable);
   };
@@ -109,18 +109,18 @@ template <const auto& report, class F>
       author::clocked_reading<report, FindPosition<F>>(
           {"position", Verb::read, 0, "position, turns, error and warning"})
           .only_if(is_readable),
-      author::command<report, registers_found<F>, read_info<F>, request>(
+      author::command<report, control_results<F>, read_info<F>, request>(
           {"info", Verb::info, 0, "who is on the line, profile, serial number, device id"})
           .only_if(is_readable),
-      author::command<report, registers_found<F>, read_memory<F>, request>(
+      author::command<report, control_results<F>, read_memory<F>, request>(
           {"memory-read", Verb::memory_read, 0, "read registers; the bank stays selected", read_arguments})
           .only_if(is_readable),
-      author::command<report, registers_found<F>, write_memory<F>, request>(
+      author::command<report, control_results<F>, write_memory<F>, request>(
           {"memory-write", Verb::memory_write, 0, "write a register; the bank stays selected", write_arguments, true,
            false})
           .only_if(is_readable),
       setting(std::integral_constant<std::size_t, 0>{}),
-      author::command<report, registers_found<F>, write_bank<F>, request>(
+      author::command<report, control_results<F>, write_bank<F>, request>(
           {"set-bank", Verb::config_set, 0, "select a bank", select_arguments, true, false, "bank"})
           .only_if(is_readable),
       setting(std::integral_constant<std::size_t, 1>{}),
@@ -128,7 +128,7 @@ template <const auto& report, class F>
       setting(std::integral_constant<std::size_t, 3>{}),
       setting(std::integral_constant<std::size_t, 4>{}),
       setting(std::integral_constant<std::size_t, 5>{}),
-      author::command<report, registers_found<F>, send_command<F>, request>(
+      author::command<report, control_results<F>, send_command<F>, request>(
           {"control-command", Verb::run, 0, "a command of control communication", command_arguments, true, false})
           .only_if(is_readable),
   };
@@ -220,7 +220,7 @@ constexpr Error decode_frame(const F& format, Frame asked, Frame answered, Field
   if (!asked.empty()) {
     const Result<ControlFrame> frame = decode_control(author::to_bits(asked), author::to_bits(answered));
     if (!frame) return frame.error();
-    register_fields.put(sink, shown_by(*frame, !answered.empty()));
+    register_fields.put(sink, results_of(*frame, !answered.empty()));
     return Error::none;
   }
   if (!is_usable(format)) return Error::invalid_argument;

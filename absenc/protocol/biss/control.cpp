@@ -19,7 +19,7 @@ void ControlMaster::begin(const ControlRequest& request) {
   at_ = 0;
   delay_ = 0;
   state_ = State::header;
-  look_ = false;
+  only_counts_slaves_ = false;
   over_ = false;
   answered_ = false;
   error_ = Error::none;
@@ -41,9 +41,9 @@ void ControlMaster::command(std::uint8_t slaves, unsigned command) {
   begin({.operation = Operation::command, .slaves = slaves, .command = static_cast<std::uint8_t>(command)});
 }
 
-void ControlMaster::look() {
+void ControlMaster::count_slaves() {
   read(0, 0, 1);
-  look_ = true;
+  only_counts_slaves_ = true;
 }
 
 bool ControlMaster::next(bool cds) {
@@ -90,7 +90,7 @@ bool ControlMaster::header(bool cds) {
   if (at_ < more_slaves_at && cds && frame_.slaves == at_ - 1) frame_.slaves = static_cast<std::uint8_t>(at_);
   if (at_ == more_slaves_at) {
     frame_.more_slaves = cds;
-    if (look_) return end(Error::none);
+    if (only_counts_slaves_) return end(Error::none);
   }
   const bool cdm = (header_ >> (header_bits - at_) & 1) != 0;
   if (at_++ == header_bits) state_ = frame_.request.is_command() ? State::acknowledge : State::direction;

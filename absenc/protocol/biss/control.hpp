@@ -105,7 +105,7 @@ class ControlMaster {
   /// Begins a command to the slaves in the mask `slaves`; 0: to all.
   void command(std::uint8_t slaves, unsigned command);
   /// Begins to count the slaves on the line; the result is `frame().slaves`.
-  void look();
+  void count_slaves();
 
   /// Takes the CDS of a received frame and returns the CDM to send after it.
   bool next(bool cds);
@@ -144,7 +144,7 @@ class ControlMaster {
   unsigned zeros_ = 0;
   unsigned delay_ = 0;
   State state_ = State::header;
-  bool look_ = false;
+  bool only_counts_slaves_ = false;
   bool over_ = true;
   bool answered_ = false;  // first of the two direction bits in CDS
   Error error_ = Error::none;

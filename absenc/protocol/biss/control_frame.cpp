@@ -22,14 +22,14 @@ struct ControlBits {
   }
 };
 
-void put_locks(ControlFrame& frame, const ControlBits& cds) {
+void decode_lock_bits(ControlFrame& frame, const ControlBits& cds) {
   for (unsigned i = 0; i < control_slaves && cds[lock_bits_at + i]; ++i)
     frame.slaves = static_cast<std::uint8_t>(i + 1);
   frame.more_slaves = cds[more_slaves_at];
 }
 
 // Decodes the bytes of a register access. For a read, `cdm` only shows how many bytes there are.
-Error take_bytes(const ControlBits& cdm, const ControlBits& cds, bool write, ControlFrame& frame) {
+Error decode_bytes(const ControlBits& cdm, const ControlBits& cds, bool write, ControlFrame& frame) {
   bool refused = false;  // p refused the next register; some encoders continue all the same
   for (unsigned due = direction_at + 3;; due += byte_bits + 2) {
     unsigned at = due;
@@ -40,10 +40,10 @@ Error take_bytes(const ControlBits& cdm, const ControlBits& cds, bool write, Con
     const bool first = due == direction_at + 3;
     if (first && write && at != due) return Error::bad_framing;  // the first written byte is never delayed
     if (!cds.has(at + byte_bits + 1) || !cdm.has(at + byte_bits)) return Error::truncated;
-    const std::uint16_t answered = cds.load(at + 1, byte_bits);
-    const std::uint16_t sent = write ? cdm.load(at, byte_bits) : answered;
-    if (!is_good_byte(answered) || !is_good_byte(sent)) return Error::bad_checksum;
-    if (answered != sent) return Error::unexpected_reply;
+    const std::uint16_t cds_bits = cds.load(at + 1, byte_bits);
+    const std::uint16_t sent = write ? cdm.load(at, byte_bits) : cds_bits;
+    if (!is_good_byte(cds_bits) || !is_good_byte(sent)) return Error::bad_checksum;
+    if (cds_bits != sent) return Error::unexpected_reply;
     if (!frame.data.push_back(static_cast<std::uint8_t>(sent >> 4))) return Error::wrong_length;
     frame.start_delay.push_back(static_cast<std::uint16_t>(at - due));
     frame.next_address_accepted = !cds[at + byte_bits + 1];
@@ -54,7 +54,7 @@ Error take_bytes(const ControlBits& cdm, const ControlBits& cds, bool write, Con
 }
 
 // Decodes the data that the host writes from CDM alone. While an encoder is not ready the host repeats its start bit.
-Error take_written(const ControlBits& cdm, ControlFrame& frame) {
+Error decode_written(const ControlBits& cdm, ControlFrame& frame) {
   for (unsigned at = direction_at + 3;; at += byte_bits + 2) {
     while (!frame.data.empty() && cdm.has(at + byte_bits) && cdm[at] && !is_good_byte(cdm.load(at, byte_bits))) ++at;
     if (!cdm.has(at + byte_bits - 1)) return Error::truncated;
@@ -65,7 +65,7 @@ Error take_written(const ControlBits& cdm, ControlFrame& frame) {
   }
 }
 
-Error take_register(const ControlBits& cdm, const ControlBits& cds, ControlFrame& frame) {
+Error decode_register_access(const ControlBits& cdm, const ControlBits& cds, ControlFrame& frame) {
   const bool write = frame.request.operation == Operation::write;
   if (!cds.has(direction_at + 2)) return Error::truncated;
   if (frame.request.slave >= frame.slaves) return Error::timeout;
@@ -74,10 +74,10 @@ Error take_register(const ControlBits& cdm, const ControlBits& cds, ControlFrame
   if (first == write) return write ? Error::unexpected_reply : Error::timeout;
   if (second != write) return Error::request_rejected;  // the second direction bit is the inverted first one
   if (!cdm[direction_at + 2]) return Error::timeout;
-  return take_bytes(cdm, cds, write, frame);
+  return decode_bytes(cdm, cds, write, frame);
 }
 
-Error take_command(const ControlBits& cdm, const ControlBits& cds, ControlFrame& frame) {
+Error decode_command(const ControlBits& cdm, const ControlBits& cds, ControlFrame& frame) {
   const bool broadcast = frame.request.slaves == 0;
   const unsigned executed_at = broadcast ? acknowledge_at : acknowledge_at + 7;
   if (!cdm.has(executed_at) || !cds.has(executed_at)) return Error::truncated;
@@ -91,7 +91,7 @@ Error take_command(const ControlBits& cdm, const ControlBits& cds, ControlFrame&
   return frame.executed && frame.acknowledged != frame.request.slaves ? Error::request_rejected : Error::none;
 }
 
-Error take_request(const ControlBits& cdm, ControlFrame& frame) {
+Error decode_request(const ControlBits& cdm, ControlFrame& frame) {
   if (!cdm.has(header_bits)) return Error::truncated;
   const Result<ControlRequest> request = request_of_header(cdm.load(1, header_bits));
   if (!request) return request.error();
@@ -109,23 +109,24 @@ Result<ControlFrame> decode_control(BitView cdm, BitView cds) {
   if (cdm.size == 0) return Error::wrong_length;
   const std::size_t start = cdm[0] ? 0 : cdm.end_of_run(0);
   if (start == cdm.size || (start != 0 && start < control_pause)) return Error::bad_framing;
-  const ControlBits asked{cdm, start};
+  const ControlBits cdm_bits{cdm, start};
   ControlFrame frame;
-  Error error = take_request(asked, frame);
+  Error error = decode_request(cdm_bits, frame);
   if (error != Error::none) return error;
   if (cds.size == 0) {
-    if (frame.request.operation == Operation::write) error = take_written(asked, frame);
+    if (frame.request.operation == Operation::write) error = decode_written(cdm_bits, frame);
     return error == Error::none ? Result(frame) : error;
   }
-  const ControlBits answered{cds, start};
-  put_locks(frame, answered);
-  error = frame.request.is_command() ? take_command(asked, answered, frame) : take_register(asked, answered, frame);
+  const ControlBits cds_bits{cds, start};
+  decode_lock_bits(frame, cds_bits);
+  error = frame.request.is_command() ? decode_command(cdm_bits, cds_bits, frame)
+                                     : decode_register_access(cdm_bits, cds_bits, frame);
   return error == Error::none ? Result(frame) : error;
 }
 
 namespace {
 
-struct Willing final : ControlTarget {
+struct AcceptingTarget final : ControlTarget {
   [[nodiscard]] bool allows(unsigned, unsigned, bool) const override { return true; }
   [[nodiscard]] std::uint8_t read(unsigned, unsigned) override { return 0; }
   void write(unsigned, unsigned, std::uint8_t) override {}
@@ -137,7 +138,7 @@ struct Willing final : ControlTarget {
 }  // namespace
 
 void append_cdm(ControlMaster master, unsigned slaves, BitBuffer<1024>& out) {
-  Willing target;
+  AcceptingTarget target;
   ControlSlaves answering(slaves);
   const auto add = [&](bool cdm) {
     answering.take(cdm, target);

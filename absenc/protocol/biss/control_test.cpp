@@ -26,11 +26,11 @@ Result<ControlFrame> decoded(std::string_view cdm, std::string_view cds) {
   return decode_control(BitText(cdm).bits.view(), BitText(cds).bits.view());
 }
 
-// From TI's table; the other frames follow the rules of the protocol description.
+// A register read from TI's table; the other frames follow the rules of the protocol description.
 constexpr std::string_view read_44 = "0000000000000011000100010011011010000000000000000";
 constexpr std::string_view read_44_answer = "0000000000000001000000000000000101000010100010000";
 
-TEST(BissControl, ARegisterThatIsRead) {
+TEST(BissControl, DecodesRegisterRead) {
   const Result<ControlFrame> frame = decoded(read_44, read_44_answer);
   ASSERT_TRUE(frame);
   EXPECT_EQ(frame->request, (ControlRequest{.operation = Operation::read, .slave = 0, .address = 0x44}));
@@ -49,7 +49,7 @@ std::string cdm_of(const ControlMaster& master) {
 }
 
 // Compares with the frames of the protocol description and of TI's table. Only zeros may follow.
-TEST(BissControl, RequestsAreTheBitsThatAreDrawn) {
+TEST(BissControl, EncodesRequestsOfTheDocument) {
   const auto expect = [](const ControlMaster& master, std::string_view drawn) {
     const std::string cdm = cdm_of(master);
     const std::size_t end = drawn.rfind('1') + 1;
@@ -72,7 +72,7 @@ TEST(BissControl, RequestsAreTheBitsThatAreDrawn) {
   expect(master, "0000000000000010000000000011111100");
 }
 
-TEST(BissControl, WhatIsWrittenIsTakenFromCdmAlone) {
+TEST(BissControl, DecodesWrittenDataFromCdmAlone) {
   const auto written = [](std::string_view cdm) {
     const Result<ControlFrame> frame = decoded(cdm, "");
     const Bytes data = frame->data.view();
@@ -87,7 +87,7 @@ TEST(BissControl, WhatIsWrittenIsTakenFromCdmAlone) {
   EXPECT_EQ(decoded("0000000000000011000100100010100110101011100100000", "").error(), Error::bad_checksum);
 }
 
-TEST(BissControl, NoBitOfAnAnswerFlipsUnnoticed) {
+TEST(BissControl, DetectsEachFlippedBitOfAnAnswer) {
   // Lock bits of other slaves and the bits after P have no meaning here.
   for (std::size_t i = 14 + 17; i < 14 + 32; ++i) {
     std::string cds(read_44_answer);
@@ -106,13 +106,13 @@ TEST(BissControl, NoBitOfAnAnswerFlipsUnnoticed) {
   }
 }
 
-TEST(BissControl, WhatIsNoControlFrame) {
+TEST(BissControl, RejectsBitsWithoutStartBit) {
   EXPECT_EQ(decoded("", "").error(), Error::wrong_length);
   EXPECT_EQ(decoded("00000000000000000000", "00000000000000000000").error(), Error::bad_framing);
   EXPECT_EQ(decoded(read_44.substr(1), read_44_answer.substr(1)).error(), Error::bad_framing);
 }
 
-// ---- Both sides
+// ---- Host and slaves against each other
 
 /// Registers of three slaves. Addresses with bit 4 set are read only; none exist from 0x70 on.
 struct Target : ControlTarget {
@@ -138,37 +138,37 @@ struct Target : ControlTarget {
 };
 
 /// The CDM and CDS bits of a run, one per frame.
-struct Talk {
+struct Transcript {
   std::string cdm;
   std::string cds;
 };
 
 /// Runs both sides to the end. `flip`: index of a CDS bit that is received wrong; the position's checks do not detect
 /// it.
-Talk run(ControlMaster& master, ControlSlaves& slaves, Target& target, std::size_t flip = ~std::size_t{0}) {
-  Talk talk;
+Transcript run(ControlMaster& master, ControlSlaves& slaves, Target& target, std::size_t flip = ~std::size_t{0}) {
+  Transcript transcript;
   for (unsigned i = 0; !master.is_over() && i < 2'000; ++i) {
     const bool cds = slaves.cds() != (i == flip);
     const bool cdm = master.next(cds);
-    talk.cds += cds ? '1' : '0';
-    talk.cdm += cdm ? '1' : '0';
+    transcript.cds += cds ? '1' : '0';
+    transcript.cdm += cdm ? '1' : '0';
     slaves.take(cdm, target);
   }
   EXPECT_TRUE(master.is_over());
-  return talk;
+  return transcript;
 }
 
-TEST(BissControl, HostAndEncoderSayWhatTheTableShows) {
+TEST(BissControl, HostAndSlavesSendBitsOfTheTable) {
   Target target;
   target.values[0][0x44] = 10;
   ControlSlaves slaves(1);
   ControlMaster master;
   master.read(0, 0x44, 1);
-  const Talk talk = run(master, slaves, target);
+  const Transcript transcript = run(master, slaves, target);
   ASSERT_EQ(master.error(), Error::none);
-  EXPECT_EQ(talk.cdm, read_44.substr(0, talk.cdm.size()));
-  EXPECT_EQ(talk.cds, read_44_answer.substr(0, talk.cds.size()));
-  EXPECT_EQ(talk.cdm.size(), 14u + 33u);
+  EXPECT_EQ(transcript.cdm, read_44.substr(0, transcript.cdm.size()));
+  EXPECT_EQ(transcript.cds, read_44_answer.substr(0, transcript.cds.size()));
+  EXPECT_EQ(transcript.cdm.size(), 14u + 33u);
 }
 
 /// Sends P = 1 after each register, and continues all the same.
@@ -176,7 +176,7 @@ struct Stopping final : Target {
   [[nodiscard]] bool stop_bit(bool) const override { return true; }
 };
 
-TEST(BissControl, AHostThatGoesOnBehindPIsDecoded) {
+TEST(BissControl, DecodesHostThatContinuesAfterStopBit) {
   Stopping target;
   target.values[0][0x44] = 10;
   target.values[0][0x45] = 11;
@@ -207,7 +207,7 @@ TEST(BissControl, AHostThatGoesOnBehindPIsDecoded) {
   EXPECT_EQ(frame->data[1], 11);
 }
 
-TEST(BissControl, EveryAccessEndsAsItShould) {
+TEST(BissControl, RandomAccessesEndWithExpectedResult) {
   sim::Random random(3);
   Target target;
   for (auto& slave : target.values) {
@@ -230,7 +230,7 @@ TEST(BissControl, EveryAccessEndsAsItShould) {
     } else {
       master.read(slave, address, count);
     }
-    const Talk talk = run(master, slaves, target);
+    const Transcript transcript = run(master, slaves, target);
     bool allowed = true;
     for (std::size_t k = 0; k < count; ++k) {
       allowed = allowed && address + k < 128 && target.allows(slave, address + static_cast<unsigned>(k), write);
@@ -242,10 +242,10 @@ TEST(BissControl, EveryAccessEndsAsItShould) {
       ASSERT_EQ(target.values[slave][address + k], master.frame().data[k]);
     }
     const std::string quiet(14, '0');
-    const Result<ControlFrame> seen = decoded(quiet + talk.cdm + quiet, quiet + talk.cds + quiet);
+    const Result<ControlFrame> seen = decoded(quiet + transcript.cdm + quiet, quiet + transcript.cds + quiet);
     // The decoder cannot know that the host wanted more registers than the encoder has.
     const std::size_t size = master.frame().data.size();
-    ASSERT_EQ(seen.error(), size > 0 ? Error::none : expected) << talk.cdm << '\n' << talk.cds;
+    ASSERT_EQ(seen.error(), size > 0 ? Error::none : expected) << transcript.cdm << '\n' << transcript.cds;
     if (!seen) continue;
     EXPECT_EQ(seen->data.size(), size);
     EXPECT_TRUE(size == count || !seen->next_address_accepted);
@@ -254,7 +254,7 @@ TEST(BissControl, EveryAccessEndsAsItShould) {
 }
 
 // A lost start bit shifts all bits after it, which four bits of CRC may miss: it shows as a delay.
-TEST(BissControl, AFlippedBitIsNoWrongByteUnlessItMovesTheStart) {
+TEST(BissControl, FlippedCdsBitIsDetectedOrShowsAsDelay) {
   for (std::size_t flip = 0; flip < 14 + 33 + 14; ++flip) {
     for (const bool write : {false, true}) {
       Target target;
@@ -277,15 +277,15 @@ TEST(BissControl, AFlippedBitIsNoWrongByteUnlessItMovesTheStart) {
   }
 }
 
-TEST(BissControl, CommandsAreExecutedWhenAllAcknowledge) {
+TEST(BissControl, ExecutesCommandWhenAllSlavesAcknowledge) {
   Target target;
   ControlSlaves slaves(3);
   ControlMaster master;
   master.command(0b101, 1);
-  Talk talk = run(master, slaves, target);
+  Transcript transcript = run(master, slaves, target);
   EXPECT_EQ(master.error(), Error::none);
   EXPECT_EQ(target.executed, 0b101 * 16 + 1);
-  EXPECT_EQ(decoded(talk.cdm, talk.cds)->acknowledged, 0b101);
+  EXPECT_EQ(decoded(transcript.cdm, transcript.cds)->acknowledged, 0b101);
 
   target.executed = -1;
   master.command(0b101, 3);
@@ -298,31 +298,31 @@ TEST(BissControl, CommandsAreExecutedWhenAllAcknowledge) {
   EXPECT_EQ(master.error(), Error::timeout);
 
   master.command(0, 2);
-  talk = run(master, slaves, target);
+  transcript = run(master, slaves, target);
   EXPECT_EQ(master.error(), Error::none);
   EXPECT_EQ(target.executed, 2);
 
-  master.look();
+  master.count_slaves();
   run(master, slaves, target);
   EXPECT_EQ(master.frame().slaves, 3);
 }
 
 // Bits are counted from the start bit, as in the table.
-TEST(BissControl, EachRuleOfAControlFrameIsLookedAt) {
-  const auto spoken = [](auto begin) {
+TEST(BissControl, DecoderChecksEachRuleOfAControlFrame) {
+  const auto transcript_of = [](auto begin) {
     Target target;
     ControlSlaves slaves(3);
     ControlMaster master;
     begin(master);
-    const Talk talk = run(master, slaves, target);
-    return Talk{talk.cdm + std::string(14, '0'), talk.cds + std::string(14, '0')};
+    const Transcript transcript = run(master, slaves, target);
+    return Transcript{transcript.cdm + std::string(14, '0'), transcript.cds + std::string(14, '0')};
   };
   const auto written = [](std::uint8_t byte) {
     return [byte](ControlMaster& master) { master.write(0, 0x20, std::array{byte}); };
   };
-  const Talk read = spoken([](ControlMaster& master) { master.read(0, 0x44, 1); });
-  const Talk write = spoken(written(0x5A));
-  const Talk command = spoken([](ControlMaster& master) { master.command(0b101, 1); });
+  const Transcript read = transcript_of([](ControlMaster& master) { master.read(0, 0x44, 1); });
+  const Transcript write = transcript_of(written(0x5A));
+  const Transcript command = transcript_of([](ControlMaster& master) { master.command(0b101, 1); });
   const auto flipped = [](std::string text, std::initializer_list<std::size_t> bits) {
     for (const std::size_t bit : bits) text[14 + bit] ^= 1;
     return text;
@@ -347,7 +347,7 @@ TEST(BissControl, EachRuleOfAControlFrameIsLookedAt) {
   EXPECT_EQ(error(write.cdm, late(write.cds, 1)), Error::bad_framing);  // no delay is allowed here
   EXPECT_EQ(error(write.cdm, flipped(write.cds, {20})), Error::bad_checksum);
   EXPECT_EQ(error(flipped(write.cdm, {19}), write.cds), Error::bad_checksum);
-  EXPECT_EQ(error(spoken(written(0xA5)).cdm, write.cds), Error::unexpected_reply);
+  EXPECT_EQ(error(transcript_of(written(0xA5)).cdm, write.cds), Error::unexpected_reply);
 
   EXPECT_EQ(error(command.cdm, begin(command.cds, 24)), Error::truncated);
   EXPECT_EQ(error(begin(command.cdm, 24), command.cds), Error::truncated);
@@ -366,7 +366,7 @@ TEST(BissControl, EachRuleOfAControlFrameIsLookedAt) {
   EXPECT_EQ(answered(written(0x5A), flipped(write.cds, {0})), Error::bad_framing);  // CDS is 1 before any request
 }
 
-TEST(BissControl, AByteWhoseCrcIsWrongIsNotStored) {
+TEST(BissControl, SlaveDoesNotStoreByteWithWrongCrc) {
   Target target;
   ControlSlaves slaves(1);
   // A write of 0x55 to 0x48 with one wrong data bit.

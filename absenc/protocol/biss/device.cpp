@@ -52,8 +52,8 @@ VirtualRegisters::VirtualRegisters(unsigned slaves, RegisterOrder order, StopBit
 
 void VirtualRegisters::power_on() {
   bank_ = {};
-  silent_ = 0;
-  closed_ = 0;
+  data_off_ = 0;
+  control_off_ = 0;
 }
 
 void VirtualRegisters::set_time(Time at, Time delay) {
@@ -75,12 +75,12 @@ bool VirtualRegisters::allows(unsigned slave, unsigned address, bool write) cons
 }
 
 std::uint8_t VirtualRegisters::read(unsigned slave, unsigned address) {
-  asked_ = false;
+  requested_ = false;
   return address == registers::bank_select ? bank_[slave] : memory_[place(slave, address)];
 }
 
 void VirtualRegisters::write(unsigned slave, unsigned address, std::uint8_t value) {
-  asked_ = false;
+  requested_ = false;
   if (address == registers::bank_select) {
     bank_[slave] = value;
   } else {
@@ -95,11 +95,11 @@ bool VirtualRegisters::stop_bit(bool next_allowed) const {
 
 bool VirtualRegisters::is_ready() const {
   if (delay_ == Time{}) return true;
-  if (!asked_) {
-    asked_ = true;
-    asked_at_ = now_;
+  if (!requested_) {
+    requested_ = true;
+    requested_at_ = now_;
   }
-  return now_ - asked_at_ >= delay_;
+  return now_ - requested_at_ >= delay_;
 }
 
 // Accepts the commands of the standard; 2 and 3 are defined by the maker.
@@ -107,10 +107,10 @@ bool VirtualRegisters::obeys(unsigned, unsigned command) const { return command 
 
 void VirtualRegisters::execute(std::uint8_t slaves, unsigned command) {
   const auto process_data = [&](std::uint8_t whose, bool on) {
-    silent_ = static_cast<std::uint8_t>(on ? silent_ & ~whose : silent_ | whose);
+    data_off_ = static_cast<std::uint8_t>(on ? data_off_ & ~whose : data_off_ | whose);
   };
   const auto control = [&](std::uint8_t whose, bool on) {
-    closed_ = static_cast<std::uint8_t>(on ? closed_ & ~whose : closed_ | whose);
+    control_off_ = static_cast<std::uint8_t>(on ? control_off_ & ~whose : control_off_ | whose);
   };
   const bool broadcast = slaves == 0;
   const auto whose = static_cast<std::uint8_t>(broadcast ? 0xFF : slaves);

@@ -52,7 +52,7 @@ class EncoderOf {
     reply.ack_bits = head_bits(format_, behaviour_.latency, period);
     reply.cds = cds;
     show(format_, shaft_->at(at), alarms_, life_counter_, reply);
-    if (!encode(format_, reply, samples, silent_)) {  // the position is not ready within the most clocks of a frame
+    if (!encode(format_, reply, samples, data_off_)) {  // the position is not ready within the most clocks of a frame
       samples.clear();
       samples.append(low_mask(idle_bits), idle_bits);
       while (samples.size() < Samples::capacity()) samples.append(0, 1);
@@ -78,7 +78,7 @@ class EncoderOf {
   /// Sets the raised alarms.
   void set_alarms(std::uint32_t alarms) { alarms_ = alarms; }
   /// Sets the slaves whose process data are switched off: bit n is slave n.
-  void set_silent(std::uint8_t slaves) { silent_ = slaves; }
+  void set_silent(std::uint8_t slaves) { data_off_ = slaves; }
 
  private:
   F format_;
@@ -86,7 +86,7 @@ class EncoderOf {
   Behaviour behaviour_;
   bool powered_ = false;
   std::uint32_t alarms_ = 0;
-  std::uint8_t silent_ = 0;
+  std::uint8_t data_off_ = 0;
   std::uint8_t life_counter_ = 0;
   LineDelay delay_;
 };
@@ -111,7 +111,7 @@ class VirtualRegisters final : public ControlTarget {
   /// Returns the number of writes.
   [[nodiscard]] std::uint32_t written() const { return written_; }
   /// Returns the slaves whose process data are switched off.
-  [[nodiscard]] std::uint8_t silent() const { return silent_; }
+  [[nodiscard]] std::uint8_t silent() const { return data_off_; }
 
   [[nodiscard]] bool allows(unsigned slave, unsigned address, bool write) const override;
   /// Returns a register.
@@ -120,7 +120,7 @@ class VirtualRegisters final : public ControlTarget {
   void write(unsigned slave, unsigned address, std::uint8_t value) override;
   [[nodiscard]] bool stop_bit(bool next_allowed) const override;
   [[nodiscard]] bool is_ready() const override;
-  [[nodiscard]] bool listens(unsigned slave) const override { return (closed_ >> slave & 1) == 0; }
+  [[nodiscard]] bool listens(unsigned slave) const override { return (control_off_ >> slave & 1) == 0; }
   [[nodiscard]] bool obeys(unsigned slave, unsigned command) const override;
   /// Executes a command on the slaves whose bits are set.
   void execute(std::uint8_t slaves, unsigned command) override;
@@ -134,11 +134,11 @@ class VirtualRegisters final : public ControlTarget {
   StopBit stop_bit_;
   Time now_{};
   Time delay_{};
-  mutable Time asked_at_{};
-  mutable bool asked_ = false;
+  mutable Time requested_at_{};
+  mutable bool requested_ = false;
   std::uint32_t written_ = 0;
-  std::uint8_t silent_ = 0;  // slaves with process data switched off: bit n is slave n
-  std::uint8_t closed_ = 0;  // slaves with control communication switched off: bit n is slave n
+  std::uint8_t data_off_ = 0;     // slaves with process data switched off: bit n is slave n
+  std::uint8_t control_off_ = 0;  // slaves with control communication switched off: bit n is slave n
 };
 
 /// Returns the number of slaves whose words the frames carry.
@@ -180,7 +180,7 @@ class VirtualEncoderOf final : public author::ClockedDevice {
       return;
     }
     expect(period / 2 < timeout_, "MA slower than the BiSS timeout allows", at);
-    if (behaviour.start_sequence && !woken_) return hold_low({});
+    if (behaviour.start_sequence && !start_sequence_received_) return hold_low({});
     registers_.set_time(at, behaviour.register_delay);
     const std::uint32_t written = registers_.written();
     if (clocked_before_) slaves_.take(held_low, registers_);
@@ -193,7 +193,7 @@ class VirtualEncoderOf final : public author::ClockedDevice {
   void clocked(Time at, std::size_t clocks) override {
     // A host cannot know whether the encoder needs the start sequence, so it is accepted at any time.
     if (is_start_sequence(clocks)) {
-      woken_ = true;
+      start_sequence_received_ = true;
     } else if (needed_ > 0) {
       expect(clocks >= needed_, "fewer clocks than the frame has bits", at);
       count_answer();
@@ -205,7 +205,7 @@ class VirtualEncoderOf final : public author::ClockedDevice {
     registers_.power_on();
     slaves_.reset();
     clocked_before_ = false;
-    woken_ = false;
+    start_sequence_received_ = false;
   }
   // Returns whether the clocks are a start sequence. An SPI controller can only clock whole bytes.
   static bool is_start_sequence(std::size_t clocks) { return clocks == start_pulses || clocks == 8; }
@@ -218,7 +218,7 @@ class VirtualEncoderOf final : public author::ClockedDevice {
   Time period_{};        // period of MA
   Time free_at_{};       // earliest time of the next frame: the timeout after the last clock
   bool clocked_before_ = false;
-  bool woken_ = false;  // the start sequence was received
+  bool start_sequence_received_ = false;  // the start sequence was received
 };
 using VirtualEncoder = VirtualEncoderOf<Format>;
 

@@ -22,7 +22,7 @@ Format format_with(Time latency, Time ready, Time line_delay = {}) {
   return format;
 }
 
-TEST(BissDevice, PutsExample4OnTheLine) {
+TEST(BissDevice, SendsExample4) {
   Bench bench(line_settings, bits_19, Behaviour{.latency = 13us});
   bench.shaft.state.position = std::int64_t{275087} << 13;
   EXPECT_EQ(bench.clock(44, 1ms, 1'000'000), "11000000000000010100001100101000111111110011");
@@ -30,7 +30,7 @@ TEST(BissDevice, PutsExample4OnTheLine) {
   EXPECT_EQ(bench.encoder.answer_count(), 1u);
 }
 
-TEST(BissDevice, SloIsLowBehindTheCrc) {
+TEST(BissDevice, HoldsSloLowAfterCrc) {
   Bench bench(line_settings, format_with(Format{}.latency, 2us, 2300ns));
   bench.shaft.state.position = std::int64_t{275087} << 13;
   const std::string samples = bench.clock(200, 1ms, 1'000'000);
@@ -40,7 +40,7 @@ TEST(BissDevice, SloIsLowBehindTheCrc) {
   EXPECT_EQ(bench.clock(200, 10us, 1'000'000), std::string(200, '0'));
 }
 
-TEST(BissDevice, ReportsWhatItsHostDoesWrong) {
+TEST(BissDevice, ReportsBrokenTimingRules) {
   Bench bench(line_settings, bits_19);
   bench.clock(41, 1ms, 1'000'000);
   EXPECT_EQ(bench.last_rule(), "");
@@ -61,7 +61,7 @@ TEST(BissDevice, ReportsWhatItsHostDoesWrong) {
   EXPECT_EQ(soon.encoder.violation_count(), 2u);
 }
 
-TEST(BissDevice, TimeoutIsThatOfItsFormat) {
+TEST(BissDevice, UsesTimeoutOfFormat) {
   // `pause` begins after the last period, half of which lies after the last edge.
   const auto allows = [](Timeout timeout, std::uint32_t rate, Time pause) {
     Format format = bits_19;
@@ -83,7 +83,7 @@ TEST(BissDevice, TimeoutIsThatOfItsFormat) {
   EXPECT_TRUE(allows(Timeout::adaptive(), 100'000, 10us));
 }
 
-TEST(BissDevice, ItsOwnTimeIsThatOfTheOptionsOrTenMicroseconds) {
+TEST(BissDevice, ReadyTimeIsThatOfOptionsOrAtMostTenMicroseconds) {
   const auto ack = [](Time latency, Time ready) {
     Bench bench(line_settings, format_with(latency, ready));
     return bench.clock(64, 1ms, 1'000'000).find("1", 2) - 2;
@@ -110,7 +110,7 @@ unsigned good_frames(Time line_delay, Time period) {
   return good;
 }
 
-TEST(BissDevice, LineDelayCorruptsAtHighClocks) {
+TEST(BissDevice, LineDelayCorruptsFramesAtHighClocks) {
   EXPECT_EQ(good_frames(300ns, 1us), 100u);
   EXPECT_EQ(good_frames(300ns, 330ns), 100u);
   EXPECT_LT(good_frames(300ns, 315ns), 20u);  // an edge falls on the sample, which reads the old bit or the new one
@@ -118,12 +118,12 @@ TEST(BissDevice, LineDelayCorruptsAtHighClocks) {
   EXPECT_EQ(good_frames(300ns, 227ns), 0u);  // a whole bit late: SLO goes low one sample late
 }
 
-TEST(BissDevice, AWholeBitLateIsOneMoreIdleSample) {
+TEST(BissDevice, LineDelayOfAWholeBitAddsAnIdleSample) {
   Bench bench(line_settings, format_with(Format{}.latency, 2us, 1500ns));
   EXPECT_EQ(bench.clock(7, 1ms, 1'000'000), "1110010");
 }
 
-TEST(BissDevice, NeverReadyIsNeverAStartBit) {
+TEST(BissDevice, SendsNoStartBitWhenNeverReady) {
   Bench bench(line_settings, format_with(Format{}.latency, 1ms));
   EXPECT_EQ(bench.clock(512, 1ms, 1'000'000), "11" + std::string(510, '0'));
 }

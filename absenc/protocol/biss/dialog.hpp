@@ -29,7 +29,7 @@ class ControlDialog : public author::ClockedHostOf<ProtocolOf<F>>, public author
     return Frame{*this};
   }
   /// Sets the CDM bit after the last frame.
-  void say(bool cdm) { cdm_ = cdm; }
+  void set_cdm(bool cdm) { cdm_ = cdm; }
   /// Number of clocked frames, and of those with an error.
   [[nodiscard]] std::uint32_t frames() const { return frames_; }
   /// Returns the number of frames that failed a check.
@@ -42,7 +42,7 @@ class ControlDialog : public author::ClockedHostOf<ProtocolOf<F>>, public author
   [[nodiscard]] bool is_alone() const { return outcome_.alone; }
   [[nodiscard]] ChangeSent change_sent() const final { return this->change(); }
   /// Accepts frames without process data, which a command may have switched off: their CDS is valid.
-  void take_empty_frames() { takes_empty_ = true; }
+  void accept_empty_frames() { accepts_empty_ = true; }
   /// Emits each valid position before the next frame begins.
   void emit_positions() { emits_ = true; }
 
@@ -60,7 +60,7 @@ class ControlDialog : public author::ClockedHostOf<ProtocolOf<F>>, public author
  private:
   // Returns sequence_mismatch if the life counter did not advance by one since the last frame. It can be checked
   // because this dialog reads every frame.
-  [[nodiscard]] Error moved(const Reply& reply) {
+  [[nodiscard]] Error check_life_counter(const Reply& reply) {
     const int now = life_counter_of(this->format(), reply);
     const int before = std::exchange(life_counter_, now);
     if (now < 0 || before < 0) return Error::none;
@@ -76,8 +76,8 @@ class ControlDialog : public author::ClockedHostOf<ProtocolOf<F>>, public author
     last_ = detail::decoded(this->format(), samples, Cds::any);
     if (start_.is_due(last_.error())) return this->clock(start_pulses);
     ++frames_;
-    if (!extended_ && needs_more(last_.error(), samples)) extended_ = true;
-    if (takes_empty_ && last_.error() == Error::bad_checksum && take_empty(samples)) return resume();
+    if (!extended_ && ended_early(last_.error(), samples)) extended_ = true;
+    if (accepts_empty_ && last_.error() == Error::bad_checksum && accept_empty(samples)) return resume();
     if (last_) {
       const unsigned head = last_->delay_bits + last_->ack_bits;
       const unsigned expected = head_bits(this->format(), this->format().latency, this->format().period());
@@ -86,7 +86,7 @@ class ControlDialog : public author::ClockedHostOf<ProtocolOf<F>>, public author
       if (head > expected && !again) last_ = Error::truncated;
     }
     if (last_) {
-      const Error error = moved(*last_);
+      const Error error = check_life_counter(*last_);
       if (error != Error::none) last_ = error;
     } else {
       life_counter_ = -1;
@@ -99,7 +99,7 @@ class ControlDialog : public author::ClockedHostOf<ProtocolOf<F>>, public author
     }
     resume();
   }
-  [[nodiscard]] bool take_empty(BitView samples) {
+  [[nodiscard]] bool accept_empty(BitView samples) {
     Reply head;
     if (!is_empty_frame(samples, head)) return false;
     last_ = head;
@@ -121,7 +121,7 @@ class ControlDialog : public author::ClockedHostOf<ProtocolOf<F>>, public author
   bool cdm_ = false;
   bool extended_ = false;
   bool emits_ = false;
-  bool takes_empty_ = false;
+  bool accepts_empty_ = false;
   bool emitting_ = false;
 };
 

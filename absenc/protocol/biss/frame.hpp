@@ -118,14 +118,14 @@ struct Format {
 /// Returns the clocks that the slaves between an encoder and the host add to the ACK: each passes the start bit on one
 /// clock later.
 template <class AnyFormat>
-[[nodiscard]] constexpr unsigned passing_bits(const AnyFormat&) {
+[[nodiscard]] constexpr unsigned relay_bits(const AnyFormat&) {
   return 0;
 }
 
 /// Returns the clocks between the idle samples and the start bit.
 template <class AnyFormat>
 [[nodiscard]] constexpr unsigned head_bits(const AnyFormat& format, Time latency, Time period) {
-  return ack_bits(latency, period) + passing_bits(format);
+  return ack_bits(latency, period) + relay_bits(format);
 }
 
 /// Returns the clocks that a whole frame needs.
@@ -299,7 +299,7 @@ template <class ReplyType>
 }
 
 /// Returns whether the samples ended before the frame did, because encoder or line need longer than expected.
-[[nodiscard]] constexpr bool needs_more(Error error, BitView samples) {
+[[nodiscard]] constexpr bool ended_early(Error error, BitView samples) {
   if (error == Error::truncated) return true;
   return error == Error::bad_framing && samples.end_of_run(samples.end_of_run(0)) == samples.size;
 }

@@ -48,7 +48,7 @@ TEST(BissFrame, HammingDistanceIsThreeUpTo55BitsAndTwoAbove) {
   }
 }
 
-TEST(BissFrame, EveryOffsetInSixtyFourSamples) {
+TEST(BissFrame, DecodesAtEveryOffsetInSixtyFourSamples) {
   const Format format = of_bits(32);
   const Word word{.position = 0x89AB'CDEF, .warning = true};
   unsigned offsets = 0;
@@ -127,7 +127,7 @@ constexpr Format started{.word = "position:24 error:1! warning:1!"_word, .check 
 constexpr Format small_crc{.word = "position:8 error:1! warning:1!"_word, .check = {5, 0x05}};
 constexpr Format long_checked{.word = "position:64 skip:20 error:1! warning:1!"_word, .check = crc16};
 
-TEST(BissFrame, AKnownFormatIsDecodedAsAnyOther) {
+TEST(BissFrame, DecodesCompileTimeFormatLikeRunTimeFormat) {
   agree<plain>(1);
   agree<turns>(2);
   agree<behind>(3);
@@ -140,7 +140,7 @@ TEST(BissFrame, AKnownFormatIsDecodedAsAnyOther) {
   static_assert(decode<plain>(BitView{}).error() == Error::wrong_length);
 }
 
-TEST(BissFrame, AnyCrcIsThatOfItsDefinition) {
+TEST(BissFrame, ComputesCrcOfAnyParameters) {
   sim::Random random(11);
   for (int i = 0; i < 2'000; ++i) {
     const auto width = static_cast<std::uint8_t>(3 + random.below(14));
@@ -155,7 +155,7 @@ TEST(BissFrame, AnyCrcIsThatOfItsDefinition) {
   }
 }
 
-TEST(BissFrame, SafetyCrcSeesEveryErrorOfThreeBits) {
+TEST(BissFrame, SafetyCrcDetectsEveryErrorOfThreeBits) {
   const Format format{.word = word_with_status({.position = 24}), .check = crc16};
   const BitBuffer<512> samples =
       samples_of(format, {.ack_bits = 4, .word = {.position = 0xABCDEF}, .life_counter = 41}, 2);
@@ -175,7 +175,7 @@ TEST(BissFrame, SafetyCrcSeesEveryErrorOfThreeBits) {
   }
 }
 
-TEST(BissTiming, AckFollowsLatencyAndClock) {
+TEST(BissTiming, AckBitsFollowLatencyAndClock) {
   EXPECT_EQ(ack_bits(10us, 1us), 10u);
   EXPECT_EQ(ack_bits(10us, 999ns), 11u);
   EXPECT_EQ(ack_bits(10us, 28'571ns), 1u);

@@ -120,14 +120,14 @@ class PositionReader : public author::ClockedHostOf<ProtocolOf<F>> {
     if constexpr (finds) {
       if (start_.is_due(error)) return this->clock(start_pulses);
       // A line that stays idle may have a longer delay than expected: the host clocks once for the longest delay.
-      if (error == Error::line_stuck && samples[0] && !second_ && !looked_further_) {
-        looked_further_ = true;
+      if (error == Error::line_stuck && samples[0] && !second_ && !tried_longest_delay_) {
+        tried_longest_delay_ = true;
         return this->clock(P::all_clocks(this->format()));
       }
       const unsigned head = this->last().delay_bits + this->last().ack_bits;
       const bool expected =
           tries_ == 0 && head <= head_bits(this->format(), this->format().latency, this->format().period());
-      const bool late = error == Error::none ? !expected && !late_.is_again(head) : needs_more(error, samples);
+      const bool late = error == Error::none ? !expected && !late_.is_again(head) : ended_early(error, samples);
       if (late && tries_++ < most_late) return this->clock(P::all_clocks(this->format()));
       if (late) return this->conclude(Error::truncated);
     }
@@ -142,7 +142,7 @@ class PositionReader : public author::ClockedHostOf<ProtocolOf<F>> {
   }
 
   bool second_ = false;
-  bool looked_further_ = false;
+  bool tried_longest_delay_ = false;
   std::uint8_t tries_ = 0;
   [[no_unique_address]] std::conditional_t<finds, LateFrames, author::Later> late_{};
   [[no_unique_address]] std::conditional_t<finds, StartSequence, author::NoRequest> start_{};

@@ -19,7 +19,7 @@ using testing::Bench;
 
 const Format turns_19{.word = word_with_status({.position = 19, .multiturn = 16})};
 
-TEST(BissHost, ReadsAtTheFirstFallingEdge) {
+TEST(BissHost, LatchesAtFirstFallingEdge) {
   Bench bench(line_settings, turns_19);
   bench.shaft.state.position = (std::int64_t{1} << 32) + (std::int64_t{275096} << 13);
   ReadPosition read(turns_19);
@@ -36,7 +36,7 @@ TEST(BissHost, ReadsAtTheFirstFallingEdge) {
   EXPECT_EQ(bench.encoder.violation_count(), 0u);
 }
 
-TEST(BissHost, LeavesTheTimeoutOfItsFormat) {
+TEST(BissHost, PausesForTimeoutOfFormat) {
   for (const auto& [timeout, rest] : std::to_array<std::pair<Timeout, Time>>({{{}, 40us},
                                                                               {Timeout::fixed(12'500ns), 12'500ns},
                                                                               {Timeout::fixed(25us), 25us},
@@ -51,7 +51,7 @@ TEST(BissHost, LeavesTheTimeoutOfItsFormat) {
   }
 }
 
-TEST(BissHost, AckFollowsTheClock) {
+TEST(BissHost, ClocksEnoughForAckAtEveryClock) {
   for (const std::uint16_t khz : std::to_array<std::uint16_t>({100, 1'000, 4'400, 6'000, 10'000})) {
     const Format format{.word = turns_19.word, .ma_khz = khz};
     Bench bench(line_settings, format);
@@ -62,7 +62,7 @@ TEST(BissHost, AckFollowsTheClock) {
   }
 }
 
-TEST(BissHost, ErrorBitMakesThePositionInvalid) {
+TEST(BissHost, ErrorBitInvalidatesPosition) {
   Bench bench(line_settings, turns_19);
   for (const std::uint32_t alarms : {0u, word_error, word_warning, word_error | word_warning}) {
     bench.encoder.lower_alarms(~0u);
@@ -75,7 +75,7 @@ TEST(BissHost, ErrorBitMakesThePositionInvalid) {
   }
 }
 
-TEST(BissHost, WhatTheLineDoesWrong) {
+TEST(BissHost, ReportsLateFrameStuckLineAndImpossibleClock) {
   Bench slow(line_settings, turns_19, Behaviour{.latency = 12us});
   ReadPosition truncated(turns_19);
   EXPECT_EQ(slow.run(truncated).error(), Error::truncated);
@@ -97,7 +97,7 @@ TEST(BissHost, WhatTheLineDoesWrong) {
   EXPECT_EQ(impossible.error(), Error::invalid_argument);
 }
 
-TEST(BissHost, AddsTheClocksThatTheLineNeeds) {
+TEST(BissHost, AddsClocksForLineDelay) {
   for (const Time delay : {1us, 3us, 17us, 40us}) {
     Bench bench(line_settings, turns_19, Behaviour{.latency = 30us, .line_delay = delay + 500ns});
     bench.shaft.state.position = std::int64_t{275096} << 13;
@@ -164,7 +164,7 @@ constexpr Format known_life_counter{
     .word = word_with_status({.position = 32, .multiturn = 12}), .check = crc16, .latency = 5us};
 constexpr Format known_linear{.word = word_with_status({.position = 26}), .scale = {.linear = true, .unit_um = 0.5}};
 
-TEST(BissHost, KnownFormatsAreReadAsAnyFormat) {
+TEST(BissHost, ReadsCompileTimeFormatLikeRunTimeFormat) {
   reads_as_any_format<known_default>();
   reads_as_any_format<known_turns>();
   reads_as_any_format<known_life_counter>();
@@ -172,7 +172,7 @@ TEST(BissHost, KnownFormatsAreReadAsAnyFormat) {
 }
 
 // A late frame whose delay is not repeated may be the result of a lost start bit.
-TEST(BissHost, FramesThatAreLateByChanceAreNoPosition) {
+TEST(BissHost, RejectsLateFramesThatDoNotAgree) {
   FindPosition<Format> read(turns_19);
   Time now{};
   unsigned frames = 0;
@@ -202,14 +202,14 @@ void expect_ten_microseconds() {
   EXPECT_EQ(bench.run(read).error(), Error::none);
   EXPECT_EQ(bench.encoder.violation_count(), 0u);
 }
-TEST(BissHost, TenMicrosecondsAreAssumed) {
+TEST(BissHost, AssumesLatencyOfTenMicroseconds) {
   expect_ten_microseconds<Format>();
   expect_ten_microseconds<SafetyFormat>();
   expect_ten_microseconds<ChainFormat>();
 }
 
 // After power on: 40 us, two pulses, 40 us, and only then a frame.
-TEST(BissHost, GivesTheStartSequenceWhereNothingComes) {
+TEST(BissHost, SendsStartSequenceWhenFirstFrameIsStuck) {
   Format format = turns_19;
   format.start_sequence = true;
   Bench bench(line_settings, format);
@@ -250,7 +250,7 @@ TEST(BissHost, GivesTheStartSequenceWhereNothingComes) {
   EXPECT_EQ(clocks, (std::vector<std::size_t>{frame, start_pulses, frame, longest}));  // each of them once
 }
 
-TEST(BissHost, LooksFurtherBeforeALineIsStuck) {
+TEST(BissHost, ClocksLongerBeforeReportingStuckLine) {
   for (const auto& [khz, latency, delay] :
        std::to_array<std::tuple<std::uint16_t, Time, std::uint32_t>>({{1000, 10us, 39'500}, {10'000, 1us, 5'050}})) {
     Format format = turns_19;
@@ -265,7 +265,7 @@ TEST(BissHost, LooksFurtherBeforeALineIsStuck) {
   }
 }
 
-TEST(BissHost, SaysWhatToDo) {
+TEST(BissHost, ExplainsErrors) {
   const auto found = [](Error error, std::int64_t latency_ns) {
     Options options;
     EXPECT_EQ(resolve_options(unit, {}, {}, options).kind, OptionError::Kind::none);
@@ -312,7 +312,7 @@ Error read_safety(std::uint8_t first, std::uint8_t second, std::size_t flip = ~s
   return read.error();
 }
 
-TEST(BissHost, SafetyNeedsALifeCounterThatMoves) {
+TEST(BissHost, SafetyReadingNeedsAdvancingLifeCounter) {
   EXPECT_EQ(read_safety(41, 42), Error::none);
   EXPECT_EQ(read_safety(63, 0), Error::none);
   EXPECT_EQ(read_safety(0, 1), Error::none);
@@ -323,7 +323,7 @@ TEST(BissHost, SafetyNeedsALifeCounterThatMoves) {
   EXPECT_EQ(read_safety(41, 42, 20), Error::bad_checksum);
 }
 
-TEST(BissHost, LifeCounterGoesOnAtZero) {
+TEST(BissHost, LifeCounterWrapsToZero) {
   Bench bench(line_settings, safety);
   for (int i = 0; i < 70; ++i) {
     ReadPosition read(safety);

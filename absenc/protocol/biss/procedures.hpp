@@ -4,8 +4,8 @@
 
 #include <algorithm>
 
+#include "absenc/protocol/biss/control_results.hpp"
 #include "absenc/protocol/biss/dialog.hpp"
-#include "absenc/protocol/biss/found.hpp"
 
 namespace absenc::biss {
 
@@ -26,20 +26,20 @@ inline constexpr std::string_view refused =
 
 /// Runs one control frame to its end.
 template <class F>
-Part<Error> carry(ControlDialog<F>& dialog, ControlMaster& master) {
+Part<Error> run_control_frame(ControlDialog<F>& dialog, ControlMaster& master) {
   Time waits_since{};
   while (!master.is_over()) {
     const Result<typename ControlDialog<F>::Reply> reply = co_await dialog.frame();
     if (!reply) {
-      dialog.say(false);
+      dialog.set_cdm(false);
       master.fail(reply.error());
       break;
     }
     const bool waited = master.is_waiting();
-    dialog.say(master.next(reply->cds));
+    dialog.set_cdm(master.next(reply->cds));
     if (!waited) waits_since = dialog.now();
     if (master.is_waiting() && dialog.now() - waits_since > 2 * start_limit) {
-      dialog.say(false);
+      dialog.set_cdm(false);
       master.fail(Error::busy);
     }
   }
@@ -54,7 +54,7 @@ Part<Error> carry(ControlDialog<F>& dialog, ControlMaster& master) {
 }
 
 /// Returns whether a repetition may help: after a damaged frame, or a header that the encoder did not receive.
-[[nodiscard]] constexpr bool may_pass(Error error) {
+[[nodiscard]] constexpr bool is_repeatable(Error error) {
   return error != Error::request_rejected && error != Error::busy && error != Error::invalid_argument;
 }
 
@@ -76,10 +76,10 @@ Part<Error> read_registers(ControlDialog<F>& dialog, ControlMaster& master, Byte
   ByteBuffer<control_most> before;
   for (unsigned attempt = 0; attempt < control_attempts; ++attempt) {
     master.read(slave, first, count);
-    error = co_await carry(dialog, master);
+    error = co_await run_control_frame(dialog, master);
     const Bytes data = master.frame().data;
     const bool stopped = error == Error::request_rejected && !data.empty();
-    if (!stopped && !may_pass(error)) break;
+    if (!stopped && !is_repeatable(error)) break;
     if (!stopped && error != Error::none) continue;
     const bool confirmed = std::equal(data.begin(), data.end(), before.view().begin(), before.view().end());
     if (!confirmed && was_late(master.frame())) {
@@ -102,7 +102,7 @@ template <class F>
 Part<Error> write_register(ControlDialog<F>& dialog, ControlMaster& master, unsigned address, std::uint8_t value) {
   const std::array<std::uint8_t, 1> bytes{value};
   master.write(dialog.format().slave, address, bytes);
-  const Error error = co_await carry(dialog, master);
+  const Error error = co_await run_control_frame(dialog, master);
   if (error == Error::request_rejected) co_return error;
   ByteBuffer<control_most> now;
   const Error read = co_await read_registers(dialog, master, now, address, 1);
@@ -135,7 +135,7 @@ Part<Error> select_bank(ControlDialog<F>& dialog, ControlMaster& master, unsigne
 }
 
 template <class F>
-Procedure read_memory(ControlDialog<F>& dialog, Found& found, Arguments arguments) {
+Procedure read_memory(ControlDialog<F>& dialog, ControlResults& found, Arguments arguments) {
   const auto address = static_cast<unsigned>(arguments[0]);
   const auto bank = static_cast<unsigned>(arguments[1]);
   const auto count = static_cast<unsigned>(arguments[2]);
@@ -160,7 +160,7 @@ Procedure read_memory(ControlDialog<F>& dialog, Found& found, Arguments argument
 
 // Writes a byte unless it has this value already: a register may wear out, and only its maker knows how fast.
 template <class F>
-Procedure write_memory(ControlDialog<F>& dialog, Found& found, Arguments arguments) {
+Procedure write_memory(ControlDialog<F>& dialog, ControlResults& found, Arguments arguments) {
   const auto address = static_cast<unsigned>(arguments[0]);
   const auto value = static_cast<std::uint8_t>(arguments[1]);
   const auto bank = static_cast<unsigned>(arguments[2]);
@@ -194,14 +194,14 @@ Procedure write_memory(ControlDialog<F>& dialog, Found& found, Arguments argumen
 
 // Reads a named register. A refusal means that the encoder does not have it, which is a result too.
 template <class F>
-Procedure read_setting(ControlDialog<F>& dialog, Found& found, unsigned address) {
+Procedure read_setting(ControlDialog<F>& dialog, ControlResults& found, unsigned address) {
   ControlMaster master;
   ByteBuffer<control_most> bytes;
   const Error error = co_await read_registers(dialog, master, bytes, address, registers::size_of(address));
   if (error != Error::none && error != Error::request_rejected) co_return failure_of(error);
   found.slave_id = dialog.format().slave;
   if (error == Error::none) {
-    tell(found, dialog.format().register_order, address, bytes);
+    store_register(found, dialog.format().register_order, address, bytes);
   } else {
     found.missing = true;
   }
@@ -209,7 +209,7 @@ Procedure read_setting(ControlDialog<F>& dialog, Found& found, unsigned address)
 }
 
 template <class F>
-Procedure write_bank(ControlDialog<F>& dialog, Found& found, Arguments arguments) {
+Procedure write_bank(ControlDialog<F>& dialog, ControlResults& found, Arguments arguments) {
   ControlMaster master;
   const auto bank = static_cast<std::uint8_t>(arguments[0]);
   const Error error = co_await change_register(dialog, master, registers::bank_select, bank);
@@ -222,7 +222,7 @@ Procedure write_bank(ControlDialog<F>& dialog, Found& found, Arguments arguments
 
 // Reads the registers that identify the encoder. Leaves out those that it refuses.
 template <class F>
-Procedure read_info(ControlDialog<F>& dialog, Found& found) {
+Procedure read_info(ControlDialog<F>& dialog, ControlResults& found) {
   ControlMaster master;
   ByteBuffer<control_most> sheet;
   Error error =
@@ -234,7 +234,8 @@ Procedure read_info(ControlDialog<F>& dialog, Found& found) {
   const RegisterOrder order = dialog.format().register_order;
   if (error == Error::none) {
     for (const unsigned address : {registers::eds_bank, registers::profile, registers::serial_number}) {
-      tell(found, order, address, sheet.view().subspan(address - registers::eds_bank, registers::size_of(address)));
+      store_register(found, order, address,
+                     sheet.view().subspan(address - registers::eds_bank, registers::size_of(address)));
     }
   }
   ByteBuffer<control_most> names;
@@ -245,7 +246,8 @@ Procedure read_info(ControlDialog<F>& dialog, Found& found) {
   }
   if (error == Error::none) {
     for (const unsigned address : {registers::device_id, registers::manufacturer}) {
-      tell(found, order, address, names.view().subspan(address - registers::device_id, registers::size_of(address)));
+      store_register(found, order, address,
+                     names.view().subspan(address - registers::device_id, registers::size_of(address)));
     }
   }
   co_return done;
@@ -254,18 +256,18 @@ Procedure read_info(ControlDialog<F>& dialog, Found& found) {
 /// Sends a command to the slaves of a mask; 0: to all, without acknowledgement. The last bit is sent after one more
 /// frame. The frames may be without process data before or after the command.
 template <class F>
-Procedure send_command(ControlDialog<F>& dialog, Found& found, Arguments arguments) {
+Procedure send_command(ControlDialog<F>& dialog, ControlResults& found, Arguments arguments) {
   ControlMaster master;
-  dialog.take_empty_frames();
+  dialog.accept_empty_frames();
   master.command(static_cast<std::uint8_t>(arguments[0]), static_cast<unsigned>(arguments[1]));
   dialog.changes();
-  const Error error = co_await carry(dialog, master);
+  const Error error = co_await run_control_frame(dialog, master);
   const Result<typename ControlDialog<F>::Reply> last = co_await dialog.frame();
   if (error == Error::request_rejected) dialog.refused();
   if (error == Error::request_rejected) co_return only(error, "not every encoder acknowledged: nothing was executed");
   if (error != Error::none) co_return failure_of(error);
   if (!last) co_return only(last.error(), "whether the encoders obeyed is not known");
-  found = shown_by(master.frame(), true);
+  found = results_of(master.frame(), true);
   co_return done;
 }
 

@@ -7,17 +7,17 @@
 #include <string>
 #include <vector>
 
-#include "absenc/protocol/biss/questions_test.hpp"
+#include "absenc/protocol/biss/procedure_bench_test.hpp"
 
 namespace absenc::biss {
 namespace {
 
-using testing::Asking;
-using testing::Questions;
+using testing::ProcedureBench;
+using testing::ProcedureRun;
 
-TEST(BissProcedures, WhatNoRegisterCanBeIsNotAsked) {
-  Questions one;
-  const auto refused = [&one](const Found&) { EXPECT_EQ(one.encoder.answer_count(), 0u); };
+TEST(BissProcedures, RefusesImpossibleRegistersWithoutRequest) {
+  ProcedureBench one;
+  const auto refused = [&one](const ControlResults&) { EXPECT_EQ(one.encoder.answer_count(), 0u); };
   const Error no = Error::invalid_argument;
   refused(one.ask<read_memory<Format>>({60, 0, 5}, no));   // beyond the end of the bank
   refused(one.ask<read_memory<Format>>({120, 0, 9}, no));  // beyond the last register
@@ -36,11 +36,11 @@ TEST(BissProcedures, WhatNoRegisterCanBeIsNotAsked) {
 }
 
 // D2: an encoder takes up to 20 ms for a start bit; the host waits twice as long.
-TEST(BissProcedures, AStartBitIsWaitedForFortyMilliseconds) {
+TEST(BissProcedures, WaitsFortyMillisecondsForStartBit) {
   const auto asked = [](std::uint16_t delay_us, Error expected) {
     Format format = testing::bits_24;
     format.register_delay_us = delay_us;
-    Questions one(format);
+    ProcedureBench one(format);
     one.ask<read_setting<Format>, registers::profile>({}, expected);
   };
   asked(38'000, Error::none);
@@ -48,20 +48,20 @@ TEST(BissProcedures, AStartBitIsWaitedForFortyMilliseconds) {
 }
 
 // LENZ's reader treats P = 1 after bank select as a fault; other encoders send it after each register.
-TEST(BissProcedures, StopBitDoesNotEndWhatIsRead) {
+TEST(BissProcedures, ReadsOnAfterStopBit) {
   for (const StopBit stop_bit : {StopBit::next, StopBit::zero, StopBit::one}) {
     Format format = testing::bits_24;
     format.stop_bit = stop_bit;
-    Questions one(format);
+    ProcedureBench one(format);
     EXPECT_EQ(one.ask<read_memory<Format>>({registers::device_id, 0, 6}).bytes.view()[2], 's');
     EXPECT_EQ(one.ask<write_memory<Format>>({3, 7, 2, 1}).written, true);
     EXPECT_EQ(one.ask<read_memory<Format>>({3, 2, 1}).value, 7);
   }
-  EXPECT_EQ(Questions().ask<read_memory<Format>>({0, 9, 1}, Error::request_rejected).bytes.size(), 0u);
+  EXPECT_EQ(ProcedureBench().ask<read_memory<Format>>({0, 9, 1}, Error::request_rejected).bytes.size(), 0u);
 }
 
-TEST(BissProcedures, CommandsOfTheStandardAreObeyed) {
-  Questions one;
+TEST(BissProcedures, EncoderExecutesCommandsOfTheStandard) {
+  ProcedureBench one;
   const auto position = [&one] {
     FindPosition<Format> read(one.format);
     one.line.replace(one.node, read);
@@ -70,21 +70,21 @@ TEST(BissProcedures, CommandsOfTheStandardAreObeyed) {
   };
   one.ask<read_setting<Format>, registers::profile>({});
   EXPECT_EQ(position(), Error::none);
-  EXPECT_EQ(one.ask<send_command<Format>>({0, 0}).executed, true);  // process data of all slaves off
+  EXPECT_EQ(one.ask<send_command<Format>>({0, 0}).executed, true);  // switches process data of all slaves off
   EXPECT_EQ(position(), Error::bad_checksum);
-  EXPECT_EQ(one.ask<send_command<Format>>({1, 0}).executed, true);  // process data of slave 0 on
+  EXPECT_EQ(one.ask<send_command<Format>>({1, 0}).executed, true);  // switches process data of slave 0 on
   EXPECT_EQ(position(), Error::none);
-  EXPECT_EQ(one.ask<send_command<Format>>({1, 1}).executed, true);  // control communication of slave 0 off
+  EXPECT_EQ(one.ask<send_command<Format>>({1, 1}).executed, true);  // switches control communication of slave 0 off
   one.ask<read_setting<Format>, registers::profile>({}, Error::timeout);
   EXPECT_EQ(position(), Error::none);
-  EXPECT_EQ(one.ask<send_command<Format>>({0, 1}).executed, true);  // control communication of all slaves on
+  EXPECT_EQ(one.ask<send_command<Format>>({0, 1}).executed, true);  // switches control communication of all slaves on
   one.ask<read_setting<Format>, registers::profile>({});
   one.ask<send_command<Format>>({1, 2}, Error::request_rejected);  // command defined by the maker
 }
 
 /// An encoder that loses the written value of register 3.
-struct Forgets final : Machine<std::uint8_t> {
-  explicit Forgets(VirtualEncoder& of) : encoder(of) {}
+struct ForgetfulEncoder final : Machine<std::uint8_t> {
+  explicit ForgetfulEncoder(VirtualEncoder& of) : encoder(of) {}
   void feed(const Event<std::uint8_t>& event) override {
     encoder.feed(event);
     encoder.memory()[3] = 0;
@@ -97,21 +97,21 @@ struct Forgets final : Machine<std::uint8_t> {
   VirtualEncoder& encoder;
 };
 
-TEST(BissProcedures, WhatIsNotKeptWasNotWritten) {
+TEST(BissProcedures, FailsWriteThatTheEncoderLoses) {
   const sim::Motion motion = sim::Motion::constant_speed(0, 600);
   VirtualEncoder encoder(testing::bits_24, motion);
   encoder.power_on(Time{}, Device<std::uint8_t>::PowerOn::skip);
-  Forgets forgets(encoder);
+  ForgetfulEncoder forgets(encoder);
   sim::Line<std::uint8_t> line(LinkKind::clocked, line_settings);
   line.attach(sim::Role::device, forgets);
   const std::array<std::int64_t, 4> arguments{3, 7, 0, 0};
   std::vector<std::byte> storage(4096);
-  Asking<write_memory<Format>> asking(testing::bits_24, arguments, storage);
+  ProcedureRun<write_memory<Format>> asking(testing::bits_24, arguments, storage);
   EXPECT_TRUE(line.run(line.attach(sim::Role::host, asking), 10s));
   EXPECT_EQ(asking.error(), Error::cross_check_failed);
 }
 
-std::vector<std::string> names_of(const Found& found) {
+std::vector<std::string> names_of(const ControlResults& found) {
   struct Names final : FieldSink {
     void put(const FieldValue& value) override { names.emplace_back(value.info->name); }
     std::vector<std::string> names;
@@ -120,9 +120,9 @@ std::vector<std::string> names_of(const Found& found) {
   return sink.names;
 }
 
-TEST(BissProcedures, WhatWasNotFoundIsNotTold) {
+TEST(BissProcedures, ReportsOnlyFieldsWithValues) {
   using Names = std::vector<std::string>;
-  Questions one;
+  ProcedureBench one;
   EXPECT_EQ(names_of(one.ask<read_memory<Format>>({60, 0, 1})), (Names{"slave_id", "bank", "address", "value"}));
   EXPECT_EQ(names_of(one.ask<read_memory<Format>>({60, 0, 2})),
             (Names{"slave_id", "bank", "address", "value", "data"}));
@@ -172,7 +172,7 @@ std::vector<Error> errors_of(const Format& format, const std::array<Reply, 5>& r
 
 using Errors = std::vector<Error>;
 
-TEST(BissProcedures, TheLifeCounterMovesByOneFromFrameToFrame) {
+TEST(BissProcedures, RejectsLifeCounterThatDoesNotAdvanceByOne) {
   const Format format{.word = testing::bits_24.word, .check = crc16};
   const auto errors = [&format](std::array<std::uint8_t, 5> counters) {
     std::array<Reply, 5> replies{};
@@ -180,13 +180,13 @@ TEST(BissProcedures, TheLifeCounterMovesByOneFromFrameToFrame) {
     return errors_of(format, replies);
   };
   const Error none = Error::none;
-  const Error moved = Error::sequence_mismatch;
+  const Error check_life_counter = Error::sequence_mismatch;
   EXPECT_EQ(errors({61, 62, 63, 0, 1}), (Errors{none, none, none, none, none}));
-  EXPECT_EQ(errors({41, 42, 42, 43, 45}), (Errors{none, none, moved, none, moved}));
+  EXPECT_EQ(errors({41, 42, 42, 43, 45}), (Errors{none, none, check_life_counter, none, check_life_counter}));
 }
 
 // A lost start bit also makes a frame look late.
-TEST(BissProcedures, ALateFrameIsTakenWhenAnotherComesAsLate) {
+TEST(BissProcedures, AcceptsLateFrameWhenTheNextIsAsLate) {
   const auto errors = [](std::array<unsigned, 5> ack_bits) {
     std::array<Reply, 5> replies{};
     for (std::size_t i = 0; i < 5; ++i) replies[i].ack_bits = ack_bits[i];

@@ -11,7 +11,7 @@
 #include <set>
 #include <vector>
 
-#include "absenc/protocol/biss/questions_test.hpp"
+#include "absenc/protocol/biss/procedure_bench_test.hpp"
 #include "absenc/sim/faults.hpp"
 #include "absenc/sim/motion.hpp"
 #include "absenc/sim/random.hpp"
@@ -20,7 +20,7 @@ namespace absenc::biss {
 namespace {
 
 using testing::bits_24;
-using testing::Questions;
+using testing::ProcedureBench;
 
 #if defined(__SANITIZE_ADDRESS__)
 constexpr bool slow = true;
@@ -44,7 +44,7 @@ std::uint32_t frames_wanted(std::uint32_t usual = some) {
 std::uint32_t limit = 0;  // number of frames for the next host; a global, because a procedure starts in its constructor
 
 /// Counts of a host's accesses, and the register values that it relies on.
-struct Work {
+struct HostRecord {
   std::uint32_t frames = limit;
   std::uint32_t reads = 0;
   std::uint32_t writes = 0;
@@ -58,32 +58,32 @@ struct Work {
 };
 
 template <class F>
-Procedure work_on_a_bank(ControlDialog<F>& dialog, Work& work) {
+Procedure work_on_a_bank(ControlDialog<F>& dialog, HostRecord& record) {
   dialog.emit_positions();
   ControlMaster master;
-  auto& known = work.known;
-  auto& is_known = work.is_known;
+  auto& known = record.known;
+  auto& is_known = record.is_known;
   std::uint32_t seed = 1;
-  while (dialog.frames() < work.frames) {
+  while (dialog.frames() < record.frames) {
     for (unsigned address = 0; address < registers::bank_size; ++address) {
       ByteBuffer<control_most> bytes;
       seed = seed * 1'664'525 + 1'013'904'223;
       const std::size_t count = 1 + (seed >> 24) % 3;
       const std::size_t fits = std::min<std::size_t>(count, registers::bank_size - address);
       const Error error = co_await read_registers(dialog, master, bytes, address, fits);
-      ++work.reads;
-      if (error != Error::none) ++work.failures;
+      ++record.reads;
+      if (error != Error::none) ++record.failures;
       for (std::size_t i = 0; i < bytes.size(); ++i) {
-        if (is_known[address + i] && bytes[i] != known[address + i]) ++work.wrong;
-        work.read[address + i] = true;
+        if (is_known[address + i] && bytes[i] != known[address + i]) ++record.wrong;
+        record.read[address + i] = true;
       }
       const auto value = static_cast<std::uint8_t>(seed >> 16);
       const Error written = co_await write_register(dialog, master, address, value);
-      ++work.writes;
-      if (written != Error::none) ++work.failures;
+      ++record.writes;
+      if (written != Error::none) ++record.failures;
       is_known[address] = written == Error::none;  // after a failed write the value is unknown
       known[address] = value;
-      work.written[address] = work.written[address] || is_known[address];
+      record.written[address] = record.written[address] || is_known[address];
     }
   }
   co_return done;
@@ -92,8 +92,8 @@ Procedure work_on_a_bank(ControlDialog<F>& dialog, Work& work) {
 /// A host with its storage.
 template <class F>
 struct Host {
-  struct Machine final : author::Run<ProtocolOf<F>, Work, work_on_a_bank<F>> {
-    using author::Run<ProtocolOf<F>, Work, work_on_a_bank<F>>::Run;
+  struct Machine final : author::Run<ProtocolOf<F>, HostRecord, work_on_a_bank<F>> {
+    using author::Run<ProtocolOf<F>, HostRecord, work_on_a_bank<F>>::Run;
     void report(FieldSink&) const override {}
   };
   Host(const F& format, std::uint32_t frames) : storage((limit = frames, 4096)), machine(format, {}, storage) {}
@@ -138,9 +138,9 @@ Outcome run(Host<F>& host, const F& format, const sim::FaultRates& rates) {
   EXPECT_TRUE(line.run(node, std::chrono::hours(24)));
   outcome.damaged = faulty.damaged_replies();
   outcome.faults = faulty.counts();
-  const Work& work = host.machine.found();
+  const HostRecord& record = host.machine.found();
   for (unsigned address = 0; address < registers::bank_size; ++address) {
-    if (work.is_known[address] && encoder.memory()[address] != work.known[address]) ++outcome.wrong_bytes;
+    if (record.is_known[address] && encoder.memory()[address] != record.known[address]) ++outcome.wrong_bytes;
   }
   outcome.frames = host.machine.frames();
   outcome.bad_frames = host.machine.bad_frames();
@@ -148,10 +148,10 @@ Outcome run(Host<F>& host, const F& format, const sim::FaultRates& rates) {
   return outcome;
 }
 
-void expect_all_of_the_bank(const Work& work) {
+void expect_all_of_the_bank(const HostRecord& record) {
   for (unsigned address = 0; address < registers::bank_size; ++address) {
-    EXPECT_TRUE(work.read[address]) << address;
-    EXPECT_TRUE(work.written[address]) << address;
+    EXPECT_TRUE(record.read[address]) << address;
+    EXPECT_TRUE(record.written[address]) << address;
   }
 }
 
@@ -159,7 +159,7 @@ void expect_all_of_the_bank(const Work& work) {
 /// changes the bytes of a frame. Most accepted ones had an error in their ACK, so that they begin early, or lost their
 /// end, and the CRC of the rest is valid by chance.
 template <class Damage>
-double taken_share(const Format& format, const Damage& damage) {
+double accepted_share(const Format& format, const Damage& damage) {
   constexpr unsigned frames = 400'000;
   sim::Random random(5);
   unsigned taken = 0;
@@ -190,24 +190,24 @@ void truncate(sim::Random& random, std::span<std::uint8_t> bytes) {
   std::ranges::fill(bytes.subspan(1 + random.below(bytes.size() - 1)), std::uint8_t{0xFF});
 }
 
-TEST(BissRegisters, PositionsGoByWhileEveryRegisterIsReadAndWritten) {
+TEST(BissRegisters, ReadsEveryPositionDuringRegisterAccess) {
   const Format format = bits_24;
   Host<Format> host(format, frames_wanted());
   const Outcome seen = run(host, format, {});
-  const Work& work = host.machine.found();
+  const HostRecord& record = host.machine.found();
   EXPECT_EQ(host.machine.error(), Error::none);
   EXPECT_GE(seen.frames, frames_wanted());
   EXPECT_EQ(seen.positions, seen.frames);  // no position is missed
   EXPECT_EQ(seen.wrong, 0u);
   EXPECT_EQ(seen.gaps, 0u);
   EXPECT_EQ(seen.violations, 0u);
-  EXPECT_EQ(work.failures, 0u);
-  EXPECT_EQ(work.wrong, 0u);
+  EXPECT_EQ(record.failures, 0u);
+  EXPECT_EQ(record.wrong, 0u);
   EXPECT_EQ(seen.wrong_bytes, 0u);
-  expect_all_of_the_bank(work);
+  expect_all_of_the_bank(record);
 }
 
-TEST(BissRegisters, FaultsMakeNoWrongByte) {
+TEST(BissRegisters, FaultsCauseNoWrongRegisterByte) {
   const Format format = bits_24;
   sim::FaultRates rates;
   rates[sim::FaultKind::corrupt] = 0.004;
@@ -215,7 +215,7 @@ TEST(BissRegisters, FaultsMakeNoWrongByte) {
   rates[sim::FaultKind::silence] = 0.001;
   Host<Format> host(format, frames_wanted(a_million));
   const Outcome seen = run(host, format, rates);
-  const Work& work = host.machine.found();
+  const HostRecord& record = host.machine.found();
   EXPECT_GT(seen.damaged, seen.frames / 500);
   EXPECT_EQ(seen.positions + seen.bad_frames, seen.frames);
   EXPECT_LE(seen.bad_frames, seen.damaged);  // no undamaged frame is rejected
@@ -223,18 +223,18 @@ TEST(BissRegisters, FaultsMakeNoWrongByte) {
   const auto times = [&seen](sim::FaultKind kind) {
     return static_cast<double>(seen.faults[static_cast<std::size_t>(kind)]);
   };
-  const double computed = times(sim::FaultKind::corrupt) * taken_share(format, corrupt) +
-                          times(sim::FaultKind::truncate) * taken_share(format, truncate);
+  const double computed = times(sim::FaultKind::corrupt) * accepted_share(format, corrupt) +
+                          times(sim::FaultKind::truncate) * accepted_share(format, truncate);
   std::printf("%u frames, %llu damaged: %llu wrong positions, %.3g computed\n", seen.frames,
               static_cast<unsigned long long>(seen.damaged), static_cast<unsigned long long>(seen.wrong), computed);
   EXPECT_LE(static_cast<double>(seen.wrong), computed + 5 * std::sqrt(computed));
-  EXPECT_EQ(work.wrong, 0u);
+  EXPECT_EQ(record.wrong, 0u);
   EXPECT_EQ(seen.wrong_bytes, 0u);
-  EXPECT_LT(work.failures, (work.reads + work.writes) / 4);  // a write is not repeated
-  expect_all_of_the_bank(work);
+  EXPECT_LT(record.failures, (record.reads + record.writes) / 4);  // a write is not repeated
+  expect_all_of_the_bank(record);
 }
 
-TEST(BissRegisters, WithALifeCounterNoDamagedFrameIsAPosition) {
+TEST(BissRegisters, AcceptsNoDamagedFrameWithLifeCounter) {
   Format format = bits_24;
   format.check = crc16;
   sim::FaultRates rates;
@@ -246,8 +246,8 @@ TEST(BissRegisters, WithALifeCounterNoDamagedFrameIsAPosition) {
   EXPECT_EQ(host.machine.found().wrong, 0u);
 }
 
-TEST(BissRegisters, EachThatHasANameIsReadAlone) {
-  Questions one;
+TEST(BissRegisters, ReadsEachNamedRegister) {
+  ProcedureBench one;
   EXPECT_EQ((one.ask<read_setting<Format>, registers::eds_bank>().eds_bank), 0);
   EXPECT_EQ((one.ask<read_setting<Format>, registers::profile>().profile), 0);
   EXPECT_EQ((one.ask<read_setting<Format>, registers::serial_number>().serial_number), 1u);
@@ -255,34 +255,34 @@ TEST(BissRegisters, EachThatHasANameIsReadAlone) {
   EXPECT_EQ((one.ask<read_setting<Format>, registers::manufacturer>().manufacturer.view()), "ve");
   EXPECT_EQ((one.ask<read_setting<Format>, registers::bank_select>().bank), 0);
   one.ask<write_bank<Format>>({200});
-  const Found found = one.ask<read_setting<Format>, registers::bank_select>();
+  const ControlResults found = one.ask<read_setting<Format>, registers::bank_select>();
   EXPECT_EQ(found.bank, 200);
   EXPECT_FALSE(found.missing);
 }
 
 // Registers of a bank that does not exist are refused, like registers that an encoder does not have.
-TEST(BissRegisters, OneThatIsRefusedIsMissing) {
-  Questions one;
+TEST(BissRegisters, ReportsRefusedRegisterAsMissing) {
+  ProcedureBench one;
   one.ask<write_bank<Format>>({200});
-  const Found found = one.ask<read_setting<Format>, 0u>();
+  const ControlResults found = one.ask<read_setting<Format>, 0u>();
   EXPECT_EQ(found.missing, true);
   EXPECT_EQ(found.slave_id, 0);
   one.format.slave = 3;
   EXPECT_FALSE((one.ask<read_setting<Format>, registers::profile>({}, Error::timeout).missing));
 }
 
-TEST(BissRegisters, AnEncoderThatWaitsForItsStartHasRegisters) {
+TEST(BissRegisters, SendsStartSequenceBeforeRegisterAccess) {
   Format format = bits_24;
   format.start_sequence = true;
-  Questions waiting(format);
+  ProcedureBench waiting(format);
   EXPECT_EQ(waiting.ask<read_info<Format>>().serial_number, 1u);
   EXPECT_EQ(waiting.encoder.violation_count(), 0u);
-  Questions off;
+  ProcedureBench off;
   off.encoder.power_off(Time{});
   off.ask<read_info<Format>>({}, Error::line_stuck);
 }
 
-TEST(BissRegisters, SomeMakersHaveTheLowByteFirst) {
+TEST(BissRegisters, UsesByteOrderOfFormat) {
   for (const RegisterOrder encoders : {RegisterOrder::big, RegisterOrder::little}) {
     for (const RegisterOrder hosts : {RegisterOrder::big, RegisterOrder::little}) {
       Format of_encoder = bits_24;
@@ -293,7 +293,7 @@ TEST(BissRegisters, SomeMakersHaveTheLowByteFirst) {
       VirtualEncoder encoder(of_encoder, motion);
       encoder.power_on(Time{}, Device<std::uint8_t>::PowerOn::skip);
       std::vector<std::byte> storage(4096);
-      testing::Asking<read_info<Format>> asked(of_host, {}, storage);
+      testing::ProcedureRun<read_info<Format>> asked(of_host, {}, storage);
       sim::Line<std::uint8_t> line(LinkKind::clocked, line_settings);
       line.attach(sim::Role::device, encoder);
       EXPECT_TRUE(line.run(line.attach(sim::Role::host, asked), 10s));
@@ -303,7 +303,7 @@ TEST(BissRegisters, SomeMakersHaveTheLowByteFirst) {
   }
 }
 
-TEST(BissRegisters, AnEncoderThatIsSlowIsWaitedFor) {
+TEST(BissRegisters, WaitsForSlowRegisters) {
   Format format = bits_24;
   format.register_delay_us = 15'000;
   Host<Format> host(format, 1'000);

@@ -73,7 +73,7 @@ constexpr Error take_channel(const Channel& channel, BitView samples, std::size_
 
 // Returns the upper bits of the position, with the turns above them if both words have turns: near zero, one count
 // changes the turns.
-constexpr std::uint64_t promised(const Channel& channel, const Word& word, unsigned bits, unsigned turns) {
+constexpr std::uint64_t compared_bits(const Channel& channel, const Word& word, unsigned bits, unsigned turns) {
   const std::uint64_t position = word.position >> (channel.word.bits_of(Meaning::position) - bits);
   return ((word.multiturn & low_mask(turns)) << bits | position) & low_mask(turns + bits);
 }
@@ -88,12 +88,12 @@ constexpr std::uint64_t promised(const Channel& channel, const Word& word, unsig
 }
 
 /// Returns whether both words have the same position, within one count of the compared bits.
-[[nodiscard]] constexpr bool agree(const SafetyFormat& format, const SafetyReply& reply) {
+[[nodiscard]] constexpr bool positions_agree(const SafetyFormat& format, const SafetyReply& reply) {
   const unsigned turns = std::min({format.cpw.word.bits_of(Meaning::multiturn),
                                    format.spw.word.bits_of(Meaning::multiturn), 64u - format.compare_bits});
   const unsigned bits = format.compare_bits;
-  const std::uint64_t difference = (detail::promised(format.cpw, reply.cpw.word, bits, turns) -
-                                    detail::promised(format.spw, reply.spw.word, bits, turns) + 1) &
+  const std::uint64_t difference = (detail::compared_bits(format.cpw, reply.cpw.word, bits, turns) -
+                                    detail::compared_bits(format.spw, reply.spw.word, bits, turns) + 1) &
                                    low_mask(turns + bits);
   return difference <= 2;
 }
@@ -111,7 +111,7 @@ constexpr std::uint64_t promised(const Channel& channel, const Word& word, unsig
   const bool counts = format.spw.check.life_counter && format.previous_life_counter >= 0;
   const unsigned follows = static_cast<unsigned>(format.previous_life_counter + 1) & low_mask(life_counter_bits);
   if (counts && reply.spw.life_counter != follows) return Error::sequence_mismatch;
-  if (!agree(format, reply)) return Error::cross_check_failed;
+  if (!positions_agree(format, reply)) return Error::cross_check_failed;
   return reply;
 }
 

@@ -17,7 +17,7 @@ void expect_unusable(const F& format) {
   EXPECT_EQ(detail::decoded(format, frame.view()).error(), Error::invalid_argument);
 }
 
-TEST(BissWords, AChainHasOneToEightWordsWithAPositionEach) {
+TEST(BissWords, ChainNeedsOneToEightWordsWithPosition) {
   ChainFormat format;
   format.count = ChainFormat::most;
   format.slave = ChainFormat::most - 1;
@@ -34,7 +34,7 @@ TEST(BissWords, AChainHasOneToEightWordsWithAPositionEach) {
   expect_unusable(format);
 }
 
-TEST(BissWords, BothWordsOfSafetyNeedACheck) {
+TEST(BissWords, SafetyNeedsValidCheckInBothWords) {
   SafetyFormat format;
   EXPECT_TRUE(is_usable(format));
   format.cpw.check.poly = 0x02;
@@ -45,7 +45,7 @@ TEST(BissWords, BothWordsOfSafetyNeedACheck) {
 }
 
 // With an even polynomial the CRC does not detect every single bit error.
-TEST(BissWords, APolynomialEndsInOne) {
+TEST(BissWords, RejectsEvenPolynomial) {
   Options options;
   const std::array<OptionText, 2> even{{{"crc_width", "6"}, {"crc_poly", "2"}}};
   ASSERT_EQ(resolve_options(unit, {}, even, options).kind, OptionError::Kind::none);
@@ -64,13 +64,13 @@ void expect_no_room() {
   EXPECT_EQ(small.size(), 0u);
 }
 
-TEST(BissWords, WhatDoesNotFitIsNotEncoded) {
+TEST(BissWords, EncodeFailsWithoutRoom) {
   expect_no_room<Format>();
   expect_no_room<ChainFormat>();
   expect_no_room<SafetyFormat>();
 }
 
-TEST(BissWords, SafetyComparesBothWordsAndCountsFrames) {
+TEST(BissWords, SafetyComparesPositionsAndLifeCounter) {
   SafetyFormat format;
   const auto error = [&format](std::uint64_t control, std::uint64_t safety, std::uint8_t life_counter) {
     SafetyReply reply;
@@ -112,7 +112,7 @@ void expect_clocks_of_ten_microseconds() {
 }
 
 // After the frame of a single encoder SLO is low: identify must not take these zeros for another word.
-TEST(BissWords, ZerosBehindAFrameAreNoWord) {
+TEST(BissWords, RejectsZerosAfterFrameAsWord) {
   ChainFormat chain;
   chain.count = 2;
   chain.channels[1].check.inverted = false;
@@ -130,13 +130,13 @@ TEST(BissWords, ZerosBehindAFrameAreNoWord) {
   EXPECT_EQ(detail::decoded(safety, frame.view()).error(), Error::line_stuck);
 }
 
-TEST(BissWords, ClocksFollowTheClock) {
+TEST(BissWords, ClocksAreThoseOfTenMicrosecondsAtEveryRate) {
   expect_clocks_of_ten_microseconds<Format>();
   expect_clocks_of_ten_microseconds<ChainFormat>();
   expect_clocks_of_ten_microseconds<SafetyFormat>();
 }
 
-TEST(BissWords, EachSlaveOfAChainPassesTheStartBitOnOneClockLater) {
+TEST(BissWords, EachSlaveOfAChainDelaysStartBitByOneClock) {
   for (unsigned count = 1; count <= ChainFormat::most; ++count) {
     ChainFormat format;
     format.count = static_cast<std::uint8_t>(count);
@@ -149,7 +149,7 @@ TEST(BissWords, EachSlaveOfAChainPassesTheStartBitOnOneClockLater) {
   }
 }
 
-TEST(BissWords, TheEncodersBitStandsBehindTheStartBit) {
+TEST(BissWords, FindsCdsAfterStartBit) {
   const auto place = [](std::initializer_list<std::uint8_t> bytes, std::size_t bits) {
     return place_of_cds({.bytes = {bytes.begin(), bytes.size()}, .bits = bits});
   };

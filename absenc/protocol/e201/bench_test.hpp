@@ -19,52 +19,52 @@ constexpr std::int64_t count = std::int64_t{1} << 13;  // one count of 19 bits, 
 inline bool says(const std::string& text, const std::string& words) { return text.find(words) != std::string::npos; }
 
 /// A text that a test sends instead of the interface's reply, `after` the event before it.
-struct Said {
+struct TextReply {
   std::string text;
   Time after = 1ms;
 };
-using Tamper = std::function<std::optional<std::vector<Said>>(char letter)>;
+using Tamper = std::function<std::optional<std::vector<TextReply>>(char letter)>;
 
-inline Tamper answering(char letter, const std::vector<Said>& answer) {
+inline Tamper answering(char letter, const std::vector<TextReply>& answer) {
   return [=](char asked) { return asked == letter ? std::optional(answer) : std::nullopt; };
 }
 
 /// Passes the bytes of the interface on, except for commands that `tamper` answers itself.
-class Answering final : public Machine<std::uint8_t> {
+class TamperedInterface final : public Machine<std::uint8_t> {
  public:
-  explicit Answering(Device<std::uint8_t>& device) : device_(device) {}
+  explicit TamperedInterface(Device<std::uint8_t>& device) : device_(device) {}
 
   void feed(const Event<std::uint8_t>& event) override {
     if (event.kind == Event<std::uint8_t>::Kind::sent) {
       busy_ = false;
-      if (std::exchange(saying_, false)) return;
+      if (std::exchange(sending_text_, false)) return;
     }
     if (event.kind != Event<std::uint8_t>::Kind::received) return device_.feed(event);
     for (const std::uint8_t byte : event.items) {
       const auto asked = static_cast<char>(byte);
       if (rest_ > 0) {
-        if (--rest_; swallowed_) continue;
+        if (--rest_; is_tampered_) continue;
       } else {
         log.emplace_back(asked, event.at);
         const auto answer = tamper ? tamper(asked) : std::nullopt;
-        if (answer) due_ = *answer;
+        if (answer) pending_texts_ = *answer;
         rest_ = asked == 'M' ? 2 : 0;
-        swallowed_ = answer.has_value();
-        if (swallowed_) continue;
+        is_tampered_ = answer.has_value();
+        if (is_tampered_) continue;
       }
       device_.feed({.kind = event.kind, .at = event.at, .items = {&byte, 1}});
     }
   }
   Step<std::uint8_t> next(Time now) override {
     if (busy_) return {.at = never};
-    if (due_.empty()) {
+    if (pending_texts_.empty()) {
       const Step<std::uint8_t> step = device_.next(now);
       busy_ = step.kind == Step<std::uint8_t>::Kind::transfer;
       return step;
     }
-    out_ = due_.front();
-    due_.erase(due_.begin());
-    saying_ = busy_ = true;
+    out_ = pending_texts_.front();
+    pending_texts_.erase(pending_texts_.begin());
+    sending_text_ = busy_ = true;
     return {.kind = Step<std::uint8_t>::Kind::transfer,
             .out = {reinterpret_cast<const std::uint8_t*>(out_.text.data()), out_.text.size()},
             .at = now + out_.after};
@@ -81,17 +81,17 @@ class Answering final : public Machine<std::uint8_t> {
 
  private:
   Device<std::uint8_t>& device_;
-  std::vector<Said> due_;
-  Said out_;
+  std::vector<TextReply> pending_texts_;
+  TextReply out_;
   unsigned rest_ = 0;  // remaining bytes of this command
-  bool swallowed_ = false;
-  bool busy_ = false;    // a transmission is in progress
-  bool saying_ = false;  // the transmission in progress is a text of `tamper`
+  bool is_tampered_ = false;
+  bool busy_ = false;          // a transmission is in progress
+  bool sending_text_ = false;  // the transmission in progress is a text of `tamper`
 };
 
 /// Result of a command with the name of its error.
-struct Ended : Told {
-  Ended(const Told& told)
+struct CommandResult : Told {
+  CommandResult(const Told& told)
       : Told(told), error(told.finished ? text_of(told.error).name : "hangs"), fields(told.numbers) {}
   std::string error;
   Fields fields;
@@ -101,14 +101,16 @@ struct Bench : author::testing::UnitBench<19> {
   explicit Bench(std::string_view settings = "singleturn_bits=19 multiturn_bits=16") : UnitBench(e201::unit, settings) {
     line.replace(0, answering);
   }
-  Ended run(std::string_view name, const std::vector<std::int64_t>& arguments = {}, const OnEmit& on_emit = {}) {
+  CommandResult run(std::string_view name, const std::vector<std::int64_t>& arguments = {},
+                    const OnEmit& on_emit = {}) {
     return UnitBench::run(name, arguments, on_emit);
   }
   /// Runs a command with replies made by `tamper`; `answering.log` has the received commands.
-  Ended run_tampered(const Tamper& tamper, std::string_view name, const std::vector<std::int64_t>& arguments = {}) {
+  CommandResult run_tampered(const Tamper& tamper, std::string_view name,
+                             const std::vector<std::int64_t>& arguments = {}) {
     answering.tamper = tamper;
     answering.log.clear();
-    const Ended ended = run(name, arguments);
+    const CommandResult ended = run(name, arguments);
     answering.tamper = nullptr;
     pass(1s);
     return ended;
@@ -118,7 +120,7 @@ struct Bench : author::testing::UnitBench<19> {
     return {reply.begin(), reply.end()};
   }
 
-  Answering answering{device};
+  TamperedInterface answering{device};
 };
 
 }  // namespace absenc::e201::testing

@@ -12,14 +12,14 @@ using testing::Bench;
 using testing::count;
 using testing::turn;
 
-TEST(E201Device, AnswersLikeExample4) {
+TEST(E201Device, RepliesWithExample4) {
   // 13 bits of ACK at 280 kHz (3571 ns): more than 12 periods of latency, less than the timeout allows.
   Bench bench("singleturn_bits=19 latency_us=46");
   bench.shaft.start.position = 275087 * count;
   EXPECT_EQ(bench.raw("4"), "c0014328ff300000\r");
 }
 
-TEST(E201Device, AnswersEveryCommand) {
+TEST(E201Device, RepliesToEveryCommand) {
   Bench bench;
   bench.shaft.start.position = 2 * turn + 5 * count;
   const auto expect = [&bench](const std::string& request, const std::string& reply) {
@@ -59,7 +59,7 @@ TEST(E201Device, AnswersEveryCommand) {
   EXPECT_TRUE(bench.device.memory().empty());
 }
 
-TEST(E201Device, TellsWhatItDoesNotKnow) {
+TEST(E201Device, ReportsUnknownCommands) {
   Bench bench;
   for (const char* text : {"x", "MM", "\r\n", "M9\r"}) EXPECT_EQ(bench.raw(text), "");
   ASSERT_EQ(bench.device.violation_count(), 3u);
@@ -68,18 +68,18 @@ TEST(E201Device, TellsWhatItDoesNotKnow) {
   EXPECT_EQ(bench.device.violations()[1].rule, "a command without its number");
 }
 
-TEST(E201Device, SeveralCommandsAreAnsweredOneAfterTheOther) {
+TEST(E201Device, RepliesToSeveralCommandsInOrder) {
   Bench bench;
   EXPECT_EQ(bench.raw("mvM5\rm"), "4\rE201-9S V1.16\r5\r");
 }
 
-TEST(E201Device, OldFirmwareKnowsNo4) {
+TEST(E201Device, OldFirmwareIgnoresCommand4) {
   Bench bench("firmware=1.09");
   EXPECT_EQ(bench.raw("4"), "");
   EXPECT_EQ(bench.raw("v"), "E201-9S V1.09\r");
 }
 
-TEST(E201Device, AckFollowsTheClock) {
+TEST(E201Device, AckBitsFollowClock) {
   Bench bench("singleturn_bits=19");
   for (unsigned clock = 1; clock <= 7; ++clock) {
     bench.raw("M" + std::to_string(clock));
@@ -88,7 +88,7 @@ TEST(E201Device, AckFollowsTheClock) {
 }
 
 // A reading takes 64 clocks and the time of USB.
-TEST(E201Device, TakesItsTime) {
+TEST(E201Device, ReadingTakes64Clocks) {
   Bench bench;
   bench.raw("M1");
   const Time slow = bench.run("position").took;
@@ -99,7 +99,7 @@ TEST(E201Device, TakesItsTime) {
   EXPECT_LT(std::chrono::abs(characters - line_settings.bits(150)), 1us);
 }
 
-TEST(E201Device, ALateLineShowsAnotherPosition) {
+TEST(E201Device, LineDelayCausesBadFraming) {
   Bench bench("singleturn_bits=19 line_delay_ns=3600");
   EXPECT_EQ(bench.run("position").error, "bad_framing");
   bench.raw("M3");

@@ -24,7 +24,7 @@ Format ssi_format(const WordFormat& word, ssi::AfterWord after = ssi::AfterWord:
 
 WordFormat position_of(unsigned bits) { return biss::word_with_status({.position = bits}); }
 
-TEST(E201Frame, FailuresAreToldApart) {
+TEST(E201Frame, DistinguishesErrorsOfSamples) {
   for (const auto& [reply, error] : std::to_array<std::pair<std::string_view, Error>>({
            {"c0014328ff300000\n", Error::wrong_length},    // LF instead of CR
            {"c0014328ff3000000\r", Error::wrong_length},   // one digit too many
@@ -40,7 +40,7 @@ TEST(E201Frame, FailuresAreToldApart) {
   }
 }
 
-TEST(E201Frame, TheLongestAckThatFits) {
+TEST(E201Frame, DecodesLongestAckThatFits) {
   for (unsigned bits = 1; bits <= 51; ++bits) {
     const Format format{.word = position_of(bits)};
     const unsigned longest = 64 - 4 - (bits + 8);
@@ -55,7 +55,7 @@ TEST(E201Frame, TheLongestAckThatFits) {
   }
 }
 
-TEST(E201Frame, TheWidestWordThatFits) {
+TEST(E201Frame, AcceptsWidestWordThatFits) {
   EXPECT_TRUE(fits({.word = position_of(51)}));
   EXPECT_FALSE(fits({.word = position_of(52)}));
   EXPECT_TRUE(fits(ssi_format("position:63"_word)));
@@ -64,7 +64,7 @@ TEST(E201Frame, TheWidestWordThatFits) {
   EXPECT_EQ(name(decode('4', "0000000000000000\r", {.word = position_of(52)}).error()), "invalid_argument");
 }
 
-TEST(E201Frame, AnSsiWordFollowsTheFirstSample) {
+TEST(E201Frame, DecodesSsiWordAfterFirstSample) {
   for (const ssi::AfterWord after : {ssi::AfterWord::repeat, ssi::AfterWord::zero, ssi::AfterWord::one}) {
     const Format format = ssi_format("multiturn:12 position:13 gray"_word, after);
     const Word word{.position = 0x1234, .multiturn = 0xABC};
@@ -79,7 +79,7 @@ TEST(E201Frame, AnSsiWordFollowsTheFirstSample) {
   }
 }
 
-TEST(E201Frame, RequestsAreWhatTheInterfaceReads) {
+TEST(E201Frame, EncodesAndDecodesRequests) {
   for (const auto& [request, text] : std::to_array<std::pair<Request, std::string_view>>(
            {{{'4'}, "4"}, {{'M', 1}, "M1\r"}, {{'M', 8}, "M8\r"}, {{'M', 0}, ""}, {{'M', 9}, ""}, {{'b'}, "b"}})) {
     const ByteBuffer<4> encoded = Protocol::encode({}, request);
@@ -115,7 +115,7 @@ TEST(E201Frame, RequestsAreWhatTheInterfaceReads) {
   EXPECT_EQ(Protocol::request_size({}, bytes("q")), 0u);
 }
 
-TEST(E201Frame, RepliesOfOneLine) {
+TEST(E201Frame, DecodesReplyLines) {
   const std::string longest(64, 'x');
   for (const auto& [letter, reply, error] : std::to_array<std::tuple<char, std::string, std::string_view>>(
            {{'v', "anything 1\r", "none"},
@@ -143,7 +143,7 @@ TEST(E201Frame, RepliesOfOneLine) {
   EXPECT_EQ(Protocol::expected({}, {'z'}, bytes("5\r")), 0u);
 }
 
-TEST(E201Frame, VersionsWhereverTheyStand) {
+TEST(E201Frame, FindsVersionAnywhereInText) {
   for (const auto& [words, major, minor] : std::to_array<std::tuple<std::string_view, unsigned, unsigned>>(
            {{"1.16\r", 1, 16}, {"E201-9S V1.16 \r", 1, 16}, {"E201-9S v 2.3.4", 2, 3}, {"rev 10 1.09 b", 1, 9}})) {
     const std::optional<Version> version = find_version(bytes(words));
@@ -156,7 +156,7 @@ TEST(E201Frame, VersionsWhereverTheyStand) {
   EXPECT_FALSE(has_samples({1, 15}) || has_samples({1, 2}) || has_samples({0, 99}));
 }
 
-TEST(E201Frame, NumbersInTextsThatNobodyDescribes) {
+TEST(E201Frame, FindsNumbersInUndocumentedTexts) {
   EXPECT_EQ(find_milli(bytes("4.98V 62mA"), 'V'), 4980u);
   EXPECT_EQ(find_milli(bytes("4.98V 62mA"), 'A'), 62u);
   EXPECT_EQ(find_milli(bytes("U = 5012 mV, I = 0.0625 A"), 'V'), 5012u);

@@ -28,7 +28,7 @@ bool is_too_old(const Reply& reply) {
 
 }  // namespace
 
-Procedure read(Dialog& dialog, Found& found) {
+Procedure read(Dialog& dialog, InterfaceResults& found) {
   Result<Reply> reply = co_await dialog.attempt({letter::samples});
   const bool unusable = reply.error() == Error::timeout || reply.error() == Error::wrong_length;
   if (unusable && !dialog.is_noisy()) {
@@ -50,7 +50,7 @@ Procedure read(Dialog& dialog, Found& found) {
 
 // A text does not show which command it answers. A reply that is sent twice must not be taken for the next one, so the
 // procedure waits for silence.
-Procedure inform(Dialog& dialog, Found& found) {
+Procedure read_info(Dialog& dialog, InterfaceResults& found) {
   static constexpr auto letters = std::array{letter::version, letter::serial, letter::supply, letter::clock};
   for (const std::uint8_t asked : letters) {
     const Result<Reply> reply = co_await dialog.attempt({asked}).until_silence();
@@ -77,7 +77,7 @@ Part<Error> switch_clock(Dialog& dialog, unsigned clock) {
 
 }  // namespace
 
-Procedure set_clock(Dialog& dialog, Found& found, Arguments arguments) {
+Procedure set_clock(Dialog& dialog, InterfaceResults& found, Arguments arguments) {
   const unsigned clock = clock_of(arguments[0]);
   const Error error = co_await switch_clock(dialog, clock);
   if (error == Error::cross_check_failed)
@@ -86,7 +86,7 @@ Procedure set_clock(Dialog& dialog, Found& found, Arguments arguments) {
   co_return {error};
 }
 
-Procedure switch_supply(Dialog& dialog, Found& found, bool on) {
+Procedure switch_supply(Dialog& dialog, InterfaceResults& found, bool on) {
   co_await dialog.ask({on ? letter::supply_on : letter::supply_off}).changes();
   const Reply reply = co_await dialog.ask({letter::supply}).after(supply_time);
   found.supply = reply.text;
@@ -110,7 +110,7 @@ bool is_near(const Dialog& dialog, std::int64_t counts, std::int64_t other) {
 
 }  // namespace
 
-Procedure set_zero(Dialog& dialog, Found& found) {
+Procedure set_zero(Dialog& dialog, InterfaceResults& found) {
   // `?` does not report errors, so `4` is read too. An interface that does not know `4` cannot report more.
   const Result<Reply> samples = co_await dialog.attempt({letter::samples});
   if (samples) {
@@ -135,7 +135,7 @@ Procedure set_zero(Dialog& dialog, Found& found) {
 
 // ---- clock-sweep
 
-unsigned Found::recommended() const {
+unsigned InterfaceResults::recommended() const {
   unsigned best = 0;
   unsigned longest = 0;
   for (unsigned first = 0; first < valid.size(); ++first) {
@@ -158,7 +158,7 @@ Outcome failure(const Dialog& dialog, Error error) {
 }
 
 // Reads frames at each clock. Ends early if the sweep is aborted or cannot continue.
-Part<Outcome> try_clocks(Dialog& dialog, Found& found) {
+Part<Outcome> try_clocks(Dialog& dialog, InterfaceResults& found) {
   Outcome bad = done;  // outcome of the last bad frame
   if (dialog.is_aborted()) co_return done;
   for (unsigned clock = 1; clock <= clocks_khz.size(); ++clock) {
@@ -184,7 +184,7 @@ Part<Outcome> try_clocks(Dialog& dialog, Found& found) {
 
 }  // namespace
 
-Procedure sweep_clocks(Dialog& dialog, Found& found, Arguments arguments) {
+Procedure sweep_clocks(Dialog& dialog, InterfaceResults& found, Arguments arguments) {
   dialog.restores();
   found.frames = static_cast<unsigned>(arguments[0]);
   const Reply version = co_await dialog.ask({letter::version});
@@ -209,9 +209,9 @@ Procedure sweep_clocks(Dialog& dialog, Found& found, Arguments arguments) {
 
 namespace {
 
-struct Words {
+struct ErrorExplanation {
   Error error;
-  Explanation say;
+  Explanation explanation;
 };
 
 constexpr std::string_view check_biss =
@@ -220,7 +220,7 @@ constexpr std::string_view check_clock =
     "select another MA clock with `absenc config set ... clock`; `absenc run ... clock-sweep` finds one";
 constexpr std::string_view check_model = "check that it is an E201-9S";
 
-constexpr auto of_samples = std::to_array<Words>({
+constexpr auto of_samples = std::to_array<ErrorExplanation>({
     {Error::invalid_argument, {"the interface samples 64 bits, and the word does not fit", "give it fewer bits"}},
     {Error::line_stuck,
      {{}, "check that an encoder is connected and supplied: `absenc run ... supply-on` switches its supply on"}},
@@ -231,7 +231,7 @@ constexpr auto of_samples = std::to_array<Words>({
     {Error::cross_check_failed, {"the bits behind the word are not what after_word says", "check the number of bits"}},
     {Error::wrong_length, {"the interface answers with 16 hexadecimal digits and CR", check_stream}},
 });
-constexpr auto of_lines = std::to_array<Words>({
+constexpr auto of_lines = std::to_array<ErrorExplanation>({
     {Error::timeout, {"the interface is silent", check_model}},
     {Error::wrong_length, {"the interface answers with a line that ends with CR", check_stream}},
     {Error::bad_framing, {"this is no answer to that command", check_model}},
@@ -255,8 +255,9 @@ Explanation explain(const Format& format, Error error, Bytes request, Bytes repl
   if (samples && error == Error::bad_checksum && format.carries == Carries::ssi) {
     return {"the parity of the word is wrong", check_clock};
   }
-  for (const Words& one : samples ? std::span<const Words>(of_samples) : std::span<const Words>(of_lines)) {
-    if (one.error == error) return one.say;
+  for (const ErrorExplanation& one :
+       samples ? std::span<const ErrorExplanation>(of_samples) : std::span<const ErrorExplanation>(of_lines)) {
+    if (one.error == error) return one.explanation;
   }
   return {};
 }

@@ -15,7 +15,7 @@ namespace absenc::e201 {
 using Dialog = author::DialogOf<Protocol>;
 
 /// Results of a procedure. Values that were not requested or not answered stay empty.
-struct Found {
+struct InterfaceResults {
   Reading reading{};                         ///< The position.
   std::uint64_t samples = 0;                 ///< the samples from which `reading` was decoded
   std::optional<Text> command{};             ///< Value of the field `command`, if there is one.
@@ -59,21 +59,21 @@ struct Found {
 
 /// Reads a position with `4`. Without a usable reply, reads the firmware version: before 1.16 the error is unsupported,
 /// otherwise `4` is sent once more.
-author::Procedure read(Dialog& dialog, Found& found);
+author::Procedure read(Dialog& dialog, InterfaceResults& found);
 /// Reads version, serial number, supply and clock. Only the version is mandatory.
-author::Procedure inform(Dialog& dialog, Found& found);
+author::Procedure read_info(Dialog& dialog, InterfaceResults& found);
 /// Sets the clock with `M` and reads it back with `m`. Argument: 1 to 8, or kHz. Error also: cross_check_failed
 /// (another clock is set).
-author::Procedure set_clock(Dialog& dialog, Found& found, Arguments arguments);
+author::Procedure set_clock(Dialog& dialog, InterfaceResults& found, Arguments arguments);
 /// Switches the supply with `n` or `f`, waits and reads it with `e`. Error also: cross_check_failed (the voltage in the
 /// reply contradicts).
-author::Procedure switch_supply(Dialog& dialog, Found& found, bool on);
+author::Procedure switch_supply(Dialog& dialog, InterfaceResults& found, bool on);
 /// Sets the zero of `?` with `z`. Errors also: not_still (the encoder moves), invalid_argument (its position is
 /// invalid), cross_check_failed (`?` is not near 0 afterwards).
-author::Procedure set_zero(Dialog& dialog, Found& found);
+author::Procedure set_zero(Dialog& dialog, InterfaceResults& found);
 /// Reads frames at each clock and emits the results after each. Restores the old clock, after an error and after
 /// `abort` too.
-author::Procedure sweep_clocks(Dialog& dialog, Found& found, Arguments arguments);
+author::Procedure sweep_clocks(Dialog& dialog, InterfaceResults& found, Arguments arguments);
 
 inline constexpr std::string_view check_stream =
     "check that it is an E201-9S and does not stream (`absenc run ... stream-off` ends it)";

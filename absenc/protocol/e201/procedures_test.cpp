@@ -9,18 +9,18 @@ namespace {
 
 using testing::answering;
 using testing::Bench;
+using testing::CommandResult;
 using testing::count;
-using testing::Ended;
 using testing::Fields;
-using testing::Said;
 using testing::says;
 using testing::Tamper;
+using testing::TextReply;
 using testing::turn;
 
-TEST(E201Read, APosition) {
+TEST(E201Read, ReadsBissPosition) {
   Bench bench;
   bench.shaft.start.position = turn + 275096 * count;
-  const Ended read = bench.run("position");
+  const CommandResult read = bench.run("position");
   EXPECT_EQ(read.error, "none");
   EXPECT_EQ(read.fields, (Fields{{"ack_bits", 3},
                                  {"multiturn", 1},
@@ -35,14 +35,14 @@ TEST(E201Read, APosition) {
   EXPECT_EQ(bench.device.violation_count(), 0u);
 }
 
-TEST(E201Read, AnSsiEncoder) {
+TEST(E201Read, ReadsSsiPosition) {
   Bench bench("carries=ssi singleturn_bits=13 multiturn_bits=12 gray=true");
   bench.shaft.start.position = 7 * turn + (std::int64_t{0x1234} << 19);
-  const Ended read = bench.run("position");
+  const CommandResult read = bench.run("position");
   EXPECT_EQ(read.fields, (Fields{{"multiturn", 7}, {"singleturn", 0x1234}, {"angle_deg", 204}}));
 }
 
-TEST(E201Read, OptionsThatContradictIt) {
+TEST(E201Read, RefusesContradictingOptions) {
   std::vector<std::byte> storage(unit.host_storage);
   std::vector<std::byte> device_storage(unit.device_storage);
   const sim::testing::TestShaft<19> shaft;
@@ -72,13 +72,13 @@ struct Failure {
   std::string advice;
 };
 
-TEST(E201Read, WhatFails) {
+TEST(E201Read, ExplainsEachError) {
   Bench bench("singleturn_bits=19");
-  const auto replies = [](std::vector<Said> samples, std::vector<Said> version) -> Tamper {
+  const auto replies = [](std::vector<TextReply> samples, std::vector<TextReply> version) -> Tamper {
     return [=](char asked) { return std::optional(asked == '4' ? samples : version); };
   };
-  const std::vector<Said> v116{{"E201-9S V1.16\r"}};
-  const std::vector<Said> garbage{{"c0014328ff300000"}};
+  const std::vector<TextReply> v116{{"E201-9S V1.16\r"}};
+  const std::vector<TextReply> garbage{{"c0014328ff300000"}};
   for (const Failure& one : std::vector<Failure>{
            {replies({{"c0014328fe300000\r"}}, v116), "4", "bad_checksum", "delay of the line", "another MA clock"},
            {replies({{"0000000000000000\r"}}, v116), "4", "line_stuck", "", "supply-on"},
@@ -89,7 +89,7 @@ TEST(E201Read, WhatFails) {
            {replies({}, v116), "4v4", "timeout", "answers `v` but not `4`", "`absenc info`"},
            {replies({}, {}), "4v", "timeout", "is silent", "it is an E201-9S"},
            {replies({}, {{"V"}}), "4v", "wrong_length", "a line that ends with CR", "stream-off"}}) {
-    const Ended read = bench.run_tampered(one.tamper, "position");
+    const CommandResult read = bench.run_tampered(one.tamper, "position");
     EXPECT_EQ(read.error, one.error);
     EXPECT_TRUE(says(read.detail, one.detail)) << read.detail;
     EXPECT_TRUE(says(read.advice, one.advice)) << read.advice;
@@ -106,7 +106,7 @@ TEST(E201Read, WhatFails) {
 }
 
 // No document gives these times: a slower reply counts as missing, and the host waits no longer.
-TEST(E201Read, ItsTimes) {
+TEST(E201Read, UsesReplyTimeouts) {
   Bench bench("singleturn_bits=19");
   const std::string good = "c0014328ff300000\r";
   const auto late = [&](Time after) { return bench.run_tampered(answering('4', {{good, after}}), "position"); };
@@ -117,8 +117,8 @@ TEST(E201Read, ItsTimes) {
   EXPECT_NE(late(52ms).error, "none");
   EXPECT_EQ(broken(18ms).error, "none");
   EXPECT_NE(broken(22ms).error, "none");
-  const std::vector<Said> stream(40, {"17\r", 10ms});
-  const Ended noisy = bench.run_tampered(answering('4', stream), "position");
+  const std::vector<TextReply> stream(40, {"17\r", 10ms});
+  const CommandResult noisy = bench.run_tampered(answering('4', stream), "position");
   EXPECT_EQ(noisy.error, "wrong_length");
   EXPECT_TRUE(says(noisy.detail, "without a pause")) << noisy.detail;
   EXPECT_TRUE(says(noisy.advice, "stream-off")) << noisy.advice;
@@ -127,7 +127,7 @@ TEST(E201Read, ItsTimes) {
   EXPECT_EQ(bench.answering.asked(), "4");  // more requests would not help
 }
 
-TEST(E201Info, KeepsWhatItCannotRead) {
+TEST(E201Info, ReportsTextsWithoutNumbers) {
   Bench bench;
   EXPECT_EQ(bench.run("info").fields, (Fields{{"version", 0},
                                               {"serial", 0},
@@ -136,7 +136,7 @@ TEST(E201Info, KeepsWhatItCannotRead) {
                                               {"supply_ma", 62},
                                               {"clock", 4},
                                               {"clock_khz", 280}}));
-  const Ended partly = bench.run_tampered(answering('e', {{"none\r"}}), "info");
+  const CommandResult partly = bench.run_tampered(answering('e', {{"none\r"}}), "info");
   EXPECT_EQ(partly.fields, (Fields{{"version", 0}, {"serial", 0}, {"supply", 0}, {"clock", 4}, {"clock_khz", 280}}));
   EXPECT_EQ(bench.run_tampered(answering('e', {}), "info").fields,
             (Fields{{"version", 0}, {"serial", 0}, {"clock", 4}, {"clock_khz", 280}}));
@@ -150,33 +150,33 @@ TEST(E201Info, KeepsWhatItCannotRead) {
   EXPECT_EQ(bench.run_tampered(answering('e', {{"4.98V 62mA\r"}, {"4.98V 62mA\r"}}), "info").fields,
             (Fields{{"version", 0}, {"serial", 0}, {"clock", 4}, {"clock_khz", 280}}));
   EXPECT_EQ(bench.run_tampered(answering('v', {}), "info").error, "timeout");
-  const Tamper stream = answering('s', std::vector<Said>(40, {"1", 10ms}));
+  const Tamper stream = answering('s', std::vector<TextReply>(40, {"1", 10ms}));
   EXPECT_EQ(bench.run_tampered(stream, "info").error, "wrong_length");
   EXPECT_EQ(bench.answering.asked(), "vs");
 }
 
-TEST(E201Set, IsReadBack) {
+TEST(E201Set, ReadsClockBack) {
   Bench bench;
   EXPECT_EQ(bench.run("set-clock", {1100}).fields, (Fields{{"clock", 6}, {"clock_khz", 1100}}));
   EXPECT_EQ(bench.run("clock").fields, (Fields{{"clock", 6}, {"clock_khz", 1100}}));
   EXPECT_EQ(bench.run("width").fields, (Fields{{"width", 35}}));
-  const Ended refused = bench.run_tampered(answering('M', {}), "set-clock", {2});
+  const CommandResult refused = bench.run_tampered(answering('M', {}), "set-clock", {2});
   EXPECT_EQ(refused.error, "cross_check_failed");
   EXPECT_TRUE(says(refused.detail, "another setting")) << refused.detail;
   EXPECT_EQ(bench.raw("M2\rm"), "2\r");
   // An undocumented reply is ignored, but one that does not end is an error.
   EXPECT_EQ(bench.run_tampered(answering('M', {{"M2 ok\r\n"}, {"more", 15ms}}), "set-clock", {2}).error, "none");
-  const Tamper stream = answering('M', std::vector<Said>(40, {"1", 10ms}));
+  const Tamper stream = answering('M', std::vector<TextReply>(40, {"1", 10ms}));
   EXPECT_EQ(bench.run_tampered(stream, "set-clock", {2}).error, "wrong_length");
   EXPECT_EQ(bench.answering.asked(), "M");
   EXPECT_EQ(bench.run_tampered(answering('m', {}), "set-clock", {2}).error, "timeout");
 }
 
 // The host waits 10 ms for the reply of a command that may have none.
-TEST(E201Set, WaitsForAReplyThatMayNotCome) {
+TEST(E201Set, WaitsBrieflyForOptionalReply) {
   Bench bench;
   const auto tell = [&](Time after) {
-    const Ended told = bench.run_tampered(answering('a', {{"ok\r", after}}), "clear-zero");
+    const CommandResult told = bench.run_tampered(answering('a', {{"ok\r", after}}), "clear-zero");
     EXPECT_EQ(told.error, "none");
     EXPECT_EQ(told.fields, (Fields{{"command", 0}}));
     return told.took;
@@ -186,7 +186,7 @@ TEST(E201Set, WaitsForAReplyThatMayNotCome) {
   EXPECT_EQ(bench.run("stream-off").error, "none");
 }
 
-TEST(E201Supply, OffIsALineThatIsStuck) {
+TEST(E201Supply, SupplyOffGivesStuckLineAndIsVerified) {
   Bench bench;
   EXPECT_EQ(bench.run("supply-off").fields, (Fields{{"supply", 0}, {"supply_mv", 20}, {"supply_ma", 0}}));
   EXPECT_EQ(bench.run("position").error, "line_stuck");
@@ -198,7 +198,7 @@ TEST(E201Supply, OffIsALineThatIsStuck) {
             {"supply-off", "1.001V", "cross_check_failed"},
             {"supply-off", "1.0V 0mA", "none"},
             {"supply-off", "whatever", "none"}})) {
-    const Ended ended = bench.run_tampered(answering('e', {{text + "\r"}}), command);
+    const CommandResult ended = bench.run_tampered(answering('e', {{text + "\r"}}), command);
     EXPECT_EQ(ended.error, error) << command << text;
     EXPECT_EQ(error != "none", says(ended.detail, "contradicts"));
     ASSERT_EQ(bench.answering.log.size(), 2u);
@@ -209,7 +209,7 @@ TEST(E201Supply, OffIsALineThatIsStuck) {
   }
 }
 
-TEST(E201Zero, IsReadBack) {
+TEST(E201Zero, ReadsZeroBack) {
   Bench bench;
   bench.shaft.start.position = 275096 * count;
   EXPECT_EQ(bench.run("set-zero").fields, (Fields{{"counts", 0}}));
@@ -221,7 +221,7 @@ TEST(E201Zero, IsReadBack) {
 }
 
 // 0.02 degrees are 29 counts of 19 bits, and 1 of 12.
-TEST(E201Zero, NeedsAnEncoderThatStandsStill) {
+TEST(E201Zero, RefusesMovingEncoder) {
   struct Case {
     std::string bits;
     std::vector<std::string> looks;
@@ -242,9 +242,9 @@ TEST(E201Zero, NeedsAnEncoderThatStandsStill) {
     std::size_t look = 0;
     const Tamper tamper = [&](char letter) {
       const bool answers = letter == '?' && look < one.looks.size();
-      return answers ? std::optional(std::vector<Said>{{one.looks[look++] + "\r"}}) : std::nullopt;
+      return answers ? std::optional(std::vector<TextReply>{{one.looks[look++] + "\r"}}) : std::nullopt;
     };
-    const Ended zero = bench.run_tampered(tamper, "set-zero");
+    const CommandResult zero = bench.run_tampered(tamper, "set-zero");
     EXPECT_EQ(zero.error, one.error) << one.looks.back();
     const std::array asked{"", "4?", "4??", "4??z?"};  // an old interface does not answer `4`
     EXPECT_EQ(bench.answering.asked(), asked[one.looks.size()]);
@@ -256,10 +256,10 @@ TEST(E201Zero, NeedsAnEncoderThatStandsStill) {
 }
 
 // `?` does not report the encoder's error bit.
-TEST(E201Zero, NeedsAPositionThatHolds) {
+TEST(E201Zero, RefusesInvalidPosition) {
   Bench bench;
   bench.device.raise_alarms(word_error);
-  const Ended zero = bench.run("set-zero");
+  const CommandResult zero = bench.run("set-zero");
   EXPECT_EQ(zero.error, "invalid_argument");
   EXPECT_TRUE(says(zero.detail, "does not hold")) << zero.detail;
   EXPECT_EQ(bench.answering.asked(), "4");

@@ -9,11 +9,11 @@ namespace absenc::e201 {
 namespace {
 
 using testing::Bench;
-using testing::Ended;
+using testing::CommandResult;
 using testing::Fields;
-using testing::Said;
 using testing::says;
 using testing::Tamper;
+using testing::TextReply;
 using testing::Told;
 
 /// 10 us of latency, 32 + 8 bits: up to 20 bits of ACK fit, so M8 (45 bits) and M7 (22) are too fast.
@@ -21,11 +21,12 @@ TEST(E201Sweep, CountsRecommendsAndRestores) {
   Bench bench("singleturn_bits=32");
   bench.raw("M7\r");
   std::vector<Fields> progress;
-  const Ended sweep = bench.run("clock-sweep", {5}, [&progress](const Conversation<std::uint8_t>& conversation) {
-    Told now;
-    now.take(conversation);
-    progress.push_back(now.numbers);
-  });
+  const CommandResult sweep =
+      bench.run("clock-sweep", {5}, [&progress](const Conversation<std::uint8_t>& conversation) {
+        Told now;
+        now.take(conversation);
+        progress.push_back(now.numbers);
+      });
   EXPECT_EQ(sweep.error, "none") << sweep.detail;
   EXPECT_EQ(sweep.fields, (Fields{{"frames", 5},
                                   {"valid_35_khz", 5},
@@ -55,10 +56,10 @@ TEST(E201Sweep, LineDelayMovesTheRecommendation) {
   EXPECT_EQ(fields.at("recommended_clock"), 3);
 }
 
-TEST(E201Sweep, TheLongestRunIsRecommended) {
+TEST(E201Sweep, RecommendsMiddleOfLongestRun) {
   for (const auto& [good, recommended] : std::to_array<std::pair<std::string_view, unsigned>>(
            {{"11111111", 5}, {"10111011", 4}, {"11000110", 2}, {"00000001", 8}, {"01000011", 8}, {"00000000", 0}})) {
-    Found sweep{.frames = 3};
+    InterfaceResults sweep{.frames = 3};
     for (unsigned i = 0; i < good.size(); ++i) sweep.valid[i] = good[i] == '1' ? 3 : 2;
     EXPECT_EQ(sweep.recommended(), recommended) << good;
   }
@@ -88,10 +89,10 @@ TEST(E201Sweep, AbortRestoresTheClockAtAnyStep) {
 }
 
 // An aborted sweep reports its results so far, and recommends nothing.
-TEST(E201Sweep, AnAbortedSweepRecommendsNothing) {
+TEST(E201Sweep, RecommendsNothingAfterAbort) {
   Bench bench;
   unsigned emits = 0;
-  const Ended sweep = bench.run("clock-sweep", {2}, [&](Conversation<std::uint8_t>& conversation) {
+  const CommandResult sweep = bench.run("clock-sweep", {2}, [&](Conversation<std::uint8_t>& conversation) {
     if (++emits == 3) conversation.abort();
   });
   EXPECT_EQ(sweep.fields, (Fields{{"frames", 2},
@@ -102,7 +103,7 @@ TEST(E201Sweep, AnAbortedSweepRecommendsNothing) {
                                   {"aborted", 1}}));
 }
 
-TEST(E201Sweep, WhatIsLeftIsTheClockThatWasSetLast) {
+TEST(E201Sweep, ReportLeftNamesClockThatWasSetLast) {
   Bench bench;
   bench.raw("M6\r");
   const author::testing::Talk<std::uint8_t> talk(unit, bench.options, "clock-sweep", {3});
@@ -125,18 +126,18 @@ TEST(E201Sweep, WhatIsLeftIsTheClockThatWasSetLast) {
   EXPECT_EQ(left, "123456786");
 }
 
-TEST(E201Sweep, WhatFails) {
+TEST(E201Sweep, ReportsEachErrorAndRestoresClock) {
   struct Case {
     char letter;  // the command that is answered with `answer` the `nth` time; if `always`, every time from then on
     int nth;
     bool always;
-    std::vector<Said> answer;
+    std::vector<TextReply> answer;
     std::string error;
     std::string detail;
     std::string advice;
     bool restored;
   };
-  const std::vector<Said> short_stream(11, {"1", 10ms});
+  const std::vector<TextReply> short_stream(11, {"1", 10ms});
   for (const Case& one : std::vector<Case>{
            {'v', 1, false, {{"V1.15\r"}}, "unsupported", "1.16", "`absenc info`", true},
            {'m', 1, false, {{"?\r"}}, "bad_framing", "does not say which clock", "E201-9S", true},
@@ -155,7 +156,7 @@ TEST(E201Sweep, WhatFails) {
       const bool answers = letter == one.letter && (asked == one.nth || (one.always && asked > one.nth));
       return answers ? std::optional(one.answer) : std::nullopt;
     };
-    const Ended sweep = bench.run_tampered(tamper, "clock-sweep", {2});
+    const CommandResult sweep = bench.run_tampered(tamper, "clock-sweep", {2});
     EXPECT_EQ(sweep.error, one.error) << one.detail;
     EXPECT_TRUE(says(sweep.detail, one.detail)) << sweep.detail;
     EXPECT_TRUE(says(sweep.advice, one.advice)) << sweep.advice;
@@ -165,13 +166,13 @@ TEST(E201Sweep, WhatFails) {
 }
 
 // Single bad frames are a normal result of a sweep.
-TEST(E201Sweep, GoesOnAfterABadFrame) {
+TEST(E201Sweep, ContinuesAfterBadFrame) {
   Bench bench;
   int asked = 0;
   const Tamper tamper = [&](char letter) {
-    return letter == '4' && ++asked == 1 ? std::optional(std::vector<Said>{{"1\r"}}) : std::nullopt;
+    return letter == '4' && ++asked == 1 ? std::optional(std::vector<TextReply>{{"1\r"}}) : std::nullopt;
   };
-  const Ended sweep = bench.run_tampered(tamper, "clock-sweep", {2});
+  const CommandResult sweep = bench.run_tampered(tamper, "clock-sweep", {2});
   EXPECT_EQ(sweep.error, "none");
   EXPECT_EQ(sweep.fields.at("valid_35_khz"), 1);
   EXPECT_EQ(sweep.fields.at("valid_70_khz"), 2);

@@ -98,52 +98,53 @@ constexpr auto models = [] {
 // ---- Fields
 
 template <auto member>
-constexpr std::optional<Bytes> words(const Found& found) {
+constexpr std::optional<Bytes> words(const InterfaceResults& found) {
   return found.*member ? std::optional<Bytes>(*(found.*member)) : std::nullopt;
 }
 template <std::uint8_t symbol>
-constexpr std::optional<unsigned> milli(const Found& found) {
+constexpr std::optional<unsigned> milli(const InterfaceResults& found) {
   return found.supply ? find_milli(*found.supply, symbol) : std::nullopt;
 }
-constexpr std::optional<unsigned> frames(const Found& found) {
+constexpr std::optional<unsigned> frames(const InterfaceResults& found) {
   return found.frames != 0 ? std::optional(found.frames) : std::nullopt;
 }
 template <std::size_t i>
-constexpr std::optional<unsigned> valid(const Found& found) {
+constexpr std::optional<unsigned> valid(const InterfaceResults& found) {
   return i < found.measured ? std::optional(found.valid[i]) : std::nullopt;
 }
-constexpr std::optional<std::int64_t> restored(const Found& found) {
+constexpr std::optional<std::int64_t> restored(const InterfaceResults& found) {
   return found.restored ? std::optional<std::int64_t>(found.previous) : std::nullopt;
 }
-constexpr std::optional<std::int64_t> aborted(const Found& found) {
+constexpr std::optional<std::int64_t> aborted(const InterfaceResults& found) {
   return found.restored ? std::optional<std::int64_t>(found.aborted) : std::nullopt;
 }
-std::optional<std::int64_t> recommended(const Found& found) {
+std::optional<std::int64_t> recommended(const InterfaceResults& found) {
   const unsigned clock = found.restored && !found.aborted ? found.recommended() : 0;
   return clock != 0 ? std::optional<std::int64_t>(clock) : std::nullopt;
 }
-constexpr std::optional<std::int64_t> set_clock_of(const Found& found) { return found.clock; }
-constexpr std::optional<std::int64_t> left(const Found& found) { return found.left; }
+constexpr std::optional<std::int64_t> set_clock_of(const InterfaceResults& found) { return found.clock; }
+constexpr std::optional<std::int64_t> left(const InterfaceResults& found) { return found.left; }
 template <auto clock>
-constexpr std::optional<unsigned> khz(const Found& found) {
+constexpr std::optional<unsigned> khz(const InterfaceResults& found) {
   const std::optional<std::int64_t> one = clock(found);
   if (!one) return std::nullopt;
   return clocks_khz[static_cast<std::size_t>(*one) - 1];
 }
 
 using enum FieldInfo::Kind;
-constexpr auto own_fields = fields_of<Found>(
-    field<words<&Found::command>>({"command", text, "", "the request", {}, Role::exchange}),
-    field<words<&Found::version>>({"version", text, "", "firmware of the interface", {}, Role::identity}),
-    field<words<&Found::serial>>({"serial", text, "", "serial number of the interface", {}, Role::identity}),
-    field<words<&Found::supply>>({"supply", text, "", "supply of the encoder, as the interface says it"}),
+constexpr auto own_fields = fields_of<InterfaceResults>(
+    field<words<&InterfaceResults::command>>({"command", text, "", "the request", {}, Role::exchange}),
+    field<words<&InterfaceResults::version>>({"version", text, "", "firmware of the interface", {}, Role::identity}),
+    field<words<&InterfaceResults::serial>>({"serial", text, "", "serial number of the interface", {}, Role::identity}),
+    field<words<&InterfaceResults::supply>>({"supply", text, "", "supply of the encoder, as the interface says it"}),
     field<milli<'V'>>({"supply_mv", number, "mV", "voltage in that text"}),
     field<milli<'A'>>({"supply_ma", number, "mA", "current in that text"}),
-    field<&Found::clock>({"clock", number, "", "setting of the MA clock, 1 to 8"}),
+    field<&InterfaceResults::clock>({"clock", number, "", "setting of the MA clock, 1 to 8"}),
     field<khz<set_clock_of>>({"clock_khz", number, "kHz", "MA clock"}),
-    field<&Found::advice>("advice", "", "the clocks that are recommended for this encoder, where another is set"),
-    field<&Found::width>({"width", number, "bits", "width of the position that ? gives"}),
-    field<&Found::counts>({"counts", number, "counts", "position, the interface's zero taken off"}),
+    field<&InterfaceResults::advice>("advice", "",
+                                     "the clocks that are recommended for this encoder, where another is set"),
+    field<&InterfaceResults::width>({"width", number, "bits", "width of the position that ? gives"}),
+    field<&InterfaceResults::counts>({"counts", number, "counts", "position, the interface's zero taken off"}),
     field<frames>({"frames", number, "", "frames read at each clock"}),
     field<valid<0>>({"valid_35_khz", number, "", "good frames at 35 kHz"}),
     field<valid<1>>({"valid_70_khz", number, "", "good frames at 70 kHz"}),
@@ -158,11 +159,11 @@ constexpr auto own_fields = fields_of<Found>(
     field<restored>({"restored_clock", number, "", "what it was before and is again"}),
     field<aborted>({"aborted", boolean, "", "the sweep was ended early: not all clocks were tried"}));
 // Fields of a sweep that was interrupted.
-constexpr auto left_fields =
-    fields_of<Found>(field<left>({"left_clock", number, "", "the clock that the sweep set last"}),
-                     field<khz<left>>({"left_khz", number, "kHz", "that clock"}),
-                     field<&Found::previous>({"previous_clock", number, "",
-                                              "what it was before: give it back with `absenc config set ... clock`"}));
+constexpr auto left_fields = fields_of<InterfaceResults>(
+    field<left>({"left_clock", number, "", "the clock that the sweep set last"}),
+    field<khz<left>>({"left_khz", number, "kHz", "that clock"}),
+    field<&InterfaceResults::previous>(
+        {"previous_clock", number, "", "what it was before: give it back with `absenc config set ... clock`"}));
 constexpr auto all_fields =
     joined_fields(joined_fields(word_fields, biss::own_fields), joined_fields(own_fields.infos, left_fields.infos));
 
@@ -177,22 +178,22 @@ constexpr void put_samples(FieldSink& sink, const Format& format, std::uint64_t 
 // ---- Reported fields
 
 constexpr void put_request(FieldSink& sink, const Format& format, const Request& request) {
-  Found found;
+  InterfaceResults found;
   found.command.emplace().append(trimmed(Protocol::encode(format, request)));
   own_fields.put(sink, found);
 }
 constexpr void put_reply(FieldSink& sink, const Format& format, const Request& request, const Reply& reply) {
   if (request.letter == letter::samples) return put_samples(sink, format, reply.samples);
   if (!letter::is_in(letter::answered_by_a_line, request.letter)) return put_request(sink, format, request);
-  Found found;
+  InterfaceResults found;
   found.take(request.letter, reply);
   own_fields.put(sink, found);
 }
-void put_found(FieldSink& sink, const Format& format, const Found& found) {
+void put_found(FieldSink& sink, const Format& format, const InterfaceResults& found) {
   if (found.reading.singleturn_bits != 0) put_samples(sink, format, found.samples);
   own_fields.put(sink, found);
 }
-void put_left(FieldSink& sink, const Format&, const Found& found) {
+void put_left(FieldSink& sink, const Format&, const InterfaceResults& found) {
   if (found.left != 0) left_fields.put(sink, found);
 }
 
@@ -202,7 +203,7 @@ constexpr Report<Protocol> report{
     .explain = explain,
     .noise_advice = check_stream,
 };
-constexpr Finding<Format, Found> found{.put = put_found, .put_left = put_left};
+constexpr Finding<Format, InterfaceResults> found{.put = put_found, .put_left = put_left};
 
 // ---- Commands
 
@@ -226,7 +227,7 @@ constexpr auto commands = std::array{
     command<report, found, read, does<letter::samples>>(
         {"position", Verb::read, 0, "position, turns, error and warning"})
         .only_if(is_readable),
-    command<report, found, inform, does<letter::version>>(
+    command<report, found, read_info, does<letter::version>>(
         {"info", Verb::info, 0, "version, serial number, supply and MA clock of the interface"}),
     reading<report, asks<letter::clock>>({"clock", Verb::config_get, 0, "MA clock"}),
     command<report, found, set_clock, selects>(

@@ -24,7 +24,7 @@ author::testing::Tamper damaging(std::vector<unsigned> frames) {
 }
 
 /// Replaces the byte `right` by `wrong` in the first `times` requests that carry it, as received by the encoder.
-author::testing::Tamper mishearing(std::uint8_t right, std::uint8_t wrong, int times) {
+author::testing::Tamper replacing(std::uint8_t right, std::uint8_t wrong, int times) {
   return [=](unsigned, RawBytes& request) mutable {
     for (std::uint8_t& byte : request) {
       if (byte == right && times-- > 0) byte = wrong;
@@ -33,7 +33,7 @@ author::testing::Tamper mishearing(std::uint8_t right, std::uint8_t wrong, int t
 }
 
 // Counts positions while the longest register is read: channel 3 must not cost a single frame.
-TEST_P(EncolinkRegister, IsReadWhilePositionsGoOn) {
+TEST_P(EncolinkRegister, ReadsRegisterWithoutLosingPositions) {
   for (const std::string_view settings : {testing::single, testing::multi}) {
     Bench bench(settings, interface);
     bench.shaft.spin(600, bench.line.now());
@@ -64,7 +64,7 @@ TEST_P(EncolinkRegister, IsReadWhilePositionsGoOn) {
   }
 }
 
-TEST_P(EncolinkRegister, EveryRegisterIsReadAsTheTableSays) {
+TEST_P(EncolinkRegister, ReadsEveryRegisterOfTheTable) {
   Bench bench(testing::multi, interface);
   bench.condition(condition_temperature, -12);
   bench.shaft.spin(-60, bench.line.now());
@@ -80,7 +80,7 @@ TEST_P(EncolinkRegister, EveryRegisterIsReadAsTheTableSays) {
   }
 }
 
-TEST_P(EncolinkRegister, InfoTellsEverything) {
+TEST_P(EncolinkRegister, InfoReportsIdentityAndRegisters) {
   Bench bench(testing::multi, interface);
   bench.tell("");
   const Told info = bench.run("info");
@@ -97,7 +97,7 @@ TEST_P(EncolinkRegister, InfoTellsEverything) {
   EXPECT_EQ(bench.first_violation(), "");
 }
 
-TEST_P(EncolinkRegister, WritesAreReadBackAndKeptWhenSaved) {
+TEST_P(EncolinkRegister, ReadsWritesBackAndKeepsSavedOnes) {
   Bench bench(testing::multi, interface);
   const Told write = bench.run("memory-write", {0, 0x10000});
   ASSERT_EQ(write.error, Error::none) << write.detail;
@@ -117,7 +117,7 @@ TEST_P(EncolinkRegister, WritesAreReadBackAndKeptWhenSaved) {
   }
 }
 
-TEST_P(EncolinkRegister, EachRefusalHasItsSentence) {
+TEST_P(EncolinkRegister, ExplainsEachRefusal) {
   Bench bench(testing::multi, interface);
   const auto refusal = [&](std::int64_t address, std::int64_t size, std::int64_t value) {
     const Told write = bench.run("memory-write", {address, value, size});
@@ -137,7 +137,7 @@ TEST_P(EncolinkRegister, EachRefusalHasItsSentence) {
   EXPECT_EQ(bench.run("memory-write", {0, 0}).error, Error::none);
 }
 
-TEST_P(EncolinkRegister, WhatCannotBeAskedIsTheCallersFault) {
+TEST_P(EncolinkRegister, RefusesInvalidArgumentsWithoutRequest) {
   Bench bench(testing::multi, interface);
   EXPECT_EQ(bench.run("memory-read", {0x1234}).error, Error::invalid_argument);
   EXPECT_EQ(bench.run("memory-write", {0x2E, 256}).error, Error::invalid_argument);
@@ -145,7 +145,7 @@ TEST_P(EncolinkRegister, WhatCannotBeAskedIsTheCallersFault) {
   EXPECT_EQ(bench.device.answer_count(), 0u);
 }
 
-TEST_P(EncolinkRegister, BusyForEverEndsWhilePositionsGoOn) {
+TEST_P(EncolinkRegister, StopsAfterTwoSecondsOfBusy) {
   Bench bench(testing::single, interface);
   bench.condition(condition_busy, 1);
   const Told read = bench.run("memory-read", {0x4C});
@@ -157,14 +157,14 @@ TEST_P(EncolinkRegister, BusyForEverEndsWhilePositionsGoOn) {
 }
 
 // Damages the third key byte, so that the encoder detects no access, or the address, so that the checksum is wrong.
-TEST_P(EncolinkRegister, AnAccessThatIsMisheardIsRepeated) {
+TEST_P(EncolinkRegister, RepeatsAccessThatArrivedDamaged) {
   for (const auto& [right, wrong, error, words] :
        std::to_array<std::tuple<std::uint8_t, std::uint8_t, Error, std::string_view>>(
            {{0xEF, 0xEE, Error::timeout, "the encoder ignores register accesses: positions go on"},
             {0x4C, 0x4D, Error::request_rejected, text_of(AccessStatus::read_checksum)}})) {
     for (const auto& [times, good] : std::to_array<std::pair<int, bool>>({{4, true}, {5, false}})) {
       Bench bench(testing::single, interface);
-      bench.tampered.requests(mishearing(right, wrong, times));
+      bench.tampered.requests(replacing(right, wrong, times));
       const Told read = bench.run("memory-read", {0x4C});
       EXPECT_EQ(read.error, good ? Error::none : error) << times;
       EXPECT_EQ(read.detail, good ? "" : words);
@@ -172,7 +172,7 @@ TEST_P(EncolinkRegister, AnAccessThatIsMisheardIsRepeated) {
   }
 }
 
-TEST_P(EncolinkRegister, DamagedFramesBeginTheAccessAnew) {
+TEST_P(EncolinkRegister, RestartsAccessAfterDamagedFrame) {
   for (const auto& [frames, error] : std::vector<std::pair<std::vector<unsigned>, Error>>{
            {{9, 60, 130}, Error::none},
            {{9, 10, 40, 70}, Error::none},
@@ -186,7 +186,7 @@ TEST_P(EncolinkRegister, DamagedFramesBeginTheAccessAnew) {
   }
 }
 
-TEST_P(EncolinkRegister, UnpluggedInTheMiddle) {
+TEST_P(EncolinkRegister, ReportsUnpluggedEncoder) {
   const Error gone = interface == Interface::uart ? Error::timeout : Error::line_stuck;
   struct Case {
     std::string_view command;
@@ -218,7 +218,7 @@ TEST_P(EncolinkRegister, UnpluggedInTheMiddle) {
 }
 
 // The answer to the write is lost, so the register must be read back before it is written again.
-TEST_P(EncolinkRegister, AWriteIsNotRepeatedBlindly) {
+TEST_P(EncolinkRegister, ReadsBackBeforeRepeatingWrite) {
   Bench bench(testing::single, interface);
   bench.tampered.replies(damaging({22}));
   unsigned written = 0;
@@ -232,11 +232,11 @@ TEST_P(EncolinkRegister, AWriteIsNotRepeatedBlindly) {
 }
 
 // The encoder receives an unknown operation: channel 3 stays idle, and the register keeps its value.
-TEST_P(EncolinkRegister, AWriteThatWasNotExecutedIsRepeated) {
+TEST_P(EncolinkRegister, RepeatsWriteThatWasNotExecuted) {
   for (const auto& [times, error] :
        std::to_array<std::pair<int, Error>>({{2, Error::none}, {3, Error::cross_check_failed}})) {
     Bench bench(testing::single, interface);
-    bench.tampered.requests(mishearing(0x58, 0x5A, times));
+    bench.tampered.requests(replacing(0x58, 0x5A, times));
     EXPECT_EQ(bench.run("memory-write", {0, 0x10000}).error, error);
     EXPECT_EQ(bench.encoder.offset(), error == Error::none ? 0x10000u : 0u);
   }
@@ -244,7 +244,7 @@ TEST_P(EncolinkRegister, AWriteThatWasNotExecutedIsRepeated) {
 
 // Frames 0 and 1 are for the identity, frame 2 resets the channels; cycles of 7 frames follow. The cycle in progress
 // when the access ends is idle too.
-TEST_P(EncolinkRegister, AnAnswerMayCome8CyclesLate) {
+TEST_P(EncolinkRegister, AcceptsAnswerAfterEightIdleCycles) {
   for (const auto& [more, asked] : std::to_array<std::pair<unsigned, unsigned>>({{7, 1}, {8, 2}})) {
     Bench bench(testing::single, interface);
     std::vector<std::uint8_t> answer;
@@ -296,7 +296,7 @@ struct OnChannel3 {
   RawBytes cycle_ = RawBytes(7);
 };
 
-TEST(EncolinkAccess, AnswersBeginWithReady) {
+TEST(EncolinkAccess, RejectsAnswerWithoutReady) {
   Bench bench(testing::single);
   const OnChannel3 strange(bench, [](std::uint8_t told) { return told == channel3::read_ready ? 0x77 : told; });
   const Told read = bench.run("memory-read", {0x4C});
@@ -305,7 +305,7 @@ TEST(EncolinkAccess, AnswersBeginWithReady) {
 }
 
 // The encoder does not count the calibration, or reports that the ring is too eccentric.
-TEST(EncolinkAccess, ASelfCalibrationMayFailOrNeverEnd) {
+TEST(EncolinkAccess, ReportsFailedAndEndlessSelfCalibration) {
   for (const auto& [says, error, words] : std::to_array<std::tuple<std::uint8_t, Error, std::string_view>>(
            {{calibration::out_of_range, Error::cross_check_failed, "too eccentric"},
             {0, Error::timeout, "does not end"}})) {
@@ -328,7 +328,7 @@ TEST(EncolinkAccess, ASelfCalibrationMayFailOrNeverEnd) {
   }
 }
 
-TEST(EncolinkAccess, WhatCannotBeWrittenIsNotTried) {
+TEST(EncolinkAccess, RefusesImpossibleWritesWithoutRequest) {
   Bench bench("resolution=20 multiturn_bits=12");
   const Register* text =
       std::find_if(registers.begin(), registers.end(), [](const Register& one) { return one.size > 8; });
@@ -343,14 +343,14 @@ TEST(EncolinkAccess, WhatCannotBeWrittenIsNotTried) {
   EXPECT_TRUE(says(preset.detail, "not so many bits")) << preset.detail;
 }
 
-TEST_P(EncolinkRegister, ACommandTellsThePositionWithoutAStatus) {
+TEST_P(EncolinkRegister, CommandReportsPositionWithoutStatus) {
   Bench bench(testing::single, interface);
   const Told save = bench.run("save");
   EXPECT_EQ(save.numbers.count("singleturn"), 1u);
   EXPECT_EQ(save.numbers.count("status"), 0u);
 }
 
-TEST_P(EncolinkRegister, APresetNeedsAShaftThatStands) {
+TEST_P(EncolinkRegister, PresetFailsWhileShaftTurns) {
   Bench bench(testing::multi, interface);
   bench.shaft.spin(30'000, bench.line.now());
   const Told preset = bench.run("preset-multiturn", {1234});
@@ -358,7 +358,7 @@ TEST_P(EncolinkRegister, APresetNeedsAShaftThatStands) {
   EXPECT_TRUE(says(preset.advice, "hold the shaft still")) << preset.advice;
 }
 
-TEST_P(EncolinkRegister, ACommandIsNeverRepeated) {
+TEST_P(EncolinkRegister, NeverRepeatsCommand) {
   Bench bench(testing::single, interface);
   bench.tampered.replies(damaging({100}));  // frame 100 arrives while the encoder is busy
   const Told save = bench.run("save");
@@ -370,11 +370,11 @@ TEST_P(EncolinkRegister, ACommandIsNeverRepeated) {
 }
 
 // After a refusal, bytes of data may follow: the next access must not begin among them.
-author::Procedure read_twice(Dialog& dialog, Found& found) {
-  const Fate refused = co_await attempt_read(dialog, found, 0x1234, 20);
-  if (refused != Fate::refused) co_return found.why;
-  const Fate good = co_await attempt_read(dialog, found, registers[temperature].address, 2);
-  co_return good == Fate::good ? author::done : found.why;
+author::Procedure read_twice(Dialog& dialog, ProcedureState& found) {
+  const AccessOutcome refused = co_await attempt_read(dialog, found, 0x1234, 20);
+  if (refused != AccessOutcome::refused) co_return found.why;
+  const AccessOutcome good = co_await attempt_read(dialog, found, registers[temperature].address, 2);
+  co_return good == AccessOutcome::good ? author::done : found.why;
 }
 
 struct Twice {
@@ -382,10 +382,10 @@ struct Twice {
   using Dialog = encolink::Dialog;
 };
 
-TEST_P(EncolinkRegister, AnAccessAfterARefusal) {
+TEST_P(EncolinkRegister, AccessesRegisterAfterRefusal) {
   Bench bench(testing::multi, interface);
   std::array<std::byte, 4000> frames{};
-  author::Run<Twice, Found, read_twice> twice(bench.encoder.format(), {}, frames);
+  author::Run<Twice, ProcedureState, read_twice> twice(bench.encoder.format(), {}, frames);
   EXPECT_EQ(bench.run(twice).error, Error::none);
   EXPECT_EQ(load_big_endian(twice.found().data), 350u);
   EXPECT_EQ(bench.first_violation(), "");

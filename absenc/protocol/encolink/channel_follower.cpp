@@ -30,7 +30,7 @@ void ChannelFollower::follow(std::uint64_t number, Bytes request, Bytes reply) {
 void ChannelFollower::lose() {
   in_step_ = false;
   frames_.clear();
-  asking_.clear();
+  partial_access_.clear();
   awaits_answer_ = false;
 }
 
@@ -64,29 +64,32 @@ void ChannelFollower::take_byte(const Format& format, std::uint64_t number, cons
 
 void ChannelFollower::take_answer(std::uint8_t byte) {
   if (!awaits_answer_) return;
-  const bool writes = asked_[access_keys.size()] == static_cast<std::uint8_t>(RegisterRequest::Operation::write);
+  const bool writes = last_access_[access_keys.size()] == static_cast<std::uint8_t>(RegisterRequest::Operation::write);
   // The encoder is idle or busy.
   if (answer_.empty() && byte != (writes ? channel3::write_ready : channel3::read_ready)) return;
   answer_.push_back(byte);
   if (answer_.size() < 2) return;
-  const Result<RegisterRequest> access = decode_access(asked_);
+  const Result<RegisterRequest> access = decode_access(last_access_);
   const bool brings_data = !writes && access && static_cast<AccessStatus>(answer_[1]) == AccessStatus::ok;
   has_answer_ = answer_.size() == 2u + (brings_data ? std::min<std::size_t>(access->length, access_capacity) : 0u);
   awaits_answer_ = !has_answer_;
 }
 
 void ChannelFollower::take_request(std::uint64_t number, std::uint8_t byte) {
-  if (asking_.size() < access_keys.size() && byte != access_keys[asking_.size()]) asking_.clear();
-  if (asking_.empty() && byte != access_keys[0]) return;
-  if (asking_.empty()) asking_from_ = number;
-  asking_.push_back(byte);
-  if (asking_.size() <= access_header) return;
-  const auto length = static_cast<std::size_t>(load_big_endian(asking_.view().subspan(access_keys.size() + 1, 2)));
-  const bool writes = asking_[access_keys.size()] == static_cast<std::uint8_t>(RegisterRequest::Operation::write);
-  if (asking_.size() < access_header + (writes ? std::min(length, access_capacity) : 0) + 1) return;
-  asked_ = asking_;
-  asked_from_ = asking_from_;
-  asking_.clear();
+  if (partial_access_.size() < access_keys.size() && byte != access_keys[partial_access_.size()])
+    partial_access_.clear();
+  if (partial_access_.empty() && byte != access_keys[0]) return;
+  if (partial_access_.empty()) partial_access_from_ = number;
+  partial_access_.push_back(byte);
+  if (partial_access_.size() <= access_header) return;
+  const auto length =
+      static_cast<std::size_t>(load_big_endian(partial_access_.view().subspan(access_keys.size() + 1, 2)));
+  const bool writes =
+      partial_access_[access_keys.size()] == static_cast<std::uint8_t>(RegisterRequest::Operation::write);
+  if (partial_access_.size() < access_header + (writes ? std::min(length, access_capacity) : 0) + 1) return;
+  last_access_ = partial_access_;
+  last_access_from_ = partial_access_from_;
+  partial_access_.clear();
   answer_.clear();
   has_answer_ = false;
   awaits_answer_ = true;
@@ -100,7 +103,7 @@ bool ChannelFollower::take(Composed& one) {
   }
   if (!has_answer_) return false;
   has_answer_ = false;
-  one = Composed{.request = asked_, .reply = answer_, .first = asked_from_};
+  one = Composed{.request = last_access_, .reply = answer_, .first = last_access_from_};
   return true;
 }
 

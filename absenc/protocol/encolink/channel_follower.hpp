@@ -42,10 +42,10 @@ class ChannelFollower final : public Follower {
   std::optional<Composed> cycle_;
   ByteBuffer<longest_cycle> cycle_bytes_;
   // Channel 3.
-  AccessBytes asking_;  // the `ra` bytes of an unfinished access
-  std::uint64_t asking_from_ = 0;
-  AccessBytes asked_;  // the last complete access
-  std::uint64_t asked_from_ = 0;
+  AccessBytes partial_access_;  // the `ra` bytes of an unfinished access
+  std::uint64_t partial_access_from_ = 0;
+  AccessBytes last_access_;  // the last complete access
+  std::uint64_t last_access_from_ = 0;
   bool awaits_answer_ = false;
   ByteBuffer<2 + access_capacity> answer_;
   bool has_answer_ = false;  // the answer was completed by the last exchange

@@ -17,7 +17,7 @@ namespace {
 constexpr Format format{.resolution = 20, .multiturn_bits = 16};
 constexpr Position here{.singleturn = 12'345, .multiturn = 7};
 
-struct Told {
+struct ComposedFrames {
   std::vector<std::uint8_t> request;
   std::vector<std::uint8_t> reply;
   std::uint64_t first;
@@ -53,14 +53,14 @@ struct Conversation {
   void take() {
     Composed one;
     while (follower.take(one)) {
-      told.push_back(
+      composed.push_back(
           {{one.request.begin(), one.request.end()}, {one.reply.begin(), one.reply.end()}, one.first, one.error});
     }
   }
   /// Returns the register accesses without the cycles.
-  [[nodiscard]] std::vector<Told> accesses() const {
-    std::vector<Told> all;
-    for (const Told& one : told) {
+  [[nodiscard]] std::vector<ComposedFrames> accesses() const {
+    std::vector<ComposedFrames> all;
+    for (const ComposedFrames& one : composed) {
       if (!one.request.empty()) all.push_back(one);
     }
     return all;
@@ -69,7 +69,7 @@ struct Conversation {
   ChannelFollower follower{format};
   std::uint64_t number = 0;
   std::size_t asked = 0;
-  std::vector<Told> told;
+  std::vector<ComposedFrames> composed;
 };
 
 struct Fields final : FieldSink {
@@ -79,7 +79,7 @@ struct Fields final : FieldSink {
   std::string text;
 };
 
-Error decode_as_unit(const Told& one, std::string& fields) {
+Error decode_as_unit(const ComposedFrames& one, std::string& fields) {
   Options options;
   EXPECT_EQ(resolve_options(unit, {}, {}, options).kind, OptionError::Kind::none);
   Fields sink;
@@ -101,55 +101,55 @@ TEST(EncolinkSpiUnit, DecodesReplyOfRequestThatIsClockedWithZeros) {
   EXPECT_FALSE(spi_unit.is_checked(options, {.bytes = clocked}, {.bytes = frame}, channel2_bit));
 }
 
-TEST(EncolinkFollower, ACycleIsWhatItsFramesCarry) {
+TEST(EncolinkFollower, ComposesCycleFromFrames) {
   Conversation line;
   line.reset();
   line.cycle(channel3::idle, status::temperature);
   line.cycle();
-  ASSERT_EQ(line.told.size(), 2u);
+  ASSERT_EQ(line.composed.size(), 2u);
   const ReplyBytes expected = encode_cycle(format, {here, status::temperature, channel3::idle});
-  EXPECT_EQ(line.told[0].reply, std::vector(expected.view().begin(), expected.view().end()));
-  EXPECT_EQ(line.told[0].first, 1u);
-  EXPECT_EQ(line.told[1].first, 10u);
+  EXPECT_EQ(line.composed[0].reply, std::vector(expected.view().begin(), expected.view().end()));
+  EXPECT_EQ(line.composed[0].first, 1u);
+  EXPECT_EQ(line.composed[1].first, 10u);
   std::string fields;
-  EXPECT_EQ(decode_as_unit(line.told[0], fields), Error::none);
+  EXPECT_EQ(decode_as_unit(line.composed[0], fields), Error::none);
   EXPECT_NE(fields.find(" alarms=16 "), std::string::npos) << fields;
 }
 
-TEST(EncolinkFollower, WithoutAResetACycleIsFoundByChecksumAndPosition) {
+TEST(EncolinkFollower, FindsCycleWithoutResetByChecksumAndPosition) {
   Conversation line;
   for (int i = 0; i < 4; ++i) line.exchange(0, 0, 0x55);
   line.cycle();
   line.cycle();
-  ASSERT_EQ(line.told.size(), 2u);
-  EXPECT_EQ(line.told[0].first, 4u);
-  EXPECT_EQ(line.told[0].error, Error::none);
+  ASSERT_EQ(line.composed.size(), 2u);
+  EXPECT_EQ(line.composed[0].first, 4u);
+  EXPECT_EQ(line.composed[0].error, Error::none);
 }
 
-TEST(EncolinkFollower, APositionOfItsOwnIsAnError) {
+TEST(EncolinkFollower, ReportsCycleWithAnotherPosition) {
   Conversation line;
   Position other = here;
   other.singleturn ^= 1;
   line.cycle(channel3::idle, 0, {}, other);
-  EXPECT_TRUE(line.told.empty()) << "it may be no cycle";
+  EXPECT_TRUE(line.composed.empty()) << "it may be no cycle";
   line.reset();
   line.cycle(channel3::idle, 0, {}, other);
-  ASSERT_EQ(line.told.size(), 1u);
-  EXPECT_EQ(line.told[0].error, Error::cross_check_failed);
+  ASSERT_EQ(line.composed.size(), 1u);
+  EXPECT_EQ(line.composed[0].error, Error::cross_check_failed);
 }
 
-TEST(EncolinkFollower, ALostFrameEndsTheCycleAndTheNextIsFound) {
+TEST(EncolinkFollower, FindsNextCycleAfterLostFrame) {
   Conversation line;
   line.reset();
   line.exchange(0, 0, 1);
   line.follower.lose();
   for (int i = 0; i < 3; ++i) line.exchange(0, 0, 0x55);
-  EXPECT_TRUE(line.told.empty());
+  EXPECT_TRUE(line.composed.empty());
   line.cycle();
-  EXPECT_EQ(line.told.size(), 1u);
+  EXPECT_EQ(line.composed.size(), 1u);
 }
 
-TEST(EncolinkFollower, ARegisterIsReadOverManyFrames) {
+TEST(EncolinkFollower, ComposesRegisterReadFromFrames) {
   Conversation line;
   line.reset();
   line.ask(read_request(0x4C, 2));
@@ -159,16 +159,16 @@ TEST(EncolinkFollower, ARegisterIsReadOverManyFrames) {
   EXPECT_TRUE(line.accesses().empty()) << "a byte of its data is missing";
   line.cycle(0x5E);
   line.cycle();
-  const std::vector<Told> told = line.accesses();
-  ASSERT_EQ(told.size(), 1u);
-  EXPECT_EQ(told[0].reply, (std::vector<std::uint8_t>{0x88, 0x09, 0x01, 0x5E}));
-  EXPECT_EQ(told[0].first, 1u);
+  const std::vector<ComposedFrames> composed = line.accesses();
+  ASSERT_EQ(composed.size(), 1u);
+  EXPECT_EQ(composed[0].reply, (std::vector<std::uint8_t>{0x88, 0x09, 0x01, 0x5E}));
+  EXPECT_EQ(composed[0].first, 1u);
   std::string fields;
-  EXPECT_EQ(decode_as_unit(told[0], fields), Error::none);
+  EXPECT_EQ(decode_as_unit(composed[0], fields), Error::none);
   EXPECT_NE(fields.find("address=76 "), std::string::npos) << fields;
 }
 
-TEST(EncolinkFollower, ARefusalIsOneWithItsReason) {
+TEST(EncolinkFollower, ComposesRefusedAccessWithReason) {
   for (const bool writes : {false, true}) {
     Conversation line;
     line.reset();
@@ -176,19 +176,19 @@ TEST(EncolinkFollower, ARefusalIsOneWithItsReason) {
     line.cycle(writes ? channel3::write_ready : channel3::read_ready);
     line.cycle(static_cast<std::uint8_t>(writes ? AccessStatus::denied : AccessStatus::byte_count));
     for (int i = 0; i < 4; ++i) line.cycle(0);  // bytes without a meaning follow
-    const std::vector<Told> told = line.accesses();
-    ASSERT_EQ(told.size(), 1u);
+    const std::vector<ComposedFrames> composed = line.accesses();
+    ASSERT_EQ(composed.size(), 1u);
     std::string fields;
-    EXPECT_EQ(decode_as_unit(told[0], fields), Error::request_rejected);
+    EXPECT_EQ(decode_as_unit(composed[0], fields), Error::request_rejected);
     Options options;
     EXPECT_EQ(resolve_options(unit, {}, {}, options).kind, OptionError::Kind::none);
     const Explanation why =
-        unit.explain(options, Error::request_rejected, {.bytes = told[0].request}, {.bytes = told[0].reply});
+        unit.explain(options, Error::request_rejected, {.bytes = composed[0].request}, {.bytes = composed[0].reply});
     EXPECT_EQ(why.detail, text_of(writes ? AccessStatus::denied : AccessStatus::byte_count));
   }
 }
 
-TEST(EncolinkFollower, AResetForgetsWhatWasAsked) {
+TEST(EncolinkFollower, ResetDropsPendingAccess) {
   Conversation line;
   line.reset();
   line.ask(read_request(0x4C, 2));
@@ -197,7 +197,7 @@ TEST(EncolinkFollower, AResetForgetsWhatWasAsked) {
     line.cycle(byte);
   }
   EXPECT_TRUE(line.accesses().empty());
-  EXPECT_EQ(line.told.size(), 6u);
+  EXPECT_EQ(line.composed.size(), 6u);
 }
 
 }  // namespace

@@ -31,9 +31,9 @@ constexpr auto at_shipping = [] {
 }();
 
 // Registers that `save` stores, in the order of the memory.
-constexpr std::array<std::size_t, 9> kept{position_offset, multiturn_preset,      write_lock,
-                                          turns_taken,     position_filter,       position_filter_speed,
-                                          velocity_filter, velocity_filter_speed, calibration_range};
+constexpr std::array<std::size_t, 9> stored_registers{position_offset, multiturn_preset,      write_lock,
+                                                      turns_taken,     position_filter,       position_filter_speed,
+                                                      velocity_filter, velocity_filter_speed, calibration_range};
 
 }  // namespace
 
@@ -132,7 +132,7 @@ void VirtualEncoder::reset_channels() {
   cycle_index_ = 0;
   access_.clear();
   answer_.clear();
-  answered_bytes_ = 0;
+  sent_answer_bytes_ = 0;
 }
 
 std::uint8_t VirtualEncoder::next_channel2(const Position& position, Time now) {
@@ -149,16 +149,16 @@ std::uint8_t VirtualEncoder::next_channel2(const Position& position, Time now) {
 }
 
 std::uint8_t VirtualEncoder::next_channel3(Time now) {
-  if (answered_bytes_ == answer_.size()) return channel3::idle;
+  if (sent_answer_bytes_ == answer_.size()) return channel3::idle;
   if (now < busy_until_ || conditions_[condition_busy] != 0) return channel3::busy;
-  return answer_[answered_bytes_++];
+  return answer_[sent_answer_bytes_++];
 }
 
 void VirtualEncoder::ra_received(std::uint8_t byte, Time at) {
   if (access_.size() < access_keys.size() && byte != access_keys[access_.size()]) access_.clear();
   if (access_.empty() && byte != access_keys[0]) return;
   access_.push_back(byte);
-  if (access_.size() == 2 && !expect(answered_bytes_ == answer_.size(), access_rule, at)) access_.clear();
+  if (access_.size() == 2 && !expect(sent_answer_bytes_ == answer_.size(), access_rule, at)) access_.clear();
   if (access_.size() < access_header) return;
   const auto length = static_cast<std::size_t>(load_big_endian(access_.view().subspan(access_keys.size() + 1, 2)));
   const bool writes = access_[access_keys.size()] == static_cast<std::uint8_t>(RegisterRequest::Operation::write);
@@ -168,14 +168,14 @@ void VirtualEncoder::ra_received(std::uint8_t byte, Time at) {
 // ---- State
 
 // Returns the shaft's position with the offset in 2^-32 revolution, as if the turn counter had no limit.
-std::int64_t VirtualEncoder::place(Time now) const {
+std::int64_t VirtualEncoder::offset_position(Time now) const {
   const auto fraction = static_cast<std::int32_t>(format_.offset_fraction(offset()));
   const std::int64_t position = shaft_->at(now).position;
   return format_.offset_sign == OffsetSign::add ? position + fraction : position - fraction;
 }
 
 Position VirtualEncoder::measure(Time now) const {
-  const std::int64_t here = place(now);
+  const std::int64_t here = offset_position(now);
   const auto turns = static_cast<std::uint32_t>(here >> 32) - values_[turns_taken];
   Position position;
   position.singleturn = static_cast<std::uint32_t>(here) >> (32 - format_.resolution);
@@ -223,7 +223,7 @@ void VirtualEncoder::execute(Time at) {
   const bool writes = access_[access_keys.size()] == static_cast<std::uint8_t>(RegisterRequest::Operation::write);
   access_.clear();
   answer_.clear();
-  answered_bytes_ = 0;
+  sent_answer_bytes_ = 0;
   busy_until_ = std::max(busy_until_, at + access_time);
   if (request.error() == Error::unsupported) return;  // an unknown operation is ignored: channel 3 stays idle
   AccessStatus status = writes ? AccessStatus::write_checksum : AccessStatus::read_checksum;
@@ -233,7 +233,7 @@ void VirtualEncoder::execute(Time at) {
     // The registers of an AksIM-4 are not described, so none is found.
     const Register* found = format_.generation == Generation::aksim2 ? find_register(request->address) : nullptr;
     if (found != nullptr) index = static_cast<std::size_t>(found - registers.data());
-    status = judge(*request, found);
+    status = check_access(*request, found);
     if (status == AccessStatus::ok && writes) status = write(index, load_big_endian(request->data), at);
   }
   answer_.push_back(writes ? channel3::write_ready : channel3::read_ready);
@@ -246,7 +246,7 @@ void VirtualEncoder::execute(Time at) {
   }
 }
 
-AccessStatus VirtualEncoder::judge(const RegisterRequest& request, const Register* found) const {
+AccessStatus VirtualEncoder::check_access(const RegisterRequest& request, const Register* found) const {
   const bool writes = request.operation == RegisterRequest::Operation::write;
   if (found == nullptr) return AccessStatus::no_such_register;
   if (writes && found->access == Access::read_only) return AccessStatus::denied;
@@ -258,20 +258,20 @@ AccessStatus VirtualEncoder::judge(const RegisterRequest& request, const Registe
 
 AccessStatus VirtualEncoder::write(std::size_t index, std::uint64_t value, Time at) {
   std::uint64_t largest = UINT64_MAX;
-  if (index == command_register) return obey(static_cast<std::uint8_t>(value), at);
+  if (index == command_register) return execute_command(static_cast<std::uint8_t>(value), at);
   if (index == position_offset) largest = format_.largest_offset();
   if (index == multiturn_preset) largest = low_mask(static_cast<unsigned>(format_.multiturn_bits));
   if (index == write_lock) largest = 1;
   if (value > largest) return AccessStatus::out_of_range;
   values_[index] = static_cast<std::uint32_t>(value);
   if (index == multiturn_preset) {
-    values_[turns_taken] = static_cast<std::uint32_t>(static_cast<std::uint64_t>(place(at) >> 32) - value);
+    values_[turns_taken] = static_cast<std::uint32_t>(static_cast<std::uint64_t>(offset_position(at) >> 32) - value);
     lower_alarms(status::multiturn_mismatch);
   }
   return AccessStatus::ok;
 }
 
-AccessStatus VirtualEncoder::obey(std::uint8_t command, Time at) {
+AccessStatus VirtualEncoder::execute_command(std::uint8_t command, Time at) {
   const std::uint32_t calibrated = values_[calibration_status];
   switch (command) {
     case commands::save:
@@ -311,23 +311,23 @@ ByteBuffer<largest_register> VirtualEncoder::value_of(std::size_t index, Time at
 
 // ---- Non-volatile memory
 
-constexpr std::size_t kept_size(std::size_t index) { return index == turns_taken ? 4 : registers[index].size; }
+constexpr std::size_t stored_size(std::size_t index) { return index == turns_taken ? 4 : registers[index].size; }
 
 void VirtualEncoder::load() {
   values_ = at_shipping;
   Bytes bytes = memory_;
-  for (const std::size_t index : kept) {
-    values_[index] = static_cast<std::uint32_t>(load_big_endian(bytes.first(kept_size(index))));
-    bytes = bytes.subspan(kept_size(index));
+  for (const std::size_t index : stored_registers) {
+    values_[index] = static_cast<std::uint32_t>(load_big_endian(bytes.first(stored_size(index))));
+    bytes = bytes.subspan(stored_size(index));
   }
 }
 
 void VirtualEncoder::save() {
   save_pending_ = false;
   MutableBytes bytes = memory_;
-  for (const std::size_t index : kept) {
-    store_big_endian(bytes.first(kept_size(index)), values_[index]);
-    bytes = bytes.subspan(kept_size(index));
+  for (const std::size_t index : stored_registers) {
+    store_big_endian(bytes.first(stored_size(index)), values_[index]);
+    bytes = bytes.subspan(stored_size(index));
   }
   change_memory();
   lower_alarms(status::configuration_error);  // the stored configuration is complete again

@@ -65,16 +65,16 @@ class VirtualEncoder final : public author::Responder {
 
   void ra_received(std::uint8_t byte, Time at);
   void execute(Time at);
-  [[nodiscard]] AccessStatus judge(const RegisterRequest& request, const Register* found) const;
+  [[nodiscard]] AccessStatus check_access(const RegisterRequest& request, const Register* found) const;
   [[nodiscard]] AccessStatus write(std::size_t index, std::uint64_t value, Time at);
-  [[nodiscard]] AccessStatus obey(std::uint8_t command, Time at);
+  [[nodiscard]] AccessStatus execute_command(std::uint8_t command, Time at);
   [[nodiscard]] ByteBuffer<largest_register> value_of(std::size_t index, Time at) const;
 
   void update(Time now);
   void end_calibration(Time now);
   void load();
   void save();
-  [[nodiscard]] std::int64_t place(Time now) const;
+  [[nodiscard]] std::int64_t offset_position(Time now) const;
 
   Format format_;
   const Shaft* shaft_;
@@ -96,7 +96,7 @@ class VirtualEncoder final : public author::Responder {
   std::size_t cycle_index_ = 0;
   AccessBytes access_;
   ByteBuffer<access_capacity + 2> answer_;
-  std::size_t answered_bytes_ = 0;
+  std::size_t sent_answer_bytes_ = 0;
 
   Time next_frame_{};  // start of the next frame of an encoder that streams
   Time pause_since_{};

@@ -16,7 +16,7 @@ constexpr const Format& single = testing::single_format;
 RawBytes wire_of(Bytes bytes) { return {bytes.begin(), bytes.end()}; }
 const RawBytes position_request{0x00, 0x00};
 
-TEST(EncolinkDevice, AnswersFiveMicrosecondsAfterTheRequest) {
+TEST(EncolinkDevice, RepliesFiveMicrosecondsAfterRequest) {
   Bench bench(testing::single);
   const auto host = bench.raw(position_request);
   EXPECT_EQ(host.first_byte_at - host.sent_at, answer_time + 10us);
@@ -24,7 +24,7 @@ TEST(EncolinkDevice, AnswersFiveMicrosecondsAfterTheRequest) {
             wire_of(encode_position(single, {.singleturn = 0x12345}).view().first(4)));
 }
 
-TEST(EncolinkDevice, TheIdentityComesInTheFrameAfterItsRequest) {
+TEST(EncolinkDevice, SendsIdentityInFrameAfterRequest) {
   for (const Interface interface : {Interface::uart, Interface::spi}) {
     Bench bench(testing::multi, interface);
     const auto replies =
@@ -39,7 +39,7 @@ TEST(EncolinkDevice, TheIdentityComesInTheFrameAfterItsRequest) {
   }
 }
 
-TEST(EncolinkDevice, CyclesBeginInTheFrameAfterTheReset) {
+TEST(EncolinkDevice, BeginsCycleInFrameAfterReset) {
   Bench bench(testing::single);
   std::vector<RawBytes> requests(10, position_request);
   requests[2] = {0xAA, 0x00};
@@ -49,7 +49,7 @@ TEST(EncolinkDevice, CyclesBeginInTheFrameAfterTheReset) {
   EXPECT_EQ(cycle, wire_of(encode_cycle(single, {{.singleturn = 0x12345}, 0, channel3::idle})));
 }
 
-TEST(EncolinkDevice, WhatIsNoRequestIsForgotten) {
+TEST(EncolinkDevice, DropsInvalidRequest) {
   Bench bench(testing::single);
   const auto replies = bench.ask({{0xAB, 0x00}, {0x55, 0x00}, position_request, {0xBB}, position_request});
   for (std::size_t i = 0; i < replies.size(); ++i) {
@@ -57,7 +57,7 @@ TEST(EncolinkDevice, WhatIsNoRequestIsForgotten) {
   }
 }
 
-TEST(EncolinkDevice, WatchesItsHost) {
+TEST(EncolinkDevice, ReportsBrokenRulesOfAccessAndTransmission) {
   const AccessBytes access = encode_access(read_request(0x4C, 2));
   std::vector<RawBytes> two_accesses;
   for (unsigned twice = 0; twice < 2; ++twice) {
@@ -98,7 +98,7 @@ class SpiHost final : public Machine<std::uint8_t> {
   std::array<std::uint8_t, 2> request_{};
 };
 
-TEST(EncolinkDevice, WatchesTheTimesOfSpi) {
+TEST(EncolinkDevice, ReportsBrokenSpiTimes) {
   LineSettings fastest = spi_settings;
   fastest.rate = 4'000'000;
   LineSettings fast = spi_settings;
@@ -120,7 +120,7 @@ TEST(EncolinkDevice, WatchesTheTimesOfSpi) {
   }
 }
 
-TEST(EncolinkDevice, SendsWellFormedZerosWhileItStarts) {
+TEST(EncolinkDevice, SendsWellFormedZerosWhileStarting) {
   Bench bench(testing::single);
   bench.device.power_off(bench.line.now());
   EXPECT_TRUE(bench.ask({position_request})[0].empty());
@@ -130,7 +130,7 @@ TEST(EncolinkDevice, SendsWellFormedZerosWhileItStarts) {
   EXPECT_EQ(decode_position(single, bench.ask({position_request})[0])->singleturn, 0x12345u);
 }
 
-TEST(EncolinkDevice, CountsRoundTheTurnAndBelowZero) {
+TEST(EncolinkDevice, CountsAcrossTurnAndBelowZero) {
   Bench bench;
   bench.shaft.put(-1, 0xFFFFF);
   EXPECT_EQ(bench.encoder.measure(Time{}).singleturn, 0xFFFFFu);
@@ -139,7 +139,7 @@ TEST(EncolinkDevice, CountsRoundTheTurnAndBelowZero) {
   EXPECT_EQ(bench.encoder.measure(Time{}).multiturn, 0u);
 }
 
-TEST(EncolinkDevice, AlarmsSetTheTwoBitsOfEveryFrame) {
+TEST(EncolinkDevice, AlarmsSetStatusBitsOfEveryFrame) {
   Bench bench;
   for (unsigned bit = 0; bit < 16; ++bit) {
     bench.device.raise_alarms(1u << bit);
@@ -151,7 +151,7 @@ TEST(EncolinkDevice, AlarmsSetTheTwoBitsOfEveryFrame) {
   EXPECT_FALSE(bench.encoder.measure(Time{}).error);
 }
 
-TEST(EncolinkDevice, TransmitsByItselfAtItsRate) {
+TEST(EncolinkDevice, StreamsAtItsRate) {
   Bench bench("resolution=20 multiturn_bits=0 stream_rate=2000");
   std::vector<Time> ends;
   bench.line.observe([&ends](auto, Time, Time end, std::uint8_t) { ends.push_back(end); });
@@ -177,7 +177,7 @@ RawBytes answer_to(Bench& bench, Bytes access) {
   return answer;
 }
 
-TEST(EncolinkDevice, AnAksim4HasOtherRegisters) {
+TEST(EncolinkDevice, Aksim4RejectsRegistersOfAksim2) {
   const AccessBytes access = encode_access(read_request(0x4C, 2));
   for (const auto& [generation, status] :
        {std::pair<std::string, AccessStatus>{"2", AccessStatus::ok}, {"4", AccessStatus::no_such_register}}) {
@@ -189,7 +189,7 @@ TEST(EncolinkDevice, AnAksim4HasOtherRegisters) {
   }
 }
 
-TEST(EncolinkDevice, KeepsWhatIsSaved) {
+TEST(EncolinkDevice, KeepsSavedValues) {
   Bench bench;
   EXPECT_EQ(bench.device.memory().size(), 31u);
   bench.device.power_off(Time{});

@@ -20,7 +20,7 @@ constexpr Format multi{.resolution = 19, .multiturn_bits = 16};
 
 static_assert(checksum(std::array<std::uint8_t, 9>{'1', '2', '3', '4', '5', '6', '7', '8', '9'}) == 0x6B);
 
-TEST(EncolinkFrame, EveryErrorOfUpToThreeBitsIsSeen) {
+TEST(EncolinkFrame, DetectsEveryErrorOfUpToThreeBits) {
   constexpr Format format{.resolution = 22, .multiturn_bits = 16};
   const ReplyBytes good = encode_position(format, {0x2AAAAA, 0x1234});
   constexpr unsigned covered_bits = 48;
@@ -38,7 +38,7 @@ TEST(EncolinkFrame, EveryErrorOfUpToThreeBitsIsSeen) {
   }
 }
 
-TEST(EncolinkFrame, WhatOfAReadingHolds) {
+TEST(EncolinkFrame, ReadingValidityFollowsStatus) {
   struct Case {
     Position position;
     std::uint16_t detailed;
@@ -62,7 +62,7 @@ TEST(EncolinkFrame, WhatOfAReadingHolds) {
 }
 
 // A frame has only two status bits and no named alarms: a cycle of channel 2 has these.
-TEST(EncolinkFrame, BitsOfAFrameReportAlarmsOnlyWhereTheyAreClear) {
+TEST(EncolinkFrame, StatusBitsReportOnlyClearAlarms) {
   EXPECT_EQ(to_reading(multi, {}).status_reported, general::error | general::warning);
   EXPECT_EQ(to_reading(multi, {}).alarms_reported, 0xFFFFu);
   EXPECT_EQ(to_reading(multi, {.error = true}).alarms_reported, status::warnings);
@@ -75,7 +75,7 @@ TEST(EncolinkFrame, BitsOfAFrameReportAlarmsOnlyWhereTheyAreClear) {
 }
 
 // The earlier cycle reported which alarm is set. The clear bit of the frame only reports that no warning is set.
-TEST(EncolinkFrame, ACycleIsRememberedWhereABitOfTheFrameIsSet) {
+TEST(EncolinkFrame, RemembersAlarmsOfCycleWhileStatusBitsAgree) {
   constexpr Position bad{.singleturn = 5, .error = true};
   constexpr Position warned{.singleturn = 5, .warning = true};
   const Reading lost = to_reading(multi, bad, status::signal_lost);
@@ -91,7 +91,7 @@ TEST(EncolinkFrame, ACycleIsRememberedWhereABitOfTheFrameIsSet) {
   EXPECT_EQ(remembered(lost, to_reading(multi, {.singleturn = 5})).alarms_reported, 0xFFFFu);
 }
 
-TEST(EncolinkFrame, AByteBehindTheIdentityMeansNothing) {
+TEST(EncolinkFrame, IgnoresByteAfterIdentity) {
   ReplyBytes padded = encode_identity({.frame_bytes = 7, .resolution = 18});
   padded.push_back(0x5A);
   ASSERT_TRUE(decode_identity(padded).has_value());
@@ -101,13 +101,13 @@ TEST(EncolinkFrame, AByteBehindTheIdentityMeansNothing) {
   EXPECT_EQ(decode_identity({}).error(), Error::wrong_length);
 }
 
-TEST(EncolinkFrame, AnIdentityOfAnotherKindIsNone) {
+TEST(EncolinkFrame, RejectsIdentityOfUnknownVersionOrLength) {
   for (const Identity& other : {Identity{.protocol_version = 3}, Identity{.frame_bytes = 6}}) {
     EXPECT_EQ(decode_identity(encode_identity(other)).error(), Error::unexpected_reply);
   }
 }
 
-TEST(EncolinkFrame, TheResolutionOfAnIdentityIsANumber) {
+TEST(EncolinkFrame, RejectsIdentityWithInvalidResolution) {
   for (const unsigned bits : {0u, 23u}) {
     EXPECT_EQ(decode_identity(encode_identity({.resolution = bits})).error(), Error::out_of_range);
   }
@@ -117,14 +117,14 @@ TEST(EncolinkFrame, TheResolutionOfAnIdentityIsANumber) {
   EXPECT_EQ(decode_identity(strange).error(), Error::out_of_range);
 }
 
-TEST(EncolinkFrame, ACycleHasItsLength) {
+TEST(EncolinkFrame, RejectsCycleOfWrongLength) {
   const ReplyBytes cycle = encode_cycle(single, {{.singleturn = 5}, 0, channel3::idle});
   ASSERT_TRUE(decode_cycle(single, cycle).has_value());
   EXPECT_EQ(decode_cycle(single, cycle.view().first(cycle.size() - 1)).error(), Error::wrong_length);
   EXPECT_EQ(decode_cycle(single, {}).error(), Error::wrong_length);
 }
 
-TEST(EncolinkFrame, TheIdentityCompletesTheFormat) {
+TEST(EncolinkFrame, CompletesFormatFromIdentity) {
   const Identity turns{.frame_bytes = 7, .resolution = 18};
   const Result<Format> asked = complete({}, turns);
   EXPECT_EQ(asked->resolution, 18u);
@@ -140,7 +140,7 @@ TEST(EncolinkFrame, TheIdentityCompletesTheFormat) {
   EXPECT_EQ(as_identified({.multiturn_bits = 0}, turns).multiturn_bits, 16);
 }
 
-TEST(EncolinkFrame, BadAccessesAreNamed) {
+TEST(EncolinkFrame, DistinguishesErrorsOfAccesses) {
   EXPECT_EQ(decode_access({}).error(), Error::wrong_length);
   EXPECT_EQ(decode_access(hex<"00CDEF">).error(), Error::wrong_length);
   EXPECT_EQ(decode_access(hex<"00CDEF89AB59000200">).error(), Error::wrong_length);
@@ -151,7 +151,7 @@ TEST(EncolinkFrame, BadAccessesAreNamed) {
   EXPECT_EQ(decode_access(hex<"00CDEF89AB5900020000004C04">).error(), Error::bad_checksum);
 }
 
-TEST(EncolinkUnit, AFrameEndsWhereItsChecksumSays) {
+TEST(EncolinkUnit, FindsFrameEndByChecksum) {
   const Options values = author::testing::options_of(unit, "multiturn_bits=0");
   const FrameEnd broken = unit.frame_end(values, Direction::reply, hex<"00000000000000000000000000000000000000">);
   EXPECT_EQ(broken.kind, FrameEnd::Kind::no_frame);
@@ -159,7 +159,7 @@ TEST(EncolinkUnit, AFrameEndsWhereItsChecksumSays) {
   EXPECT_EQ(unit.frame_end(values, Direction::request, hex<"A900">).kind, FrameEnd::Kind::no_frame);
 }
 
-TEST(EncolinkUnit, EncodesTheBytesThatDoTheWork) {
+TEST(EncolinkUnit, EncodesRequestOfEachCommand) {
   struct Case {
     std::string_view command;
     std::vector<std::int64_t> arguments;

@@ -82,8 +82,8 @@ void ReadPosition::concluded(Error error) {
   channels_.take(*this);
   const Position& position = last();
   if (channels_.in_step && !channels_.ended) return go_on(Ask::position);
-  const bool looks_closer = position.error || position.warning || is_all_zero(position);
-  if (format().has_ch2 && looks_closer && !channels_.ended) return go_on(Ask::reset);
+  const bool needs_alarms = position.error || position.warning || is_all_zero(position);
+  if (format().has_ch2 && needs_alarms && !channels_.ended) return go_on(Ask::reset);
   if (channels_.silent && is_all_zero(position)) channels_.reading.ready = false;
   finish(Error::none);
 }

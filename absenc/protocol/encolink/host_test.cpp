@@ -18,7 +18,7 @@ using PowerOn = Bench::PowerOn;
 class EncolinkHost : public testing::OnBothInterfaces {};
 INSTANTIATE_TEST_SUITE_P(Interfaces, EncolinkHost, ::testing::Values(Interface::uart, Interface::spi));
 
-TEST(EncolinkHostUart, ReadsAPositionInTheTimeOfTheWire) {
+TEST(EncolinkHostUart, ReadsPositionWithoutExtraTime) {
   Bench bench;
   const Told read = bench.run("position");
   EXPECT_EQ(read.took, (2 + 7) * 10us + answer_time);
@@ -29,7 +29,7 @@ TEST(EncolinkHostUart, ReadsAPositionInTheTimeOfTheWire) {
   EXPECT_EQ(read.reading->received, 95us);
 }
 
-TEST(EncolinkHostSpi, ThePositionIsTakenWhenNcsFalls) {
+TEST(EncolinkHostSpi, LatchesPositionWhenNcsFalls) {
   Bench bench(testing::single, Interface::spi);
   bench.pass(1ms);
   const Told read = bench.run("position");
@@ -40,7 +40,7 @@ TEST(EncolinkHostSpi, ThePositionIsTakenWhenNcsFalls) {
   EXPECT_EQ(read.took, spi_pause + spi_lead + 40us);
 }
 
-TEST_P(EncolinkHost, WhatIsWrongIsSaid) {
+TEST_P(EncolinkHost, ExplainsEachError) {
   const auto none = [](unsigned, RawBytes&) {};
   const auto all = [](std::uint8_t byte) {
     return [byte](unsigned, RawBytes& reply) { reply.assign(reply.size(), byte); };
@@ -75,7 +75,7 @@ TEST_P(EncolinkHost, WhatIsWrongIsSaid) {
   }
 }
 
-TEST(EncolinkHostUart, NothingComes) {
+TEST(EncolinkHostUart, TimesOutWithoutReply) {
   Bench bench;
   bench.device.power_off(bench.line.now());
   EXPECT_EQ(bench.run("position").took, 20us + answer_limit);
@@ -83,7 +83,7 @@ TEST(EncolinkHostUart, NothingComes) {
 
 // ---- The identity
 
-TEST_P(EncolinkHost, WhatIsNotKnownIsAskedFirst) {
+TEST_P(EncolinkHost, ReadsIdentityWhenFormatIsUnknown) {
   for (const std::string_view real : {testing::single, testing::multi, std::string_view("resolution=17")}) {
     Bench bench(real, interface);
     bench.tell("");
@@ -97,7 +97,7 @@ TEST_P(EncolinkHost, WhatIsNotKnownIsAskedFirst) {
   }
 }
 
-TEST_P(EncolinkHost, TheIdentityCountsAgainstTheOptionsWhereItIsAskedFor) {
+TEST_P(EncolinkHost, IdentityOverridesOptionsInInfoAndIdentify) {
   Bench bench("resolution=17 multiturn_bits=0", interface);
   bench.tell("resolution=20 multiturn_bits=0");
   const Told info = bench.run("info");
@@ -117,13 +117,13 @@ TEST_P(EncolinkHost, TheIdentityCountsAgainstTheOptionsWhereItIsAskedFor) {
   EXPECT_EQ(turns.reading->multiturn, 7u);
 }
 
-TEST_P(EncolinkHost, AnIdentityThatSaysOtherwiseEndsWhatTakesSeveralFrames) {
+TEST_P(EncolinkHost, StopsProcedureWhenIdentityContradictsOptions) {
   Bench bench("resolution=20 multiturn_bits=16", interface);
   bench.tell("multiturn_bits=0");
   EXPECT_EQ(bench.run("alarms").error, Error::unexpected_reply);
 }
 
-TEST_P(EncolinkHost, AnIdentityOfAnotherKindSaysNothingOfTheOptions) {
+TEST_P(EncolinkHost, DoesNotBlameOptionsForUnknownIdentity) {
   Bench bench("resolution=20 multiturn_bits=16", interface);
   bench.tampered.replies([](unsigned, RawBytes& reply) {
     if (reply.size() < identity_bytes) return;
@@ -135,7 +135,7 @@ TEST_P(EncolinkHost, AnIdentityOfAnotherKindSaysNothingOfTheOptions) {
   EXPECT_FALSE(says(identify.detail, "resolution")) << identify.detail;
 }
 
-TEST_P(EncolinkHost, TheIdentityMayHaveAByteBehindIt) {
+TEST_P(EncolinkHost, AcceptsByteAfterIdentity) {
   for (const std::string_view told : {std::string_view(""), testing::multi}) {
     Bench bench("resolution=20 multiturn_bits=16 identity_bytes=20", interface);
     bench.tell(told);
@@ -152,7 +152,7 @@ TEST_P(EncolinkHost, TheIdentityMayHaveAByteBehindIt) {
   }
 }
 
-TEST_P(EncolinkHost, TheIdentityIsAskedForThreeTimes) {
+TEST_P(EncolinkHost, ReadsIdentityUpToThreeTimes) {
   for (const auto& [bad, error] :
        std::to_array<std::pair<unsigned, Error>>({{2, Error::none}, {3, Error::bad_checksum}})) {
     Bench bench("resolution=20 multiturn_bits=16", interface);
@@ -166,7 +166,7 @@ TEST_P(EncolinkHost, TheIdentityIsAskedForThreeTimes) {
   }
 }
 
-TEST_P(EncolinkHost, TheIdentityOfVersion4LeavesRegistersAlone) {
+TEST_P(EncolinkHost, AccessesNoRegistersOfVersion4) {
   Bench bench("resolution=20 multiturn_bits=16 protocol_version=4", interface);
   for (const std::string_view told : {std::string_view(""), testing::multi}) {
     bench.tell(told);
@@ -197,7 +197,7 @@ TEST_P(EncolinkHost, TheIdentityOfVersion4LeavesRegistersAlone) {
 
 // ---- Channel 2
 
-TEST_P(EncolinkHost, TheDetailedStatusTakesOneCycle) {
+TEST_P(EncolinkHost, ReadsDetailedStatusInOneCycle) {
   constexpr std::uint16_t raised = status::temperature | status::multiturn_mismatch;
   for (const std::string_view settings : {testing::single, testing::multi}) {
     Bench bench(settings, interface);
@@ -213,7 +213,7 @@ TEST_P(EncolinkHost, TheDetailedStatusTakesOneCycle) {
   }
 }
 
-TEST_P(EncolinkHost, AnAlarmBitIsFollowedByItsWords) {
+TEST_P(EncolinkHost, ReadsAlarmsWhenStatusBitIsSet) {
   Bench bench(testing::single, interface);
   for (const auto& [alarm, general, valid] : std::to_array<std::tuple<std::uint16_t, std::uint32_t, bool>>(
            {{status::temperature, general::warning, true}, {status::signal_lost, general::error, false}})) {
@@ -228,7 +228,7 @@ TEST_P(EncolinkHost, AnAlarmBitIsFollowedByItsWords) {
   }
 }
 
-TEST_P(EncolinkHost, Channel2ThatDisagreesIsAnErrorOfItsOwn) {
+TEST_P(EncolinkHost, ReportsChannel2ThatDisagrees) {
   Bench bench(testing::multi, interface);
   bench.condition(condition_channels_disagree, 1);
   const Told status = bench.run("alarms");
@@ -243,7 +243,7 @@ TEST_P(EncolinkHost, Channel2ThatDisagreesIsAnErrorOfItsOwn) {
 }
 
 // Frame 0 resets the channels; the cycle begins in frame 1.
-TEST_P(EncolinkHost, ACycleThatIsNotGoodIsReadAgain) {
+TEST_P(EncolinkHost, RepeatsInvalidCycle) {
   const auto turned = [](unsigned frame, RawBytes& reply) {  // changes the turns in the first frame of the cycle
     if (frame % 10 != 1) return;
     ++reply[1];
@@ -285,7 +285,7 @@ TEST_P(EncolinkHost, ZerosWithoutChannel2AreNotReady) {
 }
 
 // The position is really zero and channel 2 is wrong: the encoder is not starting.
-TEST_P(EncolinkHost, ZerosBesideAWrongChannel2AreReady) {
+TEST_P(EncolinkHost, ZerosWithWrongChannel2AreReady) {
   const auto damaged = [](unsigned, RawBytes& reply) { reply.back() ^= 0x01; };
   const auto none = [](unsigned, RawBytes&) {};
   for (const bool disagrees : {false, true}) {
@@ -303,7 +303,7 @@ TEST_P(EncolinkHost, ZerosBesideAWrongChannel2AreReady) {
 
 // At 10 000 rpm a turn of 20 bits advances by 175 counts per microsecond, so `latched` must be the time of the
 // position.
-TEST_P(EncolinkHost, LatchedIsWhenTheEncoderTookThePosition) {
+TEST_P(EncolinkHost, LatchedIsTimeOfPosition) {
   for (const std::string_view told : {testing::multi, std::string_view("")}) {
     Bench bench(testing::multi, interface);
     bench.tell(told);
@@ -317,7 +317,7 @@ TEST_P(EncolinkHost, LatchedIsWhenTheEncoderTookThePosition) {
   }
 }
 
-TEST_P(EncolinkHost, WithoutChannel2ThereAreOnlyPositions) {
+TEST_P(EncolinkHost, ReadsOnlyPositionsWithoutChannel2) {
   Bench bench("resolution=20 multiturn_bits=0 has_ch2=false", interface);
   EXPECT_EQ(bench.run("position").reading->singleturn, 0x12345u);
   for (const auto& [command, arguments] : std::vector<std::pair<std::string_view, std::vector<std::int64_t>>>{
@@ -334,7 +334,7 @@ TEST_P(EncolinkHost, WithoutChannel2ThereAreOnlyPositions) {
 
 constexpr std::string_view streaming = "resolution=20 multiturn_bits=16 stream_rate=1000";
 
-TEST(EncolinkListen, FindsTheFramesByTheirChecksums) {
+TEST(EncolinkListen, FindsFramesByChecksum) {
   Bench bench("resolution=20 multiturn_bits=16 stream_rate=5000");
   bench.shaft.spin(60, bench.line.now());
   bench.pass(1ms + 95us);  // starts to listen in the middle of a frame
@@ -352,7 +352,7 @@ TEST(EncolinkListen, FindsTheFramesByTheirChecksums) {
   EXPECT_EQ(bench.first_violation(), "");
 }
 
-TEST(EncolinkListen, LatchedIsWhenTheEncoderTookThePosition) {
+TEST(EncolinkListen, LatchedIsTimeOfPosition) {
   Bench bench(streaming);
   bench.shaft.spin(10'000, bench.line.now());
   Listen listen(testing::multi_format);
@@ -366,7 +366,7 @@ TEST(EncolinkListen, LatchedIsWhenTheEncoderTookThePosition) {
 }
 
 // Document: "Nothing is sent then."
-TEST(EncolinkListen, AnEncoderThatTransmitsByItselfIsNotAsked) {
+TEST(EncolinkListen, SendsNothingToStreamingEncoder) {
   Bench bench(streaming);
   std::size_t sent = 0;
   bench.line.observe([&](std::size_t sender, Time, Time, std::uint8_t) { sent += sender == 1 ? 1 : 0; });
@@ -382,7 +382,7 @@ TEST(EncolinkListen, AnEncoderThatTransmitsByItselfIsNotAsked) {
   EXPECT_EQ(sent, 0u);
 }
 
-TEST(EncolinkListen, ReportsDamagedFramesAndGoesOn) {
+TEST(EncolinkListen, ReportsDamagedFramesAndContinues) {
   Bench bench(streaming);
   bench.tampered.replies([](unsigned frame, RawBytes& reply) {
     if (frame == 10) reply.erase(reply.begin());
@@ -404,7 +404,7 @@ TEST(EncolinkListen, ReportsDamagedFramesAndGoesOn) {
   EXPECT_EQ(listen.stream()->discarded, 5u) << "10, 20 to 22, 30";
 }
 
-TEST(EncolinkListen, OneGoodChecksumMayBeAccident) {
+TEST(EncolinkListen, NeedsTwoValidFramesInARow) {
   const auto emits = [](Listen& listen, Bytes bytes) {
     listen.next(Time{});
     listen.feed({.kind = Event<std::uint8_t>::Kind::received, .at = 1ms, .items = bytes});
@@ -423,7 +423,7 @@ TEST(EncolinkListen, OneGoodChecksumMayBeAccident) {
   EXPECT_EQ(listen.skipped(), 7u);
 }
 
-TEST(EncolinkListen, AReadingIsOfWhatStillComes) {
+TEST(EncolinkListen, HasNoReadingAfterStreamEnds) {
   using Kind = Step<std::uint8_t>::Kind;
   const ReplyBytes frame = encode_position(testing::single_format, {.singleturn = 5});
   Listen listen(testing::single_format);
@@ -441,7 +441,7 @@ TEST(EncolinkListen, AReadingIsOfWhatStillComes) {
   EXPECT_EQ(listen.reading(), nullptr);
 }
 
-TEST(EncolinkListen, SaysWhatItHears) {
+TEST(EncolinkListen, ExplainsWhyNoFrameIsValid) {
   const auto heard = [](std::string_view encoder, const Format& told) {
     Bench bench(encoder);
     Listen listen(told);

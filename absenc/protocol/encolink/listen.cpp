@@ -30,7 +30,7 @@ ByteStep Listen::next(Time now) {
   // Bytes that are no frames do not extend the deadline, so it is checked even while they arrive.
   if (!done_ && now >= deadline_) {
     frame_.clear();
-    if (!heard_) {
+    if (!received_anything_) {
       end(Error::timeout, "nothing comes: the encoder does not transmit by itself, or it was unplugged");
     } else {
       end(last_bad_, last_bad_ == Error::out_of_range
@@ -45,7 +45,7 @@ ByteStep Listen::next(Time now) {
 void Listen::feed(const ByteEvent& event) {
   const bool damaged = event.kind == ByteEvent::Kind::line_error;
   if (done_ || (!damaged && event.kind != ByteEvent::Kind::received)) return;
-  heard_ = true;
+  received_anything_ = true;
   if (damaged) {
     disturbed_ = std::exchange(in_step_, false);
     discarded_.skip(waiting().size() + 1);
@@ -96,7 +96,7 @@ bool Listen::find() {
 void Listen::take(Bytes frame, const Position& position) {
   error_ = Error::none;
   detail_ = {};
-  heard_ = false;
+  received_anything_ = false;
   position_ = position;
   frame_.clear();
   frame_.append(frame);

@@ -50,8 +50,8 @@ class Listen final : public Conversation<std::uint8_t> {
   DiscardedFrames discarded_;
   StreamCounts counts_{};
   bool in_step_ = false;
-  bool disturbed_ = false;  // a damaged character was received while in step
-  bool heard_ = false;      // bytes or damaged characters were received since the last valid frame
+  bool disturbed_ = false;          // a damaged character was received while in step
+  bool received_anything_ = false;  // bytes or damaged characters were received since the last valid frame
   bool done_ = false;
   Error last_bad_ = Error::wrong_length;
   std::array<std::uint8_t, 1024> bytes_{};  // received bytes; the size is the most that a port delivers at once

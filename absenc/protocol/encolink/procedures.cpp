@@ -28,7 +28,7 @@ constexpr std::string_view size_needed = "this address is not in the table of re
 // ---- Frames
 
 // Requests one frame. A lost or damaged frame ends the alignment of channel 2.
-Part<Error> ask_frame(Dialog& dialog, Found& found, Frames::Request request) {
+Part<Error> ask_frame(Dialog& dialog, ProcedureState& found, Frames::Request request) {
   if (found.emits && found.is_new) dialog.emit();
   found.is_new = false;
   found.ended.reset();
@@ -45,21 +45,23 @@ Part<Error> ask_frame(Dialog& dialog, Found& found, Frames::Request request) {
   co_return Error::none;
 }
 
-bool is_gone(const Dialog& dialog, const Found& found) { return found.lost >= frame_attempts || dialog.is_noisy(); }
+bool is_lost(const Dialog& dialog, const ProcedureState& found) {
+  return found.lost >= frame_attempts || dialog.is_noisy();
+}
 
-Outcome stopped(const Found& found, Error error) {
+Outcome stopped(const ProcedureState& found, Error error) {
   const bool in_access = error == Error::timeout && !found.access.empty();
   return {error, in_access ? "the encoder stopped answering during a register access" : std::string_view{}};
 }
 
 // Reads the identity, which also resets the channels. If `trusted`, the identity overrides the options; otherwise a
 // contradiction is an error. Stops the procedure if no identity arrives.
-Part<Identity> identify(Dialog& dialog, Found& found, bool trusted) {
+Part<Identity> identify(Dialog& dialog, ProcedureState& found, bool trusted) {
   for (;;) {
     Error error = co_await ask_frame(dialog, found, {Ask::identify});
     if (error == Error::none) error = co_await ask_frame(dialog, found, {Ask::identity});
     if (error == Error::none) break;
-    if (is_gone(dialog, found)) co_await dialog.stop(stopped(found, error));
+    if (is_lost(dialog, found)) co_await dialog.stop(stopped(found, error));
   }
   found.in_step = false;
   const Identity identity = *decode_identity(dialog.reply());
@@ -71,58 +73,58 @@ Part<Identity> identify(Dialog& dialog, Found& found, bool trusted) {
 }
 
 // Reads the next valid frame; if channel 2 is not aligned, with request `ask`. Stops the procedure if none arrives.
-Part<bool> next_frame(Dialog& dialog, Found& found, Ask ask = Ask::position) {
+Part<bool> next_frame(Dialog& dialog, ProcedureState& found, Ask ask = Ask::position) {
   if (!dialog.format().known()) co_await identify(dialog, found, false);
   for (;;) {
     const Error error = co_await ask_frame(dialog, found, {found.in_step ? Ask::position : ask});
     if (error == Error::none) co_return true;
-    if (is_gone(dialog, found)) co_await dialog.stop({error});
+    if (is_lost(dialog, found)) co_await dialog.stop({error});
   }
 }
 
 // ---- Register accesses
 
 // Returns the error of the last frame, or of the cycle that it completed.
-Error damage(const Found& found, Error error) {
+Error frame_or_cycle_error(const ProcedureState& found, Error error) {
   return error == Error::none ? found.ended.value_or(Error::none) : error;
 }
 
 // Sends the `ra` bytes of the access, one per frame.
-Part<Error> send(Dialog& dialog, Found& found) {
-  found.was_asked = false;
-  for (std::size_t sent = 0; !found.was_asked;) {
+Part<Error> send(Dialog& dialog, ProcedureState& found) {
+  found.was_sent = false;
+  for (std::size_t sent = 0; !found.was_sent;) {
     Frames::Request request{Ask::reset};
     if (found.in_step) request = {Ask::position, found.access[sent++]};
-    found.was_asked = sent == found.access.size();
-    if (found.was_asked && found.writes) dialog.changes();
+    found.was_sent = sent == found.access.size();
+    if (found.was_sent && found.writes) dialog.changes();
     const Error error = co_await ask_frame(dialog, found, request);
-    if (damage(found, error) != Error::none) co_return damage(found, error);
+    if (frame_or_cycle_error(found, error) != Error::none) co_return frame_or_cycle_error(found, error);
   }
   co_return Error::none;
 }
 
 // Receives the next cycle; its channel 3 byte is part of the answer.
-Part<Error> receive(Dialog& dialog, Found& found) {
+Part<Error> receive(Dialog& dialog, ProcedureState& found) {
   do {
     const Error error = co_await ask_frame(dialog, found, {});
-    if (damage(found, error) != Error::none) co_return damage(found, error);
+    if (frame_or_cycle_error(found, error) != Error::none) co_return frame_or_cycle_error(found, error);
   } while (!found.ended);
   co_return Error::none;
 }
 
 // Ends an access whose answer was lost. A write that may have been executed is not repeated before it was read back.
-Fate lost(Found& found, Error error, std::string_view detail = {}) {
+AccessOutcome lost(ProcedureState& found, Error error, std::string_view detail = {}) {
   if (found.ended.value_or(Error::none) != Error::none) {
     detail = *found.ended == Error::cross_check_failed ? channels_disagree : channel2_damaged;
   }
-  return found.end(Fate::lost, {error, detail}, !found.writes || !found.was_asked);
+  return found.end(AccessOutcome::lost, {error, detail}, !found.writes || !found.was_sent);
 }
 
-Part<Fate> try_to_execute(Dialog& dialog, Found& found) {
+Part<AccessOutcome> try_to_execute(Dialog& dialog, ProcedureState& found) {
   found.data.clear();
-  const Error unsolicited = co_await send(dialog, found);
-  if (unsolicited != Error::none) co_return lost(found, unsolicited);
-  const Time asked = dialog.received_at();
+  const Error send_error = co_await send(dialog, found);
+  if (send_error != Error::none) co_return lost(found, send_error);
+  const Time sent_at = dialog.received_at();
   const std::uint8_t ready = found.writes ? channel3::write_ready : channel3::read_ready;
   unsigned idle = 0;
   do {
@@ -136,46 +138,47 @@ Part<Fate> try_to_execute(Dialog& dialog, Found& found) {
     if (is_idle && ++idle > idle_cycles_allowed) {
       co_return lost(found, Error::timeout, "the encoder ignores register accesses: positions go on");
     }
-    if (is_busy && dialog.received_at() - asked > busy_limit) {
-      co_return found.end(Fate::refused, {Error::busy, busy_too_long});
+    if (is_busy && dialog.received_at() - sent_at > busy_limit) {
+      co_return found.end(AccessOutcome::refused, {Error::busy, busy_too_long});
     }
   } while (found.channel3 != ready);
-  const Error unsaid = co_await receive(dialog, found);
-  if (unsaid != Error::none) co_return lost(found, unsaid);
+  const Error status_error = co_await receive(dialog, found);
+  if (status_error != Error::none) co_return lost(found, status_error);
   const auto status = static_cast<AccessStatus>(found.channel3);
   if (status != AccessStatus::ok) {
-    co_return found.end(Fate::refused, {Error::request_rejected, text_of(status)}, is_damaged(status));
+    co_return found.end(AccessOutcome::refused, {Error::request_rejected, text_of(status)}, is_damaged(status));
   }
   while (!found.writes && found.data.size() < found.length) {
     const Error error = co_await receive(dialog, found);
     if (error != Error::none) co_return lost(found, error);
     found.data.push_back(found.channel3);
   }
-  co_return found.end(Fate::good, done);
+  co_return found.end(AccessOutcome::good, done);
 }
 
 // Reads the identity first: registers of an AksIM-4 must not be accessed.
-Part<Fate> execute(Dialog& dialog, Found& found) {
+Part<AccessOutcome> execute(Dialog& dialog, ProcedureState& found) {
   if (!dialog.format().has_ch2) co_await dialog.stop({Error::unsupported, no_channel2});
   if (found.protocol_version == 0) co_await identify(dialog, found, false);
   if (found.protocol_version == version::aksim4) co_await dialog.stop({Error::unsupported, not_described});
   for (unsigned left = access_attempts - 1;; --left) {
-    const Fate fate = co_await try_to_execute(dialog, found);
+    const AccessOutcome access_outcome = co_await try_to_execute(dialog, found);
     // More bytes of the answer may follow, so the channels must be reset before the next access.
-    if (fate != Fate::good) found.in_step = false;
-    if (is_gone(dialog, found)) co_return found.end(Fate::gone, stopped(found, found.why.error));
-    if (!found.again || left == 0) co_return fate;
+    if (access_outcome != AccessOutcome::good) found.in_step = false;
+    if (is_lost(dialog, found)) co_return found.end(AccessOutcome::gone, stopped(found, found.why.error));
+    if (!found.again || left == 0) co_return access_outcome;
   }
 }
 
 }  // namespace
 
-Part<Fate> attempt_read(Dialog& dialog, Found& found, std::uint32_t address, std::uint16_t size) {
+Part<AccessOutcome> attempt_read(Dialog& dialog, ProcedureState& found, std::uint32_t address, std::uint16_t size) {
   found.begin(read_request(address, size));
   return execute(dialog, found);
 }
 
-Part<Fate> attempt_write(Dialog& dialog, Found& found, std::uint32_t address, std::uint16_t size, std::uint64_t value) {
+Part<AccessOutcome> attempt_write(Dialog& dialog, ProcedureState& found, std::uint32_t address, std::uint16_t size,
+                                  std::uint64_t value) {
   found.begin(write_request(address, size, value));
   return execute(dialog, found);
 }
@@ -183,34 +186,36 @@ Part<Fate> attempt_write(Dialog& dialog, Found& found, std::uint32_t address, st
 namespace {
 
 // Reads a register into `found.data`. Stops the procedure if that fails.
-Part<bool> read(Dialog& dialog, Found& found, std::uint32_t address, std::uint16_t size) {
-  const Fate fate = co_await attempt_read(dialog, found, address, size);
-  if (fate != Fate::good) co_await dialog.stop(found.why);
+Part<bool> read(Dialog& dialog, ProcedureState& found, std::uint32_t address, std::uint16_t size) {
+  const AccessOutcome access_outcome = co_await attempt_read(dialog, found, address, size);
+  if (access_outcome != AccessOutcome::good) co_await dialog.stop(found.why);
   co_return true;
 }
 
-Part<bool> read(Dialog& dialog, Found& found, RegisterIndex index) {
+Part<bool> read(Dialog& dialog, ProcedureState& found, RegisterIndex index) {
   return read(dialog, found, registers[index].address, registers[index].size);
 }
 
 // Notes that the encoder refused a write. A procedure may write twice: only a refusal of the first write leaves the
 // encoder unchanged.
-void note_refusal(Dialog& dialog, const Found& found, Fate fate) {
-  if (fate == Fate::refused && found.why.error == Error::request_rejected && !found.changed) dialog.refused();
+void note_refusal(Dialog& dialog, const ProcedureState& found, AccessOutcome access_outcome) {
+  if (access_outcome == AccessOutcome::refused && found.why.error == Error::request_rejected && !found.changed)
+    dialog.refused();
 }
 
 // Writes a register and reads it back. A write with a lost answer is repeated only if reading back shows the old value.
-Part<bool> write(Dialog& dialog, Found& found, std::uint32_t address, std::uint16_t size, std::uint64_t value) {
+Part<bool> write(Dialog& dialog, ProcedureState& found, std::uint32_t address, std::uint16_t size,
+                 std::uint64_t value) {
   constexpr std::string_view in_the_middle =
       "the encoder stopped answering in the middle of a register write: read it to see whether it was written";
   for (unsigned left = write_attempts; left > 0; --left) {
-    Fate fate = co_await attempt_write(dialog, found, address, size, value);
-    note_refusal(dialog, found, fate);
-    const bool untouched = fate == Fate::gone && !found.was_asked;
-    if (fate == Fate::refused || untouched) co_await dialog.stop(found.why);
-    if (fate != Fate::gone) fate = co_await attempt_read(dialog, found, address, size);
-    if (fate == Fate::gone) co_await dialog.stop({found.why.error, in_the_middle});
-    if (fate != Fate::good) {
+    AccessOutcome access_outcome = co_await attempt_write(dialog, found, address, size, value);
+    note_refusal(dialog, found, access_outcome);
+    const bool untouched = access_outcome == AccessOutcome::gone && !found.was_sent;
+    if (access_outcome == AccessOutcome::refused || untouched) co_await dialog.stop(found.why);
+    if (access_outcome != AccessOutcome::gone) access_outcome = co_await attempt_read(dialog, found, address, size);
+    if (access_outcome == AccessOutcome::gone) co_await dialog.stop({found.why.error, in_the_middle});
+    if (access_outcome != AccessOutcome::good) {
       co_await dialog.stop({found.why.error, "the register may be written: it could not be read back"});
     }
     if (load_big_endian(found.data) == value) {
@@ -223,17 +228,18 @@ Part<bool> write(Dialog& dialog, Found& found, std::uint32_t address, std::uint1
   co_return false;
 }
 
-Part<bool> write(Dialog& dialog, Found& found, RegisterIndex index, std::uint64_t value) {
+Part<bool> write(Dialog& dialog, ProcedureState& found, RegisterIndex index, std::uint64_t value) {
   return write(dialog, found, registers[index].address, registers[index].size, value);
 }
 
-Part<bool> tell(Dialog& dialog, Found& found, std::uint8_t code) {
-  const Fate fate = co_await attempt_write(dialog, found, registers[command_register].address, 1, code);
-  note_refusal(dialog, found, fate);
-  const bool untouched = fate == Fate::gone && !found.was_asked;
-  if (fate == Fate::refused || untouched) co_await dialog.stop(found.why);
-  if (fate != Fate::good) {
-    co_await dialog.stop({found.why.error, fate == Fate::gone
+Part<bool> run_command(Dialog& dialog, ProcedureState& found, std::uint8_t code) {
+  const AccessOutcome access_outcome =
+      co_await attempt_write(dialog, found, registers[command_register].address, 1, code);
+  note_refusal(dialog, found, access_outcome);
+  const bool untouched = access_outcome == AccessOutcome::gone && !found.was_sent;
+  if (access_outcome == AccessOutcome::refused || untouched) co_await dialog.stop(found.why);
+  if (access_outcome != AccessOutcome::good) {
+    co_await dialog.stop({found.why.error, access_outcome == AccessOutcome::gone
                                                ? "the encoder stopped answering: the command may have been executed"
                                                : "the answer to the command was lost: it may have been executed"});
   }
@@ -246,10 +252,10 @@ bool is_near(const Dialog& dialog, std::uint32_t singleturn,
 }
 
 // Stops the procedure if a zero must not be set. A frame and a cycle of channel 2 must have been read before.
-Part<bool> may_set_zero(Dialog& dialog, Found& found) {
+Part<bool> may_set_zero(Dialog& dialog, ProcedureState& found) {
   const Reading first = to_reading(dialog.format(), dialog.last(), found.status);
-  const Time looked = dialog.received_at();
-  while (dialog.received_at() - looked < author::between_looks) co_await next_frame(dialog, found);
+  const Time first_at = dialog.received_at();
+  while (dialog.received_at() - first_at < author::between_looks) co_await next_frame(dialog, found);
   const Outcome why_not = author::objection_to_zero(first, to_reading(dialog.format(), dialog.last(), found.status));
   if (why_not.error != Error::none) co_await dialog.stop(why_not);
   co_return true;
@@ -259,9 +265,9 @@ Part<bool> may_set_zero(Dialog& dialog, Found& found) {
 
 // ---- Reading commands
 
-Procedure read_alarms(Dialog& dialog, Found& found) {
+Procedure read_alarms(Dialog& dialog, ProcedureState& found) {
   if (!dialog.format().has_ch2) co_return {Error::unsupported, no_channel2};
-  found.tells_status = true;
+  found.reports_status = true;
   for (unsigned left = cycle_attempts; left > 0; --left) {
     found.in_step = false;
     do {
@@ -273,13 +279,13 @@ Procedure read_alarms(Dialog& dialog, Found& found) {
   co_return {error, error == Error::cross_check_failed ? channels_disagree : std::string_view{}};
 }
 
-Procedure read_identity(Dialog& dialog, Found& found) {
+Procedure read_identity(Dialog& dialog, ProcedureState& found) {
   const Identity identity = co_await identify(dialog, found, true);
   found.identity = identity;
   co_return done;
 }
 
-Procedure read_info(Dialog& dialog, Found& found) {
+Procedure read_info(Dialog& dialog, ProcedureState& found) {
   const Identity identity = co_await identify(dialog, found, true);
   found.identity = identity;
   if (!dialog.format().has_ch2 || identity.protocol_version == version::aksim4) {
@@ -288,17 +294,17 @@ Procedure read_info(Dialog& dialog, Found& found) {
   }
   for (std::size_t i = 0; i < registers.size(); ++i) {
     if (!registers[i].in_info) continue;
-    const Fate fate = co_await attempt_read(dialog, found, registers[i].address, registers[i].size);
+    const AccessOutcome access_outcome = co_await attempt_read(dialog, found, registers[i].address, registers[i].size);
     if (found.why.error == Error::request_rejected) continue;
-    if (fate != Fate::good) co_return found.why;
-    found.tell(i, found.data);
+    if (access_outcome != AccessOutcome::good) co_return found.why;
+    found.add_value(i, found.data);
   }
   co_return done;
 }
 
 namespace {
 
-Procedure read_at(Dialog& dialog, Found& found, std::uint32_t address, std::uint16_t size) {
+Procedure read_at(Dialog& dialog, ProcedureState& found, std::uint32_t address, std::uint16_t size) {
   if (size == 0) co_return {Error::invalid_argument, size_needed};
   found.emits = true;
   co_await read(dialog, found, address, size);
@@ -306,7 +312,8 @@ Procedure read_at(Dialog& dialog, Found& found, std::uint32_t address, std::uint
   co_return done;
 }
 
-Procedure write_at(Dialog& dialog, Found& found, std::uint32_t address, std::uint16_t size, std::int64_t argument) {
+Procedure write_at(Dialog& dialog, ProcedureState& found, std::uint32_t address, std::uint16_t size,
+                   std::int64_t argument) {
   const auto value = static_cast<std::uint64_t>(argument);
   if (size == 0 || size > 8) co_return {Error::invalid_argument, size_needed};
   if (value > low_mask(8u * size)) {
@@ -323,33 +330,33 @@ Procedure write_at(Dialog& dialog, Found& found, std::uint32_t address, std::uin
 
 }  // namespace
 
-Procedure read_register(Dialog& dialog, Found& found, std::size_t index) {
+Procedure read_register(Dialog& dialog, ProcedureState& found, std::size_t index) {
   return read_at(dialog, found, registers[index].address, registers[index].size);
 }
 
-Procedure read_memory(Dialog& dialog, Found& found, Arguments arguments) {
+Procedure read_memory(Dialog& dialog, ProcedureState& found, Arguments arguments) {
   const auto address = static_cast<std::uint32_t>(arguments[0]);
-  return read_at(dialog, found, address, size_of(address, arguments[1]));
+  return read_at(dialog, found, address, register_size(address, arguments[1]));
 }
 
 // ---- Writing commands
 
-Procedure write_register(Dialog& dialog, Found& found, std::size_t index, Arguments arguments) {
+Procedure write_register(Dialog& dialog, ProcedureState& found, std::size_t index, Arguments arguments) {
   return write_at(dialog, found, registers[index].address, registers[index].size, arguments[0]);
 }
 
-Procedure write_memory(Dialog& dialog, Found& found, Arguments arguments) {
+Procedure write_memory(Dialog& dialog, ProcedureState& found, Arguments arguments) {
   const auto address = static_cast<std::uint32_t>(arguments[0]);
-  return write_at(dialog, found, address, size_of(address, arguments[2]), arguments[1]);
+  return write_at(dialog, found, address, register_size(address, arguments[2]), arguments[1]);
 }
 
-Procedure send_command(Dialog& dialog, Found& found, std::uint8_t code) {
+Procedure send_command(Dialog& dialog, ProcedureState& found, std::uint8_t code) {
   found.emits = true;
-  co_await tell(dialog, found, code);
+  co_await run_command(dialog, found, code);
   co_return done;
 }
 
-Procedure zero(Dialog& dialog, Found& found, Arguments arguments) {
+Procedure zero(Dialog& dialog, ProcedureState& found, Arguments arguments) {
   found.emits = true;
   co_await read(dialog, found, position_offset);
   const auto old = static_cast<std::uint32_t>(load_big_endian(found.data));
@@ -362,12 +369,12 @@ Procedure zero(Dialog& dialog, Found& found, Arguments arguments) {
     co_return {Error::cross_check_failed, "the position did not become zero, the old offset is back",
                "hold the shaft still, or change the option offset_sign or offset_unit"};
   }
-  found.tell(position_offset, found.data);
-  if (arguments[0] != 0) co_await tell(dialog, found, commands::save);
+  found.add_value(position_offset, found.data);
+  if (arguments[0] != 0) co_await run_command(dialog, found, commands::save);
   co_return done;
 }
 
-Procedure preset_multiturn(Dialog& dialog, Found& found, Arguments arguments) {
+Procedure preset_multiturn(Dialog& dialog, ProcedureState& found, Arguments arguments) {
   found.emits = true;
   co_await identify(dialog, found, false);
   const auto bits = static_cast<unsigned>(dialog.format().multiturn_bits);
@@ -379,25 +386,25 @@ Procedure preset_multiturn(Dialog& dialog, Found& found, Arguments arguments) {
     co_return {Error::cross_check_failed, "the preset is written, but the turns are others",
                "hold the shaft still, then `absenc reset-multiturn` again"};
   }
-  if (arguments[1] != 0) co_await tell(dialog, found, commands::save);
+  if (arguments[1] != 0) co_await run_command(dialog, found, commands::save);
   co_return done;
 }
 
 // The self-calibration has ended when its counter has changed, or when it reports a failure that was not set before.
-Procedure self_calibrate(Dialog& dialog, Found& found) {
+Procedure self_calibrate(Dialog& dialog, ProcedureState& found) {
   co_await read(dialog, found, calibration_status);
   const std::uint8_t before = found.data[0];
-  co_await tell(dialog, found, commands::self_calibrate);
+  co_await run_command(dialog, found, commands::self_calibrate);
   found.running = true;
   std::uint8_t status = before;
   const Time started = dialog.received_at();
-  for (Time look = started + calibration_poll; *found.running;) {
-    while (dialog.received_at() < look) co_await next_frame(dialog, found);
-    look = dialog.received_at() + calibration_poll;
+  for (Time next_poll = started + calibration_poll; *found.running;) {
+    while (dialog.received_at() < next_poll) co_await next_frame(dialog, found);
+    next_poll = dialog.received_at() + calibration_poll;
     co_await read(dialog, found, calibration_status);
     status = found.data[0];
     found.values.clear();
-    found.tell(calibration_status, found.data);
+    found.add_value(calibration_status, found.data);
     const unsigned failures = calibration::timed_out | calibration::out_of_range;
     found.running = ((status ^ before) & calibration::count) == 0 && (status & ~before & failures) == 0;
     if (*found.running && dialog.received_at() - started > calibration_limit) {
@@ -416,7 +423,7 @@ Procedure self_calibrate(Dialog& dialog, Found& found) {
   co_return done;
 }
 
-std::uint16_t size_of(std::uint32_t address, std::int64_t wanted) {
+std::uint16_t register_size(std::uint32_t address, std::int64_t wanted) {
   const Register* known = find_register(address);
   return wanted == 0 && known != nullptr ? known->size : static_cast<std::uint16_t>(wanted);
 }

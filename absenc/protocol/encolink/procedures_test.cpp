@@ -14,7 +14,7 @@ using PowerOn = Bench::PowerOn;
 class EncolinkProcedure : public testing::OnBothInterfaces {};
 INSTANTIATE_TEST_SUITE_P(Interfaces, EncolinkProcedure, ::testing::Values(Interface::uart, Interface::spi));
 
-TEST_P(EncolinkProcedure, ZeroIsHereAndSurvivesPowerOffWhenSaved) {
+TEST_P(EncolinkProcedure, ZeroSurvivesPowerOffWhenSaved) {
   Bench bench(testing::multi, interface);
   const Told zero = bench.run("zero");
   ASSERT_EQ(zero.error, Error::none) << zero.detail;
@@ -36,7 +36,7 @@ TEST_P(EncolinkProcedure, ZeroIsHereAndSurvivesPowerOffWhenSaved) {
   EXPECT_EQ(bench.run("position").reading->singleturn, 0x10000u);
 }
 
-TEST_P(EncolinkProcedure, ZeroIsHereWhereverTheShaftStandsAndWhateverTheOffsetWas) {
+TEST_P(EncolinkProcedure, ZeroWorksAtAnyPositionWithAnyOldOffset) {
   for (const std::string_view settings :
        {"", "offset_sign=subtract", "offset_unit=turn_fraction", "offset_unit=turn_fraction offset_sign=subtract"}) {
     for (const std::int64_t place : {0, 1, 0x7FFFF, 0x80000, 0xFFFFF}) {
@@ -50,7 +50,7 @@ TEST_P(EncolinkProcedure, ZeroIsHereWhereverTheShaftStandsAndWhateverTheOffsetWa
   }
 }
 
-TEST_P(EncolinkProcedure, ZeroWithTheWrongSignPutsTheOldOffsetBack) {
+TEST_P(EncolinkProcedure, ZeroWithWrongSignRestoresOldOffset) {
   Bench bench("resolution=20 multiturn_bits=0 offset_sign=subtract", interface);
   bench.tell(testing::single);
   ASSERT_EQ(bench.run("memory-write", {0, 0x10000}).error, Error::none);
@@ -60,7 +60,7 @@ TEST_P(EncolinkProcedure, ZeroWithTheWrongSignPutsTheOldOffsetBack) {
   EXPECT_EQ(bench.encoder.offset(), 0x10000u);
 }
 
-TEST_P(EncolinkProcedure, ZeroNeedsAShaftAtRestAndAPosition) {
+TEST_P(EncolinkProcedure, ZeroNeedsShaftAtRestAndValidPosition) {
   Bench bench(testing::single, interface);
   for (const std::int32_t rpm : {600, 1, -1}) {
     bench.shaft.spin(rpm, bench.line.now());
@@ -72,7 +72,7 @@ TEST_P(EncolinkProcedure, ZeroNeedsAShaftAtRestAndAPosition) {
   EXPECT_EQ(bench.encoder.offset(), 0u);
 }
 
-TEST_P(EncolinkProcedure, PresetsTheTurns) {
+TEST_P(EncolinkProcedure, PresetsTurns) {
   Bench bench(testing::multi, interface);
   const Told preset = bench.run("preset-multiturn", {1234});
   ASSERT_EQ(preset.error, Error::none) << preset.detail;
@@ -88,7 +88,7 @@ TEST_P(EncolinkProcedure, PresetsTheTurns) {
   }
 }
 
-TEST_P(EncolinkProcedure, SelfCalibrationShowsItsProgress) {
+TEST_P(EncolinkProcedure, SelfCalibrationEmitsProgress) {
   Bench bench(testing::single, interface);
   const Told still = bench.run("self-calibrate");
   EXPECT_EQ(still.error, Error::cross_check_failed);

@@ -95,7 +95,7 @@ Result<Request> reading_of(const Format&, Arguments) {
 }
 
 Result<Request> writing(std::uint32_t address, std::int64_t wanted, std::int64_t argument) {
-  const std::uint16_t size = size_of(address, wanted);
+  const std::uint16_t size = register_size(address, wanted);
   const auto value = static_cast<std::uint64_t>(argument);
   if (size == 0 || size > 8 || value > low_mask(8u * size)) return Error::invalid_argument;
   return Request{Config::position, write_request(address, size, value)};
@@ -113,7 +113,7 @@ Result<Request> order(const Format&, Arguments) {
 
 Result<Request> memory_reading(const Format&, Arguments arguments) {
   const auto address = static_cast<std::uint32_t>(arguments[0]);
-  const std::uint16_t size = size_of(address, arguments[1]);
+  const std::uint16_t size = register_size(address, arguments[1]);
   if (size == 0) return Error::invalid_argument;
   return Request{Config::position, read_request(address, size)};
 }
@@ -122,7 +122,8 @@ Result<Request> memory_writing(const Format&, Arguments arguments) {
   return writing(static_cast<std::uint32_t>(arguments[0]), arguments[2], arguments[1]);
 }
 
-constexpr MakeRequest not_known = nullptr;  // used where the value depends on the position, or where nothing is sent
+constexpr MakeRequest not_encodable =
+    nullptr;  // used where the value depends on the position, or where nothing is sent
 
 // ---- End of a frame: found by its checksum alone
 
@@ -157,7 +158,7 @@ using Host = author::HostOf<Frames>;
 void put_channels(FieldSink& sink, const Host& host, const Channels& channels) {
   put_position(sink, host.format(), host.last(), channels.status);
 }
-void put_found(FieldSink& sink, const Host& host, const Found& found) {
+void put_found(FieldSink& sink, const Host& host, const ProcedureState& found) {
   if (found.identity) {
     frame_fields.put(sink, {.identity = found.identity});
     if (found.identity->protocol_version == version::aksim4) {
@@ -167,9 +168,9 @@ void put_found(FieldSink& sink, const Host& host, const Found& found) {
   } else if (found.address) {
     put_register(sink, *found.address, found.data);
   } else {
-    put_position(sink, host.format(), host.last(), found.tells_status ? found.status : std::nullopt);
+    put_position(sink, host.format(), host.last(), found.reports_status ? found.status : std::nullopt);
   }
-  for (const Found::Value& one : found.values.view()) put_value(sink, one.index, one.bytes);
+  for (const ProcedureState::Value& one : found.values.view()) put_value(sink, one.index, one.bytes);
   if (found.running) sink.put({&running_field, *found.running ? 1 : 0});
 }
 Explanation explain_host(const Host& host) {
@@ -211,7 +212,7 @@ constexpr Explanation explain(const Format&, Error error, Bytes request, Bytes r
 
 constexpr author::Report<Protocol, Host> report{.explain = explain, .explain_host = explain_host};
 constexpr author::Finding<Host, Channels> channels{.put = put_channels};
-constexpr author::Finding<Host, Found> found{.put = put_found};
+constexpr author::Finding<Host, ProcedureState> found{.put = put_found};
 
 // ---- Commands
 
@@ -251,7 +252,7 @@ constexpr CommandOf<Protocol> position(const Command& info) {
 
 constexpr CommandOf<Protocol> listen(const Command& info) {
   return {.info = info,
-          .request = not_known,
+          .request = not_encodable,
           .make = [](const Format& format, Arguments,
                      std::span<std::byte> storage) { return make_host<Listen>(storage, format); },
           .size = sizeof(Listen)};
@@ -274,7 +275,7 @@ constexpr auto commands_of_unit = std::array{
                                         reading_of<temperature>),
     command<zero>(
         {"zero", Verb::zero, 0, "make this the zero of the turn, by the position offset", zero_arguments, true, false},
-        not_known),
+        not_encodable),
     command<preset_multiturn>({"preset-multiturn", Verb::reset_multiturn, 0,
                                "set the turns, to 0 if not told otherwise", preset_arguments, true, false},
                               writing_of<multiturn_preset>),
@@ -312,59 +313,60 @@ constexpr std::size_t option_resolution = options.find("resolution");
 constexpr std::size_t option_multiturn_bits = options.find("multiturn_bits");
 
 // Evidence for a format: the identity, or without one the length that most frames have.
-struct Told {
+struct FormatEvidence {
   std::optional<Identity> identity{};
   std::size_t identity_at = 0;         // index of the capture with the identity
   std::array<std::size_t, 2> good{};   // number of valid position frames without turns, and with turns
   std::array<std::size_t, 2> first{};  // index of the first capture of each kind
 
-  [[nodiscard]] bool tells() const { return identity || good[0] != good[1]; }
+  [[nodiscard]] bool is_conclusive() const { return identity || good[0] != good[1]; }
   [[nodiscard]] bool has_turns() const { return identity ? identity->frame_bytes == 7 : good[1] > good[0]; }
 };
 
-Told told_by(const Format& format, std::span<const Capture> captures) {
-  Told told;
+FormatEvidence collect_evidence(const Format& format, std::span<const Capture> captures) {
+  FormatEvidence evidence;
   for (std::size_t i = 0; i < captures.size(); ++i) {
     const Bytes reply = captures[i].reply;
     const Result<Identity> identity = decode_identity(reply);
-    if (identity && !told.identity) {
-      told.identity = *identity;
-      told.identity_at = i;
+    if (identity && !evidence.identity) {
+      evidence.identity = *identity;
+      evidence.identity_at = i;
     }
     for (std::size_t turns = 0; turns < 2 && !identity; ++turns) {
       const int multiturn_bits = turns != 0 ? static_cast<int>(maximum_multiturn_bits) : 0;
       if (!decode_position({maximum_resolution, multiturn_bits, format.has_ch2}, reply)) continue;
-      if (told.good[turns]++ == 0) told.first[turns] = i;
+      if (evidence.good[turns]++ == 0) evidence.first[turns] = i;
     }
   }
-  return told;
+  return evidence;
 }
 
 // Finds the resolution and the turns that fit the captures. Without an identity, the length of most position frames
 // decides: in one of 250 frames with turns, a shorter part has a valid checksum too.
 bool probe(Options& values, std::span<const Capture> captures, EvidenceSink& sink) {
-  const Told told = told_by(options.format(values), captures);
+  const FormatEvidence evidence = collect_evidence(options.format(values), captures);
   constexpr std::string_view open = "these frames do not tell";
   for (std::int64_t bits = 1; bits <= std::int64_t{maximum_resolution}; ++bits) {
-    const bool possible = !told.identity || bits == told.identity->resolution;
-    sink.put({option_resolution, bits, possible, possible ? 0 : told.identity_at,
-              !told.identity ? open
-              : possible     ? "the identity says so"
-                             : "the identity says another one"});
+    const bool possible = !evidence.identity || bits == evidence.identity->resolution;
+    sink.put({option_resolution, bits, possible, possible ? 0 : evidence.identity_at,
+              !evidence.identity ? open
+              : possible         ? "the identity says so"
+                                 : "the identity says another one"});
   }
   for (std::int64_t bits = 0; bits <= std::int64_t{maximum_multiturn_bits}; ++bits) {
-    const bool possible = !told.tells() || (bits > 0) == told.has_turns();
-    const std::size_t against = told.identity ? told.identity_at : told.first[told.has_turns() ? 1 : 0];
+    const bool possible = !evidence.is_conclusive() || (bits > 0) == evidence.has_turns();
+    const std::size_t against = evidence.identity ? evidence.identity_at : evidence.first[evidence.has_turns() ? 1 : 0];
     sink.put({option_multiturn_bits, bits, possible, possible ? 0 : against,
-              possible ? (told.tells() ? "agrees with the length of the frames" : open)
+              possible ? (evidence.is_conclusive() ? "agrees with the length of the frames" : open)
                        : "frames of this encoder have another length"});
   }
-  if (told.identity && values[option_resolution] == 0) values.values[option_resolution] = told.identity->resolution;
-  if (told.tells() && values[option_multiturn_bits] < 0) {
-    values.values[option_multiturn_bits] = told.has_turns() ? std::int64_t{maximum_multiturn_bits} : 0;
+  if (evidence.identity && values[option_resolution] == 0)
+    values.values[option_resolution] = evidence.identity->resolution;
+  if (evidence.is_conclusive() && values[option_multiturn_bits] < 0) {
+    values.values[option_multiturn_bits] = evidence.has_turns() ? std::int64_t{maximum_multiturn_bits} : 0;
   }
-  const bool is_resolution = !told.identity || values[option_resolution] == told.identity->resolution;
-  return is_resolution && (!told.tells() || (values[option_multiturn_bits] > 0) == told.has_turns());
+  const bool is_resolution = !evidence.identity || values[option_resolution] == evidence.identity->resolution;
+  return is_resolution && (!evidence.is_conclusive() || (values[option_multiturn_bits] > 0) == evidence.has_turns());
 }
 
 // ---- Declaration

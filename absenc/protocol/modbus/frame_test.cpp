@@ -15,7 +15,7 @@
 namespace absenc::modbus {
 namespace {
 
-TEST(ModbusFrame, CrcIsAppendedLowByteFirst) {
+TEST(ModbusFrame, AppendsCrcLowByteFirst) {
   FrameBytes frame;
   frame.append(hex<"010300000001">);
   append_crc(frame);
@@ -23,7 +23,7 @@ TEST(ModbusFrame, CrcIsAppendedLowByteFirst) {
   EXPECT_EQ(crc_order(frame), CrcOrder::low_first);
 }
 
-TEST(ModbusFrame, CrcOfTheOtherOrderIsTold) {
+TEST(ModbusFrame, RecognizesCrcOfOtherByteOrder) {
   EXPECT_EQ(crc_order(hex<"0103000000010a84">), CrcOrder::high_first);
   EXPECT_EQ(crc_order(hex<"0103000000010a85">), CrcOrder::wrong);
   EXPECT_EQ(crc_order(hex<"ffff">), CrcOrder::wrong);  // a CRC without a frame is invalid
@@ -31,7 +31,7 @@ TEST(ModbusFrame, CrcOfTheOtherOrderIsTold) {
 }
 
 // S 6.2.2: errors that the checksum must detect at these lengths.
-TEST(ModbusFrame, AnyTwoWrongBitsAreSeen) {
+TEST(ModbusFrame, DetectsAnyTwoWrongBits) {
   const std::vector<std::uint8_t> good(hex<"010304001fabcd7550">.begin(), hex<"010304001fabcd7550">.end());
   for (std::size_t one = 0; one < good.size() * 8; ++one) {
     for (std::size_t other = one; other < good.size() * 8; ++other) {
@@ -43,14 +43,14 @@ TEST(ModbusFrame, AnyTwoWrongBitsAreSeen) {
   }
 }
 
-TEST(ModbusFrame, RefusalsAreRecognized) {
+TEST(ModbusFrame, RecognizesRefusals) {
   EXPECT_EQ(refusal_code(hex<"018302c0f1">, read_holding_registers), 2);
   EXPECT_FALSE(refusal_code(hex<"010302017ff834">, read_holding_registers));
   EXPECT_FALSE(refusal_code(hex<"018302c0">, read_holding_registers));
   EXPECT_FALSE(refusal_code(hex<"018402c0f1">, read_holding_registers));
 }
 
-TEST(ModbusFrame, EveryRefusalHasItsOwnWords) {
+TEST(ModbusFrame, ExplainsEachRefusalCode) {
   std::set<std::string> words;
   for (const std::uint8_t code : std::to_array<std::uint8_t>({1, 2, 3, 4, 5, 6, 8, 10, 11, 0x77})) {
     const Explanation explanation = explain_refusal(code);
@@ -61,7 +61,7 @@ TEST(ModbusFrame, EveryRefusalHasItsOwnWords) {
   EXPECT_NE(words.begin()->find("exception"), std::string::npos);
 }
 
-TEST(ModbusTiming, SilencesShrinkWithTheCharactersUpTo19200) {
+TEST(ModbusTiming, SilencesShrinkWithCharactersUpTo19200) {
   EXPECT_EQ(frame_silence({.rate = 2400}), Time(14'583'334));  // 35 bits
   EXPECT_EQ(character_gap({.rate = 2400}), Time(6'250'000));
   EXPECT_EQ(frame_silence({.rate = 19'200}).count() / 1000, 1822);

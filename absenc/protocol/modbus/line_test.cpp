@@ -36,7 +36,7 @@ class ToyServer final : public Server {
   void request(Bytes body, Time at, FrameBytes& reply) override {
     ++frames;
     if (body[0] != 7) return;
-    heed_line(at);
+    check_line_rules(at);
     if (body[1] == 0x04) return refuse(reply, 7, body[1], Exception::illegal_function);
     reply.append(hex<"0703021234">);
     if (body[1] == 0x41) set_rate(9600);
@@ -93,7 +93,7 @@ struct Bench {
   Error ask(Bytes body, unsigned count = 1, std::uint32_t rate = line_settings.rate) {
     ToyClient client(body, count, rate);
     const Error error = run(client).error();
-    taken = {client.reply().begin(), client.reply().end()};
+    last_reply = {client.reply().begin(), client.reply().end()};
     return error;
   }
   /// Sends raw characters and returns the reply.
@@ -102,14 +102,14 @@ struct Bench {
     return run(raw_host).reply;
   }
   /// Returns the rule that was broken; empty unless exactly one was.
-  [[nodiscard]] std::string_view broken() const {
+  [[nodiscard]] std::string_view broken_rule() const {
     return server.violation_count() == 1 ? server.violations()[0].rule : std::string_view{};
   }
 
   ToyServer server;
   sim::Line<std::uint8_t> line{LinkKind::half_duplex, line_settings};
   std::optional<std::size_t> host;
-  Wire taken;                  // the last reply to `ask`
+  Wire last_reply;             // the last reply to `ask`
   std::vector<Time> silences;  // silences longer than a character
   Time last_end{};
 };
@@ -120,7 +120,7 @@ constexpr auto request_body = hex<"070300000001">;
 const Wire good_request{0x07, 0x03, 0x00, 0x00, 0x00, 0x01, 0x84, 0x6C};
 const Wire good_reply{0x07, 0x03, 0x02, 0x12, 0x34, 0x3D, 0x33};
 
-TEST(ModbusLine, FramesAreFurtherApartThanThreeAndAHalfCharacters) {
+TEST(ModbusLine, SeparatesFramesByThreeAndAHalfCharacters) {
   Bench bench;
   EXPECT_EQ(bench.ask(request_body, 20), Error::none);
   EXPECT_EQ(bench.silences.size(), 40u);
@@ -128,22 +128,22 @@ TEST(ModbusLine, FramesAreFurtherApartThanThreeAndAHalfCharacters) {
   EXPECT_EQ(bench.server.violation_count(), 0u);
 }
 
-TEST(ModbusLine, TheClientWaitsAlsoBeforeItsFirstFrame) {
+TEST(ModbusLine, ClientWaitsBeforeFirstFrame) {
   Bench bench;
   bench.line.run_until(1s);
   EXPECT_EQ(bench.ask(request_body), Error::none);
   EXPECT_GE(bench.silences.front(), 1s + request_silence(line_settings));
 }
 
-TEST(ModbusLine, ARefusalAndAnUnfinishedReplyEndBySilence) {
+TEST(ModbusLine, SilenceEndsRefusalAndUnfinishedReply) {
   Bench bench;
   EXPECT_EQ(bench.ask(hex<"070400000001">), Error::wrong_length);
-  EXPECT_EQ(bench.taken.size(), 5u);
-  EXPECT_EQ(bench.taken[1], 0x84);
+  EXPECT_EQ(bench.last_reply.size(), 5u);
+  EXPECT_EQ(bench.last_reply[1], 0x84);
   EXPECT_EQ(bench.ask(hex<"080300000001">), Error::timeout);
 }
 
-TEST(ModbusLine, TheServerAnswersWhatStandsAloneOnly) {
+TEST(ModbusLine, ServerAnswersOnlyFramesBetweenSilences) {
   Bench bench;
   EXPECT_EQ(bench.raw(good_request), good_reply);
   Wire behind = good_request;
@@ -160,9 +160,9 @@ TEST(ModbusLine, TheServerAnswersWhatStandsAloneOnly) {
 }
 
 /// Sends characters with a pause before one of them and records the reply.
-class Halting final : public Machine<std::uint8_t> {
+class PausingHost final : public Machine<std::uint8_t> {
  public:
-  Halting(const Wire& bytes, std::ptrdiff_t before, Time pause)
+  PausingHost(const Wire& bytes, std::ptrdiff_t before, Time pause)
       : parts_{Wire(bytes.begin(), bytes.begin() + before), Wire(bytes.begin() + before, bytes.end())}, pause_(pause) {}
   void feed(const Event<std::uint8_t>& event) override {
     using Kind = Event<std::uint8_t>::Kind;
@@ -189,29 +189,29 @@ class Halting final : public Machine<std::uint8_t> {
   Time next_at_{};
 };
 
-TEST(ModbusLine, GapsInsideAFrameAreTold) {
+TEST(ModbusLine, ServerReportsGapsInsideFrame) {
   const std::tuple<int, Wire, std::string_view> rows[]{
       {1, good_reply, ""}, {2, good_reply, "1.5 characters"}, {4, {}, ""}};  // the pause makes two frames, both invalid
   for (const auto& [characters, reply, rule] : rows) {
     Bench bench;
-    Halting halting(good_request, 4, character * characters);
-    EXPECT_EQ(bench.run(halting).reply, reply) << characters;
-    EXPECT_EQ(bench.broken().empty(), rule.empty());
-    EXPECT_TRUE(says(bench.broken(), rule)) << bench.broken();
+    PausingHost pausing(good_request, 4, character * characters);
+    EXPECT_EQ(bench.run(pausing).reply, reply) << characters;
+    EXPECT_EQ(bench.broken_rule().empty(), rule.empty());
+    EXPECT_TRUE(says(bench.broken_rule(), rule)) << bench.broken_rule();
   }
 }
 
-TEST(ModbusLine, ARequestThatComesTooSoonIsTold) {
+TEST(ModbusLine, ServerReportsRequestThatComesTooSoon) {
   Bench bench;
   bench.raw(good_request);
   bench.raw(good_request, {}, 50ms, 1us);  // ends as soon as the reply is complete
   EXPECT_EQ(bench.server.violation_count(), 0u) << "the one before waited 3 ms";
   EXPECT_EQ(bench.raw(good_request, character), good_reply);
-  EXPECT_TRUE(says(bench.broken(), "3.5 characters"));
+  EXPECT_TRUE(says(bench.broken_rule(), "3.5 characters"));
 }
 
 // A server that was scheduled late cannot tell whether the client waited long enough, so it reports no broken rule.
-TEST(ModbusLine, WhoAnswersLateBlamesNobodyForNotWaiting) {
+TEST(ModbusLine, LateServerReportsNoMissingSilence) {
   using Kind = Event<std::uint8_t>::Kind;
   for (const auto& [late, rules] : {std::pair(Time(1ms), 1u), {Time(50ms), 0u}}) {
     for (const bool replied : {false, true}) {
@@ -230,7 +230,7 @@ TEST(ModbusLine, WhoAnswersLateBlamesNobodyForNotWaiting) {
   }
 }
 
-TEST(ModbusLine, WhoeverTalksIntoAReplyIsTold) {
+TEST(ModbusLine, ServerReportsRequestDuringReply) {
   Bench bench;
   EXPECT_EQ(bench.raw(good_request, 5ms, 1us, 1us), Wire{});
   bench.raw(good_request, 5 * character);
@@ -238,7 +238,7 @@ TEST(ModbusLine, WhoeverTalksIntoAReplyIsTold) {
   EXPECT_TRUE(says(bench.server.violations()[0].rule, "transmission"));
 }
 
-TEST(ModbusLine, ARateIsChangedAfterTheReply) {
+TEST(ModbusLine, ServerChangesRateAfterReply) {
   Bench bench;
   EXPECT_EQ(bench.ask(hex<"0741">), Error::none);
   EXPECT_EQ(bench.ask(request_body), Error::timeout);
@@ -247,7 +247,7 @@ TEST(ModbusLine, ARateIsChangedAfterTheReply) {
 }
 
 // The client stops when something sends without a pause, whatever the bytes are.
-TEST(ModbusLine, NoiseWithoutEnd) {
+TEST(ModbusLine, ClientStopsOnEndlessNoise) {
   ToyClient client(request_body);
   Time now{};
   static_cast<void>(client.next(now));
@@ -265,7 +265,7 @@ TEST(ModbusLine, NoiseWithoutEnd) {
   EXPECT_TRUE(client.is_noisy());
 }
 
-TEST(ModbusLine, WhatIsHeardBeforeTheRequestPutsItOff) {
+TEST(ModbusLine, ClientDelaysRequestAfterReceivedByte) {
   using Kind = Event<std::uint8_t>::Kind;
   ToyClient client(request_body);
   static_cast<void>(client.next(Time{}));
@@ -280,7 +280,7 @@ TEST(ModbusLine, WhatIsHeardBeforeTheRequestPutsItOff) {
   EXPECT_EQ(client.error(), Error::none);
 }
 
-TEST(ModbusLine, ADamagedCharacterOrOneOutOfTurnIsNoReply) {
+TEST(ModbusLine, ClientRejectsDamagedAndEarlyReply) {
   using Kind = Event<std::uint8_t>::Kind;
   for (const bool early : {false, true}) {
     ToyClient client(request_body);

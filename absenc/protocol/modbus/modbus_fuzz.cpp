@@ -28,7 +28,7 @@ class Echoing final : public Server {
   void started() override {}
   void request(Bytes body, Time at, FrameBytes& reply) override {
     require(body.size() >= 2 && body.size() <= frame_capacity - crc_size);
-    heed_line(at);
+    check_line_rules(at);
     reply.append(body);
     if ((body[1] & 1) != 0) set_rate(9600);
   }

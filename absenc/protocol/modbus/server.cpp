@@ -15,9 +15,9 @@ constexpr std::string_view turn_rule = "something was sent during the encoder's 
 
 void Server::power_on(Time now, PowerOn) {
   on_ = true;
-  heard_ = transmitting_ = reply_pending_ = false;
+  line_was_used_ = transmitting_ = reply_pending_ = false;
   quiet_since_ = now;
-  forget_frame();
+  clear_frame();
   started();
 }
 
@@ -48,17 +48,17 @@ ByteStep Server::next(Time) {
 void Server::feed(const ByteEvent& event) {
   switch (event.kind) {
     case ByteEvent::Kind::received:
-      if (on_) hear(event);
+      if (on_) receive(event);
       break;
     case ByteEvent::Kind::line_error:
       damaged_ = on_ && !transmitting_;
       quiet_since_ = event.at;
-      heard_ = true;
+      line_was_used_ = true;
       break;
     case ByteEvent::Kind::sent:
       transmitting_ = interrupted_ = false;
       quiet_since_ = event.at;
-      heard_ = true;
+      line_was_used_ = true;
       break;
     case ByteEvent::Kind::silence:
       if (on_ && !transmitting_) frame_ended(event.at);
@@ -68,10 +68,10 @@ void Server::feed(const ByteEvent& event) {
   }
 }
 
-void Server::hear(const ByteEvent& event) {
+void Server::receive(const ByteEvent& event) {
   if (transmitting_) {
     // A request during a transmission breaks the rule once, not with each of its bytes.
-    if (!company_ && !interrupted_ && !late_) expect(false, turn_rule, event.at);
+    if (!expects_collision_ && !interrupted_ && !ended_late_) expect(false, turn_rule, event.at);
     interrupted_ = true;
     return;
   }
@@ -79,22 +79,22 @@ void Server::hear(const ByteEvent& event) {
   const Time begun = event.items.size() == 1 ? event.at - line_.character() : event.at;
   const Time idle = begun - quiet_since_;
   if (frame_.empty()) {
-    follows_ = heard_ && !late_;
-    early_ = follows_ && idle < line_.character() * 7 / 2;
+    follows_traffic_ = line_was_used_ && !ended_late_;
+    began_too_soon_ = follows_traffic_ && idle < line_.character() * 7 / 2;
   } else if (idle > character_gap(line_)) {
-    gappy_ = true;
+    has_gap_ = true;
   }
-  heard_ = true;
+  line_was_used_ = true;
   quiet_since_ = event.at;
   if (!frame_.append(event.items)) damaged_ = true;
 }
 
 void Server::frame_ended(Time at) {
   // On a real line the silence is reported in time; otherwise whenever this program is scheduled.
-  late_ = at - quiet_since_ > frame_silence(line_) + late;
+  ended_late_ = at - quiet_since_ > frame_silence(line_) + late;
   if (!damaged_ && crc_order(frame_) == CrcOrder::low_first) {
     reply_.clear();
-    company_ = false;
+    expects_collision_ = false;
     crc_order_ = CrcOrder::low_first;
     request(frame_.view().first(frame_.size() - crc_size), at, reply_);
     if (!reply_.empty()) {
@@ -104,18 +104,18 @@ void Server::frame_ended(Time at) {
       ++answer_count_;
     }
   }
-  forget_frame();
+  clear_frame();
 }
 
-void Server::forget_frame() {
+void Server::clear_frame() {
   frame_.clear();
-  damaged_ = follows_ = early_ = gappy_ = false;
+  damaged_ = follows_traffic_ = began_too_soon_ = has_gap_ = false;
 }
 
-void Server::heed_line(Time at) {
+void Server::check_line_rules(Time at) {
   if (answer_count_ > 0) expect(true, turn_rule, at);
-  if (follows_) expect(!early_, "less than 3.5 characters of silence before a request", at);
-  expect(!gappy_, "more than 1.5 characters of silence inside a request", at);
+  if (follows_traffic_) expect(!began_too_soon_, "less than 3.5 characters of silence before a request", at);
+  expect(!has_gap_, "more than 1.5 characters of silence inside a request", at);
 }
 
 void Server::refuse(FrameBytes& reply, std::uint8_t address, std::uint8_t function, Exception exception) {

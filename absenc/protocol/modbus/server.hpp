@@ -39,26 +39,26 @@ class Server : public Device<std::uint8_t> {
   /// Called at power on; must call `set_rate`.
   virtual void started() = 0;
   /// Called for a frame with a valid CRC and any address; `body` is without the CRC. Appends the reply without its CRC,
-  /// or nothing. Must call `heed_line` if the frame is for this server.
+  /// or nothing. Must call `check_line_rules` if the frame is for this server.
   virtual void request(Bytes body, Time at, FrameBytes& reply) = 0;
 
   /// Changes the rate after the present transmission.
   void set_rate(std::uint32_t rate);
-  /// Records whether the host kept a rule of the document; returns `kept`.
-  bool expect(bool kept, std::string_view rule, Time at) { return rules_.expect(kept, rule, at); }
+  /// Records whether the host kept a rule of the document; returns `satisfied`.
+  bool expect(bool satisfied, std::string_view rule, Time at) { return rules_.expect(satisfied, rule, at); }
   /// Checks the line timing of this frame. Frames for other servers are not checked.
-  void heed_line(Time at);
+  void check_line_rules(Time at);
   /// Announces that other servers may answer this request at the same time.
-  void expect_company() { company_ = true; }
+  void expect_collision() { expects_collision_ = true; }
   /// Sets the CRC byte order of this reply; default is low_first.
-  void order_crc(CrcOrder order) { crc_order_ = order; }
+  void set_crc_order(CrcOrder order) { crc_order_ = order; }
   /// Appends a refusal.
   static void refuse(FrameBytes& reply, std::uint8_t address, std::uint8_t function, Exception exception);
 
  private:
-  void hear(const Event<std::uint8_t>& event);
+  void receive(const Event<std::uint8_t>& event);
   void frame_ended(Time at);
-  void forget_frame();
+  void clear_frame();
 
   LineSettings line_;
   bool on_ = false;
@@ -66,13 +66,13 @@ class Server : public Device<std::uint8_t> {
   std::uint32_t next_rate_ = 0;
 
   FrameBytes frame_;
-  bool damaged_ = false;  // the frame has a damaged character, or too many characters
-  bool follows_ = false;  // something was received or sent before this frame
-  bool early_ = false;    // the frame began too soon after it
-  bool gappy_ = false;    // two characters of the frame were too far apart
-  bool heard_ = false;    // anything was received or sent since power on
-  bool late_ = false;     // the frame ended so long ago that its client may have timed out
-  bool company_ = false;
+  bool damaged_ = false;          // the frame has a damaged character, or too many characters
+  bool follows_traffic_ = false;  // something was received or sent before this frame
+  bool began_too_soon_ = false;   // the frame began too soon after it
+  bool has_gap_ = false;          // two characters of the frame were too far apart
+  bool line_was_used_ = false;    // anything was received or sent since power on
+  bool ended_late_ = false;       // the frame ended so long ago that its client may have timed out
+  bool expects_collision_ = false;
   Time quiet_since_{};
   FrameBytes reply_;
   CrcOrder crc_order_ = CrcOrder::low_first;

@@ -9,17 +9,17 @@
 
 namespace absenc::raa38 {
 
-/// Reports each value from `first` to `last` with its evidence. `against(value, i)` returns why capture i contradicts
-/// the value, or an empty text. Returns whether a value is possible and sets `value` to it. A possible `value` is left
-/// unchanged, because the position of a shaft that stands still fits many numbers of bits.
-template <class Against>
-bool judge(EvidenceSink& sink, std::size_t option, std::int64_t first, std::int64_t last, std::size_t captures,
-           std::int64_t& value, std::string_view agrees, Against&& against) {
+/// Reports each value from `first` to `last` with its evidence. `contradiction(value, i)` returns why capture i
+/// contradicts the value, or an empty text. Returns whether a value is possible and sets `value` to it. A possible
+/// `value` is left unchanged, because the position of a shaft that stands still fits many numbers of bits.
+template <class Contradiction>
+bool judge_option(EvidenceSink& sink, std::size_t option, std::int64_t first, std::int64_t last, std::size_t captures,
+                  std::int64_t& value, std::string_view agrees, Contradiction&& contradiction) {
   std::optional<std::int64_t> chosen;
   for (std::int64_t one = first; one <= last; ++one) {
     std::string_view why;
     std::size_t i = 0;
-    while (i < captures && (why = against(one, i)).empty()) ++i;
+    while (i < captures && (why = contradiction(one, i)).empty()) ++i;
     sink.put({option, one, why.empty(), why.empty() ? 0 : i, why.empty() ? agrees : why});
     if (why.empty() && (!chosen || one == value)) chosen = one;
   }

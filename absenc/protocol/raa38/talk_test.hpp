@@ -35,7 +35,7 @@ struct Collector final : FieldSink {
 }
 
 /// Result of a conversation.
-struct End {
+struct CommandResult {
   Error error = Error::none;
   std::string words{};   // detail and advice
   std::string fields{};  // "name=value name=value ", without real numbers
@@ -47,19 +47,20 @@ struct End {
 };
 
 template <class Item>
-[[nodiscard]] End end_of(const Conversation<Item>& conversation) {
+[[nodiscard]] CommandResult result_of(const Conversation<Item>& conversation) {
   Collector fields;
   Collector left;
   conversation.report(fields);
   conversation.report_left(left);
-  End end{.error = conversation.error(), .fields = fields.text, .left = left.text};
+  CommandResult end{.error = conversation.error(), .fields = fields.text, .left = left.text};
   end.words = std::string(conversation.detail()) + "; " + std::string(conversation.advice());
   if (conversation.reading() != nullptr) end.reading = *conversation.reading();
   return end;
 }
 
 /// Checks the error and its words. With an error, fields and reading must be empty.
-[[nodiscard]] inline ::testing::AssertionResult ended(const End& end, Error error, std::string_view words = {}) {
+[[nodiscard]] inline ::testing::AssertionResult ended(const CommandResult& end, Error error,
+                                                      std::string_view words = {}) {
   const bool good = end.error == error && says(end.words, words);
   const bool silent = error == Error::none || (end.fields.empty() && !end.reading);
   return (good && silent ? ::testing::AssertionSuccess() : ::testing::AssertionFailure())
@@ -96,16 +97,16 @@ struct Bench {
     return machine;
   }
   /// Runs a command and returns its result.
-  End does(const Format& told, std::string_view command, std::vector<std::int64_t> arguments = {}) {
+  CommandResult run_command(const Format& told, std::string_view command, std::vector<std::int64_t> arguments = {}) {
     Talk<Item> talk(unit, options_of(told), command, std::move(arguments));
-    End end = end_of<Item>(run(*talk));
+    CommandResult end = result_of<Item>(run(*talk));
     end.took = took;
     return end;
   }
-  End does(std::string_view command, std::vector<std::int64_t> arguments = {}) {
-    return does(format, command, std::move(arguments));
+  CommandResult run_command(std::string_view command, std::vector<std::int64_t> arguments = {}) {
+    return run_command(format, command, std::move(arguments));
   }
-  [[nodiscard]] std::uint64_t position() { return does("position").reading.value_or(Reading{}).singleturn; }
+  [[nodiscard]] std::uint64_t position() { return run_command("position").reading.value_or(Reading{}).singleturn; }
 
   struct Idle final : Machine<Item> {
     void feed(const Event<Item>&) override {}

@@ -28,7 +28,7 @@ void VirtualEncoder::selected(Time at, Time period, bool, author::DrivenBits& bi
   const bool repeats = format_.after_word == AfterWord::repeat || format_.after_word == AfterWord::separated;
   const std::size_t count = repeats ? author::DrivenBits::capacity() : (format_.word.bits() + 7) / 8 * 8;
   hosts_take(std::max(2 * format_.word.bits(), clocks(format_)));
-  for (std::size_t i = 0; i < count; ++i) bits.append(bit_behind(format_, coded.view(), shifted_ + i) ? 1 : 0, 1);
+  for (std::size_t i = 0; i < count; ++i) bits.append(bit_after_word(format_, coded.view(), shifted_ + i) ? 1 : 0, 1);
 }
 
 void VirtualEncoder::clocked(Time at, std::size_t clocks) {

@@ -54,7 +54,8 @@ inline constexpr std::size_t frame_capacity = 2 * WordFormat::maximum_bits;
 [[nodiscard]] constexpr unsigned clocks(const Format& format) { return format.word.bits() + format.extra_clocks; }
 
 /// Returns bit `index` (from 0) of a clock sequence that continues after the word. The word begins at `first`.
-[[nodiscard]] constexpr bool bit_behind(const Format& format, BitView word, std::size_t index, std::size_t first = 0) {
+[[nodiscard]] constexpr bool bit_after_word(const Format& format, BitView word, std::size_t index,
+                                            std::size_t first = 0) {
   const std::size_t bits = format.word.bits();
   if (index < bits || format.after_word == AfterWord::repeat) return word[first + index % bits];
   if (format.after_word == AfterWord::separated) {
@@ -102,7 +103,7 @@ constexpr Result<typename Source::Word> decode_clocked_on(const Source& source, 
   }
   bool matches = true;
   for (std::size_t i = source.word.bits(); first + i < bits.size; ++i) {
-    matches = matches && bits[first + i] == bit_behind(source.format, bits, i, first);
+    matches = matches && bits[first + i] == bit_after_word(source.format, bits, i, first);
   }
   if (!matches && bits.end_of_run(first) == bits.size) return Error::line_stuck;
   if (error != Error::none) return error;
@@ -157,7 +158,7 @@ template <std::size_t Capacity>
 constexpr bool encode(const Format& format, const Word& word, std::size_t count, BitBuffer<Capacity>& out) {
   BitBuffer<WordFormat::maximum_bits> coded;
   if (!encode_whole(format, word, coded) || out.capacity() - out.size() < count) return false;
-  for (std::size_t i = 0; i < count; ++i) out.append(bit_behind(format, coded.view(), i) ? 1 : 0, 1);
+  for (std::size_t i = 0; i < count; ++i) out.append(bit_after_word(format, coded.view(), i) ? 1 : 0, 1);
   return true;
 }
 

@@ -20,7 +20,7 @@ Result<Word> decode(const Format& format, std::string_view text) { return ssi::d
 
 // Paragraph 3.5: 8 clocks of 12 bits, converted with the formula for 12, are at most 22.4121 degrees. They must give no
 // position.
-TEST(SsiFrame, TooFewClocksGiveNoPosition) {
+TEST(SsiFrame, RejectsTooFewClocks) {
   EXPECT_NEAR(degrees(255, 12), 22.4121, 0.0001);
   for (std::size_t size = 0; size < 12; ++size) {
     EXPECT_EQ(decode({}, std::string(size, '1')).error(), Error::wrong_length) << size;
@@ -28,7 +28,7 @@ TEST(SsiFrame, TooFewClocksGiveNoPosition) {
 }
 
 // Paragraph 3.5: 14 clocks of 12 bits, read as one number, are thousands of degrees.
-TEST(SsiFrame, TooManyClocksGiveNoPosition) {
+TEST(SsiFrame, RejectsTooManyClocks) {
   for (std::uint64_t position = 0; position < 4096; ++position) {
     BitBuffer<64> read;
     ASSERT_TRUE(encode({}, {.position = position}, 14, read));
@@ -37,7 +37,7 @@ TEST(SsiFrame, TooManyClocksGiveNoPosition) {
   }
 }
 
-TEST(SsiFrame, TheWordTwiceFindsAnyWrongBit) {
+TEST(SsiFrame, ReadingTwiceDetectsAnyWrongBit) {
   const Format format{.extra_clocks = 12};
   // the word twice is accepted without extra clocks too
   EXPECT_EQ(decode({}, "000111101111000111101111")->position, 495u);
@@ -51,7 +51,7 @@ TEST(SsiFrame, TheWordTwiceFindsAnyWrongBit) {
 }
 
 // A reader with one bit too few or too many finds the error in the bits after the word.
-TEST(SsiFrame, ExtraClocksFindAWrongNumberOfBits) {
+TEST(SsiFrame, ExtraClocksDetectWrongNumberOfBits) {
   unsigned missed = 0;
   for (std::uint64_t position = 0; position < 4096; ++position) {
     for (const unsigned wrong : {11u, 13u}) {
@@ -64,7 +64,7 @@ TEST(SsiFrame, ExtraClocksFindAWrongNumberOfBits) {
   EXPECT_EQ(missed, 4u);  // positions 0 and 4095, whose bits are all alike
 }
 
-TEST(SsiFrame, AfterTheWord) {
+TEST(SsiFrame, ChecksBitsAfterWord) {
   const Format zero{.after_word = AfterWord::zero, .extra_clocks = 2};
   const Format one{.after_word = AfterWord::one, .extra_clocks = 2};
   EXPECT_TRUE(decode(zero, "00011110111100"));
@@ -76,7 +76,7 @@ TEST(SsiFrame, AfterTheWord) {
   EXPECT_TRUE(decode(zero, "00000000000000"));  // position 0
 }
 
-TEST(SsiFrame, WhatHasNoRoomIsNotEncoded) {
+TEST(SsiFrame, EncodeFailsWithoutRoom) {
   BitBuffer<64> room;
   EXPECT_TRUE(encode({}, {.position = 495}, 24, room));
   EXPECT_FALSE(encode({}, {.position = 495}, 41, room));
@@ -119,7 +119,7 @@ constexpr Format zeros{
     .word = "multiturn:12 position:13 gray error:1! parity:1"_word, .after_word = AfterWord::zero, .extra_clocks = 2};
 constexpr Format twice{.word = "position:24 gray"_word, .extra_clocks = 24};
 
-TEST(SsiFrame, AKnownFormatIsDecodedAsAnyOther) {
+TEST(SsiFrame, DecodesCompileTimeFormatLikeRunTimeFormat) {
   agree<plain>();
   agree<zeros>();
   agree<twice>();

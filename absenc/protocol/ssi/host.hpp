@@ -40,11 +40,12 @@ struct Protocol {
   const unsigned bits = format.word.bits_of(Meaning::position);
   const unsigned turns = format.word.bits_of(Meaning::multiturn);
   const std::uint64_t mask = low_mask(bits + turns);
-  const std::uint64_t way = ((after.multiturn << bits | after.position) - (before.multiturn << bits | before.position));
-  const std::uint64_t counts = std::min(way & mask, (~way + 1) & mask);
+  const std::uint64_t difference =
+      ((after.multiturn << bits | after.position) - (before.multiturn << bits | before.position));
+  const std::uint64_t counts = std::min(difference & mask, (~difference + 1) & mask);
   // In 2^-32 of a turn: at 60 rpm, which is one turn per second, the shaft moves 4295 per microsecond.
-  const auto moved = static_cast<std::uint64_t>(between.count()) / 1000 * format.confirm_rpm / 60 * 4295 + 1;
-  const std::uint64_t reach = bits >= 32 ? moved << (bits - 32) : moved >> (32 - bits);
+  const auto distance = static_cast<std::uint64_t>(between.count()) / 1000 * format.confirm_rpm / 60 * 4295 + 1;
+  const std::uint64_t reach = bits >= 32 ? distance << (bits - 32) : distance >> (32 - bits);
   return counts <= reach + 1;
 }
 

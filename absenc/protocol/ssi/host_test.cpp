@@ -34,7 +34,7 @@ struct Bench : biss::testing::ClockedBench<VirtualEncoder> {
   }
 };
 
-TEST(SsiHost, ReadsTheWord) {
+TEST(SsiHost, ReadsWord) {
   Bench bench;
   ReadPosition read({});
   bench.run(read);
@@ -46,7 +46,7 @@ TEST(SsiHost, ReadsTheWord) {
   EXPECT_EQ(bench.encoder.violation_count(), 0u);
 }
 
-TEST(SsiHost, ThePauseVariesByProduct) {
+TEST(SsiHost, UsesPauseOfFormat) {
   for (const Time pause : {Time(20us), Time(500us), Time(100ms)}) {
     const Format format{.pause = pause, .monoflop = Time{}};
     Bench bench(format);
@@ -61,7 +61,7 @@ TEST(SsiHost, ThePauseVariesByProduct) {
   EXPECT_EQ(slow.last_rule(), "clocked again within monoflop_us");
 }
 
-TEST(SsiHost, TurnsGrayParityAndErrorBit) {
+TEST(SsiHost, ReadsTurnsGrayCodeParityAndErrorBit) {
   const Format format{.word = word_with({.position = 13, .multiturn = 12}, true, ErrorBit::active_low, Parity::odd),
                       .extra_clocks = 27};
   Bench bench(format);
@@ -77,18 +77,18 @@ TEST(SsiHost, TurnsGrayParityAndErrorBit) {
   EXPECT_EQ(alarmed.reading()->alarms, word_error);
 }
 
-TEST(SsiHost, AnEncoderWithoutSupplyIsSeenWhereTheLineAllowsIt) {
+TEST(SsiHost, ReportsStuckLineWithoutSupply) {
   const Format format{.after_word = AfterWord::zero, .extra_clocks = 1};
   Bench bench(format);
   bench.encoder.power_off(Time{});
   EXPECT_EQ(bench.error(format), Error::line_stuck);
 }
 
-TEST(SsiHost, AWrongNumberOfBitsIsSeenByReadingTwice) {
+TEST(SsiHost, ReadingTwiceDetectsWrongNumberOfBits) {
   EXPECT_EQ(Bench().error({.word = word_format({.position = 13}), .extra_clocks = 13}), Error::cross_check_failed);
 }
 
-TEST(SsiHost, AWordReadOnceMoreMustBeNear) {
+TEST(SsiHost, RejectsSecondWordThatIsTooFarAway) {
   const Format format{.word = word_format({.position = 17}), .confirm_rpm = 6000};
   const Word at{.position = 1000};
   EXPECT_TRUE(can_follow(format, at, at, 100us));
@@ -111,23 +111,24 @@ TEST(SsiHost, AWordReadOnceMoreMustBeNear) {
   EXPECT_EQ(jumped.reading(), nullptr);
 }
 
-TEST(SsiHost, SaysWhatToDo) {
-  const auto said = [](Error error, std::vector<OptionText> texts) {
+TEST(SsiHost, ExplainsErrors) {
+  const auto detail_of = [](Error error, std::vector<OptionText> texts) {
     Options options;
     EXPECT_EQ(resolve_options(unit, {}, texts, options).kind, OptionError::Kind::none);
     return unit.explain(options, error, {}, {}).detail;
   };
   using ::testing::HasSubstr;
-  EXPECT_THAT(said(Error::cross_check_failed, {}), HasSubstr("number of bits may be wrong"));
-  EXPECT_THAT(said(Error::cross_check_failed, {{"confirm_rpm", "6000"}}), HasSubstr("cannot have reached"));
-  EXPECT_THAT(said(Error::bad_checksum, {}), HasSubstr("parity"));
-  EXPECT_THAT(said(Error::out_of_range, {{"tree_turns", "12"}, {"tree_steps", "13"}}), HasSubstr("fills the word up"));
-  EXPECT_THAT(said(Error::out_of_range, {}), HasSubstr("more clocks than the word has bits"));
+  EXPECT_THAT(detail_of(Error::cross_check_failed, {}), HasSubstr("number of bits may be wrong"));
+  EXPECT_THAT(detail_of(Error::cross_check_failed, {{"confirm_rpm", "6000"}}), HasSubstr("cannot have reached"));
+  EXPECT_THAT(detail_of(Error::bad_checksum, {}), HasSubstr("parity"));
+  EXPECT_THAT(detail_of(Error::out_of_range, {{"tree_turns", "12"}, {"tree_steps", "13"}}),
+              HasSubstr("fills the word up"));
+  EXPECT_THAT(detail_of(Error::out_of_range, {}), HasSubstr("more clocks than the word has bits"));
   // The unit has no explanation of its own for these errors.
-  for (const Error error : {Error::line_stuck, Error::wrong_length}) EXPECT_EQ(said(error, {}), "");
+  for (const Error error : {Error::line_stuck, Error::wrong_length}) EXPECT_EQ(detail_of(error, {}), "");
 }
 
-TEST(SsiHost, AnErrorThatTheParityTellsIsNoPosition) {
+TEST(SsiHost, InvertedParityInvalidatesPosition) {
   const Format format{.word = word_with({.position = 13}, false, ErrorBit::none, Parity::even), .error_parity = true};
   Bench bench(format);
   ReadPosition good(format);
@@ -142,7 +143,7 @@ TEST(SsiHost, AnErrorThatTheParityTellsIsNoPosition) {
 
 // ---- The virtual encoder with raw clocks
 
-TEST(SsiDevice, RepeatsItsWordOrSendsZerosOrOnes) {
+TEST(SsiDevice, SendsBitsOfAfterWord) {
   for (const auto& [after, wanted] :
        std::to_array<std::pair<AfterWord, std::string_view>>({{AfterWord::repeat, "0001111011110001"},
                                                               {AfterWord::zero, "0001111011110000"},
@@ -154,7 +155,7 @@ TEST(SsiDevice, RepeatsItsWordOrSendsZerosOrOnes) {
   }
 }
 
-TEST(SsiDevice, GoesOnWithTheOldWordWithinThePause) {
+TEST(SsiDevice, ContinuesOldWordWithinPause) {
   Bench bench({.pause = 500us, .monoflop = Time{}});
   EXPECT_EQ(bench.clock(12), "000111101111");
   bench.shaft.state.position = 0;
@@ -166,7 +167,7 @@ TEST(SsiDevice, GoesOnWithTheOldWordWithinThePause) {
   EXPECT_EQ(bench.encoder.violation_count(), 2u);
 }
 
-TEST(SsiDevice, ReportsTooFewClocksAndAWrongRate) {
+TEST(SsiDevice, ReportsTooFewClocksAndWrongRate) {
   Bench bench;
   EXPECT_EQ(bench.clock(8).size(), 8u);
   EXPECT_EQ(bench.last_rule(), "fewer clocks than the word has bits");

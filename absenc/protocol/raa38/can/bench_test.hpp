@@ -17,7 +17,7 @@ namespace absenc::raa38::can {
 
 namespace testing {
 
-using raa38::testing::End;
+using raa38::testing::CommandResult;
 using raa38::testing::ended;
 using raa38::testing::says;
 using Frames = std::vector<CanFrame>;
@@ -35,7 +35,7 @@ class RawHost final : public Machine<CanFrame> {
   RawHost(const CanFrame& request, Time until) : request_(request), until_(until) {}
   void feed(const Event<CanFrame>& event) override {
     if (event.kind == Event<CanFrame>::Kind::received)
-      heard.insert(heard.end(), event.items.begin(), event.items.end());
+      received_frames.insert(received_frames.end(), event.items.begin(), event.items.end());
     if (event.kind == Event<CanFrame>::Kind::timer) done_ = true;
   }
   Step<CanFrame> next(Time) override {
@@ -44,7 +44,7 @@ class RawHost final : public Machine<CanFrame> {
     if (std::exchange(sent_, true)) return {.at = until_};
     return {.kind = Kind::transfer, .out = {&request_, 1}};
   }
-  Frames heard;
+  Frames received_frames;
 
  private:
   CanFrame request_;
@@ -69,19 +69,19 @@ struct Bench : raa38::testing::Bench<CanFrame, VirtualNode, Format, can_unit> {
   /// Sends a request and returns the frames received within 20 ms.
   Frames raw(const CanFrame& request) {
     RawHost host(request, line.now() + 20ms);
-    return run(host).heard;
+    return run(host).received_frames;
   }
   /// Returns the number of frames that nodes send without a request.
   std::size_t count(Time duration) {
     RawHost host(CanFrame{.id = 0x7FF}, line.now() + duration);
-    return run(host).heard.size();
+    return run(host).received_frames.size();
   }
 };
 
 /// A node whose answers are made by a function of the received frame. It can also send frames cyclically.
 struct Scripted final : Machine<CanFrame> {
-  using Script = std::function<Frames(const CanFrame& heard)>;
-  explicit Scripted(Script says_what) : script(std::move(says_what)) {}
+  using Script = std::function<Frames(const CanFrame& received_frames)>;
+  explicit Scripted(Script script_) : script(std::move(script_)) {}
   void feed(const Event<CanFrame>& event) override {
     if (event.kind == Event<CanFrame>::Kind::sent) sending = false;
     if (event.kind != Event<CanFrame>::Kind::received) return;
@@ -89,7 +89,7 @@ struct Scripted final : Machine<CanFrame> {
     queue.insert(queue.end(), answers.begin(), answers.end());
   }
   Step<CanFrame> next(Time now) override {
-    if (std::exchange(tell_rate, false)) {
+    if (std::exchange(rate_changed, false)) {
       return {.kind = Step<CanFrame>::Kind::configure, .rate = rate};
     }
     if (sending) return {.at = never};
@@ -109,7 +109,7 @@ struct Scripted final : Machine<CanFrame> {
   Time wobble{};             // periods are alternately shorter and longer by this time
   unsigned* left = nullptr;  // number of cyclic frames left to send; null: no limit
   std::uint32_t rate = 250'000;
-  bool tell_rate = true;
+  bool rate_changed = true;
 
  private:
   Frames queue;
@@ -119,18 +119,18 @@ struct Scripted final : Machine<CanFrame> {
 };
 
 /// Runs a command against a scripted node on a bus of `rate` and returns its result.
-inline End with(Scripted node, std::string_view command, std::vector<std::int64_t> arguments = {},
-                const Format& format = {}, std::uint32_t rate = 250'000) {
+inline CommandResult with(Scripted node, std::string_view command, std::vector<std::int64_t> arguments = {},
+                          const Format& format = {}, std::uint32_t rate = 250'000) {
   sim::Line<CanFrame> line(LinkKind::can, {.rate = rate});
   line.attach(sim::Role::device, node);
   raa38::testing::Talk<CanFrame> talk(can_unit, options_of(format), command, std::move(arguments));
   EXPECT_TRUE(line.run(line.attach(sim::Role::host, *talk), 20s));
-  return raa38::testing::end_of<CanFrame>(*talk);
+  return raa38::testing::result_of<CanFrame>(*talk);
 }
 
 /// Returns the correct answer of a node at position `counts`.
-[[nodiscard]] inline Frames obedient(const CanFrame& heard, std::uint64_t counts) {
-  const OrderInfo& info = *order_of(heard);
+[[nodiscard]] inline Frames correct_answer(const CanFrame& received_frames, std::uint64_t counts) {
+  const OrderInfo& info = *order_of(received_frames);
   if (info.answer == Answer::position) return {encode_position(0x20, counts)};
   if (info.answer == Answer::code) return {encode_answer(0x20, info.order)};
   return {};

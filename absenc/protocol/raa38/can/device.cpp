@@ -21,7 +21,7 @@ constexpr std::uint8_t refused = 1;  // CiA 305: value not supported
 
 Time VirtualNode::period() const { return Time(1s) / readings_per_s_; }
 
-void VirtualNode::send_by_itself(std::uint8_t readings_per_s, Time from) {
+void VirtualNode::start_cyclic(std::uint8_t readings_per_s, Time from) {
   readings_per_s_ = readings_per_s;
   next_cyclic_ = readings_per_s == 0 ? never : from + period();
 }
@@ -32,9 +32,9 @@ void VirtualNode::power_on(Time now, PowerOn kind) {
   if (rate_of_index(settings_.rate()) == nullptr) memory()[Settings::rate_at] = rates[format_.rate].index;
   powered_ = true;
   configuring_ = false;
-  send_by_itself(format_.cyclic, now);
+  start_cyclic(format_.cyclic, now);
   if (kind == PowerOn::real && format_.cyclic != 0) next_cyclic_ = now + start_up_time;
-  tell_rate_ = rate() != format_.bit_rate();
+  rate_changed_ = rate() != format_.bit_rate();
 }
 
 void VirtualNode::power_off(Time) {
@@ -48,7 +48,7 @@ void VirtualNode::power_off(Time) {
 FrameStep VirtualNode::next(Time now) {
   FrameStep step{.at = never};
   if (sending_) return step;
-  if (std::exchange(tell_rate_, false)) return {.kind = FrameStep::Kind::configure, .rate = rate()};
+  if (std::exchange(rate_changed_, false)) return {.kind = FrameStep::Kind::configure, .rate = rate()};
   if (!pending_.empty()) {
     out_ = pending_[0].frame;
     step.at = pending_[0].at;
@@ -75,14 +75,14 @@ void VirtualNode::feed(const FrameEvent& event) {
     sending_ = false;
     if (pending_.empty() && switch_rate_) {
       switch_rate_ = false;
-      tell_rate_ = true;
+      rate_changed_ = true;
     }
   } else if (event.kind == FrameEvent::Kind::received && powered_) {
-    for (const CanFrame& frame : event.items) hear(frame, event.at);
+    for (const CanFrame& frame : event.items) receive(frame, event.at);
   }
 }
 
-void VirtualNode::hear(const CanFrame& frame, Time at) {
+void VirtualNode::receive(const CanFrame& frame, Time at) {
   const Function function = function_of(frame);
   const OrderInfo* const info = order_of(frame);
   const bool for_all = function == Function::configuration;
@@ -102,7 +102,7 @@ void VirtualNode::hear(const CanFrame& frame, Time at) {
   const bool is_other_table = info->order == Order::rate && frame.data[1] != 0;
   const std::uint8_t value = frame.data[info->value_at];
   if (sets) return configure(*info, is_other_table ? std::uint8_t{0xFF} : value, at);
-  obey(*info, value, at);
+  execute(*info, value, at);
 }
 
 void VirtualNode::answer(const CanFrame& frame, Time at) {
@@ -110,13 +110,13 @@ void VirtualNode::answer(const CanFrame& frame, Time at) {
   if (rules_.expect(room, "more requests than it can keep answers for", at)) ++answer_count_;
 }
 
-void VirtualNode::obey(const OrderInfo& info, std::uint8_t value, Time at) {
+void VirtualNode::execute(const OrderInfo& info, std::uint8_t value, Time at) {
   const bool changes = info.order == Order::zero || info.order == Order::direction;
   // The answer could be taken for a position, and a position for the answer.
   if (changes) rules_.expect(readings_per_s_ == 0, "a setting changed while the node sends by itself", at);
   if (info.order == Order::enter) configuring_ = value == 1;
-  if (info.order == Order::start && readings_per_s_ == 0) send_by_itself(format_.cyclic, at);
-  if (info.order == Order::cyclic) send_by_itself(value, at);
+  if (info.order == Order::start && readings_per_s_ == 0) start_cyclic(format_.cyclic, at);
+  if (info.order == Order::cyclic) start_cyclic(value, at);
   if (info.order == Order::zero) wrote(settings_.write_zero(at), at);
   if (info.order == Order::direction) {
     const std::uint8_t negative = value == format_.negative ? 1 : 0;

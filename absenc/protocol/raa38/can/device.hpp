@@ -49,10 +49,10 @@ class VirtualNode final : public Device<CanFrame> {
     Time at;
   };
 
-  void hear(const CanFrame& frame, Time at);
-  void obey(const OrderInfo& info, std::uint8_t value, Time at);
+  void receive(const CanFrame& frame, Time at);
+  void execute(const OrderInfo& info, std::uint8_t value, Time at);
   void configure(const OrderInfo& info, std::uint8_t value, Time at);
-  void send_by_itself(std::uint8_t readings_per_s, Time from);
+  void start_cyclic(std::uint8_t readings_per_s, Time from);
   void answer(const CanFrame& frame, Time at);
   void wrote(bool changed, Time at);
   [[nodiscard]] Time period() const;
@@ -63,8 +63,8 @@ class VirtualNode final : public Device<CanFrame> {
   bool powered_ = false;
   bool configuring_ = false;  // the node is in configuration mode
   bool sending_ = false;
-  bool switch_rate_ = false;  // the bit rate changes after the last pending answer
-  bool tell_rate_ = false;    // the node's end of the line must be set to its bit rate
+  bool switch_rate_ = false;   // the bit rate changes after the last pending answer
+  bool rate_changed_ = false;  // the node's end of the line must be set to its bit rate
   std::uint8_t readings_per_s_ = 0;
   Time next_cyclic_ = never;
   Buffer<Pending, 8> pending_;  // answers, the earliest first

@@ -12,14 +12,14 @@ CanFrame frame(std::uint32_t id, std::initializer_list<std::uint8_t> bytes) {
   return made;
 }
 
-TEST(CanDevice, SendsUnaskedAfterPowerOn) {
+TEST(Raa38CanDevice, SendsPositionsAfterPowerOn) {
   Bench bench;
   EXPECT_EQ(bench.count(1050ms), 10u);
   bench.encoder().power_off(bench.line.now());
   EXPECT_EQ(bench.raw(encode(Order::read, 0x20)), Frames{});
 }
 
-TEST(CanDevice, AnswersAsTheDocumentShows) {
+TEST(Raa38CanDevice, AnswersExamplesOfTheDocument) {
   Bench bench(quiet);
   bench.put(0x2647);
   EXPECT_EQ(bench.raw(frame(0x220, {0x80, 0x20})), Frames{frame(0x120, {0x47, 0x26})});
@@ -35,7 +35,7 @@ TEST(CanDevice, AnswersAsTheDocumentShows) {
   EXPECT_EQ(bench.encoder().settings().writes(), 3u);
 }
 
-TEST(CanDevice, SettingsSurvivePowerOff) {
+TEST(Raa38CanDevice, SettingsSurvivePowerOff) {
   Bench bench(quiet);
   bench.put(500);
   for (const CanFrame& setting :
@@ -61,7 +61,7 @@ TEST(CanDevice, SettingsSurvivePowerOff) {
   EXPECT_EQ(again.rate(), 250'000u);
 }
 
-TEST(CanDevice, NamesTheRulesThatAreBroken) {
+TEST(Raa38CanDevice, ReportsEachBrokenRule) {
   CanFrame seven = encode(Order::read, 0x20);
   seven.size = 7;
   CanFrame remote = encode(Order::read, 0x20);

@@ -20,15 +20,15 @@ inline constexpr std::uint8_t frame_size = 8;
 
 /// Purpose of a frame by its identifier; from the table of COB-IDs, with its two wrong numbers corrected.
 enum class Function : std::uint8_t {
-  nmt,                  // 000
-  sync,                 // 080
-  emergency,            // 081 to 0FF
-  reply,                // 101 to 1FF: from the node
-  command,              // 201 to 2FF: to the node
-  sdo_reply,            // 581 to 5FF: from the node
-  sdo_request,          // 601 to 67F: to the node
-  configuration_reply,  // 7E4: identifier on which slaves of CiA 305 answer
-  configuration,        // 7E5: to all nodes; RAA38S6 also answer on it
+  nmt,                  // identifier 000
+  sync,                 // identifier 080
+  emergency,            // identifiers 081 to 0FF
+  reply,                // identifiers 101 to 1FF: from the node
+  command,              // identifiers 201 to 2FF: to the node
+  sdo_reply,            // identifiers 581 to 5FF: from the node
+  sdo_request,          // identifiers 601 to 67F: to the node
+  configuration_reply,  // identifier 7E4, on which slaves of CiA 305 answer
+  configuration,        // identifier 7E5: to all nodes; RAA38S6 also answer on it
   unknown,
 };
 
@@ -62,7 +62,7 @@ inline constexpr std::array<std::string_view, 10> function_names{"NMT", "SYNC", 
 }
 
 /// Returns whether the frame is a setting or the answer to one.
-[[nodiscard]] constexpr bool configures(Function function) {
+[[nodiscard]] constexpr bool is_setting(Function function) {
   return function == Function::configuration || function == Function::configuration_reply;
 }
 
@@ -160,7 +160,7 @@ inline constexpr std::array<OrderInfo, 8> orders{{
 
 /// Returns the order in a frame, or the one that a frame on 7E5 or 7E4 answers; null if there is none.
 [[nodiscard]] constexpr const OrderInfo* order_of(const CanFrame& frame) {
-  const bool for_all = configures(function_of(frame));
+  const bool for_all = is_setting(function_of(frame));
   for (const OrderInfo& info : orders) {
     if (info.code == frame.data[0] && info.for_all == for_all) return &info;
   }
@@ -328,7 +328,7 @@ constexpr Result<Values> decode_answer(const Format& format, const OrderInfo& in
   if (const Error error = check_shape(*reply); error != Error::none) return error;
   if (is_only_named(asked)) return Error::unexpected_reply;
   const OrderInfo* info = &info_of(Order::read);
-  if (request != nullptr || configures(function)) info = order_of(request != nullptr ? *request : *reply);
+  if (request != nullptr || is_setting(function)) info = order_of(request != nullptr ? *request : *reply);
   if (info == nullptr) return Error::unexpected_reply;
   return detail::decode_answer(format, *info, node_of(request != nullptr ? *request : *reply), *reply);
 }

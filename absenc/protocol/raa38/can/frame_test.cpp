@@ -14,7 +14,7 @@ CanFrame with(CanFrame frame, bool CanFrame::*flag) {
   return frame;
 }
 
-TEST(Raa38CanFrame, APositionComesFromANode) {
+TEST(Raa38CanFrame, DecodesPositionOnlyFromNode) {
   const CanFrame position = encode_position(0x20, 5);
   EXPECT_EQ(*decode_position({}, position), 5u);
   EXPECT_EQ(decode_position({}, with(position, &CanFrame::extended)).error(), Error::unexpected_reply);
@@ -23,12 +23,12 @@ TEST(Raa38CanFrame, APositionComesFromANode) {
   EXPECT_EQ(decode_position({}, sent).error(), Error::unexpected_reply);
 }
 
-TEST(Raa38CanFrame, OnlySettingsAreAnsweredWithAnError) {
+TEST(Raa38CanFrame, ChecksAnswersToSettingsOnly) {
   EXPECT_EQ(check_configuration_answer(Order::node, encode_configuration_answer(0x7E5, Order::node, 0)), Error::none);
   EXPECT_EQ(check_configuration_answer(Order::zero, encode_answer(0x20, Order::zero)), Error::unexpected_reply);
 }
 
-TEST(Raa38CanFrame, WhatIsNoRequestIsRefused) {
+TEST(Raa38CanFrame, RejectsInvalidRequests) {
   const CanFrame read = encode(Order::read, 0x20);
   EXPECT_TRUE(decode({}, &read, nullptr).has_value());
   EXPECT_EQ(decode({}, nullptr, nullptr).error(), Error::wrong_length);
@@ -39,7 +39,7 @@ TEST(Raa38CanFrame, WhatIsNoRequestIsRefused) {
   EXPECT_EQ(decode({}, &more, nullptr).error(), Error::out_of_range);
 }
 
-TEST(Raa38CanFrame, WhatIsOnlyNamedIsNoPosition) {
+TEST(Raa38CanFrame, DoesNotDecodeCanopenFramesAsPosition) {
   const CanFrame start{.id = 0, .size = 2, .data = {1, 0x20}};
   EXPECT_TRUE(decode({}, nullptr, &start).has_value());
   const CanFrame remote = with(start, &CanFrame::remote);
@@ -49,7 +49,7 @@ TEST(Raa38CanFrame, WhatIsOnlyNamedIsNoPosition) {
   EXPECT_EQ(decode({}, &service, &position).error(), Error::unexpected_reply);
 }
 
-TEST(Raa38CanFrame, NothingIsSaidOfWhatIsNoOrder) {
+TEST(Raa38CanFrame, ExplainsNothingForUnknownOrder) {
   const CanFrame unknown{.id = 0x7E5, .size = 8, .data = {0xFF}};
   EXPECT_EQ(decode({}, nullptr, &unknown).error(), Error::unexpected_reply);
   EXPECT_EQ(explain({}, Error::timeout, {}, {}).detail, "");
@@ -57,7 +57,7 @@ TEST(Raa38CanFrame, NothingIsSaidOfWhatIsNoOrder) {
   EXPECT_NE(explain({}, Error::out_of_range, {}, std::array{encode_position(1, 1 << 20)}).advice, "");
 }
 
-TEST(Raa38CanDevice, ItKeepsSoManyAnswers) {
+TEST(Raa38CanDevice, ReportsMoreRequestsThanItCanAnswer) {
   testing::Bench bench(testing::quiet);
   const std::array asked{encode(Order::read, 0x20)};
   for (unsigned i = 0; i < 9; ++i) {

@@ -5,11 +5,11 @@
 
 namespace absenc::raa38::can {
 
-Read::Read(const Format& format, Way way) : format_(format) {
-  if (way == Way::listen) {
+Read::Read(const Format& format, Mode mode) : format_(format) {
+  if (mode == Mode::listen) {
     listen(listening_time);
   } else {
-    ask(position_request(format, way), Protocol::host_times(format));
+    ask(position_request(format, mode), Protocol::host_times(format));
   }
 }
 
@@ -40,7 +40,8 @@ void Read::over() {
 }
 
 unsigned Nodes::count() const {
-  return static_cast<unsigned>(std::count_if(at.begin(), at.end(), [](const Heard& node) { return node.is_there(); }));
+  return static_cast<unsigned>(
+      std::count_if(at.begin(), at.end(), [](const NodeFrames& node) { return node.is_there(); }));
 }
 
 // ---- Explanations

@@ -56,9 +56,9 @@ struct Protocol {
 class Read : public author::CanEngine {
  public:
   /// Whether positions are asked for, or come by themselves.
-  enum class Way : std::uint8_t { ask, start, listen };
-  /// Reads positions in this way.
-  Read(const Format& format, Way way);
+  enum class Mode : std::uint8_t { ask, start, listen };
+  /// Reads positions in this mode.
+  Read(const Format& format, Mode mode);
 
   /// Returns the format of the encoder.
   [[nodiscard]] const Format& format() const { return format_; }
@@ -77,9 +77,9 @@ class Read : public author::CanEngine {
 };
 
 /// Returns the frame that requests a position; for `listen`, the single read request.
-[[nodiscard]] constexpr CanFrame position_request(const Format& format, Read::Way way) {
+[[nodiscard]] constexpr CanFrame position_request(const Format& format, Read::Mode mode) {
   // Two calls with constant orders, so that the table of orders is not linked.
-  return way == Read::Way::start ? encode(Order::start, format.node) : encode(Order::read, format.node);
+  return mode == Read::Mode::start ? encode(Order::start, format.node) : encode(Order::read, format.node);
 }
 
 using Dialog = author::DialogOf<Protocol>;
@@ -98,12 +98,12 @@ author::Procedure change(Dialog& dialog, Values& found, Order order, Arguments a
 
 /// Reports the number of the node if it answers. No other number is requested: on a CANopen bus such requests are
 /// process data of other devices. Errors: timeout, bad_framing (frames are destroyed: two nodes may share the number).
-author::Procedure look_for_node(Dialog& dialog, Values& found);
+author::Procedure find_node(Dialog& dialog, Values& found);
 
 // ---- All nodes on the bus
 
 /// Frames received from one node number.
-struct Heard {
+struct NodeFrames {
   std::uint16_t unsolicited = 0;  ///< frames sent without a request
   std::uint16_t per_second = 0;   ///< frames without a request in the first second
   std::uint8_t answers = 0;       ///< answers to one request
@@ -119,9 +119,9 @@ struct Heard {
   }
 };
 
-/// Nodes that were received.
+/// Nodes that were found, by number.
 struct Nodes {
-  std::array<Heard, 256> at{};  ///< What was received from each node.
+  std::array<NodeFrames, 256> at{};  ///< Frames of each node number.
 
   /// Returns how many node numbers are in use.
   [[nodiscard]] unsigned count() const;
@@ -131,9 +131,9 @@ struct Nodes {
 /// Error: timeout if no node is found.
 author::Procedure scan(Dialog& dialog, Nodes& nodes);
 
-/// Result of a survey of the bus.
-struct Surveyed : Values {
-  Nodes nodes{};          ///< Nodes that were received.
+/// Result of a setting, with the nodes that were found on the bus.
+struct ConfigureResult : Values {
+  Nodes nodes{};          ///< Nodes that were found, by number.
   bool verified = false;  ///< the written setting was verified
 };
 
@@ -141,6 +141,6 @@ struct Surveyed : Values {
 /// sets the bit rate; the host switches too, and back if the node does not answer. Both are sent on 7E5, which reaches
 /// every node, so only one node may be on the bus. Errors: invalid_argument (other nodes are on the bus, or the
 /// document does not have that rate), timeout, request_rejected, cross_check_failed (the node kept its old setting).
-author::Procedure configure(Dialog& dialog, Surveyed& found, Order order, Arguments arguments);
+author::Procedure configure(Dialog& dialog, ConfigureResult& found, Order order, Arguments arguments);
 
 }  // namespace absenc::raa38::can

@@ -29,30 +29,30 @@ CanFrame extended_position() {
 
 // ---- Position
 
-TEST(CanRead, AsksAndListens) {
+TEST(Raa38CanRead, PollsAndListens) {
   Bench bench;
   bench.put(9799);
   EXPECT_EQ(bench.position(), 9799u);
-  const End listening = bench.does("listen");
+  const CommandResult listening = bench.run_command("listen");
   EXPECT_EQ(listening.reading->singleturn, 9799u);
   EXPECT_EQ(listening.reading->latched, listening.reading->received);
   EXPECT_LE(listening.took, 101ms);
-  EXPECT_TRUE(bench.does("start").has("singleturn=9799"));
+  EXPECT_TRUE(bench.run_command("start").has("singleturn=9799"));
   EXPECT_EQ(bench.encoder().violation_count(), 0u);
 }
 
-TEST(CanRead, NobodyThere) {
+TEST(Raa38CanRead, TimesOutWithoutNode) {
   Bench bench({.node = 0x21, .cyclic = 0});
-  EXPECT_TRUE(ended(bench.does(Format{}, "position"), Error::timeout, "scan"));
-  EXPECT_TRUE(ended(bench.does(Format{}, "listen"), Error::timeout, "by itself"));
+  EXPECT_TRUE(ended(bench.run_command(Format{}, "position"), Error::timeout, "scan"));
+  EXPECT_TRUE(ended(bench.run_command(Format{}, "listen"), Error::timeout, "by itself"));
   // Frames of other nodes arrive all the time, so the bus is never silent.
   Bench busy({.node = 0x21, .cyclic = 255});
-  const End read = busy.does(Format{}, "position");
+  const CommandResult read = busy.run_command(Format{}, "position");
   EXPECT_TRUE(ended(read, Error::timeout));
   EXPECT_LE(read.took, 300ms);
 }
 
-TEST(CanRead, WhatWasUnderWayBeforeIsNoAnswer) {
+TEST(Raa38CanRead, IgnoresFramesFromBeforeTheRequest) {
   for (const std::string_view command : {"position", "listen"}) {
     ByHand by_hand(command);
     by_hand.next();
@@ -68,7 +68,7 @@ TEST(CanRead, WhatWasUnderWayBeforeIsNoAnswer) {
   }
 }
 
-TEST(CanRead, FramesOfOthersAreLeftAside) {
+TEST(Raa38CanRead, IgnoresFramesOfOtherNodes) {
   for (const CanFrame& other :
        {encode_position(0x21, 5), extended_position(), encode(Order::read, 0x20), CanFrame{.id = 0x80}}) {
     ByHand by_hand("position");
@@ -84,7 +84,7 @@ TEST(CanRead, FramesOfOthersAreLeftAside) {
   }
 }
 
-TEST(CanRead, BadFramesOfTheNodeAreErrors) {
+TEST(Raa38CanRead, ReportsBadFramesOfTheNode) {
   CanFrame seven = encode_position(0x20, 5);
   seven.size = 7;
   CanFrame remote = encode_position(0x20, 0);
@@ -98,25 +98,25 @@ TEST(CanRead, BadFramesOfTheNodeAreErrors) {
     by_hand.sent();
     by_hand.receive(frame);
     EXPECT_EQ(by_hand.next(), Kind::done);
-    EXPECT_TRUE(ended(raa38::testing::end_of<CanFrame>(*by_hand.talk), error));
+    EXPECT_TRUE(ended(raa38::testing::result_of<CanFrame>(*by_hand.talk), error));
     EXPECT_FALSE(by_hand.talk->detail().empty());
     EXPECT_EQ(by_hand.talk->exchange().received.size(), 1u);
   }
 }
 
-TEST(CanRead, DestroyedFramesAreNamed) {
+TEST(Raa38CanRead, ReportsDestroyedFrames) {
   Bench bench(quiet);
   bench.put(100);
   bench.add_twin();
-  EXPECT_TRUE(ended(bench.does("position"), Error::bad_framing, "one number"));
+  EXPECT_TRUE(ended(bench.run_command("position"), Error::bad_framing, "one number"));
 }
 
 // ---- Cyclic positions
 
-TEST(CanCyclic, StartsAndStops) {
+TEST(Raa38CanCyclic, StartsAndStopsCyclicFrames) {
   Bench bench;
   for (const int rate : {0, 1, 2, 3, 100, 255, 7, 0}) {
-    const End cyclic = rate == 0 ? bench.does("stop") : bench.does("cyclic", {rate});
+    const CommandResult cyclic = rate == 0 ? bench.run_command("stop") : bench.run_command("cyclic", {rate});
     EXPECT_TRUE(ended(cyclic, Error::none)) << rate;
     EXPECT_EQ(cyclic.fields, "node=32 readings_per_s=" + std::to_string(rate) + " answered=1 ");
   }
@@ -124,16 +124,16 @@ TEST(CanCyclic, StartsAndStops) {
 }
 
 // A position of 49 looks like the answer: only the node's send rate decides.
-TEST(CanCyclic, ANodeThatDoesNotObey) {
+TEST(Raa38CanCyclic, FailsWhenSendRateDoesNotChange) {
   for (const std::int64_t rate : {0, 10}) {
-    Scripted deaf([](const CanFrame&) { return Frames{}; });
-    deaf.period = 20ms;
-    EXPECT_TRUE(ended(rate == 0 ? with(deaf, "stop") : with(deaf, "cyclic", {rate}), Error::cross_check_failed,
-                      rate == 0 ? "goes on" : "more or fewer"));
+    Scripted disobedient([](const CanFrame&) { return Frames{}; });
+    disobedient.period = 20ms;
+    EXPECT_TRUE(ended(rate == 0 ? with(disobedient, "stop") : with(disobedient, "cyclic", {rate}),
+                      Error::cross_check_failed, rate == 0 ? "goes on" : "more or fewer"));
   }
 }
 
-TEST(CanCyclic, WhatWasStillUnderWayIsGoneAtTheNextLook) {
+TEST(Raa38CanCyclic, RepeatsMeasurementAfterLateFrames) {
   unsigned left = 3;
   Scripted node([&](const CanFrame&) { return Frames{}; });
   node.period = 400ms;
@@ -144,66 +144,66 @@ TEST(CanCyclic, WhatWasStillUnderWayIsGoneAtTheNextLook) {
 
 // ---- Zero
 
-TEST(CanZero, IsZeroAndSendsAgainAsBefore) {
+TEST(Raa38CanZero, SetsZeroAndRestoresSendRate) {
   for (const std::uint8_t rate : std::to_array<std::uint8_t>({0, 1, 10, 200})) {
     Bench bench({.cyclic = rate});
     bench.put(9799);
-    const End zero = bench.does("zero");
+    const CommandResult zero = bench.run_command("zero");
     EXPECT_TRUE(ended(zero, Error::none));
     EXPECT_EQ(zero.fields, "node=32 written=1 answered=1 before=9799 after=0 ");
     EXPECT_EQ(bench.position(), 0u);
-    EXPECT_TRUE(bench.does("zero").has("written=0")) << "it is zero already";
+    EXPECT_TRUE(bench.run_command("zero").has("written=0")) << "it is zero already";
     EXPECT_EQ(bench.encoder().settings().writes(), 1u);
     EXPECT_EQ(bench.encoder().violation_count(), 0u);
     EXPECT_NEAR(static_cast<double>(bench.count(2s)), 2.0 * rate, 1.0 + 0.005 * rate);
   }
 }
 
-TEST(CanZero, AShaftThatTurns) {
+TEST(Raa38CanZero, RefusesWhileShaftTurns) {
   Bench bench;
   bench.put(5000);
   bench.shaft.spin(600, bench.line.now());
-  EXPECT_TRUE(ended(bench.does("zero"), Error::not_still, "nothing was changed"));
+  EXPECT_TRUE(ended(bench.run_command("zero"), Error::not_still, "nothing was changed"));
   EXPECT_EQ(bench.encoder().settings().writes(), 0u);
 }
 
 // A node that uses command 20 for something else, or not at all: it answers correctly, but its position does not
 // change.
-TEST(CanZero, AnAnswerAloneIsNoZero) {
+TEST(Raa38CanZero, FailsWhenPositionDoesNotBecomeZero) {
   // 32 is the answer read as a position; at 21 bits that is near 0.
   for (const std::uint32_t counts : {32u << 10, 1'000'000u}) {
-    Scripted stubborn([&](const CanFrame& heard) { return obedient(heard, counts); });
-    const End zero = with(stubborn, "zero", {}, {.bits = 21});
+    Scripted stubborn([&](const CanFrame& request) { return correct_answer(request, counts); });
+    const CommandResult zero = with(stubborn, "zero", {}, {.bits = 21});
     EXPECT_TRUE(ended(zero, Error::cross_check_failed, "answered, but"));
     EXPECT_TRUE(says(zero.words, "command 20"));
   }
-  const Scripted silent([](const CanFrame& heard) {
-    return heard.data[0] == info_of(Order::read).code ? obedient(heard, 5000) : Frames{};
+  const Scripted silent([](const CanFrame& request) {
+    return request.data[0] == info_of(Order::read).code ? correct_answer(request, 5000) : Frames{};
   });
   EXPECT_TRUE(ended(with(silent, "zero"), Error::cross_check_failed, "did not answer"));
   EXPECT_TRUE(ended(with(silent, "direction", {1}), Error::timeout, "is the same"));
 }
 
 // The answer to order 20 arrives late, in place of a position: at 21 bits, 32 is near 0.
-TEST(CanZero, ALateAnswerIsNoZero) {
-  bool owed = false;
-  Scripted late([&](const CanFrame& heard) {
-    const bool zero = order_of(heard)->order == Order::zero;
-    if (std::exchange(owed, zero)) return Frames{encode_answer(0x20, Order::zero)};
-    return zero ? Frames{} : obedient(heard, 1'000'000);
+TEST(Raa38CanZero, RejectsLateAnswerAsZeroPosition) {
+  bool answer_pending = false;
+  Scripted late([&](const CanFrame& request) {
+    const bool zero = order_of(request)->order == Order::zero;
+    if (std::exchange(answer_pending, zero)) return Frames{encode_answer(0x20, Order::zero)};
+    return zero ? Frames{} : correct_answer(request, 1'000'000);
   });
   EXPECT_TRUE(ended(with(late, "zero", {}, {.bits = 21}), Error::cross_check_failed));
 }
 
 // The carrier delivers frames some milliseconds late: only many frames show the send rate.
-TEST(CanZero, SendsAgainAsOftenAlsoBehindASlowCarrier) {
+TEST(Raa38CanZero, RestoresSendRateThroughSlowCarrier) {
   unsigned left = 1000;
   unsigned rate = 0;
-  Scripted node([&](const CanFrame& heard) {
-    const bool cyclic = order_of(heard)->order == Order::cyclic;
-    if (cyclic) rate = heard.data[info_of(Order::cyclic).value_at];
+  Scripted node([&](const CanFrame& request) {
+    const bool cyclic = order_of(request)->order == Order::cyclic;
+    if (cyclic) rate = request.data[info_of(Order::cyclic).value_at];
     if (cyclic) left = rate == 0 ? 0 : 1000;
-    return obedient(heard, 0);
+    return correct_answer(request, 0);
   });
   node.period = 10ms;
   node.wobble = 4ms;
@@ -212,10 +212,10 @@ TEST(CanZero, SendsAgainAsOftenAlsoBehindASlowCarrier) {
   EXPECT_NEAR(rate, 100, 1);
 }
 
-TEST(CanZero, ANodeThatNoLongerSendsIsTold) {
+TEST(Raa38CanZero, ReportsNodeThatDoesNotResumeSending) {
   unsigned left = 1000;
-  Scripted exhausted([&](const CanFrame& heard) {
-    if (order_of(heard)->order == Order::read) return obedient(heard, 0);
+  Scripted exhausted([&](const CanFrame& request) {
+    if (order_of(request)->order == Order::read) return correct_answer(request, 0);
     left = 0;
     return Frames{};
   });
@@ -226,15 +226,15 @@ TEST(CanZero, ANodeThatNoLongerSendsIsTold) {
 }
 
 // The node sends one more frame after the stop order: its position is 32, which looks like the answer to order 20.
-TEST(CanZero, WhatItStillSentByItselfIsNoAnswer) {
+TEST(Raa38CanZero, RejectsCyclicPositionThatLooksLikeAnswer) {
   for (const Time period : {80ms, 100ms}) {
     unsigned left = 1000;
     std::uint64_t counts = 32;
-    Scripted slow([&](const CanFrame& heard) {
-      const Order order = order_of(heard)->order;
-      if (order == Order::cyclic) left = heard == encode(order, 0x20, 0) ? 1 : 1000;
+    Scripted slow([&](const CanFrame& request) {
+      const Order order = order_of(request)->order;
+      if (order == Order::cyclic) left = request == encode(order, 0x20, 0) ? 1 : 1000;
       if (order == Order::zero) counts = 0;
-      return order == Order::zero ? Frames{} : obedient(heard, counts);
+      return order == Order::zero ? Frames{} : correct_answer(request, counts);
     });
     slow.unsolicited = encode_position(0x20, 32);
     slow.period = period;
@@ -245,44 +245,44 @@ TEST(CanZero, WhatItStillSentByItselfIsNoAnswer) {
 
 // ---- Direction
 
-TEST(CanDirection, IsMirrored) {
+TEST(Raa38CanDirection, ReportsMirroredPosition) {
   Bench bench;
   bench.put(1000);
-  const End negative = bench.does("direction", {1});
+  const CommandResult negative = bench.run_command("direction", {1});
   EXPECT_TRUE(ended(negative, Error::none));
   EXPECT_EQ(negative.fields, "node=32 value=1 answered=1 mirrored=1 before=1000 after=15384 ");
   EXPECT_EQ(bench.position(), (1u << 14) - 1000);
-  EXPECT_TRUE(ended(bench.does("direction", {0}), Error::none));
+  EXPECT_TRUE(ended(bench.run_command("direction", {0}), Error::none));
   EXPECT_EQ(bench.position(), 1000u);
   EXPECT_EQ(bench.encoder().settings().writes(), 2u);
   EXPECT_EQ(bench.encoder().violation_count(), 0u);
-  EXPECT_TRUE(bench.does("direction", {0}).has("mirrored=0"));
+  EXPECT_TRUE(bench.run_command("direction", {0}).has("mirrored=0"));
   EXPECT_EQ(bench.encoder().violation_count(), 1u) << "nobody can know before that it wears the memory";
 }
 
-TEST(CanDirection, AnotherPositionIsNoDirection) {
+TEST(Raa38CanDirection, FailsWhenPositionIsNeitherSameNorMirrored) {
   std::uint32_t counts = 1000;
-  Scripted jumping([&](const CanFrame& heard) {
-    if (order_of(heard)->order == Order::direction) counts = 7000;
-    return obedient(heard, counts);
+  Scripted jumping([&](const CanFrame& request) {
+    if (order_of(request)->order == Order::direction) counts = 7000;
+    return correct_answer(request, counts);
   });
   EXPECT_TRUE(ended(with(jumping, "direction", {1}), Error::cross_check_failed, "mirror image"));
 }
 
 // The position 32 may be a late answer to order 22.
-TEST(CanDirection, APositionThatIsNotThereAgainIsNone) {
-  unsigned looks = 0;
-  Scripted late([&](const CanFrame& heard) {
-    const bool third = order_of(heard)->order == Order::read && ++looks == 3;
-    return obedient(heard, third ? 32u : 1000u);
+TEST(Raa38CanDirection, RejectsPositionThatIsNotRepeated) {
+  unsigned measurements = 0;
+  Scripted late([&](const CanFrame& request) {
+    const bool third = order_of(request)->order == Order::read && ++measurements == 3;
+    return correct_answer(request, third ? 32u : 1000u);
   });
   EXPECT_TRUE(ended(with(late, "direction", {0}), Error::cross_check_failed, "mirror image"));
 }
 
-TEST(CanDirection, OtherValues) {
+TEST(Raa38CanDirection, UsesValuesOfOptions) {
   Bench bench({.positive = 0x10, .negative = 0x11});
   bench.put(1000);
-  EXPECT_TRUE(bench.does("direction", {1}).has("value=17"));
+  EXPECT_TRUE(bench.run_command("direction", {1}).has("value=17"));
   EXPECT_TRUE(bench.encoder().settings().counts_down());
 }
 

@@ -16,14 +16,14 @@ using MaybeFrame = std::optional<CanFrame>;
 // Enough frames to measure the send rate to 1 % if the carrier delivers frames some milliseconds late.
 constexpr unsigned enough_frames = 4;
 constexpr Time enough_time = 500ms;
-constexpr unsigned most_looks = 3;   // attempts to measure the send rate
-constexpr Time slowest_period = 1s;  // longest period of a node that sends cyclically: TT = 1
+constexpr unsigned most_measurements = 3;  // attempts to measure the send rate
+constexpr Time slowest_period = 1s;        // longest period of a node that sends cyclically: TT = 1
 // Time for which answers to a command are received. It is never shortened, because a cyclic position may look like the
 // answer.
 constexpr Time command_window = answer_limit;
 
 /// Measures how often a node sends without a request.
-struct Cadence {
+struct SendRate {
   unsigned count = 0;
   Time first{};
   Time last{};
@@ -48,8 +48,8 @@ struct Cadence {
 // ---- Receiving until a time is over
 
 // Measures how often the node sends; with `until_enough`, only until enough frames were received.
-Part<Cadence> hear_node(Dialog& dialog, bool until_enough = false) {
-  Cadence cadence;
+Part<SendRate> count_frames(Dialog& dialog, bool until_enough = false) {
+  SendRate cadence;
   for (;;) {
     const MaybeFrame frame = co_await dialog.heard();
     if (!frame) break;
@@ -85,40 +85,40 @@ Part<MaybeFrame> read(Dialog& dialog, std::uint8_t node, Time pause = {}) {
 }
 
 // A position, or the reason that it is missing.
-struct Look {
+struct PositionResult {
   Outcome outcome{};
   std::uint32_t counts = 0;
 };
 
-Part<Look> look(Dialog& dialog, Time pause = {}) {
+Part<PositionResult> read_position(Dialog& dialog, Time pause = {}) {
   const MaybeFrame frame = co_await read(dialog, dialog.format().node, pause);
   const Result<std::uint32_t> counts = frame ? decode_position(dialog.format(), *frame) : dialog.missing();
   // The exchange is copied, because other frames may follow before the procedure ends.
   const Exchange<CanFrame> exchange = dialog.exchange();
   const Explanation words = explain(dialog.format(), counts.error(), exchange.sent, exchange.received);
-  co_return Look{counts ? done : only(counts.error(), words.detail, words.advice), *counts};
+  co_return PositionResult{counts ? done : only(counts.error(), words.detail, words.advice), *counts};
 }
 
 // ---- Commands whose answer looks like a position. The node is stopped first and restarted with its old rate
 // afterwards; no position is accepted until the time for the answer is over.
 
-Part<Cadence> hush(Dialog& dialog) {
+Part<SendRate> stop_cyclic_frames(Dialog& dialog) {
   dialog.listen(listening_time);
-  const Cadence before = co_await hear_node(dialog, true);
+  const SendRate before = co_await count_frames(dialog, true);
   if (before.count != 0) {
     co_await is_answered(dialog, Order::cyclic, 0);
     dialog.listen(before.pause());
     // If the node cannot be stopped, the command continues all the same.
-    co_await hear_node(dialog);
+    co_await count_frames(dialog);
   }
   co_return before;
 }
 
-Part<Outcome> let_send_again(Dialog& dialog, Cadence before, Outcome outcome) {
+Part<Outcome> restore_cyclic_frames(Dialog& dialog, SendRate before, Outcome outcome) {
   if (before.count == 0) co_return outcome;
   co_await is_answered(dialog, Order::cyclic, static_cast<std::uint8_t>(before.per_second()));
   dialog.listen(before.pause());
-  const Cadence now = co_await hear_node(dialog);
+  const SendRate now = co_await count_frames(dialog);
   if (now.count == 0 && outcome.error == Error::none) {
     co_return only(Error::cross_check_failed, "it was done, but the node no longer sends by itself as it did before",
                    "let it: `absenc run ... cyclic 10`");
@@ -127,21 +127,21 @@ Part<Outcome> let_send_again(Dialog& dialog, Cadence before, Outcome outcome) {
 }
 
 // Reads the position twice; fails if the shaft turns.
-Part<Look> look_twice(Dialog& dialog) {
-  const Look first = co_await look(dialog);
+Part<PositionResult> read_at_rest(Dialog& dialog) {
+  const PositionResult first = co_await read_position(dialog);
   if (first.outcome.error != Error::none) co_return first;
-  Look second = co_await look(dialog, between_looks);
+  PositionResult second = co_await read_position(dialog, between_looks);
   const unsigned bits = dialog.format().bits;
-  const Outcome why_not =
+  const Outcome objection =
       objection_to_zero(position_reading(first.counts, bits), position_reading(second.counts, bits));
-  if (second.outcome.error == Error::none && why_not.error != Error::none) {
-    second.outcome = only(why_not.error, why_not.detail, why_not.advice);
+  if (second.outcome.error == Error::none && objection.error != Error::none) {
+    second.outcome = only(objection.error, objection.detail, objection.advice);
   }
   co_return second;
 }
 
 // Takes two positions, because the first may be a late answer that looks like position 32.
-Outcome judge_zero(const Format& format, const Values& found, std::uint32_t first, std::uint32_t second) {
+Outcome check_zero(const Format& format, const Values& found, std::uint32_t first, std::uint32_t second) {
   if (is_near(first, 0, format.bits, zero_millidegrees) && is_near(second, 0, format.bits, zero_millidegrees)) {
     return done;
   }
@@ -151,7 +151,7 @@ Outcome judge_zero(const Format& format, const Values& found, std::uint32_t firs
               "the document only lets one guess that command 20 sets the zero: this node may not have it");
 }
 
-Outcome judge_direction(const Format& format, Values& found, std::uint32_t first, std::uint32_t second) {
+Outcome check_direction(const Format& format, Values& found, std::uint32_t first, std::uint32_t second) {
   // The shaft may have vibrated before and after.
   const auto is_at = [&](std::uint64_t place) {
     return is_near(second, place, format.bits, 2 * standstill_millidegrees);
@@ -169,7 +169,7 @@ Outcome judge_direction(const Format& format, Values& found, std::uint32_t first
 
 Part<Outcome> change_quietly(Dialog& dialog, Values& found, Order order, std::uint8_t value) {
   const bool zeroing = order == Order::zero;
-  const Look before = co_await look_twice(dialog);
+  const PositionResult before = co_await read_at_rest(dialog);
   if (before.outcome.error != Error::none) co_return before.outcome;
   found.before = found.after = before.counts;
   if (zeroing) {
@@ -178,17 +178,17 @@ Part<Outcome> change_quietly(Dialog& dialog, Values& found, Order order, std::ui
   }
   dialog.changes();
   found.answered = co_await is_answered(dialog, order, value);
-  const Look first = co_await look(dialog);
+  const PositionResult first = co_await read_position(dialog);
   if (first.outcome.error != Error::none) co_return first.outcome;
-  const Look second = co_await look(dialog, between_looks);
+  const PositionResult second = co_await read_position(dialog, between_looks);
   if (second.outcome.error != Error::none) co_return second.outcome;
   found.after = zeroing ? second.counts : first.counts;
-  co_return zeroing ? judge_zero(dialog.format(), found, first.counts, second.counts)
-                    : judge_direction(dialog.format(), found, first.counts, second.counts);
+  co_return zeroing ? check_zero(dialog.format(), found, first.counts, second.counts)
+                    : check_direction(dialog.format(), found, first.counts, second.counts);
 }
 
 // Compares the number of received frames, not their times: the carrier may deliver them in bursts.
-Outcome judge_cyclic(Dialog& dialog, unsigned wanted, bool answered, const Cadence& heard) {
+Outcome check_cyclic(Dialog& dialog, unsigned wanted, bool answered, const SendRate& heard) {
   if (wanted == 0) {
     if (heard.count == 0) return done;
     return only(Error::cross_check_failed, "the node goes on sending by itself", "try again");
@@ -212,16 +212,16 @@ Procedure set_cyclic(Dialog& dialog, Values& found, Arguments arguments) {
   found.answered = co_await is_answered(dialog, Order::cyclic, static_cast<std::uint8_t>(wanted));
   Outcome outcome = done;
   // The carrier may deliver frames late; a repeated measurement corrects that.
-  for (unsigned looks = 0; looks < most_looks; ++looks) {
+  for (unsigned measurements = 0; measurements < most_measurements; ++measurements) {
     dialog.listen(wanted == 0 ? listening_time : std::max(5 * slowest_period / wanted / 2, enough_time) + answer_limit);
-    const Cadence heard = co_await hear_node(dialog);
-    outcome = judge_cyclic(dialog, wanted, *found.answered, heard);
+    const SendRate heard = co_await count_frames(dialog);
+    outcome = check_cyclic(dialog, wanted, *found.answered, heard);
     if (outcome.error == Error::none || outcome.error == Error::timeout) break;
   }
   co_return outcome;
 }
 
-Procedure look_for_node(Dialog& dialog, Values& found) {
+Procedure find_node(Dialog& dialog, Values& found) {
   const std::uint8_t node = dialog.format().node;
   const MaybeFrame frame = co_await read(dialog, node);
   if (!frame) co_return {dialog.missing()};
@@ -233,9 +233,9 @@ Procedure change(Dialog& dialog, Values& found, Order order, Arguments arguments
   const std::uint8_t value = order == Order::zero ? 0 : *value_of(dialog.format(), order, arguments[0]);
   found.node = dialog.format().node;
   if (order == Order::direction) found.value = value;
-  const Cadence before = co_await hush(dialog);
+  const SendRate before = co_await stop_cyclic_frames(dialog);
   const Outcome outcome = co_await change_quietly(dialog, found, order, value);
-  const Outcome end = co_await let_send_again(dialog, before, outcome);
+  const Outcome end = co_await restore_cyclic_frames(dialog, before, outcome);
   co_return end;
 }
 
@@ -252,27 +252,27 @@ constexpr Time switching_time = 50ms;  // time that a controller needs to rejoin
 constexpr int rate_attempts = 3;
 constexpr auto most_clashes = 16;  // more shared numbers than this indicate a bad line
 
-constexpr std::string_view alone = "connect this one alone: 7E5 reaches every node on the bus";
-constexpr std::string_view shared = "two nodes share the number, or the line is bad";
-constexpr std::string_view which = "`absenc scan` shows which: set node=";
+constexpr std::string_view connect_alone = "connect this one alone: 7E5 reaches every node on the bus";
+constexpr std::string_view number_shared = "two nodes share the number, or the line is bad";
+constexpr std::string_view scan_hint = "`absenc scan` shows which: set node=";
 
 // Values of `asked`: no number was requested yet, or all were.
-constexpr unsigned nobody = 0;
-constexpr unsigned everybody = 256;
+constexpr unsigned before_requests = 0;
+constexpr unsigned after_requests = 256;
 
 // Counts the frames of all nodes until the time is over. `asked`: the last number that was requested.
-Part<bool> hear_nodes(Dialog& dialog, Nodes& nodes, unsigned asked) {
+Part<bool> count_node_frames(Dialog& dialog, Nodes& nodes, unsigned asked) {
   Time from = never;
   while (const MaybeFrame frame = co_await dialog.heard()) {
     if (function_of(*frame) != Function::reply) continue;
     dialog.keep();
     const unsigned number = node_of(*frame);
-    Heard& node = nodes.at[number];
+    NodeFrames& node = nodes.at[number];
     if (from == never) from = dialog.heard_at();
-    if (asked == nobody && dialog.heard_at() - from < 1s) ++node.per_second;
+    if (asked == before_requests && dialog.heard_at() - from < 1s) ++node.per_second;
     // Late answers arrive while the next numbers are requested; no answer arrives before its own request.
     const unsigned early = dialog.came_early() && node.damaged == 0 ? 1 : 0;
-    const bool was_asked = asked == everybody || (number + early <= asked && number + answering > asked);
+    const bool was_asked = asked == after_requests || (number + early <= asked && number + answering > asked);
     if (!was_asked) {
       ++node.unsolicited;
     } else if (node.answers < 255) {
@@ -288,35 +288,36 @@ Part<bool> hear_nodes(Dialog& dialog, Nodes& nodes, unsigned asked) {
 Part<bool> survey(Dialog& dialog, Nodes& nodes) {
   dialog.overhear();
   dialog.listen(listening_time);
-  co_await hear_nodes(dialog, nodes, nobody);
+  co_await count_node_frames(dialog, nodes, before_requests);
   for (unsigned number = 1; number < nodes.at.size(); ++number) {
-    bool once_more = true;
-    while (once_more) {
+    bool repeat = true;
+    while (repeat) {
       dialog.ask_for(encode(Order::read, static_cast<std::uint8_t>(number)), between_requests);
-      co_await hear_nodes(dialog, nodes, number);
-      once_more = dialog.is_disturbed() && ++nodes.at[number].damaged < 2;
+      co_await count_node_frames(dialog, nodes, number);
+      repeat = dialog.is_disturbed() && ++nodes.at[number].damaged < 2;
     }
   }
   dialog.listen(last_answers);
-  co_await hear_nodes(dialog, nodes, everybody);
+  co_await count_node_frames(dialog, nodes, after_requests);
   dialog.overhear(false);
   co_return true;
 }
 
 // Stops the procedure unless this node is the only one on the bus, because 7E5 reaches every node.
-Part<bool> be_alone(Dialog& dialog, Nodes& nodes) {
+Part<bool> require_single_node(Dialog& dialog, Nodes& nodes) {
   co_await survey(dialog, nodes);
-  const Heard& node = nodes.at[dialog.format().node];
+  const NodeFrames& node = nodes.at[dialog.format().node];
   if (nodes.count() == 0) co_await dialog.stop(only(Error::timeout, "no node answers"));
   if (!node.is_there()) {
-    co_await dialog.stop(only(Error::unexpected_reply, "other nodes answer, but not this one", which));
+    co_await dialog.stop(only(Error::unexpected_reply, "other nodes answer, but not this one", scan_hint));
   }
-  if (nodes.count() > 1) co_await dialog.stop(only(Error::invalid_argument, "other nodes are on this bus", alone));
-  if (node.clash()) co_await dialog.stop(only(Error::invalid_argument, shared, alone));
+  if (nodes.count() > 1)
+    co_await dialog.stop(only(Error::invalid_argument, "other nodes are on this bus", connect_alone));
+  if (node.clash()) co_await dialog.stop(only(Error::invalid_argument, number_shared, connect_alone));
   co_return true;
 }
 
-Part<bool> hear_out(Dialog& dialog) {
+Part<bool> wait_until_over(Dialog& dialog) {
   MaybeFrame frame;
   do {
     frame = co_await dialog.heard();
@@ -325,9 +326,9 @@ Part<bool> hear_out(Dialog& dialog) {
 }
 
 // Writes a setting. It may take effect even if the answer is lost.
-Part<bool> write(Dialog& dialog, Surveyed& found, Order order, std::uint8_t value) {
+Part<bool> write(Dialog& dialog, ConfigureResult& found, Order order, std::uint8_t value) {
   dialog.ask_for(encode(Order::enter, 0, 1), entering_time);
-  co_await hear_out(dialog);
+  co_await wait_until_over(dialog);
   found.written = true;
   found.answered = false;
   dialog.changes();
@@ -361,13 +362,13 @@ Part<Outcome> verify_node(Dialog& dialog, std::uint8_t before, std::uint8_t node
 Part<Outcome> verify_rate(Dialog& dialog, std::uint32_t bits_per_second) {
   const Format& format = dialog.format();
   dialog.configure(bits_per_second, switching_time);
-  co_await hear_out(dialog);
+  co_await wait_until_over(dialog);
   for (int attempt = 0; attempt < rate_attempts; ++attempt) {
     const MaybeFrame there = co_await read(dialog, format.node);
     if (there) co_return done;
   }
   dialog.configure(format.bit_rate(), switching_time);
-  co_await hear_out(dialog);
+  co_await wait_until_over(dialog);
   const MaybeFrame back = co_await read(dialog, format.node);
   if (back) {
     co_return only(Error::cross_check_failed, "it keeps its old bit rate",
@@ -382,13 +383,13 @@ Part<Outcome> verify_rate(Dialog& dialog, std::uint32_t bits_per_second) {
 Procedure scan(Dialog& dialog, Nodes& nodes) {
   co_await survey(dialog, nodes);
   const auto damaged =
-      std::count_if(nodes.at.begin(), nodes.at.end(), [](const Heard& node) { return node.damaged > 1; });
+      std::count_if(nodes.at.begin(), nodes.at.end(), [](const NodeFrames& node) { return node.damaged > 1; });
   if (damaged > most_clashes) co_return {Error::bad_framing};
   if (nodes.count() == 0) co_return only(Error::timeout, {});
   co_return done;
 }
 
-Procedure configure(Dialog& dialog, Surveyed& found, Order order, Arguments arguments) {
+Procedure configure(Dialog& dialog, ConfigureResult& found, Order order, Arguments arguments) {
   const Format& format = dialog.format();
   const std::optional<std::uint8_t> value = value_of(format, order, arguments[0]);
   if (!value) {
@@ -397,7 +398,7 @@ Procedure configure(Dialog& dialog, Surveyed& found, Order order, Arguments argu
   const std::int64_t before = order == Order::rate ? format.bit_rate() : format.node;
   (order == Order::rate ? found.bit_rate : found.node) = arguments[0];
   found.written = false;
-  co_await be_alone(dialog, found.nodes);
+  co_await require_single_node(dialog, found.nodes);
   if (arguments[0] == before && arguments[1] == 0) co_return done;
   co_await write(dialog, found, order, *value);
   Outcome outcome;

@@ -7,13 +7,13 @@ namespace {
 
 using namespace testing;
 
-TEST(CanScan, FindsWhoSendsAndWhoOnlyAnswers) {
+TEST(Raa38CanScan, FindsSendingAndSilentNodes) {
   Bench bench;
   bench.put(77);
   bench.add({.node = 0x01, .cyclic = 0});
   bench.add({.node = 0xFF, .cyclic = 50});
   bench.add({.bits = 21, .node = 0x30, .cyclic = 0});
-  const End scan = bench.does("scan");
+  const CommandResult scan = bench.run_command("scan");
   EXPECT_TRUE(ended(scan, Error::none));
   EXPECT_EQ(scan.fields,
             "node=1 clash=0 readings_per_s=0 singleturn=77 node=32 clash=0 readings_per_s=10 singleturn=77 "
@@ -21,26 +21,26 @@ TEST(CanScan, FindsWhoSendsAndWhoOnlyAnswers) {
   for (const VirtualNode& node : bench.encoders) EXPECT_EQ(node.violation_count(), 0u);
 }
 
-TEST(CanScan, NobodyThere) {
+TEST(Raa38CanScan, TimesOutWithoutNode) {
   Bench bench;
   bench.encoder().power_off(bench.line.now());
-  EXPECT_TRUE(ended(bench.does("scan"), Error::timeout));
+  EXPECT_TRUE(ended(bench.run_command("scan"), Error::timeout));
 }
 
-TEST(CanScan, TwoNodesWithOneNumber) {
+TEST(Raa38CanScan, ReportsClashOfTwoNodesWithOneNumber) {
   Bench bench(quiet);
   bench.put(100);
   bench.add_twin();
   bench.add({.node = 0x21, .cyclic = 0});
-  EXPECT_EQ(bench.does("scan").fields,
+  EXPECT_EQ(bench.run_command("scan").fields,
             "node=32 clash=1 readings_per_s=0 node=33 clash=0 readings_per_s=0 singleturn=100 ");
-  EXPECT_TRUE(ended(bench.does("set-node", {0x42}), Error::invalid_argument, "other nodes"));
+  EXPECT_TRUE(ended(bench.run_command("set-node", {0x42}), Error::invalid_argument, "other nodes"));
   bench.encoders.back().power_off(bench.line.now());
-  EXPECT_TRUE(ended(bench.does("set-node", {0x42}), Error::invalid_argument, "share the number"));
-  EXPECT_TRUE(ended(bench.does("node"), Error::bad_framing, "no two nodes have one number"));
+  EXPECT_TRUE(ended(bench.run_command("set-node", {0x42}), Error::invalid_argument, "share the number"));
+  EXPECT_TRUE(ended(bench.run_command("node"), Error::bad_framing, "no two nodes have one number"));
 }
 
-TEST(CanScan, AWrongBitRateIsNotManyClashes) {
+TEST(Raa38CanScan, ReportsWrongBitRateInsteadOfClashes) {
   Scripted noise([](const CanFrame&) { return Frames{}; });
   noise.period = 1ms;
   EXPECT_TRUE(ended(with(noise, "scan", {}, {}, 500'000), Error::bad_framing, "bit rate"));
@@ -59,13 +59,13 @@ std::vector<std::uint32_t> identifiers_of(std::string_view command, const Format
 }
 
 // On a CANopen bus, identifiers 201 to 27F are process data of other devices.
-TEST(CanNode, AsksTheGivenNodeOnly) {
+TEST(Raa38CanNode, PollsGivenNodeOnly) {
   EXPECT_EQ(identifiers_of("node", {.node = 0x42}), std::vector<std::uint32_t>{0x242});
   EXPECT_EQ(identifiers_of("scan", {.node = 0x42}).size(), 255u);
 }
 
 // The text `disturbs` warns users before the command is sent.
-TEST(CanNode, EveryCommandThatAsksOthersSaysSo) {
+TEST(Raa38CanNode, CommandsThatPollOtherNodesWarn) {
   for (const Command& command : can_unit.commands) {
     if (!command.arguments.empty() && command.verb != Verb::config_set) continue;
     std::vector<std::int64_t> arguments;
@@ -83,84 +83,87 @@ TEST(CanNode, EveryCommandThatAsksOthersSaysSo) {
   }
 }
 
-TEST(CanNode, IsTheOneThatAnswers) {
+TEST(Raa38CanNode, ReportsNodeThatAnswers) {
   Bench bench({.node = 0x55, .cyclic = 50});
-  EXPECT_EQ(bench.does("node").fields, "node=85 ");
-  EXPECT_TRUE(ended(bench.does(Format{}, "node"), Error::timeout, "`absenc scan` asks them all"));
+  EXPECT_EQ(bench.run_command("node").fields, "node=85 ");
+  EXPECT_TRUE(ended(bench.run_command(Format{}, "node"), Error::timeout, "`absenc scan` asks them all"));
 }
 
 // A slow adapter delivers answers while the next number is requested. A frame before the request for its number is no
 // answer.
-TEST(CanScan, AnswersThatComeWhileItIsSendingAreHeard) {
+TEST(Raa38CanScan, AcceptsAnswersWhileSendingNextRequest) {
   for (const bool unasked_too : {false, true}) {
-    Talk find("scan");
+    Talk conversation("scan");
     Time now{};
     const auto tell = [&](std::uint8_t node) {
       const CanFrame frame = encode_position(node, 5);
-      find->feed({.kind = Event<CanFrame>::Kind::received, .at = now, .items = {&frame, 1}});
+      conversation->feed({.kind = Event<CanFrame>::Kind::received, .at = now, .items = {&frame, 1}});
     };
     for (;;) {
-      const Step<CanFrame> step = find->next(now);
+      const Step<CanFrame> step = conversation->next(now);
       if (step.kind == Step<CanFrame>::Kind::done) break;
       now = step.at > now ? step.at : now + 100us;
       if (step.kind != Step<CanFrame>::Kind::transfer) continue;
       if (unasked_too && step.out[0].id == 0x220) tell(0x20);
       if (step.out[0].id == 0x221) tell(0x20);
-      find->feed({.kind = Event<CanFrame>::Kind::sent, .at = now});
+      conversation->feed({.kind = Event<CanFrame>::Kind::sent, .at = now});
     }
-    EXPECT_EQ(raa38::testing::end_of<CanFrame>(*find).fields, "node=32 clash=0 readings_per_s=0 singleturn=5 ");
+    EXPECT_EQ(raa38::testing::result_of<CanFrame>(*conversation).fields,
+              "node=32 clash=0 readings_per_s=0 singleturn=5 ");
   }
 }
 
-TEST(CanScan, TheLastAnswersAreWaitedFor) {
-  Talk find("scan");
+TEST(Raa38CanScan, WaitsForLastAnswers) {
+  Talk conversation("scan");
   Time now{};
   unsigned asked = 0;
   for (;;) {
-    const Step<CanFrame> step = find->next(now);
+    const Step<CanFrame> step = conversation->next(now);
     if (step.kind == Step<CanFrame>::Kind::done) break;
     if (step.kind == Step<CanFrame>::Kind::transfer) {
       ++asked;
-      find->feed({.kind = Event<CanFrame>::Kind::sent, .at = now});
+      conversation->feed({.kind = Event<CanFrame>::Kind::sent, .at = now});
     } else if (asked == 255 && step.at >= now + 50ms) {
       const CanFrame late = encode_position(0xFF, 5);
-      find->feed({.kind = Event<CanFrame>::Kind::received, .at = now, .items = {&late, 1}});
+      conversation->feed({.kind = Event<CanFrame>::Kind::received, .at = now, .items = {&late, 1}});
     }
     now = std::max(now, step.at);
   }
-  EXPECT_EQ(raa38::testing::end_of<CanFrame>(*find).fields, "node=255 clash=0 readings_per_s=0 singleturn=5 ");
+  EXPECT_EQ(raa38::testing::result_of<CanFrame>(*conversation).fields,
+            "node=255 clash=0 readings_per_s=0 singleturn=5 ");
 }
 
 // ---- Settings
 
-TEST(CanSetNode, AnswersUnderTheNewNumber) {
+TEST(Raa38CanSetNode, SetsAndVerifiesNodeNumber) {
   for (const bool on_7e4 : {false, true}) {
     Bench bench({.answers_on_7e4 = on_7e4});
-    EXPECT_EQ(bench.does("set-node", {0x42}).fields, "node=66 written=1 answered=1 ");
+    EXPECT_EQ(bench.run_command("set-node", {0x42}).fields, "node=66 written=1 answered=1 ");
     EXPECT_EQ(bench.encoder().node(), 0x42);
     EXPECT_EQ(bench.encoder().settings().writes(), 1u);
     EXPECT_EQ(bench.encoder().violation_count(), 0u);
   }
 }
 
-TEST(CanSetNode, WritesNothingTwice) {
+TEST(Raa38CanSetNode, DoesNotWritePresentValue) {
   Bench bench;
-  EXPECT_EQ(bench.does("set-node", {0x20}).fields, "node=32 written=0 ");
-  EXPECT_EQ(bench.does("bitrate", {250'000}).fields, "bit_rate=250000 written=0 ");
+  EXPECT_EQ(bench.run_command("set-node", {0x20}).fields, "node=32 written=0 ");
+  EXPECT_EQ(bench.run_command("bitrate", {250'000}).fields, "bit_rate=250000 written=0 ");
   EXPECT_EQ(bench.encoder().settings().writes(), 0u);
-  EXPECT_EQ(bench.does("set-node", {0x20, 1}).fields, "node=32 written=1 answered=1 ");
+  EXPECT_EQ(bench.run_command("set-node", {0x20, 1}).fields, "node=32 written=1 answered=1 ");
   EXPECT_EQ(bench.encoder().settings().writes(), 1u);
   EXPECT_EQ(bench.encoder().violation_count(), 1u) << "it wears out";
 }
 
-TEST(CanSetNode, NotWithOthersOnTheBus) {
+TEST(Raa38CanSetNode, RefusesWithOtherNodesOnTheBus) {
   Bench bench;
   const VirtualNode& other = bench.add({.node = 0x21, .cyclic = 0});
-  EXPECT_TRUE(ended(bench.does("set-node", {0x42}), Error::invalid_argument, "7E5"));
-  EXPECT_TRUE(ended(bench.does(Format{.node = 0x77}, "set-node", {0x42}), Error::unexpected_reply, "not this one"));
+  EXPECT_TRUE(ended(bench.run_command("set-node", {0x42}), Error::invalid_argument, "7E5"));
+  EXPECT_TRUE(
+      ended(bench.run_command(Format{.node = 0x77}, "set-node", {0x42}), Error::unexpected_reply, "not this one"));
   EXPECT_EQ(bench.encoder().settings().writes() + other.settings().writes(), 0u);
   for (VirtualNode& node : bench.encoders) node.power_off(bench.line.now());
-  EXPECT_TRUE(ended(bench.does("set-node", {0x42}), Error::timeout, "no node answers"));
+  EXPECT_TRUE(ended(bench.run_command("set-node", {0x42}), Error::timeout, "no node answers"));
 }
 
 /// A node that may answer a setting, but does not apply it.
@@ -170,22 +173,22 @@ struct Settings {
   std::uint8_t appears = 0;  // number of another node that answers afterwards
 };
 
-End set(const Settings& one, std::string_view command, std::int64_t value) {
+CommandResult set(const Settings& one, std::string_view command, std::int64_t value) {
   bool is_set = false;
-  Scripted node([&](const CanFrame& heard) {
-    const OrderInfo& info = *order_of(heard);
+  Scripted node([&](const CanFrame& request) {
+    const OrderInfo& info = *order_of(request);
     if (info.answer == Answer::error) {
       is_set = true;
       return one.answer;
     }
-    if (heard.id == 0x220u && !(is_set && one.dies)) return obedient(heard, 5);
-    const bool other = is_set && one.appears != 0 && heard.id == (0x200u | one.appears);
+    if (request.id == 0x220u && !(is_set && one.dies)) return correct_answer(request, 5);
+    const bool other = is_set && one.appears != 0 && request.id == (0x200u | one.appears);
     return other ? Frames{encode_position(one.appears, 5)} : Frames{};
   });
   return with(node, command, {value});
 }
 
-TEST(CanSettings, AnAnswerAloneIsNoSetting) {
+TEST(Raa38CanSettings, VerifiesEffectOfSettings) {
   const auto answer = [](Order order, std::uint8_t error, std::uint32_t id = 0x7E5) {
     return Frames{encode_configuration_answer(id, order, error)};
   };
@@ -205,23 +208,23 @@ TEST(CanSettings, AnAnswerAloneIsNoSetting) {
       {"bitrate", {answer(Order::rate, 0), true}, Error::timeout, "neither", "bit_rate=500000 "},
   };
   for (const Row& row : rows) {
-    const End end = set(row.node, row.command, row.command == "bitrate" ? 500'000 : 0x42);
+    const CommandResult end = set(row.node, row.command, row.command == "bitrate" ? 500'000 : 0x42);
     EXPECT_TRUE(ended(end, row.error, row.words));
     EXPECT_EQ(end.left, row.left);
   }
 }
 
-TEST(CanSetRate, IsFollowed) {
+TEST(Raa38CanSetRate, SwitchesHostToNewRate) {
   Bench bench;
-  EXPECT_EQ(bench.does("bitrate", {1'000'000}).fields, "bit_rate=1000000 written=1 answered=1 ");
+  EXPECT_EQ(bench.run_command("bitrate", {1'000'000}).fields, "bit_rate=1000000 written=1 answered=1 ");
   EXPECT_EQ(bench.encoder().rate(), 1'000'000u);
   EXPECT_EQ(bench.encoder().violation_count(), 0u);
-  EXPECT_TRUE(ended(bench.does("position"), Error::none)) << "this end of the line goes to it too";
+  EXPECT_TRUE(ended(bench.run_command("position"), Error::none)) << "this end of the line goes to it too";
 }
 
-TEST(CanSetRate, OnlyThoseOfTheDocument) {
+TEST(Raa38CanSetRate, RefusesRateThatTheDocumentLacks) {
   Bench bench;
-  EXPECT_TRUE(ended(bench.does("bitrate", {125'000}), Error::invalid_argument, "500000"));
+  EXPECT_TRUE(ended(bench.run_command("bitrate", {125'000}), Error::invalid_argument, "500000"));
   EXPECT_EQ(bench.encoder().answer_count(), 0u);
 }
 

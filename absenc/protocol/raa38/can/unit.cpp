@@ -38,7 +38,7 @@ constexpr auto options = author::OptionsOf{
 
 constexpr Argument force{"force", "1: write even what is set already", 0, 1, 0, false, Role::force};
 // CANopen uses identifiers 201 to 27F for RPDO1, by which a master moves drives, and those from 281 on for TPDO2.
-constexpr std::string_view asks_all =
+constexpr std::string_view survey_warning =
     "asks every number, by 201#8001 to 2FF#80FF: on a CANopen bus these are process data of other devices, which may "
     "obey them";
 constexpr std::array<Argument, 1> cyclic_arguments{{{"readings", "a second", 1, 255}}};
@@ -86,10 +86,10 @@ void put_position(FieldSink& sink, const Format& format, const Reading& position
   fields.put(sink, values_of(format, format.node, position.singleturn));
 }
 void put_change(FieldSink& sink, const Format&, const Values& found) { fields.put(sink, found); }
-void put_surveyed(FieldSink& sink, const Format&, const Surveyed& found) { fields.put(sink, found); }
+void put_surveyed(FieldSink& sink, const Format&, const ConfigureResult& found) { fields.put(sink, found); }
 void put_nodes(FieldSink& sink, const Format& format, const Nodes& found) {
   for (unsigned number = 1; number < found.at.size(); ++number) {
-    const Heard& node = found.at[number];
+    const NodeFrames& node = found.at[number];
     if (!node.is_there()) continue;
     const bool shown = node.readable && !node.clash();
     Values values = shown ? values_of(format, 0, node.counts) : Values{};
@@ -99,7 +99,7 @@ void put_nodes(FieldSink& sink, const Format& format, const Nodes& found) {
     put_found(sink, format, values);
   }
 }
-void put_left(FieldSink& sink, const Format&, const Surveyed& found) {
+void put_left(FieldSink& sink, const Format&, const ConfigureResult& found) {
   if (found.written.value_or(false) && !found.verified) {
     fields.put(sink, {.node = found.node, .bit_rate = found.bit_rate});
   }
@@ -109,27 +109,27 @@ constexpr author::Report<Protocol> report{.explain = explain};
 constexpr author::Finding<Format, Reading> position{.put = put_position};
 constexpr author::Finding<Format, Values> found{.put = put_change};
 constexpr author::Finding<Format, Nodes> nodes{.put = put_nodes};
-constexpr author::Finding<Format, Surveyed> surveyed{.put = put_surveyed, .put_left = put_left};
+constexpr author::Finding<Format, ConfigureResult> surveyed{.put = put_surveyed, .put_left = put_left};
 
 // ---- Commands
 
 constexpr bool listens(const Format& format) { return format.listens; }
 
-template <Read::Way way>
+template <Read::Mode mode>
 constexpr author::CommandOf<Protocol> read_by(const Command& info) {
   using Made = author::Reported<report, Read, position>;
   return {.info = info,
-          .request = [](const Format& format, Arguments) -> Result<CanFrame> { return position_request(format, way); },
+          .request = [](const Format& format, Arguments) -> Result<CanFrame> { return position_request(format, mode); },
           .make = [](const Format& format, Arguments,
-                     std::span<std::byte> storage) { return make_host<Made>(storage, format, way); },
+                     std::span<std::byte> storage) { return make_host<Made>(storage, format, mode); },
           .size = sizeof(Made)};
 }
 
-constexpr Command read_position{"position", Verb::read, 0, "position"};
+constexpr Command position_command{"position", Verb::read, 0, "position"};
 constexpr auto commands = std::array{
-    read_by<Read::Way::ask>(read_position).or_when(listens, read_by<Read::Way::listen>(read_position)),
-    read_by<Read::Way::listen>({"listen", Verb::read_part, 0, "the next position that the node sends by itself"}),
-    read_by<Read::Way::start>({"start", Verb::run, 0, "start the node", {}, true, false}),
+    read_by<Read::Mode::ask>(position_command).or_when(listens, read_by<Read::Mode::listen>(position_command)),
+    read_by<Read::Mode::listen>({"listen", Verb::read_part, 0, "the next position that the node sends by itself"}),
+    read_by<Read::Mode::start>({"start", Verb::run, 0, "start the node", {}, true, false}),
     author::command<report, found, set_cyclic, to<Order::cyclic>>(
         {"cyclic", Verb::run, 0, "let the node send so many readings a second by itself", cyclic_arguments, true,
          false}),
@@ -138,12 +138,12 @@ constexpr auto commands = std::array{
     author::command<report, found, change, to<Order::zero>, Order::zero>(
         {"zero", Verb::zero, 0, "make this the zero of the turn", {}, true, false}),
     author::command<report, nodes, scan, to<Order::read>>(
-        {"scan", Verb::scan, 0, "who is on the bus", {}, false, false, {}, {}, asks_all}),
-    author::command<report, found, look_for_node, to<Order::read>>(
+        {"scan", Verb::scan, 0, "who is on the bus", {}, false, false, {}, {}, survey_warning}),
+    author::command<report, found, find_node, to<Order::read>>(
         {"node", Verb::config_get, 0, "number of the node", {}, false, false}),
     author::command<report, surveyed, configure, to<Order::node>, Order::node>(
         {"set-node", Verb::config_set, 0, "give the only node on the bus another number", node_arguments, true, false,
-         "node", "node", asks_all}),
+         "node", "node", survey_warning}),
     author::command<report, surveyed, configure, to<Order::rate>, Order::rate>(
         {"bitrate",
          Verb::config_set,
@@ -154,7 +154,7 @@ constexpr auto commands = std::array{
          false,
          {},
          {},
-         asks_all}),
+         survey_warning}),
     author::command<report, found, change, to<Order::direction>, Order::direction>(
         {"direction", Verb::config_set, 0, "set the counting direction", direction_arguments, true, false}),
 };

@@ -22,7 +22,7 @@ namespace testing {
 
 using author::testing::PowerOn;
 using author::testing::Wire;
-using raa38::testing::End;
+using raa38::testing::CommandResult;
 using raa38::testing::ended;
 using raa38::testing::says;
 
@@ -69,11 +69,11 @@ class Scripted final : public Machine<std::uint8_t> {
 
   void feed(const Event<std::uint8_t>& event) override {
     if (event.kind == Event<std::uint8_t>::Kind::received)
-      heard_.insert(heard_.end(), event.items.begin(), event.items.end());
-    if (event.kind != Event<std::uint8_t>::Kind::silence || heard_.empty()) return;
-    asked_at.push_back(event.at);
-    reply_ = script_(heard_, requests++);
-    heard_.clear();
+      request_bytes_.insert(request_bytes_.end(), event.items.begin(), event.items.end());
+    if (event.kind != Event<std::uint8_t>::Kind::silence || request_bytes_.empty()) return;
+    request_times.push_back(event.at);
+    reply_ = script_(request_bytes_, requests++);
+    request_bytes_.clear();
     pending_ = !reply_.empty();
   }
   Step<std::uint8_t> next(Time) override {
@@ -82,29 +82,29 @@ class Scripted final : public Machine<std::uint8_t> {
   }
 
   unsigned requests = 0;
-  std::vector<Time> asked_at{};
+  std::vector<Time> request_times{};
 
  private:
   Script script_;
-  Wire heard_;
+  Wire request_bytes_;
   Wire reply_;
   bool pending_ = false;
 };
 
-struct Conversed : End {
+struct ScriptedResult : CommandResult {
   unsigned requests = 0;
-  std::vector<Time> asked_at{};
+  std::vector<Time> request_times{};
 };
 
 /// Runs a command against a scripted slave and returns its result.
-[[nodiscard]] inline Conversed with(const Scripted::Script& script, std::string_view command,
-                                    std::vector<std::int64_t> arguments = {}, const Format& format = {}) {
+[[nodiscard]] inline ScriptedResult with(const Scripted::Script& script, std::string_view command,
+                                         std::vector<std::int64_t> arguments = {}, const Format& format = {}) {
   sim::Line<std::uint8_t> line{LinkKind::half_duplex, line_settings};
   Scripted scripted(script);
   Talk talk(format, command, std::move(arguments));
   line.attach(sim::Role::device, scripted);
   EXPECT_TRUE(line.run(line.attach(sim::Role::host, *talk), 60s));
-  return {raa38::testing::end_of<std::uint8_t>(*talk), scripted.requests, scripted.asked_at};
+  return {raa38::testing::result_of<std::uint8_t>(*talk), scripted.requests, scripted.request_times};
 }
 
 }  // namespace testing

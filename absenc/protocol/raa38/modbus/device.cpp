@@ -30,16 +30,16 @@ void VirtualEncoder::started() {
 }
 
 void VirtualEncoder::request(Bytes body, Time at, FrameBytes& reply) {
-  if (body.size() == 2 && body[0] == any_address && body[1] == function::ask_address) {
-    heed_line(at);
-    expect_company();
+  if (body.size() == 2 && body[0] == any_address && body[1] == function::read_address) {
+    check_line_rules(at);
+    expect_collision();
     reply.append(body);
     reply.push_back(address());
-    order_crc(format_.address_crc);
+    set_crc_order(format_.address_crc);
     return;
   }
   if (body[0] != address()) return;
-  heed_line(at);
+  check_line_rules(at);
   switch (body[1]) {
     case function::read:
       return read(body, at, reply);

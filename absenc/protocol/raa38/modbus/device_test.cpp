@@ -6,7 +6,7 @@ namespace {
 
 using namespace testing;
 
-TEST(Raa38ModbusDevice, AnswersAsTheManualShows) {
+TEST(Raa38ModbusDevice, AnswersExamplesOfTheManual) {
   Bench bench;
   bench.put(383);
   EXPECT_EQ(bench.raw({0x01, 0x03, 0x00, 0x00, 0x00, 0x01, 0x84, 0x0A}), (Wire{1, 3, 2, 0x01, 0x7F, 0xF8, 0x34}));
@@ -22,7 +22,7 @@ TEST(Raa38ModbusDevice, AnswersAsTheManualShows) {
   }
 }
 
-TEST(Raa38ModbusDevice, RefusesAsTheStandardSays) {
+TEST(Raa38ModbusDevice, RefusesWithExceptionsOfTheStandard) {
   Bench bench;
   const std::pair<Wire, Wire> rows[]{
       {{1, 4, 0, 0, 0, 1}, {1, 0x84, 1}},  // read input registers
@@ -44,7 +44,7 @@ TEST(Raa38ModbusDevice, RefusesAsTheStandardSays) {
   EXPECT_EQ(wide.body({1, 3, 0, 0, 0, 2}), (Wire{1, 3, 4, 0, 1, 0xFF, 0xFF}));
 }
 
-TEST(Raa38ModbusDevice, IsSilentToWhatIsNotForIt) {
+TEST(Raa38ModbusDevice, IgnoresFramesOfOthers) {
   Bench bench;
   for (const Wire& request : {
            Wire{2, 3, 0, 0, 0, 1},
@@ -81,21 +81,21 @@ TEST(Raa38ModbusDevice, SettingsSurvivePowerOff) {
   EXPECT_EQ(bench.encoder().violation_count(), 0u);
 }
 
-TEST(Raa38ModbusDevice, ABaudRateHoldsFromTheReplyOn) {
+TEST(Raa38ModbusDevice, UsesNewBaudRateAfterReply) {
   for (std::size_t i = 0; i < bauds.size(); ++i) {
     if (i == baud_at_shipping) continue;
     Bench bench;
     EXPECT_EQ(bench.body({1, 0xCC, baud_parameters[i]}), (Wire{1, 0xCC, baud_parameters[i]}));
     EXPECT_EQ(bench.encoder().baud(), bauds[i]);
     EXPECT_EQ(bench.body({1, 3, 0, 0, 0, 1}), Wire{}) << "it listens at " << bauds[i];
-    EXPECT_EQ(bench.does("baud").fields, "baud=" + std::to_string(bauds[i]) + " ");
+    EXPECT_EQ(bench.run_command("baud").fields, "baud=" + std::to_string(bauds[i]) + " ");
     bench.encoder().power_off(bench.line.now());
     bench.encoder().power_on(bench.line.now(), PowerOn::skip);
     EXPECT_EQ(bench.encoder().baud(), bauds[i]);
   }
 }
 
-TEST(Raa38ModbusDevice, TellsTheRulesThatAreBroken) {
+TEST(Raa38ModbusDevice, ReportsEachBrokenRule) {
   Bench bench;
   bench.body({1, 0xCC, 0x02});
   EXPECT_EQ(bench.encoder().violation_count(), 0u);
@@ -113,7 +113,7 @@ TEST(Raa38ModbusDevice, TellsTheRulesThatAreBroken) {
   EXPECT_EQ(bench.encoder().settings().writes(), 14u);
 }
 
-TEST(Raa38ModbusDevice, AMemoryOfRubbishIsNotTakenOver) {
+TEST(Raa38ModbusDevice, ReplacesInvalidMemory) {
   Bench bench;
   for (std::uint8_t& byte : bench.encoder().memory()) byte = 0xFF;
   bench.encoder().power_on(bench.line.now(), PowerOn::skip);
@@ -121,7 +121,7 @@ TEST(Raa38ModbusDevice, AMemoryOfRubbishIsNotTakenOver) {
   EXPECT_EQ(bench.encoder().baud(), 19'200u);
 }
 
-TEST(Raa38ModbusDevice, SeveralAnswerA0AtOnce) {
+TEST(Raa38ModbusDevice, SeveralSlavesAnswerA0AtOnce) {
   Bench bench;
   const VirtualEncoder& other = bench.add({.address = 6});
   EXPECT_NE(bench.raw({0xFF, 0xA0, 0x40, 0x38}), (Wire{0xFF, 0xA0, 0x01, 0xF8, 0x30}));

@@ -19,12 +19,12 @@ using modbus::CrcOrder;
 
 namespace function {
 inline constexpr std::uint8_t read = modbus::read_holding_registers;
-inline constexpr std::uint8_t ask_address = 0xA0;  // functions A0, A1 and CC are specific to the maker
+inline constexpr std::uint8_t read_address = 0xA0;  // functions A0, A1 and CC are specific to the maker
 inline constexpr std::uint8_t set_address = 0xA1;
 inline constexpr std::uint8_t set_parameter = 0xCC;
 
 [[nodiscard]] constexpr bool is_known(std::uint8_t code) {
-  return code == read || code == ask_address || code == set_address || code == set_parameter;
+  return code == read || code == read_address || code == set_address || code == set_parameter;
 }
 }  // namespace function
 
@@ -64,9 +64,9 @@ inline constexpr LineSettings line_settings{.rate = bauds[baud_at_shipping]};
 
 /// Form of the virtual encoder's reply to a request of two registers; the document has all three.
 enum class Data : std::uint8_t {
-  four_bytes,     // byte count 04, four bytes
-  three_bytes,    // byte count 03, three bytes
-  three_as_four,  // byte count 04, three bytes
+  four_bytes,     // byte count 04, four bytes of data
+  three_bytes,    // byte count 03, three bytes of data
+  three_as_four,  // byte count 04, but three bytes of data
 };
 
 /// Format of the encoder: the values of its options.
@@ -80,7 +80,7 @@ struct Format {
   CrcOrder address_crc = CrcOrder::low_first;
 
   /// Returns the number of registers that are requested.
-  [[nodiscard]] constexpr unsigned asked() const { return registers != 0 ? registers : bits > 16 ? 2 : 1; }
+  [[nodiscard]] constexpr unsigned register_count() const { return registers != 0 ? registers : bits > 16 ? 2 : 1; }
   /// Returns the settings of the line.
   [[nodiscard]] constexpr LineSettings line() const { return {.rate = bauds[baud]}; }
   /// Returns the bits of position and turns.
@@ -100,7 +100,7 @@ using RequestBytes = ByteBuffer<8>;
 
 [[nodiscard]] constexpr std::size_t request_length(std::uint8_t code) {
   if (code == function::read) return 8;
-  return code == function::ask_address ? 4 : 5;
+  return code == function::read_address ? 4 : 5;
 }
 
 [[nodiscard]] constexpr RequestBytes encode_request(const Request& request) {
@@ -112,7 +112,7 @@ using RequestBytes = ByteBuffer<8>;
       bytes.push_back(static_cast<std::uint8_t>(number >> 8));
       bytes.push_back(static_cast<std::uint8_t>(number));
     }
-  } else if (request.function != function::ask_address) {
+  } else if (request.function != function::read_address) {
     bytes.push_back(request.value);
   }
   modbus::append_crc(bytes);
@@ -120,7 +120,7 @@ using RequestBytes = ByteBuffer<8>;
 }
 
 [[nodiscard]] constexpr Request read_request(const Format& format) {
-  return {.address = format.address, .registers = static_cast<std::uint16_t>(format.asked())};
+  return {.address = format.address, .registers = static_cast<std::uint16_t>(format.register_count())};
 }
 
 /// Decodes a request. Errors: wrong_length, bad_checksum, unsupported (another function), unexpected_reply (A0 sent to
@@ -133,11 +133,11 @@ using RequestBytes = ByteBuffer<8>;
   if (modbus::crc_order(bytes) != CrcOrder::low_first) return Error::bad_checksum;
   if (!known) return Error::unsupported;
   Request request{.function = code, .address = bytes[0]};
-  if (code == function::ask_address && request.address != any_address) return Error::unexpected_reply;
+  if (code == function::read_address && request.address != any_address) return Error::unexpected_reply;
   if (code == function::read) {
     request.first_register = static_cast<std::uint16_t>(bytes[2] << 8 | bytes[3]);
     request.registers = static_cast<std::uint16_t>(bytes[4] << 8 | bytes[5]);
-  } else if (code != function::ask_address) {
+  } else if (code != function::read_address) {
     request.value = bytes[2];
   }
   return request;
@@ -190,7 +190,7 @@ constexpr bool length_is_right(const Request& request, Bytes reply) {
 constexpr bool is_answer(const Request& request, Bytes reply) {
   if (reply[1] != request.function) return false;
   switch (request.function) {
-    case function::ask_address:
+    case function::read_address:
       return reply[0] == any_address;
     case function::set_address:
       return reply[0] == request.value;
@@ -210,7 +210,7 @@ constexpr bool is_answer(const Request& request, Bytes reply) {
   if (!refusal && !detail::length_is_right(request, bytes)) return Error::wrong_length;
   Reply reply{.function = request.function, .address = bytes[0], .order = modbus::crc_order(bytes)};
   // The document labels the CRC of this reply "MSB first", unlike all others.
-  const bool either = request.function == function::ask_address;
+  const bool either = request.function == function::read_address;
   if (reply.order == CrcOrder::wrong || (reply.order == CrcOrder::high_first && !either)) return Error::bad_checksum;
   if (refusal) return bytes[0] == request.address ? Error::request_rejected : Error::unexpected_reply;
   if (!detail::is_answer(request, bytes)) return Error::unexpected_reply;
@@ -220,7 +220,7 @@ constexpr bool is_answer(const Request& request, Bytes reply) {
     for (const std::uint8_t byte : data) reply.singleturn = reply.singleturn << 8 | byte;
     if (reply.singleturn >> format.bits != 0) return Error::out_of_range;
     if (length_is_doubtful(bytes)) reply.doubtful_size = bytes.size();
-  } else if (request.function == function::ask_address) {
+  } else if (request.function == function::read_address) {
     reply.address = bytes[2];
     if (reply.address < modbus::first_address || reply.address > modbus::last_address) return Error::out_of_range;
   } else if (request.function == function::set_parameter) {

@@ -13,16 +13,16 @@ using testing::Wire;
 constexpr Format fine{.bits = 21};
 constexpr Request one_register{};
 constexpr Request two_registers{.registers = 2};
-constexpr Request ask{.function = function::ask_address, .address = any_address};
+constexpr Request ask{.function = function::read_address, .address = any_address};
 
 Error error_of(const Format& format, const Request& request, const Wire& body) {
   return decode_reply(format, request, framed(body)).error();
 }
 
-static_assert(Format{.bits = 16}.asked() == 1 && Format{.bits = 17}.asked() == 2);
-static_assert(Format{.bits = 14, .registers = 2}.asked() == 2);
+static_assert(Format{.bits = 16}.register_count() == 1 && Format{.bits = 17}.register_count() == 2);
+static_assert(Format{.bits = 14, .registers = 2}.register_count() == 2);
 
-TEST(Raa38ModbusFrame, TheByteCountSaysTheForm) {
+TEST(Raa38ModbusFrame, ByteCountSelectsForm) {
   for (unsigned i = 0; i < 256; ++i) {
     const auto count = static_cast<std::uint8_t>(i);
     EXPECT_EQ(error_of({}, one_register, {1, 3, count, 0x01, 0x7F}), i == 2 ? Error::none : Error::wrong_length);
@@ -35,7 +35,7 @@ TEST(Raa38ModbusFrame, TheByteCountSaysTheForm) {
   }
 }
 
-TEST(Raa38ModbusFrame, ThePositionFitsItsBits) {
+TEST(Raa38ModbusFrame, RejectsPositionWithTooManyBits) {
   for (unsigned bits = 10; bits <= 21; ++bits) {
     const auto most = static_cast<std::uint32_t>(low_mask(bits));
     for (const std::uint32_t position : {most, most + 1}) {
@@ -46,7 +46,7 @@ TEST(Raa38ModbusFrame, ThePositionFitsItsBits) {
   }
 }
 
-TEST(Raa38ModbusFrame, OnlyTheAddressMayComeWithTheCrcTheOtherWayRound) {
+TEST(Raa38ModbusFrame, AcceptsSwappedCrcOnlyInReplyToA0) {
   EXPECT_EQ(decode_reply({}, ask, hex<"ffa00130f8">)->order, CrcOrder::high_first);
   EXPECT_EQ(decode_reply({}, ask, hex<"ffa001f830">)->order, CrcOrder::low_first);
   const auto error = [](const Request& request, Bytes reply) { return decode_reply({}, request, reply).error(); };
@@ -58,7 +58,7 @@ TEST(Raa38ModbusFrame, OnlyTheAddressMayComeWithTheCrcTheOtherWayRound) {
   EXPECT_EQ(decode_request(hex<"ffa03840">).error(), Error::bad_checksum);
 }
 
-TEST(Raa38ModbusFrame, AnAddressIsFrom1To247AndEveryRefusalHasWords) {
+TEST(Raa38ModbusFrame, ChecksAddressRangeAndExplainsEachRefusal) {
   for (unsigned i = 0; i < 256; ++i) {
     const auto byte = static_cast<std::uint8_t>(i);
     EXPECT_EQ(error_of({}, ask, {0xFF, 0xA0, byte}), i >= 1 && i <= 247 ? Error::none : Error::out_of_range) << i;
@@ -72,7 +72,7 @@ TEST(Raa38ModbusFrame, AnAddressIsFrom1To247AndEveryRefusalHasWords) {
   EXPECT_EQ(error_of({}, {.function = function::set_parameter, .value = 0x19}, {1, 0xCC, 1}), Error::unexpected_reply);
 }
 
-TEST(Raa38ModbusFrame, RequestsAreCheckedToo) {
+TEST(Raa38ModbusFrame, ChecksRequests) {
   EXPECT_EQ(decode_request(hex<"0103">).error(), Error::wrong_length);
   EXPECT_EQ(decode_request(hex<"01030000000184">).error(), Error::wrong_length);
   EXPECT_EQ(decode_request(framed({1, 6, 0, 0, 0, 1})).error(), Error::unsupported);
@@ -80,7 +80,7 @@ TEST(Raa38ModbusFrame, RequestsAreCheckedToo) {
   EXPECT_EQ(error_of({}, {.first_register = 5, .registers = 2}, {1, 3, 4, 0, 0, 0, 1}), Error::unsupported);
 }
 
-TEST(Raa38ModbusFrame, WithoutTheRequestTheReplyTells) {
+TEST(Raa38ModbusFrame, AssumesRequestFromReply) {
   EXPECT_EQ(assumed_request({}, hex<"010302017ff834">).registers, 1);
   EXPECT_EQ(assumed_request({}, hex<"010304001fabcd7550">).registers, 2);
   EXPECT_EQ(assumed_request({}, hex<"02a1c168">).value, 2);
@@ -89,7 +89,7 @@ TEST(Raa38ModbusFrame, WithoutTheRequestTheReplyTells) {
 }
 
 // A valid frame followed by 00 has a valid CRC again.
-TEST(Raa38ModbusFrame, ALengthThatTheCrcDoesNotTell) {
+TEST(Raa38ModbusFrame, RecognizesLengthThatTheCrcDoesNotProve) {
   Wire followed = framed({1, 3, 4, 0x00, 0x00, 0x05});
   EXPECT_TRUE(decode_reply(fine, two_registers, followed));
   EXPECT_TRUE(length_is_doubtful(followed));
@@ -102,7 +102,7 @@ TEST(Raa38ModbusFrame, ALengthThatTheCrcDoesNotTell) {
   }
 }
 
-TEST(Raa38ModbusFrame, EndsAreFoundInARun) {
+TEST(Raa38ModbusFrame, FindsFrameEndWithoutSilence) {
   struct Row {
     Direction way;
     Wire bytes;
@@ -136,7 +136,7 @@ struct Evidence final : EvidenceSink {
   std::string reasons;
 };
 
-TEST(Raa38ModbusProbe, FramesTellRegistersAndHowManyBitsAtLeast) {
+TEST(Raa38ModbusProbe, FindsRegistersAndLeastBits) {
   Options options = options_of({});
   Evidence evidence;
   ASSERT_TRUE(modbus_unit.probe(options, std::vector<Capture>{{{}, hex<"010304001fabcd7550">}}, evidence));
@@ -147,12 +147,12 @@ TEST(Raa38ModbusProbe, FramesTellRegistersAndHowManyBitsAtLeast) {
   EXPECT_TRUE(says(evidence.reasons, "checksum"));
 }
 
-TEST(Raa38ModbusFrame, ReadingsOfOtherRegistersAreNoPosition) {
+TEST(Raa38ModbusFrame, RejectsReadingsOfOtherRegisters) {
   EXPECT_EQ(decode_reply({}, {.registers = 0}, hex<"01030020f0">).error(), Error::unsupported);
   EXPECT_EQ(decode_reply({}, {.registers = 3}, hex<"010306000000000005e176">).error(), Error::unsupported);
 }
 
-TEST(Raa38ModbusFrame, NothingIsSaidOfWhatIsTooShort) {
+TEST(Raa38ModbusFrame, ExplainsNothingForShortReply) {
   EXPECT_EQ(explain({}, Error::unexpected_reply, hex<"010300000001840a">, hex<"01">).detail, "");
 }
 

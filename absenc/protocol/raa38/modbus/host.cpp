@@ -16,7 +16,7 @@ constexpr Explanation other_crc_order{
 
 Explanation explain_length(const Request& request) {
   switch (request.function) {
-    case function::ask_address:
+    case function::read_address:
       return {"the reply to A0 is FF A0, the address and the CRC; several encoders on a line answer it all at once",
               "with several on the line use scan, and name each by its address"};
     case function::set_address:
@@ -64,7 +64,7 @@ Explanation explain_reply(const Request& request, Error error, Bytes reply) {
     case Error::unsupported:
       return {"the position is read from register 0 on, one register or two", {}};
     case Error::out_of_range:
-      if (request.function == function::ask_address) {
+      if (request.function == function::read_address) {
         return {"the address that came is none: they go from 1 to 247", "check that an RAA38S6 is connected"};
       }
       return {"the position has more bits than bits says", "set bits to the resolution of the encoder (10 to 21)"};
@@ -105,7 +105,7 @@ using namespace std::chrono_literals;
 
 constexpr unsigned most_damaged_answers = 3;
 constexpr Time memory_time = 20ms;  // time that the encoder needs to store a setting; the document gives none
-constexpr Request which_address{.function = function::ask_address, .address = any_address};
+constexpr Request address_request{.function = function::read_address, .address = any_address};
 
 constexpr Explanation too_few_registers{"one register has 16 bits, and the position has more",
                                         "set registers=2, or leave it to bits (registers=auto); check bits"};
@@ -115,7 +115,7 @@ constexpr Request setting(const Format& format, std::uint8_t value) {
 }
 
 // Reads the position, up to `attempts` times; stops if the encoder refuses.
-Part<Result<Reply>> look(Dialog& dialog, std::uint8_t address, unsigned attempts) {
+Part<Result<Reply>> read_position(Dialog& dialog, std::uint8_t address, unsigned attempts) {
   Request request = read_request(dialog.format());
   request.address = address;
   if (request.registers == 1 && dialog.format().bits > 16) {
@@ -140,14 +140,14 @@ void set_rate(Dialog& dialog, std::uint32_t rate) {
 
 // Called when no encoder answered at the address of the format. Sends A0 and ends the command if an encoder reports
 // another address. `baud`: rate to which the line is set.
-Part<bool> ask_who_is_there(Dialog& dialog, Found& found, std::uint32_t baud) {
+Part<bool> check_other_address(Dialog& dialog, Found& found, std::uint32_t baud) {
   const std::uint8_t asked = dialog.format().address;
-  const Result<Reply> told = co_await dialog.attempt(which_address).repeated(2);
-  if (!told || told->address == asked) co_return false;
+  const Result<Reply> reply_to_a0 = co_await dialog.attempt(address_request).repeated(2);
+  if (!reply_to_a0 || reply_to_a0->address == asked) co_return false;
   if (baud != dialog.format().line().rate) set_rate(dialog, dialog.format().line().rate);
   found.words.add("nobody answers at address ").add_number(asked);
   found.words.add(", but A0 is answered by address ")
-      .add_number(told->address)
+      .add_number(reply_to_a0->address)
       .add(" at ")
       .add_number(baud)
       .add(" baud");
@@ -158,12 +158,12 @@ Part<bool> ask_who_is_there(Dialog& dialog, Found& found, std::uint32_t baud) {
 
 // Reads the position of the encoder at the address of the format, up to `attempts` times. Stops the procedure if that
 // fails.
-Part<Reply> look_at_it(Dialog& dialog, Found& found, unsigned attempts) {
-  const Result<Reply> reply = co_await look(dialog, dialog.format().address, attempts);
+Part<Reply> read_own_position(Dialog& dialog, Found& found, unsigned attempts) {
+  const Result<Reply> reply = co_await read_position(dialog, dialog.format().address, attempts);
   if (!reply) {
     const Outcome failed{reply.error()};
     const bool silent = reply.error() == Error::timeout && !dialog.is_noisy();
-    if (silent) co_await ask_who_is_there(dialog, found, dialog.format().line().rate);
+    if (silent) co_await check_other_address(dialog, found, dialog.format().line().rate);
     co_await dialog.stop(failed);
   }
   co_return *reply;
@@ -177,15 +177,16 @@ void show_position(const Dialog& dialog, Found& found) {
 }
 
 // Checks where the encoder answers after a setting: with the new one, or with the old one if it was not accepted.
-Part<Outcome> look_for_it(Dialog& dialog, std::uint8_t address, std::uint32_t rate, std::string_view at_the_old_one) {
+Part<Outcome> verify_setting(Dialog& dialog, std::uint8_t address, std::uint32_t rate,
+                             std::string_view at_the_old_one) {
   const Format& format = dialog.format();
   const bool moves_rate = rate != format.line().rate;
   if (moves_rate) set_rate(dialog, rate);
   co_await dialog.rest(memory_time);
-  const Result<Reply> there = co_await look(dialog, address, 3);
+  const Result<Reply> there = co_await read_position(dialog, address, 3);
   if (there) co_return done;
   if (moves_rate) set_rate(dialog, format.line().rate);
-  const Result<Reply> back = co_await look(dialog, format.address, 3);
+  const Result<Reply> back = co_await read_position(dialog, format.address, 3);
   if (!back) {
     co_return only(back.error(), "the setting was sent, and now the encoder answers neither as before nor as it should",
                    "switch the encoder off and on, then find it: `absenc config get ... baud`, `absenc scan`; do not "
@@ -199,44 +200,44 @@ Part<Outcome> look_for_it(Dialog& dialog, std::uint8_t address, std::uint32_t ra
 
 // ---- Reading
 
-Procedure look_once(Dialog& dialog, Found& found) {
-  co_await look_at_it(dialog, found, 1);
+Procedure read_position_once(Dialog& dialog, Found& found) {
+  co_await read_own_position(dialog, found, 1);
   show_position(dialog, found);
   co_return done;
 }
 
-Procedure look_at_direction(Dialog& dialog, Found& found) {
-  const Reply reply = co_await look_at_it(dialog, found, 1);
+Procedure read_direction(Dialog& dialog, Found& found) {
+  const Reply reply = co_await read_own_position(dialog, found, 1);
   found.singleturn = reply.singleturn;
   found.direction = "the encoder does not tell: turn the shaft and see";
   co_return done;
 }
 
-Procedure ask_address(Dialog& dialog, Found& found) {
-  const Result<Reply> reply = co_await dialog.attempt(which_address).repeated(2);
+Procedure read_address(Dialog& dialog, Found& found) {
+  const Result<Reply> reply = co_await dialog.attempt(address_request).repeated(2);
   const std::uint8_t address = reply ? reply->address : dialog.format().address;
   found.address = address;
   if (reply || dialog.is_noisy()) co_return {reply.error()};
-  const Result<Reply> position = co_await look(dialog, address, 2);
+  const Result<Reply> position = co_await read_position(dialog, address, 2);
   co_return {position.error()};
 }
 
 Procedure find_baud(Dialog& dialog, Found& found) {
   const std::size_t own = dialog.format().baud;
   found.baud = bauds[own];
-  const Result<Reply> first = co_await look(dialog, dialog.format().address, 2);
+  const Result<Reply> first = co_await read_position(dialog, dialog.format().address, 2);
   if (first || first.error() == Error::request_rejected) co_return done;  // an encoder that refuses is there too
   if (dialog.is_noisy()) co_return {first.error()};
   const Explanation reason = explain_reply(read_request(dialog.format()), first.error(), dialog.reply());
-  if (first.error() == Error::timeout) co_await ask_who_is_there(dialog, found, bauds[own]);
+  if (first.error() == Error::timeout) co_await check_other_address(dialog, found, bauds[own]);
   for (std::size_t i = 0; i < bauds.size(); ++i) {
     if (i == own) continue;
     found.baud = bauds[i];
     set_rate(dialog, bauds[i]);
-    const Result<Reply> reply = co_await look(dialog, dialog.format().address, 2);
+    const Result<Reply> reply = co_await read_position(dialog, dialog.format().address, 2);
     const bool there = reply || reply.error() == Error::request_rejected;
     const bool silent = reply.error() == Error::timeout && !dialog.is_noisy();
-    if (silent) co_await ask_who_is_there(dialog, found, bauds[i]);
+    if (silent) co_await check_other_address(dialog, found, bauds[i]);
     if (!there && !dialog.is_noisy()) continue;
     set_rate(dialog, bauds[own]);
     co_return {there ? Error::none : reply.error()};
@@ -252,10 +253,10 @@ Procedure scan(Dialog& dialog, Slaves& found, Arguments arguments) {
   const std::int64_t first = arguments[0];
   const std::int64_t last = arguments[1];
   if (first > last) co_return {Error::invalid_argument, "the last address is before the first"};
-  const Result<Reply> single = co_await dialog.attempt(which_address);
+  const Result<Reply> single = co_await dialog.attempt(address_request);
   if (dialog.is_noisy()) co_return {single.error()};
   if (single) {
-    const Result<Reply> there = co_await look(dialog, single->address, 1);
+    const Result<Reply> there = co_await read_position(dialog, single->address, 1);
     if (dialog.is_noisy()) co_return {there.error()};
     if (there) {
       found.at[single->address] = Kind::answers;
@@ -267,7 +268,7 @@ Procedure scan(Dialog& dialog, Slaves& found, Arguments arguments) {
     const auto address = static_cast<std::uint8_t>(i);
     Result<Reply> reply = Error::timeout;
     for (unsigned damaged = 0; damaged < most_damaged_answers; ++damaged) {
-      reply = co_await look(dialog, address, 1);
+      reply = co_await read_position(dialog, address, 1);
       if (dialog.is_noisy()) co_return {reply.error()};
       if (reply || reply.error() == Error::timeout || reply.error() == Error::request_rejected) break;
       found.at[address] = Kind::clash;
@@ -288,10 +289,10 @@ Procedure set_address(Dialog& dialog, Found& found, Arguments arguments) {
   const Format& format = dialog.format();
   found.address = address;
   found.written = false;
-  co_await look_at_it(dialog, found, 3);
+  co_await read_own_position(dialog, found, 3);
   if (address == format.address && arguments[1] == 0) co_return done;
   if (address != format.address) {
-    const Result<Reply> other = co_await look(dialog, address, 3);
+    const Result<Reply> other = co_await read_position(dialog, address, 3);
     const bool is_free = !other && other.error() == Error::timeout;
     if (!is_free) {
       co_return {Error::invalid_argument,
@@ -307,8 +308,8 @@ Procedure set_address(Dialog& dialog, Found& found, Arguments arguments) {
           .changes();
   if (!answer && answer.error() == Error::request_rejected) co_return {answer.error()};
   // If the reply is lost, only a request at the new address shows whether the address was set.
-  const Outcome end = co_await look_for_it(dialog, address, format.line().rate,
-                                           "the encoder answers at its old address still: it did not take the new one");
+  const Outcome end = co_await verify_setting(
+      dialog, address, format.line().rate, "the encoder answers at its old address still: it did not take the new one");
   co_return end;
 }
 
@@ -322,14 +323,14 @@ Procedure set_baud(Dialog& dialog, Found& found, Arguments arguments) {
   found.baud = bauds[*baud];
   found.written = false;
   set_rate(dialog, format.line().rate);  // a port that cannot change its rate must fail before the encoder has changed
-  co_await look_at_it(dialog, found, 3);
+  co_await read_own_position(dialog, found, 3);
   if (*baud == format.baud && arguments[1] == 0) co_return done;
   found.written = true;
   // The reply may be sent at the new rate, so it is ignored.
   static_cast<void>(co_await dialog.attempt(setting(format, baud_parameters[*baud])).changes());
   const Outcome end =
-      co_await look_for_it(dialog, format.address, bauds[*baud],
-                           "the encoder answers at its old baud rate still: it did not take the new one");
+      co_await verify_setting(dialog, format.address, bauds[*baud],
+                              "the encoder answers at its old baud rate still: it did not take the new one");
   co_return end;
 }
 
@@ -338,7 +339,7 @@ Procedure set_direction(Dialog& dialog, Found& found, Arguments arguments) {
   const auto value = static_cast<std::uint8_t>(arguments[0]);
   found.parameter = value;
   found.setting = name_of_setting(value);
-  const std::uint32_t before = (co_await look_at_it(dialog, found, 3)).singleturn;
+  const std::uint32_t before = (co_await read_own_position(dialog, found, 3)).singleturn;
   found.written = true;
   const Result<Reply> echo = co_await dialog.attempt(setting(dialog.format(), value)).changes();
   if (!echo) {
@@ -347,7 +348,7 @@ Procedure set_direction(Dialog& dialog, Found& found, Arguments arguments) {
                    "turn the shaft and see how the position moves before you send it again: its memory wears out");
   }
   co_await dialog.rest(memory_time);
-  const Result<Reply> now = co_await look(dialog, dialog.format().address, 3);
+  const Result<Reply> now = co_await read_position(dialog, dialog.format().address, 3);
   if (!now) {
     co_return {now.error(), "the encoder has taken the direction, but then its position could not be read"};
   }
@@ -361,12 +362,12 @@ Procedure set_direction(Dialog& dialog, Found& found, Arguments arguments) {
 
 Procedure set_zero(Dialog& dialog, Found& found, Arguments arguments) {
   const unsigned bits = dialog.format().bits;
-  const Reply first = co_await look_at_it(dialog, found, 3);
+  const Reply first = co_await read_own_position(dialog, found, 3);
   co_await dialog.rest(between_looks);
-  const Reply second = co_await look_at_it(dialog, found, 3);
-  const Outcome why_not =
+  const Reply second = co_await read_own_position(dialog, found, 3);
+  const Outcome objection =
       objection_to_zero(position_reading(first.singleturn, bits), position_reading(second.singleturn, bits));
-  if (why_not.error != Error::none) co_return why_not;
+  if (objection.error != Error::none) co_return objection;
   show_position(dialog, found);
   found.written = second.singleturn != 0 || arguments[0] != 0;
   if (!*found.written) co_return done;
@@ -374,7 +375,7 @@ Procedure set_zero(Dialog& dialog, Found& found, Arguments arguments) {
       // ignored: the zero may be set without a reply
       co_await dialog.attempt(setting(dialog.format(), parameter::zero)).changes());
   co_await dialog.rest(memory_time);
-  const Result<Reply> now = co_await look(dialog, dialog.format().address, 3);
+  const Result<Reply> now = co_await read_position(dialog, dialog.format().address, 3);
   if (!now) co_return {now.error(), "the zero was sent, but then the position could not be read"};
   show_position(dialog, found);
   if (is_near(now->singleturn, 0, bits, zero_millidegrees)) co_return done;

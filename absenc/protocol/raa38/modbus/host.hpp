@@ -50,14 +50,14 @@ using Dialog = author::DialogOf<Protocol>;
 // If no encoder answers at the address of the format, all these procedures send A0 and name the address in its reply.
 
 /// Reads the position once.
-author::Procedure look_once(Dialog& dialog, Found& found);
+author::Procedure read_position_once(Dialog& dialog, Found& found);
 
 /// Reads the position: no command reads the direction, so the position is all that can be reported.
-author::Procedure look_at_direction(Dialog& dialog, Found& found);
+author::Procedure read_direction(Dialog& dialog, Found& found);
 
 /// Reads the address with A0. If A0 gets no valid reply, as with several encoders on the line, checks whether the
 /// encoder at the address of the format answers.
-author::Procedure ask_address(Dialog& dialog, Found& found);
+author::Procedure read_address(Dialog& dialog, Found& found);
 
 /// Finds the baud rate at which the encoder answers: first that of the format, then the others. Leaves the line at its
 /// old rate. Error: timeout, or that of the reply at the rate of the format.

@@ -15,7 +15,7 @@ const Wire position_of_1 = framed({1, 3, 2, 0, 9});
 // ---- Reading
 
 // Compares the positions per second with the limit that the silences on the line set.
-TEST(Raa38ModbusHost, IsAsFastAsTheSilencesAllow) {
+TEST(Raa38ModbusHost, ReadsAsFastAsSilencesAllow) {
   for (std::size_t baud = 0; baud < bauds.size(); ++baud) {
     Bench bench({.baud = baud});
     bench.put(0x1555);
@@ -47,15 +47,15 @@ TEST(Raa38ModbusHost, ReadsEveryForm) {
   }
 }
 
-TEST(Raa38ModbusHost, OneRegisterDoesNotHold17Bits) {
+TEST(Raa38ModbusHost, RefusesOneRegisterFor17Bits) {
   Talk read({.bits = 17, .registers = 1}, "position");
   EXPECT_EQ(read->next(Time{}).kind, Step<std::uint8_t>::Kind::done);
-  EXPECT_TRUE(ended(raa38::testing::end_of<std::uint8_t>(*read), Error::invalid_argument, "16 bits"));
+  EXPECT_TRUE(ended(raa38::testing::result_of<std::uint8_t>(*read), Error::invalid_argument, "16 bits"));
 }
 
 // One position in 256 has a CRC that ends with 00: without its last byte the frame is a valid frame of another form.
 // Reader and procedures must both detect it.
-TEST(Raa38ModbusHost, AReplyThatLostItsLastByteIsNotAPosition) {
+TEST(Raa38ModbusHost, RejectsReplyThatLostItsLastByte) {
   Wire whole;
   std::uint32_t position = 0x100000;
   for (; whole.empty() || whole.back() != 0; ++position) {
@@ -77,7 +77,7 @@ TEST(Raa38ModbusHost, AReplyThatLostItsLastByteIsNotAPosition) {
                    {whole, whole, Error::none, right}};
   for (const std::string_view command : {"position", "direction"}) {
     for (const Row& row : rows) {
-      const Conversed read =
+      const ScriptedResult read =
           with([&](Bytes, unsigned before) { return before == 0 ? row.first : row.second; }, command, {}, fine);
       EXPECT_TRUE(ended(read, row.error));
       EXPECT_EQ(read.requests, 2u);
@@ -87,7 +87,7 @@ TEST(Raa38ModbusHost, AReplyThatLostItsLastByteIsNotAPosition) {
   }
 }
 
-TEST(Raa38ModbusHost, EachBadReplyHasItsWords) {
+TEST(Raa38ModbusHost, ExplainsEachBadReply) {
   struct Row {
     Wire reply;
     Error error;
@@ -108,96 +108,97 @@ TEST(Raa38ModbusHost, EachBadReplyHasItsWords) {
   }
 }
 
-TEST(Raa38ModbusHost, ALineThatIsNeverSilentIsGivenUpAtOnce) {
+TEST(Raa38ModbusHost, StopsOnEndlessNoise) {
   for (const std::string_view command : {"position", "address", "baud", "direction", "scan", "zero"}) {
     Talk talk({}, command);
     EXPECT_LT(raa38::testing::time_with_noise(*talk), 1500ms) << command;
-    EXPECT_TRUE(ended(raa38::testing::end_of<std::uint8_t>(*talk), Error::wrong_length, "without a pause"));
+    EXPECT_TRUE(ended(raa38::testing::result_of<std::uint8_t>(*talk), Error::wrong_length, "without a pause"));
   }
 }
 
 // ---- Address, baud rate, direction and scan
 
-TEST(Raa38ModbusHost, TheAddressIsAskedOfWhoeverIsThere) {
+TEST(Raa38ModbusHost, ReadsAddressOfConnectedSlave) {
   Bench bench({.address = 42});
-  EXPECT_EQ(bench.does(Format{}, "address").fields, "address=42 ");
+  EXPECT_EQ(bench.run_command(Format{}, "address").fields, "address=42 ");
   bench.add({.address = 200});
-  EXPECT_EQ(bench.does(Format{.address = 200}, "address").fields, "address=200 ");
-  EXPECT_TRUE(ended(bench.does(Format{.address = 7}, "address"), Error::timeout));
+  EXPECT_EQ(bench.run_command(Format{.address = 200}, "address").fields, "address=200 ");
+  EXPECT_TRUE(ended(bench.run_command(Format{.address = 7}, "address"), Error::timeout));
 }
 
-TEST(Raa38ModbusHost, TheAddressIsTakenInBothOrdersOfItsCrc) {
+TEST(Raa38ModbusHost, ReadsAddressWithEitherCrcOrder) {
   for (const CrcOrder order : {CrcOrder::low_first, CrcOrder::high_first}) {
     Bench bench({.address = 42, .address_crc = order});
     const Wire reply = bench.raw(framed({0xFF, 0xA0}));
     EXPECT_EQ(modbus::crc_order(reply), order);
-    EXPECT_EQ(bench.does("address").fields, "address=42 ");
-    EXPECT_EQ(bench.does("scan").fields, "encoder_address=42 clash=0 ");
+    EXPECT_EQ(bench.run_command("address").fields, "address=42 ");
+    EXPECT_EQ(bench.run_command("scan").fields, "encoder_address=42 clash=0 ");
     EXPECT_EQ(modbus::crc_order(bench.raw(framed({42, 3, 0, 0, 0, 1}))), CrcOrder::low_first) << "no other reply";
   }
 }
 
-TEST(Raa38ModbusHost, AtAWrongAddressTheRightOneIsNamed) {
+TEST(Raa38ModbusHost, NamesAddressThatAnswersA0) {
   const std::pair<std::string_view, std::vector<std::int64_t>> commands[]{{"baud", {}},           {"direction", {}},
                                                                           {"set-address", {2}},   {"set-baud", {9600}},
                                                                           {"set-direction", {1}}, {"zero", {0}}};
   for (const auto& [command, arguments] : commands) {
     Bench bench({.address = 42});
-    const End end = bench.does(Format{.address = 5}, command, arguments);
+    const CommandResult end = bench.run_command(Format{.address = 5}, command, arguments);
     EXPECT_TRUE(
         ended(end, Error::timeout, "nobody answers at address 5, but A0 is answered by address 42 at 19200 baud"))
         << command;
     EXPECT_EQ(bench.encoder().settings().writes(), 0u);
     bench.add({.address = 43});  // their answers to A0 collide
-    EXPECT_TRUE(ended(bench.does(Format{.address = 5}, command, arguments), Error::timeout, "nobody answers at this"));
+    EXPECT_TRUE(
+        ended(bench.run_command(Format{.address = 5}, command, arguments), Error::timeout, "nobody answers at this"));
   }
   Bench bench({.address = 42});
   bench.encoder().memory()[1] = 4;
   bench.encoder().power_on(bench.line.now(), PowerOn::skip);
   bench.line.wake(0);
-  EXPECT_TRUE(ended(bench.does(Format{.address = 5}, "baud"), Error::timeout, "by address 42 at 57600 baud"));
+  EXPECT_TRUE(ended(bench.run_command(Format{.address = 5}, "baud"), Error::timeout, "by address 42 at 57600 baud"));
 }
 
-TEST(Raa38ModbusHost, TheBaudRateIsFound) {
+TEST(Raa38ModbusHost, FindsBaudRate) {
   for (std::size_t set = 0; set < bauds.size(); ++set) {
-    for (std::size_t told = 0; told < bauds.size(); ++told) {
-      Bench bench({.baud = told});
+    for (std::size_t reply_to_a0 = 0; reply_to_a0 < bauds.size(); ++reply_to_a0) {
+      Bench bench({.baud = reply_to_a0});
       bench.encoder().memory()[1] = static_cast<std::uint8_t>(set);
       bench.encoder().power_on(bench.line.now(), PowerOn::skip);
       bench.line.wake(0);
-      EXPECT_EQ(bench.does("baud").fields, "baud=" + std::to_string(bauds[set]) + " ") << bauds[told];
+      EXPECT_EQ(bench.run_command("baud").fields, "baud=" + std::to_string(bauds[set]) + " ") << bauds[reply_to_a0];
     }
   }
   Bench bench;
-  EXPECT_TRUE(ended(bench.does(Format{.address = 2}, "baud"), Error::timeout, "by address 1"));
-  EXPECT_TRUE(ended(bench.does("position"), Error::none)) << "the line is as it was";
+  EXPECT_TRUE(ended(bench.run_command(Format{.address = 2}, "baud"), Error::timeout, "by address 1"));
+  EXPECT_TRUE(ended(bench.run_command("position"), Error::none)) << "the line is as it was";
   bench.encoder().power_off(bench.line.now());
-  EXPECT_TRUE(ended(bench.does("baud"), Error::timeout, "any of the five"));
+  EXPECT_TRUE(ended(bench.run_command("baud"), Error::timeout, "any of the five"));
 }
 
-TEST(Raa38ModbusHost, ScanFindsASingleOneByAskingAll) {
+TEST(Raa38ModbusHost, ScanFindsSingleSlaveByA0) {
   Bench bench({.address = 99});
-  const End scan = bench.does("scan");
+  const CommandResult scan = bench.run_command("scan");
   EXPECT_EQ(scan.fields, "encoder_address=99 clash=0 ");
   EXPECT_LT(scan.took, 200ms);
 }
 
-TEST(Raa38ModbusHost, ScanAsksEveryAddressOfALine) {
+TEST(Raa38ModbusHost, ScanPollsEveryAddress) {
   Bench bench({.address = 3});
   bench.add({.address = 20, .bits = 15});
   bench.add({.address = 20, .bits = 14});
   bench.add({.address = 247});
   bench.add({.address = 100, .bits = 18});
   bench.put(0x1234);
-  EXPECT_EQ(bench.does("scan").fields,
+  EXPECT_EQ(bench.run_command("scan").fields,
             "encoder_address=3 clash=0 encoder_address=20 clash=1 encoder_address=100 clash=0 refuses=1 "
             "encoder_address=247 clash=0 ");
-  EXPECT_EQ(bench.does("scan", {3, 19}).fields, "encoder_address=3 clash=0 ");
-  EXPECT_TRUE(ended(bench.does("scan", {4, 19}), Error::timeout));
-  EXPECT_TRUE(ended(bench.does("scan", {5, 4}), Error::invalid_argument));
+  EXPECT_EQ(bench.run_command("scan", {3, 19}).fields, "encoder_address=3 clash=0 ");
+  EXPECT_TRUE(ended(bench.run_command("scan", {4, 19}), Error::timeout));
+  EXPECT_TRUE(ended(bench.run_command("scan", {5, 4}), Error::invalid_argument));
 }
 
-TEST(Raa38ModbusHost, ScanAsksADamagedAnswerAgain) {
+TEST(Raa38ModbusHost, ScanRepeatsRequestAfterDamagedReply) {
   for (const unsigned damaged : {2u, 3u}) {
     const auto answer = [&](Bytes request, unsigned before) {
       if (request[0] != 5) return Wire{};
@@ -209,23 +210,23 @@ TEST(Raa38ModbusHost, ScanAsksADamagedAnswerAgain) {
 
 // ---- Settings
 
-TEST(Raa38ModbusSettings, AnAddressIsSetAndAsked) {
+TEST(Raa38ModbusSettings, SetsAndVerifiesAddress) {
   Bench bench;
-  EXPECT_EQ(bench.does("set-address", {5}).fields, "address=5 written=1 ");
+  EXPECT_EQ(bench.run_command("set-address", {5}).fields, "address=5 written=1 ");
   EXPECT_EQ(bench.encoder().address(), 5);
   const Format moved{.address = 5};
-  EXPECT_EQ(bench.does(moved, "set-address", {5}).fields, "address=5 written=0 ");
+  EXPECT_EQ(bench.run_command(moved, "set-address", {5}).fields, "address=5 written=0 ");
   EXPECT_EQ(bench.encoder().settings().writes(), 1u);
   EXPECT_EQ(bench.encoder().violation_count(), 0u);
-  EXPECT_EQ(bench.does(moved, "set-address", {5, 1}).fields, "address=5 written=1 ");
+  EXPECT_EQ(bench.run_command(moved, "set-address", {5, 1}).fields, "address=5 written=1 ");
   EXPECT_EQ(bench.encoder().settings().writes(), 2u);
   EXPECT_EQ(bench.encoder().violation_count(), 1u);
 }
 
-TEST(Raa38ModbusSettings, AnAddressThatIsTakenIsRefused) {
+TEST(Raa38ModbusSettings, RefusesAddressInUse) {
   Bench bench;
   const VirtualEncoder& other = bench.add({.address = 2});
-  EXPECT_TRUE(ended(bench.does("set-address", {2}), Error::invalid_argument, "already"));
+  EXPECT_TRUE(ended(bench.run_command("set-address", {2}), Error::invalid_argument, "already"));
   EXPECT_EQ(bench.encoder().settings().writes() + other.settings().writes(), 0u);
   const auto damaged = [](Bytes request, unsigned) {
     EXPECT_EQ(request[1], function::read);
@@ -234,8 +235,8 @@ TEST(Raa38ModbusSettings, AnAddressThatIsTakenIsRefused) {
   EXPECT_TRUE(ended(with(damaged, "set-address", {2}), Error::invalid_argument, "though not well"));
 }
 
-TEST(Raa38ModbusSettings, AnEncoderThatDoesNotTakeASettingIsFoundOut) {
-  const auto deaf_to_settings = [](Bytes request, unsigned) {
+TEST(Raa38ModbusSettings, ReportsSettingThatWasNotAccepted) {
+  const auto ignores_settings = [](Bytes request, unsigned) {
     if (request[1] == function::read) return request[0] == 1 ? framed({1, 3, 2, 0x10, 0}) : Wire{};
     if (request[1] == function::set_address) return framed({request[2], request[1]});
     return Wire(request.begin(), request.end());
@@ -247,11 +248,11 @@ TEST(Raa38ModbusSettings, AnEncoderThatDoesNotTakeASettingIsFoundOut) {
   };
   for (const Row& row : {Row{"set-address", 2, "old address"}, Row{"set-baud", 9600, "old baud rate"},
                          Row{"zero", 1, "still not zero"}}) {
-    EXPECT_TRUE(ended(with(deaf_to_settings, row.command, {row.value}), Error::cross_check_failed, row.words));
+    EXPECT_TRUE(ended(with(ignores_settings, row.command, {row.value}), Error::cross_check_failed, row.words));
   }
 }
 
-TEST(Raa38ModbusSettings, ASettingIsSentOnceWhateverComes) {
+TEST(Raa38ModbusSettings, SendsSettingOnlyOnce) {
   for (const std::string_view command : {"set-address", "set-baud"}) {
     unsigned sent = 0;
     const auto dies = [&](Bytes request, unsigned) {
@@ -263,8 +264,8 @@ TEST(Raa38ModbusSettings, ASettingIsSentOnceWhateverComes) {
   }
 }
 
-TEST(Raa38ModbusSettings, ARefusalIsToldAndNotAskedForAgain) {
-  const Conversed read = with([](Bytes, unsigned) { return framed({1, 0x83, 2}); }, "set-address", {2});
+TEST(Raa38ModbusSettings, ReportsRefusalWithoutRepetition) {
+  const ScriptedResult read = with([](Bytes, unsigned) { return framed({1, 0x83, 2}); }, "set-address", {2});
   EXPECT_TRUE(ended(read, Error::request_rejected));
   EXPECT_EQ(read.requests, 1u);
   const auto refuses = [](Bytes request, unsigned) {
@@ -275,83 +276,83 @@ TEST(Raa38ModbusSettings, ARefusalIsToldAndNotAskedForAgain) {
 }
 
 // The document gives no time for storing a setting; a request right after it may read the old value, or get no reply.
-TEST(Raa38ModbusSettings, TheEncoderHasTimeToKeepASetting) {
+TEST(Raa38ModbusSettings, WaitsForEncoderToStoreSetting) {
   const std::pair<std::string_view, std::int64_t> commands[]{
       {"set-address", 2}, {"set-baud", 9600}, {"set-direction", 1}, {"zero", 0}};
   for (const auto& [command, value] : commands) {
     unsigned set_at = 0;
-    const auto obeys = [&](Bytes request, unsigned before) -> Wire {
+    const auto accepts = [&](Bytes request, unsigned before) -> Wire {
       if (request[1] == function::read) return request[0] == 1 ? framed({1, 3, 2, 0x10, 0}) : Wire{};
       set_at = before;
       return request[1] == function::set_address ? framed({request[2], request[1]})
                                                  : Wire(request.begin(), request.end());
     };
-    const Conversed talk = with(obeys, command, {value});
-    ASSERT_LT(set_at + 1, talk.asked_at.size()) << command;
-    EXPECT_GE(talk.asked_at[set_at + 1] - talk.asked_at[set_at], 20ms) << command;
+    const ScriptedResult talk = with(accepts, command, {value});
+    ASSERT_LT(set_at + 1, talk.request_times.size()) << command;
+    EXPECT_GE(talk.request_times[set_at + 1] - talk.request_times[set_at], 20ms) << command;
   }
 }
 
-TEST(Raa38ModbusSettings, ALostReplyIsNoLostSetting) {
+TEST(Raa38ModbusSettings, VerifiesSettingAfterLostReply) {
   std::uint8_t address = 1;
-  const auto obeys = [&](Bytes request, unsigned) -> Wire {
+  const auto accepts = [&](Bytes request, unsigned) -> Wire {
     if (request[1] == function::set_address) address = request[2];
     return request[1] == function::read && request[0] == address ? framed({address, 3, 2, 0, 9}) : Wire{};
   };
-  EXPECT_TRUE(ended(with(obeys, "set-address", {2}), Error::none));
+  EXPECT_TRUE(ended(with(accepts, "set-address", {2}), Error::none));
   EXPECT_EQ(address, 2);
 }
 
-TEST(Raa38ModbusSettings, ABaudRateIsFollowed) {
+TEST(Raa38ModbusSettings, SwitchesHostToNewBaudRate) {
   for (std::size_t from = 0; from < bauds.size(); ++from) {
     for (std::size_t to = 0; to < bauds.size(); ++to) {
       Bench bench({.baud = from});
-      EXPECT_TRUE(bench.does("set-baud", {bauds[to]}).has(from != to ? "written=1" : "written=0"));
+      EXPECT_TRUE(bench.run_command("set-baud", {bauds[to]}).has(from != to ? "written=1" : "written=0"));
       EXPECT_EQ(bench.encoder().baud(), bauds[to]);
-      EXPECT_TRUE(ended(bench.does(Format{.baud = to}, "position"), Error::none)) << "the line goes on so";
+      EXPECT_TRUE(ended(bench.run_command(Format{.baud = to}, "position"), Error::none)) << "the line goes on so";
       EXPECT_EQ(bench.encoder().violation_count(), 0u);
     }
   }
-  EXPECT_TRUE(ended(Bench().does("set-baud", {38'400}), Error::invalid_argument, "57600"));
+  EXPECT_TRUE(ended(Bench().run_command("set-baud", {38'400}), Error::invalid_argument, "57600"));
   // A port that cannot change its rate must fail before the encoder has changed.
   EXPECT_EQ(Talk({}, "set-baud", {9600})->next(Time{}).kind, Step<std::uint8_t>::Kind::configure);
 }
 
-TEST(Raa38ModbusSettings, ADirectionShowsInThePosition) {
+TEST(Raa38ModbusSettings, ReportsEffectOfDirection) {
   Bench bench;
   bench.put(383);
-  const auto set = [&](std::uint8_t value) { return bench.does("set-direction", {value}).fields; };
+  const auto set = [&](std::uint8_t value) { return bench.run_command("set-direction", {value}).fields; };
   EXPECT_EQ(set(parameter::negative),
             "parameter=2 setting=negative direction effect=mirrored: the direction has changed written=1 ");
   EXPECT_TRUE(bench.encoder().settings().counts_down());
   EXPECT_TRUE(says(set(parameter::negative), "counted so already"));
   bench.shaft.spin(60, bench.line.now());
   EXPECT_TRUE(says(set(parameter::positive), "neither"));
-  EXPECT_TRUE(says(bench.does("direction").fields, "does not tell"));
+  EXPECT_TRUE(says(bench.run_command("direction").fields, "does not tell"));
 }
 
-TEST(Raa38ModbusSettings, ADirectionWithoutItsEchoIsNotKnown) {
+TEST(Raa38ModbusSettings, ReportsDirectionWithoutEchoAsUnknown) {
   const auto mute = [](Bytes request, unsigned) { return request[1] == function::read ? position_of_1 : Wire{}; };
   EXPECT_TRUE(ended(with(mute, "set-direction", {1}), Error::timeout, "nothing else tells"));
 }
 
-TEST(Raa38ModbusSettings, ZeroIsHere) {
+TEST(Raa38ModbusSettings, SetsZeroOfShaftAtRest) {
   Bench bench;
   bench.put(5000);
-  EXPECT_EQ(bench.does("zero").fields, "singleturn=0 written=1 ");
-  EXPECT_EQ(bench.does("zero").fields, "singleturn=0 written=0 ");
+  EXPECT_EQ(bench.run_command("zero").fields, "singleturn=0 written=1 ");
+  EXPECT_EQ(bench.run_command("zero").fields, "singleturn=0 written=0 ");
   bench.shaft.spin(60, bench.line.now());
-  EXPECT_TRUE(ended(bench.does("zero"), Error::not_still, "nothing was changed"));
+  EXPECT_TRUE(ended(bench.run_command("zero"), Error::not_still, "nothing was changed"));
   EXPECT_EQ(bench.encoder().settings().writes(), 1u);
   EXPECT_EQ(bench.encoder().violation_count(), 0u);
 }
 
-TEST(Raa38ModbusSettings, NothingIsSentToAnEncoderThatIsNotThere) {
+TEST(Raa38ModbusSettings, SendsNoSettingWithoutEncoder) {
   Bench bench({.address = 9});
   const std::pair<std::string_view, std::int64_t> commands[]{
       {"set-address", 2}, {"set-baud", 9600}, {"set-direction", 1}, {"zero", 0}};
   for (const auto& [command, value] : commands) {
-    EXPECT_TRUE(ended(bench.does(Format{}, command, {value}), Error::timeout));
+    EXPECT_TRUE(ended(bench.run_command(Format{}, command, {value}), Error::timeout));
   }
   EXPECT_EQ(bench.encoder().settings().writes(), 0u);
 }

@@ -57,7 +57,7 @@ constexpr std::array<Argument, 2> scan_arguments{
 
 constexpr Request to_read(const Format& format, Arguments) { return read_request(format); }
 constexpr Request to_ask_address(const Format&, Arguments) {
-  return {.function = function::ask_address, .address = any_address};
+  return {.function = function::read_address, .address = any_address};
 }
 constexpr Request to_set(const Format& format, std::uint8_t code, std::int64_t value) {
   return {.function = code, .address = format.address, .value = static_cast<std::uint8_t>(value)};
@@ -75,7 +75,7 @@ constexpr Result<Request> to_set_baud(const Format& format, Arguments arguments)
   return to_set(format, function::set_parameter, baud_parameters[*index]);
 }
 
-constexpr bool has_too_few_registers(const Format& format) { return format.asked() == 1 && format.bits > 16; }
+constexpr bool has_too_few_registers(const Format& format) { return format.register_count() == 1 && format.bits > 16; }
 
 // ---- End of a frame
 
@@ -113,13 +113,13 @@ FrameEnd frame_end(const Options& values, Direction way, Bytes bytes) {
 // ---- Evidence of captured frames. Their address does not matter.
 
 /// Content of a valid capture, or why it is invalid with any options. `reply` is empty if there was none.
-struct Judged {
+struct CaptureContent {
   Request request{};
   std::optional<Reply> reply{};
   std::string_view wrong{};
 };
 
-Judged look_at(const Capture& capture) {
+CaptureContent examine(const Capture& capture) {
   Format most{.bits = 21};
   if (!capture.reply.empty()) most.address = capture.reply[0];
   const Result<Request> request = capture.request.empty()
@@ -134,15 +134,15 @@ Judged look_at(const Capture& capture) {
   return {.wrong = text_of(reply.error()).description};
 }
 
-std::string_view against_bits(std::int64_t bits, const Judged& seen) {
+std::string_view bits_contradiction(std::int64_t bits, const CaptureContent& seen) {
   if (!seen.wrong.empty() || !seen.reply || seen.request.function != function::read) return seen.wrong;
   if (seen.reply->singleturn >> bits != 0) return "the position has more bits";
   return seen.request.registers == 1 && bits > 16 ? "one register was answered, and so many bits do not fit" : "";
 }
 
-std::string_view against_registers(const Format& format, const Judged& seen) {
+std::string_view registers_contradiction(const Format& format, const CaptureContent& seen) {
   if (!seen.wrong.empty() || seen.request.function != function::read) return seen.wrong;
-  return seen.request.registers != format.asked() ? "another number of registers was asked for" : "";
+  return seen.request.registers != format.register_count() ? "another number of registers was asked for" : "";
 }
 
 bool probe(Options& values, std::span<const Capture> captures, EvidenceSink& sink) {
@@ -151,14 +151,14 @@ bool probe(Options& values, std::span<const Capture> captures, EvidenceSink& sin
   constexpr std::size_t registers = options.find("registers");
   const Option& range = options.infos[bits];
   const bool bits_found =
-      judge(sink, bits, range.minimum, range.maximum, captures.size(), values.values[bits], agrees,
-            [&](std::int64_t value, std::size_t i) { return against_bits(value, look_at(captures[i])); });
-  const bool registers_found = judge(sink, registers, 0, 2, captures.size(), values.values[registers], agrees,
-                                     [&](std::int64_t value, std::size_t i) {
-                                       Format format = options.format(values);
-                                       format.registers = static_cast<unsigned>(value);
-                                       return against_registers(format, look_at(captures[i]));
-                                     });
+      judge_option(sink, bits, range.minimum, range.maximum, captures.size(), values.values[bits], agrees,
+                   [&](std::int64_t value, std::size_t i) { return bits_contradiction(value, examine(captures[i])); });
+  const bool registers_found = judge_option(sink, registers, 0, 2, captures.size(), values.values[registers], agrees,
+                                            [&](std::int64_t value, std::size_t i) {
+                                              Format format = options.format(values);
+                                              format.registers = static_cast<unsigned>(value);
+                                              return registers_contradiction(format, examine(captures[i]));
+                                            });
   return bits_found && registers_found;
 }
 
@@ -190,7 +190,7 @@ constexpr void show_setting(Values& values, std::uint8_t value) {
 }
 constexpr Values values_of_request(const Format&, const Request& request) {
   Values values{.function = request.function, .crc_order = "low_first"};
-  if (request.function != function::ask_address) values.address = request.address;
+  if (request.function != function::read_address) values.address = request.address;
   if (request.function == function::read) {
     values.first_register = request.first_register;
     values.registers = request.registers;
@@ -235,12 +235,12 @@ constexpr author::Finding<Format, Slaves> slaves{.put = put_slaves};
 constexpr Command position{"position", Verb::read, 0, "position within the turn"};
 constexpr auto commands = std::array{
     author::reading<report, read_request, ReadPosition>(position).or_when(
-        has_too_few_registers, author::command<report, found, look_once, to_read>(position)),
-    author::command<report, found, ask_address, to_ask_address>(
+        has_too_few_registers, author::command<report, found, read_position_once, to_read>(position)),
+    author::command<report, found, read_address, to_ask_address>(
         {"address", Verb::config_get, 0, "address of the encoder"}),
     author::command<report, found, find_baud, to_read>(
         {"baud", Verb::config_get, 0, "the baud rate at which it answers", {}, false, false}),
-    author::command<report, found, look_at_direction, to_read>(
+    author::command<report, found, read_direction, to_read>(
         {"direction", Verb::config_get, 0, "in which direction it counts: only the position shows it"}),
     author::command<report, found, set_address, to_give<function::set_address>>(
         {"set-address", Verb::config_set, 0, "give it another address", address_arguments, true, false, "address",
@@ -261,7 +261,7 @@ constexpr auto commands = std::array{
 constexpr auto models = std::array{author::ModelText{"RAA38S6", "single-turn, 10 to 21 bits (option bits)", 0, ""}};
 
 BitRanges bits_in(const Options& values, Frame, Frame reply, const FieldInfo& field) {
-  const std::size_t address_at = reply.bytes[1] == function::ask_address ? 2 : 0;
+  const std::size_t address_at = reply.bytes[1] == function::read_address ? 2 : 0;
   if (&field == fields.of<&Values::address>()) return author::bits_of(address_at, 0, 8);
   if (&field == fields.of<&Values::new_address>()) return author::bits_of(0, 0, 8);
   if (&field == fields.of<&Values::function>()) return author::bits_of(1, 0, 8);

@@ -25,7 +25,7 @@ namespace absenc::raa38::serial {
 namespace testing {
 
 using author::testing::Wire;
-using raa38::testing::End;
+using raa38::testing::CommandResult;
 using raa38::testing::ended;
 using raa38::testing::says;
 

@@ -39,7 +39,7 @@ void VirtualEncoder::feed(const ByteEvent& event) {
   if (event.kind == ByteEvent::Kind::triggered && is_on(event.at)) triggered(event);
   if (event.kind == ByteEvent::Kind::received) {
     if (format().mode != Mode::bus) return;
-    if (is_transmitting()) return hear_meanwhile(event);
+    if (is_transmitting()) return check_during_transmission(event);
   }
   BusDevice::feed(event);
 }
@@ -63,13 +63,14 @@ void VirtualEncoder::triggered(const ByteEvent& event) {
 
 // Reports a request during a transmission. Two encoders with one number send at the same time, so that only the bytes
 // of a request count, not other bytes.
-void VirtualEncoder::hear_meanwhile(const ByteEvent& event) {
+void VirtualEncoder::check_during_transmission(const ByteEvent& event) {
   const std::uint32_t own = 0xBCAA00u | number_mark | format().unit;
   // If this program was not scheduled, the frame should already have been sent before the request arrived.
   const bool may_have_waited = event.late > Protocol::device_times(format()).answer_time + format().transmission;
   for (const std::uint8_t byte : event.items) {
-    meanwhile_ = (meanwhile_ << 8 | byte) & 0xFFFFFF;
-    if (meanwhile_ == own && !may_have_waited) expect(false, "request during the encoder's transmission", event.at);
+    last_characters_ = (last_characters_ << 8 | byte) & 0xFFFFFF;
+    if (last_characters_ == own && !may_have_waited)
+      expect(false, "request during the encoder's transmission", event.at);
   }
 }
 

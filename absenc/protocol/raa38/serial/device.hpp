@@ -28,7 +28,7 @@ class VirtualEncoder final : public author::BusDevice<Protocol, VirtualEncoder, 
  private:
   void started(Time at) override { due_ = at; }
   void triggered(const Event<std::uint8_t>& event);
-  void hear_meanwhile(const Event<std::uint8_t>& event);
+  void check_during_transmission(const Event<std::uint8_t>& event);
   [[nodiscard]] Position position(Time at) const;
   [[nodiscard]] Step<std::uint8_t> character();
 
@@ -38,7 +38,7 @@ class VirtualEncoder final : public author::BusDevice<Protocol, VirtualEncoder, 
   Time frame_at_{};
   std::size_t sent_ = 0;
   bool pending_ = false;
-  std::uint32_t meanwhile_ = 0;  // the last three characters received while a frame is sent
+  std::uint32_t last_characters_ = 0;  // the last three characters received while a frame is sent
 };
 
 }  // namespace absenc::raa38::serial

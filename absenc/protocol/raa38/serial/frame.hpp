@@ -128,17 +128,17 @@ using RequestBytes = ByteBuffer<request_bytes>;
 }
 
 /// Matches a frame of any unit. Used without a request, where the frame itself shows its unit.
-inline constexpr int anybody = -1;
+inline constexpr int any_unit = -1;
 
 [[nodiscard]] constexpr bool second_byte_fits(const Format& format, int unit, std::uint8_t second_byte) {
-  const bool numbered = unit == anybody ? (second_byte & 0xF0) == number_mark : second_byte == (number_mark | unit);
+  const bool numbered = unit == any_unit ? (second_byte & 0xF0) == number_mark : second_byte == (number_mark | unit);
   if (format.second_byte == SecondByte::fixed) return second_byte == fixed_second_byte;
   return numbered || (format.second_byte == SecondByte::automatic && second_byte == fixed_second_byte);
 }
 
-/// Decodes a frame of `unit`, 0 to 15, or `anybody`. Errors: wrong_length, bad_checksum, unexpected_reply,
+/// Decodes a frame of `unit`, 0 to 15, or `any_unit`. Errors: wrong_length, bad_checksum, unexpected_reply,
 /// out_of_range.
-[[nodiscard]] constexpr Result<Position> decode_position(const Format& format, Bytes bytes, int unit = anybody) {
+[[nodiscard]] constexpr Result<Position> decode_position(const Format& format, Bytes bytes, int unit = any_unit) {
   if (bytes.size() != format.frame_bytes()) return Error::wrong_length;
   if (checksum(bytes.first(bytes.size() - 1)) != bytes.back()) return Error::bad_checksum;
   if (bytes[0] != header || !second_byte_fits(format, unit, bytes[1])) return Error::unexpected_reply;
@@ -252,7 +252,7 @@ struct Protocol {
   static constexpr Result<Position> decode(const Format& format, const Request& request, Bytes bytes) {
     // The encoder does not answer zero clearing.
     if (request.kind == Request::Kind::zero_clear) return Error::unexpected_reply;
-    return decode_position(format, bytes, request.kind == Request::Kind::read ? request.unit : anybody);
+    return decode_position(format, bytes, request.kind == Request::Kind::read ? request.unit : any_unit);
   }
   /// Returns the position of a reply.
   static constexpr Reading reading(const Format& format, const Request&, const Position& position) {

@@ -11,8 +11,8 @@ namespace {
 static_assert(Format{.bits = 16}.data_bytes() == 2 && Format{.bits = 17}.data_bytes() == 3);
 static_assert(encode_position({.bits = 14}, {383})[4] == 0x00, "the sum of 3.1.1 is 200 hex");
 
-TEST(RaaFrame, TheFirstCheckThatFailsNamesTheError) {
-  const auto error = [](std::initializer_list<std::uint8_t> bytes, int unit = anybody) {
+TEST(Raa38SerialFrame, FirstFailingCheckGivesError) {
+  const auto error = [](std::initializer_list<std::uint8_t> bytes, int unit = any_unit) {
     return decode_position({.bits = 14}, {bytes.begin(), bytes.size()}, unit).error();
   };
   EXPECT_EQ(error({0xFF, 0x81, 0x40, 0x00}), Error::wrong_length);
@@ -26,7 +26,7 @@ TEST(RaaFrame, TheFirstCheckThatFailsNamesTheError) {
 
 // An encoder that stands still repeats its frame. For all its frame sizes, reading the repetition from another byte on
 // never gives another position, so a search cannot align wrongly.
-TEST(RaaFrame, ARepeatedFrameReadElsewhereIsNoOtherPosition) {
+TEST(Raa38SerialFrame, RepeatedFrameHasNoOtherAlignment) {
   for (const unsigned bits : {10u, 14u, 16u, 17u, 21u}) {
     const Format format{.bits = bits};
     const std::size_t size = format.frame_bytes();
@@ -43,7 +43,7 @@ TEST(RaaFrame, ARepeatedFrameReadElsewhereIsNoOtherPosition) {
   }
 }
 
-TEST(Raa38Frame, EveryByteOfARequestIsLookedAt) {
+TEST(Raa38SerialFrame, ChecksEveryByteOfARequest) {
   const RequestBytes good = encode_request({Request::Kind::read, 3});
   ASSERT_TRUE(decode_request(good).has_value());
   for (std::size_t i = 0; i < good.size(); ++i) {

@@ -77,38 +77,38 @@ Listen::Listen(const Format& format) : format_(format), decoder_(format) {}
 ByteStep Listen::next(Time now) {
   if (taken_ < waiting_.size()) {
     take(waiting_[taken_++]);
-    arm_ = true;
+    restart_timeout_ = true;
     return {.kind = ByteStep::Kind::emit};
   }
   // The timeout restarts here: the time that the caller takes with a result does not count.
-  if (arm_) deadline_ = now + std::max(listen_limit, 4 * format_.period());
-  arm_ = false;
+  if (restart_timeout_) deadline_ = now + std::max(listen_limit, 4 * format_.period());
+  restart_timeout_ = false;
   // Bytes that are no frames do not extend the deadline, so it is checked even while they arrive.
-  if (!done_ && now >= deadline_) give_up();
+  if (!done_ && now >= deadline_) end_stream();
   if (done_) return {.kind = ByteStep::Kind::done};
   return {.at = deadline_};
 }
 
 void Listen::feed(const ByteEvent& event) {
   if (done_) return;
-  const auto keep = [this](const Found& found) { waiting_.push_back(found); };
+  const auto keep = [this](const StreamFrame& found) { waiting_.push_back(found); };
   if (taken_ == waiting_.size()) {
     waiting_.clear();
     taken_ = 0;
   }
   if (event.kind == ByteEvent::Kind::received) {
-    heard_before_ = good_ == 0 && !heard_ ? event.at : heard_at_;
-    heard_at_ = event.at;
-    heard_ = true;
+    received_before_ = valid_count_ == 0 && !received_anything_ ? event.at : received_at_;
+    received_at_ = event.at;
+    received_anything_ = true;
     decoder_.feed(event.items, event.at, keep);
   } else if (event.kind == ByteEvent::Kind::line_error) {
-    heard_ = true;
+    received_anything_ = true;
     decoder_.disturbed(keep);
   }
   counts_.discarded = decoder_.discarded();
 }
 
-void Listen::take(const Found& found) {
+void Listen::take(const StreamFrame& found) {
   error_ = Error::none;
   words_ = {};
   frame_.clear();
@@ -121,23 +121,23 @@ void Listen::take(const Found& found) {
   reading_ = author::position_reading(found.singleturn, format_.bits);
   reading_.latched = latched;
   reading_.received = found.at;
-  heard_ = false;
-  ++good_;
+  received_anything_ = false;
+  ++valid_count_;
 }
 
 // Returns when the position was taken. Frames that were received together were sent one after the other.
-Time Listen::latched_time(const Found& found) const {
-  if (found.at != heard_at_) return found.at;
+Time Listen::latched_time(const StreamFrame& found) const {
+  if (found.at != received_at_) return found.at;
   const auto behind = static_cast<std::int64_t>(waiting_.size() - taken_);
   const auto together = static_cast<std::int64_t>(std::max<std::size_t>(waiting_.size(), 1));
-  const Time each = format_.period() > Time{} ? format_.period() : (heard_at_ - heard_before_) / together;
-  return heard_at_ - behind * each;
+  const Time each = format_.period() > Time{} ? format_.period() : (received_at_ - received_before_) / together;
+  return received_at_ - behind * each;
 }
 
-void Listen::give_up() {
+void Listen::end_stream() {
   done_ = true;
   frame_.clear();
-  const Error error = !heard_                           ? Error::timeout
+  const Error error = !received_anything_               ? Error::timeout
                       : decoder_.saw_larger_positions() ? Error::out_of_range
                                                         : Error::bad_framing;
   fail(error, explain_stream(error));
@@ -148,7 +148,7 @@ void Listen::fail(Error error, const Explanation& words) {
   words_ = words;
 }
 
-const Reading* Listen::reading() const { return error_ == Error::none && good_ > 0 ? &reading_ : nullptr; }
+const Reading* Listen::reading() const { return error_ == Error::none && valid_count_ > 0 ? &reading_ : nullptr; }
 
 void Listen::report(FieldSink& sink) const {
   if (reading() == nullptr) return;
@@ -158,7 +158,7 @@ void Listen::report(FieldSink& sink) const {
   sink.put_reading(reading_);
 }
 
-Exchange<std::uint8_t> Listen::exchange() const { return {{}, frame_.view(), heard_at_, heard_at_}; }
+Exchange<std::uint8_t> Listen::exchange() const { return {{}, frame_.view(), received_at_, received_at_}; }
 
 // ---- Procedures
 
@@ -169,12 +169,12 @@ using namespace author;
 constexpr unsigned scan_attempts = 2;
 
 // Returns the newest frame of the first bytes with a valid frame.
-Part<Result<Position>> hear_one(Dialog& dialog) {
+Part<Result<Position>> receive_frame(Dialog& dialog) {
   StreamDecoder decoder(dialog.format());
   Position position{.second_byte = dialog.format().own_second_byte()};
   bool found = false;
   bool anything = false;
-  const auto keep = [&](const serial::Found& frame) {
+  const auto keep = [&](const serial::StreamFrame& frame) {
     if (frame.error != Error::none) return;
     position.singleturn = frame.singleturn;
     found = true;
@@ -194,10 +194,10 @@ Part<Result<Position>> hear_one(Dialog& dialog) {
 }
 
 // Reads the next position in any mode.
-Part<Result<Position>> look(Dialog& dialog) {
+Part<Result<Position>> read_next_position(Dialog& dialog) {
   Result<Position> position = Error::timeout;
   if (dialog.format().mode == Mode::timing) {
-    position = co_await hear_one(dialog);
+    position = co_await receive_frame(dialog);
   } else {
     position = co_await dialog.attempt(position_request(dialog.format()));
   }
@@ -217,26 +217,26 @@ Procedure set_zero(Dialog& dialog, Values& found) {
     co_return {Error::invalid_argument, "BC AA Cx is a command of a bus",
                "set mode=bus, or zeroing=line for a wire to CLR"};
   }
-  const Result<Position> first = co_await look(dialog);
+  const Result<Position> first = co_await read_next_position(dialog);
   if (!first) co_return {first.error()};
   co_await dialog.rest(between_looks);
-  const Result<Position> second = co_await look(dialog);
+  const Result<Position> second = co_await read_next_position(dialog);
   if (!second) co_return {second.error()};
-  const Outcome why_not = objection_to_zero(position_reading(first->singleturn, format.bits),
-                                            position_reading(second->singleturn, format.bits));
-  if (why_not.error != Error::none) co_return why_not;
+  const Outcome objection = objection_to_zero(position_reading(first->singleturn, format.bits),
+                                              position_reading(second->singleturn, format.bits));
+  if (objection.error != Error::none) co_return objection;
   const Request by_command{Request::Kind::zero_clear, format.zeroed_unit()};
   co_await dialog.ask(format.zeroing == Zeroing::line ? Request{Request::Kind::clear} : by_command).changes();
   // The encoder does not confirm zero clearing, so the position is polled.
-  const Time give_up_at = dialog.received_at() + zero_limit;
+  const Time deadline = dialog.received_at() + zero_limit;
   Result<Position> now = Error::timeout;
   do {
     co_await dialog.rest(zero_poll);
-    now = co_await look(dialog);
+    now = co_await read_next_position(dialog);
     found = values_of(format, *now);
     found.before = second->singleturn;
     if (now && is_near(now->singleturn, 0, format.bits, zero_millidegrees)) co_return done;
-  } while (dialog.received_at() < give_up_at);
+  } while (dialog.received_at() < deadline);
   if (!now) {
     co_return only(now.error(), "the zero was set, but the position could not be read back",
                    "read the encoder to see what it is now");

@@ -53,22 +53,22 @@ class Listen final : public Conversation<std::uint8_t> {
   // Most frames in the bytes that a port delivers at once.
   static constexpr std::size_t most_waiting = 1024;
 
-  void take(const Found& found);
-  [[nodiscard]] Time latched_time(const Found& found) const;
-  void give_up();
+  void take(const StreamFrame& found);
+  [[nodiscard]] Time latched_time(const StreamFrame& found) const;
+  void end_stream();
   void fail(Error error, const Explanation& words);
 
   Format format_;
   StreamDecoder decoder_;
-  Buffer<Found, most_waiting> waiting_;
+  Buffer<StreamFrame, most_waiting> waiting_;
   std::size_t taken_ = 0;  // number of emitted results in `waiting_`
   bool done_ = false;
-  bool heard_ = false;  // bytes or damaged characters were received since the last valid frame
-  bool arm_ = true;     // the timeout must be restarted
+  bool received_anything_ = false;  // bytes or damaged characters were received since the last valid frame
+  bool restart_timeout_ = true;     // the timeout must be restarted
   Time deadline_{};
-  Time heard_at_{};         // time of the bytes that are being processed
-  Time heard_before_{};     // time of the bytes before them
-  std::uint64_t good_ = 0;  // number of valid frames
+  Time received_at_{};             // time of the bytes that are being processed
+  Time received_before_{};         // time of the bytes before them
+  std::uint64_t valid_count_ = 0;  // number of valid frames
   StreamCounts counts_{};
   Reading reading_{};
   FrameBytes frame_;

@@ -19,37 +19,37 @@ Format with(Format format, auto member, auto value) {
   return format;
 }
 
-TEST(RaaHandshake, AFrameForEachPulse) {
+TEST(Raa38SerialHandshake, ReadsOneFramePerPulse) {
   Bench bench(handshake);
-  const End read = bench.does("position");
+  const CommandResult read = bench.run_command("position");
   EXPECT_EQ(read.reading->singleturn, 383u);
   EXPECT_EQ(read.reading->latched, Time{}) << "at the edge";
   EXPECT_EQ(read.took, virtual_acquisition + frame_time) << "T1";
   EXPECT_EQ(bench.encoder().violation_count(), 0u);
   // T3 may be shorter than the pulse.
-  EXPECT_TRUE(ended(Bench(with(handshake, &Format::acquisition, Time(1))).does("position"), Error::none));
+  EXPECT_TRUE(ended(Bench(with(handshake, &Format::acquisition, Time(1))).run_command("position"), Error::none));
 }
 
-TEST(RaaHandshake, T3IsAsOrdered) {
+TEST(Raa38SerialHandshake, UsesOrderedT3) {
   Bench bench(with(handshake, &Format::acquisition, Time(250ms)));
-  EXPECT_EQ(bench.does("position").took, 250ms + frame_time);
-  const End unknowing = bench.does(handshake, "position");
+  EXPECT_EQ(bench.run_command("position").took, 250ms + frame_time);
+  const CommandResult unknowing = bench.run_command(handshake, "position");
   EXPECT_TRUE(ended(unknowing, Error::timeout, "no frame followed the pulse"));
   EXPECT_TRUE(says(unknowing.words, "CLK"));
 }
 
-TEST(RaaHandshake, AFrameTakesAsLongAsOrdered) {
+TEST(Raa38SerialHandshake, AllowsOrderedFrameDuration) {
   const Format slow = with(handshake, &Format::transmission, Time(60ms));
   Bench bench(slow);
-  const End read = bench.does("position");
+  const CommandResult read = bench.run_command("position");
   EXPECT_TRUE(ended(read, Error::none));
   EXPECT_GT(read.took, virtual_acquisition + 4 * slow.transmission / 5) << "T1 - T3";
   EXPECT_LE(read.took, virtual_acquisition + slow.transmission);
-  EXPECT_TRUE(ended(bench.does(handshake, "position"), Error::wrong_length));
+  EXPECT_TRUE(ended(bench.run_command(handshake, "position"), Error::wrong_length));
   EXPECT_EQ(bench.encoder().violation_count(), 0u);
 }
 
-TEST(RaaHandshake, NoCharacterAt1200BaudIsAGap) {
+TEST(Raa38SerialHandshake, CharacterGapAllows1200Baud) {
   using Event = absenc::Event<std::uint8_t>;
   Talk read(handshake, "position");
   ASSERT_EQ(read->next(Time{}).kind, Step<std::uint8_t>::Kind::pulse);
@@ -58,7 +58,7 @@ TEST(RaaHandshake, NoCharacterAt1200BaudIsAGap) {
   EXPECT_GT(read->next(1ms).gap, LineSettings{.rate = 1200}.character());
 }
 
-TEST(RaaHandshake, TheWholeFrameMayComeDuringThePulse) {
+TEST(Raa38SerialHandshake, AcceptsFrameDuringPulse) {
   using Event = absenc::Event<std::uint8_t>;
   const FrameBytes frame = encode_position(handshake, {383});
   Talk read(handshake, "position");
@@ -69,15 +69,15 @@ TEST(RaaHandshake, TheWholeFrameMayComeDuringThePulse) {
   EXPECT_EQ(read->reading()->singleturn, 383u);
 }
 
-TEST(RaaBus, TheUnitThatIsAskedAnswersInEitherForm) {
+TEST(Raa38SerialBus, ReadsPolledUnitInEitherForm) {
   for (const SecondByte form : {SecondByte::automatic, SecondByte::fixed, SecondByte::echo}) {
-    const End read = Bench(with(bus, &Format::second_byte, form)).does("position");
+    const CommandResult read = Bench(with(bus, &Format::second_byte, form)).run_command("position");
     EXPECT_EQ(read.reading->singleturn, 383u);
     EXPECT_EQ(read.took, (3 + 5) * line_of_tests.character() + virtual_acquisition);
   }
 }
 
-TEST(RaaBus, AWrongReplyIsAnErrorThatSaysWhy) {
+TEST(Raa38SerialBus, ExplainsEachWrongReply) {
   struct Row {
     Wire reply;
     Error error;
@@ -95,26 +95,26 @@ TEST(RaaBus, AWrongReplyIsAnErrorThatSaysWhy) {
   for (const Row& row : rows) {
     Bench bench(bus);
     bench.encoder().set([&](unsigned, Wire& reply) { reply = row.reply; });
-    EXPECT_TRUE(ended(bench.does("position"), row.error, row.words));
+    EXPECT_TRUE(ended(bench.run_command("position"), row.error, row.words));
   }
 }
 
-TEST(RaaHandshake, ABadSumIsNotForTwoEncoders) {
+TEST(Raa38SerialHandshake, DoesNotBlameSecondEncoderForBadChecksum) {
   Bench bench(handshake);
   bench.encoder().set([](unsigned, Wire& reply) { reply[4] ^= 1; });
-  const End read = bench.does("position");
+  const CommandResult read = bench.run_command("position");
   EXPECT_TRUE(ended(read, Error::bad_checksum));
   EXPECT_FALSE(says(read.words, "scan")) << "nobody else is there: " << read.words;
 }
 
-TEST(RaaBus, TwoWithOneNumberAreNeverAPosition) {
+TEST(Raa38SerialBus, RejectsCollisionOfTwoUnits) {
   Bench bench(bus);
   bench.add_twin(with(bus, &Format::second_byte, SecondByte::echo));
-  EXPECT_TRUE(ended(bench.does("position"), Error::bad_checksum));  // FF 81 01 7F 00 and FF B1 01 7E 2F collide
+  EXPECT_TRUE(ended(bench.run_command("position"), Error::bad_checksum));  // FF 81 01 7F 00 and FF B1 01 7E 2F collide
 }
 
 // A frame may contain BC AA, but its checksum never completes a request.
-TEST(RaaBus, TheBeginOfARequestInsideAFrameOfAnotherIsNone) {
+TEST(Raa38SerialBus, IgnoresRequestStartInsideFrame) {
   Bench bench(with(bus, &Format::bits, 16u));
   bench.add(with(bench.format, &Format::unit, std::uint8_t{2}));
   bench.shaft.start.position = std::int64_t{0xBCAA} << 16;
@@ -125,11 +125,11 @@ TEST(RaaBus, TheBeginOfARequestInsideAFrameOfAnotherIsNone) {
 
 // ---- Zero
 
-class RaaZero : public ::testing::TestWithParam<Format> {};
+class Raa38SerialZero : public ::testing::TestWithParam<Format> {};
 
-TEST_P(RaaZero, IsSetAndReadBack) {
+TEST_P(Raa38SerialZero, SetsZeroAndReadsItBack) {
   Bench bench(GetParam());
-  const End zero = bench.does("zero");
+  const CommandResult zero = bench.run_command("zero");
   EXPECT_TRUE(ended(zero, Error::none));
   EXPECT_TRUE(zero.has("before=383 singleturn=0")) << zero.fields;
   EXPECT_EQ(bench.encoder().memory_version(), 1u);
@@ -141,40 +141,40 @@ TEST_P(RaaZero, IsSetAndReadBack) {
   EXPECT_EQ(bench.position(), 17u) << "it survives power off";
 }
 
-TEST_P(RaaZero, ThatHadNoEffectIsTold) {
+TEST_P(Raa38SerialZero, ReportsZeroWithoutEffect) {
   Bench bench(with(GetParam(), &Format::zeroing, Zeroing::none));
-  const End zero = bench.does(GetParam(), "zero");
+  const CommandResult zero = bench.run_command(GetParam(), "zero");
   EXPECT_TRUE(ended(zero, Error::cross_check_failed, "CLR"));
   EXPECT_GE(zero.took, zero_limit);
   if (GetParam().mode == Mode::timing) return;
   EXPECT_LE(bench.encoder().answer_count(), static_cast<std::uint64_t>(3 + zero_limit / zero_poll));
 }
 
-TEST_P(RaaZero, IsNotSetWhileTheShaftTurns) {
+TEST_P(Raa38SerialZero, RefusesWhileShaftTurns) {
   for (const int rpm : {60, 2}) {  // the slow speed is detected because some time passes between the two readings
     Bench bench(GetParam());
     bench.shaft.spin(rpm, Time{});
-    EXPECT_TRUE(ended(bench.does("zero"), Error::not_still, "nothing was changed")) << rpm;
+    EXPECT_TRUE(ended(bench.run_command("zero"), Error::not_still, "nothing was changed")) << rpm;
     EXPECT_EQ(bench.encoder().memory_version(), 0u);
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Modes, RaaZero, ::testing::Values(timing, handshake, bus, bus_with_line));
+INSTANTIATE_TEST_SUITE_P(Modes, Raa38SerialZero, ::testing::Values(timing, handshake, bus, bus_with_line));
 
-TEST(RaaZeroing, TheNumberBehindCMayBeAnother) {
+TEST(Raa38SerialZeroing, UsesNumberOfZeroUnit) {
   Bench bench(with(bus, &Format::zero_unit, 7));
-  EXPECT_TRUE(ended(bench.does("zero"), Error::none));
+  EXPECT_TRUE(ended(bench.run_command("zero"), Error::none));
   bench.put(5000);
-  EXPECT_TRUE(ended(bench.does(bus, "zero"), Error::cross_check_failed));
+  EXPECT_TRUE(ended(bench.run_command(bus, "zero"), Error::cross_check_failed));
 }
 
-TEST(RaaZeroing, SaysWhatIsMissing) {
-  EXPECT_TRUE(ended(Bench({}).does("zero"), Error::unsupported, "zero clearing"));
-  EXPECT_TRUE(ended(Bench({.mode = Mode::handshake, .zeroing = Zeroing::command}).does("zero"), Error::invalid_argument,
-                    "set mode=bus, or zeroing=line for a wire to CLR"));
+TEST(Raa38SerialZeroing, ExplainsMissingOptions) {
+  EXPECT_TRUE(ended(Bench({}).run_command("zero"), Error::unsupported, "zero clearing"));
+  EXPECT_TRUE(ended(Bench({.mode = Mode::handshake, .zeroing = Zeroing::command}).run_command("zero"),
+                    Error::invalid_argument, "set mode=bus, or zeroing=line for a wire to CLR"));
 }
 
-TEST(RaaZeroing, APositionThatCannotBeReadBackIsTold) {
+TEST(Raa38SerialZeroing, ReportsPositionThatCannotBeReadBack) {
   for (const Format& format : {bus, timing}) {
     const bool streams = format.mode == Mode::timing;
     Bench bench(format);
@@ -182,11 +182,11 @@ TEST(RaaZeroing, APositionThatCannotBeReadBackIsTold) {
       if (frame > (streams ? 4 : 1)) reply.assign(streams ? 1 : 0, 0x00);
     });
     const Error error = streams ? Error::bad_framing : Error::timeout;
-    EXPECT_TRUE(ended(bench.does("zero"), error, "could not be read back"));
+    EXPECT_TRUE(ended(bench.run_command("zero"), error, "could not be read back"));
   }
 }
 
-TEST(RaaZeroing, AStreamWithoutFramesIsNoZero) {
+TEST(Raa38SerialZeroing, SetsNoZeroWithoutValidFrames) {
   const std::pair<Error, std::function<void(Wire&)>> rows[]{
       {Error::timeout, [](Wire&) {}},
       {Error::bad_framing, [](Wire& reply) { reply[4] ^= 1; }},
@@ -198,7 +198,7 @@ TEST(RaaZeroing, AStreamWithoutFramesIsNoZero) {
   for (const auto& [error, change] : rows) {
     Bench bench(error == Error::timeout ? bus : timing);
     bench.encoder().set([&how = change](unsigned, Wire& reply) { how(reply); });
-    const End zero = bench.does(timing, "zero");
+    const CommandResult zero = bench.run_command(timing, "zero");
     EXPECT_TRUE(ended(zero, error));
     EXPECT_EQ(zero.took, listen_limit);
     EXPECT_EQ(bench.encoder().memory_version(), 0u);
@@ -207,34 +207,35 @@ TEST(RaaZeroing, AStreamWithoutFramesIsNoZero) {
 
 // ---- Scan
 
-TEST(RaaScan, FindsEverybodyAndClashes) {
+TEST(Raa38SerialScan, FindsUnitsAndClashes) {
   Bench bench(bus);
   for (const std::uint8_t unit : std::to_array<std::uint8_t>({3, 9, 15})) bench.add(with(bus, &Format::unit, unit));
   bench.add_twin({.second_byte = SecondByte::echo, .mode = Mode::bus, .unit = 9});
-  EXPECT_EQ(bench.does("scan").fields,
+  EXPECT_EQ(bench.run_command("scan").fields,
             "encoder_address=1 clash=0 singleturn=383 second_byte=129 "
             "encoder_address=3 clash=0 singleturn=383 second_byte=129 encoder_address=9 clash=1 "
             "encoder_address=15 clash=0 singleturn=383 second_byte=129 ");
   for (const Tampered& encoder : bench.encoders) EXPECT_EQ(encoder.violation_count(), 0u);
 }
 
-TEST(RaaScan, AsksADamagedAnswerAgain) {
+TEST(Raa38SerialScan, RepeatsRequestAfterDamagedReply) {
   Bench bench(bus);
   bench.encoder().set([](unsigned frame, Wire& reply) {
     if (frame == 0) reply[4] ^= 1;
   });
-  EXPECT_TRUE(bench.does("scan").has("clash=0"));
+  EXPECT_TRUE(bench.run_command("scan").has("clash=0"));
 }
 
-TEST(RaaScan, ALineThatIsNeverSilentIsGivenUpAtOnce) {
+TEST(Raa38SerialScan, StopsOnEndlessNoise) {
   Talk scan(bus, "scan");
   EXPECT_LT(raa38::testing::time_with_noise(*scan), 1500ms);
   EXPECT_TRUE(says(scan->detail(), "without a pause"));
 }
 
-TEST(RaaScan, NobodyAndSomebodyWhoTransmitsByHimself) {
-  EXPECT_TRUE(ended(Bench(handshake).does("scan"), Error::timeout, "no number from 0 to F"));
-  EXPECT_TRUE(ended(Bench(timing).does("scan"), Error::unexpected_reply, "something comes although nobody asks"));
+TEST(Raa38SerialScan, ReportsNoUnitAndStreamingEncoder) {
+  EXPECT_TRUE(ended(Bench(handshake).run_command("scan"), Error::timeout, "no number from 0 to F"));
+  EXPECT_TRUE(
+      ended(Bench(timing).run_command("scan"), Error::unexpected_reply, "something comes although nobody asks"));
 }
 
 // ---- Rules that the virtual encoder checks
@@ -256,7 +257,7 @@ struct Twice final : Machine<std::uint8_t> {
   int count = 0;
 };
 
-TEST(RaaDevice, ListsTheRulesThatTheHostBreaks) {
+TEST(Raa38SerialDevice, ReportsEachBrokenRule) {
   const auto violation = [](const Format& format, Twice host) -> std::string {
     Bench bench(format);
     bench.run(host, [] { return true; });
@@ -271,7 +272,7 @@ TEST(RaaDevice, ListsTheRulesThatTheHostBreaks) {
   EXPECT_EQ(violation(slow, {{}, 2ms, {0xBC, 0xAA, 0xB1}}), "request during the encoder's transmission");
 }
 
-TEST(RaaDevice, ARequestThatItHeardLateMayHaveWaitedForTheFrame) {
+TEST(Raa38SerialDevice, DoesNotReportRequestThatWasReceivedLate) {
   const Format slow = with(with(bus, &Format::acquisition, Time(5ms)), &Format::transmission, Time(2ms));
   const Wire request{0xBC, 0xAA, 0xB1};
   for (const auto& [late, rules] : {std::pair(7ms, 1u), {8ms, 0u}}) {
@@ -285,7 +286,7 @@ TEST(RaaDevice, ARequestThatItHeardLateMayHaveWaitedForTheFrame) {
   }
 }
 
-TEST(RaaDevice, AnswersNoRequestThatIsNotItsOwn) {
+TEST(Raa38SerialDevice, IgnoresRequestsOfOtherUnits) {
   const auto reply_to = [](const Wire& request) {
     Bench bench(bus);
     sim::testing::RawHost host(request, 50ms, 10ms, Time{});

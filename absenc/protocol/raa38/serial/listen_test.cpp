@@ -16,7 +16,7 @@ struct Results {
   std::vector<std::uint32_t> positions;
   std::vector<Time> times;
   std::vector<Error> errors;
-  End end;
+  CommandResult end;
 };
 
 Results listen(Bench& bench, std::size_t count = SIZE_MAX) {
@@ -31,11 +31,11 @@ Results listen(Bench& bench, std::size_t count = SIZE_MAX) {
     }
     return results.positions.size() + results.errors.size() < count;
   });
-  results.end = raa38::testing::end_of<std::uint8_t>(machine);
+  results.end = raa38::testing::result_of<std::uint8_t>(machine);
   return results;
 }
 
-TEST(RaaListen, EveryFrameAtTheRateOfTheStream) {
+TEST(Raa38SerialListen, ReadsEveryFrameAtStreamRate) {
   Bench bench(fast);
   bench.shaft.spin(60, Time{});  // 16.384 counts per frame
   const Results results = listen(bench, 1000);
@@ -46,7 +46,7 @@ TEST(RaaListen, EveryFrameAtTheRateOfTheStream) {
   for (std::size_t i = 3; i < 1000; ++i) EXPECT_EQ(results.times[i] - results.times[i - 1], 1ms);
 }
 
-TEST(RaaListen, ADamagedFrameIsOneErrorAndTheStreamGoesOn) {
+TEST(Raa38SerialListen, ReportsDamagedFrameOnceAndContinues) {
   Bench bench(fast);
   bench.encoder().set([](unsigned frame, Wire& reply) {
     if (frame == 5) reply[3] ^= 1;
@@ -59,7 +59,7 @@ TEST(RaaListen, ADamagedFrameIsOneErrorAndTheStreamGoesOn) {
   EXPECT_TRUE(results.end.has("skipped=9")) << results.end.fields;
 }
 
-TEST(RaaListen, SaysWhyNothingGoodComes) {
+TEST(Raa38SerialListen, ExplainsWhyNoFrameIsValid) {
   struct Row {
     std::function<void(Wire&)> change;
     Error error;
@@ -84,7 +84,7 @@ TEST(RaaListen, SaysWhyNothingGoodComes) {
   }
 }
 
-TEST(RaaListen, WithoutTheRefreshRateTimesAreSpreadOverWhatCameAtOnce) {
+TEST(Raa38SerialListen, SpreadsTimesOfFramesReceivedTogether) {
   Listen machine(Format{});
   Wire wire;
   const auto feed = [&](std::uint32_t from, std::uint32_t frames, Time at) {
@@ -133,7 +133,7 @@ struct SessionBench {
   host::Session<std::uint8_t> session{serial_unit, options, port, storage, host::EchoMode::automatic};
 };
 
-TEST(RaaSession, ReadsEveryFrameOfTheStream) {
+TEST(Raa38SerialSession, ReadsEveryFrame) {
   SessionBench bench;
   bench.read(host::Take::every);
   Time before = bench.read(host::Take::every).reading()->received;
@@ -146,7 +146,7 @@ TEST(RaaSession, ReadsEveryFrameOfTheStream) {
 }
 
 // A pause of the caller must not return old positions.
-TEST(RaaSession, TheNewestIsNew) {
+TEST(Raa38SerialSession, TakesNewestFrameAfterPause) {
   SessionBench bench;
   bench.read(host::Take::newest);
   for (int i = 0; i < 20; ++i) {
@@ -158,7 +158,7 @@ TEST(RaaSession, TheNewestIsNew) {
   }
 }
 
-TEST(RaaSession, SilenceIsToldAndTheStreamFoundAgain) {
+TEST(Raa38SerialSession, ReportsTimeoutOfStream) {
   SessionBench bench;
   bench.read(host::Take::every);
   bench.encoder.power_off(bench.port.now());

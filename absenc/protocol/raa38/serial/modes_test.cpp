@@ -75,7 +75,7 @@ void read_and_set_zero(const Row& row, LinkKind kind) {
   EXPECT_EQ(device.violation_count(), 0u);
 }
 
-TEST(RaaOrders, EachIsReadAndItsZeroSet) {
+TEST(Raa38SerialOrders, ReadsAndZeroesEveryOrder) {
   std::set<std::string> paragraphs;
   for (const Row& row : rows_of_readme()) {
     SCOPED_TRACE(row.paragraph + ": " + row.options);

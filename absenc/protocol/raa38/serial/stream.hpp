@@ -14,7 +14,7 @@
 namespace absenc::raa38::serial {
 
 /// A frame, or the error that ended the alignment. Each loss of alignment is reported once.
-struct Found {
+struct StreamFrame {
   Error error = Error::none;     ///< Error of the frame.
   std::uint32_t singleturn = 0;  ///< Position in counts.
   Time at{};                     ///< time at which its last byte was received
@@ -33,7 +33,7 @@ class StreamDecoder {
         second_byte_(format.own_second_byte()),
         discarded_(format.frame_bytes()) {}
 
-  /// Takes bytes that were received at `at`. Calls `on_frame(const Found&)` in the order of the line.
+  /// Takes bytes that were received at `at`. Calls `on_frame(const StreamFrame&)` in the order of the line.
   template <class OnFrame>
   constexpr void feed(Bytes bytes, Time at, OnFrame&& on_frame) {
     for (const std::uint8_t byte : bytes) {
@@ -52,7 +52,7 @@ class StreamDecoder {
     if (!in_step_) return;
     in_step_ = false;
     bad_.clear();
-    on_frame(Found{.error = Error::bad_framing});
+    on_frame(StreamFrame{.error = Error::bad_framing});
   }
 
   /// Returns whether the next frame must begin where the last one ended.
@@ -86,7 +86,7 @@ class StreamDecoder {
     const bool good = frame_at(0).has_value();
     if (good && may_hold_header && size_ < frame_ + 2) return false;
     if (good && (!may_hold_header || is_header(frame_))) {
-      hand_out(on_frame);
+      emit_frame(on_frame);
     } else {
       lose(on_frame);
     }
@@ -102,8 +102,8 @@ class StreamDecoder {
     if (first && size_ < 2 * frame_) return false;
     if (first && frame_at(frame_) && !is_too_early()) {
       in_step_ = true;
-      hand_out(on_frame);
-      hand_out(on_frame);
+      emit_frame(on_frame);
+      emit_frame(on_frame);
     } else {
       discarded_.skip(1);
       remove(1);
@@ -118,8 +118,8 @@ class StreamDecoder {
   }
 
   template <class OnFrame>
-  constexpr void hand_out(OnFrame& on_frame) {
-    const Found found{.singleturn = frame_at(0)->singleturn, .at = times_[frame_ - 1]};
+  constexpr void emit_frame(OnFrame& on_frame) {
+    const StreamFrame found{.singleturn = frame_at(0)->singleturn, .at = times_[frame_ - 1]};
     discarded_.found();
     remove(frame_);
     on_frame(found);
@@ -131,7 +131,7 @@ class StreamDecoder {
     bad_.clear();
     bad_.append(Bytes(window_).first(frame_));
     const Error error = decode_position(format_, bad_).error();
-    on_frame(Found{.error = error == Error::none ? Error::unexpected_reply : error});
+    on_frame(StreamFrame{.error = error == Error::none ? Error::unexpected_reply : error});
   }
 
   constexpr void remove(std::size_t count) {

@@ -12,22 +12,22 @@ using testing::Wire;
 
 void append(Wire& wire, Bytes bytes) { wire.insert(wire.end(), bytes.begin(), bytes.end()); }
 
-struct Heard {
+struct StreamResults {
   std::vector<std::uint32_t> positions;
   std::vector<Error> errors;
 };
 
-Heard hear(StreamDecoder& decoder, Bytes bytes, std::size_t piece = SIZE_MAX) {
-  Heard heard;
+StreamResults decode_stream(StreamDecoder& decoder, Bytes bytes, std::size_t piece = SIZE_MAX) {
+  StreamResults results;
   while (!bytes.empty()) {
     const Bytes now = bytes.first(std::min(piece, bytes.size()));
     bytes = bytes.subspan(now.size());
-    decoder.feed(now, Time{}, [&](const Found& found) {
-      if (found.error == Error::none) heard.positions.push_back(found.singleturn);
-      if (found.error != Error::none) heard.errors.push_back(found.error);
+    decoder.feed(now, Time{}, [&](const StreamFrame& found) {
+      if (found.error == Error::none) results.positions.push_back(found.singleturn);
+      if (found.error != Error::none) results.errors.push_back(found.error);
     });
   }
-  return heard;
+  return results;
 }
 
 Wire stream(const Format& format, std::uint32_t first, std::uint32_t last) {
@@ -42,67 +42,67 @@ std::vector<std::uint32_t> range(std::uint32_t first, std::uint32_t last) {
   return values;
 }
 
-TEST(RaaStream, EveryFrameInPiecesOfEverySize) {
+TEST(Raa38SerialStream, FindsEveryFrameInPiecesOfAnySize) {
   for (const unsigned bits : {14u, 17u, 21u}) {
     const Format format{.bits = bits};
     const Wire wire = stream(format, 100, 150);
     for (std::size_t piece = 1; piece <= wire.size(); ++piece) {
       StreamDecoder decoder(format);
-      const Heard heard = hear(decoder, wire, piece);
-      EXPECT_EQ(heard.positions, range(100, 150)) << bits << " bits in pieces of " << piece;
-      EXPECT_TRUE(heard.errors.empty());
+      const StreamResults results = decode_stream(decoder, wire, piece);
+      EXPECT_EQ(results.positions, range(100, 150)) << bits << " bits in pieces of " << piece;
+      EXPECT_TRUE(results.errors.empty());
       EXPECT_EQ(decoder.skipped(), 0u);
     }
   }
 }
 
-TEST(RaaStream, ADisturbanceCostsWhatItHits) {
+TEST(Raa38SerialStream, DisturbanceCostsOnlyFramesItHits) {
   const Format format{.bits = 14};
   const std::size_t size = format.frame_bytes();
   for (std::size_t piece = 1; piece < 23; ++piece) {
     Wire flipped = stream(format, 100, 110);
     flipped[5 * size + 3] ^= 0x10;
     StreamDecoder decoder(format);
-    Heard heard = hear(decoder, flipped, piece);
+    StreamResults results = decode_stream(decoder, flipped, piece);
     std::vector<std::uint32_t> wanted = range(100, 110);
     wanted.erase(wanted.begin() + 5);
-    EXPECT_EQ(heard.positions, wanted);
-    EXPECT_EQ(heard.errors, std::vector{Error::bad_checksum});
+    EXPECT_EQ(results.positions, wanted);
+    EXPECT_EQ(results.errors, std::vector{Error::bad_checksum});
     EXPECT_EQ(decoder.skipped(), size);
 
     Wire longer = stream(format, 100, 110);
     longer.insert(longer.begin() + 5 * static_cast<std::ptrdiff_t>(size), {0xFF, 0x81, 0x00});
     StreamDecoder other(format);
-    heard = hear(other, longer, piece);
-    EXPECT_EQ(heard.positions, range(100, 110)) << "what came in between hit no frame";
-    EXPECT_EQ(heard.errors.size(), 1u);
+    results = decode_stream(other, longer, piece);
+    EXPECT_EQ(results.positions, range(100, 110)) << "what came in between hit no frame";
+    EXPECT_EQ(results.errors.size(), 1u);
     EXPECT_EQ(other.skipped(), 3u);
   }
 }
 
-TEST(RaaStream, BeginsInTheMiddleOfAFrameWithTheHeaderInItsData) {
+TEST(Raa38SerialStream, AlignsInMiddleOfFrameWithHeaderInData) {
   const Format format{.bits = 14};
   Wire wire;
   for (int i = 0; i < 5; ++i) append(wire, encode_position(format, {0x3F81}));  // the frame is FF 81 3F 81 40
   for (std::size_t cut = 0; cut < 5; ++cut) {
     StreamDecoder decoder(format);
-    const Heard heard = hear(decoder, Bytes(wire).subspan(cut));
-    EXPECT_EQ(heard.positions, std::vector<std::uint32_t>(cut == 0 ? 5 : 4, 0x3F81));
+    const StreamResults results = decode_stream(decoder, Bytes(wire).subspan(cut));
+    EXPECT_EQ(results.positions, std::vector<std::uint32_t>(cut == 0 ? 5 : 4, 0x3F81));
   }
 }
 
-TEST(RaaStream, FramesOfAnotherNumberAreNone) {
+TEST(Raa38SerialStream, IgnoresFramesOfOtherUnits) {
   for (const SecondByte form : {SecondByte::automatic, SecondByte::echo}) {
     const Format format{.second_byte = form, .unit = 1};
     Wire wire;
     for (std::uint32_t value = 1; value < 5; ++value) append(wire, encode_position(format, {value, 0xB2}));
     StreamDecoder decoder(format);
-    EXPECT_TRUE(hear(decoder, wire).positions.empty());
+    EXPECT_TRUE(decode_stream(decoder, wire).positions.empty());
   }
 }
 
 // Two bytes are lost: FF 81 02 .. .. FF 81 02 09 8B. The first five bytes have a valid checksum and fit into 10 bits.
-TEST(RaaStream, AHeaderThatSlippedIntoAFrameIsNoPosition) {
+TEST(Raa38SerialStream, RejectsFrameWithHeaderInside) {
   const Format format{.bits = 10};
   for (std::size_t piece = 1; piece < 20; ++piece) {
     Wire wire = stream(format, 0x200, 0x203);
@@ -111,69 +111,69 @@ TEST(RaaStream, AHeaderThatSlippedIntoAFrameIsNoPosition) {
     StreamDecoder decoder(format);
     std::vector<std::uint32_t> wanted = range(0x200, 0x203);
     for (const std::uint32_t position : range(0x209, 0x20C)) wanted.push_back(position);
-    EXPECT_EQ(hear(decoder, wire, piece).positions, wanted) << piece;
+    EXPECT_EQ(decode_stream(decoder, wire, piece).positions, wanted) << piece;
   }
 }
 
 // The checksum of FF 81 00 7F is FF: such a frame waits for the next header, but not longer.
-TEST(RaaStream, AFrameWithFFInsideWaitsForTheNextHeader) {
+TEST(Raa38SerialStream, FrameWithFFWaitsForNextHeader) {
   const Format format{.bits = 14};
   StreamDecoder decoder(format);
   Wire wire = stream(format, 0x7D, 0x7F);
-  EXPECT_EQ(hear(decoder, wire).positions, range(0x7D, 0x7E));
-  EXPECT_EQ(hear(decoder, hex<"ff81">).positions, range(0x7F, 0x7F));
-  EXPECT_EQ(hear(decoder, hex<"008000">).positions, range(0x80, 0x80));
+  EXPECT_EQ(decode_stream(decoder, wire).positions, range(0x7D, 0x7E));
+  EXPECT_EQ(decode_stream(decoder, hex<"ff81">).positions, range(0x7F, 0x7F));
+  EXPECT_EQ(decode_stream(decoder, hex<"008000">).positions, range(0x80, 0x80));
 }
 
-TEST(RaaStream, TellsEachLossOnceAndWhy) {
+TEST(Raa38SerialStream, ReportsEachLossOnce) {
   const Format format{.bits = 14};
   Wire wire = stream(format, 1, 2);
   append(wire, encode_position({.bits = 16}, {0x4001}));
   for (int i = 0; i < 20; ++i) wire.push_back(0x55);
   StreamDecoder decoder(format);
-  EXPECT_EQ(hear(decoder, wire).errors, std::vector{Error::out_of_range});
+  EXPECT_EQ(decode_stream(decoder, wire).errors, std::vector{Error::out_of_range});
   EXPECT_TRUE(decoder.saw_larger_positions());
   EXPECT_FALSE(decoder.in_step());
   EXPECT_EQ(decoder.bad().size(), 5u);
 }
 
-TEST(RaaStream, ADamagedCharacterIsADisturbance) {
+TEST(Raa38SerialStream, DamagedCharacterEndsAlignment) {
   const Format format{.bits = 14};
   StreamDecoder decoder(format);
   const Wire wire = stream(format, 1, 4);
-  EXPECT_EQ(hear(decoder, Bytes(wire).first(17)).positions, range(1, 3));
+  EXPECT_EQ(decode_stream(decoder, Bytes(wire).first(17)).positions, range(1, 3));
   std::vector<Error> errors;
-  decoder.disturbed([&](const Found& found) { errors.push_back(found.error); });
+  decoder.disturbed([&](const StreamFrame& found) { errors.push_back(found.error); });
   EXPECT_EQ(errors, std::vector{Error::bad_framing});
-  EXPECT_EQ(hear(decoder, stream(format, 5, 7)).positions, range(5, 7));
+  EXPECT_EQ(decode_stream(decoder, stream(format, 5, 7)).positions, range(5, 7));
 }
 
 // ---- Refresh rate: rejects frames that pass checksum and range
 
-TEST(RaaStream, FramesNearerThanTheRefreshRateAllowsAreNone) {
+TEST(Raa38SerialStream, RejectsFramesCloserThanRefreshRate) {
   const Format format{.bits = 14};
   const Wire burst = stream(format, 1, 2);
   StreamDecoder strict({.bits = 14, .refresh_millihertz = 100'000});
   StreamDecoder plain(format);
-  std::size_t believed = 0;
-  std::size_t believed_plainly = 0;
+  std::size_t accepted = 0;
+  std::size_t accepted_without_rate = 0;
   for (std::size_t i = 0; i < burst.size(); ++i) {
     const Time at = 87us * static_cast<int>(i);
-    strict.feed(Bytes(burst).subspan(i, 1), at, [&](const Found&) { ++believed; });
-    plain.feed(Bytes(burst).subspan(i, 1), at, [&](const Found&) { ++believed_plainly; });
+    strict.feed(Bytes(burst).subspan(i, 1), at, [&](const StreamFrame&) { ++accepted; });
+    plain.feed(Bytes(burst).subspan(i, 1), at, [&](const StreamFrame&) { ++accepted_without_rate; });
   }
-  EXPECT_EQ(believed, 0u);
-  EXPECT_EQ(believed_plainly, 2u);
+  EXPECT_EQ(accepted, 0u);
+  EXPECT_EQ(accepted_without_rate, 2u);
 }
 
 // The operating system delivers bytes in pieces of any size; this must not prevent the alignment to a valid stream.
-TEST(RaaStream, PiecesThatEndInsideEveryFrameOnlyDelay) {
+TEST(Raa38SerialStream, AlignsWhenPiecesEndInsideFrames) {
   const Format format{.bits = 14};
   const Wire wire = stream(format, 1, 100);
   for (std::size_t cut = 1; cut < 5; ++cut) {
     StreamDecoder decoder({.bits = 14, .refresh_millihertz = 1'000'000});
     std::vector<std::uint32_t> positions;
-    const auto keep = [&](const Found& found) { positions.push_back(found.singleturn); };
+    const auto keep = [&](const StreamFrame& found) { positions.push_back(found.singleturn); };
     decoder.feed(Bytes(wire).first(cut), Time{}, keep);
     for (std::size_t at = cut; at + 5 <= wire.size(); at += 5) {
       decoder.feed(Bytes(wire).subspan(at, 5), Time(1ms) * static_cast<int>(at / 5 + 1), keep);
@@ -221,10 +221,10 @@ bool disturb(Wire& wire, std::size_t size, sim::Random& random) {
 
 // Compares sent and received positions in order. A received position that was not sent next is wrong; a sent one that
 // was not received is lost.
-void judge(Tally& tally, const std::vector<Sent>& sent, const std::vector<std::uint32_t>& heard) {
+void judge_option(Tally& tally, const std::vector<Sent>& sent, const std::vector<std::uint32_t>& results) {
   constexpr std::size_t most_missing = 12;  // most lost frames in a row
   std::size_t next = 0;
-  for (const std::uint32_t position : heard) {
+  for (const std::uint32_t position : results) {
     const std::size_t end = std::min(sent.size(), next + most_missing);
     std::size_t found = next;
     while (found < end && sent[found].position != position) ++found;
@@ -256,11 +256,11 @@ void pollute(Tally& tally, const Format& format, std::uint64_t frames) {
     }
     tally.sent += sent.size();
     tally.disturbances += 50;
-    judge(tally, sent, hear(decoder, wire, 1 + random.below(300)).positions);
+    judge_option(tally, sent, decode_stream(decoder, wire, 1 + random.below(300)).positions);
   }
 }
 
-TEST(RaaStream, AMillionFramesCutJoinedAndPolluted) {
+TEST(Raa38SerialStream, SurvivesMillionDisturbedFrames) {
   Tally all;
   for (const unsigned bits : {10u, 14u, 16u, 17u, 21u}) pollute(all, {.bits = bits}, 200'000);
   std::printf("%llu frames, %llu disturbances: %llu good frames lost, %llu positions wrong\n",

@@ -52,18 +52,18 @@ constexpr std::size_t second_byte_option = options.find("second_byte");
 
 FrameEnd frame_end(const Options& values, Direction direction, Bytes bytes) {
   const Format format = options.format(values);
-  const bool asks = direction == Direction::request;
-  const std::size_t size = asks ? request_bytes : format.frame_bytes();
-  if (!bytes.empty() && bytes[0] != (asks ? encode_request({})[0] : header)) return {FrameEnd::Kind::no_frame};
+  const bool is_request = direction == Direction::request;
+  const std::size_t size = is_request ? request_bytes : format.frame_bytes();
+  if (!bytes.empty() && bytes[0] != (is_request ? encode_request({})[0] : header)) return {FrameEnd::Kind::no_frame};
   if (bytes.size() < size) return {FrameEnd::Kind::incomplete, size};
-  const bool good =
-      asks ? decode_request(bytes.first(size)).has_value() : decode_position(format, bytes.first(size)).has_value();
+  const bool good = is_request ? decode_request(bytes.first(size)).has_value()
+                               : decode_position(format, bytes.first(size)).has_value();
   return good ? FrameEnd{FrameEnd::Kind::complete, size} : FrameEnd{FrameEnd::Kind::no_frame};
 }
 
 // ---- Evidence of captured frames for bits and second_byte
 
-std::string_view against_bits(std::int64_t bits, Bytes reply) {
+std::string_view bits_contradiction(std::int64_t bits, Bytes reply) {
   if (reply.empty()) return {};
   const Error error = decode_position({.bits = static_cast<unsigned>(bits)}, reply).error();
   if (error == Error::wrong_length) return "it has another number of data bytes";
@@ -72,10 +72,10 @@ std::string_view against_bits(std::int64_t bits, Bytes reply) {
 
 int unit_of(const Capture& capture) {
   const Result<Request> asked = decode_request(capture.request);
-  return asked ? asked->unit : anybody;
+  return asked ? asked->unit : any_unit;
 }
 
-std::string_view against_second_byte(SecondByte form, const Capture& capture) {
+std::string_view second_byte_contradiction(SecondByte form, const Capture& capture) {
   const Bytes reply = capture.reply;
   if (reply.size() < 2 || second_byte_fits({.second_byte = form}, unit_of(capture), reply[1])) return {};
   return form == SecondByte::fixed ? "its second byte is not 81" : "its second byte is not the number";
@@ -83,12 +83,12 @@ std::string_view against_second_byte(SecondByte form, const Capture& capture) {
 
 bool probe(Options& values, std::span<const Capture> captures, EvidenceSink& sink) {
   constexpr std::string_view fits = "every frame fits";
-  judge(sink, bits_option, least_bits, most_bits, captures.size(), values.values[bits_option], fits,
-        [&](std::int64_t bits, std::size_t i) { return against_bits(bits, captures[i].reply); });
-  judge(sink, second_byte_option, 0, second_byte_choices.size() - 1, captures.size(), values.values[second_byte_option],
-        fits, [&](std::int64_t form, std::size_t i) {
-          return against_second_byte(static_cast<SecondByte>(form), captures[i]);
-        });
+  judge_option(sink, bits_option, least_bits, most_bits, captures.size(), values.values[bits_option], fits,
+               [&](std::int64_t bits, std::size_t i) { return bits_contradiction(bits, captures[i].reply); });
+  judge_option(sink, second_byte_option, 0, second_byte_choices.size() - 1, captures.size(),
+               values.values[second_byte_option], fits, [&](std::int64_t form, std::size_t i) {
+                 return second_byte_contradiction(static_cast<SecondByte>(form), captures[i]);
+               });
   const Format format = options.format(values);
   return std::all_of(captures.begin(), captures.end(), [&](const Capture& capture) {
     return capture.reply.empty() || decode_position(format, capture.reply, unit_of(capture)).has_value();

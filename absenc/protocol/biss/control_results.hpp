@@ -58,26 +58,26 @@ class MakerName {
   Buffer<char, 8> text_;
 };
 
-/// Values that a procedure found.
-struct Found {
-  /// Of a control frame.
+/// Results of a captured control frame, or of a procedure; empty members are not reported.
+struct ControlResults {
+  // ---- Results of a control frame
   std::optional<std::uint8_t> slaves{};
   std::optional<bool> more_slaves{};            ///< Value of the field `more_slaves`, if there is one.
   std::optional<std::string_view> operation{};  ///< Value of the field `operation`, if there is one.
-  std::optional<std::uint8_t> slave_id{};       ///< Value of the field `slave_id`, if there is one.
+  std::optional<std::uint8_t> slave_id{};       ///< Slave whose register was accessed.
   std::optional<std::uint8_t> bank{};           ///< Value of the field `bank`, if there is one.
-  std::optional<std::uint8_t> address{};        ///< Address.
+  std::optional<std::uint8_t> address{};        ///< Address of the first register.
   std::optional<std::uint8_t> value{};          ///< Value of the field `value`, if there is one.
   ByteBuffer<control_most> bytes;               ///< Bytes of the registers.
   bool has_data = false;                        ///< Whether `bytes` holds data.
-  NumberList start_delay;                       ///< Start delay of each slave.
+  NumberList start_delay;                       ///< Frames by which each byte was delayed.
   std::optional<bool> next_address_accepted{};  ///< Value of the field `next_address_accepted`, if there is one.
   std::optional<std::uint8_t> command{};        ///< Value of the field `command`, if there is one.
   std::optional<bool> broadcast{};              ///< Value of the field `broadcast`, if there is one.
   NumberList slave_ids;                         ///< Identifiers of the slaves.
   NumberList acknowledged;                      ///< Slaves that acknowledged.
   std::optional<bool> executed{};               ///< Value of the field `executed`, if there is one.
-  // Of procedures.
+  // ---- Results of procedures
   std::optional<bool> written{};                 ///< false: the register had this value already, so nothing was written
   std::optional<bool> missing{};                 ///< true: the encoder refused the register; otherwise not set
   std::optional<std::uint8_t> eds_bank{};        ///< Value of the field `eds_bank`, if there is one.
@@ -94,41 +94,46 @@ template <class Text>
 constexpr std::optional<std::string_view> some(const Text& list) {
   return list.empty() ? std::nullopt : std::optional(list.view());
 }
-constexpr std::optional<Bytes> data(const Found& found) { return some(found.bytes, found.has_data); }
-constexpr std::optional<std::string_view> start_delay(const Found& found) { return some(found.start_delay); }
-constexpr std::optional<std::string_view> slave_ids(const Found& found) { return some(found.slave_ids); }
-constexpr std::optional<std::string_view> acknowledged(const Found& found) { return some(found.acknowledged); }
-constexpr std::optional<Bytes> device_id(const Found& found) { return some(found.device_id, !found.device_id.empty()); }
-constexpr std::optional<std::string_view> manufacturer(const Found& found) { return some(found.manufacturer); }
+constexpr std::optional<Bytes> data(const ControlResults& found) { return some(found.bytes, found.has_data); }
+constexpr std::optional<std::string_view> start_delay(const ControlResults& found) { return some(found.start_delay); }
+constexpr std::optional<std::string_view> slave_ids(const ControlResults& found) { return some(found.slave_ids); }
+constexpr std::optional<std::string_view> acknowledged(const ControlResults& found) { return some(found.acknowledged); }
+constexpr std::optional<Bytes> device_id(const ControlResults& found) {
+  return some(found.device_id, !found.device_id.empty());
+}
+constexpr std::optional<std::string_view> manufacturer(const ControlResults& found) { return some(found.manufacturer); }
 }  // namespace shown
 
-inline constexpr auto register_fields = author::fields_of<Found>(
-    author::field<&Found::slaves>("slaves", "", "how many encoders have an ID"),
-    author::field<&Found::more_slaves>("more_slaves", "", "whether there are some without an ID"),
-    author::field<&Found::operation>("operation", "", "what is asked: read, write or command"),
-    author::field<&Found::slave_id>("slave_id", "", "whose registers: 0 is the encoder at the end of the line"),
-    author::field<&Found::bank>("bank", "", "which bank was selected for it"),
-    author::field<&Found::address>("address", "", "of the first register"),
-    author::field<&Found::value>("value", "", "the register", Role::value),
+inline constexpr auto register_fields = author::fields_of<ControlResults>(
+    author::field<&ControlResults::slaves>("slaves", "", "how many encoders have an ID"),
+    author::field<&ControlResults::more_slaves>("more_slaves", "", "whether there are some without an ID"),
+    author::field<&ControlResults::operation>("operation", "", "what is asked: read, write or command"),
+    author::field<&ControlResults::slave_id>("slave_id", "",
+                                             "whose registers: 0 is the encoder at the end of the line"),
+    author::field<&ControlResults::bank>("bank", "", "which bank was selected for it"),
+    author::field<&ControlResults::address>("address", "", "of the first register"),
+    author::field<&ControlResults::value>("value", "", "the register", Role::value),
     author::field<shown::data>("data", "", "the registers one behind the other", Role::data),
     author::field<shown::start_delay>("start_delay", "", "how many frames the encoder took for each of them"),
-    author::field<&Found::next_address_accepted>("next_address_accepted", "", "whether the one behind could follow"),
-    author::field<&Found::command>("command", "", "its number"),
-    author::field<&Found::broadcast>("broadcast", "", "whether it is for all, who do not answer"),
+    author::field<&ControlResults::next_address_accepted>("next_address_accepted", "",
+                                                          "whether the one behind could follow"),
+    author::field<&ControlResults::command>("command", "", "its number"),
+    author::field<&ControlResults::broadcast>("broadcast", "", "whether it is for all, who do not answer"),
     author::field<shown::slave_ids>("slave_ids", "", "who is addressed"),
     author::field<shown::acknowledged>("acknowledged", "", "who has acknowledged it"),
-    author::field<&Found::executed>("executed", "", "whether the host had it executed"),
-    author::field<&Found::written>("written", "", "whether it was written: what is there already is not"),
-    author::field<&Found::missing>("missing", "", "the encoder refuses to show this register: it does not have it"),
-    author::field<&Found::eds_bank>("eds_bank", "", "bank of the electronic data sheet; 0: none"),
-    author::field<&Found::profile>("profile", "", "of the encoder", Role::identity),
-    author::field<&Found::serial_number>("serial_number", "", "of the encoder", Role::identity),
+    author::field<&ControlResults::executed>("executed", "", "whether the host had it executed"),
+    author::field<&ControlResults::written>("written", "", "whether it was written: what is there already is not"),
+    author::field<&ControlResults::missing>("missing", "",
+                                            "the encoder refuses to show this register: it does not have it"),
+    author::field<&ControlResults::eds_bank>("eds_bank", "", "bank of the electronic data sheet; 0: none"),
+    author::field<&ControlResults::profile>("profile", "", "of the encoder", Role::identity),
+    author::field<&ControlResults::serial_number>("serial_number", "", "of the encoder", Role::identity),
     author::field<shown::device_id>("device_id", "", "of the encoder", Role::identity),
     author::field<shown::manufacturer>("manufacturer", "", "two letters, which the BiSS Association gives",
                                        Role::identity));
 
 /// Stores the value of the named register at `address`.
-constexpr void tell(Found& found, RegisterOrder order, unsigned address, Bytes bytes) {
+constexpr void store_register(ControlResults& found, RegisterOrder order, unsigned address, Bytes bytes) {
   const std::uint64_t number = order == RegisterOrder::big ? load_big_endian(bytes) : load_little_endian(bytes);
   switch (address) {
     case registers::bank_select:
@@ -152,7 +157,7 @@ constexpr void tell(Found& found, RegisterOrder order, unsigned address, Bytes b
 }
 
 /// Returns the fields of a control frame; without an answer, those of its request.
-[[nodiscard]] constexpr Found shown_by(const ControlFrame& frame, bool answered) {
+[[nodiscard]] constexpr ControlResults results_of(const ControlFrame& frame, bool answered) {
   constexpr std::array<std::string_view, 3> names{"read", "write", "command"};
   const ControlRequest& request = frame.request;
   const auto put_mask = [](NumberList& list, std::uint8_t mask) {
@@ -160,7 +165,7 @@ constexpr void tell(Found& found, RegisterOrder order, unsigned address, Bytes b
       if ((mask >> i & 1) != 0) list.add(i);
     }
   };
-  Found found;
+  ControlResults found;
   found.operation = names[static_cast<std::size_t>(request.operation)];
   if (answered) {
     found.slaves = frame.slaves;

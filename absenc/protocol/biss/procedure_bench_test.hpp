@@ -18,20 +18,20 @@ namespace absenc::biss::testing {
 inline constexpr Format bits_24{.word = "position:24 error:1! warning:1!"_word};
 
 template <auto procedure, auto... bound>
-struct Asking final : author::Run<Protocol, Found, procedure, bound...> {
-  using author::Run<Protocol, Found, procedure, bound...>::Run;
+struct ProcedureRun final : author::Run<Protocol, ControlResults, procedure, bound...> {
+  using author::Run<Protocol, ControlResults, procedure, bound...>::Run;
   void report(FieldSink&) const override {}
 };
 
-struct Questions {
-  explicit Questions(const Format& of = bits_24) : format(of), encoder(of, motion) {
+struct ProcedureBench {
+  explicit ProcedureBench(const Format& of = bits_24) : format(of), encoder(of, motion) {
     encoder.power_on(Time{}, Device<std::uint8_t>::PowerOn::skip);
     line.attach(sim::Role::device, encoder);
   }
   template <auto procedure, auto... bound>
-  Found ask(std::initializer_list<std::int64_t> arguments = {}, Error expected = Error::none) {
+  ControlResults ask(std::initializer_list<std::int64_t> arguments = {}, Error expected = Error::none) {
     std::vector<std::byte> storage(4096);
-    Asking<procedure, bound...> asking(format, {arguments.begin(), arguments.size()}, storage);
+    ProcedureRun<procedure, bound...> asking(format, {arguments.begin(), arguments.size()}, storage);
     if (node == none) {
       node = line.attach(sim::Role::host, asking);
     } else {
