@@ -140,7 +140,7 @@ void set_rate(Dialog& dialog, std::uint32_t rate) {
 
 // Called when no encoder answered at the address of the format. Sends A0 and ends the command if an encoder reports
 // another address. `baud`: rate to which the line is set.
-Part<bool> check_other_address(Dialog& dialog, Found& found, std::uint32_t baud) {
+Part<bool> check_other_address(Dialog& dialog, CommandValues& found, std::uint32_t baud) {
   const std::uint8_t asked = dialog.format().address;
   const Result<Reply> reply_to_a0 = co_await dialog.attempt(address_request).repeated(2);
   if (!reply_to_a0 || reply_to_a0->address == asked) co_return false;
@@ -158,7 +158,7 @@ Part<bool> check_other_address(Dialog& dialog, Found& found, std::uint32_t baud)
 
 // Reads the position of the encoder at the address of the format, up to `attempts` times. Stops the procedure if that
 // fails.
-Part<Reply> read_own_position(Dialog& dialog, Found& found, unsigned attempts) {
+Part<Reply> read_own_position(Dialog& dialog, CommandValues& found, unsigned attempts) {
   const Result<Reply> reply = co_await read_position(dialog, dialog.format().address, attempts);
   if (!reply) {
     const Outcome failed{reply.error()};
@@ -170,7 +170,7 @@ Part<Reply> read_own_position(Dialog& dialog, Found& found, unsigned attempts) {
 }
 
 // Stores the position of the last reply in `found`.
-void show_position(const Dialog& dialog, Found& found) {
+void show_position(const Dialog& dialog, CommandValues& found) {
   found.reading = dialog.last_reading();
   found.singleturn = dialog.last().singleturn;
   found.angle = degrees(dialog.last().singleturn, dialog.format().bits);
@@ -200,20 +200,20 @@ Part<Outcome> verify_setting(Dialog& dialog, std::uint8_t address, std::uint32_t
 
 // ---- Reading
 
-Procedure read_position_once(Dialog& dialog, Found& found) {
+Procedure read_position_once(Dialog& dialog, CommandValues& found) {
   co_await read_own_position(dialog, found, 1);
   show_position(dialog, found);
   co_return done;
 }
 
-Procedure read_direction(Dialog& dialog, Found& found) {
+Procedure read_direction(Dialog& dialog, CommandValues& found) {
   const Reply reply = co_await read_own_position(dialog, found, 1);
   found.singleturn = reply.singleturn;
   found.direction = "the encoder does not tell: turn the shaft and see";
   co_return done;
 }
 
-Procedure read_address(Dialog& dialog, Found& found) {
+Procedure read_address(Dialog& dialog, CommandValues& found) {
   const Result<Reply> reply = co_await dialog.attempt(address_request).repeated(2);
   const std::uint8_t address = reply ? reply->address : dialog.format().address;
   found.address = address;
@@ -222,7 +222,7 @@ Procedure read_address(Dialog& dialog, Found& found) {
   co_return {position.error()};
 }
 
-Procedure find_baud(Dialog& dialog, Found& found) {
+Procedure find_baud(Dialog& dialog, CommandValues& found) {
   const std::size_t own = dialog.format().baud;
   found.baud = bauds[own];
   const Result<Reply> first = co_await read_position(dialog, dialog.format().address, 2);
@@ -284,7 +284,7 @@ Procedure scan(Dialog& dialog, Slaves& found, Arguments arguments) {
 
 // ---- Settings
 
-Procedure set_address(Dialog& dialog, Found& found, Arguments arguments) {
+Procedure set_address(Dialog& dialog, CommandValues& found, Arguments arguments) {
   const auto address = static_cast<std::uint8_t>(arguments[0]);
   const Format& format = dialog.format();
   found.address = address;
@@ -313,7 +313,7 @@ Procedure set_address(Dialog& dialog, Found& found, Arguments arguments) {
   co_return end;
 }
 
-Procedure set_baud(Dialog& dialog, Found& found, Arguments arguments) {
+Procedure set_baud(Dialog& dialog, CommandValues& found, Arguments arguments) {
   const std::optional<std::size_t> baud = baud_index(static_cast<std::uint64_t>(arguments[0]));
   const Format& format = dialog.format();
   if (!baud) {
@@ -334,7 +334,7 @@ Procedure set_baud(Dialog& dialog, Found& found, Arguments arguments) {
   co_return end;
 }
 
-Procedure set_direction(Dialog& dialog, Found& found, Arguments arguments) {
+Procedure set_direction(Dialog& dialog, CommandValues& found, Arguments arguments) {
   const unsigned bits = dialog.format().bits;
   const auto value = static_cast<std::uint8_t>(arguments[0]);
   found.parameter = value;
@@ -360,7 +360,7 @@ Procedure set_direction(Dialog& dialog, Found& found, Arguments arguments) {
   co_return done;
 }
 
-Procedure set_zero(Dialog& dialog, Found& found, Arguments arguments) {
+Procedure set_zero(Dialog& dialog, CommandValues& found, Arguments arguments) {
   const unsigned bits = dialog.format().bits;
   const Reply first = co_await read_own_position(dialog, found, 3);
   co_await dialog.rest(between_looks);

@@ -40,7 +40,7 @@ struct Values {
 };
 
 /// Result of a command.
-struct Found : Values {
+struct CommandValues : Values {
   Reading reading{};  ///< The position.
   Sentence words{};   ///< text of the error's detail
 };
@@ -50,18 +50,18 @@ using Dialog = author::DialogOf<Protocol>;
 // If no encoder answers at the address of the format, all these procedures send A0 and name the address in its reply.
 
 /// Reads the position once.
-author::Procedure read_position_once(Dialog& dialog, Found& found);
+author::Procedure read_position_once(Dialog& dialog, CommandValues& found);
 
 /// Reads the position: no command reads the direction, so the position is all that can be reported.
-author::Procedure read_direction(Dialog& dialog, Found& found);
+author::Procedure read_direction(Dialog& dialog, CommandValues& found);
 
 /// Reads the address with A0. If A0 gets no valid reply, as with several encoders on the line, checks whether the
 /// encoder at the address of the format answers.
-author::Procedure read_address(Dialog& dialog, Found& found);
+author::Procedure read_address(Dialog& dialog, CommandValues& found);
 
 /// Finds the baud rate at which the encoder answers: first that of the format, then the others. Leaves the line at its
 /// old rate. Error: timeout, or that of the reply at the rate of the format.
-author::Procedure find_baud(Dialog& dialog, Found& found);
+author::Procedure find_baud(Dialog& dialog, CommandValues& found);
 
 /// Finds the slaves on a line. Sends A0 first, which a single encoder answers, otherwise requests every address from
 /// the first argument to the second. If all replies of an address are damaged, two encoders share it or the line is
@@ -76,18 +76,18 @@ author::Procedure scan(Dialog& dialog, Slaves& found, Arguments arguments);
 /// Sets the address with A1. Refuses an address at which another slave answers (invalid_argument). Reads the position
 /// at the new address to verify; errors: cross_check_failed (it still has its old address), timeout (it answers at
 /// neither).
-author::Procedure set_address(Dialog& dialog, Found& found, Arguments arguments);
+author::Procedure set_address(Dialog& dialog, CommandValues& found, Arguments arguments);
 
 /// Sets the baud rate with CC, sets the line to it and verifies there. Errors: invalid_argument (the encoder does not
 /// have this rate), cross_check_failed (it still has its old rate), timeout (it answers at neither). After an error the
 /// line has its old rate.
-author::Procedure set_baud(Dialog& dialog, Found& found, Arguments arguments);
+author::Procedure set_baud(Dialog& dialog, CommandValues& found, Arguments arguments);
 
 /// Sets the direction with CC. Only the echo of the request confirms it. Reports how the position changed.
-author::Procedure set_direction(Dialog& dialog, Found& found, Arguments arguments);
+author::Procedure set_direction(Dialog& dialog, CommandValues& found, Arguments arguments);
 
 /// Makes the present position zero with CC 00. Errors also: not_still (the shaft turns), cross_check_failed (the
 /// position is not zero afterwards).
-author::Procedure set_zero(Dialog& dialog, Found& found, Arguments arguments);
+author::Procedure set_zero(Dialog& dialog, CommandValues& found, Arguments arguments);
 
 }  // namespace absenc::raa38::rtu

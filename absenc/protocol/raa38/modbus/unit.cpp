@@ -210,7 +210,7 @@ constexpr Values values_of_reply(const Format& format, const Request&, const Rep
   if (reply.function == function::set_parameter) show_setting(values, reply.value);
   return values;
 }
-void put_found(FieldSink& sink, const Format&, const Found& found) { fields.put(sink, found); }
+void put_found(FieldSink& sink, const Format&, const CommandValues& found) { fields.put(sink, found); }
 void put_slaves(FieldSink& sink, const Format&, const Slaves& found) {
   using Kind = Slaves::Kind;
   for (std::size_t i = 0; i < found.at.size(); ++i) {
@@ -227,7 +227,7 @@ constexpr author::Report<Protocol> report{
     .put_reply = author::put_values<fields, values_of_reply>,
     .explain = explain,
 };
-constexpr author::Finding<Format, Found> found{.put = put_found};
+constexpr author::Finding<Format, CommandValues> found{.put = put_found};
 constexpr author::Finding<Format, Slaves> slaves{.put = put_slaves};
 
 // ---- Commands
