@@ -16,15 +16,15 @@ struct ChainFormat {
   std::array<Channel, most> channels{};  ///< Channels in the order of the line.
   std::uint8_t count = 2;                ///< Number of channels in use.
   std::uint8_t slave = 0;                ///< the slave whose position a reading shows and whose registers are accessed
-  RegisterOrder register_order = RegisterOrder::big;  ///< Order of the bytes of registers.
+  RegisterOrder register_order = RegisterOrder::big;  ///< Byte order of registers that together are one number.
   std::uint16_t register_delay_us = 0;  ///< Time until a virtual encoder has a requested register ready, in us.
   bool start_sequence = false;          ///< Whether SLO of a virtual encoder stays idle until the start sequence.
   Timeout timeout{};                    ///< Timeout of the encoder.
   StopBit stop_bit = StopBit::next;     ///< The bit P that a virtual encoder sends after each register.
-  /// These members mean the same as in Format.
-  std::uint32_t ma_khz = 1000;
-  Time latency = 10us;  ///< Time that the encoder takes before its start bit.
-  Time ready{};         ///< Time that a virtual encoder needs for a position; 0: as `latency`, at most 10 us.
+  // ---- The following members mean the same as in Format.
+  std::uint32_t ma_khz = 1000;  ///< Clock MA in kHz.
+  Time latency = 10us;          ///< Time that the encoder takes before its start bit.
+  Time ready{};                 ///< Time that a virtual encoder needs for a position; 0: as `latency`, at most 10 us.
   std::uint32_t line_delay_ns = 0;  ///< Delay of the line in nanoseconds.
   Scale scale{};                    ///< scale of all linear encoders in the chain
 
@@ -53,7 +53,7 @@ struct ChainFormat {
 
 /// A reply of several encoders in a chain.
 struct ChainReply {
-  unsigned ack_bits = 1;  ///< Number of acknowledge bits: clocks from the first edge to the start bit.
+  unsigned ack_bits = 1;  ///< Number of ACK bits: zeros between the idle samples and the start bit.
   std::array<ChannelData, ChainFormat::most> channels{};  ///< Data of each channel.
   unsigned delay_bits = 0;                                ///< Extra idle samples: the delay of the line in clocks.
   bool cds = false;                                       ///< Bit of control data that the encoder sent.

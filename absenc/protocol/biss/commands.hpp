@@ -31,7 +31,7 @@ inline constexpr std::array<Argument, 2> command_arguments{
 struct NamedRegister {
   std::string_view name;     ///< Name of the register.
   unsigned address;          ///< Address of the register.
-  std::string_view meaning;  ///< What the register holds.
+  std::string_view meaning;  ///< Content of the register, in words.
 };
 inline constexpr std::array<NamedRegister, 6> named_registers{{
     {"bank", registers::bank_select, "which bank addresses 0 to 63 mean"},
@@ -55,7 +55,7 @@ struct TimeoutSettings {
   std::uint16_t timeout_tenths = 0;  ///< fixed timeout in 0.1 us; 0: unknown
   bool adaptive_timeout = false;     ///< Whether the encoder adapts its timeout to the clock.
 
-  /// Returns the timeout that the options name.
+  /// Returns the timeout that the options set.
   [[nodiscard]] constexpr Timeout timeout_given() const {
     if (adaptive_timeout) return Timeout::adaptive();
     return timeout_tenths == 0 ? Timeout{} : Timeout::fixed(Time(timeout_tenths * 100));

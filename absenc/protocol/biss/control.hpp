@@ -27,7 +27,7 @@ inline constexpr Check crc4{4, 0x3};
   return static_cast<std::uint8_t>(detail::crc_bit_by_bit(crc4, BitNumber{bits, count}, 0, count));
 }
 
-/// What a control frame asks for.
+/// The request of a control frame.
 struct ControlRequest {
   /// Kind of the request.
   enum class Operation : std::uint8_t { read, write, command };
@@ -37,7 +37,7 @@ struct ControlRequest {
   std::uint8_t slaves = 0;  ///< slaves that receive a command: bit n is slave n; 0: all slaves, without acknowledgement
   std::uint8_t command = 0;  ///< number of a command, 0 to 3
 
-  /// Returns whether it is a command.
+  /// Returns whether the request is a command.
   [[nodiscard]] constexpr bool is_command() const { return operation == Operation::command; }
   /// Compares all members.
   friend constexpr bool operator==(const ControlRequest&, const ControlRequest&) = default;
@@ -74,14 +74,14 @@ inline constexpr unsigned header_bits = 15;  // bits after the start bit: CTS, t
 
 /// A control frame with the answer of the encoders.
 struct ControlFrame {
-  ControlRequest request{};                         ///< What the frame asks for.
+  ControlRequest request{};                         ///< Request of the frame.
   std::uint8_t slaves = 0;                          ///< number of slaves with an ID, from the lock bits
   bool more_slaves = false;                         ///< there are slaves without an ID
   ByteBuffer<control_most> data;                    ///< Data bytes of the frame.
   Buffer<std::uint16_t, control_most> start_delay;  ///< number of frames by which each byte was delayed
-  bool next_address_accepted = false;               ///< Whether the slave accepted the next address.
+  bool next_address_accepted = false;               ///< Whether the next register may be accessed too (P = 0).
   std::uint8_t acknowledged = 0;                    ///< slaves that acknowledged a command: bit n is slave n
-  bool executed = false;                            ///< Whether the slave executed the command.
+  bool executed = false;                            ///< Whether the host had the command executed.
 };
 
 /// Decodes a control frame from the bits of CDM and CDS, one of each per frame. Before the start bit may be zeros or
@@ -116,7 +116,7 @@ class ControlMaster {
   [[nodiscard]] bool is_over() const { return over_; }
   /// Returns whether the host waits for a start bit of the encoder, which may take 20 ms.
   [[nodiscard]] bool is_waiting() const { return !over_ && state_ == State::start; }
-  /// Returns why it failed.
+  /// Returns the error that ended the control frame, or none.
   [[nodiscard]] Error error() const { return error_; }
   /// Returns the control frame; after an error, with the bytes before it.
   [[nodiscard]] const ControlFrame& frame() const { return frame_; }
@@ -181,14 +181,14 @@ struct ControlTarget {
 /// The encoders' side of control frames, for all slaves on the line.
 class ControlSlaves {
  public:
-  /// Listens as so many slaves.
+  /// `count`: number of slaves on the line.
   explicit ControlSlaves(unsigned count) : count_(count) {}
 
   /// Takes the CDM after the last frame; sets the CDS of the next frame, see `cds`.
   void take(bool cdm, ControlTarget& target);
   /// Returns the bit that the slaves send next.
   [[nodiscard]] bool cds() const { return cds_; }
-  /// Begins anew, as after power-on.
+  /// Restarts as after power on.
   void reset() { *this = ControlSlaves(count_); }
 
  private:

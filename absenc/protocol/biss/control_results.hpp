@@ -26,7 +26,7 @@ class NumberList {
     while ((number /= 10) != 0 && size < digits.size());
     while (size > 0) text_.push_back(digits[--size]);
   }
-  /// Returns whether there is nothing.
+  /// Returns whether the text is empty.
   [[nodiscard]] constexpr bool empty() const { return text_.empty(); }
   /// Returns the text.
   [[nodiscard]] constexpr std::string_view view() const { return {text_.view().data(), text_.size()}; }
@@ -49,7 +49,7 @@ class MakerName {
       for (const char c : {'\\', 'x', hex[byte >> 4], hex[byte & 15]}) text_.push_back(c);
     }
   }
-  /// Returns whether there is nothing.
+  /// Returns whether the text is empty.
   [[nodiscard]] constexpr bool empty() const { return text_.empty(); }
   /// Returns the text.
   [[nodiscard]] constexpr std::string_view view() const { return {text_.view().data(), text_.size()}; }
@@ -61,7 +61,7 @@ class MakerName {
 /// Results of a captured control frame, or of a procedure; empty members are not reported.
 struct ControlResults {
   // ---- Results of a control frame
-  std::optional<std::uint8_t> slaves{};
+  std::optional<std::uint8_t> slaves{};         ///< Number of slaves with an ID, if known.
   std::optional<bool> more_slaves{};            ///< Value of the field `more_slaves`, if there is one.
   std::optional<std::string_view> operation{};  ///< Value of the field `operation`, if there is one.
   std::optional<std::uint8_t> slave_id{};       ///< Slave whose register was accessed.

@@ -38,7 +38,7 @@ class ControlDialog : public author::ClockedHostOf<ProtocolOf<F>>, public author
   [[nodiscard]] Time now() const { return this->received_at(); }
   [[nodiscard]] std::string_view detail() const override { return outcome_.detail; }
   [[nodiscard]] std::string_view advice() const override { return outcome_.advice; }
-  /// Returns whether a good reply needs no second one to be presented as good.
+  /// Returns whether the texts of the outcome are complete, so that the last reply is not explained too.
   [[nodiscard]] bool is_alone() const { return outcome_.alone; }
   [[nodiscard]] ChangeSent change_sent() const final { return this->change(); }
   /// Accepts frames without process data, which a command may have switched off: their CDS is valid.
@@ -53,7 +53,7 @@ class ControlDialog : public author::ClockedHostOf<ProtocolOf<F>>, public author
   }
 
  protected:
-  /// Talks to an encoder of this format; coroutines live in `arena`.
+  /// `arena`: storage of the coroutines.
   ControlDialog(const F& format, std::span<std::byte> arena) : Base(format, author::later), Routine(arena) {}
   ~ControlDialog() = default;
 

@@ -87,9 +87,9 @@ struct Format {
   Timeout timeout{};                    ///< Timeout of the encoder.
   /// The longest time that the encoder needs for a position, up to 1 ms; it decides the number of clocks.
   Time latency = 10us;
-  /// Members for the virtual encoder.
-  StopBit stop_bit = StopBit::next;
-  std::uint32_t line_delay_ns = 0;  ///< Delay of the line in nanoseconds.
+  // ---- Members for the virtual encoder
+  StopBit stop_bit = StopBit::next;  ///< The bit P of the virtual encoder.
+  std::uint32_t line_delay_ns = 0;   ///< Delay of the line in nanoseconds.
   Time ready{};  ///< time that the virtual encoder needs for a position; 0: as `latency`, but at most 10 us
 
   /// Returns the period of MA.
@@ -137,7 +137,7 @@ template <class AnyFormat>
 /// A reply: position word, checksum and what frames the data.
 template <class WordType>
 struct ReplyWith {
-  unsigned ack_bits = 1;          ///< Number of acknowledge bits: clocks from the first edge to the start bit.
+  unsigned ack_bits = 1;          ///< Number of ACK bits: zeros between the idle samples and the start bit.
   WordType word{};                ///< The position word.
   std::uint8_t life_counter = 0;  ///< life counter, if the check has one
   bool cds = false;               ///< the encoder's bit of control communication

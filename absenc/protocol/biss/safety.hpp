@@ -32,16 +32,16 @@ struct SafetyFormat {
   Channel spw{.word = "position:16 error:1! warning:1!"_word, .check = crc16};  ///< The safety position word.
   std::uint8_t compare_bits = 13;          ///< upper bits of the position in which both words must agree (ACC_MIN)
   std::int8_t previous_life_counter = -1;  ///< life counter of the frame before; -1: unknown
-  /// These members mean the same as in Format.
-  std::uint32_t ma_khz = 1000;
-  Time latency = 10us;  ///< Time that the encoder takes before its start bit.
-  Time ready{};         ///< Time that a virtual encoder needs for a position; 0: as `latency`, at most 10 us.
+  // ---- The following members mean the same as in Format.
+  std::uint32_t ma_khz = 1000;  ///< Clock MA in kHz.
+  Time latency = 10us;          ///< Time that the encoder takes before its start bit.
+  Time ready{};                 ///< Time that a virtual encoder needs for a position; 0: as `latency`, at most 10 us.
   std::uint32_t line_delay_ns = 0;      ///< Delay of the line in nanoseconds.
   std::uint16_t register_delay_us = 0;  ///< Time until a virtual encoder has a requested register ready, in us.
   bool start_sequence = false;          ///< Whether SLO of a virtual encoder stays idle until the start sequence.
   Timeout timeout{};                    ///< Timeout of the encoder.
   StopBit stop_bit = StopBit::next;     ///< The bit P that a virtual encoder sends after each register.
-  std::uint8_t slave = 0;               ///< Number of the slave in its chain.
+  std::uint8_t slave = 0;               ///< Slave whose registers are accessed: 0 safety word, 1 control word.
   RegisterOrder register_order = RegisterOrder::big;  ///< Order of the bytes of registers.
 
   /// Returns the period of the clock.
@@ -54,7 +54,7 @@ struct SafetyFormat {
 
 /// A reply of BiSS Safety.
 struct SafetyReply {
-  unsigned ack_bits = 1;    ///< Number of acknowledge bits: clocks from the first edge to the start bit.
+  unsigned ack_bits = 1;    ///< Number of ACK bits: zeros between the idle samples and the start bit.
   ChannelData cpw{};        ///< The control position word.
   ChannelData spw{};        ///< The safety position word.
   unsigned delay_bits = 0;  ///< Extra idle samples: the delay of the line in clocks.

@@ -81,10 +81,10 @@ struct Format {
   Carries carries = Carries::biss;                     ///< Protocol behind the interface.
   ssi::AfterWord after_word = ssi::AfterWord::repeat;  ///< What an SSI encoder sends after its word.
   Kind kind = Kind::other;                             ///< Kind of the encoder behind the interface.
-  /// Of the virtual interface and its encoder.
-  Version firmware{1, 16};
-  Time latency = 10us;  ///< Time that the encoder takes before its start bit.
-  Time line_delay{};    ///< Delay of the line.
+  // ---- Members for the virtual interface and its encoder
+  Version firmware{1, 16};  ///< Firmware version of the virtual interface.
+  Time latency = 10us;      ///< Time that the encoder takes before its start bit.
+  Time line_delay{};        ///< Delay of the line.
 
   /// Returns the format of a BiSS encoder.
   [[nodiscard]] constexpr biss::Format biss() const { return {.word = word, .scale = scale}; }
@@ -138,7 +138,7 @@ struct Request {
 
 /// A reply of the protocol.
 struct Reply {
-  std::uint64_t samples = 0;  ///< Number of samples.
+  std::uint64_t samples = 0;  ///< The 64 samples, the first one in the highest bit.
   std::int64_t number = 0;    ///< number in the reply to ? > m b
   Text text{};                ///< text of a reply line, trimmed
 };

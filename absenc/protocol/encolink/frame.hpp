@@ -168,11 +168,11 @@ inline constexpr std::uint32_t warning = 2;  ///< Status: warning.
 
 /// Protocol versions. Both have the same frames, but different registers.
 namespace version {
-inline constexpr std::uint8_t aksim2 = 2;  ///< Version: aksim2.
-inline constexpr std::uint8_t aksim4 = 4;  ///< Version: aksim4.
+inline constexpr std::uint8_t aksim2 = 2;  ///< AksIM-2
+inline constexpr std::uint8_t aksim4 = 4;  ///< AksIM-4
 }  // namespace version
 
-/// What an encoder says about itself.
+/// Content of an identity frame.
 struct Identity {
   std::uint8_t protocol_version = version::aksim2;  ///< Version of the protocol.
   std::uint8_t frame_bytes = 5;                     ///< Number of bytes of a frame.

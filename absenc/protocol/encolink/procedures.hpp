@@ -49,19 +49,19 @@ struct ProcedureState : Channels {
   author::Outcome why{};               ///< why the access failed
   bool again = false;                  ///< a repetition of the access can help and does no harm
 
-  /// Begins with a request.
+  /// Begins a register access.
   void begin(const RegisterRequest& request) {
     access = encode_access(request);
     writes = request.operation == RegisterRequest::Operation::write;
     length = request.length;
   }
-  /// Notes how an access ended.
+  /// Stores the outcome of an access and returns it.
   AccessOutcome end(AccessOutcome access_outcome, const author::Outcome& outcome, bool can_help = false) {
     why = outcome;
     again = can_help;
     return access_outcome;
   }
-  /// Notes the bytes of a register.
+  /// Adds the value of a register to the results.
   void add_value(std::size_t index, Bytes bytes) {
     values.push_back({index, {}});
     values[values.size() - 1].bytes.append(bytes);

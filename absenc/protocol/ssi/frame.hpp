@@ -37,7 +37,7 @@ struct Format {
   bool padded = false;        ///< skipped bits of the word must be zero
   /// The word is read once more, and the shaft may have moved with this speed; 0: read once.
   std::uint32_t confirm_rpm = 0;
-  /// Values that vary by product (RAA38S6 3.5, note).
+  // ---- Values that vary by product (RAA38S6 3.5, note)
   /// Pause between two words; it must exceed the encoder's monoflop time Tm, or the old word continues.
   Time pause = 50us;
   std::uint32_t clock_khz = 200;  ///< Clock in kHz.

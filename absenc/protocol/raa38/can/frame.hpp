@@ -68,7 +68,7 @@ inline constexpr std::array<std::string_view, 10> function_names{"NMT", "SYNC", 
 
 /// A bit rate of the document with its index in the table of CiA 305.
 struct Rate {
-  std::uint8_t index;             ///< Number of the rate in the encoder's memory.
+  std::uint8_t index;             ///< Index of the rate in the table of CiA 305.
   std::uint32_t bits_per_second;  ///< The rate in bits per second.
 };
 inline constexpr std::array<Rate, 3> rates{{{0, 1'000'000}, {2, 500'000}, {3, 250'000}}};

@@ -20,7 +20,7 @@ inline constexpr Time listening_time = 1200ms;
 
 /// The protocol, as author layers use it: frames, lengths and times.
 struct Protocol {
-  /// Item of the line.
+  /// The line carries CAN frames.
   using Item = CanFrame;
   /// Format of the encoder: the values of its options.
   using Format = can::Format;
@@ -55,9 +55,9 @@ struct Protocol {
 /// Reads one position: requested (orders 80 and 01), or the next that the node sends without a request.
 class Read : public author::CanEngine {
  public:
-  /// Whether positions are asked for, or come by themselves.
+  /// How the position is obtained: read request, start request, or listening.
   enum class Mode : std::uint8_t { ask, start, listen };
-  /// Reads positions in this mode.
+  /// Reads one position in this mode.
   Read(const Format& format, Mode mode);
 
   /// Returns the format of the encoder.
@@ -111,7 +111,7 @@ struct NodeFrames {
   bool readable = false;          ///< `counts` fits the format
   std::uint32_t counts = 0;       ///< position in the last frame
 
-  /// Returns whether a node is there.
+  /// Returns whether a node with this number was found.
   [[nodiscard]] constexpr bool is_there() const { return unsolicited != 0 || answers != 0 || damaged > 1; }
   /// Returns whether two nodes seem to share the number: two answers to one request, or destroyed frames each time.
   [[nodiscard]] constexpr bool clash() const {

@@ -67,9 +67,9 @@ author::Procedure find_baud(Dialog& dialog, CommandValues& found);
 /// the first argument to the second. If all replies of an address are damaged, two encoders share it or the line is
 /// bad. Error: timeout if no slave answers.
 struct Slaves {
-  /// What was received from an address.
+  /// Result of polling an address.
   enum class Kind : std::uint8_t { none, answers, clash, refuses };
-  std::array<Kind, modbus::last_address + 1> at{};  ///< What was received from each address.
+  std::array<Kind, modbus::last_address + 1> at{};  ///< Result of polling each address.
 };
 author::Procedure scan(Dialog& dialog, Slaves& found, Arguments arguments);
 

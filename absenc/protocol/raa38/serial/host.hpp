@@ -43,7 +43,7 @@ class Listen final : public Conversation<std::uint8_t> {
   [[nodiscard]] std::string_view advice() const override { return words_.advice; }
   [[nodiscard]] const Reading* reading() const override;
   void report(FieldSink& sink) const override;
-  /// Returns the items of the last exchange.
+  /// Returns the bytes of the last exchange.
   [[nodiscard]] Exchange<std::uint8_t> exchange() const override;
 
   /// Returns the decoder of the stream.
