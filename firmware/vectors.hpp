@@ -15,7 +15,7 @@ struct ExpectedField {
   enum class Kind : std::uint8_t { number, real, text, names } kind;
   std::string_view field;
   std::int64_t number;
-  double real;            // value of a number, also of a whole one
+  double real;            // expected number, also for a whole one
   std::string_view text;  // flag names separated by blanks; bytes in hexadecimal
 };
 

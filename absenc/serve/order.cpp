@@ -40,8 +40,8 @@ OrderResult run_command(Encoder& encoder, const Order& order) {
   return success(command, change.now, change.was_so ? "it had this value already" : change.note, change.state);
 }
 
-// Sends one request after the other. A question that the encoder refuses, or that its options exclude, is reported with
-// its reason; `done` returns the first reason if no question was answered.
+// Reads settings and memory, one request after the other. A request that the encoder refuses, or that its options
+// exclude, is reported with its reason; `done` returns the first reason if no request was answered.
 class OptionalReads {
  public:
   OptionalReads(Encoder& encoder, const Between& between) : encoder_(&encoder), between_(&between) {}
@@ -64,9 +64,9 @@ class OptionalReads {
     return std::nullopt;
   }
 
-  /// Returns why the last question failed.
+  /// Returns why the last request failed.
   [[nodiscard]] const std::string& reason() const { return last_; }
-  /// Returns false if the options of the encoder exclude the last question.
+  /// Returns false if the options of the encoder exclude the last request.
   [[nodiscard]] bool was_sent() const { return was_sent_; }
   [[nodiscard]] OrderResult done(Json json) const {
     if (answered_) return {true, "read", std::move(json), ChangeState::none};
@@ -76,7 +76,7 @@ class OptionalReads {
  private:
   Encoder* encoder_;
   const Between* between_;
-  bool has_sent_ = false;  // a question was sent before
+  bool has_sent_ = false;  // a read request was sent before
   bool was_sent_ = false;
   bool answered_ = false;
   std::string first_;

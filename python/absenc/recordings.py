@@ -141,7 +141,7 @@ def _parse_json_lines(lines: list[str]) -> _Parsed:
     names: list[str] = []
     for name in meanings:
         names.append(name)
-        if name in ("singleturn", "multiturn"):  # only these have a column for their validity
+        if name in ("singleturn", "multiturn"):  # only these columns have a column for their validity
             names.append(name + "_valid")
     for row in rows:
         for name, value in row.items():

@@ -39,7 +39,7 @@ export class EncoderPage {
   constructor(main, bar, name, values) {
     this.name = name;
     this.trace = name;
-    this.points = [];     // [at_ms, position, speed]
+    this.points = [];     // points as [at_ms, position, speed]
     this.events = [];
     this.loss = 0;        // number of connection losses: a response from before a loss is ignored
     this.hasHistory = true;
@@ -65,7 +65,7 @@ export class EncoderPage {
     this.below = element("p", {class: "below"});
     this.ranges = element("div");
     this.units = element("div");
-    this.scale.node.hidden = true;  // until the encoder is known to be linear
+    this.scale.node.hidden = true;  // hidden until the encoder is known to be linear
     this.plot = element("div", {class: "plot", hidden: true, role: "img", "aria-label": "trace"});
     this.noTrace = element("p", {class: "faint"});
     this.wrong = element("div");
@@ -296,7 +296,7 @@ export class EncoderPage {
       if (point[0] - (this.points.at(-1)?.[0] ?? 0) >= LEAST_MS) this.points.push(point);
     }
     while (this.points.length > MOST_POINTS) this.points.shift();
-    if (this.range === "live") this.changed = true;  // history plots are redrawn by refresh() only
+    if (this.range === "live") this.changed = true;  // plots of the history are redrawn by refresh() only
   }
 
   /** Returns the plot's rows, from the points or the history, in the selected unit. */
