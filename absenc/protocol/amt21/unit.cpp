@@ -129,11 +129,11 @@ constexpr auto models = std::array{
     ModelText{"AMT21xG", "12 bits and turns, rate to be set", 8000, "singleturn_bits=12 multiturn_bits=14 rate=115200"},
 };
 constexpr auto fields = fields_of<Values>(
-    field<&Values::encoder_address>("encoder_address", "", "whose request this is", Role::encoder),
-    field<&Values::command>("command", "", "what was asked", Role::exchange),
+    field<&Values::encoder_address>("encoder_address", "", "address of the request", Role::encoder),
+    field<&Values::command>("command", "", "command of the request", Role::exchange),
     field<&Values::singleturn>("singleturn", "counts", "position within the turn", Role::position),
     field<&Values::multiturn>("multiturn", "revolutions", "turns", Role::turns),
-    field<&Values::clash>("clash", "", "what came was damaged: two encoders of one address, or a bad line",
+    field<&Values::clash>("clash", "", "the reply was damaged: two encoders of one address, or a bad line",
                           Role::clash));
 
 // ---- Reported fields

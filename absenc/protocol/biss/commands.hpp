@@ -22,10 +22,10 @@ inline constexpr std::array<Argument, 4> write_arguments{
     {address_argument,
      {"value", "the byte", 0, 255, 0, true, Role::value},
      bank_argument,
-     {"force", "1: also what only the maker knows", 0, 1, 0, false, Role::force}}};
+     {"force", "1: also registers that are defined by the maker", 0, 1, 0, false, Role::force}}};
 inline constexpr std::array<Argument, 1> select_arguments{{{"bank", "that addresses 0 to 63 mean", 0, 255}}};
 inline constexpr std::array<Argument, 2> command_arguments{
-    {{"slaves", "bit n is slave n; 0: all, who do not answer", 0, 255}, {"command", "its number", 0, 3}}};
+    {{"slaves", "bit n is slave n; 0: all, without acknowledgement", 0, 255}, {"command", "its number", 0, 3}}};
 
 /// A register with a name and with a command that reads it.
 struct NamedRegister {
@@ -34,12 +34,12 @@ struct NamedRegister {
   std::string_view meaning;  ///< Content of the register, in words.
 };
 inline constexpr std::array<NamedRegister, 6> named_registers{{
-    {"bank", registers::bank_select, "which bank addresses 0 to 63 mean"},
+    {"bank", registers::bank_select, "bank of addresses 0 to 63"},
     {"eds-bank", registers::eds_bank, "the bank of its electronic data sheet; 0: none"},
-    {"profile", registers::profile, "the profile that it keeps to"},
+    {"profile", registers::profile, "profile of the encoder"},
     {"serial-number", registers::serial_number, "its serial number"},
-    {"device-id", registers::device_id, "which device it is"},
-    {"manufacturer", registers::manufacturer, "who made it"},
+    {"device-id", registers::device_id, "device id of the encoder"},
+    {"manufacturer", registers::manufacturer, "manufacturer of the encoder"},
 }};
 
 template <class F>
@@ -110,7 +110,7 @@ template <const auto& report, class F>
           {"position", Verb::read, 0, "position, turns, error and warning"})
           .only_if(is_readable),
       author::command<report, control_results<F>, read_info<F>, request>(
-          {"info", Verb::info, 0, "who is on the line, profile, serial number, device id"})
+          {"info", Verb::info, 0, "number of encoders, profile, serial number, device id"})
           .only_if(is_readable),
       author::command<report, control_results<F>, read_memory<F>, request>(
           {"memory-read", Verb::memory_read, 0, "read registers; the bank stays selected", read_arguments})

@@ -141,10 +141,10 @@ Procedure read_memory(ControlDialog<F>& dialog, ControlResults& found, Arguments
   const auto count = static_cast<unsigned>(arguments[2]);
   const unsigned limit = address < registers::bank_size ? registers::bank_size : registers::end;
   if (address + count > limit) {
-    co_return only(Error::invalid_argument, "a bank ends at address 63, the registers behind it at 127");
+    co_return only(Error::invalid_argument, "a bank ends at address 63, the registers after it at 127");
   }
   if (address >= registers::bank_size && bank != 0) {
-    co_return only(Error::invalid_argument, "what is behind the banks is on bank 0");
+    co_return only(Error::invalid_argument, "registers outside the banks are on bank 0");
   }
   ControlMaster master;
   Error error = co_await select_bank(dialog, master, bank, address);
@@ -167,11 +167,11 @@ Procedure write_memory(ControlDialog<F>& dialog, ControlResults& found, Argument
   const bool force = arguments[3] != 0;
   const MemoryArea* const area = registers::find_area(bank, address);
   if (address >= registers::bank_size && bank != 0) {
-    co_return only(Error::invalid_argument, "what is behind the banks is on bank 0");
+    co_return only(Error::invalid_argument, "registers outside the banks are on bank 0");
   }
   if (area != nullptr && !area->writable) co_return only(Error::invalid_argument, "this register is read only");
   if (!force && (area == nullptr || !area->protection.empty())) {
-    co_return only(Error::invalid_argument, "only the maker says what is written there: force=1 writes it");
+    co_return only(Error::invalid_argument, "this register is defined by the maker: force=1 writes it");
   }
   ControlMaster master;
   Error error = co_await select_bank(dialog, master, bank, address);
@@ -213,7 +213,7 @@ Procedure write_bank(ControlDialog<F>& dialog, ControlResults& found, Arguments 
   ControlMaster master;
   const auto bank = static_cast<std::uint8_t>(arguments[0]);
   const Error error = co_await change_register(dialog, master, registers::bank_select, bank);
-  if (error == Error::cross_check_failed) co_return only(error, "another bank is selected still");
+  if (error == Error::cross_check_failed) co_return only(error, "another bank is still selected");
   if (error != Error::none) co_return failure_of(error);
   found.slave_id = dialog.format().slave;
   found.bank = bank;
@@ -242,7 +242,7 @@ Procedure read_info(ControlDialog<F>& dialog, ControlResults& found) {
   error = co_await read_registers(dialog, master, names, registers::device_id, registers::end - registers::device_id);
   if (error != Error::none && error != Error::request_rejected) co_return failure_of(error);
   if (error == Error::request_rejected && !found.eds_bank) {
-    co_return only(error, "the encoder has none of the registers that say who it is");
+    co_return only(error, "the encoder has none of the registers that identify it");
   }
   if (error == Error::none) {
     for (const unsigned address : {registers::device_id, registers::manufacturer}) {
@@ -266,7 +266,7 @@ Procedure send_command(ControlDialog<F>& dialog, ControlResults& found, Argument
   if (error == Error::request_rejected) dialog.refused();
   if (error == Error::request_rejected) co_return only(error, "not every encoder acknowledged: nothing was executed");
   if (error != Error::none) co_return failure_of(error);
-  if (!last) co_return only(last.error(), "whether the encoders obeyed is not known");
+  if (!last) co_return only(last.error(), "it is unknown whether the encoders executed the command");
   found = results_of(master.frame(), true);
   co_return done;
 }

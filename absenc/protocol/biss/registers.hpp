@@ -55,7 +55,7 @@ inline constexpr std::array<MemoryArea, 6> areas = [] {
        .count = device_id - device,
        .meaning = "the maker's own",
        .in_dump = false,
-       .protection = "only its maker says what is written there"},
+       .protection = "its values are defined by the maker"},
       {.page = 0,
        .first = device_id,
        .count = end - device_id,
@@ -67,7 +67,7 @@ inline constexpr std::array<MemoryArea, 6> areas = [] {
        .count = bank_size,
        .meaning = "bank",
        .in_dump = false,
-       .protection = "only its maker says what a bank holds",
+       .protection = "the content of this bank is defined by the maker",
        .pages = most_banks - 1},
   }};
 }();

@@ -156,14 +156,14 @@ constexpr auto own_fields = fields_of<InterfaceResults>(
     field<valid<7>>({"valid_4400_khz", number, "", "good frames at 4400 kHz"}),
     field<recommended>({"recommended_clock", number, "", "to be set with `absenc config set ... clock`"}),
     field<khz<recommended>>({"recommended_khz", number, "kHz", "that clock"}),
-    field<restored>({"restored_clock", number, "", "what it was before and is again"}),
+    field<restored>({"restored_clock", number, "", "clock before the sweep, which is restored"}),
     field<aborted>({"aborted", boolean, "", "the sweep was ended early: not all clocks were tried"}));
 // Fields of a sweep that was interrupted.
 constexpr auto left_fields = fields_of<InterfaceResults>(
     field<left>({"left_clock", number, "", "the clock that the sweep set last"}),
     field<khz<left>>({"left_khz", number, "kHz", "that clock"}),
     field<&InterfaceResults::previous>(
-        {"previous_clock", number, "", "what it was before: give it back with `absenc config set ... clock`"}));
+        {"previous_clock", number, "", "clock before the sweep: restore it with `absenc config set ... clock`"}));
 constexpr auto all_fields =
     joined_fields(joined_fields(word_fields, biss::own_fields), joined_fields(own_fields.infos, left_fields.infos));
 
@@ -235,14 +235,13 @@ constexpr auto commands = std::array{
     reading<report, asks<letter::width>>({"width", Verb::config_get, 0, "width of the position that ? gives"}),
     command<report, found, set_zero, does<letter::zero>>(
         {"set-zero", Verb::run, 0, "the interface's own zero: decimal counts from here", {}, true, false}),
-    reading<report, asks<letter::clear_zero>>({"clear-zero", Verb::run, 0, "take that zero away", {}, true, false}),
+    reading<report, asks<letter::clear_zero>>({"clear-zero", Verb::run, 0, "clear that zero", {}, true, false}),
     reading<report, asks<letter::decimal>>({"decimal", Verb::read_part, 0, "position from that zero, by ?"}),
     command<report, found, switch_supply, does<letter::supply_on>, true>(
         {"supply-on", Verb::run, 0, "switch the encoder's supply on", {}, true, false}),
     command<report, found, switch_supply, does<letter::supply_off>, false>(
         {"supply-off", Verb::run, 0, "switch the encoder's supply off", {}, true, false}),
-    reading<report, asks<letter::stream_off>>(
-        {"stream-off", Verb::run, 0, "end the stream of positions that somebody began"}),
+    reading<report, asks<letter::stream_off>>({"stream-off", Verb::run, 0, "end a stream of positions"}),
     command<report, found, sweep_clocks, does<letter::samples>>(
         {"clock-sweep", Verb::run, 0, "count the good frames at every MA clock and recommend one", sweep_arguments,
          false, false})

@@ -136,16 +136,16 @@ inline constexpr auto frame_fields = [] {
 inline constexpr FieldInfo calibrations_field{"calibrations", FieldInfo::Kind::number, "",
                                               "self-calibrations that ended, modulo 4"};
 inline constexpr FieldInfo running_field{"running", FieldInfo::Kind::boolean, "",
-                                         "whether the self-calibration still goes on"};
-inline constexpr FieldInfo not_described_field{"registers", FieldInfo::Kind::text, "", "why none of them is shown"};
+                                         "whether the self-calibration is running"};
+inline constexpr FieldInfo not_described_field{"registers", FieldInfo::Kind::text, "", "why no register is shown"};
 
 /// Fields of the registers, in the order of the table `registers`.
 inline constexpr auto register_fields = [] {
   using enum FieldInfo::Kind;
   constexpr std::array<FieldInfo, 5> of_content{{
       {"", number, "", "register"},
-      {"", real, "degC", "register: how warm the readhead is"},
-      {"", real, "rpm", "register: how fast the ring turns"},
+      {"", real, "degC", "register: temperature of the readhead"},
+      {"", real, "rpm", "register: speed of the ring"},
       {"", flags, "", "how the last self-calibration ended", calibration_flags},
       {"", text, "", "register", {}, Role::identity},  // all registers with text are numbers that identify the encoder
   }};

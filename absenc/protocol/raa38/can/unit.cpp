@@ -59,10 +59,10 @@ constexpr Result<CanFrame> to(const Format& format, Arguments arguments) {
 using enum FieldInfo::Kind;
 constexpr auto fields = author::fields_of<Values>(
     field<&Values::node>("node", "", "number of the node", Role::encoder),
-    field<&Values::function>("function", "", "what the identifier stands for in CANopen; this encoder does not use it",
+    field<&Values::function>("function", "", "meaning of the identifier in CANopen; this encoder does not use it",
                              Role::exchange),
     field<&Values::data>("data", "", "its data"),
-    field<&Values::command>("command", "", "what is asked, or answered", Role::exchange),
+    field<&Values::command>("command", "", "command that is requested or answered", Role::exchange),
     field<&Values::value>("value", "", "counting direction as command 22 carries it"),
     field<&Values::new_node>("new_node", "", "number that the node is given"),
     field<&Values::bit_rate>("bit_rate", "bit/s", "bit rate that the node is given"),
@@ -70,7 +70,8 @@ constexpr auto fields = author::fields_of<Values>(
     field<&Values::readings_per_s>("readings_per_s", "1/s", "positions that the node sends by itself"),
     field<&Values::singleturn>({"singleturn", counts, "counts", "position within one revolution", {}, Role::position}),
     field<&Values::angle>("angle_deg", "deg", "the same as an angle", Role::of_position),
-    field<&Values::written>("written", "", "whether anything was written: not what is set already", Role::written),
+    field<&Values::written>("written", "", "whether a value was written; it is not if it is set already",
+                            Role::written),
     field<&Values::answered>("answered", "", "whether the command was answered"),
     field<&Values::mirrored>("mirrored", "", "whether the position is counted the other way since"),
     field<&Values::before>({"before", counts, "counts", "position before the command"}),
@@ -131,14 +132,14 @@ constexpr auto commands = std::array{
     read_by<Read::Mode::listen>({"listen", Verb::read_part, 0, "the next position that the node sends by itself"}),
     read_by<Read::Mode::start>({"start", Verb::run, 0, "start the node", {}, true, false}),
     author::command<report, found, set_cyclic, to<Order::cyclic>>(
-        {"cyclic", Verb::run, 0, "let the node send so many readings a second by itself", cyclic_arguments, true,
-         false}),
+        {"cyclic", Verb::run, 0, "let the node send this many readings a second without requests", cyclic_arguments,
+         true, false}),
     author::command<report, found, set_cyclic, to<Order::cyclic>>(
         {"stop", Verb::run, 0, "let it send none by itself", {}, true, false}),
     author::command<report, found, change, to<Order::zero>, Order::zero>(
         {"zero", Verb::zero, 0, "make this the zero of the turn", {}, true, false}),
     author::command<report, nodes, scan, to<Order::read>>(
-        {"scan", Verb::scan, 0, "who is on the bus", {}, false, false, {}, {}, survey_warning}),
+        {"scan", Verb::scan, 0, "nodes on the bus", {}, false, false, {}, {}, survey_warning}),
     author::command<report, found, find_node, to<Order::read>>(
         {"node", Verb::config_get, 0, "number of the node", {}, false, false}),
     author::command<report, surveyed, configure, to<Order::node>, Order::node>(

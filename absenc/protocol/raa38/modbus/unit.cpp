@@ -40,8 +40,8 @@ constexpr auto options = author::OptionsOf{
                                  crc_choices),
 };
 
-constexpr Argument force{"force",    "1: also what is so already (each time wears the memory)", 0, 1, 0, false,
-                         Role::force};
+constexpr Argument force{
+    "force", "1: also if the encoder has it already (each time wears the memory)", 0, 1, 0, false, Role::force};
 constexpr std::array<Argument, 2> address_arguments{
     {{"address", "the new one", modbus::first_address, modbus::last_address}, force}};
 constexpr std::array<Argument, 2> baud_arguments{
@@ -172,13 +172,13 @@ constexpr auto fields = author::fields_of<Values>(
     field<&Values::singleturn>("singleturn", "counts", "position within the turn", Role::position),
     field<&Values::angle>("angle_deg", "deg", "the same as an angle", Role::of_position),
     field<&Values::new_address>("new_address", "", "address from now on"),
-    field<&Values::parameter>("parameter", "", "what function CC sets"),
+    field<&Values::parameter>("parameter", "", "parameter of function CC"),
     field<&Values::setting>("setting", "", "the same in words"),
     field<&Values::crc_order>("crc_order", "", "which byte of the CRC comes first", Role::exchange),
     field<&Values::baud>("baud", "bit/s", "the baud rate at which it answers"),
     field<&Values::direction>("direction", "", "in which direction it counts"),
-    field<&Values::effect>("effect", "", "what became of the position"),
-    field<&Values::written>("written", "", "whether the setting was sent; it is not where it is so already",
+    field<&Values::effect>("effect", "", "effect on the position"),
+    field<&Values::written>("written", "", "whether the setting was sent; it is not if the encoder has it already",
                             Role::written),
     field<&Values::encoder_address>("encoder_address", "", "address that answers", Role::encoder),
     field<&Values::clash>("clash", "", "the answer is damaged every time", Role::clash),
@@ -253,7 +253,7 @@ constexpr auto commands = std::array{
     author::command<report, found, set_zero, to_set_zero>(
         {"zero", Verb::zero, 0, "make this the zero of the turn", zero_arguments, true, false}),
     author::command<report, slaves, scan, to_ask_address>(
-        {"scan", Verb::scan, 0, "who answers on the line", scan_arguments, false, false}),
+        {"scan", Verb::scan, 0, "addresses that answer on the line", scan_arguments, false, false}),
 };
 
 // ---- Declaration

@@ -20,7 +20,7 @@ inline constexpr auto fields = author::fields_of<Values>(
     author::field<&Values::angle>("angle_deg", "deg", "the same as an angle", Role::of_position),
     author::field<&Values::command>("command", "", "read or zero_clear"),
     author::field<&Values::unit>("unit", "", "the number behind B or C"),
-    author::field<&Values::skipped>("skipped", "bytes", "so far, that belonged to no good frame"));
+    author::field<&Values::skipped>("skipped", "bytes", "received so far that belong to no valid frame"));
 
 /// Explains an error of `reply` to `request`, which is empty for a pulse; with an empty reply, why none was received or
 /// what is wrong with the request.

@@ -138,7 +138,8 @@ constexpr Command position{"position", Verb::read, 0, "position within the turn"
 constexpr auto commands = std::array{
     author::reading<report, position_request, ReadPosition>(position).or_when(
         listens, {.info = position, .request = nullptr, .make = make_listen, .size = sizeof(Listen)}),
-    author::command<report, units, scan, to_scan>({"scan", Verb::scan, 0, "who answers on a bus", {}, false, false}),
+    author::command<report, units, scan, to_scan>(
+        {"scan", Verb::scan, 0, "units that answer on a bus", {}, false, false}),
     author::command<report, found, set_zero, to_zero>(
         {"zero", Verb::zero, 0, "make this the zero of the turn", {}, true, false}),
 };
