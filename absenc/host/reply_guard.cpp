@@ -2,6 +2,7 @@
 #include "absenc/host/reply_guard.hpp"
 
 #include <algorithm>
+#include <utility>
 
 namespace absenc::host {
 
@@ -9,32 +10,22 @@ namespace {
 
 using namespace std::chrono_literals;
 
-constexpr int quiet_limits = 4;         // how many limits a line is quiet before a request is repeated
-constexpr Time longest_quiet = 2500ms;  // no reply that is later has been seen but on a line that is always late
-constexpr Time stall_quiet = 500ms;     // how long a line that stalled is quiet before what it held back is lost
-constexpr Time longest_way = 10s;       // what has not come by then is lost
-constexpr Time noise_limit = 100ms;     // no reply goes on for so long
+constexpr int silent_timeouts = 4;        // a request is repeated after a silence of this many timeouts
+constexpr Time longest_silence = 2500ms;  // later replies were only seen on a line that delays every reply
+constexpr Time stall_silence = 500ms;     // after this silence, replies that a stalled line held back are lost
+constexpr Time longest_lateness = 10s;    // a reply later than this counts as lost
+constexpr Time noise_limit = 100ms;       // longer than any reply lasts
 constexpr Time tick{1};
 
 }  // namespace
 
 template <class Item>
 void ReplyGuard<Item>::attach(Machine<Item>& inner, const Unit& unit, const Options& options, bool may_repeat) {
-  close();
+  end_exchange();
+  enter_forwarding({});
   inner_ = &inner;
-  owed_.judge_by(unit, options);
+  outstanding_.use(unit, options);
   may_repeat_ = may_repeat;
-  tell_sent_ = tell_error_ = tell_reply_ = tell_silence_ = false;
-}
-
-// ---- What is owed
-
-template <class Item>
-void ReplyGuard<Item>::close() {
-  const bool looked_after = phase_ == Phase::asking || phase_ == Phase::holding;  // and the conversation left
-  if (looked_after || (open_ && (!heard_ || doubtful_))) owed_.add(request_, expect_, sent_at_);
-  open_ = false;
-  phase_ = Phase::passing;
 }
 
 template <class Item>
@@ -42,17 +33,96 @@ bool ReplyGuard<Item>::is_request(const Step<Item>& step) const {
   using Kind = typename Step<Item>::Kind;
   if (step.kind == Kind::pulse) return step.wire == ExtraWire::trigger;
   if (step.kind != Kind::transfer || step.out.empty() || step.out.size() > Request::capacity()) return false;
-  return owed_.is_answered(step.out);
+  return outstanding_.is_answered(step.out);
 }
 
 template <class Item>
-Time ReplyGuard<Item>::quiet_time() const {
-  return std::min(std::max(quiet_limits * std::max(limit_, pending_.answer), lateness_ * 3 / 2), longest_wait());
+Time ReplyGuard<Item>::required_silence() const {
+  const Time timeout = std::max(longest_timeout_, pending_.step.answer);
+  return std::min(std::max(silent_timeouts * timeout, expected_lateness_ * 3 / 2), longest_wait());
 }
 
 template <class Item>
 Time ReplyGuard<Item>::longest_wait() const {
-  return std::clamp(lateness_ * 3 / 2, longest_quiet, longest_way);
+  return std::clamp(expected_lateness_ * 3 / 2, longest_silence, longest_lateness);
+}
+
+// ---- Phases: where they are entered
+
+// The last request becomes outstanding if no valid reply arrived.
+template <class Item>
+void ReplyGuard<Item>::end_exchange() {
+  const bool unmatched = phase_ == Phase::matching || phase_ == Phase::listening;
+  const bool unanswered =
+      phase_ == Phase::forwarding && forwarding_.answerable && (!forwarding_.received || forwarding_.doubtful);
+  if (unmatched || unanswered) outstanding_.add(last_.items, last_.expect, last_.sent_at);
+  if (phase_ != Phase::forwarding) return enter_forwarding({});
+  forwarding_.answerable = false;
+}
+
+template <class Item>
+void ReplyGuard<Item>::enter_forwarding(const Forwarding& data) {
+  phase_ = Phase::forwarding;
+  forwarding_ = data;
+}
+
+template <class Item>
+void ReplyGuard<Item>::enter_delaying(const Step<Item>& request, Time now) {
+  phase_ = Phase::delaying;
+  received_.clear();
+  outstanding_.remove_older(now - longest_lateness);
+  pending_ = {.step = request, .deadline = std::max(now, request.at) + 4 * longest_wait()};
+  // A pause before the request is listened to as well; a short one the port keeps more exactly than its timer.
+  delaying_ = {.until = request.at > now + 1ms ? request.at : now + tick, .received_at = now - request.gap};
+  if (outstanding_.full()) {  // a silence makes all of them lost, so that new ones can be stored
+    delaying_.until = std::max(delaying_.until, last_.sent_at + required_silence());
+  } else if (const Entry* entry = outstanding_.find(request.out)) {
+    // An encoder that did not answer twice, on a line where no reply was late, is absent.
+    const bool absent = expected_lateness_ == Time{} && entry->count() > 1;
+    const Time silence = expected_lateness_ == Time{} ? required_silence() / 2 : required_silence();
+    if (!absent) delaying_.until = std::max(delaying_.until, entry->newest() + silence);
+  }
+}
+
+template <class Item>
+Step<Item> ReplyGuard<Item>::send(Time now) {
+  last_.items.clear();
+  last_.items.append(pending_.step.out);
+  last_.expect = pending_.step.expect;
+  last_.exists = true;
+  last_.sent_at = now;
+  received_.clear();
+  if (outstanding_.full()) outstanding_.clear();
+  outstanding_.mark_lost(last_.items, longest_wait());
+  if (outstanding_.empty()) {
+    enter_forwarding({.answerable = true});
+  } else {
+    phase_ = Phase::matching;
+    matching_ = {.received_at = now};
+  }
+  return pending_.step;
+}
+
+// The reply that is stored may be one to `entry`.
+template <class Item>
+void ReplyGuard<Item>::enter_listening(const Entry& entry) {
+  const Time suspected = matching_.first_at - entry.oldest();
+  Time until = std::min(last_.sent_at + listening_time(suspected), pending_.deadline);
+  if (may_repeat_) until = std::max(until, matching_.received_at + outstanding_.pause_after(last_.items));
+  phase_ = Phase::listening;
+  received_.clear();
+  listening_ = {.until = until, .suspected = suspected};
+}
+
+// A reply that was late by `suspected` is followed by the next at the interval of their requests, if the line delays
+// every reply by as much. Where that interval passes in silence, and no earlier reply was nearly as late, the line had
+// stalled, and the replies that it held back are lost. A CAN bus holds nothing back.
+template <class Item>
+Time ReplyGuard<Item>::listening_time(Time suspected) const {
+  const Time always_late = std::clamp(suspected * 5 / 4, required_silence(), longest_wait());
+  if (is_can || expected_lateness_ * 2 > suspected) return always_late;
+  const Time next_due = matching_.received_at - last_.sent_at + outstanding_.longest_interval(last_.sent_at) * 5 / 4;
+  return std::min(always_late, std::max({next_due, required_silence(), stall_silence}));
 }
 
 // ---- Steps
@@ -61,51 +131,52 @@ template <class Item>
 Step<Item> ReplyGuard<Item>::next(Time now) {
   for (;;) {
     switch (phase_) {
-      case Phase::passing:
-        return pass(now);
-      case Phase::before:
-        if (now < until_) return {.at = until_, .gap = pending_.gap};
-        // Not into what is still coming, unless it never ends: then the conversation finds out.
-        if (noise_end_ == never) noise_end_ = now + noise_limit;
-        if (!is_can && heard_at_ + pending_.gap > now && now < noise_end_) {
-          until_ = heard_at_ + pending_.gap;
+      case Phase::forwarding:
+        return forward(now);
+      case Phase::delaying:
+        if (now < delaying_.until) return {.at = delaying_.until, .gap = pending_.step.gap};
+        // The request must not collide with items that still arrive. If they never end, the conversation reports that.
+        if (delaying_.noise_end == never) delaying_.noise_end = now + noise_limit;
+        if (!is_can && delaying_.received_at + pending_.step.gap > now && now < delaying_.noise_end) {
+          delaying_.until = delaying_.received_at + pending_.step.gap;
           break;
         }
         return send(now);
-      case Phase::asking:
-        if (now < until_) {
-          const std::size_t due = pending_.expect - std::min(pending_.expect, reply_.size());
-          return {.expect = due, .at = until_, .answer = pending_.answer, .gap = pending_.gap};
+      case Phase::matching:
+        if (now < matching_.until) {
+          const std::size_t expected = pending_.step.expect;
+          const std::size_t due = expected - std::min(expected, received_.size());
+          return {.expect = due, .at = matching_.until, .answer = pending_.step.answer, .gap = pending_.step.gap};
         }
-        // Something goes on that is no reply: on CAN that of others.
-        reply_.clear();
-        damaged_ = !is_can;
-        conclude_asking(true);
+        // Items arrive without end that are no reply; on CAN other nodes send them.
+        received_.clear();
+        matching_.damaged = !is_can;
+        conclude_matching(true);
         break;
-      case Phase::holding:
-        if (now < until_) return {.at = until_, .gap = pending_.gap};
-        return end_holding(now);
+      case Phase::listening:
+        if (now < listening_.until) return {.at = listening_.until, .gap = pending_.step.gap};
+        return end_listening(now);
     }
   }
 }
 
-// What the conversation wants goes on where it was made: a step is not copied on each of its ways.
+// The conversation's step is returned in place, because steps are large and this runs for each event.
 template <class Item>
-Step<Item> ReplyGuard<Item>::pass(Time now) {
-  Step<Item> step = next_passing(now);
-  const bool asks = is_request(step);
-  if (asks || step.kind == Step<Item>::Kind::done) close();
-  if (asks) {
-    begin(step, now);
+Step<Item> ReplyGuard<Item>::forward(Time now) {
+  Step<Item> step = next_of_conversation(now);
+  const bool requests = is_request(step);
+  if (requests || step.kind == Step<Item>::Kind::done) end_exchange();
+  if (requests) {
+    enter_delaying(step, now);
     step = next(now);
   }
   return step;
 }
 
-// After each event that is told, the conversation is asked for its next step.
+// The conversation gives a step after each event that is reported.
 template <class Item>
-Step<Item> ReplyGuard<Item>::next_passing(Time now) {
-  while (deliver()) {
+Step<Item> ReplyGuard<Item>::next_of_conversation(Time now) {
+  while (report_event()) {
     const Step<Item> step = inner_->next(now);
     if (step.kind != Step<Item>::Kind::wait) return step;
   }
@@ -113,17 +184,17 @@ Step<Item> ReplyGuard<Item>::next_passing(Time now) {
 }
 
 template <class Item>
-bool ReplyGuard<Item>::deliver() {
+bool ReplyGuard<Item>::report_event() {
   using Kind = typename Event<Item>::Kind;
-  const auto due = [](bool& tell) { return tell && !(tell = false); };
-  if (due(tell_sent_)) {
-    inner_->feed({.kind = Kind::sent, .at = sent_at_});
-  } else if (due(tell_error_)) {
-    inner_->feed({.kind = Kind::line_error, .at = received_at_});
-  } else if (due(tell_reply_)) {
-    inner_->feed({.kind = Kind::received, .at = received_at_, .items = reply_});
-  } else if (due(tell_silence_)) {
-    inner_->feed({.kind = Kind::silence, .at = std::max(sent_at_, received_at_)});
+  Report& report = forwarding_.report;
+  if (std::exchange(report.sent, false)) {
+    inner_->feed({.kind = Kind::sent, .at = last_.sent_at});
+  } else if (std::exchange(report.line_error, false)) {
+    inner_->feed({.kind = Kind::line_error, .at = report.received_at});
+  } else if (std::exchange(report.reply, false)) {
+    inner_->feed({.kind = Kind::received, .at = report.received_at, .items = received_});
+  } else if (std::exchange(report.timeout, false)) {
+    inner_->feed({.kind = Kind::silence, .at = std::max(last_.sent_at, report.received_at)});
   } else {
     return false;
   }
@@ -131,48 +202,13 @@ bool ReplyGuard<Item>::deliver() {
 }
 
 template <class Item>
-void ReplyGuard<Item>::begin(const Step<Item>& request, Time now) {
-  tell_sent_ = tell_error_ = tell_reply_ = tell_silence_ = false;
-  pending_ = request;
-  reply_.clear();
-  owed_.forget(now - longest_way);
-  heard_at_ = now - request.gap;
-  noise_end_ = never;
-  latest_ = std::max(now, request.at) + 4 * longest_wait();
-  // A pause before the request is listened to as well; a short one the port keeps more exactly than its timer.
-  until_ = request.at > now + 1ms ? request.at : now + tick;
-  if (owed_.full()) {  // no more can be kept apart: a silence ends them all
-    until_ = std::max(until_, sent_at_ + quiet_time());
-  } else if (const Owed* owed = owed_.find(request.out)) {
-    // Who has not answered twice, on a line where nothing came late, is not there.
-    const bool absent = lateness_ == Time{} && owed->count() > 1;
-    const Time quiet = lateness_ == Time{} ? quiet_time() / 2 : quiet_time();
-    if (!absent) until_ = std::max(until_, owed->newest() + quiet);
-  }
-  phase_ = Phase::before;
-}
-
-template <class Item>
-Step<Item> ReplyGuard<Item>::send(Time now) {
-  request_.clear();
-  request_.append(pending_.out);
-  expect_ = pending_.expect;
-  asked_ = true;
-  if (owed_.full()) owed_.clear();
-  owed_.sent_again(request_, longest_wait());
-  reply_.clear();
-  stranger_.clear();
-  damaged_ = false;
-  sent_at_ = received_at_ = now;
-  if (owed_.empty()) {
-    phase_ = Phase::passing;
-    open_ = true;
-    heard_ = doubtful_ = false;
-  } else {
-    phase_ = Phase::asking;
-    until_ = never;
-  }
-  return pending_;
+Step<Item> ReplyGuard<Item>::end_listening(Time now) {
+  outstanding_.clear();
+  expected_lateness_ -= expected_lateness_ / 16;
+  if (may_repeat_) return send(now);
+  received_.clear();
+  enter_forwarding({.report = {.sent = true, .timeout = true, .received_at = last_.sent_at}});
+  return next(now);
 }
 
 // ---- Events
@@ -180,232 +216,217 @@ Step<Item> ReplyGuard<Item>::send(Time now) {
 template <class Item>
 void ReplyGuard<Item>::feed(const Event<Item>& event) {
   switch (phase_) {
-    case Phase::passing:
-      return feed_passing(event);
-    case Phase::asking:
-      return feed_asking(event);
-    case Phase::before:
-    case Phase::holding:
-      if (event.kind == Event<Item>::Kind::received) take_late(event.items, event.at);
-      if (event.kind == Event<Item>::Kind::silence) pause_late(event.at);
+    case Phase::forwarding:
+      return feed_forwarding(event);
+    case Phase::matching:
+      return feed_matching(event);
+    case Phase::delaying:
+    case Phase::listening:
+      if (event.kind == Event<Item>::Kind::received) drop_items(event.items, event.at);
+      if (event.kind == Event<Item>::Kind::silence) drop_at_silence(event.at);
       return;
   }
 }
 
 template <class Item>
-void ReplyGuard<Item>::feed_passing(const Event<Item>& event) {
+void ReplyGuard<Item>::feed_forwarding(const Event<Item>& event) {
   using Kind = typename Event<Item>::Kind;
-  if (event.kind == Kind::sent) sent_at_ = event.at;
-  if (event.kind == Kind::received && open_) heard_ = heard_ || owed_.concerns(request_, event.items);
+  Forwarding& exchange = forwarding_;
+  if (event.kind == Kind::sent) last_.sent_at = event.at;
+  if (event.kind == Kind::received && exchange.answerable) {
+    exchange.received = exchange.received || outstanding_.may_answer(last_.items, event.items);
+  }
   if constexpr (is_can) {
-    // Whoever only listens is not answered: what comes of that was owed to others.
-    if (event.kind == Kind::received && !open_ && !owed_.empty()) {
-      if (Owed* const owed = owed_.owed_to(event.items)) return count_late(owed, event.at);
+    // A listener sends nothing, so a matching reply belongs to an earlier request.
+    if (event.kind == Kind::received && !exchange.answerable && !outstanding_.empty()) {
+      if (Entry* const entry = outstanding_.find_by_reply(event.items)) return count_late(entry, event.at);
     }
   }
-  if (event.kind == Kind::silence && open_ && !heard_) limit_ = std::max(limit_, event.at - sent_at_);
+  if (event.kind == Kind::silence && exchange.answerable && !exchange.received) {
+    longest_timeout_ = std::max(longest_timeout_, event.at - last_.sent_at);
+  }
   inner_->feed(event);
 }
 
 template <class Item>
-void ReplyGuard<Item>::feed_asking(const Event<Item>& event) {
+void ReplyGuard<Item>::feed_matching(const Event<Item>& event) {
   using Kind = typename Event<Item>::Kind;
   switch (event.kind) {
     case Kind::sent:
-      sent_at_ = event.at;
-      if (reply_.empty()) received_at_ = event.at;
-      until_ = sent_at_ + quiet_time() + (is_can ? Time{} : longest_wait());
+      last_.sent_at = event.at;
+      if (received_.empty()) matching_.received_at = event.at;
+      matching_.until = event.at + required_silence() + (is_can ? Time{} : longest_wait());
       break;
     case Kind::received:
-      take(event.items, event.at);
+      store(event.items, event.at);
       break;
     case Kind::line_error:
-      damaged_ = true;
+      matching_.damaged = true;
       break;
     case Kind::silence:
-      if (reply_.empty()) limit_ = std::max(limit_, event.at - sent_at_);
-      conclude_asking(true);
+      if (received_.empty()) longest_timeout_ = std::max(longest_timeout_, event.at - last_.sent_at);
+      conclude_matching(true);
       break;
     default:
       break;
   }
 }
 
+// ---- Matching
+
 template <class Item>
-void ReplyGuard<Item>::take(std::span<const Item> items, Time at) {
+void ReplyGuard<Item>::store(Items items, Time at) {
   for (const Item& item : items) {
     if constexpr (is_can) {
-      const std::span<const Item> one(&item, 1);
-      if (!owed_.concerns(request_, one) && owed_.owed_to(one) == nullptr) {
-        keep_stranger(item);
+      const Items frame(&item, 1);
+      if (!outstanding_.may_answer(last_.items, frame) && outstanding_.find_by_reply(frame) == nullptr) {
+        keep_foreign(item);
         continue;
       }
     }
-    if (reply_.empty()) first_at_ = at;
-    reply_.push_back(item);
+    if (received_.empty()) matching_.first_at = at;
+    received_.push_back(item);
   }
   if (!is_can) strip_late(at);
-  if (reply_.empty()) return;
-  received_at_ = at;
-  if (!is_can && at - first_at_ >= noise_limit) return conclude_noise();
-  // Where the length is not known silence ends the reply: some begin with what is one already.
-  const std::size_t expected = is_can ? 1 : pending_.expect;
-  if (expected == 0 || reply_.size() < expected) return;
-  if (owed_.is_reply(request_, reply_) || owed_.owed_to(reply_) != nullptr) conclude_asking(false);
+  if (received_.empty()) return;
+  matching_.received_at = at;
+  if (!is_can && at - matching_.first_at >= noise_limit) return conclude_noise();
+  // A reply of unknown length ends with silence: its begin may look like a complete reply.
+  const std::size_t expected = is_can ? 1 : pending_.step.expect;
+  if (expected == 0 || received_.size() < expected) return;
+  const bool complete =
+      outstanding_.is_reply(last_.items, received_) || outstanding_.find_by_reply(received_) != nullptr;
+  if (complete) conclude_matching(false);
 }
 
 template <class Item>
-void ReplyGuard<Item>::keep_stranger(const Item& item) {
+void ReplyGuard<Item>::keep_foreign(const Item& item) {
   if constexpr (is_can) {
     CanFrame plain = item;
     plain.extended = false;
-    if (item.extended && owed_.concerns(request_, std::span(&plain, 1))) stranger_.push_back(item);
+    const bool answers = item.extended && outstanding_.may_answer(last_.items, Items(&plain, 1));
+    if (answers) matching_.foreign_frame.push_back(item);
   }
 }
 
-// What begins with the reply to another request is that, and what is behind it may be this one's.
+// Removes replies that answer an outstanding request and not this one; the items behind them may be its reply.
 template <class Item>
 void ReplyGuard<Item>::strip_late(Time at) {
-  for (std::size_t i = 0; i < owed_.size();) {
-    const std::size_t size = owed_[i].expect;
-    const std::span<const Item> start = reply_.view().first(std::min(size, reply_.size()));
-    if (size == 0 || start.size() < size || !owed_.is_reply(owed_[i].request, start) ||
-        owed_.is_reply(request_, start)) {
+  for (std::size_t i = 0; i < outstanding_.size();) {
+    const std::size_t size = outstanding_[i].expect;
+    const Items start = received_.view().first(std::min(size, received_.size()));
+    if (size == 0 || start.size() < size || !outstanding_.is_reply(outstanding_[i].request, start) ||
+        outstanding_.is_reply(last_.items, start)) {
       ++i;
       continue;
     }
-    count_late(&owed_[i], at);
-    drop_first(reply_, size);
-    first_at_ = at;
+    count_late(&outstanding_[i], at);
+    drop_first(received_, size);
+    matching_.first_at = at;
     i = 0;
   }
 }
 
 template <class Item>
-void ReplyGuard<Item>::count_late(Owed* owed, Time at) {
-  Time sent_at = sent_at_;
-  if (owed != nullptr) {
-    sent_at = owed->sent_at.empty() ? owed->lost_last : owed->sent_at[0];
-    // The first late reply of several that are owed may be to any of them: the next one tells. On CAN it may also have
-    // been sent unsolicited.
-    if (!is_can && lateness_ == Time{}) sent_at = owed->newest();
+void ReplyGuard<Item>::conclude_matching(bool timed_out) {
+  const bool received = !received_.empty();
+  if (received) {
+    if (const Entry* entry = outstanding_.find_by_reply(received_)) return enter_listening(*entry);
   }
-  lateness_ = std::max(lateness_, std::min(at - sent_at, longest_way));
-  // One too many, where nothing was late yet, is more likely to have come twice.
-  if (owed == nullptr && late_ == 0) return;
-  ++late_;
-  if (phase_ == Phase::holding) lateness_ = std::max(lateness_, suspected_);  // another one comes: it was
-  latest_reply_ = std::max(latest_reply_, lateness_);
-  if (owed != nullptr) owed_.came(*owed);
+  const bool valid = received && !matching_.damaged && outstanding_.is_reply(last_.items, received_);
+  if (valid) outstanding_.clear();  // the line keeps the order: earlier replies have arrived or are lost
+  if (!received) received_.append(matching_.foreign_frame);
+  enter_forwarding({.answerable = true,
+                    .received = received,
+                    .doubtful = !valid,
+                    .report = {.sent = true,
+                               .line_error = matching_.damaged,
+                               .reply = !received_.empty(),
+                               .timeout = timed_out || !received,
+                               .received_at = matching_.received_at}});
 }
 
-template <class Item>
-void ReplyGuard<Item>::conclude_asking(bool silent) {
-  if (!reply_.empty()) {
-    if (const Owed* owed = owed_.owed_to(reply_)) {
-      suspected_ = first_at_ - owed->oldest();
-      until_ = std::min(sent_at_ + holding_time(), latest_);
-      if (may_repeat_) until_ = std::max(until_, received_at_ + owed_.pause_after(request_));
-      reply_.clear();
-      phase_ = Phase::holding;
-      return;
-    }
-  }
-  phase_ = Phase::passing;
-  open_ = true;
-  heard_ = !reply_.empty();
-  if (!heard_) reply_ = stranger_;
-  tell_sent_ = true;
-  tell_error_ = damaged_;
-  tell_reply_ = !reply_.empty();
-  tell_silence_ = silent || !heard_;
-  doubtful_ = !(heard_ && !damaged_ && owed_.is_reply(request_, reply_));
-  if (!doubtful_) owed_.clear();  // the line keeps the order: whatever was to come before this has come, or is lost
-}
-
-// A reply that was late by `suspected_` is followed by the next at the distance of their requests, if the line is
-// always late by so much. Where that time passes in silence, and nothing was nearly so late before, the line had
-// stalled, and the requests that it held back are lost. A CAN bus holds nothing back.
-template <class Item>
-Time ReplyGuard<Item>::holding_time() const {
-  const Time always_late = std::clamp(suspected_ * 5 / 4, quiet_time(), longest_wait());
-  if (is_can || lateness_ * 2 > suspected_) return always_late;
-  const Time next_due = received_at_ - sent_at_ + owed_.widest(sent_at_) * 5 / 4;
-  return std::min(always_late, std::max({next_due, quiet_time(), stall_quiet}));
-}
-
-// On a line that is never silent nothing tells whose a reply is: the conversation, which is to take none of what came,
-// finds out in its own time.
+// On a line that is never silent no reply can be matched. The conversation gets none of these items and ends by its own
+// time limit.
 template <class Item>
 void ReplyGuard<Item>::conclude_noise() {
-  phase_ = Phase::passing;
-  reply_.clear();
-  tell_sent_ = tell_error_ = true;
-  open_ = heard_ = doubtful_ = true;
+  received_.clear();
+  enter_forwarding({.answerable = true,
+                    .received = true,
+                    .doubtful = true,
+                    .report = {.sent = true, .line_error = true, .received_at = matching_.received_at}});
 }
 
-// Where the length of a reply is known, the last ones that could be it are looked at: noise may come before them.
+// ---- Delaying and listening
+
+// Where the length of a reply is known, the last received items may be one: noise may precede it.
 template <class Item>
-void ReplyGuard<Item>::take_late(std::span<const Item> items, Time at) {
-  heard_at_ = at;
+void ReplyGuard<Item>::drop_items(Items items, Time at) {
+  if (phase_ == Phase::delaying) delaying_.received_at = at;
   for (const Item& item : items) {
-    if (reply_.size() == Reply::capacity()) drop_first(reply_);
-    reply_.push_back(item);
+    if (received_.size() == received_.capacity()) drop_first(received_);
+    received_.push_back(item);
     std::size_t i = 0;
-    while (i < owed_.size() && !ends_with_reply(owed_[i].request, owed_[i].expect)) ++i;
-    if (i < owed_.size()) {
-      end_late(&owed_[i], at);
-    } else if (!is_can && asked_ && ends_with_reply(request_, expect_)) {
-      end_late(nullptr,
-               at);  // one too many: what was taken for the reply to the last request may have been another one's
+    while (i < outstanding_.size() && !ends_with_reply(outstanding_[i].request, outstanding_[i].expect)) ++i;
+    if (i < outstanding_.size()) {
+      drop_late_reply(&outstanding_[i], at);
+    } else if (!is_can && last_.exists && ends_with_reply(last_.items, last_.expect)) {
+      // A second reply to the last request: the first one may have belonged to an earlier request.
+      drop_late_reply(nullptr, at);
     }
   }
 }
 
-// Elsewhere silence ends it.
+// A reply of unknown length ends with silence.
 template <class Item>
-void ReplyGuard<Item>::pause_late(Time at) {
-  if (reply_.empty()) return;
-  if (Owed* const owed = owed_.owed_to(reply_)) {
-    end_late(owed, at);
-  } else if (!is_can && asked_ && owed_.is_reply(request_, reply_)) {
-    end_late(nullptr, at);
+void ReplyGuard<Item>::drop_at_silence(Time at) {
+  if (received_.empty()) return;
+  if (Entry* const entry = outstanding_.find_by_reply(received_)) {
+    drop_late_reply(entry, at);
+  } else if (!is_can && last_.exists && outstanding_.is_reply(last_.items, received_)) {
+    drop_late_reply(nullptr, at);
   }
-  reply_.clear();
+  received_.clear();
 }
 
 template <class Item>
-bool ReplyGuard<Item>::ends_with_reply(std::span<const Item> request, std::size_t expect) const {
+bool ReplyGuard<Item>::ends_with_reply(Items request, std::size_t expect) const {
   const std::size_t size = is_can ? 1 : expect;
-  return size != 0 && reply_.size() >= size && owed_.is_reply(request, reply_.view().last(size));
+  return size != 0 && received_.size() >= size && outstanding_.is_reply(request, received_.view().last(size));
 }
 
+// `entry`: the outstanding request that it answers; null: it answers the last request, which had a reply.
 template <class Item>
-void ReplyGuard<Item>::end_late(Owed* owed, Time at) {
-  reply_.clear();
-  count_late(owed, at);
-  if (phase_ == Phase::before) {
-    if (owed == nullptr) owed_.add(request_, expect_, sent_at_);
-    if (owed_.empty()) {
-      until_ = std::max(at + pending_.gap, pending_.at);
-      return;
-    }
+void ReplyGuard<Item>::drop_late_reply(Entry* entry, Time at) {
+  received_.clear();
+  count_late(entry, at);
+  const bool delaying = phase_ == Phase::delaying;
+  if (delaying && entry == nullptr) outstanding_.add(last_.items, last_.expect, last_.sent_at);
+  Time& until = delaying ? delaying_.until : listening_.until;
+  if (delaying && outstanding_.empty()) {
+    until = std::max(at + pending_.step.gap, pending_.step.at);
+  } else if (!is_can) {  // on CAN it may also have been unsolicited
+    until = std::min(std::max(until, at + required_silence()), pending_.deadline);
   }
-  // On CAN it may also have been sent unsolicited.
-  if (!is_can) until_ = std::min(std::max(until_, at + quiet_time()), latest_);
 }
 
 template <class Item>
-Step<Item> ReplyGuard<Item>::end_holding(Time now) {
-  owed_.clear();
-  lateness_ -= lateness_ / 16;
-  if (may_repeat_) return send(now);
-  phase_ = Phase::passing;
-  reply_.clear();
-  received_at_ = sent_at_;
-  tell_sent_ = tell_silence_ = true;
-  open_ = false;
-  return next(now);
+void ReplyGuard<Item>::count_late(Entry* entry, Time at) {
+  Time sent_at = last_.sent_at;
+  if (entry != nullptr) {
+    sent_at = entry->sent_at.empty() ? entry->lost_last : entry->sent_at[0];
+    // The first late reply may answer any of several outstanding requests; the next late reply shows which. On CAN it
+    // may also have been unsolicited.
+    if (!is_can && expected_lateness_ == Time{}) sent_at = entry->newest();
+  }
+  expected_lateness_ = std::max(expected_lateness_, std::min(at - sent_at, longest_lateness));
+  // Where no reply was late before, a second reply to the last request is more likely a duplicate.
+  if (entry == nullptr && late_replies_ == 0) return;
+  ++late_replies_;
+  // Another reply arrives, so the stored one was late.
+  if (phase_ == Phase::listening) expected_lateness_ = std::max(expected_lateness_, listening_.suspected);
+  greatest_lateness_ = std::max(greatest_lateness_, expected_lateness_);
+  if (entry != nullptr) outstanding_.remove_oldest(*entry);
 }
 
 template class ReplyGuard<std::uint8_t>;

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Keeps replies with their requests on a line where one may come late: no protocol of ours numbers them, so a reply
-// that comes after its host gave up would answer the next request, whose own reply would answer the one after, for
-// ever.
+// Keeps late replies from answering the wrong request. No supported protocol numbers its requests: a reply that arrives
+// after its timeout would answer the next request, whose own reply would answer the one after, without end.
 #pragma once
 
 #include <cstddef>
@@ -9,28 +8,42 @@
 #include <span>
 
 #include "absenc/core/bytes.hpp"
-#include "absenc/host/owed_replies.hpp"
+#include "absenc/host/outstanding_requests.hpp"
 #include "absenc/link/step.hpp"
 #include "absenc/protocol/unit.hpp"
 
 namespace absenc::host {
 
-/// Stands between a conversation and its line. Before each request it takes in what waits, and drops it. A request that
-/// was not answered is owed its reply, until that came, or until a good reply to the present request came that cannot
-/// be one to the owed: a line keeps the order. Where it could be either, time tells:
+/// A filter between a conversation and its line. A request without a reply is outstanding until its reply arrives, or
+/// until a reply arrives that can only answer a later request: a line keeps the order of replies.
 ///
-/// 1. the same request is sent again only when the line was quiet for twice the limit that was missed, and for half as
-///    much again as the latest reply was late;
-/// 2. what then comes first is not taken: it may be the owed reply;
-/// 3. the line is listened to for four times the limit, and for a quarter more than that reply would have been late: if
-///    it was, the present request's own is coming. Where nothing was nearly so late before, half a second and
-///    a quarter more than their requests were apart is enough: a line that is always late keeps their distance;
-/// 4. the request is sent once more where it may be, and its reply is taken; elsewhere the conversation is told that
-///    none came.
+///   phase       entered when                     received items       left when                             next phase
+///   ----------  -------------------------------  -------------------  ------------------------------------  ----------
+///   forwarding  a conversation is attached, or   go to the            the conversation wants to send a      delaying
+///               an exchange has ended            conversation         request
+///   delaying    a request is to be sent          are dropped, late    the line was silent long enough: the
+///                                                replies counted      request is sent;
+///                                                                       no request is outstanding           forwarding
+///                                                                       others are outstanding              matching
+///   matching    a request was sent while others  are stored           a reply answers this request only;
+///               are outstanding                                       silence, noise, or the time limit:
+///                                                                     the result is reported                forwarding
+///                                                                     a reply may answer an older request   listening
+///   listening   the stored reply may be late     are dropped, late    its time is over: the request is
+///                                                replies counted      repeated where it may be, else a
+///                                                                     timeout is reported                   forwarding
 ///
-/// It knows no protocol: whether a reply could be that to another request is asked of Unit::decode. On CAN a node that
-/// sends by itself cannot be told from a late answer. Tests compare with the true shaft (tests/late_reply_test.cpp) and
-/// excuse nothing because it was late.
+/// Delaying ends at once for a request that is not outstanding. The same request is sent again when the line was silent
+/// for four times the longest timeout and for 3/2 of the latest reply's lateness. Half of that is enough where no reply
+/// was late yet, and nothing is waited for an encoder that did not answer twice.
+///
+/// Listening lasts for 5/4 of the lateness that the stored reply would have: if it was late, the reply of the present
+/// request follows within that time. Where no earlier reply was nearly as late, half a second plus 5/4 of the longest
+/// interval between the requests is enough, because a line that delays every reply keeps their intervals.
+///
+/// The guard knows no protocol: Unit::decode decides whether a reply can answer a request. On CAN an unsolicited reply
+/// cannot be told from a late one. Tests compare each reading with the true shaft (tests/late_reply_test.cpp) and
+/// accept no wrong reading.
 template <class Item>
 class ReplyGuard final : public Machine<Item> {
  public:
@@ -39,92 +52,119 @@ class ReplyGuard final : public Machine<Item> {
   void attach(Machine<Item>& inner, const Unit& unit, const Options& options, bool may_repeat);
   /// Returns whether this guard belongs to `inner`.
   [[nodiscard]] bool serves(const Machine<Item>& inner) const { return inner_ == &inner; }
-  /// The conversation has ended, or is not gone on with.
-  void conclude() { close(); }
+  /// Ends the exchange of a conversation that is over, or that its caller abandons.
+  void conclude() { end_exchange(); }
 
   /// Takes an event of the port.
   void feed(const Event<Item>& event) override;
   /// Returns the next step of the port.
   Step<Item> next(Time now) override;
 
-  /// Replies that came after their time and were dropped.
-  [[nodiscard]] std::uint64_t late() const { return late_; }
-  /// How long after its request the latest of them came; 0: none did.
-  [[nodiscard]] Time lateness() const { return latest_reply_; }
+  /// Returns the number of replies that arrived after their timeout and were dropped.
+  [[nodiscard]] std::uint64_t late() const { return late_replies_; }
+  /// Returns the time from a request to its reply, of the latest reply that was dropped; 0: none was.
+  [[nodiscard]] Time lateness() const { return greatest_lateness_; }
 
  private:
-  static constexpr bool is_can = OwedReplies<Item>::is_can;
-  using Request = typename OwedReplies<Item>::Request;
-  using Owed = typename OwedReplies<Item>::Owed;
-  using Reply = Buffer<Item, is_can ? 1 : 64>;
+  static constexpr bool is_can = OutstandingRequests<Item>::is_can;
+  using Request = typename OutstandingRequests<Item>::Request;
+  using Entry = typename OutstandingRequests<Item>::Entry;
+  using Items = std::span<const Item>;
 
-  enum class Phase : std::uint8_t {
-    passing,  // the conversation is on the line itself
-    before,   // its request waits until the line is quiet
-    asking,   // its request is out, and what comes is not passed on before it is known whose it is
-    holding,  // what came may be late: is the request's own still coming?
+  enum class Phase : std::uint8_t { forwarding, delaying, matching, listening };
+
+  // Events that the conversation gets before its next step, in this order.
+  struct Report {
+    bool sent = false;
+    bool line_error = false;
+    bool reply = false;  // with the items of `received_`
+    bool timeout = false;
+    Time received_at{};
+  };
+  struct Forwarding {
+    bool answerable = false;  // the reply of the last request may still arrive
+    bool received = false;    // items arrived that may belong to its reply
+    bool doubtful = false;    // these items are no valid reply, and older requests are outstanding
+    Report report{};
+  };
+  struct Delaying {
+    Time until{};            // when the request is sent
+    Time received_at{};      // when the last item arrived
+    Time noise_end = never;  // when the request is sent even if items still arrive
+  };
+  struct Matching {
+    Time until = never;               // time limit, from the end of the request on
+    Time first_at{};                  // when the first of `received_` arrived
+    Time received_at{};               // when the last of `received_` arrived
+    bool damaged = false;             // a line error was among them
+    Buffer<Item, 1> foreign_frame{};  // CAN: a reply but for its identifier of 29 bits; explains a timeout
+  };
+  struct Listening {
+    Time until{};      // when the request is sent again, or a timeout reported
+    Time suspected{};  // lateness of the stored reply, if it is late
+  };
+  // The request that the conversation wants to be sent, from delaying until forwarding.
+  struct Pending {
+    Step<Item> step{};
+    Time deadline{};  // no late reply prolongs delaying or listening beyond
+  };
+  struct LastRequest {
+    bool exists = false;
+    Request items{};  // of a pulse empty
+    std::size_t expect = 0;
+    Time sent_at{};  // end of the last transfer, also of one that is no request
   };
 
-  void close();
   [[nodiscard]] bool is_request(const Step<Item>& step) const;
-  [[nodiscard]] Time quiet_time() const;
+  [[nodiscard]] Time required_silence() const;
   [[nodiscard]] Time longest_wait() const;
 
-  Step<Item> pass(Time now);
-  Step<Item> next_passing(Time now);
-  bool deliver();
-  void begin(const Step<Item>& request, Time now);
+  void end_exchange();
+  void enter_forwarding(const Forwarding& data);
+  void enter_delaying(const Step<Item>& request, Time now);
+  void enter_listening(const Entry& entry);
   Step<Item> send(Time now);
-  void feed_passing(const Event<Item>& event);
-  void feed_asking(const Event<Item>& event);
-  void take(std::span<const Item> items, Time at);
-  void keep_stranger(const Item& item);
+
+  Step<Item> forward(Time now);
+  Step<Item> next_of_conversation(Time now);
+  bool report_event();
+  Step<Item> end_listening(Time now);
+
+  void feed_forwarding(const Event<Item>& event);
+  void feed_matching(const Event<Item>& event);
+  void store(Items items, Time at);
+  void keep_foreign(const Item& item);
   void strip_late(Time at);
-  void count_late(Owed* owed, Time at);
-  void take_late(std::span<const Item> items, Time at);
-  void pause_late(Time at);
-  [[nodiscard]] bool ends_with_reply(std::span<const Item> request, std::size_t expect) const;
-  void end_late(Owed* owed, Time at);
-  void conclude_asking(bool silent);
-  [[nodiscard]] Time holding_time() const;
+  void conclude_matching(bool timed_out);
   void conclude_noise();
-  Step<Item> end_holding(Time now);
+  [[nodiscard]] Time listening_time(Time suspected) const;
+
+  void drop_items(Items items, Time at);
+  void drop_at_silence(Time at);
+  [[nodiscard]] bool ends_with_reply(Items request, std::size_t expect) const;
+  void drop_late_reply(Entry* entry, Time at);
+  void count_late(Entry* entry, Time at);
 
   Machine<Item>* inner_ = nullptr;
   bool may_repeat_ = false;
 
-  Phase phase_ = Phase::passing;
-  Step<Item> pending_{};  // of the conversation, which waits for its `sent`
-  Time until_{};          // before, asking, holding: no longer than that
-  Time latest_{};         // no wait before or after the request is longer
+  // The data of each phase, reset when it is entered.
+  Phase phase_ = Phase::forwarding;
+  Forwarding forwarding_{};
+  Delaying delaying_{};
+  Matching matching_{};
+  Listening listening_{};
+  // One buffer for all phases, because a microcontroller has little RAM. Forwarding: the reply to report. Matching: the
+  // items since the request. Delaying, listening: the last items, at whose end a late reply is looked for.
+  Buffer<Item, is_can ? 1 : 64> received_{};
 
-  Request request_{};   // the last one that went out; of a pulse empty
-  bool asked_ = false;  // there was one
-  std::size_t expect_ = 0;
-  bool open_ = false;      // it may still be answered
-  bool heard_ = false;     // something came that may be its reply
-  bool doubtful_ = false;  // what came was none, while others were owed
-  Time sent_at_{};
-  Time received_at_{};
-  Time first_at_{};
-  Time heard_at_{};  // before: when something came that was not asked for
-  Time noise_end_ = never;
-  Time suspected_{};  // holding: how late what came is, if it is
-
-  Reply reply_{};     // asking: what came; before and holding: the end of it
-  Reply stranger_{};  // asking: what would be a reply but for its identifier of 29 bits: it explains a silence
-  bool damaged_ = false;
-  // What the conversation is still to be told.
-  bool tell_sent_ = false;
-  bool tell_error_ = false;
-  bool tell_reply_ = false;
-  bool tell_silence_ = false;
-
-  OwedReplies<Item> owed_;
-  Time limit_{};     // the longest that was waited for a reply in vain
-  Time lateness_{};  // that is allowed for: fades
-  Time latest_reply_{};
-  std::uint64_t late_ = 0;
+  Pending pending_{};
+  LastRequest last_{};
+  OutstandingRequests<Item> outstanding_;
+  Time longest_timeout_{};    // longest time in which no reply arrived
+  Time expected_lateness_{};  // how late a reply may be; fades with each that is not late
+  Time greatest_lateness_{};
+  std::uint64_t late_replies_ = 0;
 };
 
 extern template class ReplyGuard<std::uint8_t>;

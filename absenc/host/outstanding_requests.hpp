@@ -1,0 +1,110 @@
+// SPDX-License-Identifier: Apache-2.0
+// The outstanding requests of one line: each was sent and not answered, and its reply may still arrive. Used by
+// ReplyGuard.
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <type_traits>
+
+#include "absenc/core/bytes.hpp"
+#include "absenc/protocol/unit.hpp"
+
+namespace absenc::host {
+
+/// The requests whose replies are outstanding.
+template <class Item>
+class OutstandingRequests {
+ public:
+  static constexpr bool is_can = std::is_same_v<Item, CanFrame>;  ///< Whether items are CAN frames, not bytes.
+  /// A request; longer ones are not stored.
+  using Request = Buffer<Item, is_can ? 1 : 16>;
+  /// Items as they were sent or received.
+  using Items = std::span<const Item>;
+
+  /// Requests with the same bytes, which may have been sent several times.
+  struct Entry {
+    Request request;            ///< The request.
+    std::size_t expect = 0;     ///< Number of items of the reply; 0: unknown before it ends.
+    Buffer<Time, 4> sent_at{};  ///< Times at which the requests were sent, the oldest first.
+    /// Time at which the first request was sent whose reply is most likely lost, because the line was silent after it.
+    Time lost_first{};
+    Time lost_last{};   ///< Time at which the last of these requests was sent.
+    unsigned lost = 0;  ///< Number of these requests.
+
+    /// Returns the time at which the last request of this entry was sent.
+    [[nodiscard]] Time newest() const { return sent_at.empty() ? lost_last : sent_at[sent_at.size() - 1]; }
+    /// Returns the time at which the first request of this entry was sent.
+    [[nodiscard]] Time oldest() const { return lost != 0 ? lost_first : sent_at[0]; }
+    /// Returns the number of requests of this entry.
+    [[nodiscard]] std::size_t count() const { return lost + sent_at.size(); }
+  };
+
+  /// Sets the unit whose rules decide which reply belongs to which request. Both arguments must outlive their use.
+  void use(const Unit& unit, const Options& options) {
+    unit_ = &unit;
+    options_ = &options;
+  }
+  /// Returns whether an encoder answers this request.
+  [[nodiscard]] bool is_answered(Items request) const;
+  /// Returns the time after the last received item before which this request must not be sent again.
+  [[nodiscard]] Time pause_after(Items request) const;
+  /// Returns whether `reply` is a valid reply to `request`.
+  [[nodiscard]] bool is_reply(Items request, Items reply) const;
+  /// Returns whether `reply`, good or bad, may belong to `request`. On a CAN bus other nodes send, too.
+  [[nodiscard]] bool may_answer(Items request, Items reply) const;
+
+  /// Returns whether no reply is outstanding.
+  [[nodiscard]] bool empty() const { return entries_.empty(); }
+  /// Returns whether no further entry can be stored.
+  [[nodiscard]] bool full() const { return entries_.size() == most; }
+  /// Returns the number of entries.
+  [[nodiscard]] std::size_t size() const { return entries_.size(); }
+  /// Returns the entry at `index`, which is less than `size()`.
+  [[nodiscard]] Entry& operator[](std::size_t index) { return entries_[index]; }
+  /// Returns the entry of this request, or null.
+  [[nodiscard]] Entry* find(Items request);
+  /// Returns the first entry that this reply could answer, or null.
+  [[nodiscard]] Entry* find_by_reply(Items reply);
+
+  /// Adds a request that was sent at this time. Ignored when full, unless the same request has an entry already.
+  void add(Items request, std::size_t expect, Time sent_at);
+  /// Marks all earlier requests of these bytes as lost, because the line was silent before the request is sent again.
+  /// The oldest of them counts as sent at most `longest` before the newest.
+  void mark_lost(Items request, Time longest);
+  /// Removes the oldest request of this entry: its reply arrived.
+  void remove_oldest(Entry& entry);
+  /// Removes all entries.
+  void clear() { entries_.clear(); }
+  /// Returns the longest time between two outstanding requests in a row, whatever their bytes, or from the last of them
+  /// until `now`.
+  [[nodiscard]] Time longest_interval(Time now) const { return std::max(longest_interval_, now - newest_); }
+  /// Removes the entries whose newest request was sent before this time.
+  void remove_older(Time before);
+
+ private:
+  static constexpr std::size_t most = 8;
+
+  void remove(const Entry& entry);
+
+  const Unit* unit_ = nullptr;
+  const Options* options_ = nullptr;
+  Buffer<Entry, most> entries_{};
+  Time newest_{};            // when the newest outstanding request was sent
+  Time longest_interval_{};  // between two requests that were added one after the other
+};
+
+/// Removes the first `count` items; the buffer must have as many.
+template <class Buffer>
+void drop_first(Buffer& buffer, std::size_t count = 1) {
+  const Buffer all = buffer;
+  buffer.clear();
+  buffer.append(all.view().subspan(count));
+}
+
+extern template class OutstandingRequests<std::uint8_t>;
+extern template class OutstandingRequests<CanFrame>;
+
+}  // namespace absenc::host
