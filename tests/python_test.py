@@ -18,7 +18,7 @@ class Package(PackageCase):
     def test_help_shows_documentation(self):
         text = self.run_python("-c", "import absenc; help(absenc.open); help(absenc)")
         self.assertIn("absenc.emulate", text)
-        self.assertIn("Degrees", self.run_python("-c", "import absenc; print(absenc.Reading.angle_deg.__doc__)"))
+        self.assertIn("degrees", self.run_python("-c", "import absenc; print(absenc.Reading.angle_deg.__doc__)"))
 
 
 if __name__ == "__main__":
