@@ -89,7 +89,7 @@ struct Protocol {
     if (!request.is_answered()) bytes.push_back(ask);
     return bytes;
   }
-  /// Returns the request, or why it is none.
+  /// Returns the request, or the error of an invalid one.
   static constexpr Result<Request> decode_request(const Format& format, Bytes bytes) {
     if (bytes.empty()) return Error::wrong_length;
     if ((bytes[0] & 3) == 3) return Error::unexpected_reply;  // reserved code

@@ -86,9 +86,9 @@ struct ControlFrame {
 
 /// Decodes a control frame from the bits of CDM and CDS, one of each per frame. Before the start bit may be zeros or
 /// nothing. Without CDS bits only the request is decoded: written data is taken from CDM, and repeated start bits are
-/// told from data by the CRC. Errors: wrong_length (no bits), bad_framing (no start bit, too few zeros before it, or
-/// neither read nor write), truncated, bad_checksum (header or a byte), timeout (no slave has this ID, or it does not
-/// answer), unexpected_reply (written data is returned with another value), request_rejected.
+/// separated from data by the CRC. Errors: wrong_length (no bits), bad_framing (no start bit, too few zeros before it,
+/// or neither read nor write), truncated, bad_checksum (header or a byte), timeout (no slave has this ID, or it does
+/// not answer), unexpected_reply (written data is returned with another value), request_rejected.
 [[nodiscard]] Result<ControlFrame> decode_control(BitView cdm, BitView cds);
 
 /// The host's side of one control frame. It owns no line: the caller passes the CDS of each frame and sends the CDM

@@ -75,7 +75,7 @@ struct Format {
   unsigned bits = 14;                   ///< bits of the position, 10 to 21
   unsigned registers = 0;               ///< number of registers to request, 1 or 2; 0: as many as the bits need
   std::size_t baud = baud_at_shipping;  ///< Index of the rate.
-  Data data = Data::four_bytes;         ///< Data of a reply.
+  Data data = Data::four_bytes;         ///< Form of the data in a reply.
   /// Virtual encoder: byte order of the CRC in its reply to A0, low_first or high_first.
   CrcOrder address_crc = CrcOrder::low_first;
 
@@ -274,7 +274,7 @@ struct Protocol {
   static constexpr author::Manner manner(const Format&, const Request&) { return {}; }
   /// Returns the request as it is sent.
   static constexpr RequestBytes encode(const Format&, const Request& request) { return encode_request(request); }
-  /// Returns the request, or why it is none.
+  /// Returns the request, or the error of an invalid one.
   static constexpr Result<Request> decode_request(const Format&, Bytes bytes) { return rtu::decode_request(bytes); }
   /// Returns the length of the reply, as far as its first bytes say, in bytes; 0 if it is not known.
   static constexpr std::size_t expected(const Format&, const Request& request, Bytes reply) {

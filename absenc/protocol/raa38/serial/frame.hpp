@@ -229,7 +229,7 @@ struct Protocol {
   }
   /// Returns the request as it is sent.
   static constexpr RequestBytes encode(const Format&, const Request& request) { return encode_request(request); }
-  /// Returns the request, or why it is none.
+  /// Returns the request, or the error of an invalid one.
   static constexpr Result<Request> decode_request(const Format&, Bytes bytes) { return serial::decode_request(bytes); }
   /// Returns the length of the request that begins with `begin`, in bytes; 0 if that is no request.
   static constexpr std::size_t request_size(const Format&, Bytes begin) {
