@@ -169,7 +169,7 @@ struct Can {
 TEST(CanFifoTest, ReadsPositionAmongOtherFrames) {
   Can can;
   CanFifo<Can> line{can, 1ms};
-  raa38::can::Read read{raa38::can::Format{}, raa38::can::Read::Way::ask};
+  raa38::can::Read read{raa38::can::Format{}, raa38::can::Read::Mode::ask};
   line.start(read, 0us);
   Time now = 1ms;
   for (; can.transmitted.empty() && now < 1s; now += 1ms) line.tick(now);
