@@ -139,7 +139,7 @@ class Damage(TapCase):
         relay = self.relay(emulator)
         tap = self.tap(relay.tap_path, "tformat", "--json")
         self.assertEqual(absenc("read", f"tformat:{relay.host_path}?latency=1200").returncode, 1)
-        self.wait_for(tap, lambda text: text.count("unanswered") + text.count("nobody answered") >= 2)
+        self.wait_for(tap, lambda text: text.count("unanswered") + text.count("no encoder answered") >= 2)
         status, text, messages = self.finish(tap)
         lines, _ = self.lines(text)
         self.assertIn("request", {line["kind"] for line in lines})

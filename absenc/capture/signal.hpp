@@ -20,7 +20,7 @@ enum class Content : std::uint8_t {
   samples,  // levels of all channels at a fixed rate
   changes,  // times at which each channel changed its level
   bytes,    // characters that the line decoder of another program found
-  frames,   // CAN frames
+  frames,   // CAN frames with their times
 };
 
 struct Layout {
@@ -56,7 +56,7 @@ struct Character {
 struct Burst {
   Tick begin = 0;
   Tick end = 0;
-  std::size_t bits = 0;           // number of clocks
+  std::size_t bits = 0;           // number of clocks in the burst
   std::vector<std::uint8_t> in;   // bits sent by the encoder, packed MSB first, the last byte left-aligned
   std::vector<std::uint8_t> out;  // SPI: bits sent by the host, packed like `in`
   bool cut = false;               // its beginning or its end is not in the capture: bits may be missing there
@@ -92,8 +92,8 @@ struct Block {
   std::vector<std::uint8_t> samples;  // samples: `bytes_per_sample` bytes each, little endian, channel 0 in bit 0
   unsigned bytes_per_sample = 1;      // 1, 2, 4 or 8
   std::vector<Changes> changes;       // changes: one entry for each channel
-  std::vector<Character> bytes;       // bytes: the characters
-  std::vector<CanRecord> frames;      // frames: the CAN frames
+  std::vector<Character> bytes;       // the characters of a capture of kind bytes
+  std::vector<CanRecord> frames;      // the CAN frames of a capture of kind frames
   std::uint64_t file_offset = 0;      // private to the reader, between `claim` and `fill`
   std::uint64_t file_size = 0;
 };

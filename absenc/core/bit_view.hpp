@@ -69,7 +69,7 @@ struct BitView {
     const std::uint8_t* from = bytes.data() + at;
     return ((std::size_t{from[i]} << (register_bits - 8 - 8 * i)) | ...);
   }
-  // Does the same for views with fewer bytes than a machine word.
+  // Returns the same machine word as `window`, for views with fewer bytes than a machine word.
   [[nodiscard, gnu::noinline]] constexpr std::size_t short_window(std::size_t first) const {
     std::size_t value = 0;
     unsigned shift = register_bits;

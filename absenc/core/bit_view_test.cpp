@@ -55,7 +55,7 @@ TEST(BitView, FindsTheEndOfARunOfAnyLength) {
 }
 
 TEST(BitView, FindsTheEndOfARun) {
-  const BitView bits{bytes, 18};  // 1 0000000 11111111 00
+  const BitView bits{bytes, 18};  // the bits are 1 0000000 11111111 00
   EXPECT_EQ(bits.end_of_run(0), 1u);
   EXPECT_EQ(bits.end_of_run(1), 8u);
   EXPECT_EQ(bits.end_of_run(3), 8u);
@@ -63,7 +63,7 @@ TEST(BitView, FindsTheEndOfARun) {
   EXPECT_EQ(bits.end_of_run(16), 18u);  // not 19: the bits behind the end do not count
 }
 
-TEST(BitBuffer, KeepsWhatWasAppended) {
+TEST(BitBuffer, ReturnsAppendedBits) {
   BitBuffer<70> buffer;
   EXPECT_TRUE(buffer.append(0b101, 3));
   EXPECT_TRUE(buffer.append(0x1234'5678'9ABC'DEF0, 64));
@@ -80,7 +80,7 @@ TEST(BitBuffer, KeepsWhatWasAppended) {
   EXPECT_EQ(buffer.bytes()[0], 0);
 }
 
-TEST(BitView, CrcOfAnyNumberOfBitsIsThatOfTheDefinition) {
+TEST(BitView, CrcOfAnyNumberOfBitsEqualsDefinition) {
   constexpr CrcParameters six{6, 0x03, 0, false, false, 0x3F};
   constexpr CrcParameters sixteen{16, 0x90D9, 0, false, false, 0xFFFF};
   const BitView bits{bytes, 80};

@@ -11,7 +11,7 @@ namespace {
 
 constexpr std::array<std::uint8_t, 3> three{1, 2, 3};
 
-TEST(Buffer, RefusesWhatDoesNotFitAndStoresNothingOfIt) {
+TEST(Buffer, RefusesItemsThatDoNotFitAndStoresNone) {
   ByteBuffer<4> buffer;
   EXPECT_TRUE(buffer.empty());
   EXPECT_TRUE(buffer.append(three));
@@ -23,7 +23,7 @@ TEST(Buffer, RefusesWhatDoesNotFitAndStoresNothingOfIt) {
   EXPECT_TRUE(std::ranges::equal(buffer.view(), std::array{1, 2, 3, 4}));
 }
 
-TEST(Buffer, BeginsAgainAfterClear) {
+TEST(Buffer, IsEmptyAfterClear) {
   ByteBuffer<4> buffer;
   ASSERT_TRUE(buffer.append(three));
   buffer.clear();

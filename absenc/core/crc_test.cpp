@@ -47,7 +47,7 @@ static_assert(Crc<biss>::table_bytes == 256 && Crc<biss, CrcTable::nibble>::tabl
 static_assert(Crc<modbus>::table_bytes == 512 && Crc<modbus, CrcTable::nibble>::table_bytes == 32);
 static_assert(sizeof(Crc<biss>) == 1 && sizeof(Crc<modbus>) == 2, "the state is the remainder alone");
 
-constexpr std::uint64_t mixed(std::uint64_t x) {  // splitmix64
+constexpr std::uint64_t mixed(std::uint64_t x) {  // mixes the bits like splitmix64
   x += 0x9E37'79B9'7F4A'7C15;
   x = (x ^ (x >> 30)) * 0xBF58'476D'1CE4'E5B9;
   x = (x ^ (x >> 27)) * 0x94D0'49BB'1331'11EB;
@@ -114,7 +114,7 @@ TEST(Crc, EqualsTheDefinitionForEveryWidthAndLength) {
   (std::make_integer_sequence<unsigned, 14>());
 }
 
-TEST(Crc, GoesOnWhereItStopped) {
+TEST(Crc, UpdateInPartsEqualsUpdateInOne) {
   for (std::size_t split = 0; split <= noise.size(); ++split) {
     Crc<modbus> crc;
     crc.update(Bytes(noise).first(split));

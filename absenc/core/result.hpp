@@ -13,26 +13,26 @@ namespace absenc {
 /// Errors, grouped by their source. Alarms and warnings that an encoder reports in a good frame are data, not errors.
 enum class Error : std::uint8_t {
   none,
-  // caused by the caller
+  // errors caused by the caller
   invalid_argument,
   unsupported,
   buffer_too_small,
-  // caused by the line
+  // errors caused by the line
   timeout,
   line_stuck,
   bad_framing,
   truncated,
-  // caused by the content of a frame
+  // errors caused by the content of a frame
   wrong_length,
   unexpected_reply,
   bad_checksum,
   out_of_range,
   sequence_mismatch,
   cross_check_failed,
-  // refused by the encoder
+  // errors because the encoder refused the request
   busy,
   request_rejected,
-  // caused by the shaft
+  // errors caused by the shaft
   not_still,
 };
 

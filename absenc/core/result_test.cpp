@@ -32,7 +32,7 @@ static_assert(text_of(Error::cross_check_failed).name == "cross_check_failed");
 static_assert(text_of(Error::busy).name == "busy" && text_of(Error::request_rejected).name == "request_rejected");
 static_assert(static_cast<std::size_t>(Error::not_still) + 1 == error_texts.size());
 
-TEST(ErrorTexts, HaveDistinctNamesOfOneWordAndSayWhatToTry) {
+TEST(ErrorTexts, HaveDistinctOneWordNamesAndAdvice) {
   std::set<std::string_view> names;
   for (const ErrorText& text : error_texts) {
     EXPECT_TRUE(names.insert(text.name).second) << text.name << " twice";

@@ -12,7 +12,7 @@ namespace absenc {
 struct ShaftState {
   std::int64_t position = 0;        ///< unit 2^-32 revolution; the upper 32 bits count revolutions, negative below zero
   std::int32_t speed_millirpm = 0;  ///< 1/1000 revolutions per minute, counter-clockwise positive
-  std::int32_t acceleration = 0;    ///< rad/s^2
+  std::int32_t acceleration = 0;    ///< angular acceleration in rad/s^2
 };
 
 /// A motion as a function of time. Implementations accept any times, in any order.

@@ -5,7 +5,7 @@
 // Includes only the durations of <chrono>, without calendars and time zones, which would cost half a second in every
 // file.
 #if __has_include(<bits/chrono.h>)
-#include <bits/chrono.h>  // libstdc++
+#include <bits/chrono.h>  // header of libstdc++ with only the durations
 #else
 #include <chrono>
 #endif

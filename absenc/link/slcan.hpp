@@ -114,7 +114,7 @@ class LineReader {
   enum class LineEvent : std::uint8_t {
     nothing,
     line,     // `line()` is complete and valid until the next byte; may be empty
-    refused,  // BEL
+    refused,  // the adapter refused a command (BEL)
     garbage,  // bytes that cannot be a line were discarded
   };
 

@@ -15,7 +15,7 @@ Bytes bytes(std::string_view text) { return {reinterpret_cast<const std::uint8_t
 
 const CanFrame position{.id = 0x120, .size = 8, .data = {0x47, 0x26}};
 
-TEST(Slcan, FramesAsTheAdaptersWriteThem) {
+TEST(Slcan, EncodesFramesLikeAdapters) {
   EXPECT_EQ(text(encode(position)), "t12084726000000000000\r");
   EXPECT_EQ(text(encode({.id = 0x18DAF110, .extended = true, .size = 2, .data = {1, 0xAB}})), "T18DAF110201AB\r");
   EXPECT_EQ(text(encode({.id = 0x7FF, .remote = true, .size = 8})), "r7FF8\r");
@@ -24,7 +24,7 @@ TEST(Slcan, FramesAsTheAdaptersWriteThem) {
   EXPECT_EQ(encode({.id = 0x1FFFFFFF, .extended = true, .size = 8}, 0).size(), line_capacity);
 }
 
-TEST(Slcan, WhatIsWrittenIsRead) {
+TEST(Slcan, DecodesEncodedFrames) {
   for (const bool extended : {false, true}) {
     for (const bool remote : {false, true}) {
       for (std::uint8_t size = 0; size <= 8; ++size) {
@@ -41,7 +41,7 @@ TEST(Slcan, WhatIsWrittenIsRead) {
   }
 }
 
-TEST(Slcan, WhatIsNoFrame) {
+TEST(Slcan, RefusesInvalidLines) {
   const std::pair<std::string_view, Error> cases[] = {{"", Error::bad_framing},
                                                       {"V1013", Error::bad_framing},
                                                       {"t", Error::wrong_length},
@@ -65,7 +65,7 @@ TEST(Slcan, WhatIsNoFrame) {
   for (const auto& [line, error] : cases) EXPECT_EQ(decode(bytes(line)).error(), error) << line;
 }
 
-TEST(Slcan, BitRates) {
+TEST(Slcan, MapsBitRatesToCodes) {
   EXPECT_EQ(rate_code(250'000), '5');
   EXPECT_EQ(rate_code(500'000), '6');
   EXPECT_EQ(rate_code(1'000'000), '8');
@@ -96,17 +96,18 @@ std::vector<std::string> found(std::string_view stream) {
   return all;
 }
 
-TEST(SlcanReader, LinesAndRefusals) {
+TEST(SlcanReader, SplitsLinesAndRefusals) {
   using Lines = std::vector<std::string>;
   EXPECT_EQ(found("\rz\r\at1200\rV1013\r"), (Lines{"", "z", "refused", "t1200", "V1013"}));
   EXPECT_EQ(found("z\r\nt1200\r\n"), (Lines{"z", "t1200"}));
   EXPECT_EQ(found("t12"), Lines{});
 }
 
-TEST(SlcanReader, GoesOnAfterGarbage) {
+TEST(SlcanReader, ResumesAfterGarbage) {
   using Lines = std::vector<std::string>;
   EXPECT_EQ(found("xyt1200\r"), (Lines{"garbage", "t1200"}));
-  EXPECT_EQ(found("t12084726t1200\rt0800\r"), (Lines{"garbage", "t1200", "t0800"}));  // a CR was lost
+  // The CR of the first frame was lost.
+  EXPECT_EQ(found("t12084726t1200\rt0800\r"), (Lines{"garbage", "t1200", "t0800"}));
   const std::string endless(100, '5');
   EXPECT_EQ(found(endless + "\rt1200\r"), (Lines{"garbage", "t1200"}));
   EXPECT_EQ(found(endless + "t1200\r"), (Lines{"garbage", "t1200"}));

@@ -25,12 +25,12 @@ template <class Item>
 struct Step {
   /// What a machine wants from its port.
   enum class Kind : std::uint8_t {
-    wait,       // until the next event
+    wait,       // no action until the next event
     transfer,   // not before `at`: send `out` (spi: and receive max(out, expect) items; clocked: clock `bits`)
     pulse,      // not before `at`: drive `wire` active for `width`
     configure,  // switch this end of the line to `rate`; all else stays as it is
     emit,       // a result is ready; the caller reads it and calls `next` again
-    done,       // the conversation is over
+    done,       // the conversation has ended
   };
 
   Kind kind = Kind::wait;  ///< What the machine wants.
@@ -64,7 +64,7 @@ struct Event {
   /// What happened at a port.
   enum class Kind : std::uint8_t {
     sent,      // the transfer is complete (device side of spi and clocked: the host has stopped clocking)
-    received,  // `items` were received
+    received,  // `items` were received from the line
     silence,   // the `answer` or `gap` limit of the last step has passed
     timer,     // the time `at` of the last wait step was reached
     selected,  // device side: chip select or first clock edge; the next step should be the reply that the device drives

@@ -47,7 +47,7 @@ TEST(EmulatorPort, TalksToASerialPort) {
   SerialPort host(device.path(), fast);
   host.begin(transfer(request));
   EXPECT_EQ(receive(device), request);
-  EXPECT_EQ(device.wait({.at = never, .gap = 1ns}).kind, Kind::silence);  // after 2 ms
+  EXPECT_EQ(device.wait({.at = never, .gap = 1ns}).kind, Kind::silence);  // the default latency of 2 ms ends the frame
   const Data reply{1, 2, 3};
   device.begin(transfer(reply));
   EXPECT_EQ(receive(host), reply);
@@ -55,7 +55,7 @@ TEST(EmulatorPort, TalksToASerialPort) {
   EXPECT_EQ(device.dropped(), 0u);
 }
 
-TEST(EmulatorPort, ADeviceWithARateHearsOnlyThat) {
+TEST(EmulatorPort, DeviceWithARateReceivesOnlyThatRate) {
   EmulatorPort device({}, 0);
   SerialPort at_9600(device.path(), {.rate = 9600});
   TcpPort without_rate("127.0.0.1", device.tcp_port());
@@ -77,7 +77,7 @@ TEST(EmulatorPort, ADeviceWithARateHearsOnlyThat) {
   expect_quiet(device);
 }
 
-TEST(EmulatorPort, ATerminalThatNobodySetIsHeardAtEveryRate) {
+TEST(EmulatorPort, UnsetTerminalWorksAtEveryRate) {
   EmulatorPort device;
   device.begin({.kind = ByteStep::Kind::configure, .rate = 19'200});
   const Descriptor plain(::open(device.path().c_str(), O_RDWR | O_NOCTTY | O_CLOEXEC));
@@ -125,7 +125,7 @@ TEST(EmulatorPort, RefusesClientsAboveItsLimit) {
 }
 
 // Simulates a busy machine: two threads compete for one processor, and the one under test has to wait.
-TEST(EmulatorPort, TellsThatItWasKeptFromLooking) {
+TEST(EmulatorPort, ReportsSchedulingDelayAsLate) {
   cpu_set_t before;
   cpu_set_t one;
   ASSERT_EQ(::sched_getaffinity(0, sizeof before, &before), 0);
@@ -151,7 +151,7 @@ TEST(EmulatorPort, TellsThatItWasKeptFromLooking) {
   ::sched_setaffinity(0, sizeof before, &before);
 }
 
-TEST(EmulatorPort, GoesOnWhenAUserLeaves) {
+TEST(EmulatorPort, ContinuesWhenAUserLeaves) {
   EmulatorPort device;
   for (int i = 0; i < 3; ++i) {
     SerialPort host(device.path(), fast);
@@ -163,10 +163,10 @@ TEST(EmulatorPort, GoesOnWhenAUserLeaves) {
   expect_quiet(device);
 }
 
-TEST(EmulatorPort, KeepsNothingForTheNextUser) {
+TEST(EmulatorPort, DiscardsBytesForTheNextUser) {
   EmulatorPort device;
   const Data frame(1000, 0x55);
-  while (device.dropped() == 0) device.begin(transfer(frame));  // no program reads
+  while (device.dropped() == 0) device.begin(transfer(frame));  // no program reads, so bytes are dropped at last
   const Time written = now();
   sleep_until(written + 200ms);  // later than any reply that may still be in transit
   // A SerialPort would discard the bytes itself.
@@ -177,7 +177,7 @@ TEST(EmulatorPort, KeepsNothingForTheNextUser) {
   EXPECT_EQ(get(host.get()), request);
 }
 
-TEST(EmulatorPort, LeavesAReplyAloneWhenAnotherProgramLooks) {
+TEST(EmulatorPort, KeepsReplyWhenAnotherProgramOpensTheTerminal) {
   EmulatorPort device;
   const Descriptor host(::open(device.path().c_str(), O_RDWR | O_NOCTTY));
   device.begin(transfer(request));
@@ -202,7 +202,7 @@ TEST(EmulatorPort, IsNotLockedByAUserWhoLeft) {
 }
 
 // After a byte the port waits long for the rest of a request, but only briefly where no more bytes are expected.
-TEST(EmulatorPort, APauseIsShorterWhereNothingMoreIsDue) {
+TEST(EmulatorPort, PauseIsShorterWhereNoMoreBytesAreExpected) {
   EmulatorPort device;
   device.set_latency(std::chrono::hours(1));
   const Descriptor host(::open(device.path().c_str(), O_RDWR | O_NOCTTY));
@@ -296,7 +296,7 @@ TEST(EmulatorPort, RemovesOnlyItsOwnLink) {
   EXPECT_TRUE(fs::is_symlink(link));
 }
 
-TEST(EmulatorPort, SaysThatItsTcpPortIsInUse) {
+TEST(EmulatorPort, ReportsTcpPortInUse) {
   const EmulatorPort device({}, 0);
   const auto second = [&] { const EmulatorPort other({}, device.tcp_port()); };
   EXPECT_EQ(failure_of(second).kind(), Failure::Kind::in_use);

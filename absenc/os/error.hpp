@@ -33,7 +33,7 @@ class Failure : public std::runtime_error {
   /// Takes the text of the failure.
   Failure(Kind kind, const std::string& sentence, Bus bus = Bus::unknown)
       : std::runtime_error(sentence), kind_(kind), bus_(bus) {}
-  /// Creates a Failure `in_use`.
+  /// Creates a Failure of kind `in_use` with the kind of its holder.
   Failure(const std::string& sentence, Holder holder)
       : std::runtime_error(sentence), kind_(Kind::in_use), holder_(holder) {}
   /// Returns the kind of the failure.

@@ -13,7 +13,7 @@ namespace absenc::os {
 ///
 /// A transfer begins at `at`, never earlier; `begin` blocks until then. A frame received before the transfer began, or
 /// before `now` was called, is reported with a time that is not later, however long it waited in a queue. Because
-/// replies on CAN carry no number, the machine can report such an old frame only by its time. `sent` carries the time
+/// replies on CAN carry no number, the machine recognises such an old frame only by its time. `sent` carries the time
 /// before the frame was handed to the kernel, because the kernel does not report when the controller has sent it; so a
 /// reply is never older than `sent`. `timer` is reported as by StreamPort.
 class FramePort : public Port<CanFrame> {

@@ -44,7 +44,7 @@ TEST(InputLines, TakesWholeLinesAndDoesNotWait) {
   EXPECT_FALSE(lines.ended());
 }
 
-TEST(InputLines, TheEndOfTheInputIsTheEndOfItsLastLine) {
+TEST(InputLines, EndOfInputEndsLastLine) {
   Pipe pipe;
   InputLines lines(pipe.out.get());
   pipe.write("help");
@@ -55,14 +55,14 @@ TEST(InputLines, TheEndOfTheInputIsTheEndOfItsLastLine) {
   EXPECT_THAT(lines.take(), IsEmpty());
 }
 
-TEST(InputLines, WhatHasNoLinesIsCut) {
+TEST(InputLines, CutsInputWithoutLines) {
   const Descriptor zeros(::open("/dev/zero", O_RDONLY | O_CLOEXEC));
   InputLines lines(zeros.get());
   EXPECT_THAT(lines.take(), ElementsAre(SizeIs(4096)));
   EXPECT_FALSE(lines.ended());
 }
 
-TEST(InputLines, WhatCannotBeReadHasEnded) {
+TEST(InputLines, UnreadableInputHasEnded) {
   const Descriptor folder(::open("/", O_RDONLY | O_CLOEXEC));
   InputLines lines(folder.get());
   EXPECT_THAT(lines.take(), IsEmpty());

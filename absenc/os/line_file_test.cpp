@@ -46,7 +46,7 @@ TEST(LineFile, GrowsAtOnce) {
   file.sync();
 }
 
-TEST(LineFile, IsNeverOneThatWasThere) {
+TEST(LineFile, RefusesExistingFile) {
   const Directory directory;
   std::ofstream(directory.path / "log") << "precious";
   try {
@@ -60,7 +60,7 @@ TEST(LineFile, IsNeverOneThatWasThere) {
   EXPECT_THROW(LineFile(directory.path.string()), Failure);
 }
 
-TEST(LineFile, TakesBackWhatDoesNotFit) {
+TEST(LineFile, RemovesPartOfLinesThatDoNotFit) {
   const Directory directory;
   LineFile file(directory.path / "log");
   file.append("whole line\n");

@@ -42,7 +42,7 @@ class OwnedFile {
   /// Returns whether the path still leads to this file.
   [[nodiscard]] bool has_its_name() const;
   struct State {
-    std::int64_t size = 0;         // in bytes
+    std::int64_t size = 0;         // size in bytes
     std::int64_t modified_ns = 0;  // calendar time of the last write, in nanoseconds
   };
   /// Returns size and modification time. Throws Failure.

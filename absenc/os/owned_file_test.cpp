@@ -54,7 +54,7 @@ TEST_F(OwnedFileTest, IsMadeAndReplaced) {
   EXPECT_EQ(content(), "last");
 }
 
-TEST_F(OwnedFileTest, HasOneKeeper) {
+TEST_F(OwnedFileTest, HasOneOwner) {
   {
     OwnedFile file(path);
     EXPECT_EQ(refusal(path), Failure::Kind::in_use);
@@ -74,7 +74,7 @@ TEST_F(OwnedFileTest, IsARegularFile) {
   EXPECT_EQ(refusal(directory.path() / "loop"), Failure::Kind::system);
 }
 
-TEST_F(OwnedFileTest, WhatCannotBeWrittenLeavesTheOldOne) {
+TEST_F(OwnedFileTest, FailedWriteLeavesOldFile) {
   OwnedFile file(path);
   file.replace("old", Durable::no);
   fs::rename(directory.path(), directory.path().string() + "-away");
@@ -84,7 +84,7 @@ TEST_F(OwnedFileTest, WhatCannotBeWrittenLeavesTheOldOne) {
   EXPECT_EQ(files(), 1u);
 }
 
-TEST_F(OwnedFileTest, ANewFileThatIsNotWholeVanishes) {
+TEST_F(OwnedFileTest, IncompleteNewFileDisappears) {
   {
     NewFile file(path);
     file.write("half");
@@ -97,7 +97,7 @@ TEST_F(OwnedFileTest, ANewFileThatIsNotWholeVanishes) {
   EXPECT_EQ(files(), 1u);
 }
 
-TEST_F(OwnedFileTest, AFileWithoutANameIsSeenByNobody) {
+TEST_F(OwnedFileTest, NamelessFileIsInvisible) {
   const Descriptor file = nameless_file(directory.path());
   EXPECT_EQ(files(), 0u);
   EXPECT_THROW(static_cast<void>(nameless_file(path)), Failure);

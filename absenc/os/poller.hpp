@@ -17,7 +17,7 @@ class Poller {
   static constexpr std::size_t most_ready = 16;  // maximum per call of `wait`; further descriptors follow with the next
                                                  // call
 
-  /// Throws Failure.
+  /// Creates the epoll and timer descriptors. Throws Failure.
   Poller();
 
   /// Makes `wait` report `descriptor` when it is readable or has an error. Throws Failure.

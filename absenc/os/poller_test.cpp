@@ -25,7 +25,7 @@ TEST(Poller, ReturnsAtTheDeadlineAndNeverBefore) {
   EXPECT_TRUE(poller.wait(Time{}).empty());
 }
 
-TEST(Poller, TellsWhereThereIsSomethingToRead) {
+TEST(Poller, ReturnsReadableDescriptors) {
   Poller poller;
   const Descriptor first(::eventfd(0, EFD_NONBLOCK));
   const Descriptor second(::eventfd(1, EFD_NONBLOCK));
@@ -38,7 +38,7 @@ TEST(Poller, TellsWhereThereIsSomethingToRead) {
   EXPECT_TRUE(poller.wait(now() + 1ms).empty());
 }
 
-TEST(Poller, AsksWhetherItIsOver) {
+TEST(Poller, ChecksForCancellation) {
   int calls = 0;
   const std::function<bool()> over = [&] { return ++calls == 3; };
   const EndQuestion question(over);
@@ -47,7 +47,7 @@ TEST(Poller, AsksWhetherItIsOver) {
   EXPECT_EQ(calls, 3);
 }
 
-TEST(Poller, SeesWhatIsReadyEvenAfterTheDeadline) {
+TEST(Poller, ReturnsReadyDescriptorsAfterTheDeadline) {
   Poller poller;
   const Descriptor ready(::eventfd(1, EFD_NONBLOCK));
   poller.add(ready.get());

@@ -24,8 +24,8 @@ struct LineCounts {
 
 /// Properties of a port; unknown ones are empty.
 struct PortFacts {
-  std::string driver{};                     // for example "ftdi_sio", "serial8250"
-  std::optional<unsigned> latency_timer{};  // milliseconds
+  std::string driver{};                     // name of the driver, for example "ftdi_sio", "serial8250"
+  std::optional<unsigned> latency_timer{};  // time for which a USB adapter holds back received bytes, in milliseconds
   std::optional<bool> kernel_direction{};   // whether the kernel switches an RS-485 transceiver
   std::optional<LineCounts> counts{};
   bool pseudo_terminal = false;  // a pseudo-terminal has no line and so no rate

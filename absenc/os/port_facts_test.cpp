@@ -13,7 +13,7 @@ namespace absenc::os {
 namespace fs = std::filesystem;
 
 // A folder replaces /sys/class/tty, and a regular file replaces the port.
-TEST(PortFacts, WhatSysTellsOfAPort) {
+TEST(PortFacts, ReadsPropertiesFromSys) {
   const testing::TemporaryDirectory directory;
   const fs::path port = directory.path() / "ttyUSB7";
   std::ofstream{port};
@@ -33,7 +33,7 @@ TEST(PortFacts, WhatSysTellsOfAPort) {
   EXPECT_FALSE(unknown.latency_timer);
 }
 
-TEST(PortFacts, WhatDriversAre) {
+TEST(PortFacts, ClassifiesDrivers) {
   EXPECT_TRUE(is_modem_driver("option1"));
   EXPECT_FALSE(is_modem_driver("ftdi_sio"));
   EXPECT_TRUE(is_bare_uart("serial8250"));
@@ -41,7 +41,7 @@ TEST(PortFacts, WhatDriversAre) {
   EXPECT_FALSE(is_bare_uart(""));
 }
 
-TEST(PortFacts, CountsOfAnExamination) {
+TEST(PortFacts, SubtractsCounts) {
   const LineCounts now{5, 7, 9, 11};
   const LineCounts gone = now.since({5, 6, 7, 8});
   EXPECT_EQ(gone.breaks, 0u);

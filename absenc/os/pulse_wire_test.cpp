@@ -92,21 +92,21 @@ TEST_F(PulseWireTest, IsLowForThePulseAndHighAtRest) {
   EXPECT_EQ(kernel.log, (Log{"RTS cleared", "DTR cleared", "RTS set", "RTS cleared", "DTR set", "DTR cleared"}));
 }
 
-TEST_F(PulseWireTest, IsHighForThePulseWhereThatIsWanted) {
+TEST_F(PulseWireTest, IsHighForThePulseIfActiveHigh) {
   SerialPort port(terminal.path, settings, Rs485::automatic, {.trigger = {.kind = Wire::dtr, .active_high = true}},
                   kernel);
   port.begin(trigger);
   EXPECT_EQ(kernel.log, (Log{"DTR set", "DTR cleared", "DTR set"}));
 }
 
-TEST_F(PulseWireTest, LastsAsLongAsTheUserSays) {
+TEST_F(PulseWireTest, UsesPulseWidthOfUser) {
   SerialPort port(terminal.path, settings, Rs485::automatic, {.trigger = {.kind = Wire::rts, .width = 3ms}}, kernel);
   port.begin(trigger);
   ASSERT_EQ(kernel.times.size(), 3u);
   EXPECT_GE(kernel.times[2] - kernel.times[1], 3ms);
 }
 
-TEST_F(PulseWireTest, MayBeALineOfTheBoard) {
+TEST_F(PulseWireTest, DrivesGpioLine) {
   for (const bool high : {false, true}) {
     kernel.log.clear();
     {
@@ -118,7 +118,7 @@ TEST_F(PulseWireTest, MayBeALineOfTheBoard) {
   }
 }
 
-TEST_F(PulseWireTest, SaysWhatIsWrongWithALine) {
+TEST_F(PulseWireTest, ReportsGpioErrors) {
   const PulseWires clk{.clear = {.kind = Wire::gpio, .name = "CLK"}};
   const Failure unknown = refused({.clear = {.kind = Wire::gpio, .name = "CLR"}});
   EXPECT_EQ(unknown.kind(), Failure::Kind::not_found);
@@ -135,14 +135,14 @@ TEST_F(PulseWireTest, SaysWhatIsWrongWithALine) {
   EXPECT_EQ(failure_of([&] { port.begin(clear_step); }).kind(), Failure::Kind::system);
 }
 
-TEST_F(PulseWireTest, SaysThatAPortHasNoSuchWire) {
+TEST_F(PulseWireTest, ReportsMissingWire) {
   kernel.modem_error = ENOTTY;
   const Failure failure = refused({.trigger = {.kind = Wire::rts}});
   EXPECT_EQ(failure.kind(), Failure::Kind::unsupported);
   EXPECT_NE(std::string(failure.what()).find("has no RTS line for the pulse"), std::string::npos);
 }
 
-TEST_F(PulseWireTest, WithoutAWireThereIsNoPulse) {
+TEST_F(PulseWireTest, RefusesPulseWithoutWire) {
   SerialPort port(terminal.path, settings, Rs485::automatic, {.trigger = {.kind = Wire::rts}}, kernel);
   const Failure failure = failure_of([&] { port.begin(clear_step); });
   EXPECT_EQ(failure.kind(), Failure::Kind::unsupported);
@@ -157,7 +157,7 @@ TEST_F(PulseWireTest, RtsHasOneUseOnly) {
 }
 
 // Tests the real system calls as far as possible without a wire.
-TEST(SystemWires, TellThatAPseudoTerminalHasNone) {
+TEST(SystemWires, ReportPseudoTerminalWithoutWires) {
   const PseudoTerminal terminal;
   for (const Wire wire : {Wire::rts, Wire::dtr}) {
     const Failure failure = failure_of(
@@ -171,7 +171,7 @@ TEST(SystemWires, TellThatAPseudoTerminalHasNone) {
   EXPECT_TRUE(failure.kind() == Failure::Kind::not_found || failure.kind() == Failure::Kind::no_permission);
 }
 
-TEST(SystemWires, APseudoTerminalIsKnownByItsPath) {
+TEST(SystemWires, RecognisePseudoTerminalByPath) {
   const PseudoTerminal terminal;
   EXPECT_TRUE(is_pseudo_terminal(terminal.path));
   EXPECT_FALSE(is_pseudo_terminal("/dev/null"));

@@ -17,9 +17,10 @@ namespace absenc::os {
 
 /// Selects the component that switches an RS-485 transceiver to sending.
 enum class Rs485 : std::uint8_t {
-  automatic,  // half-duplex lines: the kernel with RTS if the port supports it and RTS is free, otherwise the adapter
-  on,         // the kernel; a port that does not support it is an error
-  off,        // not the kernel; for full-duplex lines
+  automatic,  // the kernel switches with RTS if the port supports it and RTS is free, otherwise the adapter; for
+              // half-duplex lines
+  on,         // the kernel switches; a port that does not support it is an error
+  off,        // the kernel never switches; for full-duplex lines
 };
 
 /// Directions in which a port is used.

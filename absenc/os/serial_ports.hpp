@@ -34,10 +34,10 @@ struct ListedPort {
                                // order; or ""
   std::string driver{};
   std::optional<UsbAdapter> usb{};
-  std::optional<unsigned> latency_timer{};      // in milliseconds
-  std::optional<std::uint32_t> highest_rate{};  // in bits per second, of the chip
+  std::optional<unsigned> latency_timer{};  // time for which a USB adapter holds back received bytes, in milliseconds
+  std::optional<std::uint32_t> highest_rate{};  // highest rate of the chip, in bits per second
   std::string refusal{};                        // reason why this user may not open it; "" if the user may
-  std::string holder{};                         // result of `holder_of`
+  std::string holder{};                         // program that uses the port, as returned by `holder_of`
 };
 
 /// Reads the properties of the port at `path`. `sys` and `links` are parameters for tests.

@@ -55,7 +55,7 @@ class ListedPorts : public ::testing::Test {
   testing::TemporaryDirectory directory_;
 };
 
-TEST_F(ListedPorts, AnAdapterSaysWhoItIs) {
+TEST_F(ListedPorts, ReadsIdentityOfAdapter) {
   plug_in("0403", "6001", "0600");
   fs::create_directories(root() / "by-id");
   fs::create_symlink(root() / "dev/ttyUSB0", root() / "by-id/usb-FTDI_A50285BI");
@@ -72,7 +72,7 @@ TEST_F(ListedPorts, AnAdapterSaysWhoItIs) {
   EXPECT_EQ(port.holder, "");
 }
 
-TEST_F(ListedPorts, AChipThatTheNumbersDoNotTellHasNoRate) {
+TEST_F(ListedPorts, UnknownChipHasNoRate) {
   plug_in("0403", "6010", "0700");
   EXPECT_EQ(look().highest_rate, 12'000'000u);  // the release number identifies the chip
   write("devices/usb1/1-2/bcdDevice", "9999");
@@ -91,7 +91,7 @@ TEST_F(ListedPorts, AUartHasTheRateOfItsClock) {
   EXPECT_EQ(port.highest_rate, 115'200u);
 }
 
-TEST_F(ListedPorts, TheDriverOfAUartStandsBehindTheKernelsOwnDevices) {
+TEST_F(ListedPorts, FindsUartDriverBehindKernelDevices) {
   for (const auto& [device, driver] :
        {std::pair{"uart", "serial8250"}, {"uart/uart:0", "ctrl"}, {"uart/uart:0/uart:0.0", "port"}}) {
     fs::create_directories(root() / "drivers" / driver);
@@ -104,7 +104,7 @@ TEST_F(ListedPorts, TheDriverOfAUartStandsBehindTheKernelsOwnDevices) {
   EXPECT_EQ(driver_of("ttyS1", sys()), "");
 }
 
-TEST_F(ListedPorts, AProgramThatHasItOpenIsNamed) {
+TEST_F(ListedPorts, NamesProgramThatHasPortOpen) {
   plug_in("0403", "6001", "0600");
   std::array<int, 2> ready{};
   ASSERT_EQ(::pipe(ready.data()), 0);
@@ -125,7 +125,7 @@ TEST_F(ListedPorts, AProgramThatHasItOpenIsNamed) {
   EXPECT_EQ(look().holder, "");
 }
 
-TEST_F(ListedPorts, APortInUseSaysWhoHasIt) {
+TEST_F(ListedPorts, PortInUseNamesItsHolder) {
   plug_in("0403", "6001", "0600");
   const std::string path = root() / "dev/ttyUSB0";
   const int port = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
@@ -147,7 +147,7 @@ TEST_F(ListedPorts, APortInUseSaysWhoHasIt) {
   ::close(port);
 }
 
-TEST_F(ListedPorts, APortThatCannotBeOpenedSaysWhy) {
+TEST_F(ListedPorts, UnopenablePortStatesReason) {
   plug_in("0403", "6001", "0600");
   fs::remove(root() / "dev/ttyUSB0");
   EXPECT_NE(look().refusal.find("there is no port"), std::string::npos);

@@ -46,7 +46,7 @@ static_assert(nearest_rate(2'500'000, 9600, 4'000'000) == 2'000'000, "divided by
 static_assert(nearest_rate(2'500'000, 2'400'000, 3'000'000) == 2'400'000, "the driver does better");
 static_assert(nearest_rate(2'500'000, 9600, 5'000'000) == 9600, "the driver has just refused 2.5 MBd");
 
-TEST(SerialPort, SetsAnyRateAndPutsEverythingBack) {
+TEST(SerialPort, SetsAnyRateAndRestoresSettings) {
   const PseudoTerminal terminal;
   const auto before = terminal_state(terminal.master.get());  // settings of the slave: a master has none of its own
   ASSERT_TRUE(before);
@@ -148,13 +148,13 @@ TEST(SerialPort, NamesThePortsThatExist) {
   for (const std::string& port : serial_ports()) EXPECT_TRUE(contains(failure, port)) << failure.what();
 }
 
-TEST(SerialPort, RefusesWhatIsNoTerminal) {
+TEST(SerialPort, RefusesFilesThatAreNoTerminal) {
   for (const char* path : {"/dev/null", "/tmp"}) {
     EXPECT_EQ(failure_of([&] { const SerialPort port(path, fast); }).kind(), Kind::unsupported) << path;
   }
 }
 
-TEST(SerialPort, SaysWhenThePseudoTerminalHasNoWires) {
+TEST(SerialPort, ReportsPseudoTerminalWithoutWires) {
   const PseudoTerminal terminal;
   SerialPort port(terminal.path, fast);
   EXPECT_EQ(failure_of([&] { port.begin({.kind = ByteStep::Kind::pulse}); }).kind(), Kind::unsupported);
@@ -181,7 +181,7 @@ void expect_no_permission(const std::string& path, const std::string& part) {
   EXPECT_EQ(WEXITSTATUS(status), 0);
 }
 
-TEST(SerialPort, SaysWhoMayOpenIt) {
+TEST(SerialPort, ReportsNeededPermission) {
   const PseudoTerminal terminal;
   const bool root = ::geteuid() == 0;
   ASSERT_EQ(::chmod(terminal.path.c_str(), root ? 0600 : 0000), 0);

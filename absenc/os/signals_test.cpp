@@ -52,7 +52,7 @@ TEST_F(Signals, EndWaitingForTheTimeOfATransfer) {
   EXPECT_THROW(port.begin(transfer(bytes, now() + 1h)), Interrupted);
 }
 
-TEST_F(Signals, AreSeenWhenTheyCameBefore) {
+TEST_F(Signals, EndWaitThatBeginsLater) {
   std::raise(SIGINT);
   EXPECT_THROW(sleep_until(never), Interrupted);
 }
@@ -65,7 +65,7 @@ TEST_F(Signals, InterruptOnceEach) {
   EXPECT_THROW(sleep_until(never), Interrupted);
 }
 
-TEST_F(Signals, AreSeenOnALineThatIsNeverQuiet) {
+TEST_F(Signals, EndWaitOnBusyLine) {
   std::array<int, 2> ends{};
   ASSERT_EQ(::pipe(ends.data()), 0);
   const Descriptor reader(ends[0]), writer(ends[1]);
@@ -89,7 +89,7 @@ TEST_F(Signals, OfOtherKindsDoNotEndAWait) {
   ::sigaction(SIGALRM, &before, nullptr);
 }
 
-TEST(EndQuestion, EndsAWaitThatNothingElseEnds) {
+TEST(EndQuestion, EndsAWaitWithoutEvents) {
   int calls = 0;
   const std::function<bool()> over = [&] { return ++calls == 3; };
   const EndQuestion question(over);
@@ -104,7 +104,7 @@ TEST(EndQuestion, EndsAWaitThatNothingElseEnds) {
   EXPECT_GT(calls, 3);
 }
 
-TEST(WaitFor, SeesWhatIsReadyAfterTheDeadline) {
+TEST(WaitFor, ReportsReadyDescriptorsAfterTheDeadline) {
   std::array<int, 2> ends{};
   ASSERT_EQ(::pipe(ends.data()), 0);
   const Descriptor reader(ends[0]), writer(ends[1]);

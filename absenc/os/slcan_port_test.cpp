@@ -26,7 +26,7 @@ const CanFrame request{.id = 0x220, .size = 8, .data = {0x80, 0x20}};
 
 FrameStep sending(const CanFrame& frame) { return {.kind = FrameStep::Kind::transfer, .out = {&frame, 1}}; }
 
-/// A byte port in memory that replies commands like an adapter, unless a test changes the replies.
+/// A byte port in memory that answers commands like an adapter, unless a test changes the replies.
 class FakeAdapter final : public Port<std::uint8_t> {
  public:
   Time now() override { return os::now(); }
@@ -62,7 +62,7 @@ TEST(SlcanPort, OpensTheAdapterAndClosesIt) {
   EXPECT_EQ(adapter->written, "\r\r\rC\rS5\rO\rC\r");
 }
 
-TEST(SlcanPort, SaysWhatAnAdapterRefuses) {
+TEST(SlcanPort, ReportsRefusalOfAdapter) {
   const auto adapter = std::make_shared<FakeAdapter>();
   const auto refusal = [&](const LineSettings& settings) {
     return failure_of([&] { const SlcanPort port(adapter, "/dev/ttyACM9", settings); });
@@ -95,7 +95,7 @@ TEST(SlcanPort, FramesGarbageAndRefusals) {
   EXPECT_EQ(last.items[0], (CanFrame{.id = 0x18DAF110, .extended = true, .size = 1, .data = {1}}));
 }
 
-TEST(SlcanPort, WhatWaitedComesBeforeTheRequest) {
+TEST(SlcanPort, ReportsQueuedFramesBeforeTheRequest) {
   const auto adapter = std::make_shared<FakeAdapter>();
   SlcanPort port(adapter, "X", bus);
   adapter->coming = "t12084726000000000000\r";
@@ -141,7 +141,7 @@ struct Adapter : ::testing::Test {
   std::vector<CanFrame> received;
 };
 
-TEST_F(Adapter, AnswersAsAdaptersDo) {
+TEST_F(Adapter, AnswersLikeAdapters) {
   EXPECT_EQ(send_text("\r\r"), "\r\r");
   EXPECT_EQ(send_text("O\r"), "\a");  // refused: no bit rate is set yet
   EXPECT_EQ(send_text("S5\r"), "\r");
@@ -206,7 +206,7 @@ TEST_F(Adapter, FramesSentAtOnceComeOneAfterTheOther) {
   EXPECT_EQ(times[2] - times[1], frame_time);
 }
 
-TEST_F(Adapter, RefusesAndCountsWhatItCannotKeep) {
+TEST_F(Adapter, RefusesAndCountsFramesBeyondItsQueue) {
   send_text("S5\rO\r");
   std::string all;
   for (unsigned i = 0; i < 100; ++i) all += "t22088020000000000000\r";

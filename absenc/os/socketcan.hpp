@@ -21,7 +21,7 @@ struct CanKernel {
   /// Calls socket(PF_CAN, SOCK_RAW, CAN_RAW), non-blocking.
   virtual int open();
   virtual int control(int descriptor, unsigned long request, void* argument);
-  /// Calls setsockopt(2).
+  /// Sets a socket option with setsockopt(2).
   virtual int set(int descriptor, int level, int name, const void* value, std::size_t size);
   /// Binds the socket to the interface with this index.
   virtual int bind(int descriptor, int index);

@@ -35,7 +35,7 @@ std::string sentence(FakeCan& kernel, const std::string& interface = "can0") {
   return failure_of([&] { const SocketCan port(interface, line, kernel); }).what();
 }
 
-TEST(SocketCan, OpensAsItShould) {
+TEST(SocketCan, OpensWithRequiredOptions) {
   FakeCan kernel;
   const SocketCan port("can0", line, kernel);
   EXPECT_EQ(kernel.bound, 7);
@@ -45,7 +45,7 @@ TEST(SocketCan, OpensAsItShould) {
   EXPECT_EQ((kernel.options[{SOL_SOCKET, SO_TIMESTAMPNS}]), 1u);
 }
 
-TEST(SocketCan, SaysWhatIsWrongAndWhatToType) {
+TEST(SocketCan, ErrorsStateProblemAndCommand) {
   FakeCan kernel;
   kernel.open_error = EAFNOSUPPORT;
   EXPECT_NE(sentence(kernel).find("modprobe can_raw"), std::string::npos);
@@ -105,7 +105,7 @@ TEST(SocketCan, ExtendedAndRemoteFrames) {
   EXPECT_EQ(kernel.written[0].can_id, 0x18DAF110 | CAN_EFF_FLAG | CAN_RTR_FLAG);
 }
 
-TEST(SocketCan, WhatWaitedInTheQueueComesBeforeTheRequest) {
+TEST(SocketCan, ReportsQueuedFramesBeforeTheRequest) {
   FakeCan kernel;
   SocketCan port("can0", line, kernel);
   kernel.put(raw(0x120, {1}));
@@ -135,7 +135,7 @@ TEST(SocketCan, SilenceTimerAndEnd) {
   EXPECT_THROW(static_cast<void>(port.wait({.at = never})), Ended);
 }
 
-TEST(SocketCan, AFullQueueIsWaitedOut) {
+TEST(SocketCan, WaitsForFullQueue) {
   FakeCan kernel;
   SocketCan port("can0", line, kernel);
   kernel.write_errors = {ENOBUFS, ENOBUFS, EAGAIN};
@@ -177,7 +177,7 @@ TEST(SocketCan, AnInterfaceThatGoesAway) {
   EXPECT_NE(std::string(failure_of([&] { port.begin(sending(request)); }).what()).find("unplugged"), std::string::npos);
 }
 
-TEST(SocketCan, ItsBitRateIsNotOurs) {
+TEST(SocketCan, DoesNotSetBitRate) {
   FakeCan kernel;
   SocketCan port("can0", line, kernel);
   port.begin({.kind = FrameStep::Kind::configure, .rate = line.rate});  // equal to the interface's rate, so it is
@@ -189,7 +189,7 @@ TEST(SocketCan, ItsBitRateIsNotOurs) {
 }
 
 // Tests the same system call on a UDP socket, which every kernel has.
-TEST(SocketCan, TheKernelsStampIsOfWhenItCame) {
+TEST(SocketCan, KernelStampIsTimeOfReception) {
   const Descriptor socket(::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0));
   sockaddr_in address{};
   address.sin_family = AF_INET;
@@ -227,7 +227,7 @@ TEST(SocketCan, ListsInterfaces) {
 }
 
 // The test machine may have no CAN, so the kernel may give either of two errors.
-TEST(SocketCan, TheRealKernelSaysThatThereIsNoSuchInterface) {
+TEST(SocketCan, RealKernelReportsMissingInterface) {
   const std::string what = failure_of([] { const SocketCan port("absenc-none", line); }).what();
   EXPECT_TRUE(what.find("there is no CAN interface absenc-none") != std::string::npos ||
               what.find("this kernel has no CAN") != std::string::npos)

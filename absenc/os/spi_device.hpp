@@ -17,7 +17,7 @@ struct SpiTransfer {
   std::size_t size = 0;    // number of bytes; without both buffers nothing is clocked
   Bytes out{};             // bytes of the host, `size` of them; empty: zeros are sent
   MutableBytes in{};       // buffer for the device's bytes, `size` of them; empty: they are discarded
-  std::uint32_t rate = 0;  // Hz
+  std::uint32_t rate = 0;  // clock rate in Hz
   std::uint8_t mode = 0;   // 2 * CPOL + CPHA
   bool lsb_first = false;
   Time delay{};           // pause behind the last bit
@@ -78,7 +78,7 @@ class SpiDevice {
   std::vector<std::uint8_t> received_;
   std::size_t clocks_ = 0;
   bool last_out_ = false;
-  Time period_{};  // shortest clock period
+  Time period_{};  // shortest clock period of the frame
   Time selected_at_{};
   Time lead_{};  // time to the first clock
 };

@@ -146,7 +146,7 @@ TEST(SpiDevice, EveryModeOnAClockedDevice) {
   }
 }
 
-TEST(SpiDevice, TellsAChipWhenItIsSelectedAndWhenNot) {
+TEST(SpiDevice, ReportsSelectionToChip) {
   const SpiTransfer wait{.rate = 1, .mode = 1, .delay = 5us};
   const SpiTransfer bytes{.size = 2, .rate = 500'000, .mode = 1, .delay = 3us};
   EXPECT_EQ(exchange(LinkKind::spi, chip_settings, {wait, bytes}).log,
@@ -158,7 +158,7 @@ TEST(SpiDevice, TellsAChipWhenItIsSelectedAndWhenNot) {
             "1080000 received 00 00, 1080000 sent 16 2000");
 }
 
-TEST(SpiDevice, TellsAClockedDeviceThePeriodAndThePauses) {
+TEST(SpiDevice, ReportsPeriodAndPausesToClockedDevice) {
   const LineSettings settings{.rate = 200'000, .spi_mode = 3};
   const SpiTransfer wait{.rate = 1, .mode = 3, .delay = 5us};
   const SpiTransfer bytes{.size = 1, .rate = 200'000, .mode = 3};
@@ -181,7 +181,7 @@ TEST(SpiDevice, TheFastestClockOfAFrameCounts) {
   EXPECT_THAT(exchange(LinkKind::spi, chip_settings, {slow, fast, slow}).log, HasSubstr("1034000 sent 24 250"));
 }
 
-TEST(SpiDevice, AChipThatStaysSelectedGoesOn) {
+TEST(SpiDevice, ChipThatStaysSelectedContinues) {
   Data received_bytes;
   ByteToy toy = chip(&received_bytes);
   SpiDevice device(LinkKind::spi, chip_settings, toy);
@@ -198,7 +198,7 @@ TEST(SpiDevice, AChipThatStaysSelectedGoesOn) {
   EXPECT_EQ(received_bytes, sent);
 }
 
-TEST(SpiDevice, AChipThatStaysSelectedForEverIsNotKeptInMind) {
+TEST(SpiDevice, LimitsMemoryForChipThatStaysSelected) {
   Data received_bytes;
   ByteToy toy = chip(&received_bytes);
   SpiDevice device(LinkKind::spi, chip_settings, toy);
@@ -230,7 +230,7 @@ TEST(SpiDevice, WithoutBuffersNothingIsClocked) {
   EXPECT_EQ(toy.log, "1000000 selected, 1004000 received, 1004000 sent");
 }
 
-TEST(SpiDevice, WakesTheDeviceOnceWhenItWants) {
+TEST(SpiDevice, WakesTheDeviceOnceAtItsTimer) {
   ByteToy toy = chip();
   SpiDevice device(LinkKind::spi, chip_settings, toy);
   EXPECT_EQ(device.timer(), never);

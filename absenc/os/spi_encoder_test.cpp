@@ -50,7 +50,7 @@ TEST_F(SpiEncoder, SsiOfEveryLength) {
 }
 
 // Clocks 1000 bits, of which the frame needs 41, on each kind of port that carries a clocked line.
-TEST_F(SpiEncoder, SloIsLowBehindTheCrcWhateverCarriesIt) {
+TEST_F(SpiEncoder, SloIsLowBehindTheCrcOnEveryPort) {
   constexpr std::size_t clocks = 1000;
   const auto samples = [&](Port<std::uint8_t>& port) {
     port.begin({.kind = ByteStep::Kind::transfer, .bits = clocks, .at = port.now() + 1ms});
@@ -126,7 +126,7 @@ struct BissRegisters {
   std::vector<std::byte> storage = std::vector<std::byte>(biss::unit.host_storage);
 };
 
-TEST_F(SpiEncoder, RegistersAreAskedForByTheLevelOfTheClock) {
+TEST_F(SpiEncoder, ReadsRegistersWithClockLevel) {
   BissRegisters registers(kernel, shaft);
   SpiPort port(FakeSpi::path, LinkKind::clocked, biss::line_settings, {}, kernel);
   Conversation<std::uint8_t>& info = registers.info();
@@ -217,7 +217,7 @@ TEST_F(SpiEncoder, EncolinkNoticesAClockTooSoonAfterChipSelect) {
   }
 }
 
-TEST_F(SpiEncoder, NobodyThere) {
+TEST_F(SpiEncoder, ReportsMissingEncoder) {
   SpiPort port(FakeSpi::path, LinkKind::clocked, biss::line_settings, {}, kernel);
   biss::ReadPosition read({});
   ASSERT_TRUE(run(read, port));

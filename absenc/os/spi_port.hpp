@@ -21,15 +21,15 @@ struct SpiKernel {
   virtual ~SpiKernel() = default;
   /// Works like open(2) with O_RDWR: negative, with errno, on failure.
   virtual int open(const std::string& path);
-  /// Works like ioctl(2).
+  /// Sends a request to the driver like ioctl(2).
   virtual int control(int descriptor, unsigned long request, void* argument);
 };
 [[nodiscard]] SpiKernel& system_kernel();
 
 /// Controller settings chosen by the user; they override those of the protocol, also in every `configure` step.
 struct SpiChoice {
-  std::optional<std::uint32_t> speed;  // Hz
-  std::optional<std::uint8_t> mode;    // 0 to 3
+  std::optional<std::uint32_t> speed;  // clock rate in Hz
+  std::optional<std::uint8_t> mode;    // SPI mode, 0 to 3
 };
 
 /// A port on an SPI controller, locked against other programs that use locks. Every function throws Failure or

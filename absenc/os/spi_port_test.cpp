@@ -56,13 +56,13 @@ TEST_F(SpiPortTest, SetsWordModeAndSpeed) {
   EXPECT_EQ(port.settings(), encoder_settings);
 }
 
-TEST_F(SpiPortTest, LeavesHowTheBoardSelectsTheChip) {
+TEST_F(SpiPortTest, LeavesChipSelectFlags) {
   kernel.settings().mode = SPI_MODE_2 | SPI_CS_HIGH | SPI_LSB_FIRST;
   open();
   EXPECT_EQ(kernel.settings().mode, static_cast<std::uint32_t>(SPI_MODE_1 | SPI_CS_HIGH));
 }
 
-TEST_F(SpiPortTest, WhatTheUserSaysGoesBeforeTheProtocol) {
+TEST_F(SpiPortTest, UserSettingsOverrideProtocol) {
   SpiPort port = open(LinkKind::clocked, biss_settings, {.speed = 400'000, .mode = 2});
   EXPECT_EQ(kernel.log, "bits 8, mode 2, speed 400000, ");
   kernel.log.clear();
@@ -126,7 +126,7 @@ TEST_F(SpiPortTest, ClocksOnceMoreForTheIdleLine) {
   EXPECT_EQ(kernel.log, "2 bytes in, 3 bytes in, ");
 }
 
-TEST_F(SpiPortTest, TellsThatTheIdleLineWasLow) {
+TEST_F(SpiPortTest, ReportsLowIdleLine) {
   const auto idle_low = [&](const LineSettings& settings) {
     SpiPort port = open(LinkKind::clocked, settings);
     port.begin(clocks(13));
@@ -154,7 +154,7 @@ TEST_F(SpiPortTest, BeginsNotBeforeItsTimeAndStampsTheEnd) {
   EXPECT_EQ(port.wait({}).at, sent.at);
 }
 
-TEST_F(SpiPortTest, TellsTimerGapAndAnswer) {
+TEST_F(SpiPortTest, ReportsTimerGapAndAnswer) {
   SpiPort port = open();
   port.begin({.kind = ByteStep::Kind::transfer, .expect = 1});
   EXPECT_EQ(received(port).size(), 1u);
@@ -184,7 +184,7 @@ TEST_F(SpiPortTest, InterruptsEndEveryWait) {
   EXPECT_THROW(port.begin({.kind = ByteStep::Kind::transfer, .expect = 1, .at = os::now() + 1h}), Interrupted);
 }
 
-TEST_F(SpiPortTest, SaysThatTheModeIsRefused) {
+TEST_F(SpiPortTest, ReportsRefusedMode) {
   kernel.refusals[SPI_IOC_WR_MODE32] = EINVAL;
   EXPECT_EQ(refusal(Kind::unsupported),
             "the controller of /dev/spidev0.0 refused SPI mode 1 (Invalid argument): use another controller");
@@ -196,13 +196,13 @@ TEST_F(SpiPortTest, SaysThatTheModeIsRefused) {
   EXPECT_THAT(refusal(Kind::unsupported, LinkKind::clocked, biss_settings), HasSubstr("refused SPI mode 3"));
 }
 
-TEST_F(SpiPortTest, SaysThatTheWordIsRefused) {
+TEST_F(SpiPortTest, ReportsRefusedWord) {
   kernel.refusals[SPI_IOC_WR_BITS_PER_WORD] = EINVAL;
   EXPECT_EQ(refusal(Kind::unsupported),
             "the controller of /dev/spidev0.0 refused words of 8 bits (Invalid argument): use another controller");
 }
 
-TEST_F(SpiPortTest, SaysThatTheSpeedIsRefused) {
+TEST_F(SpiPortTest, ReportsRefusedSpeed) {
   kernel.refusals[SPI_IOC_WR_MAX_SPEED_HZ] = EINVAL;
   EXPECT_EQ(refusal(Kind::bad_rate),
             "the controller of /dev/spidev0.0 refused a clock of 4000000 Hz (Invalid argument): try another one with "
@@ -214,7 +214,7 @@ TEST_F(SpiPortTest, SaysThatTheSpeedIsRefused) {
       "the controller of /dev/spidev0.0 makes a clock of 1000000 Hz when asked for 4000000 Hz: set speed=1000000");
 }
 
-TEST_F(SpiPortTest, SaysThatAMessageIsRefused) {
+TEST_F(SpiPortTest, ReportsRefusedMessage) {
   SpiPort port = open();
   const auto failure = [&](int error) {
     kernel.refusals[SPI_IOC_MESSAGE(1)] = error;
@@ -234,7 +234,7 @@ TEST_F(SpiPortTest, SaysThatAMessageIsRefused) {
               HasSubstr("refused a message of 2 bytes"));
 }
 
-TEST_F(SpiPortTest, SaysWhyItDoesNotOpen) {
+TEST_F(SpiPortTest, ReportsWhyItDoesNotOpen) {
   const auto failure = [&](const std::string& path) {
     return failure_of([&] { const SpiPort port(path, LinkKind::spi, encoder_settings, {}, kernel); });
   };

@@ -32,7 +32,7 @@ struct SpidevReply {
 struct SpidevSettings {
   std::uint32_t mode = 0;  // mode with the flags of <linux/spi/spi.h>
   std::uint8_t word_bits = 8;
-  std::uint32_t speed;      // in Hz
+  std::uint32_t speed;      // clock rate in Hz
   std::uint32_t mode_bits;  // mode flags that the controller supports
 };
 

@@ -85,7 +85,7 @@ TEST_F(SpidevTest, IsAtFirstAsWithoutADeviceTree) {
   EXPECT_EQ(get<std::uint32_t>(SPI_IOC_RD_MAX_SPEED_HZ), 1'000'000u);
 }
 
-TEST_F(SpidevTest, KeepsWhatIsSet) {
+TEST_F(SpidevTest, StoresSettings) {
   EXPECT_EQ(set<std::uint32_t>(SPI_IOC_WR_MODE32, SPI_MODE_2 | SPI_LSB_FIRST), 0);
   EXPECT_EQ(get<std::uint32_t>(SPI_IOC_RD_MODE32), static_cast<std::uint32_t>(SPI_MODE_2 | SPI_LSB_FIRST));
   EXPECT_EQ(get<std::uint8_t>(SPI_IOC_RD_LSB_FIRST), 1);
@@ -100,7 +100,7 @@ TEST_F(SpidevTest, KeepsWhatIsSet) {
   EXPECT_EQ(get<std::uint8_t>(SPI_IOC_RD_BITS_PER_WORD), 8);
 }
 
-TEST_F(SpidevTest, RefusesWhatItsControllerDoesNot) {
+TEST_F(SpidevTest, RefusesUnsupportedSettings) {
   EXPECT_EQ(set<std::uint8_t>(SPI_IOC_WR_MODE, SPI_CS_HIGH), EINVAL);
   EXPECT_EQ(set<std::uint32_t>(SPI_IOC_WR_MODE32, SPI_TX_QUAD), EINVAL);
   EXPECT_EQ(set<std::uint8_t>(SPI_IOC_WR_BITS_PER_WORD, 16), EINVAL);
@@ -111,7 +111,7 @@ TEST_F(SpidevTest, RefusesWhatItsControllerDoesNot) {
   EXPECT_EQ(refused({.rx_buf = 1, .len = 1, .bits_per_word = 8, .tx_nbits = 1, .rx_nbits = 1}), 0);
 }
 
-TEST_F(SpidevTest, RefusesWhatIsNoRequestOfSpidev) {
+TEST_F(SpidevTest, RefusesUnknownRequests) {
   for (const unsigned long request : {_IOW(SPI_IOC_MAGIC, 6, std::uint8_t), _IOR(SPI_IOC_MAGIC, 0, std::uint32_t),
                                       _IOW('j', 1, std::uint8_t), _IOW(SPI_IOC_MAGIC, 1, std::uint32_t), 0x5401ul}) {
     const SpidevReply reply = spidev.control(request, 0x1000, {}, 0, 1ms);
@@ -122,7 +122,7 @@ TEST_F(SpidevTest, RefusesWhatIsNoRequestOfSpidev) {
   EXPECT_EQ(toy.log, "");
 }
 
-TEST_F(SpidevTest, AsksForTheMemoryOfASetting) {
+TEST_F(SpidevTest, RequestsMemoryOfASetting) {
   const SpidevReply write = spidev.control(SPI_IOC_WR_MAX_SPEED_HZ, 0x1234, {}, 0, 1ms);
   EXPECT_TRUE(write.again);
   EXPECT_THAT(write.in, ElementsAre(UserMemory{0x1234, 4}));
@@ -133,7 +133,7 @@ TEST_F(SpidevTest, AsksForTheMemoryOfASetting) {
   EXPECT_THAT(read.out, ElementsAre(UserMemory{0x1234, 1}));
 }
 
-TEST_F(SpidevTest, AsksForTheTransfersAndThenForTheirBuffers) {
+TEST_F(SpidevTest, RequestsTransfersThenTheirBuffers) {
   const SpidevReply first = message({}, 3, 0);
   EXPECT_TRUE(first.again);
   EXPECT_THAT(first.in, ElementsAre(UserMemory{0x1000, 96}));
@@ -159,7 +159,7 @@ TEST_F(SpidevTest, AsksForTheTransfersAndThenForTheirBuffers) {
   EXPECT_THAT(toy.log, HasSubstr("received A1 B2 C3,"));
 }
 
-TEST_F(SpidevTest, AListThatChangedMeanwhileIsAskedForAgain) {
+TEST_F(SpidevTest, RequestsChangedListAgain) {
   Data in = bytes_of(TransferFields{.tx_buf = 0x2000, .len = 5});
   in.insert(in.end(), {1, 2});  // bytes that were fetched for a list with a two-byte buffer
   const SpidevReply reply = message(in, 1, 0);
@@ -176,7 +176,7 @@ TEST_F(SpidevTest, EveryTransferMayHaveItsOwnSpeedAndDelay) {
   EXPECT_EQ(message(in, 2, 0).at, 1ms + 16us + 3us + 10us + 8us);
 }
 
-TEST_F(SpidevTest, LimitsWhatOneMessageHas) {
+TEST_F(SpidevTest, LimitsSizeOfMessage) {
   EXPECT_EQ(refused({.tx_buf = 1, .len = 4097}), EMSGSIZE);
   EXPECT_EQ(refused({.rx_buf = 1, .len = 4097}), EMSGSIZE);
   EXPECT_EQ(refused({.rx_buf = 1, .len = 4096}), 0);
@@ -196,7 +196,7 @@ TEST_F(SpidevTest, LimitsWhatOneMessageHas) {
   EXPECT_EQ(refused_all(128, {.tx_buf = 1, .rx_buf = 1, .len = 1}), EMSGSIZE);
 }
 
-TEST_F(SpidevTest, OfNothing) {
+TEST_F(SpidevTest, AcceptsEmptyMessages) {
   const SpidevReply reply = message({}, 0, 0);
   EXPECT_FALSE(reply.again);
   EXPECT_EQ(reply.result, 0);
@@ -216,7 +216,7 @@ TEST_F(SpidevTest, ReadsAndWritesWithoutAList) {
   EXPECT_EQ(spidev.write(Data(4097), 1ms).result, -EMSGSIZE);
 }
 
-TEST_F(SpidevTest, TheLastUserGivesTheSpeedBack) {
+TEST_F(SpidevTest, LastCloseResetsSpeed) {
   spidev.open();
   spidev.open();
   EXPECT_EQ(set<std::uint32_t>(SPI_IOC_WR_MAX_SPEED_HZ, 4'000'000), 0);

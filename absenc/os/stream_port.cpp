@@ -144,7 +144,7 @@ void DescriptorPort::write_all(Bytes bytes) {
 
 void DescriptorPort::fail(int error) const {
   switch (error) {
-    case 0:  // end of file
+    case 0:  // the end of the stream
     case EIO:
     case ENXIO:
     case ENODEV:

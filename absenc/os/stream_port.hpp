@@ -106,7 +106,7 @@ class DescriptorPort : public StreamPort {
  protected:
   [[nodiscard]] int descriptor() const { return descriptor_.get(); }
 
-  /// Works like write(2).
+  /// Writes as many bytes as possible, like write(2).
   virtual ssize_t write_some(Bytes bytes);
 
   std::size_t read_some(MutableBytes into, std::span<const int> ready) override;

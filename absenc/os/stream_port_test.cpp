@@ -116,7 +116,7 @@ TEST_F(StreamPortTest, ReportsSilenceOnceAfterAGap) {
   EXPECT_GE(again.at, last + 3ms);
 }
 
-TEST_F(StreamPortTest, BytesThatAreThereGoBeforeSilence) {
+TEST_F(StreamPortTest, ReportsAvailableBytesBeforeSilence) {
   port_.begin(transfer(request_));
   const Time sent = port_.wait({}).at;
   put(peer_.get(), {1});
@@ -124,7 +124,7 @@ TEST_F(StreamPortTest, BytesThatAreThereGoBeforeSilence) {
   EXPECT_EQ(port_.wait({.at = never, .answer = 1ms}).kind, Kind::received);
 }
 
-TEST_F(StreamPortTest, TheTimerComesWhenItIsDueAndOnce) {
+TEST_F(StreamPortTest, ReportsTimerOnceWhenDue) {
   const Time at = port_.now() + 2ms;
   const ByteEvent timer = port_.wait({.at = at});
   ASSERT_EQ(timer.kind, Kind::timer);
@@ -135,14 +135,14 @@ TEST_F(StreamPortTest, TheTimerComesWhenItIsDueAndOnce) {
   EXPECT_THROW(static_cast<void>(port_.wait({.at = at})), Ended);
 }
 
-TEST_F(StreamPortTest, ATimerInThePastIsNone) {
+TEST_F(StreamPortTest, IgnoresTimerInThePast) {
   port_.begin(transfer(request_));
   EXPECT_EQ(port_.wait({}).kind, Kind::sent);
   const Time past = port_.now() - 1ns;
   EXPECT_EQ(port_.wait({.at = past, .answer = 1ms}).kind, Kind::silence);
 }
 
-TEST_F(StreamPortTest, ATimerThatPassesMeanwhileIsNotLost) {
+TEST_F(StreamPortTest, ReportsTimerThatPassesMeanwhile) {
   const Time at = port_.now() + 1ms;
   put(peer_.get(), {1});
   sleep_until(at);
@@ -151,7 +151,7 @@ TEST_F(StreamPortTest, ATimerThatPassesMeanwhileIsNotLost) {
   EXPECT_EQ(port_.wait({.at = at}).kind, Kind::timer);
 }
 
-TEST_F(StreamPortTest, ATimerThatPassesWhileSendingIsNotLost) {
+TEST_F(StreamPortTest, ReportsTimerThatPassesWhileSending) {
   port_.begin(transfer(request_));
   const Time at = port_.now() + 1ms;
   sleep_until(at);
@@ -160,7 +160,7 @@ TEST_F(StreamPortTest, ATimerThatPassesWhileSendingIsNotLost) {
   EXPECT_EQ(port_.wait({.at = at}).kind, Kind::timer);
 }
 
-TEST_F(StreamPortTest, TheEarlierOfTimerAndSilenceComesFirst) {
+TEST_F(StreamPortTest, ReportsEarlierOfTimerAndSilenceFirst) {
   // Also if both have passed before the port checks.
   const auto first_of = [this](Time timer, Time answer) {
     port_.begin(transfer(request_));
@@ -186,7 +186,7 @@ TEST_F(StreamPortTest, WaitsForAnAnswerAfterEachTransfer) {
   EXPECT_EQ(port_.wait({.at = never, .answer = 1ms}).kind, Kind::silence);
 }
 
-TEST_F(StreamPortTest, WritesOnWhenTheOtherSideIsSlow) {
+TEST_F(StreamPortTest, ContinuesWritingToSlowPeer) {
   Data many(1'000'000);
   std::iota(many.begin(), many.end(), std::uint8_t{0});
   Data got;
@@ -202,7 +202,7 @@ TEST_F(StreamPortTest, WritesOnWhenTheOtherSideIsSlow) {
   EXPECT_EQ(got, many);
 }
 
-TEST_F(StreamPortTest, EndsWhileTheOtherSideTakesNothing) {
+TEST_F(StreamPortTest, EndsWhilePeerReadsNothing) {
   const Data many(1'000'000);
   const Time end = now() + 5ms;
   port_.set_end(end);

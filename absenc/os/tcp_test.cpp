@@ -17,8 +17,8 @@ using namespace testing;
 using Kind = Failure::Kind;
 
 // A socket on a free port of the loopback interface.
-struct Listener {
-  explicit Listener(int family = AF_INET) : socket(::socket(family, SOCK_STREAM | SOCK_CLOEXEC, 0)) {
+struct TestListener {
+  explicit TestListener(int family = AF_INET) : socket(::socket(family, SOCK_STREAM | SOCK_CLOEXEC, 0)) {
     if (family == AF_INET6) {
       sockaddr_in6 address{};
       address.sin6_family = AF_INET6;
@@ -43,7 +43,7 @@ struct Listener {
   std::uint16_t port = 0;
 };
 
-void expect_exchange(const std::string& host, const Listener& listener) {
+void expect_exchange(const std::string& host, const TestListener& listener) {
   listener.listen(1);
   TcpPort port(host, listener.port);
   const Descriptor server = listener.accept();
@@ -58,32 +58,33 @@ void expect_exchange(const std::string& host, const Listener& listener) {
   EXPECT_EQ(port.latency(), 200ms);
 }
 
-TEST(TcpPort, ExchangesBytes) { expect_exchange("127.0.0.1", Listener()); }
+TEST(TcpPort, ExchangesBytes) { expect_exchange("127.0.0.1", TestListener()); }
 
-TEST(TcpPort, KnowsNames) { expect_exchange("localhost", Listener()); }
+TEST(TcpPort, KnowsNames) { expect_exchange("localhost", TestListener()); }
 
 TEST(TcpPort, KnowsIpv6) {
-  if (!Listener(AF_INET6).bound) GTEST_SKIP() << "no IPv6 here";
-  expect_exchange("[::1]", Listener(AF_INET6));
-  expect_exchange("::1", Listener(AF_INET6));
+  if (!TestListener(AF_INET6).bound) GTEST_SKIP() << "no IPv6 here";
+  expect_exchange("[::1]", TestListener(AF_INET6));
+  expect_exchange("::1", TestListener(AF_INET6));
 }
 
-TEST(TcpPort, SaysThatNobodyListens) {
-  const Listener listener;  // bound, so that no other program takes the port
+TEST(TcpPort, ReportsRefusedConnection) {
+  const TestListener listener;  // bound, so that no other program takes the port
   const Failure failure = failure_of([&] { const TcpPort port("127.0.0.1", listener.port); });
   EXPECT_EQ(failure.kind(), Kind::not_found);
   EXPECT_EQ(std::string(failure.what()), "nothing listens on 127.0.0.1 port " + std::to_string(listener.port) +
                                              ": check the port and that the server runs");
 }
 
-TEST(TcpPort, SaysThatTheHostIsUnknown) {
-  const Failure failure = failure_of([] { const TcpPort port("[::no]", 4001); });  // needs no name server
+TEST(TcpPort, ReportsUnknownHost) {
+  // An invalid address, so the test needs no name server.
+  const Failure failure = failure_of([] { const TcpPort port("[::no]", 4001); });
   EXPECT_EQ(failure.kind(), Kind::not_found);
   EXPECT_NE(std::string_view(failure.what()).find("::no is not known"), std::string_view::npos) << failure.what();
 }
 
-TEST(TcpPort, GivesUpAServerThatDoesNotAnswer) {
-  const Listener listener;
+TEST(TcpPort, TimesOutOnSilentServer) {
+  const TestListener listener;
   listener.listen(0);
   const TcpPort first("127.0.0.1", listener.port);  // the queue is full: further connection requests are dropped
   const Time begin = now();
@@ -92,7 +93,7 @@ TEST(TcpPort, GivesUpAServerThatDoesNotAnswer) {
 }
 
 TEST(TcpPort, IsLostWhenTheServerCloses) {
-  const Listener listener;
+  const TestListener listener;
   listener.listen(1);
   TcpPort port("127.0.0.1", listener.port);
   Descriptor server = listener.accept();
@@ -101,7 +102,7 @@ TEST(TcpPort, IsLostWhenTheServerCloses) {
   server.close();
   EXPECT_EQ(failure_of([&] { static_cast<void>(port.wait({.at = never})); }).kind(), Kind::lost);
   const Data bytes{1};
-  EXPECT_EQ(failure_of([&] { port.begin(transfer(bytes)); }).kind(), Kind::lost);  // and raises no SIGPIPE
+  EXPECT_EQ(failure_of([&] { port.begin(transfer(bytes)); }).kind(), Kind::lost);  // the write fails without SIGPIPE
 }
 
 }  // namespace

@@ -18,7 +18,7 @@ std::uint16_t number_of(const fs::path& path) { return static_cast<std::uint16_t
 struct KnownChip {
   std::uint16_t vendor;
   std::uint16_t product;
-  std::uint16_t release;  // 0: any
+  std::uint16_t release;  // release number bcdDevice; 0: any
   AdapterChip chip;
 };
 

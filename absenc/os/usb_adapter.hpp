@@ -11,17 +11,17 @@ namespace absenc::os {
 
 /// Identity from the descriptors of the USB device; missing ones are empty.
 struct UsbAdapter {
-  std::uint16_t vendor = 0;     // idVendor
-  std::uint16_t product = 0;    // idProduct
+  std::uint16_t vendor = 0;     // vendor number, from idVendor
+  std::uint16_t product = 0;    // product number, from idProduct
   std::uint16_t release = 0;    // bcdDevice: distinguishes chips with the same product number
-  std::string maker{};          // iManufacturer
-  std::string name{};           // iProduct
-  std::string serial_number{};  // iSerialNumber
+  std::string maker{};          // manufacturer's name, from iManufacturer
+  std::string name{};           // product name, from iProduct
+  std::string serial_number{};  // serial number, from iSerialNumber
 };
 
 /// A bridge chip between USB and UART.
 struct AdapterChip {
-  std::string_view name;       // "FT232R"
+  std::string_view name;       // name of the chip, for example "FT232R"
   std::uint32_t highest_rate;  // in bits per second, from its data sheet
 };
 

@@ -95,12 +95,12 @@ std::vector<Wire> run_requests(const Wire& requests, const std::vector<Machine<s
   return requester.replies;
 }
 
-TEST(Bus, HearsAsALineDoes) {
+TEST(Bus, DeliversSameBytesAsLine) {
   const auto devices = [] {
     std::vector<std::unique_ptr<Responder>> made;
     made.push_back(std::make_unique<Responder>(1, Wire{0x11, 0x22, 0x33}));
     made.push_back(std::make_unique<Responder>(2, Wire{0xF0, 0xAA, 0x55}));
-    made.push_back(std::make_unique<Responder>(2, Wire{0x3C, 0xFF}));  // replies the same request at the same time
+    made.push_back(std::make_unique<Responder>(2, Wire{0x3C, 0xFF}));  // answers the same request at the same time
     return made;
   };
   const Wire requests{1, 2, 9, 1};
@@ -120,7 +120,7 @@ TEST(Bus, HearsAsALineDoes) {
   EXPECT_EQ(behind[0]->received_bytes, (Wire{1, 2, 0x30, 0xAA, 0x55, 9, 1}));
 }
 
-TEST(Bus, WhatOverlapsIsMergedAndTheRestComesLater) {
+TEST(Bus, MergesOverlappingTransfersAndSendsTheRestLater) {
   Responder first(1, {0x81, 0x7E});
   Responder second(1, {0x0F, 0x0F}, 5us + 12us);  // starts about one character later
   Responder late(1, {0x77}, 50ms);

@@ -45,21 +45,21 @@ std::vector<bool> can_bits(const CanFrame& frame) {
   stuffed.append(false);
   if (frame.extended) {
     stuffed.append(frame.id >> 18, 11);
-    stuffed.append(0b11, 2);  // SRR, IDE
+    stuffed.append(0b11, 2);  // the recessive bits SRR and IDE
     stuffed.append(frame.id & 0x3FFFF, 18);
     stuffed.append(frame.remote);
-    stuffed.append(0, 2);  // r1, r0
+    stuffed.append(0, 2);  // the reserved bits r1 and r0
   } else {
     stuffed.append(frame.id, 11);
     stuffed.append(frame.remote);
-    stuffed.append(0, 2);  // IDE, r0
+    stuffed.append(0, 2);  // the dominant bits IDE and r0
   }
   stuffed.append(frame.size, 4);
   for (const std::uint8_t byte : frame.remote ? Bytes() : frame.bytes()) stuffed.append(byte, 8);
   stuffed.append(stuffed.crc(), 15);
   std::vector<bool> bits = std::move(stuffed.bits);
   bits.insert(bits.end(), {true, false, true});  // CRC delimiter, acknowledge slot, acknowledge delimiter
-  bits.insert(bits.end(), 7, true);              // end of frame
+  bits.insert(bits.end(), 7, true);              // the end of frame has seven recessive bits
   return bits;
 }
 

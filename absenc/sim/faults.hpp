@@ -21,7 +21,7 @@ enum class FaultKind : std::uint8_t {
   delay,            // the reply is sent late
   echo,             // the bytes of the request are sent before the reply
   garbage,          // 1 to 4 random bytes are sent before the reply
-  silence,          // no reply
+  silence,          // the reply is not sent
   repeat,           // the reply is sent twice
   request_corrupt,  // 1 to 3 bits of a byte that the device receives are flipped
 };

@@ -30,7 +30,7 @@ class Device final : public Machine<std::uint8_t> {
   void feed(const Event<std::uint8_t>& event) override {
     if (event.kind == Kind::sent) sending = false;
     if (event.kind == Kind::timer) ++timers;
-    // by the port: it must not report `silence` during a transfer
+    // A violation by the port, which must not report `silence` during a transfer.
     if (event.kind == Kind::silence && sending) ++violations;
     if (event.kind != Kind::received) return;
     if (sending) ++violations;
@@ -106,7 +106,7 @@ int different_bits(const ByteVector& a, const ByteVector& b) {
   return count;
 }
 
-TEST_F(Faults, NoneLeavesEverythingAsItIs) {
+TEST_F(Faults, WithoutFaultsRepliesAreUnchanged) {
   damage(FaultKind::drop, 0);
   for (int i = 0; i < 5; ++i) EXPECT_EQ(exchange(), reply);
   EXPECT_EQ(host.first_at % microseconds(1000), microseconds(33));
@@ -179,7 +179,7 @@ TEST_F(Faults, GarbageComesBeforeTheReply) {
   for (std::size_t size = 1; size <= 4; ++size) EXPECT_GT(seen.at(size), 3);
 }
 
-TEST_F(Faults, SilentDeviceGoesOn) {
+TEST_F(Faults, DeviceContinuesAfterSuppressedReply) {
   damage(FaultKind::silence);
   device.timer_at = microseconds(500);  // timers of the device still run
   EXPECT_TRUE(exchange().empty());
@@ -200,7 +200,7 @@ TEST_F(Faults, RequestCorruptReachesTheDeviceOnly) {
 }
 
 // The host's next request after 150 us falls into the delay. The device must not count that as a violation by the host.
-TEST_F(Faults, StretchedReplyIsNotTheHostsFault) {
+TEST_F(Faults, StretchedReplyCausesNoViolation) {
   damage(FaultKind::delay);
   for (const FaultKind kind : {FaultKind::delay, FaultKind::repeat}) {
     FaultRates rates;
@@ -220,7 +220,7 @@ TEST_F(Faults, StretchedReplyIsNotTheHostsFault) {
 }
 
 // The device takes half of a damaged request for a whole one and answers while the host still sends.
-TEST_F(Faults, MisheardRequestIsNotTheHostsFault) {
+TEST_F(Faults, DamagedRequestCausesNoViolation) {
   damage(FaultKind::request_corrupt);
   host.request_bytes = {1, 2, 3, 4};
   (void)exchange();
@@ -230,7 +230,7 @@ TEST_F(Faults, MisheardRequestIsNotTheHostsFault) {
 }
 
 // The repeated reply ends at 103 us, between the two bytes of a request that begins at 90 us.
-TEST_F(Faults, RequestWhoseBeginningIsNotHeardIsNotHeardAtAll) {
+TEST_F(Faults, RequestWithIgnoredBeginningIsIgnored) {
   damage(FaultKind::repeat);
   device.gap = microseconds(15);
   for (const int begin : {0, 90}) {
@@ -243,18 +243,18 @@ TEST_F(Faults, RequestWhoseBeginningIsNotHeardIsNotHeardAtAll) {
   EXPECT_EQ(exchange().size(), 8u);  // the next request is answered again
 }
 
-TEST_F(Faults, EarlyRequestIsTheHostsFault) {
+TEST_F(Faults, EarlyRequestIsAViolation) {
   damage(FaultKind::corrupt);
   host.send_now = true;
   line.wake(node);
-  line.run_until(microseconds(40));  // the reply has begun
+  line.run_until(microseconds(40));  // at this time the reply has begun
   host.send_now = true;
   line.wake(node);
   line.run_until(microseconds(1000));
   EXPECT_GT(device.violations, 0);
 }
 
-TEST(FaultSeed, Decides) {
+TEST(FaultSeed, DeterminesTheFaults) {
   const auto run = [](std::uint64_t seed) {
     Device device;
     FaultRates rates;
@@ -285,7 +285,7 @@ TEST(ParseFault, KindsAndRates) {
   EXPECT_EQ(parse_fault("drop=1").rate, 1.0);
 }
 
-TEST(ParseFault, SaysWhatIsWrong) {
+TEST(ParseFault, ErrorNamesTheProblem) {
   const auto refusal = [](const char* text) -> std::string {
     try {
       (void)parse_fault(text);

@@ -17,7 +17,7 @@ const CanFrame request{.id = 0x220, .size = 8, .data = {0x80, 0x20}};
 const CanFrame answer{.id = 0x120, .size = 8, .data = {0x47, 0x26}};
 
 /// Outcome of one request to a device that answers every request.
-struct Result {
+struct FaultOutcome {
   std::vector<CanFrame> frames;
   Time at{};
   std::string received_frames;
@@ -25,7 +25,7 @@ struct Result {
   std::uint64_t damaged = 0;
 };
 
-Result exchange(FaultKind kind, double rate = 1) {
+FaultOutcome exchange(FaultKind kind, double rate = 1) {
   Toy device([](Toy& self, const Event<CanFrame>& event) {
     if (event.kind == Kind::received) self.send({answer}, event.at);
   });
@@ -34,14 +34,14 @@ Result exchange(FaultKind kind, double rate = 1) {
   FaultyNode faulty(device, rates, 5);
   faulty.feed({.kind = Kind::received, .at = 1ms, .items = {&request, 1}});
   const Step<CanFrame> step = faulty.next(1ms);
-  Result result{{step.out.begin(), step.out.end()}, step.at, device.log};
+  FaultOutcome result{{step.out.begin(), step.out.end()}, step.at, device.log};
   result.count = faulty.counts()[static_cast<std::size_t>(kind)];
   result.damaged = faulty.damaged_frames();
   return result;
 }
 
 TEST(FaultyNode, WithoutFaultsNothingChanges) {
-  const Result result = exchange(FaultKind::drop, 0);
+  const FaultOutcome result = exchange(FaultKind::drop, 0);
   EXPECT_EQ(result.frames, std::vector<CanFrame>{answer});
   EXPECT_EQ(result.damaged, 0u);
 }
@@ -54,7 +54,7 @@ TEST(FaultyNode, EachFault) {
   EXPECT_EQ(exchange(FaultKind::delay).at, 1ms + FaultRates{}.delay);
   EXPECT_EQ(exchange(FaultKind::echo).frames, (std::vector<CanFrame>{request, answer}));
   EXPECT_EQ(exchange(FaultKind::repeat).frames, (std::vector<CanFrame>{answer, answer}));
-  const Result garbage = exchange(FaultKind::garbage);
+  const FaultOutcome garbage = exchange(FaultKind::garbage);
   ASSERT_EQ(garbage.frames.size(), 2u);
   EXPECT_NE(garbage.frames[0], answer);
   EXPECT_EQ(garbage.frames[1], answer);
@@ -64,14 +64,14 @@ TEST(FaultyNode, EachFault) {
   }
 }
 
-TEST(FaultyNode, ASuppressedFrameWasSentAsFarAsTheDeviceKnows) {
-  const Result result = exchange(FaultKind::silence);
+TEST(FaultyNode, ReportsSuppressedFrameAsSent) {
+  const FaultOutcome result = exchange(FaultKind::silence);
   EXPECT_TRUE(result.frames.empty());
   EXPECT_EQ(result.count, 1u);
 }
 
-TEST(FaultyNode, HearsWrong) {
-  const Result result = exchange(FaultKind::request_corrupt);
+TEST(FaultyNode, DamagesReceivedFrames) {
+  const FaultOutcome result = exchange(FaultKind::request_corrupt);
   EXPECT_EQ(result.received_frames.find("220:8020000000000000"), std::string::npos);
   EXPECT_EQ(result.frames, std::vector<CanFrame>{answer});
 }

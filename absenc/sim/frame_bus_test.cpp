@@ -29,7 +29,7 @@ std::string sent_by(FrameBus& bus, Time now) {
   return sent;
 }
 
-TEST(FrameBus, EverybodyHearsWhatComesAndWhatTheOthersSend) {
+TEST(FrameBus, DeliversFramesOfHostAndOtherNodes) {
   Toy one([](Toy& self, const Event<CanFrame>& event) {
     if (event.kind == Kind::received && event.items[0].id == 0x200) self.send({frame(0x120, 1)});
   });
@@ -43,7 +43,7 @@ TEST(FrameBus, EverybodyHearsWhatComesAndWhatTheOthersSend) {
   EXPECT_EQ(two.log, "1000000 received 200:09, 1000000 received 120:01");
 }
 
-TEST(FrameBus, TheLowestIdentifierFirstAndTimesAreKept) {
+TEST(FrameBus, SendsLowestIdentifierFirstAtItsTime) {
   Toy high;
   high.send({frame(0x121, 1)}, 5ms);
   Toy low;
@@ -67,7 +67,7 @@ TEST(FrameBus, TimersOfEachNode) {
   EXPECT_EQ(bus.next(3ms).at, 7ms);
 }
 
-TEST(FrameBus, ANodeAtAnotherBitRateIsAlone) {
+TEST(FrameBus, IsolatesNodeAtAnotherBitRate) {
   Toy moved;
   moved.push({.kind = StepKind::configure, .rate = 500'000});
   moved.send({frame(0x120, 1)});

@@ -45,7 +45,7 @@ struct LineTest : testing::Test {
   Line<Byte>::Node host_node = line.attach(Role::host, host);
 };
 
-TEST_F(LineTest, WakeAsksForAStepWithoutAnEvent) {
+TEST_F(LineTest, WakeTakesAStepWithoutAnEvent) {
   EXPECT_EQ(line.next_event(), never);
   EXPECT_FALSE(line.step());
   line.run_until(microseconds(7));
@@ -57,7 +57,7 @@ TEST_F(LineTest, WakeAsksForAStepWithoutAnEvent) {
   EXPECT_EQ(device.log, "17000 received 27000 received ");
 }
 
-TEST_F(LineTest, ReplaceCutsOffWhatIsBeingSent) {
+TEST_F(LineTest, ReplaceCutsOffTransferInProgress) {
   host.todo = send_two;
   line.wake(host_node);
   line.run_until(microseconds(15));
@@ -82,7 +82,7 @@ TEST_F(LineTest, ReplaceAfterDone) {
   EXPECT_EQ(line.next_event(), Time{});
 }
 
-TEST_F(LineTest, TimerInThePastIsNoTimerAndDoesNotHideTheSilence) {
+TEST_F(LineTest, IgnoresTimerInThePastAndReportsSilence) {
   host.idle = {.at = microseconds(10), .answer = microseconds(30)};
   host.todo = send_two;
   line.wake(host_node);
@@ -102,7 +102,7 @@ TEST_F(LineTest, ObserverSeesWhatIsOnTheWire) {
   EXPECT_EQ(seen, "1 0-10000 1 1 10000-20000 2 ");
 }
 
-TEST(FullDuplex, EachDirectionIsAWireOfItsOwn) {
+TEST(FullDuplex, HasOneWirePerDirection) {
   Line<Byte> line(LinkKind::full_duplex, {.rate = 1'000'000});
   const std::vector<Byte> other{6, 7};
   Puppet one;
@@ -168,7 +168,7 @@ struct CanLine : testing::Test {
   }
 };
 
-TEST_F(CanLine, WhoeverBeginsAtOneTimeTakesPartInTheArbitration) {
+TEST_F(CanLine, ArbitratesAllFramesThatBeginTogether) {
   EXPECT_EQ(run({5, microseconds(10), false}, {4, microseconds(10), true}), seen(4, 10) + seen(5, 10 + length(4)));
 }
 

@@ -160,12 +160,13 @@ ShaftState Motion::offset_at(const ConstantSpeed& speed, Time time) {
 
 ShaftState Motion::offset_at(const Sine& sine, Time time) {
   // Whole periods are removed exactly, so that the phase is as accurate after a day as at the start.
-  constexpr std::uint64_t one_period = 1'000'000'000'000'000;  // unit: micro-hertz * ns
+  constexpr std::uint64_t one_period = 1'000'000'000'000'000;  // one period in micro-hertz * ns
   const auto phase = multiply_divide(sine.micro_hertz, magnitude(time.count()), one_period).remainder;
   const double turn = static_cast<double>(phase) / static_cast<double>(one_period);
   const double angle = 2 * std::numbers::pi * (time.count() < 0 ? -turn : turn);
-  const double angular = 2 * std::numbers::pi * static_cast<double>(sine.micro_hertz) / 1e6;  // rad/s
-  const double speed = sine.amplitude * angular * std::cos(angle);                            // revolutions per second
+  // Angular frequency of the phase in rad/s.
+  const double angular = 2 * std::numbers::pi * static_cast<double>(sine.micro_hertz) / 1e6;
+  const double speed = sine.amplitude * angular * std::cos(angle);  // speed in revolutions per second
   const double acceleration = -sine.amplitude * angular * angular * std::sin(angle);
   return {std::llround(sine.amplitude * std::sin(angle) * revolution), saturated(speed * 60e3),
           saturated(acceleration * 2 * std::numbers::pi)};

@@ -54,7 +54,7 @@ class Motion final : public Shaft {
     std::uint64_t micro_hertz;
   };
   struct Path {
-    std::vector<Knot> knots;  // at least one point
+    std::vector<Knot> knots;  // points in the order of time, at least one
   };
   using Kind = std::variant<Still, ConstantSpeed, Sine, Path>;
 

@@ -55,7 +55,7 @@ TEST(Motion, ConstantSpeedWrapsInsteadOfOverflowing) {
   EXPECT_EQ(motion.at(1000h).position, wrapped);
 }
 
-TEST(Motion, BeginsWhenItIsTold) {
+TEST(Motion, BeginsAtSetTime) {
   Motion motion = Motion::constant_speed(0, 60);
   motion.begin_at(5s);
   EXPECT_EQ(motion.at(3s).position, 0);
@@ -130,7 +130,7 @@ TEST(ParseMotion, EveryKind) {
   std::remove(name.c_str());
 }
 
-TEST(ParseMotion, SaysWhatIsWrongAndWhatIsAllowed) {
+TEST(ParseMotion, ErrorStatesProblemAndAllowedValues) {
   EXPECT_EQ(refusal([] { return parse_motion("spin", 0); }),
             "motion `spin`: unknown; allowed are still, rpm=R, sine=DEGREES,HZ and file=CSV");
   EXPECT_EQ(refusal([] { return parse_motion("still=1", 0); }),

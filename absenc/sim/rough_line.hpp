@@ -15,7 +15,7 @@ namespace absenc::sim {
 /// Probability, 0 to 1, of each kind of damage to data that is sent to the host: `bit` per data bit, all others per
 /// frame. Faults of the device itself are FaultRates, applied between the device and this line.
 struct RoughRates {
-  double bit = 0;    ///< this bit is flipped
+  double bit = 0;    ///< probability that a data bit is flipped
   double burst = 0;  ///< 2 to 16 adjacent bits are damaged: the first and last are flipped, each bit between them with
                      ///< probability 1/2
   double doubled = 0;  ///< one byte arrives twice; where the host is the clock, one bit arrives twice and the last bit

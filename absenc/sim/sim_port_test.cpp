@@ -110,7 +110,7 @@ TEST(SimPort, SilenceAndTimers) {
   expect(Kind::silence, microseconds(75));
 }
 
-TEST(SimPort, WhatIsSentBehindATransferThatWasBrokenOffWaitsForIt) {
+TEST(SimPort, TransferWaitsForAbandonedOne) {
   Mute mute;
   SimPort<std::uint8_t> port(LinkKind::half_duplex, settings, mute);
   const std::array<std::uint8_t, 2> out{1, 2};
@@ -165,7 +165,7 @@ TEST(SimPort, KeepsPaceWithRealTimeAndStampsExactly) {
   EXPECT_LT(world.clock - std::chrono::seconds(1000) - times.back(), microseconds(150));
 }
 
-TEST(SimPort, LimitsDoNotRunWhileNobodyWaits) {
+TEST(SimPort, LimitsRunOnlyDuringWaits) {
   SlowWorld world;
   Responder device;
   SimPort<std::uint8_t> port(LinkKind::half_duplex, settings, device, world.real_time());
@@ -183,7 +183,7 @@ TEST(SimPort, LimitsDoNotRunWhileNobodyWaits) {
 }
 
 // A configuration is carried out at the present time, not at the time of the last event.
-TEST(SimPort, ATimerThatPassedMeanwhileIsTold) {
+TEST(SimPort, ReportsTimerThatPassedMeanwhile) {
   SlowWorld world;
   Mute mute;
   SimPort<std::uint8_t> port(LinkKind::half_duplex, settings, mute, world.real_time());
@@ -195,7 +195,7 @@ TEST(SimPort, ATimerThatPassedMeanwhileIsTold) {
   EXPECT_EQ(event.at, start + microseconds(5));
 }
 
-TEST(SimPort, BrokenOffSleepLeavesThePortUsable) {
+TEST(SimPort, InterruptedSleepLeavesThePortUsable) {
   Time clock{};
   bool interrupt = true;
   Responder device;

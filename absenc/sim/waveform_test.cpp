@@ -114,7 +114,7 @@ TEST(Waveform, BitsThatAreNoWholeNanoseconds) {
   }
 }
 
-TEST(Waveform, SpiHasItsDataAtTheEdgeThatTheModeSays) {
+TEST(Waveform, SpiDataChangesAtTheEdgeOfTheMode) {
   const std::array<std::uint8_t, 1> out{0x80};
   const std::array<std::uint8_t, 1> in{0x7F};
   const auto drawn = [&](std::uint8_t mode) {
@@ -134,7 +134,7 @@ TEST(Waveform, SpiHasItsDataAtTheEdgeThatTheModeSays) {
   EXPECT_THAT(drawn(3), StartsWith("#0\n1!\n1\"\n0#\n1$\n#1000\n0!\n0\"\n1#\n0$\n#1500\n1\"\n#2000\n0\"\n0#\n1$\n"));
 }
 
-TEST(Waveform, TheClockWaitsForTheChip) {
+TEST(Waveform, SpiClockBeginsAfterSelectLead) {
   Picture waveform(LinkKind::spi, {.rate = 1'000'000, .spi_mode = 1, .select_lead = 5us});
   const std::array<std::uint8_t, 1> out{0x80};
   const std::array<std::uint8_t, 1> in{0xFF};
@@ -145,7 +145,7 @@ TEST(Waveform, TheClockWaitsForTheChip) {
 
 TEST(Waveform, ClockedBits) {
   Picture at_once(LinkKind::clocked, slow);
-  const std::array<std::uint8_t, 1> bits{0x50};  // 010
+  const std::array<std::uint8_t, 1> bits{0x50};  // the bits are 010
   at_once.transfer({1us, 4us, 3, {}, bits});
   EXPECT_EQ(body(at_once),
             "#0\n1!\n1\"\n#1000\n0!\n0\"\n#1500\n1!\n1\"\n#2000\n0!\n#2500\n1!\n0\"\n#3000\n0!\n"
@@ -205,7 +205,7 @@ TEST(Waveform, PulsesHaveWiresOfTheirOwn) {
 }
 
 // A sink that receives everything only at the end would run out of memory.
-TEST(Waveform, HandsOverWhatIsSettled) {
+TEST(Waveform, PassesSettledChangesToSink) {
   struct Counter final : Waveform::Sink {
     void change(Time at, std::size_t) override {
       EXPECT_GE(at, last);

@@ -46,13 +46,13 @@ Annotator::Annotator(const Unit& unit, const Options& options, const Settings& s
       options_(options) {
   is_first_ = !settings_.begins_silent;
   for (std::size_t i = 0; i < settings_.channel_count; ++i) channels_[i].carries = settings_.channels[i];
-  if (settings_.by_arrival) channels_[0].synchronised = channels_[0].in_step = settings_.begins_silent;
+  if (settings_.by_arrival) channels_[0].synchronised = channels_[0].at_frame_start = settings_.begins_silent;
 }
 
 void Annotator::put(const Character& character) {
   if (character.channel >= settings_.channel_count) return;
   if (channels_[0].carries == Carries::one) {
-    hold(character);
+    store_undecided(character);
   } else {
     take(character);
   }
@@ -69,29 +69,29 @@ void Annotator::finish(Tick end) {
   exchanges_.finish(end);
 }
 
-void Annotator::hold(const Character& character) {
-  held_.push_back(character);
-  if (held_.size() == enough_characters) find_roles();
+void Annotator::store_undecided(const Character& character) {
+  undecided_.push_back(character);
+  if (undecided_.size() == enough_characters) find_roles();
 }
 
 // Tries both assignments of the channels on the characters so far, and takes the one that explains more of them.
 void Annotator::find_roles() {
-  constexpr std::array<std::array<Carries, 2>, 2> ways{
+  constexpr std::array<std::array<Carries, 2>, 2> assignments{
       {{Carries::requests, Carries::replies}, {Carries::replies, Carries::requests}}};
   std::array<long, 2> points{};
-  for (std::size_t i = 0; i < ways.size(); ++i) {
+  for (std::size_t i = 0; i < assignments.size(); ++i) {
     Score score;
     Settings settings = settings_;
-    settings.channels = ways[i];
+    settings.channels = assignments[i];
     const auto trial = std::make_unique<Annotator>(judge_.unit(), options_, settings, score);
-    for (const Character& character : held_) trial->put(character);
-    trial->finish(held_.empty() ? 0 : held_.back().end);
+    for (const Character& character : undecided_) trial->put(character);
+    trial->finish(undecided_.empty() ? 0 : undecided_.back().end);
     points[i] = score.points;
   }
-  const auto& way = ways[points[1] > points[0] ? 1 : 0];
-  for (std::size_t i = 0; i < way.size(); ++i) channels_[i].carries = way[i];
-  for (const Character& character : held_) take(character);
-  held_ = {};
+  const auto& assignment = assignments[points[1] > points[0] ? 1 : 0];
+  for (std::size_t i = 0; i < assignment.size(); ++i) channels_[i].carries = assignment[i];
+  for (const Character& character : undecided_) take(character);
+  undecided_ = {};
 }
 
 Tick Annotator::pause_of(const Channel& channel) const {
@@ -117,7 +117,7 @@ void Annotator::take(const Character& character) {
     close(channel, false);
   }
   if (channel.run.empty() && !channel.synchronised) {
-    channel.synchronised = channel.in_step =
+    channel.synchronised = channel.at_frame_start =
         settings_.begins_silent || character.begin >= settings_.begin + settings_.ticks.character;
   }
   if (channel.run.full()) parse(channel, false, false);
@@ -127,7 +127,7 @@ void Annotator::take(const Character& character) {
 void Annotator::close(Channel& channel, bool cut) {
   parse(channel, true, cut);
   channel.run.clear();
-  channel.synchronised = channel.in_step = true;
+  channel.synchronised = channel.at_frame_start = true;
   channel.last_size = 0;
 }
 
@@ -141,7 +141,7 @@ void Annotator::parse(Channel& channel, bool whole, bool cut) {
   if (whole && !channel.synchronised && !settings_.by_arrival) {
     const Run& run = channel.run;
     const Piece all{run.bytes(), run.begin(0), run.end()};
-    return exchanges_.alone(Annotation::Kind::noise, all, Error::none, Remark::cut);
+    return exchanges_.report_unpaired(Annotation::Kind::noise, all, Error::none, Remark::cut);
   }
   while (at_ < channel.run.size()) {
     const std::size_t taken = next_frame();

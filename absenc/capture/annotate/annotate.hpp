@@ -74,16 +74,16 @@ class Annotator {
     Carries carries = Carries::both;
     Run run;
     bool synchronised = false;    // a pause was found, so the beginnings of frames are known
-    bool in_step = false;         // a frame is known to begin at the first character of the run
+    bool at_frame_start = false;  // a frame is known to begin at the first character of the run
     std::size_t last_size = 0;    // size of the last good unsolicited frame in this run; 0: none
     std::size_t stream_size = 0;  // size of the last good unsolicited frame in any run
   };
 
   // Detection of the channels' directions.
-  void hold(const Character& character);
+  void store_undecided(const Character& character);
   void find_roles();
 
-  // Splitting into runs.
+  // Splitting of the characters into runs.
   void take(const Character& character);
   [[nodiscard]] Tick pause_of(const Channel& channel) const;
   void close(Channel& channel, bool cut);
@@ -92,17 +92,17 @@ class Annotator {
   // Parsing of the run from `at_` on. Each function returns the number of characters that it consumed, 0 for none.
   std::size_t next_frame();
   std::size_t whole_frame();
-  std::size_t answer_here();
-  [[nodiscard]] bool goes_on(std::size_t size);
-  [[nodiscard]] std::optional<std::size_t> asked_before(Tick begin) const;
-  [[nodiscard]] std::size_t echoed_answer_size(Bytes request, std::size_t from);
-  std::size_t echoed_answer_here(std::size_t which, std::size_t size);
-  std::size_t repeated_here();
-  std::size_t request_here();
+  std::size_t match_reply();
+  [[nodiscard]] bool is_followed_by_frame(std::size_t size);
+  [[nodiscard]] std::optional<std::size_t> request_before(Tick begin) const;
+  [[nodiscard]] std::size_t echoed_reply_size(Bytes request, std::size_t from);
+  std::size_t match_echoed_reply(std::size_t which, std::size_t size);
+  std::size_t match_repeated();
+  std::size_t match_request();
   [[nodiscard]] bool is_request(std::size_t size);
-  std::size_t unsolicited_here();
-  std::size_t bad_here();
-  void tell_bad(std::size_t size);
+  std::size_t match_unsolicited();
+  std::size_t take_bad();
+  void report_bad(std::size_t size);
 
   [[nodiscard]] Bytes rest(std::size_t from) const { return channel_->run.bytes().subspan(from); }
   [[nodiscard]] Piece piece(std::size_t size) const;
@@ -120,7 +120,7 @@ class Annotator {
   Options options_;
   std::array<Channel, 2> channels_{};
   std::array<std::size_t, 256> reply_sizes_{};  // size of the last good reply, indexed by the first byte of its request
-  std::vector<Character> held_;                 // characters stored until the channels' directions are known
+  std::vector<Character> undecided_;            // characters stored until the channels' directions are known
 
   bool is_first_ = true;  // the rest of the first frame may lie before the capture
 

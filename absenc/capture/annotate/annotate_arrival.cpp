@@ -18,7 +18,7 @@ void Annotator::fall_silent() {
   Channel& channel = channels_[0];
   close(channel, false);
   is_first_ = false;
-  exchanges_.give_up(exchanges_.waiting().size());
+  exchanges_.report_unanswered(exchanges_.waiting().size());
 }
 
 bool Annotator::has_gap(std::size_t before) const {
@@ -36,7 +36,7 @@ bool Annotator::stands_alone(std::size_t size) const {
 // Returns the size of the frame at `at_` if it is complete and good whatever follows, or 0: the next characters may
 // belong to it.
 std::size_t Annotator::whole_frame() {
-  if (!channel_->in_step) return 0;
+  if (!channel_->at_frame_start) return 0;
   const auto answered = [&](std::size_t size) {
     const Bytes request = rest(at_).first(size);
     return reply_at(request, at_ + size, reply_sizes_[request[0]]) != 0;
@@ -48,19 +48,19 @@ std::size_t Annotator::whole_frame() {
     const Bytes behind = rest(at_ + size);
     return std::equal(behind.begin(), behind.begin() + static_cast<std::ptrdiff_t>(size), rest(at_).begin());
   };
-  const std::optional<std::size_t> which = asked_before(channel_->run.begin(at_));
+  const std::optional<std::size_t> which = request_before(channel_->run.begin(at_));
   if (which) {
-    const Exchanges::Asked& asked = exchanges_.waiting()[*which];
-    if (asked.error != Error::none || reply_at(asked.bytes(), at_, reply_sizes_[asked.storage[0]]) != 0) {
-      return answer_here();
+    const Exchanges::PendingRequest& pending = exchanges_.waiting()[*which];
+    if (pending.error != Error::none || reply_at(pending.bytes(), at_, reply_sizes_[pending.storage[0]]) != 0) {
+      return match_reply();
     }
     if (!repeats() && judge_.is_incomplete(Direction::reply, rest(at_))) return 0;
   }
-  if (repeats()) return request_here();
+  if (repeats()) return match_request();
   const bool needs_no_reply = size != 0 && !judge_.is_answered({.bytes = rest(at_).first(size)});
-  if (size != 0 && (needs_no_reply || answered(size))) return request_here();
-  const bool sends_by_itself = judge_.streams() || (!exchanges_.has_asked() && channel_->last_size != 0);
-  return size == 0 && sends_by_itself ? unsolicited_here() : 0;
+  if (size != 0 && (needs_no_reply || answered(size))) return match_request();
+  const bool sends_by_itself = judge_.streams() || (!exchanges_.has_request() && channel_->last_size != 0);
+  return size == 0 && sends_by_itself ? match_unsolicited() : 0;
 }
 
 }  // namespace absenc::capture

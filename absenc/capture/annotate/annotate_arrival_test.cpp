@@ -16,14 +16,14 @@
 namespace absenc::capture {
 namespace {
 
-using testing::Said;
 using testing::Talker;
+using testing::Transmission;
 using Kind = Annotation::Kind;
 using Wire = std::vector<std::uint8_t>;
 
 constexpr Tick gap = 20;
 
-struct Found {
+struct FoundAnnotation {
   Kind kind;
   Remark remark;
   Error error;
@@ -33,7 +33,7 @@ struct Found {
   [[nodiscard]] bool is_good_exchange() const { return kind == Kind::exchange && error == Error::none; }
 };
 
-struct Finder final : AnnotationSink {
+struct AnnotationCollector final : AnnotationSink {
   void put(const Annotation& one) override {
     found.push_back({one.kind,
                      one.remark,
@@ -41,14 +41,14 @@ struct Finder final : AnnotationSink {
                      {one.request.bytes.begin(), one.request.bytes.end()},
                      {one.reply.bytes.begin(), one.reply.bytes.end()}});
   }
-  std::vector<Found> found;
+  std::vector<FoundAnnotation> found;
 };
 
 /// A request with its reply; `reply` is empty if the encoder sent none.
-struct Spoken {
+struct Exchange {
   Wire request;
   Wire reply;
-  friend bool operator==(const Spoken&, const Spoken&) = default;
+  friend bool operator==(const Exchange&, const Exchange&) = default;
 };
 
 std::string hex(const Wire& wire) {
@@ -59,13 +59,13 @@ std::string hex(const Wire& wire) {
 }
 
 // Returns the first difference only: the whole lists have hundreds of exchanges.
-std::string difference(const std::vector<Spoken>& found, const std::vector<Spoken>& spoken) {
-  const auto text = [](const std::vector<Spoken>& all, std::size_t i) {
+std::string difference(const std::vector<Exchange>& found, const std::vector<Exchange>& exchanges) {
+  const auto text = [](const std::vector<Exchange>& all, std::size_t i) {
     return i < all.size() ? hex(all[i].request) + " > " + hex(all[i].reply) : std::string("nothing");
   };
-  for (std::size_t i = 0; i < std::max(found.size(), spoken.size()); ++i) {
-    if (i >= found.size() || i >= spoken.size() || !(found[i] == spoken[i])) {
-      return std::to_string(i) + ": " + text(found, i) + " instead of " + text(spoken, i);
+  for (std::size_t i = 0; i < std::max(found.size(), exchanges.size()); ++i) {
+    if (i >= found.size() || i >= exchanges.size() || !(found[i] == exchanges[i])) {
+      return std::to_string(i) + ": " + text(found, i) + " instead of " + text(exchanges, i);
     }
   }
   return {};
@@ -73,34 +73,34 @@ std::string difference(const std::vector<Spoken>& found, const std::vector<Spoke
 
 class Arrival : public ::testing::TestWithParam<const Unit*> {
  protected:
-  void listen(bool begins_silent) {
+  void start(bool begins_silent) {
     Annotator::Settings settings;
     settings.begins_silent = begins_silent;
     settings.by_arrival = true;
     settings.gap = gap;
     settings.ticks.limit = LineTicks::never;
-    annotator = std::make_unique<Annotator>(unit, options, settings, finder);
+    annotator = std::make_unique<Annotator>(unit, options, settings, collector);
   }
 
   // Returns exchanges of one request and one reply between host and encoder; none if the encoder only sends unsolicited
   // frames.
-  std::vector<Spoken> talk(std::size_t count, std::uint64_t seed) {
+  std::vector<Exchange> talk(std::size_t count, std::uint64_t seed) {
     Talker talker(unit, options, {}, seed);
-    std::vector<Spoken> spoken;
-    for (std::size_t talks = 0; spoken.size() < count && talks < spoken.size() + 20; ++talks) {
-      for (const Said& said : talker.talk().said) {
-        if (said.by == sim::Role::host) {
-          spoken.push_back({said.bytes, {}});
-        } else if (!spoken.empty()) {
-          Wire& reply = spoken.back().reply;
-          reply.insert(reply.end(), said.bytes.begin(), said.bytes.end());
+    std::vector<Exchange> exchanges;
+    for (std::size_t talks = 0; exchanges.size() < count && talks < exchanges.size() + 20; ++talks) {
+      for (const Transmission& sent : talker.talk().transmissions) {
+        if (sent.by == sim::Role::host) {
+          exchanges.push_back({sent.bytes, {}});
+        } else if (!exchanges.empty()) {
+          Wire& reply = exchanges.back().reply;
+          reply.insert(reply.end(), sent.bytes.begin(), sent.bytes.end());
         }
       }
     }
-    std::erase_if(spoken, [&](const Spoken& one) {
+    std::erase_if(exchanges, [&](const Exchange& one) {
       return one.reply.empty() || unit.check(options, {.bytes = one.request}, {.bytes = one.reply}) != Error::none;
     });
-    return spoken;
+    return exchanges;
   }
 
   void receive(const Wire& bytes) {
@@ -108,18 +108,18 @@ class Arrival : public ::testing::TestWithParam<const Unit*> {
     annotator->hand_out();
   }
 
-  [[nodiscard]] std::vector<Spoken> good() const {
-    std::vector<Spoken> all;
-    for (const Found& one : finder.found) {
+  [[nodiscard]] std::vector<Exchange> good() const {
+    std::vector<Exchange> all;
+    for (const FoundAnnotation& one : collector.found) {
       if (one.is_good_exchange()) all.push_back({one.request, one.reply});
     }
     return all;
   }
-  [[nodiscard]] std::size_t others() const { return finder.found.size() - good().size(); }
+  [[nodiscard]] std::size_t others() const { return collector.found.size() - good().size(); }
 
   const Unit& unit = *GetParam();
   Options options = testing::options_of(unit);
-  Finder finder;
+  AnnotationCollector collector;
   std::unique_ptr<Annotator> annotator;
   Tick now = 1000;
 };
@@ -132,9 +132,9 @@ std::vector<const Unit*> units_of_characters() {
   return units;
 }
 
-Wire joined(const std::vector<Spoken>& spoken) {
+Wire joined(const std::vector<Exchange>& exchanges) {
   Wire all;
-  for (const Spoken& one : spoken) {
+  for (const Exchange& one : exchanges) {
     all.insert(all.end(), one.request.begin(), one.request.end());
     all.insert(all.end(), one.reply.begin(), one.reply.end());
   }
@@ -142,56 +142,56 @@ Wire joined(const std::vector<Spoken>& spoken) {
 }
 
 TEST_P(Arrival, ExchangesInPartsAndSeveralAtOnce) {
-  const std::vector<Spoken> spoken = talk(1000, 1);
-  if (spoken.empty()) return;
-  listen(true);
-  const Wire all = joined(spoken);
+  const std::vector<Exchange> exchanges = talk(1000, 1);
+  if (exchanges.empty()) return;
+  start(true);
+  const Wire all = joined(exchanges);
   sim::Random random(2);
   for (std::size_t at = 0; at < all.size();) {
     const std::size_t size = std::min<std::size_t>(all.size() - at, 1 + random.below(random.below(4) == 0 ? 60 : 6));
     receive({all.begin() + static_cast<std::ptrdiff_t>(at), all.begin() + static_cast<std::ptrdiff_t>(at + size)});
     at += size;
-    now += random.below(10) == 0 ? 5 * gap : 1;  // pauses within frames, too
+    now += random.below(10) == 0 ? 5 * gap : 1;  // the pauses also lie within frames
   }
   annotator->fall_silent();
-  EXPECT_EQ(difference(good(), spoken), "");
+  EXPECT_EQ(difference(good(), exchanges), "");
   EXPECT_EQ(others(), 0u);
 }
 
-TEST_P(Arrival, AnExchangeIsHandedOutWhenItIsWhole) {
-  const std::vector<Spoken> spoken = talk(300, 3);
-  if (spoken.empty()) return;
-  listen(true);
+TEST_P(Arrival, ReportsExchangeWhenComplete) {
+  const std::vector<Exchange> exchanges = talk(300, 3);
+  if (exchanges.empty()) return;
+  start(true);
   std::size_t late = 0;
-  for (std::size_t i = 0; i < spoken.size(); ++i) {
-    receive(spoken[i].request);
+  for (std::size_t i = 0; i < exchanges.size(); ++i) {
+    receive(exchanges[i].request);
     now += gap / 2;
-    receive(spoken[i].reply);
+    receive(exchanges[i].reply);
     now += gap / 2;
     late += good().size() <= i ? 1u : 0u;
   }
-  EXPECT_EQ(difference(good(), spoken), "");
-  EXPECT_LE(late, spoken.size() / 20);  // an exchange is late if its length differs from that of the previous one
+  EXPECT_EQ(difference(good(), exchanges), "");
+  EXPECT_LE(late, exchanges.size() / 20);  // an exchange is late if its length differs from that of the previous one
 }
 
-TEST_P(Arrival, FromTheMiddleOfAnExchange) {
-  const std::vector<Spoken> spoken = talk(80, 4);
-  if (spoken.empty()) return;
-  const Wire all = joined(spoken);
-  const std::size_t first = spoken[0].request.size() + spoken[0].reply.size();
+TEST_P(Arrival, CaptureBeginsWithinAnExchange) {
+  const std::vector<Exchange> exchanges = talk(80, 4);
+  if (exchanges.empty()) return;
+  const Wire all = joined(exchanges);
+  const std::size_t first = exchanges[0].request.size() + exchanges[0].reply.size();
   for (std::size_t from = 1; from < first; ++from) {
-    finder.found.clear();
+    collector.found.clear();
     now += 1000;
-    listen(false);
+    start(false);
     receive({all.begin() + static_cast<std::ptrdiff_t>(from), all.end()});
     annotator->fall_silent();
-    const std::vector<Spoken> found = good();
-    ASSERT_GE(found.size() + 3, spoken.size()) << from << " " << hex(finder.found[0].reply) << " " << hex(all);
+    const std::vector<Exchange> found = good();
+    ASSERT_GE(found.size() + 3, exchanges.size()) << from << " " << hex(collector.found[0].reply) << " " << hex(all);
     // Each exchange found was really sent, and the last ones are in their order.
     for (std::size_t i = 1; i <= found.size(); ++i) {
-      ASSERT_EQ(found[found.size() - i], spoken[spoken.size() - i]) << from;
+      ASSERT_EQ(found[found.size() - i], exchanges[exchanges.size() - i]) << from;
     }
-    for (const Found& one : finder.found) {
+    for (const FoundAnnotation& one : collector.found) {
       EXPECT_TRUE(one.error == Error::none) << from << ": cut, not bad: " << text_of(one.error).name;
     }
   }
@@ -200,58 +200,58 @@ TEST_P(Arrival, FromTheMiddleOfAnExchange) {
 // A line with one pair of wires, as a tap receives it.
 TEST_P(Arrival, ADamagedReplyCostsNoOtherExchange) {
   if (unit.link != LinkKind::half_duplex) return;
-  const std::vector<Spoken> spoken = talk(400, 5);
-  if (spoken.empty()) return;
-  listen(true);
+  const std::vector<Exchange> exchanges = talk(400, 5);
+  if (exchanges.empty()) return;
+  start(true);
   sim::Random random(6);
-  std::vector<Spoken> whole;
+  std::vector<Exchange> whole;
   std::size_t damaged = 0;
-  for (std::size_t i = 0; i < spoken.size(); ++i) {
-    Wire reply = spoken[i].reply;
+  for (std::size_t i = 0; i < exchanges.size(); ++i) {
+    Wire reply = exchanges[i].reply;
     if (i % 16 == 8) {
       std::uint8_t& byte = reply[random.below(reply.size())];
       byte = static_cast<std::uint8_t>(byte ^ 1u << random.below(8));
-      if (unit.check(options, {.bytes = spoken[i].request}, {.bytes = reply}) == Error::none) continue;
+      if (unit.check(options, {.bytes = exchanges[i].request}, {.bytes = reply}) == Error::none) continue;
       ++damaged;
     } else {
-      whole.push_back(spoken[i]);
+      whole.push_back(exchanges[i]);
     }
-    receive(spoken[i].request);
+    receive(exchanges[i].request);
     receive(reply);
     now += 2 * gap;
   }
   annotator->fall_silent();
   EXPECT_EQ(difference(good(), whole), "");
   std::size_t bad = 0;
-  for (const Found& one : finder.found) bad += one.error != Error::none ? 1u : 0u;
+  for (const FoundAnnotation& one : collector.found) bad += one.error != Error::none ? 1u : 0u;
   EXPECT_GE(bad, damaged);
 }
 
-TEST_P(Arrival, RequestsThatNobodyAnswers) {
-  const std::vector<Spoken> spoken = talk(20, 7);
-  if (spoken.empty()) return;
-  listen(true);
-  receive(spoken[0].request);
-  receive(spoken[0].reply);
+TEST_P(Arrival, ReportsUnansweredRequests) {
+  const std::vector<Exchange> exchanges = talk(20, 7);
+  if (exchanges.empty()) return;
+  start(true);
+  receive(exchanges[0].request);
+  receive(exchanges[0].reply);
   constexpr std::size_t count = 50;
   for (std::size_t i = 0; i < count; ++i) {
     now += 2 * gap;
-    receive(spoken[0].request);
+    receive(exchanges[0].request);
   }
-  EXPECT_GE(finder.found.size() + 3, count) << "they are handed out while it goes on";
+  EXPECT_GE(collector.found.size() + 3, count) << "they are handed out while it goes on";
   annotator->fall_silent();
   EXPECT_EQ(good().size(), 1u);
-  EXPECT_EQ(finder.found.size(), 1 + count);
-  for (std::size_t i = 1; i < finder.found.size(); ++i) {
-    EXPECT_EQ(finder.found[i].request, spoken[0].request);
-    EXPECT_EQ(finder.found[i].remark, Remark::unanswered);
+  EXPECT_EQ(collector.found.size(), 1 + count);
+  for (std::size_t i = 1; i < collector.found.size(); ++i) {
+    EXPECT_EQ(collector.found[i].request, exchanges[0].request);
+    EXPECT_EQ(collector.found[i].remark, Remark::unanswered);
   }
-  // The encoder answers again.
-  for (const Spoken& one : spoken) {
+  // Afterwards the encoder answers again.
+  for (const Exchange& one : exchanges) {
     receive(one.request);
     receive(one.reply);
   }
-  EXPECT_EQ(good().size(), 1 + spoken.size());
+  EXPECT_EQ(good().size(), 1 + exchanges.size());
 }
 
 std::string name_of(const ::testing::TestParamInfo<const Unit*>& info) {
@@ -260,26 +260,26 @@ std::string name_of(const ::testing::TestParamInfo<const Unit*>& info) {
   return name;
 }
 
-TEST_P(Arrival, AnEncoderThatSendsByItself) {
+TEST_P(Arrival, ReportsUnsolicitedFrames) {
   if (unit.streams == nullptr || !unit.streams(options)) return;
   Talker talker(unit, options, {}, 8);
   std::vector<Wire> frames;
   while (frames.size() < 300) {
-    for (const Said& said : talker.talk().said) {
-      if (unit.check(options, {}, {.bytes = said.bytes}) == Error::none) frames.push_back(said.bytes);
+    for (const Transmission& sent : talker.talk().transmissions) {
+      if (unit.check(options, {}, {.bytes = sent.bytes}) == Error::none) frames.push_back(sent.bytes);
     }
   }
-  listen(true);
+  start(true);
   for (const Wire& frame : frames) {
     receive({frame.begin(), frame.begin() + 2});
     now += 5 * gap;
     receive({frame.begin() + 2, frame.end()});
   }
   annotator->fall_silent();
-  ASSERT_EQ(finder.found.size(), frames.size());
+  ASSERT_EQ(collector.found.size(), frames.size());
   for (std::size_t i = 0; i < frames.size(); ++i) {
-    EXPECT_EQ(finder.found[i].error, Error::none);
-    EXPECT_EQ(hex(finder.found[i].reply), hex(frames[i]));
+    EXPECT_EQ(collector.found[i].error, Error::none);
+    EXPECT_EQ(hex(collector.found[i].reply), hex(frames[i]));
   }
 }
 

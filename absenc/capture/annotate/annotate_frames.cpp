@@ -94,21 +94,21 @@ bool ControlFrames::settle(bool fell) {
   if (!pending_) return false;
   const Pending word = *std::exchange(pending_, std::nullopt);
   const bool asks = word.low_after || fell;
-  const unsigned before = quiet_;
-  quiet_ = asks ? 0 : std::min(quiet_ + 1, zeros);
+  const unsigned before = zeros_seen_;
+  zeros_seen_ = asks ? 0 : std::min(zeros_seen_ + 1, zeros);
   if (!open_) {
     if (!asks || before < zeros) return false;
     open_ = true;
-    asked_ = {};
-    answered_ = {};
+    request_bits_ = {};
+    reply_bits_ = {};
     begin_ = word.begin;
     error_ = Error::none;
   }
-  asked_.add(asks);
-  answered_.add(word.answered);
+  request_bits_.add(asks);
+  reply_bits_.add(word.answered);
   end_ = word.end;
   if (error_ == Error::none) error_ = word.error;
-  open_ = quiet_ < zeros;
+  open_ = zeros_seen_ < zeros;
   return !open_;
 }
 
@@ -118,8 +118,8 @@ Annotation ControlFrames::annotation(Judge& judge) const {
                         .error = error_,
                         .begin = begin_,
                         .end = end_,
-                        .request = asked_.frame(),
-                        .reply = answered_.frame()};
+                        .request = request_bits_.frame(),
+                        .reply = reply_bits_.frame()};
   if (error_ != Error::none) return annotation;
   annotation.error = judge.decode(annotation.request, annotation.reply);
   annotation.contents = judge.contents();
@@ -148,44 +148,45 @@ void BurstAnnotator::decode_exchange(const Burst& burst, Annotation& annotation)
 
 void CanAnnotator::put(const CanRecord& record) {
   using Kind = Annotation::Kind;
-  while (waiting_ != 0 && record.at > asked_[0].at + ticks_.limit) give_up(0, Remark::unanswered);
-  if (record.error_frame) return tell(Kind::noise, record, Error::bad_framing, Remark::damaged);
-  if (answers(record)) return;
+  while (request_count_ != 0 && record.at > requests_[0].at + ticks_.limit) report_unanswered(0, Remark::unanswered);
+  if (record.error_frame) return report(Kind::noise, record, Error::bad_framing, Remark::damaged);
+  if (pair_reply(record)) return;
   const Frame frame{.bytes = record.frame.bytes(), .can = &record.frame};
   const Error as_reply = judge_.decode({}, frame);
-  if (as_reply == Error::none) return tell(Kind::reply, record, Error::none, Remark::none, judge_.contents());
+  if (as_reply == Error::none) return report(Kind::reply, record, Error::none, Remark::none, judge_.contents());
   if (judge_.decode(frame, {}) != Error::none) {
-    return answers_badly(record) ? void() : tell(Kind::noise, record, as_reply, Remark::none);
+    return pair_bad_reply(record) ? void() : report(Kind::noise, record, as_reply, Remark::none);
   }
-  if (!judge_.is_answered(frame)) return tell(Kind::request, record, Error::none, Remark::none, judge_.contents());
-  end_waits(record.frame);
-  if (waiting_ == capacity) give_up(0, Remark::unanswered);
-  asked_[waiting_++] = record;
+  if (!judge_.is_answered(frame)) return report(Kind::request, record, Error::none, Remark::none, judge_.contents());
+  end_earlier_requests(record.frame);
+  if (request_count_ == capacity) report_unanswered(0, Remark::unanswered);
+  requests_[request_count_++] = record;
 }
 
 void CanAnnotator::finish(Tick end) {
-  while (waiting_ != 0) give_up(0, end > asked_[0].at + ticks_.limit ? Remark::unanswered : Remark::cut);
+  while (request_count_ != 0)
+    report_unanswered(0, end > requests_[0].at + ticks_.limit ? Remark::unanswered : Remark::cut);
 }
 
 // Pairs the frame with the oldest outstanding request that it answers. Returns false if there is none.
-bool CanAnnotator::answers(const CanRecord& record) {
+bool CanAnnotator::pair_reply(const CanRecord& record) {
   const Frame reply{.bytes = record.frame.bytes(), .can = &record.frame};
-  for (std::size_t i = 0; i < waiting_; ++i) {
-    const Frame request{.bytes = asked_[i].frame.bytes(), .can = &asked_[i].frame};
+  for (std::size_t i = 0; i < request_count_; ++i) {
+    const Frame request{.bytes = requests_[i].frame.bytes(), .can = &requests_[i].frame};
     if (judge_.decode(request, reply) != Error::none) continue;
-    answer(i, record, Error::none);
+    report_exchange(i, record, Error::none);
     return true;
   }
   return false;
 }
 
 // Pairs a bad frame with the newest request that it would answer if it were good. Returns false if there is none.
-bool CanAnnotator::answers_badly(const CanRecord& record) {
+bool CanAnnotator::pair_bad_reply(const CanRecord& record) {
   const Frame reply{.bytes = record.frame.bytes(), .can = &record.frame};
-  for (std::size_t i = waiting_; i-- > 0;) {
-    const Error error = judge_.decode({.bytes = asked_[i].frame.bytes(), .can = &asked_[i].frame}, reply);
+  for (std::size_t i = request_count_; i-- > 0;) {
+    const Error error = judge_.decode({.bytes = requests_[i].frame.bytes(), .can = &requests_[i].frame}, reply);
     if (error == Error::unexpected_reply) continue;
-    answer(i, record, error);
+    report_exchange(i, record, error);
     return true;
   }
   return false;
@@ -193,40 +194,40 @@ bool CanAnnotator::answers_badly(const CanRecord& record) {
 
 // A host that repeats a request to the same encoder no longer expects the earlier reply: the next reply answers the new
 // request.
-void CanAnnotator::end_waits(const CanFrame& request) {
-  for (std::size_t i = 0; i < waiting_;) {
-    const CanFrame& asked = asked_[i].frame;
-    const bool same = asked.id == request.id && asked.extended == request.extended;
+void CanAnnotator::end_earlier_requests(const CanFrame& request) {
+  for (std::size_t i = 0; i < request_count_;) {
+    const CanFrame& sent = requests_[i].frame;
+    const bool same = sent.id == request.id && sent.extended == request.extended;
     if (same) {
-      give_up(i, Remark::unanswered);
+      report_unanswered(i, Remark::unanswered);
     } else {
       ++i;
     }
   }
 }
 
-void CanAnnotator::answer(std::size_t index, const CanRecord& record, Error error) {
-  const CanRecord asked = take(index);
+void CanAnnotator::report_exchange(std::size_t index, const CanRecord& record, Error error) {
+  const CanRecord sent = take(index);
   sink_.put({.kind = Annotation::Kind::exchange,
              .error = error,
-             .begin = asked.at,
+             .begin = sent.at,
              .end = record.at,
-             .request = {.bytes = asked.frame.bytes(), .can = &asked.frame},
+             .request = {.bytes = sent.frame.bytes(), .can = &sent.frame},
              .reply = {.bytes = record.frame.bytes(), .can = &record.frame},
              .contents = judge_.contents(),
-             .turnaround = record.at - asked.at});
+             .turnaround = record.at - sent.at});
 }
 
 CanRecord CanAnnotator::take(std::size_t index) {
-  const CanRecord asked = asked_[index];
-  const auto first = asked_.begin() + static_cast<std::ptrdiff_t>(index);
-  std::copy(first + 1, asked_.begin() + static_cast<std::ptrdiff_t>(waiting_), first);
-  --waiting_;
-  return asked;
+  const CanRecord sent = requests_[index];
+  const auto first = requests_.begin() + static_cast<std::ptrdiff_t>(index);
+  std::copy(first + 1, requests_.begin() + static_cast<std::ptrdiff_t>(request_count_), first);
+  --request_count_;
+  return sent;
 }
 
-void CanAnnotator::tell(Annotation::Kind kind, const CanRecord& record, Error error, Remark remark,
-                        const Contents& contents) {
+void CanAnnotator::report(Annotation::Kind kind, const CanRecord& record, Error error, Remark remark,
+                          const Contents& contents) {
   Annotation annotation{
       .kind = kind, .remark = remark, .error = error, .begin = record.at, .end = record.at, .contents = contents};
   const Frame frame{.bytes = record.frame.bytes(), .can = &record.frame};
@@ -234,9 +235,9 @@ void CanAnnotator::tell(Annotation::Kind kind, const CanRecord& record, Error er
   sink_.put(annotation);
 }
 
-void CanAnnotator::give_up(std::size_t index, Remark remark) {
-  const CanRecord asked = take(index);
-  tell(Annotation::Kind::request, asked, remark == Remark::cut ? Error::none : Error::timeout, remark);
+void CanAnnotator::report_unanswered(std::size_t index, Remark remark) {
+  const CanRecord sent = take(index);
+  report(Annotation::Kind::request, sent, remark == Remark::cut ? Error::none : Error::timeout, remark);
 }
 
 }  // namespace absenc::capture

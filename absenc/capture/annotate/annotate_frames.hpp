@@ -41,7 +41,7 @@ class ControlFrames {
     [[nodiscard]] Frame frame() const { return {.bytes = bytes, .bits = size}; }
   };
 
-  // A word whose following rest has not ended.
+  // A word that was added but not completed by `settle`, because its following rest has not ended.
   struct Pending {
     Tick begin;
     Tick end;
@@ -51,12 +51,12 @@ class ControlFrames {
   };
 
   std::optional<Pending> pending_;
-  Bits asked_;
-  Bits answered_;
+  Bits request_bits_;
+  Bits reply_bits_;
   Tick begin_ = 0;
   Tick end_ = 0;
   Error error_ = Error::none;
-  unsigned quiet_ = 0;
+  unsigned zeros_seen_ = 0;
   bool open_ = false;
 };
 
@@ -96,19 +96,20 @@ class CanAnnotator {
  private:
   static constexpr std::size_t capacity = 16;
 
-  bool answers(const CanRecord& record);
-  bool answers_badly(const CanRecord& record);
-  void end_waits(const CanFrame& request);
-  void answer(std::size_t index, const CanRecord& record, Error error);
+  bool pair_reply(const CanRecord& record);
+  bool pair_bad_reply(const CanRecord& record);
+  void end_earlier_requests(const CanFrame& request);
+  void report_exchange(std::size_t index, const CanRecord& record, Error error);
   CanRecord take(std::size_t index);
-  void tell(Annotation::Kind kind, const CanRecord& record, Error error, Remark remark, const Contents& contents = {});
-  void give_up(std::size_t index, Remark remark);
+  void report(Annotation::Kind kind, const CanRecord& record, Error error, Remark remark,
+              const Contents& contents = {});
+  void report_unanswered(std::size_t index, Remark remark);
 
   Judge judge_;
   LineTicks ticks_;
   AnnotationSink& sink_;
-  std::array<CanRecord, capacity> asked_{};
-  std::size_t waiting_ = 0;
+  std::array<CanRecord, capacity> requests_{};
+  std::size_t request_count_ = 0;
 };
 
 }  // namespace absenc::capture

@@ -18,14 +18,14 @@
 namespace absenc::capture {
 namespace {
 
-using testing::Said;
-using testing::Talk;
 using testing::Talker;
+using testing::TalkRecord;
+using testing::Transmission;
 using Kind = Annotation::Kind;
 using Wire = std::vector<std::uint8_t>;
 
 /// An annotation that owns its data.
-struct Kept {
+struct OwnedAnnotation {
   Kind kind;
   Remark remark;
   Error error;
@@ -37,7 +37,7 @@ struct Kept {
   std::optional<Tick> turnaround;
 };
 
-struct Keeper final : AnnotationSink {
+struct AnnotationCollector final : AnnotationSink {
   void put(const Annotation& annotation) override {
     kept.push_back({annotation.kind, annotation.remark, annotation.error, annotation.begin, annotation.end,
                     Wire(annotation.request.bytes.begin(), annotation.request.bytes.end()),
@@ -45,7 +45,7 @@ struct Keeper final : AnnotationSink {
                     annotation.contents.reading == nullptr ? std::nullopt : std::optional(*annotation.contents.reading),
                     annotation.turnaround});
   }
-  std::vector<Kept> kept;
+  std::vector<OwnedAnnotation> kept;
 };
 
 std::string to_text(const Wire& bytes) {
@@ -56,7 +56,7 @@ std::string to_text(const Wire& bytes) {
   return text;
 }
 
-std::string to_text(const Kept& one) {
+std::string to_text(const OwnedAnnotation& one) {
   return std::to_string(one.begin) + ".." + std::to_string(one.end) + " kind " +
          std::to_string(static_cast<int>(one.kind)) + " " + to_text(one.request) + " -> " + to_text(one.reply) + " " +
          std::string(text_of(one.error).name) + " " + std::string(text_of(one.remark)) +
@@ -70,19 +70,19 @@ class Truth {
  public:
   Truth(const Unit& unit, const Options& options) : judge_(unit, options), limit_(unit.timing.turnaround_limit) {}
 
-  void add(const std::vector<Said>& said) {
-    for (std::size_t i = 0; i < said.size(); ++i) {
-      if (said[i].by == sim::Role::device) {
-        unsolicited(said[i]);
+  void add(const std::vector<Transmission>& sent) {
+    for (std::size_t i = 0; i < sent.size(); ++i) {
+      if (sent[i].by == sim::Role::device) {
+        unsolicited(sent[i]);
         continue;
       }
-      if (i + 1 < said.size() && said[i + 1].by == sim::Role::device) {
-        answered(said[i], said[i + 1]);
+      if (i + 1 < sent.size() && sent[i + 1].by == sim::Role::device) {
+        answered(sent[i], sent[i + 1]);
         ++i;
       } else {
-        const bool bad = judge_.decode({.bytes = said[i].bytes}, {}) != Error::none;
-        const bool may = !bad && !judge_.is_answered({.bytes = said[i].bytes});
-        add(Kind::request, may ? Remark::none : Remark::unanswered, may ? Error::none : Error::timeout, said[i], {});
+        const bool bad = judge_.decode({.bytes = sent[i].bytes}, {}) != Error::none;
+        const bool may = !bad && !judge_.is_answered({.bytes = sent[i].bytes});
+        add(Kind::request, may ? Remark::none : Remark::unanswered, may ? Error::none : Error::timeout, sent[i], {});
       }
     }
   }
@@ -120,7 +120,7 @@ class Truth {
     if (unit.control_bit != nullptr) control_.put(burst, says_one, error);
   }
 
-  std::vector<Kept> expected;
+  std::vector<OwnedAnnotation> expected;
 
  private:
   ControlFrames control_;
@@ -142,39 +142,39 @@ class Truth {
                         {}});
   }
 
-  void add(Kind kind, Remark remark, Error error, const Said& said, std::optional<Reading> read) {
-    Kept one{kind, remark, error, said.begin, said.end, {}, {}, read, {}};
-    (kind == Kind::request ? one.request : one.reply) = said.bytes;
+  void add(Kind kind, Remark remark, Error error, const Transmission& sent, std::optional<Reading> read) {
+    OwnedAnnotation one{kind, remark, error, sent.begin, sent.end, {}, {}, read, {}};
+    (kind == Kind::request ? one.request : one.reply) = sent.bytes;
     expected.push_back(one);
   }
 
-  void unsolicited(const Said& said) {
+  void unsolicited(const Transmission& sent) {
     const std::size_t size = stream_size_;
-    const Error error = judge_.decode({}, {.bytes = said.bytes});
-    if (error == Error::none) stream_size_ = said.bytes.size();
-    if (error != Error::none && judge_.streams() && size != 0 && said.bytes.size() > size) {
-      const auto middle = said.bytes.end() - static_cast<std::ptrdiff_t>(size);
-      const Wire last(middle, said.bytes.end());
-      if (judge_.decode({}, {.bytes = last}) == Error::none) return add_disturbed(said, middle, last);
+    const Error error = judge_.decode({}, {.bytes = sent.bytes});
+    if (error == Error::none) stream_size_ = sent.bytes.size();
+    if (error != Error::none && judge_.streams() && size != 0 && sent.bytes.size() > size) {
+      const auto middle = sent.bytes.end() - static_cast<std::ptrdiff_t>(size);
+      const Wire last(middle, sent.bytes.end());
+      if (judge_.decode({}, {.bytes = last}) == Error::none) return add_disturbed(sent, middle, last);
     }
-    add(Kind::reply, Remark::none, error, said, reading(error));
+    add(Kind::reply, Remark::none, error, sent, reading(error));
   }
 
   // The frame behind a disturbance is valid: a listening host accepts it.
-  void add_disturbed(const Said& said, Wire::const_iterator middle, const Wire& last) {
-    const Wire before(said.bytes.begin(), middle);
-    const Tick each = (said.end - said.begin) / said.bytes.size();
-    const Tick turn = said.begin + each * before.size();
-    add(Kind::reply, Remark::none, judge_.decode({}, {.bytes = before}), {said.by, before, said.begin, turn}, {});
+  void add_disturbed(const Transmission& sent, Wire::const_iterator middle, const Wire& last) {
+    const Wire before(sent.bytes.begin(), middle);
+    const Tick each = (sent.end - sent.begin) / sent.bytes.size();
+    const Tick turn = sent.begin + each * before.size();
+    add(Kind::reply, Remark::none, judge_.decode({}, {.bytes = before}), {sent.by, before, sent.begin, turn}, {});
     static_cast<void>(judge_.decode({}, {.bytes = last}));
-    add(Kind::reply, Remark::none, Error::none, {said.by, last, turn, said.end}, reading(Error::none));
+    add(Kind::reply, Remark::none, Error::none, {sent.by, last, turn, sent.end}, reading(Error::none));
   }
 
-  void answered(const Said& asked, const Said& said) {
-    Wire reply = said.bytes;
-    Kept one{Kind::exchange, Remark::none, Error::none, asked.begin, said.end, asked.bytes, {}, {}, {}};
-    one.turnaround = said.begin - asked.end;
-    const Tick each = (said.end - said.begin) / reply.size();
+  void answered(const Transmission& asked, const Transmission& sent) {
+    Wire reply = sent.bytes;
+    OwnedAnnotation one{Kind::exchange, Remark::none, Error::none, asked.begin, sent.end, asked.bytes, {}, {}, {}};
+    one.turnaround = sent.begin - asked.end;
+    const Tick each = (sent.end - sent.begin) / reply.size();
     const auto good = [&](const Wire& bytes) {
       return judge_.decode({.bytes = asked.bytes}, {.bytes = bytes}) == Error::none;
     };
@@ -182,7 +182,7 @@ class Truth {
     const Wire second(reply.begin() + static_cast<std::ptrdiff_t>(reply.size() / 2), reply.end());
     bool twice = half == second && !half.empty() && good(half);
     if (twice) reply = half;
-    if (twice) one.end = said.begin + each * half.size();
+    if (twice) one.end = sent.begin + each * half.size();
     if (!good(reply) && reply.size() > asked.bytes.size() &&
         std::equal(asked.bytes.begin(), asked.bytes.end(), reply.begin())) {
       const Wire behind(reply.begin() + static_cast<std::ptrdiff_t>(asked.bytes.size()), reply.end());
@@ -202,7 +202,7 @@ class Truth {
     // The reply equals its request, so this may be a late reply or the repeated request.
     if (one.error == Error::none && *one.turnaround > static_cast<Tick>(limit_.count()) && one.request == one.reply) {
       add(Kind::request, Remark::unanswered, Error::timeout, asked, {});
-      return add(Kind::request, Remark::unanswered, Error::timeout, said, {});
+      return add(Kind::request, Remark::unanswered, Error::timeout, sent, {});
     }
     if (one.error == Error::none && *one.turnaround > static_cast<Tick>(limit_.count())) {
       one.error = Error::timeout;
@@ -211,7 +211,7 @@ class Truth {
     }
     expected.push_back(one);
     if (twice) {
-      const Said rest{said.by, half, one.end, said.end};
+      const Transmission rest{sent.by, half, one.end, sent.end};
       add(Kind::reply, Remark::repeated, Error::unexpected_reply, rest, {});
     }
   }
@@ -224,12 +224,13 @@ class Truth {
 
 // Requires every good exchange as expected, and an error at each expected error. Several faults together may look like
 // another error, so only a `share` of the bad ones must match exactly.
-void expect_same(const std::vector<Kept>& found, const std::vector<Kept>& expected, double share = 1) {
+void expect_same(const std::vector<OwnedAnnotation>& found, const std::vector<OwnedAnnotation>& expected,
+                 double share = 1) {
   std::size_t next = 0;
   std::size_t bad = 0;
   std::size_t exact = 0;
   for (std::size_t i = 0; i < expected.size(); ++i) {
-    const Kept& one = expected[i];
+    const OwnedAnnotation& one = expected[i];
     const std::string context =
         std::to_string(i) + " " + to_text(one) + (i == 0 ? "" : "\nbefore: " + to_text(expected[i - 1]));
     ASSERT_LT(next, found.size()) << context;
@@ -305,17 +306,17 @@ class Characters : public ::testing::TestWithParam<const Unit*> {
   void talk(const sim::FaultRates& rates, std::size_t exchanges, std::uint64_t seed) {
     Talker talker(unit, options, rates, seed);
     while (truth.expected.size() < exchanges) {
-      const Talk one = talker.talk();
+      const TalkRecord one = talker.talk();
       if (one.collided) continue;
-      truth.add(one.said);
+      truth.add(one.transmissions);
       characters.insert(characters.end(), one.characters.begin(), one.characters.end());
     }
     std::stable_sort(characters.begin(), characters.end(),
                      [](const Character& a, const Character& b) { return a.begin < b.begin; });
     end = talker.now();
   }
-  std::vector<Kept> annotate(const Annotator::Settings& settings) const {
-    Keeper keeper;
+  std::vector<OwnedAnnotation> annotate(const Annotator::Settings& settings) const {
+    AnnotationCollector keeper;
     const auto annotator = std::make_unique<Annotator>(unit, options, settings, keeper);
     for (const Character& character : characters) annotator->put(character);
     annotator->finish(end);
@@ -329,7 +330,7 @@ class Characters : public ::testing::TestWithParam<const Unit*> {
 
 TEST_P(Characters, EveryExchangeWithoutFaults) {
   talk({}, 2000, 1);
-  for (const Kept& one : truth.expected) ASSERT_EQ(one.error, Error::none) << to_text(one);
+  for (const OwnedAnnotation& one : truth.expected) ASSERT_EQ(one.error, Error::none) << to_text(one);
   expect_same(annotate(settings_of(unit)), truth.expected);
 }
 
@@ -350,18 +351,18 @@ bool has_weak_check(const Unit& unit, const Options& options) {
   return false;
 }
 
-TEST_P(Characters, EveryErrorWhereItWas) {
+TEST_P(Characters, FindsEveryErrorAtItsPlace) {
   if (has_weak_check(unit, options)) GTEST_SKIP() << "its check is too weak";
   talk(faults_of(unit, options), 5000, 2);
   expect_same(annotate(settings_of(unit)), truth.expected, 0.97);
   std::map<Error, int> errors;
-  for (const Kept& one : truth.expected) ++errors[one.error];
+  for (const OwnedAnnotation& one : truth.expected) ++errors[one.error];
   EXPECT_GT(errors.size(), 3u);
   EXPECT_GT(errors[Error::none], 2000);
 }
 
 // A recording of the adapter's transmit wire only, or of only one of two pairs.
-TEST_P(Characters, OnlyWhatTheEncoderSays) {
+TEST_P(Characters, FindsRepliesWithoutRequests) {
   talk({}, 500, 3);
   if (unit.link != LinkKind::full_duplex) return;
   std::erase_if(characters, [](const Character& character) { return character.channel == 0; });
@@ -370,9 +371,9 @@ TEST_P(Characters, OnlyWhatTheEncoderSays) {
   settings.channel_count = 1;
   settings.channels[0] = Carries::replies;
   std::size_t positions = 0;
-  for (const Kept& one : annotate(settings)) positions += one.reading ? 1u : 0u;
+  for (const OwnedAnnotation& one : annotate(settings)) positions += one.reading ? 1u : 0u;
   std::size_t expected = 0;
-  for (const Kept& one : truth.expected) expected += one.reading ? 1u : 0u;
+  for (const OwnedAnnotation& one : truth.expected) expected += one.reading ? 1u : 0u;
   EXPECT_GE(positions, expected);
 }
 
@@ -381,8 +382,8 @@ TEST_P(Characters, DamagedCharacters) {
   if (has_weak_check(unit, options)) GTEST_SKIP() << "its check is too weak";
   talk({}, 1000, 4);
   sim::Random random(4);
-  std::vector<Kept> expected = truth.expected;
-  for (Kept& one : expected) {
+  std::vector<OwnedAnnotation> expected = truth.expected;
+  for (OwnedAnnotation& one : expected) {
     const auto first = std::find_if(characters.begin(), characters.end(),
                                     [&](const Character& character) { return character.begin >= one.begin; });
     if (!random.chance(0.1) || one.kind != Kind::exchange || &one == &expected.front()) continue;
@@ -403,8 +404,8 @@ TEST_P(Characters, DamagedCharacters) {
 TEST_P(Characters, BeginsAnywhere) {
   talk({}, 300, 5);
   const std::vector<Character> all = characters;
-  std::map<std::pair<Tick, Tick>, const Kept*> there;
-  for (const Kept& one : truth.expected) there[{one.begin, one.end}] = &one;
+  std::map<std::pair<Tick, Tick>, const OwnedAnnotation*> there;
+  for (const OwnedAnnotation& one : truth.expected) there[{one.begin, one.end}] = &one;
   const std::size_t step = 200 / test_cases(200);
   for (std::size_t from = 1; from < std::min<std::size_t>(all.size(), 200); from += step) {
     characters.assign(all.begin() + static_cast<std::ptrdiff_t>(from), all.end());
@@ -413,9 +414,9 @@ TEST_P(Characters, BeginsAnywhere) {
     settings.begin = characters.front().begin - 1;
     std::size_t missed = 0;
     std::size_t first = 0;
-    for (const Kept& one : truth.expected) first += one.begin < settings.begin ? 1u : 0u;
-    const std::vector<Kept> found = annotate(settings);
-    for (const Kept& one : found) {
+    for (const OwnedAnnotation& one : truth.expected) first += one.begin < settings.begin ? 1u : 0u;
+    const std::vector<OwnedAnnotation> found = annotate(settings);
+    for (const OwnedAnnotation& one : found) {
       if (one.error != Error::none && ++missed == 1) std::printf("%zu: %s\n", from, to_text(one).c_str());
       if (one.error != Error::none || one.kind != Kind::exchange) continue;
       const auto known = there.find({one.begin, one.end});
@@ -438,7 +439,7 @@ TEST_P(Bursts, EveryExchange) {
   const Options options = testing::options_of(unit);
   Talker talker(unit, options, faults_of(unit, options), 6);
   Truth truth(unit, options);
-  Keeper keeper;
+  AnnotationCollector keeper;
   BurstAnnotator annotator(unit, options, keeper);
   while (truth.expected.size() < 5000) {
     for (const Burst& burst : talker.talk().bursts) {

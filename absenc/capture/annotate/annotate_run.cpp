@@ -79,20 +79,20 @@ std::size_t Annotator::next_frame() {
   if (!whole_ && channel_->run.size() - at_ <= lookahead) return settings_.by_arrival ? whole_frame() : 0;
   std::size_t taken = 0;
   if (channel_->carries != Carries::requests) {
-    taken = answer_here();
-    if (taken == 0) taken = repeated_here();
+    taken = match_reply();
+    if (taken == 0) taken = match_repeated();
   }
   const auto waiting = exchanges_.waiting();
   if (taken == 0 && !waiting.empty() && exchanges_.overdue(waiting[0], channel_->run.begin(at_))) {
-    exchanges_.give_up(1);
+    exchanges_.report_unanswered(1);
   }
-  if (taken == 0 && channel_->carries != Carries::replies) taken = request_here();
-  if (taken == 0 && channel_->carries != Carries::requests) taken = unsolicited_here();
-  return taken != 0 ? taken : bad_here();
+  if (taken == 0 && channel_->carries != Carries::replies) taken = match_request();
+  if (taken == 0 && channel_->carries != Carries::requests) taken = match_unsolicited();
+  return taken != 0 ? taken : take_bad();
 }
 
 // Returns the newest request that was complete: a host that sends another request no longer expects earlier replies.
-std::optional<std::size_t> Annotator::asked_before(Tick begin) const {
+std::optional<std::size_t> Annotator::request_before(Tick begin) const {
   const auto waiting = exchanges_.waiting();
   for (std::size_t i = waiting.size(); i-- > 0;) {
     if (waiting[i].end <= begin) return i;
@@ -100,52 +100,52 @@ std::optional<std::size_t> Annotator::asked_before(Tick begin) const {
   return std::nullopt;
 }
 
-std::size_t Annotator::answer_here() {
+std::size_t Annotator::match_reply() {
   const Tick begin = channel_->run.begin(at_);
-  const std::optional<std::size_t> which = asked_before(begin);
+  const std::optional<std::size_t> which = request_before(begin);
   if (!which) return 0;
-  const Exchanges::Asked& asked = exchanges_.waiting()[*which];
-  const bool overdue = exchanges_.overdue(asked, begin);
-  if (asked.error != Error::none) {
+  const Exchanges::PendingRequest& pending = exchanges_.waiting()[*which];
+  const bool overdue = exchanges_.overdue(pending, begin);
+  if (pending.error != Error::none) {
     // The request is damaged, but an encoder answered it.
     const std::size_t size = overdue ? 0 : reply_at({}, at_);
-    if (size != 0) exchanges_.answer(*which, piece(size), asked.error, asked.remark, {});
+    if (size != 0) exchanges_.report_reply(*which, piece(size), pending.error, pending.remark, {});
     return size;
   }
-  std::size_t& usual = reply_sizes_[asked.storage[0]];
-  const std::size_t size = reply_at(asked.bytes(), at_, usual);
+  std::size_t& usual = reply_sizes_[pending.storage[0]];
+  const std::size_t size = reply_at(pending.bytes(), at_, usual);
   const bool leaves_rest = whole_ && size < rest(at_).size();
   if (size == 0 || leaves_rest) {
     // A reply that leaves a rest may match by accident; an echo of the request with a reply that leaves no rest is no
     // accident. Some replies equal their requests, and a reply may be sent twice.
-    const bool may_be_accident = size == 0 || size > asked.bytes().size();
+    const bool may_be_accident = size == 0 || size > pending.bytes().size();
     // Later than the turnaround limit, the host has repeated its request.
-    const bool is_late = settings_.ticks.turnaround != 0 && begin > asked.end + 2 * settings_.ticks.turnaround;
+    const bool is_late = settings_.ticks.turnaround != 0 && begin > pending.end + 2 * settings_.ticks.turnaround;
     // Between host and encoder no echo occurs: equal bytes are a repeated request.
     const bool may_be_echo = !is_late && !settings_.by_arrival;
-    const std::size_t echoed = may_be_accident && may_be_echo ? echoed_answer_size(asked.bytes(), at_) : 0;
-    if (echoed != 0 && (size == 0 || echoed == rest(at_).size())) return echoed_answer_here(*which, echoed);
+    const std::size_t echoed = may_be_accident && may_be_echo ? echoed_reply_size(pending.bytes(), at_) : 0;
+    if (echoed != 0 && (size == 0 || echoed == rest(at_).size())) return match_echoed_reply(*which, echoed);
     if (size == 0) return 0;
   }
   // Some replies equal their requests: overdue, these bytes are the repeated request.
   if (overdue && channel_->carries == Carries::both && request_at(at_) == size) return 0;
-  if (leaves_rest && usual != 0 && size != usual && !goes_on(size)) return 0;
+  if (leaves_rest && usual != 0 && size != usual && !is_followed_by_frame(size)) return 0;
   last_reply_at_ = at_;
   last_reply_size_ = usual = size;
   if (settings_.by_arrival) {
-    channel_->in_step = true;
-    channel_->last_size = 0;  // a request was sent
+    channel_->at_frame_start = true;
+    channel_->last_size = 0;  // a request was sent, so the stream of unsolicited frames has ended
   }
   // Lookahead has changed the judge's contents: decode this reply again.
   if (leaves_rest || overdue) {
-    static_cast<void>(judge_.decode({.bytes = asked.bytes()}, {.bytes = rest(at_).first(size)}));
+    static_cast<void>(judge_.decode({.bytes = pending.bytes()}, {.bytes = rest(at_).first(size)}));
   }
-  exchanges_.answer(*which, piece(size), Error::none, Remark::none, judge_.contents());
+  exchanges_.report_reply(*which, piece(size), Error::none, Remark::none, judge_.contents());
   return size;
 }
 
 // Returns whether a good frame follows the good reply: then its unusual size is no accident.
-bool Annotator::goes_on(std::size_t size) {
+bool Annotator::is_followed_by_frame(std::size_t size) {
   const Bytes behind = rest(at_ + size);
   const Bytes reply = rest(at_).first(size);
   return request_at(at_ + size) != 0 ||
@@ -154,22 +154,22 @@ bool Annotator::goes_on(std::size_t size) {
 
 // Returns the size of an echo of the request together with the good reply behind it, or 0. Adapters and some encoders
 // send echoes.
-std::size_t Annotator::echoed_answer_size(Bytes request, std::size_t from) {
+std::size_t Annotator::echoed_reply_size(Bytes request, std::size_t from) {
   const Bytes bytes = rest(from);
   if (bytes.size() <= request.size() || !std::equal(request.begin(), request.end(), bytes.begin())) return 0;
   const std::size_t size = reply_at(request, from + request.size());
   return size == 0 ? 0 : request.size() + size;
 }
 
-std::size_t Annotator::echoed_answer_here(std::size_t which, std::size_t size) {
+std::size_t Annotator::match_echoed_reply(std::size_t which, std::size_t size) {
   const std::size_t echo = exchanges_.waiting()[which].bytes().size();
   at_ += echo;
-  exchanges_.answer(which, piece(size - echo), Error::none, Remark::echo, judge_.contents());
+  exchanges_.report_reply(which, piece(size - echo), Error::none, Remark::echo, judge_.contents());
   at_ -= echo;
   return size;
 }
 
-std::size_t Annotator::repeated_here() {
+std::size_t Annotator::match_repeated() {
   const std::size_t size = last_reply_size_;
   if (size == 0 || last_reply_at_ + size != at_ || rest(at_).size() < size) return 0;
   const Bytes before = channel_->run.bytes().subspan(last_reply_at_, size);
@@ -179,17 +179,17 @@ std::size_t Annotator::repeated_here() {
   if (channel_->carries == Carries::both && may_turn(at_ + size) && reply_at(rest(at_).first(size), at_ + size) != 0) {
     return 0;
   }
-  exchanges_.alone(Annotation::Kind::reply, piece(size), Error::unexpected_reply, Remark::repeated);
+  exchanges_.report_unpaired(Annotation::Kind::reply, piece(size), Error::unexpected_reply, Remark::repeated);
   return size;
 }
 
-std::size_t Annotator::request_here() {
+std::size_t Annotator::match_request() {
   const std::size_t size = request_at(at_);
   if (size == 0 || !is_request(size)) return 0;
-  if (channel_->carries == Carries::both) exchanges_.give_up(exchanges_.waiting().size());
+  if (channel_->carries == Carries::both) exchanges_.report_unanswered(exchanges_.waiting().size());
   // Some replies equal their requests, and the request of this reply may lie before the capture.
   const bool may_be_reply = is_first_ && channel_->carries == Carries::both && reply_at({}, at_) == size;
-  exchanges_.ask(piece(size), Error::none, may_be_reply ? Remark::cut : Remark::none, true);
+  exchanges_.add_request(piece(size), Error::none, may_be_reply ? Remark::cut : Remark::none, true);
   last_reply_size_ = 0;
   return size;
 }
@@ -199,55 +199,55 @@ std::size_t Annotator::request_here() {
 bool Annotator::is_request(std::size_t size) {
   const Channel& channel = *channel_;
   const bool is_rest = whole_ && size == rest(at_).size();
-  if (channel.carries == Carries::requests) return channel.in_step || good_from(at_);
+  if (channel.carries == Carries::requests) return channel.at_frame_start || good_from(at_);
   if (is_rest) {
     const auto waiting = exchanges_.waiting();
-    if (waiting.empty() || at_ != 0) return channel.in_step;
+    if (waiting.empty() || at_ != 0) return channel.at_frame_start;
     // No host repeats a request so soon: this is the rest of the reply.
     const Tick silence = channel.run.begin(at_) - std::min(channel.run.begin(at_), waiting.back().end);
     return settings_.ticks.turnaround == 0 || silence > 2 * settings_.ticks.turnaround;
   }
   // After an exchange the host sends next, whatever else the frame could be.
-  const bool is_turn_of_host = settings_.by_arrival && channel.in_step && channel.last_size == 0 &&
-                               exchanges_.has_asked() && exchanges_.waiting().empty() && !judge_.streams();
+  const bool is_turn_of_host = settings_.by_arrival && channel.at_frame_start && channel.last_size == 0 &&
+                               exchanges_.has_request() && exchanges_.waiting().empty() && !judge_.streams();
   if (is_turn_of_host) return true;
   const bool turns = may_turn(at_ + size);
   const Bytes request = rest(at_).first(size);
   const bool answered = turns && (reply_at(request, at_ + size) != 0 ||
-                                  echoed_answer_size(request, at_ + size) == rest(at_ + size).size());
+                                  echoed_reply_size(request, at_ + size) == rest(at_ + size).size());
   const std::size_t as_reply = reply_at({}, at_);
   if (as_reply != 0 && (!answered || channel.last_size != 0)) return false;
   if (answered) return true;
-  if (settings_.by_arrival && channel.in_step && stands_alone(size)) return true;
+  if (settings_.by_arrival && channel.at_frame_start && stands_alone(size)) return true;
   const auto waiting = exchanges_.waiting();
   const bool expects_reply = !waiting.empty() && judge_.is_answered({.bytes = waiting.back().bytes()});
-  return turns && channel.in_step && exchanges_.has_asked() && !expects_reply && !judge_.streams();
+  return turns && channel.at_frame_start && exchanges_.has_request() && !expects_reply && !judge_.streams();
 }
 
-std::size_t Annotator::unsolicited_here() {
+std::size_t Annotator::match_unsolicited() {
   const bool streams = judge_.streams();
   // A good reply, but to another request.
-  if (!streams && asked_before(channel_->run.begin(at_))) return 0;
+  if (!streams && request_before(channel_->run.begin(at_))) return 0;
   const std::size_t size = reply_at({}, at_, channel_->last_size);
   if (size == 0) return 0;
-  const bool trusted = channel_->in_step || good_from(at_);
+  const bool trusted = channel_->at_frame_start || good_from(at_);
   if (!trusted) return 0;
-  channel_->in_step = true;
+  channel_->at_frame_start = true;
   channel_->last_size = channel_->stream_size = size;
   last_reply_size_ = 0;
-  const bool good = streams || !exchanges_.has_asked();
+  const bool good = streams || !exchanges_.has_request();
   static_cast<void>(judge_.decode({}, {.bytes = rest(at_).first(size)}));  // lookahead has changed the judge's contents
-  exchanges_.alone(Annotation::Kind::reply, piece(size), good ? Error::none : Error::unexpected_reply,
-                   good ? Remark::none : Remark::unsolicited, good ? judge_.contents() : Contents{});
+  exchanges_.report_unpaired(Annotation::Kind::reply, piece(size), good ? Error::none : Error::unexpected_reply,
+                             good ? Remark::none : Remark::unsolicited, good ? judge_.contents() : Contents{});
   return size;
 }
 
-std::size_t Annotator::bad_here() {
+std::size_t Annotator::take_bad() {
   const std::size_t size = bad_size();
-  tell_bad(size);
+  report_bad(size);
   last_reply_size_ = 0;
-  channel_->in_step = true;  // the following bytes were found to be good
-  if (!whole_ && !good_from(at_ + size)) channel_->in_step = false;
+  channel_->at_frame_start = true;  // the following bytes were found to be good
+  if (!whole_ && !good_from(at_ + size)) channel_->at_frame_start = false;
   return size;
 }
 
@@ -258,7 +258,7 @@ std::size_t Annotator::bad_size() {
   const std::size_t left = rest(at_).size();
   // In a stream the next frame is one frame size ahead.
   const std::size_t period = channel_->last_size;
-  if (channel_->in_step && period != 0 && period < left && reply_at({}, at_ + period) != 0) return period;
+  if (channel_->at_frame_start && period != 0 && period < left && reply_at({}, at_ + period) != 0) return period;
   // An unsolicited frame may end with the run: the disturbance is before it.
   const std::size_t last = channel_->stream_size;
   if (judge_.streams() && whole_ && last != 0 && last < left && reply_at({}, at_ + left - last) == last)
@@ -268,15 +268,15 @@ std::size_t Annotator::bad_size() {
     return size != 0 && size < left && request_at(at_ + size) == left - size;
   };
   if (channel_->carries == Carries::both && whole_) {
-    const std::optional<std::size_t> which = asked_before(channel_->run.begin(at_));
+    const std::optional<std::size_t> which = request_before(channel_->run.begin(at_));
     const std::size_t usual = which ? reply_sizes_[exchanges_.waiting()[*which].storage[0]] : 0;
     if (ends_before_request(usual)) return usual;
     const std::size_t size = judge_.frame_size(Direction::reply, rest(at_));
     if (ends_before_request(size)) return size;
   }
   // The reply is damaged but has its usual length.
-  if (const auto asked = asked_before(channel_->run.begin(at_)); settings_.by_arrival && asked) {
-    const std::size_t usual = reply_sizes_[exchanges_.waiting()[*asked].storage[0]];
+  if (const auto pending = request_before(channel_->run.begin(at_)); settings_.by_arrival && pending) {
+    const std::size_t usual = reply_sizes_[exchanges_.waiting()[*pending].storage[0]];
     for (const std::size_t size : {usual, judge_.frame_size(Direction::reply, rest(at_))}) {
       if (size != 0 && size < left && has_gap(at_ + size)) return size;
     }
@@ -288,7 +288,7 @@ std::size_t Annotator::bad_size() {
   return most;
 }
 
-void Annotator::tell_bad(std::size_t size) {
+void Annotator::report_bad(std::size_t size) {
   using Kind = Annotation::Kind;
   const Piece bad = piece(size);
   const bool is_end = whole_ && size == rest(at_).size();
@@ -303,19 +303,19 @@ void Annotator::tell_bad(std::size_t size) {
   const auto unless_cut = [cut](Error error) { return cut ? Error::none : error; };
 
   if (channel_->carries == Carries::requests) {
-    return exchanges_.alone(Kind::request, bad, unless_cut(error_of({.bytes = bad.bytes}, {})), remark);
+    return exchanges_.report_unpaired(Kind::request, bad, unless_cut(error_of({.bytes = bad.bytes}, {})), remark);
   }
-  const std::optional<std::size_t> which = asked_before(bad.begin);
+  const std::optional<std::size_t> which = request_before(bad.begin);
   if (which) {
     const Error error = error_of({.bytes = exchanges_.waiting()[*which].bytes()}, {.bytes = bad.bytes});
-    return exchanges_.answer(*which, bad, unless_cut(error), remark, {});
+    return exchanges_.report_reply(*which, bad, unless_cut(error), remark, {});
   }
   const bool may_be_request = channel_->carries == Carries::both && is_end && at_ == 0 && !judge_.streams();
-  if (may_be_request && !cut && exchanges_.has_asked()) {
-    return exchanges_.ask(bad, error_of({.bytes = bad.bytes}, {}), remark, false);
+  if (may_be_request && !cut && exchanges_.has_request()) {
+    return exchanges_.add_request(bad, error_of({.bytes = bad.bytes}, {}), remark, false);
   }
   const Kind kind = channel_->carries == Carries::both && !judge_.streams() ? Kind::noise : Kind::reply;
-  exchanges_.alone(kind, bad, unless_cut(error_of({}, {.bytes = bad.bytes})), remark);
+  exchanges_.report_unpaired(kind, bad, unless_cut(error_of({}, {.bytes = bad.bytes})), remark);
 }
 
 }  // namespace absenc::capture

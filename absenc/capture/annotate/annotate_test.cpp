@@ -18,13 +18,13 @@
 namespace absenc::capture {
 namespace {
 
-using testing::Said;
-using testing::Talk;
 using testing::Talker;
+using testing::TalkRecord;
+using testing::Transmission;
 using Kind = Annotation::Kind;
 using Wire = std::vector<std::uint8_t>;
 
-struct Found {
+struct FoundAnnotation {
   Kind kind;
   Remark remark;
   Error error;
@@ -34,7 +34,7 @@ struct Found {
   std::optional<Tick> turnaround;
 };
 
-struct Finder final : AnnotationSink {
+struct AnnotationCollector final : AnnotationSink {
   void put(const Annotation& one) override {
     found.push_back({one.kind,
                      one.remark,
@@ -47,7 +47,7 @@ struct Finder final : AnnotationSink {
       if (frame->can != nullptr) ids.push_back(frame->can->id);
     }
   }
-  std::vector<Found> found;
+  std::vector<FoundAnnotation> found;
   std::vector<std::uint32_t> ids;
 };
 
@@ -56,21 +56,22 @@ class OfUnit : public ::testing::TestWithParam<const Unit*> {
   const Unit& unit = *GetParam();
   Options options = testing::options_of(unit);
 
-  std::vector<Said> talk(std::size_t count, std::uint64_t seed) {
+  std::vector<Transmission> talk(std::size_t count, std::uint64_t seed) {
     Talker talker(unit, options, {}, seed);
-    std::vector<Said> said;
-    while (said.size() < count) {
-      const Talk one = talker.talk();
-      said.insert(said.end(), one.said.begin(), one.said.end());
+    std::vector<Transmission> transmissions;
+    while (transmissions.size() < count) {
+      const TalkRecord one = talker.talk();
+      transmissions.insert(transmissions.end(), one.transmissions.begin(), one.transmissions.end());
     }
-    return said;
+    return transmissions;
   }
-  std::vector<Found> annotate(const std::vector<Character>& characters, const Annotator::Settings& settings) const {
-    Finder finder;
-    const auto annotator = std::make_unique<Annotator>(unit, options, settings, finder);
+  std::vector<FoundAnnotation> annotate(const std::vector<Character>& characters,
+                                        const Annotator::Settings& settings) const {
+    AnnotationCollector collector;
+    const auto annotator = std::make_unique<Annotator>(unit, options, settings, collector);
     for (const Character& character : characters) annotator->put(character);
     annotator->finish(characters.empty() ? 0 : characters.back().end + settings.ticks.pause);
-    return finder.found;
+    return collector.found;
   }
 };
 
@@ -88,22 +89,23 @@ std::vector<const Unit*> units_of_characters() {
   return units;
 }
 
-constexpr Tick length = 100;  // duration of a character
+constexpr Tick length = 100;  // duration of a character in ticks
 
 // An encoder that sends positions without a pause; the capture begins anywhere.
 TEST_P(OfUnit, ALineThatNeverPauses) {
   std::vector<Character> characters;
   std::vector<Tick> begins;
   std::vector<std::size_t> sizes;
-  for (const Said& said : talk(2000, 1)) {
-    Finder finder;
+  for (const Transmission& transmission : talk(2000, 1)) {
+    AnnotationCollector collector;
     Judge judge(unit, options);
-    const bool is_position = said.by == sim::Role::device && judge.decode({}, {.bytes = said.bytes}) == Error::none &&
+    const bool is_position = transmission.by == sim::Role::device &&
+                             judge.decode({}, {.bytes = transmission.bytes}) == Error::none &&
                              judge.contents().reading != nullptr;
     if (!is_position) continue;
     begins.push_back(characters.size() * length);
-    sizes.push_back(said.bytes.size());
-    for (const std::uint8_t byte : said.bytes) {
+    sizes.push_back(transmission.bytes.size());
+    for (const std::uint8_t byte : transmission.bytes) {
       const Tick begin = characters.size() * length;
       characters.push_back({.begin = begin, .end = begin + length, .value = byte});
     }
@@ -126,7 +128,7 @@ TEST_P(OfUnit, ALineThatNeverPauses) {
     settings.begin = seen.front().begin;
     std::size_t good = 0;
     Tick skipped_until = 0;
-    for (const Found& one : annotate(seen, settings)) {
+    for (const FoundAnnotation& one : annotate(seen, settings)) {
       const Tick begin = one.begin % (characters.size() * length);
       if (one.error != Error::none || one.remark != Remark::none) {
         EXPECT_LT(one.begin, settings.begin + 200 * length) << from << " " << text_of(one.error).name;
@@ -145,9 +147,9 @@ TEST_P(OfUnit, ALineThatNeverPauses) {
 // Bytes without times, as from a terminal program or a dump: both directions in one sequence.
 TEST_P(OfUnit, BytesWithoutTimes) {
   std::vector<Character> characters;
-  std::vector<Said> said = talk(1200, 2);
-  for (std::size_t i = 0; i < said.size(); ++i) {
-    for (const std::uint8_t byte : said[i].bytes) {
+  std::vector<Transmission> transmissions = talk(1200, 2);
+  for (std::size_t i = 0; i < transmissions.size(); ++i) {
+    for (const std::uint8_t byte : transmissions[i].bytes) {
       const Tick begin = characters.size();
       characters.push_back({.begin = begin, .end = begin + 1, .value = byte});
     }
@@ -155,15 +157,15 @@ TEST_P(OfUnit, BytesWithoutTimes) {
   ASSERT_GT(characters.size(), 3 * Run::capacity);
   Annotator::Settings settings;
   settings.begins_silent = true;
-  const std::vector<Found> found = annotate(characters, settings);
+  const std::vector<FoundAnnotation> found = annotate(characters, settings);
   std::size_t next = 0;
   std::size_t wrong = 0;
-  for (const Found& one : found) {
+  for (const FoundAnnotation& one : found) {
     Wire bytes = one.request;
     bytes.insert(bytes.end(), one.reply.begin(), one.reply.end());
     Wire expected;
-    while (next < said.size() && expected.size() < bytes.size()) {
-      expected.insert(expected.end(), said[next].bytes.begin(), said[next].bytes.end());
+    while (next < transmissions.size() && expected.size() < bytes.size()) {
+      expected.insert(expected.end(), transmissions[next].bytes.begin(), transmissions[next].bytes.end());
       ++next;
     }
     wrong += one.error != Error::none || bytes != expected ? 1u : 0u;
@@ -171,10 +173,10 @@ TEST_P(OfUnit, BytesWithoutTimes) {
       ADD_FAILURE() << text_of(one.error).name << " at " << one.begin << " " << std::string(bytes.begin(), bytes.end());
   }
   EXPECT_EQ(wrong, 0u);
-  EXPECT_EQ(next, said.size());
+  EXPECT_EQ(next, transmissions.size());
 }
 
-TEST_P(OfUnit, WhichWireIsWhose) {
+TEST_P(OfUnit, FindsWireOfRequests) {
   if (unit.link != LinkKind::full_duplex) return;
   for (const std::uint8_t swapped : {std::uint8_t{0}, std::uint8_t{1}}) {
     Talker talker(unit, options, {}, 3);
@@ -191,7 +193,7 @@ TEST_P(OfUnit, WhichWireIsWhose) {
     settings.begins_silent = true;
     settings.ticks = line_ticks(unit, 1e9 / testing::line_of(unit).rate, 1'000'000'000);
     std::size_t exchanges = 0;
-    for (const Found& one : annotate(characters, settings)) {
+    for (const FoundAnnotation& one : annotate(characters, settings)) {
       EXPECT_EQ(one.error, Error::none);
       exchanges += one.kind == Kind::exchange ? 1u : 0u;
     }
@@ -242,10 +244,10 @@ TEST_P(OfUnit, NoiseBetweenExchanges) {
     settings.channels = {Carries::requests, Carries::replies};
     settings.channel_count = 2;
   }
-  const std::vector<Found> without = annotate(quiet, settings);
+  const std::vector<FoundAnnotation> without = annotate(quiet, settings);
   std::size_t next = 0;
   std::size_t bad = 0;
-  for (const Found& one : annotate(noisy, settings)) {
+  for (const FoundAnnotation& one : annotate(noisy, settings)) {
     if (one.error != Error::none) {
       ++bad;
       EXPECT_NE(one.kind, Kind::exchange) << one.begin;
@@ -295,8 +297,8 @@ CanRecord record(Tick at, std::uint32_t id, std::uint8_t value) {
 
 TEST(Can, NodesAnswerInAnyOrder) {
   const Unit unit = toy();
-  Finder finder;
-  CanAnnotator annotator(unit, {}, {.limit = 1000}, finder);
+  AnnotationCollector collector;
+  CanAnnotator annotator(unit, {}, {.limit = 1000}, collector);
   annotator.put(record(0, 0x201, 7));
   annotator.put(record(10, 0x202, 8));
   annotator.put(record(20, 0x102, 9));  // an unsolicited frame of node 2, not the reply
@@ -309,23 +311,23 @@ TEST(Can, NodesAnswerInAnyOrder) {
   annotator.put(record(70, 0x203, 1));
   annotator.put(record(2000, 0x204, 1));
   annotator.finish(2500);
-  ASSERT_EQ(finder.found.size(), 7u);
+  ASSERT_EQ(collector.found.size(), 7u);
   const auto expect = [&](std::size_t i, Kind kind, Error wrong, Remark remark, Tick begin) {
-    EXPECT_EQ(finder.found[i].kind, kind) << i;
-    EXPECT_EQ(finder.found[i].error, wrong) << i;
-    EXPECT_EQ(finder.found[i].remark, remark) << i;
-    EXPECT_EQ(finder.found[i].begin, begin) << i;
+    EXPECT_EQ(collector.found[i].kind, kind) << i;
+    EXPECT_EQ(collector.found[i].error, wrong) << i;
+    EXPECT_EQ(collector.found[i].remark, remark) << i;
+    EXPECT_EQ(collector.found[i].begin, begin) << i;
   };
   expect(0, Kind::reply, Error::none, Remark::none, 20);
   expect(1, Kind::exchange, Error::none, Remark::none, 10);
   expect(2, Kind::exchange, Error::none, Remark::none, 0);
-  EXPECT_EQ(finder.found[1].turnaround, 20u);
-  EXPECT_EQ(finder.found[2].turnaround, 40u);
+  EXPECT_EQ(collector.found[1].turnaround, 20u);
+  EXPECT_EQ(collector.found[2].turnaround, 40u);
   expect(3, Kind::noise, Error::unexpected_reply, Remark::none, 50);
   expect(4, Kind::noise, Error::bad_framing, Remark::damaged, 60);
   expect(5, Kind::request, Error::timeout, Remark::unanswered, 70);
   expect(6, Kind::request, Error::none, Remark::cut, 2000);
-  EXPECT_EQ(finder.ids, (std::vector<std::uint32_t>{0x102, 0x202, 0x102, 0x201, 0x101, 0x333, 4, 0x203, 0x204}));
+  EXPECT_EQ(collector.ids, (std::vector<std::uint32_t>{0x102, 0x202, 0x102, 0x201, 0x101, 0x333, 4, 0x203, 0x204}));
 }
 
 // A toy whose replies with bit 0 report its only alarm and are valid then; replies without it depend on an earlier one
@@ -404,8 +406,8 @@ TEST(Can, EachReplyBelongsToTheNewestRequest) {
   const Unit& unit = *find_unit("raa38-can");
   Options options;
   ASSERT_EQ(resolve_options(unit, {}, {}, options).kind, OptionError::Kind::none);
-  Finder finder;
-  CanAnnotator annotator(unit, options, {.limit = 100'000}, finder);
+  AnnotationCollector collector;
+  CanAnnotator annotator(unit, options, {.limit = 100'000}, collector);
   const auto ask = [&](Tick at) {
     CanRecord one = record(at, 0x220, 0xFF);
     one.frame.data[0] = 0x80;
@@ -422,9 +424,9 @@ TEST(Can, EachReplyBelongsToTheNewestRequest) {
     if (i != 3) reply(1000 * i + 70, i != 1);
   }
   annotator.finish(1'000'000);
-  ASSERT_EQ(finder.found.size(), 6u);
+  ASSERT_EQ(collector.found.size(), 6u);
   for (std::size_t i = 0; i < 6; ++i) {
-    const Found& one = finder.found[i];
+    const FoundAnnotation& one = collector.found[i];
     EXPECT_EQ(one.begin, 1000 * i);
     EXPECT_EQ(one.error, i == 1 ? Error::out_of_range : i == 3 ? Error::timeout : Error::none) << i;
     EXPECT_EQ(one.kind, i == 3 ? Kind::request : Kind::exchange) << i;

@@ -31,16 +31,16 @@ inline Options options_of(const Unit& unit, const std::vector<OptionText>& setti
 inline LineSettings line_of(const Unit& unit) { return unit.line.with_some_rate(); }
 
 /// Bytes that one side sent without a pause.
-struct Said {
+struct Transmission {
   sim::Role by;
   std::vector<std::uint8_t> bytes;
   Tick begin;
   Tick end;
 };
 
-struct Talk {
+struct TalkRecord {
   std::vector<Character> characters;
-  std::vector<Said> said;
+  std::vector<Transmission> transmissions;
   std::vector<Burst> bursts;
   bool collided = false;
 };
@@ -61,11 +61,11 @@ class Talker {
     line_.attach(sim::Role::device, faulty_);
     line_.observe([this](std::size_t sender, Time start, Time end, std::uint8_t byte) {
       if (waveform_ != nullptr) waveform_->character(line_.role(sender), start, end, byte);
-      hear(line_.role(sender), static_cast<Tick>(start.count()), static_cast<Tick>(end.count()), byte);
+      record(line_.role(sender), static_cast<Tick>(start.count()), static_cast<Tick>(end.count()), byte);
     });
     line_.observe_transfers([this](const auto& transfer) {
       if (waveform_ != nullptr) waveform_->transfer(transfer);
-      hear(transfer);
+      record(transfer);
     });
     for (const Command& command : unit.commands) {
       if (!command.changes_encoder && command.repeatable) commands_.push_back(&command);
@@ -73,8 +73,8 @@ class Talker {
   }
 
   /// Runs one command to its end, with a pause behind it.
-  Talk talk() {
-    talk_ = {};
+  TalkRecord talk() {
+    record_ = {};
     shaft_.put(static_cast<std::int64_t>(random_.below(60'000)), static_cast<std::int64_t>(random_.below(4096)));
     const Command& command = *commands_[random_.below(commands_.size())];
     std::vector<std::int64_t> arguments;
@@ -89,14 +89,15 @@ class Talker {
       if (host_) {
         line_.replace(*host_, *conversation);
       } else {
-        host_ = line_.attach(sim::Role::host, *conversation, [this] { return !streams_; });  // one result is enough
+        // A streaming host stops after its first result.
+        host_ = line_.attach(sim::Role::host, *conversation, [this] { return !streams_; });
       }
       line_.run(*host_, line_.now() + std::chrono::seconds(30));
     }
     const bool may_come_late = unit_.link == LinkKind::half_duplex || unit_.link == LinkKind::full_duplex;
     const Time pause = may_come_late ? unit_.timing.turnaround_limit : Time{};
     line_.run_until(line_.now() + pause + std::chrono::milliseconds(1));
-    return std::move(talk_);
+    return std::move(record_);
   }
 
   /// Draws all further traffic to `waveform` too.
@@ -107,29 +108,30 @@ class Talker {
   [[nodiscard]] const sim::FaultyDevice& faulty() const { return faulty_; }
 
  private:
-  void hear(sim::Role by, Tick begin, Tick end, std::uint8_t byte) {
+  void record(sim::Role by, Tick begin, Tick end, std::uint8_t byte) {
     const bool is_other_wire = unit_.link == LinkKind::full_duplex && by == sim::Role::device;
-    talk_.characters.push_back(
+    record_.characters.push_back(
         {.begin = begin, .end = end, .value = byte, .channel = static_cast<std::uint8_t>(is_other_wire ? 1 : 0)});
-    const auto last =
-        std::find_if(talk_.said.rbegin(), talk_.said.rend(), [&](const Said& one) { return one.by == by; });
+    const auto last = std::find_if(record_.transmissions.rbegin(), record_.transmissions.rend(),
+                                   [&](const Transmission& one) { return one.by == by; });
     if (unit_.link == LinkKind::half_duplex) {
-      for (const Said& one : talk_.said) talk_.collided = talk_.collided || (one.by != by && one.end > begin);
+      for (const Transmission& one : record_.transmissions)
+        record_.collided = record_.collided || (one.by != by && one.end > begin);
     }
-    if (last != talk_.said.rend() && last->end == begin) {
+    if (last != record_.transmissions.rend() && last->end == begin) {
       last->bytes.push_back(byte);
       last->end = end;
     } else {
-      talk_.said.push_back({by, {byte}, begin, end});
+      record_.transmissions.push_back({by, {byte}, begin, end});
     }
   }
 
-  void hear(const sim::Line<std::uint8_t>::Transfer& transfer) {
+  void record(const sim::Line<std::uint8_t>::Transfer& transfer) {
     std::size_t idle = unit_.link == LinkKind::clocked ? unit_.line.idle_clocks : 0;
     const bool held_low = transfer.held_low != never;
     if (held_low) {  // the edge with which the clock rises again samples a bit of the idle line
       ++idle;
-      if (!talk_.bursts.empty()) talk_.bursts.back().low_after = true;
+      if (!record_.bursts.empty()) record_.bursts.back().low_after = true;
     }
     Burst burst{.begin = static_cast<Tick>(transfer.start.count()),
                 .end = static_cast<Tick>(transfer.end.count()),
@@ -142,7 +144,7 @@ class Talker {
       const bool bit = i < idle || (transfer.in[(i - idle) / 8] >> (7 - (i - idle) % 8) & 1) != 0;
       if (bit) burst.in[i / 8] = static_cast<std::uint8_t>(burst.in[i / 8] | 0x80u >> i % 8);
     }
-    talk_.bursts.push_back(std::move(burst));
+    record_.bursts.push_back(std::move(burst));
   }
 
   const Unit& unit_;
@@ -158,7 +160,7 @@ class Talker {
   sim::Waveform* waveform_ = nullptr;
   std::optional<std::size_t> host_;
   std::vector<const Command*> commands_;
-  Talk talk_;
+  TalkRecord record_;
 };
 
 }  // namespace absenc::capture::testing

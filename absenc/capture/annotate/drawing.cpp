@@ -47,9 +47,9 @@ void begin_reading(std::FILE* file) {
 }
 
 /// The levels of all wires while going through the changes of a drawing.
-class Levels {
+class WireLevels {
  public:
-  explicit Levels(Drawing& drawing) : drawing_(drawing) {
+  explicit WireLevels(Drawing& drawing) : drawing_(drawing) {
     for (const Drawing::Wire& wire : drawing.wires()) levels.push_back(wire.before);
     drawing.rewind_changes();
     take();
@@ -126,7 +126,7 @@ class Samples {
     return wanted * size;
   }
 
-  const std::size_t size;  // bytes per sample
+  const std::size_t size;  // number of bytes per sample
   const std::uint64_t count;
   std::exception_ptr trouble{};  // exception that ended the computation
 
@@ -151,7 +151,7 @@ class Samples {
   }
 
   Drawing& drawing_;
-  Levels levels_;
+  WireLevels levels_;
   std::uint64_t rate_;
   std::uint64_t sample_ = 0;
   std::uint64_t changes_at_ = 0;
@@ -159,15 +159,15 @@ class Samples {
 };
 
 /// One part of the samples, which is a file of the archive.
-struct Part {
+struct SamplesPart {
   Samples* samples;
-  std::uint64_t size;  // bytes
+  std::uint64_t size;  // number of bytes in the part
   std::uint64_t given = 0;
 };
 
 // Callback of libzip that provides the content of a file during compression.
 zip_int64_t provide(void* state, void* data, zip_uint64_t size, zip_source_cmd_t command) {
-  Part& part = *static_cast<Part*>(state);
+  SamplesPart& part = *static_cast<SamplesPart*>(state);
   switch (command) {
     case ZIP_SOURCE_OPEN:
     case ZIP_SOURCE_CLOSE:
@@ -284,7 +284,7 @@ void write_vcd(std::ostream& out, Drawing& drawing) {
     out << "$var wire 1 " << identifier(i) << ' ' << drawing.wires()[i].name << " $end\n";
   }
   out << "$upscope $end\n$enddefinitions $end\n#0\n";
-  Levels levels(drawing);
+  WireLevels levels(drawing);
   for (std::size_t i = 0; i < levels.levels.size(); ++i) out << levels.levels[i] << identifier(i) << '\n';
   for (Tick at = levels.next_change(); at < drawing.end(); at = levels.next_change()) {
     const std::vector<bool> before = levels.levels;
@@ -301,7 +301,7 @@ void write_saleae_csv(std::ostream& out, Drawing& drawing) {
   out << "Time [s]";
   for (const Drawing::Wire& wire : drawing.wires()) out << ',' << wire.name;
   out << '\n';
-  Levels levels(drawing);
+  WireLevels levels(drawing);
   for (Tick at = 0;; at = levels.next_change()) {
     levels.advance(at);
     out << seconds(at);
@@ -327,10 +327,10 @@ void write_sigrok(const std::string& path, Drawing& drawing, std::uint64_t rate)
   add(archive.get(), path, "metadata", zip_source_buffer(archive.get(), about.data(), about.size(), 0));
 
   constexpr std::uint64_t samples_a_part = 4 << 20;
-  std::vector<std::unique_ptr<Part>> parts;
+  std::vector<std::unique_ptr<SamplesPart>> parts;
   for (std::uint64_t first = 0; first < samples.count; first += samples_a_part) {
     const std::uint64_t size = std::min(samples_a_part, samples.count - first) * samples.size;
-    parts.push_back(std::make_unique<Part>(Part{&samples, size}));
+    parts.push_back(std::make_unique<SamplesPart>(SamplesPart{&samples, size}));
     add(archive.get(), path, ("logic-1-" + std::to_string(parts.size())).c_str(),
         zip_source_function(archive.get(), provide, parts.back().get()));
   }

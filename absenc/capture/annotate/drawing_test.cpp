@@ -96,7 +96,7 @@ TEST_F(SigrokSession, OfMoreThanOnePartAndManyTraces) {
   }
 }
 
-TEST_F(SigrokSession, SaysWhyItCannotBeWritten) {
+TEST_F(SigrokSession, ErrorStatesReason) {
   Drawing drawing = three_wires();
   try {
     write_sigrok(directory / "missing" / "x.sr", drawing, 1'000'000);
@@ -107,7 +107,7 @@ TEST_F(SigrokSession, SaysWhyItCannotBeWritten) {
 }
 
 // An exception thrown while libzip requests samples is passed on, and no file is left.
-TEST_F(SigrokSession, CanBeBrokenOff) {
+TEST_F(SigrokSession, CanBeCancelled) {
   Drawing drawing = three_wires();
   drawing.set_end(100'000'000);
   int left = 3;
@@ -133,7 +133,7 @@ TEST(Drawing, IsWrittenTwiceTheSame) {
 }
 
 // A full disk (ENOSPC) must be an error, not a shorter waveform.
-TEST(Drawing, SaysThatTheDiskIsFull) {
+TEST(Drawing, ReportsFullDisk) {
   Drawing drawing("full", ScratchFile(std::fopen("/dev/full", "w+")));
   EXPECT_THROW(for (Tick at = 0; at < 100'000; ++at) drawing.change(at, 0);
                drawing.rewind_changes(), std::runtime_error);

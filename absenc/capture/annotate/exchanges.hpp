@@ -15,7 +15,7 @@ namespace absenc::capture {
 
 /// Times of a line, in ticks of its capture.
 struct LineTicks {
-  static constexpr Tick never = UINT64_MAX / 4;  // leaves room for additions
+  static constexpr Tick never = UINT64_MAX / 4;  // small enough that times can be added without overflow
 
   Tick pause = 1;       // a silence of this length ends a frame
   Tick character = 1;   // no silence within a character is that long
@@ -33,7 +33,7 @@ struct Piece {
 class Exchanges {
  public:
   /// A request whose reply has not been found yet.
-  struct Asked {
+  struct PendingRequest {
     static constexpr std::size_t capacity = 272;  // longer requests are cut: they are bad in any case
     std::array<std::uint8_t, capacity> storage{};
     std::size_t size = 0;
@@ -50,37 +50,38 @@ class Exchanges {
   Exchanges(Judge judge, const LineTicks& ticks, AnnotationSink& sink)
       : judge_(std::move(judge)), ticks_(ticks), sink_(sink) {}
 
-  [[nodiscard]] std::span<const Asked> waiting() const { return {asked_.data(), waiting_}; }
+  [[nodiscard]] std::span<const PendingRequest> waiting() const { return {pending_.data(), count_}; }
   /// Returns whether a good request was found so far.
-  [[nodiscard]] bool has_asked() const { return has_asked_; }
+  [[nodiscard]] bool has_request() const { return has_request_; }
   /// Returns whether the request has had no reply for so long that none will follow.
-  [[nodiscard]] bool overdue(const Asked& asked, Tick now) const { return now > asked.end + ticks_.limit; }
+  [[nodiscard]] bool overdue(const PendingRequest& pending, Tick now) const { return now > pending.end + ticks_.limit; }
 
   /// Adds a request. If the list is full, the oldest is reported as unanswered.
-  void ask(const Piece& request, Error error, Remark remark, bool is_request);
+  void add_request(const Piece& request, Error error, Remark remark, bool is_request);
   /// Reports the reply to `waiting()[which]`, and the requests before it as unanswered. `contents` must be empty with
   /// an error. A damaged reply counts as a reply. A reply after the limit is paired too, but with the error timeout: no
   /// host would accept it.
-  void answer(std::size_t which, const Piece& reply, Error error, Remark remark, const Contents& contents);
+  void report_reply(std::size_t which, const Piece& reply, Error error, Remark remark, const Contents& contents);
   /// Reports the first `count` requests as unanswered.
-  void give_up(std::size_t count);
+  void report_unanswered(std::size_t count);
   /// Reports bytes that belong to no request.
-  void alone(Annotation::Kind kind, const Piece& piece, Error error, Remark remark, const Contents& contents = {});
+  void report_unpaired(Annotation::Kind kind, const Piece& piece, Error error, Remark remark,
+                       const Contents& contents = {});
   /// Ends the capture: outstanding requests may have been answered after it.
   void finish(Tick end);
 
  private:
   static constexpr std::size_t capacity = 4;
 
-  void tell_unanswered(const Asked& asked, bool cut);
-  void forget(std::size_t count);
+  void report_request(const PendingRequest& pending, bool cut);
+  void remove(std::size_t count);
 
   Judge judge_;
   LineTicks ticks_;
   AnnotationSink& sink_;
-  std::array<Asked, capacity> asked_{};
-  std::size_t waiting_ = 0;
-  bool has_asked_ = false;
+  std::array<PendingRequest, capacity> pending_{};
+  std::size_t count_ = 0;
+  bool has_request_ = false;
 };
 
 }  // namespace absenc::capture

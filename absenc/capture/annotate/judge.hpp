@@ -19,19 +19,21 @@ namespace absenc::capture {
 class Judge {
  public:
   /// `unit` must outlive the judge.
-  Judge(const Unit& unit, const Options& options) : unit_(&unit), options_(options), kept_(options.has_word()) {}
+  Judge(const Unit& unit, const Options& options) : unit_(&unit), options_(options), decoded_(options.has_word()) {}
 
   [[nodiscard]] const Unit& unit() const { return *unit_; }
 
   /// Decodes a frame with the unit; `contents` returns its content.
   Error decode(const Frame& request, const Frame& reply) {
-    kept_.clear();
-    const Error error = unit_->decode(options_, request, reply, kept_);
-    if (error != Error::none) kept_.clear();
+    decoded_.clear();
+    const Error error = unit_->decode(options_, request, reply, decoded_);
+    if (error != Error::none) decoded_.clear();
     return error;
   }
   /// Returns the content of the last decoded frame, empty if it was bad. Valid until the next call of `decode`.
-  [[nodiscard]] Contents contents() const { return {kept_.fields, kept_.has_reading ? &kept_.reading : nullptr}; }
+  [[nodiscard]] Contents contents() const {
+    return {decoded_.fields, decoded_.has_reading ? &decoded_.reading : nullptr};
+  }
 
   /// Returns the size of the frame that begins with the first byte, or 0.
   [[nodiscard]] std::size_t frame_size(Direction direction, Bytes bytes) const {
@@ -48,7 +50,7 @@ class Judge {
     return size != 0 && decode({.bytes = bytes.first(size)}, {}) == Error::none ? size : 0;
   }
 
-  /// See Unit.
+  /// Returns the place of the encoder's control communication bit in a reply; see Unit::control_bit.
   [[nodiscard]] std::optional<std::size_t> control_bit(const Frame& reply) const {
     return unit_->control_bit != nullptr ? unit_->control_bit(options_, reply) : std::nullopt;
   }
@@ -59,19 +61,19 @@ class Judge {
   [[nodiscard]] bool streams() const { return unit_->streams != nullptr && unit_->streams(options_); }
 
  private:
-  struct Kept final : FieldSink {
-    explicit Kept(bool has_word) : is_described(has_word) {}
+  struct DecodedFields final : FieldSink {
+    explicit DecodedFields(bool has_word) : is_described(has_word) {}
 
     void clear() {
       fields.clear();
       bytes.clear();
-      made.clear();
+      described.clear();
       has_reading = false;
     }
     void put(const FieldValue& value) override {
       fields.push_back(value);
-      if (!value.bytes.empty()) keep_bytes();
-      if (is_described) keep_info();
+      if (!value.bytes.empty()) store_bytes();
+      if (is_described) store_info();
     }
     void put_reading(const Reading& one) override {
       reading = one;
@@ -79,7 +81,7 @@ class Judge {
     }
     // Copies the bytes of the newest field, which are valid during the call only. All views are set again, because the
     // storage may have moved.
-    void keep_bytes() {
+    void store_bytes() {
       const Bytes added = fields.back().bytes;
       bytes.insert(bytes.end(), added.begin(), added.end());
       std::size_t at = 0;
@@ -89,27 +91,27 @@ class Judge {
       }
     }
     // Copies the description of the newest field, which for a word described by the user is valid during the call only.
-    void keep_info() {
-      made.push_back({std::string(fields.back().info->name), *fields.back().info});
-      made.back().info.name = made.back().name;
-      fields.back().info = &made.back().info;
+    void store_info() {
+      described.push_back({std::string(fields.back().info->name), *fields.back().info});
+      described.back().info.name = described.back().name;
+      fields.back().info = &described.back().info;
     }
 
-    struct Made {
+    struct DescribedField {
       std::string name;
       FieldInfo info;
     };
     bool is_described;  // the word was described by the user
     std::vector<FieldValue> fields;
     std::vector<std::uint8_t> bytes;
-    std::deque<Made> made;
+    std::deque<DescribedField> described;
     Reading reading{};
     bool has_reading = false;
   };
 
   const Unit* unit_;
   Options options_;
-  Kept kept_;
+  DecodedFields decoded_;
 };
 
 }  // namespace absenc::capture

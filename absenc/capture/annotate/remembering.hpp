@@ -64,7 +64,7 @@ class Remembering final : public AnnotationSink {
 
   const Unit* unit_;
   AnnotationSink* sink_;
-  std::vector<std::vector<std::uint8_t>> clearing_;  // requests that clear alarms
+  std::vector<std::vector<std::uint8_t>> clearing_;  // bytes of the requests that clear alarms
   std::map<std::int64_t, Reading> last_;             // last completed reading by the encoder's address
 };
 

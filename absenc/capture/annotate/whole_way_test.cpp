@@ -22,8 +22,8 @@
 namespace absenc::capture {
 namespace {
 
-using testing::Talk;
 using testing::Talker;
+using testing::TalkRecord;
 
 /// Annotations as text lines. Their times are separate, because a waveform rounds them.
 struct Lines final : AnnotationSink {
@@ -129,7 +129,7 @@ class WholeWay : public ::testing::TestWithParam<const Unit*> {
   }
 };
 
-TEST_P(WholeWay, IsTheShortWay) {
+TEST_P(WholeWay, EqualsDirectAnnotation) {
   sim::FaultRates faults = sim::testing::damaged_replies(0.02);
   faults[sim::FaultKind::delay] = faults[sim::FaultKind::repeat] = 0;  // these faults make both sides send at once
   Talker talker(unit, options, faults, 7);
@@ -145,7 +145,7 @@ TEST_P(WholeWay, IsTheShortWay) {
   const unsigned least = test_cases(300);
   // Some units send no bytes in some conversations.
   for (unsigned i = 0; i < least || (expected.lines.empty() && all.size() < 1200); ++i) {
-    const Talk talk = talker.talk();
+    const TalkRecord talk = talker.talk();
     ASSERT_FALSE(talk.collided);
     for (const Burst& burst : talk.bursts) bursts.put(burst);
     all.insert(all.end(), talk.characters.begin(), talk.characters.end());

@@ -22,7 +22,7 @@ bool parse_identifier(std::string_view text, CanRecord& record) {
     if (hex_digit(c) < 0) return false;
     id = id << 4 | static_cast<std::uint32_t>(hex_digit(c));
   }
-  constexpr std::uint32_t error_flag = 0x20000000;  // CAN_ERR_FLAG of the kernel
+  constexpr std::uint32_t error_flag = 0x20000000;  // the kernel's flag for error frames, CAN_ERR_FLAG
   record.frame.extended = text.size() == 8;
   record.error_frame = record.frame.extended && (id & error_flag) != 0;
   record.frame.id = id & (record.frame.extended ? 0x1FFFFFFF : 0x7FF);
@@ -65,7 +65,7 @@ bool parse_log(std::string_view identifier, std::string_view data, CandumpLine& 
 // frames.
 bool parse_screen(std::string_view rest, CandumpLine& parsed) {
   const std::string_view length = take_word(rest);
-  if (length.size() == 4 && length.front() == '[') {  // "[08]" is CAN FD
+  if (length.size() == 4 && length.front() == '[') {  // a length with two digits, "[08]", is CAN FD
     parsed.kind = CandumpLine::Kind::other_can;
     return true;
   }

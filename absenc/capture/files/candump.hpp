@@ -13,7 +13,7 @@
 
 namespace absenc::capture {
 
-/// Content of one line.
+/// Content of one line of a candump log.
 struct CandumpLine {
   enum class Kind : std::uint8_t { frame, other_can };  // other_can: CAN FD or XL
   Kind kind = Kind::frame;

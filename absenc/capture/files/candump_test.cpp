@@ -69,16 +69,16 @@ TEST(Candump, TimesOfAllKinds) {
   };
   using Ticks = std::vector<Tick>;
   EXPECT_EQ(times(" (000.000000)  c  001   [0]\n (000.010000)  c  001   [0]\n (000.025000)  c  001   [0]\n"),
-            (Ticks{0, 10'000'000, 25'000'000}));  // -t z
+            (Ticks{0, 10'000'000, 25'000'000}));  // as `candump -t z` prints times
   EXPECT_EQ(times(" (000.000000)  c  001   [0]\n (000.010000)  c  001   [0]\n (000.005000)  c  001   [0]\n"),
-            (Ticks{0, 10'000'000, 15'000'000}));  // -t d
+            (Ticks{0, 10'000'000, 15'000'000}));  // as `candump -t d` prints times
   EXPECT_EQ(times(" (000.000000)  c  001   [0]\n (000.010000)  c  001   [0]\n (000.010000)  c  001   [0]\n"),
             (Ticks{0, 10'000'000, 20'000'000}));
   EXPECT_EQ(times(" (2026-11-21 17:55:24.000001)  c  001   [0]\n (2026-11-21 17:55:25.000000)  c  001   [0]\n"),
-            (Ticks{0, 999'999'000}));  // -t A
+            (Ticks{0, 999'999'000}));  // as `candump -t A` prints times
 }
 
-TEST(Candump, WhatIsLeftOutIsNoted) {
+TEST(Candump, NotesFramesLeftOut) {
   const auto reader = open_text("(1.0) can0 123##1112233\n(2.0) can0 123#11\n(3.0) can0 123##0\n");
   EXPECT_EQ(read_all(*reader).frames.size(), 1u);
   ASSERT_EQ(reader->damages().size(), 1u);
@@ -89,7 +89,7 @@ TEST(Candump, WhatIsLeftOutIsNoted) {
   EXPECT_EQ(screen->damages().size(), 1u);
 }
 
-TEST(Candump, WhatPrecedesADamageCounts) {
+TEST(Candump, ReadsEverythingBeforeADamage) {
   for (const auto& [line, words] : std::vector<std::pair<std::string, std::string>>{
            {"(1.5) can0 123#11", "backwards"},
            {"(3.0) can0 123#1", "none that candump prints"},
@@ -120,7 +120,7 @@ TEST(Candump, ManyFramesAndALateInterface) {
     text += line;
   }
   const auto reader = open_text(text);
-  const Contents contents = read_all(*reader);
+  const CaptureContents contents = read_all(*reader);
   EXPECT_GE(contents.blocks, 4u);
   ASSERT_EQ(contents.frames.size(), 49'999u);
   EXPECT_EQ(contents.frames[45'000].at, 45'001'000u);

@@ -107,13 +107,13 @@ bool parse_sigrok(std::string_view line, HexLine& parsed) {
   const std::string_view kind = take_word(rest);
   const bool classed = kind.ends_with(':');
   if (classed) {
-    if (kind != "rx-data:" && kind != "tx-data:") return true;  // an annotation of another class
+    if (kind != "rx-data:" && kind != "tx-data:") return true;  // an annotation of another class has no bytes
     parsed.channel = kind == "tx-data:" ? 0 : 1;
     line = rest;
   }
   const std::string_view value = trim(line);
   if (value.size() == 2 && all_hex(value)) return append_group(value, parsed.bytes);
-  return !classed && !value.empty();  // other annotations: "Start bit", "1" ...
+  return !classed && !value.empty();  // annotations like "Start bit" and "1" have no bytes
 }
 
 bool is_offset(std::string_view word, std::string_view line) {

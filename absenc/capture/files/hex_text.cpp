@@ -44,18 +44,18 @@ class HexTextReader final : public ParsedReader {
     do {
       if (!parse_hex_line(form_, content_of(line, form_), line_)) break;
     } while (line_.bytes.empty() && ahead.offset() < far_enough && ahead.next(line));
-    clock_ = line_.begin ? Clock::samples : line_.at ? Clock::times : Clock::none;
-    if (clock_ == Clock::times) layout_.ticks_per_second = 1'000'000'000;
-    if (clock_ == Clock::samples) layout_.ticks_per_second = samples_per_second;
+    clock_ = line_.begin ? LineTime::samples : line_.at ? LineTime::times : LineTime::none;
+    if (clock_ == LineTime::times) layout_.ticks_per_second = 1'000'000'000;
+    if (clock_ == LineTime::samples) layout_.ticks_per_second = samples_per_second;
     if (line_.at) origin_ = *line_.at;
-    told_ = line_.channel >= 0;
-    told_source_ = line_.source;
-    if (told_) layout_.channels = {"tx", "rx"};
+    has_direction_ = line_.channel >= 0;
+    source_name_ = line_.source;
+    if (has_direction_) layout_.channels = {"tx", "rx"};
   }
 
   [[nodiscard]] bool claim(Block& block) override {
     if (done_) return false;
-    begin_block(block, index_++, clock_ == Clock::none ? at_ : last_);
+    begin_block(block, index_++, clock_ == LineTime::none ? at_ : last_);
     while (block.bytes.size() < bytes_at_once) {
       if (!take_line(block)) {
         done_ = true;
@@ -63,12 +63,12 @@ class HexTextReader final : public ParsedReader {
       }
     }
     // The next line may begin at the same time as the last one.
-    block.end = done_ || clock_ == Clock::none ? at_ : last_;
+    block.end = done_ || clock_ == LineTime::none ? at_ : last_;
     return true;
   }
 
  private:
-  enum class Clock : std::uint8_t { none, times, samples };
+  enum class LineTime : std::uint8_t { none, times, samples };
 
   bool fail(const std::string& what) {
     damages_.add({.offset = lines_.offset(), .tick = at_, .what = what});
@@ -106,28 +106,28 @@ class HexTextReader final : public ParsedReader {
 
   bool append(Block& block) {
     const bool timed =
-        clock_ == Clock::times ? line_.at.has_value() : line_.begin.has_value() == (clock_ == Clock::samples);
-    if (!timed || (clock_ != Clock::times && line_.at)) return fail("some lines have a time and some have none");
-    if (told_ != (line_.channel >= 0)) return fail("some lines have a direction and some have none");
-    if (line_.source != told_source_) {
-      return fail("this line is of \"" + line_.source + "\", the first of \"" + told_source_ +
+        clock_ == LineTime::times ? line_.at.has_value() : line_.begin.has_value() == (clock_ == LineTime::samples);
+    if (!timed || (clock_ != LineTime::times && line_.at)) return fail("some lines have a time and some have none");
+    if (has_direction_ != (line_.channel >= 0)) return fail("some lines have a direction and some have none");
+    if (line_.source != source_name_) {
+      return fail("this line is of \"" + line_.source + "\", the first of \"" + source_name_ +
                   "\": keep those of one, as with grep");
     }
     Tick begin = at_;
-    if (clock_ == Clock::times) {
+    if (clock_ == LineTime::times) {
       const auto ticks = ticks_between(origin_, *line_.at, nanosecond);
       if (!ticks) return fail("the time runs backwards");
       begin = *ticks;
-    } else if (clock_ == Clock::samples) {
+    } else if (clock_ == LineTime::samples) {
       begin = *line_.begin;
     }
     if (begin < last_) return fail("the time runs backwards");
     last_ = begin;
     const auto channel = static_cast<std::uint8_t>(std::max(line_.channel, 0));
     for (const std::uint8_t value : line_.bytes) {
-      const Tick end = clock_ == Clock::times ? begin : clock_ == Clock::samples ? line_.end : begin + 1;
+      const Tick end = clock_ == LineTime::times ? begin : clock_ == LineTime::samples ? line_.end : begin + 1;
       block.bytes.push_back({.begin = begin, .end = end, .value = value, .channel = channel});
-      if (clock_ == Clock::none) begin = end;
+      if (clock_ == LineTime::none) begin = end;
     }
     at_ = std::max(at_, block.bytes.back().end);
     return true;
@@ -136,9 +136,9 @@ class HexTextReader final : public ParsedReader {
   std::unique_ptr<Source> source_;
   TextLines lines_;
   HexForm form_ = HexForm::plain;
-  Clock clock_ = Clock::none;
-  bool told_ = false;
-  std::string told_source_;
+  LineTime clock_ = LineTime::none;
+  bool has_direction_ = false;
+  std::string source_name_;
   bool jumped_ = false;
   bool done_ = false;
   Instant origin_;

@@ -32,7 +32,7 @@ TEST(HexText, WithoutTimesEachByteIsATick) {
   const auto reader = open_text("1A 00\n35");
   EXPECT_EQ(reader->layout().ticks_per_second, 0u);
   EXPECT_TRUE(reader->layout().channels.empty());
-  const Contents contents = read_all(*reader);
+  const CaptureContents contents = read_all(*reader);
   ASSERT_EQ(contents.bytes.size(), 3u);
   EXPECT_EQ(contents.bytes[2].begin, 2u);
   EXPECT_EQ(contents.end, 3u);
@@ -75,7 +75,7 @@ TEST(HexText, TimesAndDirections) {
     const auto reader = open_text(text);
     EXPECT_EQ(reader->layout().ticks_per_second, 1'000'000'000u);
     EXPECT_EQ(reader->layout().channels, (std::vector<std::string>{"tx", "rx"}));
-    const Contents contents = read_all(*reader);
+    const CaptureContents contents = read_all(*reader);
     EXPECT_TRUE(reader->damages().empty()) << text;
     ASSERT_EQ(contents.bytes.size(), 4u) << text;
     EXPECT_EQ(contents.bytes[0].channel, 0);
@@ -130,7 +130,7 @@ TEST(HexText, TimesOfTerminals) {
         "11:59:59.750 PM rx 1A\n11:60:01 PM rx 35\n", "11/21/2026 11:59:59.750 PM 1A\n11/22/2026 12:00:01 AM 35\n",
         "[21.11.2026 23:59:59:750] 1A\n[22.11.2026 00:00:01] 35\n"}) {
     const auto reader = open_text(text);
-    const Contents contents = read_all(*reader);
+    const CaptureContents contents = read_all(*reader);
     if (std::string_view(text).find("11:60") != std::string_view::npos) {
       EXPECT_EQ(reader->damages().size(), 1u) << text;
       continue;
@@ -141,7 +141,7 @@ TEST(HexText, TimesOfTerminals) {
   }
 }
 
-TEST(HexText, LogsThatMayMeanTwoThings) {
+TEST(HexText, RefusesAmbiguousLogs) {
   const auto why = [](const char* text) -> std::string {
     try {
       const auto reader = open_text(text);
@@ -181,7 +181,7 @@ TEST(HexText, SigroksDecoder) {
       "400-410 uart-1: rx-stop-bits: Stop bit\n",
       {.samples_per_second = 96'000});
   EXPECT_EQ(reader->layout().ticks_per_second, 96'000u);
-  const Contents contents = read_all(*reader);
+  const CaptureContents contents = read_all(*reader);
   EXPECT_TRUE(reader->damages().empty());
   ASSERT_EQ(contents.bytes.size(), 2u);
   EXPECT_EQ(contents.bytes[0].begin, 210u);
@@ -191,7 +191,7 @@ TEST(HexText, SigroksDecoder) {
   EXPECT_EQ(contents.bytes[1].channel, 0);
 }
 
-TEST(HexText, WhatPrecedesADamageCounts) {
+TEST(HexText, ReadsEverythingBeforeADamage) {
   for (const char* line : {"1A 0", "1A xx", "0.5 tx 00", "5.0 00", "rx 00", "5.0 rx zz"}) {
     const std::string good = "1.0 tx 11\n2.0 rx 22 33\n";
     const auto reader = open_text(good + line + "\n9.0 tx 44\n");
@@ -209,7 +209,7 @@ TEST(HexText, LongLinesAndManyBlocks) {
   std::string lines;
   for (unsigned i = 0; i < 30'000; ++i) lines += "00 11 22 33 44 55 66 77\n";
   const auto reader = open_text(lines);
-  const Contents contents = read_all(*reader);
+  const CaptureContents contents = read_all(*reader);
   EXPECT_EQ(contents.bytes.size(), 240'000u);
   EXPECT_GE(contents.blocks, 3u);
   EXPECT_EQ(contents.bytes[239'999].begin, 239'999u);

@@ -110,9 +110,9 @@ bool take_bytes(std::string_view text, HexLine& parsed) {
 
 // ---- Times
 
-struct Taken {
+struct ParsedTime {
   std::optional<Instant> at;
-  std::size_t size = 0;  // number of characters
+  std::size_t size = 0;  // number of characters that the time takes
 };
 
 // Returns the length of a clock time at the beginning: "17:55:24.123", "17:55:24,123", "17:55:24:123", "5:55:24".
@@ -127,11 +127,11 @@ std::size_t clock_size(std::string_view text) {
         digits == behind.size() || std::string_view(" \t])|;").find(behind[digits]) != std::string_view::npos;
     if (ends && (digits == 3 || digits == 6)) size += 1 + digits;
   }
-  while (size > 0 && !is_digit(text[size - 1])) --size;  // as in "17:55:24:"
+  while (size > 0 && !is_digit(text[size - 1])) --size;  // a colon behind the time, "17:55:24:", is no part of it
   return size;
 }
 
-Taken match_clock(std::string_view text, const std::string& date) {
+ParsedTime match_clock(std::string_view text, const std::string& date) {
   std::size_t size = clock_size(text);
   std::string clock(text.substr(0, size));
   if (clock.size() > 1 && clock[1] == ':') clock.insert(0, "0");
@@ -174,19 +174,19 @@ std::string match_date(std::string_view text) {
 
 // Parses a time like "12.000250" or "250us".
 std::optional<Instant> parse_count(std::string_view word) {
-  struct Unit {
+  struct TimeUnit {
     std::string_view suffix;
     std::string_view power;
   };
-  constexpr std::array<Unit, 4> units = {{{"ms", "e-3"}, {"us", "e-6"}, {"ns", "e-9"}, {"s", ""}}};
-  for (const Unit& unit : units) {
+  constexpr std::array<TimeUnit, 4> units = {{{"ms", "e-3"}, {"us", "e-6"}, {"ns", "e-9"}, {"s", ""}}};
+  for (const TimeUnit& unit : units) {
     if (!word.ends_with(unit.suffix) || word.size() > 40) continue;
     return parse_seconds(std::string(word.substr(0, word.size() - unit.suffix.size())) + std::string(unit.power));
   }
   return word.find('.') == std::string_view::npos ? std::nullopt : parse_seconds(word);
 }
 
-Taken match_time(std::string_view text) {
+ParsedTime match_time(std::string_view text) {
   const std::string_view iso = text.substr(0, text.find_first_of(" \t,;|])"));
   if (iso.size() > 11 && iso[10] == 'T') {
     const std::string_view stamp = iso.ends_with(':') ? iso.substr(0, iso.size() - 1) : iso;
@@ -195,11 +195,11 @@ Taken match_time(std::string_view text) {
   if (const std::string date = match_date(text); !date.empty()) {
     const std::size_t gap = text.find_first_not_of(" \t,", 10);
     if (gap == std::string_view::npos || gap == 10) return {};
-    Taken taken = match_clock(text.substr(gap), date);
+    ParsedTime taken = match_clock(text.substr(gap), date);
     taken.size += gap;
     return taken;
   }
-  if (const Taken clock = match_clock(text, ""); clock.at) return clock;
+  if (const ParsedTime clock = match_clock(text, ""); clock.at) return clock;
   const std::string_view word = text.substr(0, text.find_first_of(separators));
   return {parse_count(word.ends_with(':') ? word.substr(0, word.size() - 1) : word), word.size()};
 }
@@ -215,7 +215,7 @@ constexpr std::array<std::array<std::string_view, 4>, 2> arrows = {
 
 int direction_of(std::string_view word) {
   std::string lower = lower_case(word);
-  if (lower.starts_with("tx") || lower.starts_with("rx")) {  // such as "RX1"
+  if (lower.starts_with("tx") || lower.starts_with("rx")) {  // words like "RX1" are directions too
     while (lower.size() > 2 && is_digit(lower.back())) lower.pop_back();
   }
   for (std::size_t i = 0; i < directions.size(); ++i) {
@@ -264,7 +264,7 @@ class Prefix {
       const std::string_view word = text_.substr(0, text_.find_first_of(separators));
       if (is_bytes(word)) {
         if (take_bytes(text_, parsed_)) return true;
-        if (!all_digits(word) || !(counts(word) || (first && !goes_on(word)))) return false;
+        if (!all_digits(word) || !(is_count(word) || (first && !bytes_follow(word)))) return false;
         parsed_.bytes.clear();
         parsed_.trouble.clear();
         text_.remove_prefix(word.size());
@@ -292,7 +292,7 @@ class Prefix {
 
   bool take_time() {
     if (parsed_.at) return false;
-    const Taken taken = match_time(text_);
+    const ParsedTime taken = match_time(text_);
     if (!taken.at) return false;
     const std::string_view clock = text_.substr(0, taken.size);
     const bool nothing_behind = trim(text_.substr(taken.size)).empty();
@@ -371,25 +371,25 @@ class Prefix {
       parsed_.trouble = quoted(inner) + " in brackets may be bytes, or none";
       return false;
     }
-    HexLine said;
-    Prefix inside(inner, said);
-    if (!inside.read() || !said.bytes.empty()) {  // as in "[main loop]"
+    HexLine inner_line;
+    Prefix inside(inner, inner_line);
+    if (!inside.read() || !inner_line.bytes.empty()) {  // brackets without known content, "[main loop]", are a source
       if (!is_filler(inner) && inner.find("byte") == std::string_view::npos) add_source(inner);
       return false;
     }
-    if (said.at) parsed_.at = said.at;
-    if (!said.source.empty()) add_source(said.source);
-    if (said.channel >= 0) static_cast<void>(set_direction(said.channel));
+    if (inner_line.at) parsed_.at = inner_line.at;
+    if (!inner_line.source.empty()) add_source(inner_line.source);
+    if (inner_line.channel >= 0) static_cast<void>(set_direction(inner_line.channel));
     return false;
   }
 
   // Returns whether the word is a count, as in "11 bytes".
-  [[nodiscard]] bool counts(std::string_view word) const {
+  [[nodiscard]] bool is_count(std::string_view word) const {
     return lower_case(trim(text_.substr(word.size()))).starts_with("byte");
   }
 
   // Returns whether bytes follow the word, so that the word is a byte itself.
-  [[nodiscard]] bool goes_on(std::string_view word) const {
+  [[nodiscard]] bool bytes_follow(std::string_view word) const {
     std::string_view rest = text_.substr(word.size());
     rest.remove_prefix(std::min(rest.find_first_not_of(separators), rest.size()));
     return rest.empty() || is_bytes(rest.substr(0, rest.find_first_of(separators)));

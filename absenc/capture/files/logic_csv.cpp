@@ -21,19 +21,19 @@ namespace {
 constexpr std::uint64_t text_at_once = 1 << 20;
 constexpr std::size_t most_columns = 1024;
 
-struct Unit {
+struct TimeUnit {
   std::string_view name;
   std::uint64_t per_second;
 };
-constexpr std::array<Unit, 5> time_units = {{{"seconds", 1},
-                                             {"milliseconds", 1'000},
-                                             {"microseconds", 1'000'000},
-                                             {"nanoseconds", 1'000'000'000},
-                                             {"picoseconds", 1'000'000'000'000}}};
+constexpr std::array<TimeUnit, 5> time_units = {{{"seconds", 1},
+                                                 {"milliseconds", 1'000},
+                                                 {"microseconds", 1'000'000},
+                                                 {"nanoseconds", 1'000'000'000},
+                                                 {"picoseconds", 1'000'000'000'000}}};
 
-const Unit* find_unit(std::string_view name) {
+const TimeUnit* find_unit(std::string_view name) {
   const auto* unit =
-      std::find_if(time_units.begin(), time_units.end(), [&](const Unit& one) { return one.name == name; });
+      std::find_if(time_units.begin(), time_units.end(), [&](const TimeUnit& one) { return one.name == name; });
   return unit == time_units.end() ? nullptr : unit;
 }
 
@@ -54,7 +54,7 @@ bool names_kinds(std::string_view line) {
 }
 
 // Kinds of time in a row.
-enum class Clock : std::uint8_t { seconds, counts, rows };
+enum class RowTime : std::uint8_t { seconds, counts, rows };
 
 class LogicCsv final : public ParsedReader {
  public:
@@ -123,17 +123,17 @@ class LogicCsv final : public ParsedReader {
       static_cast<void>(take_field(line));
       while (!line.empty()) add_column(std::string(trim(take_field(line))), name);
       layout_.ticks_per_second = 1'000'000'000'000;
-      clock_ = Clock::seconds;
+      clock_ = RowTime::seconds;
     }
     if (layout_.channels.empty()) throw OpenError(std::string(name) + " names no channels in its first line");
   }
 
   void kinds_of_columns(std::string_view line, std::string_view name) {
-    clock_ = Clock::rows;
+    clock_ = RowTime::rows;
     layout_.ticks_per_second = rate_;
     const std::string_view first = line.substr(0, line.find(','));
-    if (const Unit* unit = find_unit(first)) {
-      clock_ = Clock::counts;
+    if (const TimeUnit* unit = find_unit(first)) {
+      clock_ = RowTime::counts;
       layout_.ticks_per_second = unit->per_second;
     }
     if (first != "logic") static_cast<void>(take_field(line));
@@ -196,12 +196,12 @@ class LogicCsv final : public ParsedReader {
   std::optional<Tick> row_time(std::string_view& row) {
     std::optional<Tick> at;
     const bool first = std::exchange(first_row_, false);
-    if (clock_ == Clock::rows) {
+    if (clock_ == RowTime::rows) {
       if (skip_first_) static_cast<void>(take_field(row));
       return rows_++;
     }
     const std::string_view field = trim(take_field(row));
-    if (clock_ == Clock::counts) {
+    if (clock_ == RowTime::counts) {
       Tick value = 0;
       const auto [end, error] = std::from_chars(field.data(), field.data() + field.size(), value);
       if (error != std::errc() || end != field.data() + field.size()) return std::nullopt;
@@ -242,7 +242,7 @@ class LogicCsv final : public ParsedReader {
   std::uint64_t rate_;
   std::vector<std::string> names_;
   std::vector<char> columns_;  // kind of each column, without the time column
-  Clock clock_ = Clock::seconds;
+  RowTime clock_ = RowTime::seconds;
   bool skip_first_ = false;
   bool first_row_ = true;
   bool started_ = false;

@@ -26,7 +26,7 @@ inline void invert(Drawn& levels) {
   for (std::uint8_t& level : levels) level ^= 1;
 }
 
-/// Levels of several channels.
+/// Levels of several channels at the same ticks.
 struct Wires {
   std::vector<Drawn> levels;
   std::uint64_t ticks_per_second = 1'000'000'000;

@@ -36,7 +36,7 @@ TEST(Raw, EveryNumberOfChannels) {
     EXPECT_EQ(reader->layout().channels.size(), channels);
     EXPECT_EQ(reader->layout().ticks_per_second, 24'000'000u);
     EXPECT_EQ(reader->layout().ticks, bytes.size() / bytes_per_sample(channels));
-    const Contents contents = read_all(*reader);
+    const CaptureContents contents = read_all(*reader);
     EXPECT_EQ(contents.samples, bytes);
     EXPECT_EQ(contents.end, reader->layout().ticks);
     EXPECT_EQ(contents.blocks, 4u);
@@ -69,7 +69,7 @@ TEST(Raw, ASourceThatFailsCutsItsBlockShort) {
     }
   };
   const auto reader = read_raw(std::make_unique<Failing>(), "failing", 16, 1000);
-  const Contents contents = read_all(*reader);
+  const CaptureContents contents = read_all(*reader);
   ASSERT_EQ(reader->damages().size(), 3u);
   EXPECT_EQ(reader->damages()[0].offset, (1u << 20) + 1001);
   EXPECT_EQ(reader->damages()[0].tick, (1u << 19) + 500);
@@ -107,7 +107,7 @@ TEST_F(RawFile, ThatIsMadeShorterWhileItIsReadIsADamage) {
   EXPECT_EQ(reader->damages()[0].tick, (1u << 20) + 100);
 }
 
-TEST_F(RawFile, ThatIsNotThereIsNamed) {
+TEST_F(RawFile, MissingFileIsNamed) {
   for (const char* name : {"missing", "."}) {
     try {
       static_cast<void>(open_capture(path_ / name, {.channels = 8, .samples_per_second = 1}));

@@ -40,9 +40,9 @@ bool is_time(double seconds) { return std::isfinite(seconds) && std::abs(seconds
 std::int64_t to_picoseconds(double seconds) { return std::llround(seconds * ticks_per_second); }
 
 /// The transitions of one file, some of which are read ahead.
-class Stream {
+class TransitionStream {
  public:
-  Stream(SaleaeChannel channel, Damages& damages)
+  TransitionStream(SaleaeChannel channel, Damages& damages)
       : name_(std::move(channel.name)), source_(std::move(channel.source)), damages_(&damages) {
     std::array<std::uint8_t, 16> header{};
     if (source_->read(0, header) != header.size() ||
@@ -171,8 +171,8 @@ class Stream {
   Damages* damages_;
   std::uint32_t version_ = 0;
   std::uint64_t position_ = 0;
-  std::uint64_t chunks_ = 0;     // chunks still to read
-  std::uint64_t remaining_ = 0;  // transitions of the present chunk still to read
+  std::uint64_t chunks_ = 0;     // number of chunks still to read
+  std::uint64_t remaining_ = 0;  // number of transitions of the present chunk still to read
   std::int64_t begin_ = 0;
   std::int64_t end_ = std::numeric_limits<std::int64_t>::min();
   std::int64_t last_ = 0;
@@ -195,9 +195,10 @@ class SaleaeReader final : public ParsedReader {
       layout_.channels.push_back(streams_.back().name());
     }
     if (streams_.empty()) throw OpenError("there is no file digital_0.bin, digital_1.bin ...");
-    origin_ = std::min_element(streams_.begin(), streams_.end(), [](const Stream& a, const Stream& b) {
-                return a.begin() < b.begin();
-              })->begin();
+    origin_ =
+        std::min_element(streams_.begin(), streams_.end(), [](const TransitionStream& a, const TransitionStream& b) {
+          return a.begin() < b.begin();
+        })->begin();
   }
 
   [[nodiscard]] bool claim(Block& block) override {
@@ -207,7 +208,7 @@ class SaleaeReader final : public ParsedReader {
     // All transitions of every channel before `limit` are known.
     std::optional<std::int64_t> limit;
     std::optional<std::int64_t> damaged;
-    for (Stream& stream : streams_) {
+    for (TransitionStream& stream : streams_) {
       stream.refill(origin_);
       if (stream.damaged()) {
         damaged = std::min(damaged.value_or(stream.last() + 1), stream.last() + 1);
@@ -230,12 +231,12 @@ class SaleaeReader final : public ParsedReader {
  private:
   [[nodiscard]] std::int64_t last_of_all() const {
     std::int64_t last = origin_;
-    for (const Stream& stream : streams_) last = std::max({last, stream.end(), stream.last() + 1});
+    for (const TransitionStream& stream : streams_) last = std::max({last, stream.end(), stream.last() + 1});
     return last;
   }
 
   void report() {
-    for (const Stream& stream : streams_) {
+    for (const TransitionStream& stream : streams_) {
       stream.report_gaps();
       if (!stream.damaged()) continue;
       Damage damage = stream.damage();
@@ -245,7 +246,7 @@ class SaleaeReader final : public ParsedReader {
     }
   }
 
-  std::vector<Stream> streams_;
+  std::vector<TransitionStream> streams_;
   std::int64_t origin_ = 0;
   std::uint64_t index_ = 0;
   Tick first_ = 0;

@@ -38,7 +38,7 @@ TEST(Saleae, OneChannel) {
   const auto reader = open_bytes(saleae_file(true, -0.001, 0.002, {-0.0005, 0.0, 0.000000002}), {}, "x/digital_3.bin");
   EXPECT_EQ(reader->layout().channels, (Names{"Channel 3"}));
   EXPECT_EQ(reader->layout().ticks_per_second, 1'000'000'000'000u);
-  const Contents contents = read_all(*reader);
+  const CaptureContents contents = read_all(*reader);
   EXPECT_TRUE(contents.changes[0].before);
   EXPECT_EQ(contents.changes[0].at, (Ticks{500'000'000, 1'000'000'000, 1'000'002'000}));
   EXPECT_EQ(contents.end, 3'000'000'000u);
@@ -61,7 +61,7 @@ TEST(Saleae, ManyChannelsAreMerged) {
     expected.push_back(ticks);
   }
   const auto reader = open_channels(files);
-  const Contents contents = read_all(*reader);
+  const CaptureContents contents = read_all(*reader);
   EXPECT_GE(contents.blocks, 30u);
   for (std::size_t i = 0; i < files.size(); ++i) EXPECT_TRUE(contents.changes[i].at == expected[i]) << i;
   EXPECT_EQ(contents.end, 1'000'000'000'000u);
@@ -74,7 +74,7 @@ TEST(Saleae, ChunksOfVersionOne) {
   file.put(std::uint32_t{1}).put(1e6).put(3.0).put(4.0).put(std::uint64_t{1}).put(3.5);
   file.put(std::uint32_t{0}).put(1e6).put(4.0).put(5.0).put(std::uint64_t{0});
   const auto reader = open_bytes(file.bytes);
-  const Contents contents = read_all(*reader);
+  const CaptureContents contents = read_all(*reader);
   constexpr Tick second = 1'000'000'000'000;
   EXPECT_EQ(contents.changes[0].at, (Ticks{second / 4, second / 2, 2 * second, 2 * second + second / 2}));
   EXPECT_EQ(contents.end, 4 * second);
@@ -92,7 +92,7 @@ TEST(Saleae, AFileThatIsCutOffEndsAllChannels) {
   FileBytes cut = saleae_file(false, 0, 1, rarely);
   cut.resize(44 + 8 * 30 + 3);
   const auto reader = open_channels({saleae_file(false, 0, 1, often), cut});
-  const Contents contents = read_all(*reader);
+  const CaptureContents contents = read_all(*reader);
   EXPECT_EQ(contents.changes[1].at.size(), 30u);
   EXPECT_EQ(contents.changes[0].at.size(), 30'000u);
   EXPECT_EQ(contents.end, 300'000'000'001u);
@@ -102,7 +102,7 @@ TEST(Saleae, AFileThatIsCutOffEndsAllChannels) {
   EXPECT_NE(reader->damages()[0].what.find("Channel 1 ends before the last"), std::string::npos);
 }
 
-TEST(Saleae, TimesThatMakeNoSense) {
+TEST(Saleae, RefusesInvalidTimes) {
   for (const double time : {0.1, std::numeric_limits<double>::quiet_NaN(), 1e30}) {
     const auto reader = open_bytes(saleae_file(false, 0, 1, {0.25, 0.5, time, 0.75}));
     EXPECT_EQ(read_all(*reader).changes[0].at.size(), 2u);
@@ -132,7 +132,7 @@ TEST(Saleae, AFolderIsOneCapture) {
   std::ofstream(folder / "notes.txt") << "nothing";
   const auto reader = open_capture(folder, {});
   EXPECT_EQ(reader->layout().channels, (Names{"Channel 0", "Channel 2", "Channel 10"}));
-  const Contents contents = read_all(*reader);
+  const CaptureContents contents = read_all(*reader);
   EXPECT_EQ(contents.changes[2].at, (Ticks{110'000'000'000}));
   EXPECT_THROW(static_cast<void>(open_capture(folder, {.channels = 8})), OpenError);
   std::filesystem::remove_all(folder);

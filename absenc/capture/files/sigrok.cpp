@@ -106,7 +106,7 @@ class SigrokReader final : public Reader {
   [[nodiscard]] bool claim(Block& block) override {
     while (stream_ == nullptr) {
       if (next_ == pieces_.size()) return false;
-      const Piece& piece = pieces_[next_++];
+      const SamplePiece& piece = pieces_[next_++];
       if (piece.entry.size <= largest_piece) {
         start(block, piece.first, (piece.entry.size + piece.tail - piece.skip) / unit_size_);
         block.file_offset = next_ - 1;
@@ -122,7 +122,7 @@ class SigrokReader final : public Reader {
   void fill(Block& block) override {
     if (block.file_size == 0) return;  // a part of a streamed piece, which `claim` has read
     const auto index = static_cast<std::size_t>(block.file_offset);
-    const Piece& piece = pieces_[index];
+    const SamplePiece& piece = pieces_[index];
     const auto size = static_cast<std::size_t>(piece.entry.size);
     block.samples.resize(
         std::max(static_cast<std::size_t>(block.end - block.first) * bytes_per_sample_, size + piece.tail));
@@ -149,7 +149,7 @@ class SigrokReader final : public Reader {
   }
 
  private:
-  struct Piece {
+  struct SamplePiece {
     std::string name;
     ZipArchive::Entry entry{};
     Tick first = 0;
@@ -253,7 +253,7 @@ class SigrokReader final : public Reader {
   void list_pieces(ZipArchive& archive, const std::string& name) {
     std::uint64_t bytes = 0;
     const auto add = [&](const std::string& entry_name) {
-      Piece piece{.name = entry_name};
+      SamplePiece piece{.name = entry_name};
       if (!archive.find(entry_name, piece.entry)) return false;
       if (piece.entry.size == 0) return true;
       piece.skip = missing(bytes);
@@ -277,11 +277,11 @@ class SigrokReader final : public Reader {
   }
 
   void describe_end(ZipArchive& archive) {
-    Piece& last = pieces_.back();
+    SamplePiece& last = pieces_.back();
     if (has_lost_entries()) {
       last.tail = 0;
-      if (std::any_of(pieces_.begin(), pieces_.end(), [&](const Piece& piece) { return is_cut(piece); })) {
-        layout_.ticks = 0;  // known only after reading
+      if (std::any_of(pieces_.begin(), pieces_.end(), [&](const SamplePiece& piece) { return is_cut(piece); })) {
+        layout_.ticks = 0;  // the length of a cut capture is known only after reading
       } else {
         damages_.add({.offset = cut_->end,
                       .tick = layout_.ticks,
@@ -301,10 +301,10 @@ class SigrokReader final : public Reader {
     damages_.add({.offset = archive.offset(), .tick = layout_.ticks, .what = last.name + " ends within a sample"});
   }
 
-  [[nodiscard]] bool is_cut(const Piece& piece) const { return cut_ && cut_->cut_entry == piece.entry.index; }
+  [[nodiscard]] bool is_cut(const SamplePiece& piece) const { return cut_ && cut_->cut_entry == piece.entry.index; }
 
   // Returns whether a piece that was read is correct except for its missing end.
-  [[nodiscard]] bool ends_at_cut(const Piece& piece, const ZipArchive* archive) const {
+  [[nodiscard]] bool ends_at_cut(const SamplePiece& piece, const ZipArchive* archive) const {
     return is_cut(piece) && archive != nullptr && archive->ran_out();
   }
 
@@ -335,7 +335,7 @@ class SigrokReader final : public Reader {
     block.end = block.first + count;
   }
 
-  void begin_stream(const Piece& piece) {
+  void begin_stream(const SamplePiece& piece) {
     stream_ = take();
     stream_tick_ = piece.first;
     stream_left_ = piece.entry.size - piece.skip;
@@ -349,7 +349,7 @@ class SigrokReader final : public Reader {
 
   // Reads the next part of a large piece.
   void claim_streamed(Block& block) {
-    const Piece& piece = pieces_[next_ - 1];
+    const SamplePiece& piece = pieces_[next_ - 1];
     const auto wanted = static_cast<std::size_t>(std::min(stream_left_, streamed_bytes / unit_size_ * unit_size_));
     const bool last = wanted == stream_left_;
     start(block, stream_tick_, 0);
@@ -370,7 +370,7 @@ class SigrokReader final : public Reader {
     give_back(std::move(stream_));
   }
 
-  void report(const Piece& piece, Tick at, const ZipArchive* archive) {
+  void report(const SamplePiece& piece, Tick at, const ZipArchive* archive) {
     const std::string why = archive == nullptr ? "the file cannot be opened again" : archive->trouble();
     damages_.add({.offset = archive == nullptr ? 0 : archive->offset(),
                   .tick = at,
@@ -380,7 +380,7 @@ class SigrokReader final : public Reader {
   }
 
   // Data before the cut is as it was written: a disk that lost other parts leaves complete pieces with wrong checksums.
-  void report_cut(const Piece& piece, Tick at, bool checked) {
+  void report_cut(const SamplePiece& piece, Tick at, bool checked) {
     damages_.add({.offset = cut_->end,
                   .tick = at,
                   .what = "the file is cut off within " + piece.name +
@@ -415,7 +415,7 @@ class SigrokReader final : public Reader {
   std::optional<MendedZip> cut_;
   std::mutex mutex_;
   std::vector<std::unique_ptr<ZipArchive>> idle_;
-  std::vector<Piece> pieces_;
+  std::vector<SamplePiece> pieces_;
   unsigned unit_size_ = 1;
   unsigned bytes_per_sample_ = 1;
   std::size_t next_ = 0;

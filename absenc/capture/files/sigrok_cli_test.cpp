@@ -74,7 +74,7 @@ TEST_F(SigrokCli, Sessions) {
     const auto reader = open_capture(folder_ / "session", {});
     EXPECT_EQ(reader->layout().ticks_per_second, 12'500'000u);
     EXPECT_EQ(reader->layout().channels.size(), channels);
-    const Contents contents = read_all(*reader);
+    const CaptureContents contents = read_all(*reader);
     EXPECT_EQ(contents.end, 2'500'000u);
     EXPECT_TRUE(reader->damages().empty());
     const unsigned bytes = (channels + 7) / 8;
@@ -96,14 +96,14 @@ TEST_F(SigrokCli, CutSessions) {
   for (Tick at = 1; at < drawing.end(); at += 1 + random() % 99) drawing.change(at, 0);
   write_sigrok((folder_ / "drawn").string(), drawing, 1'000'000'000);
   for (const char* name : {"session", "drawn"}) {
-    const Contents whole = read_all(*open_capture(folder_ / name, {}));
+    const CaptureContents whole = read_all(*open_capture(folder_ / name, {}));
     ASSERT_EQ(whole.end, 9'000'000u);
-    ASSERT_EQ(whole.blocks, 3u);  // blocks of 4 MiB
+    ASSERT_EQ(whole.blocks, 3u);  // nine million samples are three blocks of up to 4 MiB
     const std::uintmax_t size = std::filesystem::file_size(folder_ / name);
     for (const std::uintmax_t percent : {90u, 60u, 20u}) {
       std::filesystem::resize_file(folder_ / name, size * percent / 100);
       const auto reader = open_capture(folder_ / name, {});
-      const Contents contents = read_all(*reader);
+      const CaptureContents contents = read_all(*reader);
       EXPECT_NEAR(static_cast<double>(contents.end), 90'000.0 * static_cast<double>(percent), 200'000) << name;
       EXPECT_TRUE(std::equal(contents.samples.begin(), contents.samples.end(), whole.samples.begin()));
       ASSERT_EQ(reader->damages().size(), 1u);
@@ -121,7 +121,7 @@ TEST_F(SigrokCli, ValueChangeDumps) {
   ASSERT_EQ(reader->layout().channels.size(), 10u);
   const Tick tick = reader->layout().ticks_per_second / 12'500'000;
   ASSERT_EQ(tick * 12'500'000, reader->layout().ticks_per_second);
-  const Contents contents = read_all(*reader);
+  const CaptureContents contents = read_all(*reader);
   EXPECT_TRUE(reader->damages().empty());
   for (unsigned channel = 0; channel < 10; ++channel) {
     Changes expected = changes_of(samples, 2, channel);
@@ -138,10 +138,10 @@ TEST_F(SigrokCli, CommaSeparatedValues) {
   ASSERT_NO_FATAL_FAILURE(run("-i session -O csv:time=true:dedup=true -o times"));
   const auto rows = open_capture(folder_ / "rows", {});
   EXPECT_EQ(rows->layout().ticks_per_second, 12'500'000u);
-  const Contents by_row = read_all(*rows);
+  const CaptureContents by_row = read_all(*rows);
   const auto times = open_capture(folder_ / "times", {});
   EXPECT_EQ(times->layout().ticks_per_second % 1'000, 0u);
-  const Contents by_time = read_all(*times);
+  const CaptureContents by_time = read_all(*times);
   EXPECT_TRUE(rows->damages().empty());
   EXPECT_TRUE(times->damages().empty());
   for (unsigned channel = 0; channel < 5; ++channel) {
@@ -167,7 +167,7 @@ TEST_F(SigrokCli, TheBytesOfItsDecoder) {
   for (const char* more : {"", " -A uart=rx-data", " --protocol-decoder-samplenum"}) {
     ASSERT_NO_FATAL_FAILURE(run(decode + more));
     const auto reader = open_capture(folder_ / "log", {.samples_per_second = 96'000});
-    const Contents contents = read_all(*reader);
+    const CaptureContents contents = read_all(*reader);
     EXPECT_TRUE(reader->damages().empty()) << more << reader->damages()[0].what;
     FileBytes seen;
     for (const Character& one : contents.bytes) seen.push_back(one.value);

@@ -49,7 +49,7 @@ TEST(Sigrok, PiecesInARow) {
   EXPECT_EQ(reader->layout().ticks, 1'250'000u);
   ASSERT_EQ(reader->layout().channels.size(), 16u);
   EXPECT_EQ(reader->layout().channels[15], "D15");
-  const Contents contents = read_all(*reader);
+  const CaptureContents contents = read_all(*reader);
   EXPECT_EQ(contents.samples, samples);
   EXPECT_EQ(contents.blocks, 3u);
   EXPECT_TRUE(reader->damages().empty());
@@ -71,7 +71,7 @@ TEST(Sigrok, OnePieceThatIsLargeComesInParts) {
   const FileBytes samples = wave((17 << 20) + 6);
   for (const bool deflate : {true, false}) {
     const auto reader = open_bytes(session(sigrok_metadata("1 kHz", 8, 1), {{"logic-1", samples}}, "1", deflate));
-    const Contents contents = read_all(*reader);
+    const CaptureContents contents = read_all(*reader);
     EXPECT_EQ(contents.blocks, 5u);
     EXPECT_TRUE(contents.samples == samples);
     EXPECT_TRUE(reader->damages().empty());
@@ -82,7 +82,7 @@ TEST(Sigrok, SamplesOfThreeBytesAreSpread) {
   for (const std::size_t count : {std::size_t{1000}, std::size_t{6'000'000}}) {  // as one piece, and in parts
     const FileBytes samples = wave(3 * count);
     const auto reader = open_bytes(session(sigrok_metadata("1 MHz", 24, 3), {{"logic-1-1", samples}}));
-    const Contents contents = read_all(*reader);
+    const CaptureContents contents = read_all(*reader);
     ASSERT_EQ(contents.samples.size(), 4 * count);
     std::size_t wrong = 0;
     for (std::size_t i = 0; i < count; ++i) {
@@ -102,7 +102,7 @@ TEST(Sigrok, SamplesThatPiecesCutInTwo) {
                           FileBytes(from, from + static_cast<std::ptrdiff_t>(size)));
     }
     const auto reader = open_bytes(session(sigrok_metadata("1 MHz", 24, 3), pieces, "2", false));
-    const Contents contents = read_all(*reader);
+    const CaptureContents contents = read_all(*reader);
     EXPECT_TRUE(reader->damages().empty());
     ASSERT_EQ(contents.samples.size(), 4 * size);
     std::size_t wrong = 0;
@@ -113,7 +113,7 @@ TEST(Sigrok, SamplesThatPiecesCutInTwo) {
   }
 }
 
-TEST(Sigrok, TheRateMayComeFromOutside) {
+TEST(Sigrok, UsesRateOfCaller) {
   const FileBytes file = session(sigrok_metadata("", 8, 1), {{"logic-1-1", wave(100)}});
   EXPECT_EQ(open_bytes(file)->layout().ticks_per_second, 0u);
   EXPECT_EQ(open_bytes(file, {.samples_per_second = 5000})->layout().ticks_per_second, 5000u);
@@ -141,7 +141,7 @@ TEST(Sigrok, ADamagedPieceIsCutShortAndTheOthersCount) {
     FileBytes bad = good;
     bad[at] ^= 0x55;
     const auto reader = open_bytes(bad);
-    const Contents contents = read_all(*reader);
+    const CaptureContents contents = read_all(*reader);
     EXPECT_EQ(contents.end, 900'000u);
     ASSERT_EQ(reader->damages().size(), 1u) << at;
     const Damage& damage = reader->damages()[0];
@@ -165,7 +165,7 @@ TEST(Sigrok, AMissingPieceIsADamageAndTheOthersKeepTheirTime) {
     std::vector<std::pair<std::string, FileBytes>> pieces;
     for (const int number : numbers) pieces.emplace_back("logic-1-" + std::to_string(number), samples);
     const auto reader = open_bytes(session(sigrok_metadata("1 MHz", 8, 1), pieces));
-    const Contents contents = read_all(*reader);
+    const CaptureContents contents = read_all(*reader);
     EXPECT_EQ(contents.end, end) << words;
     EXPECT_EQ(reader->layout().ticks, end) << words;
     EXPECT_EQ(contents.samples.size(), numbers.size() * samples.size());
@@ -201,7 +201,7 @@ TEST(Sigrok, ALargePieceThatIsDamagedEndsWhereItShows) {
   FileBytes bad = session(sigrok_metadata("1 MHz", 8, 1), {{"logic-1-1", samples}, {"logic-1-2", behind}});
   bad[bad.size() / 2] ^= 0x55;
   const auto reader = open_bytes(bad);
-  const Contents contents = read_all(*reader);
+  const CaptureContents contents = read_all(*reader);
   ASSERT_EQ(reader->damages().size(), 1u);
   EXPECT_EQ(contents.end, (20u << 20) + 1000);
   ASSERT_GT(contents.samples.size(), (5u << 20));
@@ -229,7 +229,7 @@ FileBytes cut_at(FileBytes file, std::size_t size) {
   return file;
 }
 
-TEST(Sigrok, WhatStandsBeforeACutIsRead) {
+TEST(Sigrok, ReadsEverythingBeforeACut) {
   const FileBytes samples = wave(1500);
   const std::vector<std::pair<std::string, FileBytes>> pieces = {
       {"logic-1-1", {samples.begin(), samples.begin() + 500}},
@@ -255,7 +255,7 @@ TEST(Sigrok, WhatStandsBeforeACutIsRead) {
         continue;
       }
       const auto reader = open_bytes(file);
-      const Contents contents = read_all(*reader);
+      const CaptureContents contents = read_all(*reader);
       EXPECT_TRUE(is_prefix(contents.samples, samples));
       ASSERT_EQ(reader->damages().size(), 1u);
       const Damage& damage = reader->damages()[0];
@@ -276,7 +276,7 @@ TEST(Sigrok, WhatStandsBeforeACutIsRead) {
   }
 }
 
-TEST(Sigrok, ACutPieceGivesWhatExpandsOfIt) {
+TEST(Sigrok, ReadsExpandablePartOfCutPiece) {
   const FileBytes samples = wave(300'000);
   const FileBytes good =
       session(sigrok_metadata("1 MHz", 8, 1), {{"logic-1-1", samples}, {"logic-1-2", samples}, {"logic-1-3", samples}});
@@ -310,7 +310,7 @@ TEST(Sigrok, ALargePieceMayBeCut) {
     FileBytes file = session(sigrok_metadata("1 MHz", 8, 1), {{"logic-1", samples}}, "1", deflate);
     file.resize(file.size() / 2);
     const auto reader = open_bytes(file);
-    const Contents contents = read_all(*reader);
+    const CaptureContents contents = read_all(*reader);
     EXPECT_GT(contents.samples.size(), samples.size() / 3);
     EXPECT_TRUE(is_prefix(contents.samples, samples));
     ASSERT_EQ(reader->damages().size(), 1u);
@@ -329,7 +329,7 @@ TEST(Sigrok, SamplesOfThreeBytesMayBeCut) {
   const std::size_t second = place_of(good, "logic-1-2") + 9;
   const auto count = [&](std::size_t size) {
     const auto reader = open_bytes(cut_at(good, size));
-    const Contents contents = read_all(*reader);
+    const CaptureContents contents = read_all(*reader);
     for (std::size_t i = 0; i < contents.samples.size(); ++i) {
       EXPECT_EQ(contents.samples[i], i % 4 == 3 ? 0 : samples[i / 4 * 3 + i % 4]);
     }
@@ -359,7 +359,7 @@ TEST(Sigrok, ACutArchiveMayHaveSizesOf64Bits) {
   file.insert(file.begin() + static_cast<std::ptrdiff_t>(header) + 39, extra.bytes.begin(), extra.bytes.end());
   for (const std::size_t missing : {std::size_t{0}, std::size_t{300}}) {
     const auto reader = open_bytes(cut_at(file, file.size() - missing));
-    const Contents contents = read_all(*reader);
+    const CaptureContents contents = read_all(*reader);
     EXPECT_EQ(contents.blocks, 2u);
     EXPECT_EQ(contents.end, 2000 - missing);
     EXPECT_TRUE(std::equal(samples.begin(), samples.end(), contents.samples.begin()));

@@ -33,7 +33,7 @@ inline std::unique_ptr<Reader> open_text(std::string_view text, const OpenChoice
 }
 
 /// The joined content of all blocks of a capture.
-struct Contents {
+struct CaptureContents {
   std::vector<std::uint8_t> samples;
   std::vector<Changes> changes;
   std::vector<Character> bytes;
@@ -48,8 +48,8 @@ inline void require_that(bool condition) {
 }
 
 /// Reads a capture to its end, into one reused block, and aborts if a block violates the rules in signal.hpp.
-inline Contents read_all(Reader& reader) {
-  Contents all;
+inline CaptureContents read_all(Reader& reader) {
+  CaptureContents all;
   Block block;
   const Layout layout = reader.layout();
   while (reader.claim(block)) {

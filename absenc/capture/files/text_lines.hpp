@@ -43,7 +43,7 @@ class TextLines {
   bool too_long_ = false;
 };
 
-inline constexpr std::int64_t nanosecond = 1000;  // in picoseconds
+inline constexpr std::int64_t nanosecond = 1000;  // a nanosecond in picoseconds
 inline constexpr std::int64_t picoseconds_per_second = 1'000'000'000'000;
 
 /// A time of day, or a time on the counter of any program.

@@ -201,7 +201,7 @@ class VcdReader final : public ParsedReader {
   std::uint64_t index_ = 0;
   Tick now_ = 0;
   bool started_ = false;  // a time or a value was read
-  bool valued_ = false;   // a value was read
+  bool valued_ = false;   // a value change was read
   bool initial_ = true;   // the present time is the first one
   bool last_changed_ = false;
   bool done_ = false;

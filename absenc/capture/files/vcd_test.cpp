@@ -37,7 +37,7 @@ TEST(Vcd, LevelsAndTimes) {
   const auto reader = open_text(with_header("#0\n$dumpvars\n1!\n0\"\n$end\n#7 0!\n#9 1! 1\"\n#9 0!\n#20\n"));
   EXPECT_EQ(reader->layout().ticks_per_second, 100'000'000u);
   EXPECT_EQ(reader->layout().channels, (Names{"tx", "rx"}));
-  const Contents contents = read_all(*reader);
+  const CaptureContents contents = read_all(*reader);
   EXPECT_TRUE(contents.changes[0].before);
   EXPECT_EQ(contents.changes[0].at, (Ticks{7}));  // the pulse without length at 9 is no change
   EXPECT_FALSE(contents.changes[1].before);
@@ -76,7 +76,7 @@ std::unique_ptr<Reader> open_repeated(const std::string& part) {
 // `absenc wave` writes each byte of the traffic as a comment.
 TEST(Vcd, AnyNumberOfCommentsBeforeTheChanges) {
   const auto reader = open_repeated("$comment #123456789012 device 1A and 0 more words like these in between $end\n");
-  const Contents contents = read_all(*reader);
+  const CaptureContents contents = read_all(*reader);
   EXPECT_EQ(contents.changes[0].at, (Ticks{7}));
   EXPECT_EQ(contents.end, 20u);
   EXPECT_TRUE(reader->damages().empty());
@@ -99,7 +99,7 @@ TEST(Vcd, ScopesMayNotNestForEver) {
 
 TEST(Vcd, BeginsAtItsFirstTime) {
   const auto reader = open_text(with_header("#1000 1! 0\"\n#1001 0!"));
-  const Contents contents = read_all(*reader);
+  const CaptureContents contents = read_all(*reader);
   EXPECT_EQ(contents.first, 1000u);
   EXPECT_EQ(contents.end, 1002u);
   EXPECT_TRUE(contents.changes[0].before);
@@ -114,7 +114,7 @@ TEST(Vcd, VectorsAndNames) {
       "$enddefinitions $end #0 b0 ! 0% 0& b0 ' 0( r1.5 ) #5 b1010 ! b1 ' #6 b1 ! 1% #7 b100 '");
   EXPECT_EQ(reader->layout().channels, (Names{"bus[0]", "bus[1]", "bus[2]", "bus[3]", "top.clk", "top.a.clk", "up[2]",
                                               "up[1]", "up[0]", "one[5]", "alias"}));
-  const Contents contents = read_all(*reader);
+  const CaptureContents contents = read_all(*reader);
   const std::vector<Ticks> expected = {{6}, {5, 6}, {}, {5, 6}, {6}, {}, {5, 7}, {}, {7}, {}, {6}};
   for (std::size_t i = 0; i < expected.size(); ++i) EXPECT_EQ(contents.changes[i].at, expected[i]) << i;
   ASSERT_EQ(reader->damages().size(), 1u);
@@ -123,7 +123,7 @@ TEST(Vcd, VectorsAndNames) {
 
 TEST(Vcd, UnknownValuesKeepTheLevel) {
   const auto reader = open_text(with_header("#0 x! 1\"\n#3 1!\n#4 z!\n#5 1!\n#6 bx \"\n#7 0\"\n"));
-  const Contents contents = read_all(*reader);
+  const CaptureContents contents = read_all(*reader);
   EXPECT_EQ(contents.changes[0].at, (Ticks{3}));
   EXPECT_EQ(contents.changes[1].at, (Ticks{7}));
   ASSERT_EQ(reader->damages().size(), 1u);
@@ -132,7 +132,7 @@ TEST(Vcd, UnknownValuesKeepTheLevel) {
   EXPECT_EQ(reader->damages()[0].what.substr(0, 2), "3 ");
 }
 
-TEST(Vcd, WhatPrecedesADamageCounts) {
+TEST(Vcd, ReadsEverythingBeforeADamage) {
   for (const auto& [body, words] : std::vector<std::pair<std::string, std::string>>{
            {"#5 0!\n#9 1!\n#8 0!\n#20 1!", "from 9 to 8"},
            {"#5 0!\n#9 1!\n0@\n#20 1!", "no such identifier"},
@@ -143,7 +143,7 @@ TEST(Vcd, WhatPrecedesADamageCounts) {
        }) {
     const std::string file = with_header("#0 1!\n" + body);
     const auto reader = open_text(file);
-    const Contents contents = read_all(*reader);
+    const CaptureContents contents = read_all(*reader);
     EXPECT_EQ(contents.changes[0].at, (Ticks{5, 9})) << body;
     EXPECT_EQ(contents.end, 10u) << body;
     ASSERT_EQ(reader->damages().size(), 1u) << body;
@@ -153,7 +153,7 @@ TEST(Vcd, WhatPrecedesADamageCounts) {
   }
 }
 
-TEST(Vcd, HeadersThatMakeNoSense) {
+TEST(Vcd, RefusesInvalidHeaders) {
   EXPECT_NE(trouble("$timescale 1 us $end $var wire 1 ! a $end").find("cut off"), std::string::npos);
   EXPECT_NE(trouble("$var wire 1 ! a $end $enddefinitions $end #0 1!").find("no $timescale"), std::string::npos);
   EXPECT_NE(trouble("$timescale 3 us $end $enddefinitions $end").find("1, 10 or 100"), std::string::npos);
@@ -186,7 +186,7 @@ TEST(Vcd, LargeFiles) {
     expected[channel].push_back(time);
   }
   const auto reader = open_text(text);
-  const Contents contents = read_all(*reader);
+  const CaptureContents contents = read_all(*reader);
   EXPECT_GE(contents.blocks, 4u);
   for (std::size_t i = 0; i < channels; ++i) ASSERT_EQ(contents.changes[i].at, expected[i]) << i;
   EXPECT_TRUE(reader->damages().empty());

@@ -60,7 +60,7 @@ TEST(ZipArchive, ExpandsAWholeEntry) {
   EXPECT_TRUE(result.found_by_reading);
 }
 
-TEST(ZipArchive, WhatIsWrongIsToldByReading) {
+TEST(ZipArchive, ReadingReportsDamage) {
   for (const bool deflate : {true, false}) {
     const FileBytes good = make_zip({{"entry", content}}, deflate);
     FileBytes file = good;
@@ -70,7 +70,7 @@ TEST(ZipArchive, WhatIsWrongIsToldByReading) {
     EXPECT_EQ(result.trouble, "CRC error");
 
     file = good;
-    file[200] ^= 0x10;  // a byte within the entry
+    file[200] ^= 0x10;  // damages a byte of the compressed data
     result = expanded(file);
     EXPECT_FALSE(result.whole || result.found_by_reading);
     EXPECT_NE(result.trouble, "");
@@ -84,7 +84,7 @@ TEST(ZipArchive, WhatIsWrongIsToldByReading) {
 }
 
 // Includes stored entries: libzip always checks their checksum.
-TEST(ZipArchive, WhatIsPackedAnotherWayIsReadOnly) {
+TEST(ZipArchive, ReadsOtherCompressionMethodsWithoutExpand) {
   for (const zip_int32_t method : {ZIP_CM_STORE, ZIP_CM_BZIP2}) {
     if (zip_compression_method_supported(method, 1) == 0) continue;
     const Expanded result = expanded(make_zip({{"entry", content}}, method));

@@ -183,7 +183,7 @@ std::optional<std::size_t> AsyncDecoder::run(bool final, std::span<const Charact
   edges_.push_back(never);
   std::optional<std::size_t> met;
   std::optional<std::size_t> start = level_ ? 0 : 1;
-  if (start_ == Start::look) start = find_start(limit, final);
+  if (start_ == Start::search) start = find_start(limit, final);
   std::size_t done = 0;
   if (start) {
     start_ = Start::trust;

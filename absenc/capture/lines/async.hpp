@@ -44,13 +44,13 @@ class AsyncDecoder {
     Statistics& operator-=(const Statistics& other);
   };
   /// Whether the first start bit must be searched, or is the first falling edge.
-  enum class Start : std::uint8_t { look, trust };
+  enum class Start : std::uint8_t { search, trust };
 
   /// `channel` is stored in each character.
-  explicit AsyncDecoder(const AsyncFormat& format, std::uint8_t channel = 0, Start start = Start::look);
+  explicit AsyncDecoder(const AsyncFormat& format, std::uint8_t channel = 0, Start start = Start::search);
 
   /// Clears everything except the statistics: the next part does not follow the previous one.
-  void restart(Start start = Start::look);
+  void restart(Start start = Start::search);
   /// Decodes the next part, from `first` to `end`. If `part.before` differs from the last level, the line changed at
   /// `first`.
   void decode(const Changes& part, Tick first, Tick end, std::vector<Character>& characters);
@@ -89,7 +89,7 @@ class AsyncDecoder {
   unsigned stop_;                  // index of the stop bit
   std::array<Tick, 11> middle_{};  // middle of each bit in ticks, from the falling edge
   Tick length_;                    // duration of a character in ticks
-  double per_tick_;                // bits per tick
+  double per_tick_;                // number of bits per tick
 
   Start start_;
   bool begun_ = false;

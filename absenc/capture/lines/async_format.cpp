@@ -9,7 +9,7 @@ namespace absenc::capture {
 
 namespace {
 
-constexpr double shortest_bit = 2.5;       // in ticks
+constexpr double shortest_bit = 2.5;       // shortest bit time, in ticks
 constexpr std::size_t fewest_changes = 4;  // two pulses, the least from which a bit time can be found
 constexpr std::size_t tried_changes = 4096;
 constexpr std::size_t most_clusters = 8;

@@ -15,7 +15,7 @@ struct AsyncSettings {
   double baud = 0;  // 0: detected from the changes
   Parity parity = Parity::none;
   unsigned stop_bits = 1;
-  Idle idle = Idle::automatic;  // low: an inverted line
+  Idle idle = Idle::automatic;  // `low` means an inverted line
   Tick glitch = 0;              // a level shorter than this is noise, in ticks; 0: no filter
 };
 

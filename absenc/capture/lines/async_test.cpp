@@ -32,13 +32,13 @@ std::vector<std::uint8_t> values(const std::vector<Character>& characters) {
   return bytes;
 }
 
-struct Decoded {
+struct DecodedCharacters {
   std::vector<Character> characters;
   AsyncOutcome outcome;
 };
 
-Decoded decoded(Reader& reader, const std::vector<AsyncLine>& lines, unsigned threads = 2) {
-  Decoded all;
+DecodedCharacters decoded(Reader& reader, const std::vector<AsyncLine>& lines, unsigned threads = 2) {
+  DecodedCharacters all;
   all.outcome = decode_async(reader, lines, threads, [&](const Part& part) {
     all.characters.insert(all.characters.end(), part.characters.begin(), part.characters.end());
     return true;
@@ -60,7 +60,7 @@ TEST(Async, ACharacterLastsFromItsStartBitToTheEndOfItsStopBit) {
 }
 
 TEST(Async, ANextCharacterThatComesEarlyEndsTheOneBefore) {
-  Pen pen(7.8, Parity::none, 1);  // 2.5 % fast
+  Pen pen(7.8, Parity::none, 1);  // the sender is 2.5 % too fast
   pen.hold(true, 12);
   pen.character(0x55);
   pen.character(0xAA);
@@ -70,7 +70,7 @@ TEST(Async, ANextCharacterThatComesEarlyEndsTheOneBefore) {
   EXPECT_EQ(found[0].end, found[1].begin);
 }
 
-TEST(Async, ABreakAndAFramingErrorAreTold) {
+TEST(Async, ReportsBreakAndFramingError) {
   Pen pen(8, Parity::none, 1);
   pen.hold(true, 12);
   pen.hold(false, 14);
@@ -88,7 +88,7 @@ TEST(Async, ABreakAndAFramingErrorAreTold) {
   EXPECT_TRUE(!found[3].is_break && !found[3].bad_stop);
 }
 
-TEST(Async, AWrongParityIsTold) {
+TEST(Async, ReportsWrongParity) {
   for (const Parity parity : {Parity::odd, Parity::even}) {
     Pen pen(8, parity, 2);
     pen.hold(true, 12);
@@ -141,7 +141,7 @@ TEST(Async, ACaptureMayBeginInsideACharacter) {
   }
 }
 
-TEST(Async, WhatChangesBetweenPartsIsSeenOnce) {
+TEST(Async, SeesChangeBetweenPartsOnce) {
   const auto begin_of = [](const Changes& second) {
     std::vector<Character> characters;
     AsyncDecoder decoder(format);
@@ -153,7 +153,7 @@ TEST(Async, WhatChangesBetweenPartsIsSeenOnce) {
   EXPECT_EQ(begin_of({false, {108}}), 100u);
 }
 
-TEST(Async, WhatLiesBehindAHoleIsDecodedAfresh) {
+TEST(Async, RestartsBehindAHole) {
   Pen pen(8, Parity::none, 1);
   pen.hold(true, 20);
   for (unsigned i = 0; i < 30; ++i) {
@@ -181,7 +181,7 @@ TEST(Async, ASilentLineTakesTheBaudRateOfAnother) {
   for (unsigned i = 0; i < 200; ++i) pen.character(static_cast<std::uint8_t>(i * 77));
   Wires wires{{pen.levels, Drawn(pen.levels.size(), true)}, 1'050'000};
   MemoryReader reader(wires, Content::samples, 1000, 1);
-  const Decoded all = decoded(reader, {{1, {}}, {0, {}}});
+  const DecodedCharacters all = decoded(reader, {{1, {}}, {0, {}}});
   EXPECT_EQ(all.outcome.problem, "");
   EXPECT_EQ(all.characters.size(), 200u);
   EXPECT_EQ(all.characters.front().channel, 1);
@@ -191,7 +191,7 @@ TEST(Async, ASilentLineTakesTheBaudRateOfAnother) {
 }
 
 // A sender whose clock drifts by 1 %, with more changes than the detection uses.
-TEST(Async, WhatIsFoundDoesNotDependOnTheBlocks) {
+TEST(Async, DetectionDoesNotDependOnBlocks) {
   Wires wires{{{}}};
   for (const double bit : {5.0, 5.05}) {
     Pen pen(bit, Parity::none, 1);
@@ -202,14 +202,14 @@ TEST(Async, WhatIsFoundDoesNotDependOnTheBlocks) {
   std::optional<double> bit;
   for (const std::size_t most : {1000u, 70'000u, 10'000'000u}) {
     MemoryReader reader(wires, Content::samples, most, 1);
-    const Decoded all = decoded(reader, {{0, {}}});
+    const DecodedCharacters all = decoded(reader, {{0, {}}});
     EXPECT_EQ(all.characters.size(), 5000u);
     EXPECT_EQ(all.outcome.formats[0].bit, bit.value_or(all.outcome.formats[0].bit)) << most;
     bit = all.outcome.formats[0].bit;
   }
 }
 
-TEST(Async, WhatCannotBeDecodedIsExplained) {
+TEST(Async, ReportsWhyLineCannotBeDecoded) {
   Pen pen(8, Parity::none, 1);
   pen.hold(true, 12);
   pen.character(0x55);
@@ -235,7 +235,7 @@ TEST(Async, NoiseHasNoBaudRate) {
             "no baud rate explains D0, which changes its level 99");
 }
 
-TEST(Async, WhoWantsNoMoreGetsNoMore) {
+TEST(Async, StopsWhenSinkReturnsFalse) {
   Pen pen(8, Parity::none, 1);
   for (unsigned i = 0; i < 1000; ++i) pen.character(0x55);
   const Wires wires{{pen.levels}};
@@ -260,7 +260,7 @@ struct Failing : Reader {
   Reader& reader;
 };
 
-TEST(Async, WhatTheReaderThrowsArrives) {
+TEST(Async, PassesOnExceptionsOfReader) {
   const Wires wires{{Drawn(10'000, true)}};
   for (const unsigned threads : {1u, 2u, 5u}) {
     MemoryReader memory(wires, Content::samples, 100, 1);
@@ -290,7 +290,7 @@ class Slow final : public Reader {
     claimed_ += more ? 1 : 0;
     return more;
   }
-  // The joining thread waits until another thread claims while claimed blocks are outstanding.
+  // The joining thread waits in `fill` until another thread claims a block at the same time.
   void fill(Block& block) override {
     std::unique_lock lock(mutex_);
     if (is_joining()) wait(lock, [this] { return overlaps_; });
@@ -320,7 +320,7 @@ class Slow final : public Reader {
   bool held_up_ = false;
 };
 
-TEST(Async, WhoClaimsABlockKeepsNobodyFromDecoding) {
+TEST(Async, ClaimingDoesNotBlockDecoding) {
   Pen pen(8, Parity::none, 1);
   for (unsigned i = 0; i < 2000; ++i) pen.character(0x55);
   const Wires wires{{pen.levels}};

@@ -85,7 +85,7 @@ class BlockRun {
  public:
   BlockRun(LevelReader& reader, Decoding& decoding, unsigned threads)
       : reader_(reader), decoding_(decoding), threads_(threads), jobs_(threads < 2 ? 1 : 2 * threads) {
-    for (Job& job : jobs_) free_.push_back(&job);
+    for (Job& job : jobs_) free_jobs_.push_back(&job);
   }
 
   /// Decodes all blocks. Returns false if `decode` or `join` ended the run.
@@ -131,16 +131,17 @@ class BlockRun {
     return true;
   }
 
-  [[nodiscard]] bool can_claim() const { return !exhausted_ && !stopped_ && !claiming_ && !free_.empty(); }
+  [[nodiscard]] bool can_claim() const { return !exhausted_ && !stopped_ && !claiming_ && !free_jobs_.empty(); }
 
   // Claims a block and prepares it; the lock is held before and after the call. Only one thread claims at a time, which
   // for text is most of the work, while the others decode earlier blocks.
   void prepare(std::unique_lock<std::mutex>& lock, unsigned thread) {
     // The block that this thread used last is still in its cache.
-    const auto last = std::find_if(free_.rbegin(), free_.rend(), [&](const Job* job) { return job->thread == thread; });
-    const auto own = last == free_.rend() ? free_.begin() : last.base() - 1;
+    const auto last =
+        std::find_if(free_jobs_.rbegin(), free_jobs_.rend(), [&](const Job* job) { return job->thread == thread; });
+    const auto own = last == free_jobs_.rend() ? free_jobs_.begin() : last.base() - 1;
     Job& job = **own;
-    free_.erase(own);
+    free_jobs_.erase(own);
     job.thread = thread;
     claiming_ = true;
     lock.unlock();
@@ -149,7 +150,7 @@ class BlockRun {
       lock.lock();
       claiming_ = false;
       exhausted_ = !claimed;
-      if (claimed) flying_.push_back(&job);
+      if (claimed) in_order_.push_back(&job);
       changed_.notify_all();
       if (!claimed) return;
       lock.unlock();
@@ -178,18 +179,18 @@ class BlockRun {
     std::unique_lock lock(mutex_);
     for (;;) {
       if (stopped_) return false;
-      if (!flying_.empty() && flying_.front()->ready) {
-        Job& job = *flying_.front();
+      if (!in_order_.empty() && in_order_.front()->ready) {
+        Job& job = *in_order_.front();
         lock.unlock();
         if (!decoding_.join(job.levels, job.guess)) return false;
         lock.lock();
         job.ready = false;
-        flying_.pop_front();
-        free_.push_back(&job);
+        in_order_.pop_front();
+        free_jobs_.push_back(&job);
         changed_.notify_all();
       } else if (can_claim()) {
         prepare(lock, 0);
-      } else if (exhausted_ && flying_.empty()) {
+      } else if (exhausted_ && in_order_.empty()) {
         return true;
       } else {
         changed_.wait(lock);
@@ -203,8 +204,8 @@ class BlockRun {
   std::vector<Job> jobs_;
   std::mutex mutex_;
   std::condition_variable changed_;
-  std::vector<Job*> free_;
-  std::deque<Job*> flying_;  // claimed jobs in the order of the capture
+  std::vector<Job*> free_jobs_;
+  std::deque<Job*> in_order_;  // claimed jobs in the order of the capture
   bool claiming_ = false;
   bool exhausted_ = false;
   bool stopped_ = false;

@@ -43,10 +43,10 @@ std::string_view text_of_error(const CanFrame& error) {
 void CanDecoder::decode(const Changes& part, Tick first, Tick end, std::vector<CanRecord>& frames) {
   if (first != end_) {
     finish(frames);
-    since_ = first;
-    told_ = 0;
+    level_since_ = first;
+    bits_taken_ = 0;
     recessive_ = 0;
-    doing_ = Doing::waiting;
+    state_ = State::waiting;
   }
   if (part.before != level_) change(first, frames);
   for (const Tick at : part.at) change(at, frames);
@@ -54,17 +54,17 @@ void CanDecoder::decode(const Changes& part, Tick first, Tick end, std::vector<C
 }
 
 void CanDecoder::change(Tick at, std::vector<CanRecord>& frames) {
-  level_for(level_, since_, at, frames);
+  level_for(level_, level_since_, at, frames);
   level_ = !level_;
-  since_ = at;
-  told_ = 0;
+  level_since_ = at;
+  bits_taken_ = 0;
 }
 
 void CanDecoder::finish(std::vector<CanRecord>& frames) {
-  if (end_ > since_) level_for(level_, since_, end_, frames);
-  since_ = end_;
+  if (end_ > level_since_) level_for(level_, level_since_, end_, frames);
+  level_since_ = end_;
   // The frame is cut off by the end: no bus error.
-  if (doing_ == Doing::stuffed || doing_ == Doing::tail) doing_ = Doing::waiting;
+  if (state_ == State::stuffed || state_ == State::tail) state_ = State::waiting;
 }
 
 // Takes the number of bits that fits the time best; of an idle bus only as many as matter.
@@ -72,28 +72,29 @@ void CanDecoder::level_for(bool level, Tick from, Tick to, std::vector<CanRecord
   constexpr double enough = 32;
   const double bits = std::min(static_cast<double>(to - from) / bit_, enough);
   const auto count = static_cast<std::size_t>(std::lround(bits));
-  for (; told_ < count; ++told_) take(level, from + static_cast<Tick>(static_cast<double>(told_) * bit_), frames);
+  for (; bits_taken_ < count; ++bits_taken_)
+    take(level, from + static_cast<Tick>(static_cast<double>(bits_taken_) * bit_), frames);
 }
 
 void CanDecoder::take(bool bit, Tick at, std::vector<CanRecord>& frames) {
   recessive_ = bit ? recessive_ + 1 : 0;
-  switch (doing_) {
-    case Doing::waiting:
-      if (recessive_ >= integration_bits) doing_ = Doing::idle;
+  switch (state_) {
+    case State::waiting:
+      if (recessive_ >= integration_bits) state_ = State::idle;
       break;
-    case Doing::idle:
+    case State::idle:
       if (bit) break;
-      doing_ = Doing::stuffed;
+      state_ = State::stuffed;
       record_ = {.at = at};
       bits_.assign(1, false);
       before_ = false;
       run_ = 1;
       length_ = 0;
       break;
-    case Doing::stuffed:
+    case State::stuffed:
       take_stuffed(bit, frames);
       break;
-    case Doing::tail:
+    case State::tail:
       take_tail(bit, frames);
       break;
   }
@@ -110,7 +111,7 @@ void CanDecoder::take_stuffed(bool bit, std::vector<CanRecord>& frames) {
   }
   // A stuff bit may follow the last bit of the CRC.
   if (length_ == 0 || bits_.size() < length_ || run_ == most_equal) return;
-  doing_ = Doing::tail;
+  state_ = State::tail;
   tail_ = 0;
 }
 
@@ -128,7 +129,7 @@ void CanDecoder::take_tail(bool bit, std::vector<CanRecord>& frames) {
   }
   if (tail_++ < last) return;
   frames.push_back(record_);
-  doing_ = Doing::waiting;
+  state_ = State::waiting;
   recessive_ = last;  // the rest of the end and the intermission complete the idle time
 }
 
@@ -162,7 +163,7 @@ void CanDecoder::fail(std::uint32_t error_class, std::uint8_t how, std::uint8_t 
   record_.frame = {.id = error_class, .size = 8, .data = {0, 0, how, where}};
   record_.error_frame = true;
   frames.push_back(record_);
-  doing_ = Doing::waiting;
+  state_ = State::waiting;
 }
 
 }  // namespace absenc::capture

@@ -25,11 +25,11 @@ class CanDecoder {
   /// Decodes the next part, from `first` to `end`. If it does not follow the previous part, the decoder waits for an
   /// idle bus.
   void decode(const Changes& part, Tick first, Tick end, std::vector<CanRecord>& frames);
-  /// Ends the capture.
+  /// Ends the capture; a frame that is cut off there is no error.
   void finish(std::vector<CanRecord>& frames);
 
  private:
-  enum class Doing : std::uint8_t { waiting, idle, stuffed, tail };
+  enum class State : std::uint8_t { waiting, idle, stuffed, tail };
 
   void change(Tick at, std::vector<CanRecord>& frames);
   void level_for(bool level, Tick from, Tick to, std::vector<CanRecord>& frames);
@@ -42,11 +42,11 @@ class CanDecoder {
 
   double bit_;
   bool level_ = true;
-  Tick since_ = 0;  // time of the last level change
+  Tick level_since_ = 0;  // time of the last level change
   Tick end_ = 0;
-  std::size_t told_ = 0;  // number of bits of the present level that were handled already
+  std::size_t bits_taken_ = 0;  // number of bits of the present level that were handled already
 
-  Doing doing_ = Doing::waiting;
+  State state_ = State::waiting;
   unsigned recessive_ = 0;  // number of consecutive recessive bits
   unsigned run_ = 0;        // number of consecutive equal bits in the stuffed part
   bool before_ = true;

@@ -14,8 +14,8 @@ namespace absenc::capture {
 namespace {
 
 /// A bus as a capture shows it: bits of any duration, with edges at whole ticks.
-struct Bus {
-  explicit Bus(double one_bit) : bit(one_bit) { pass(12); }
+struct CanBusDrawing {
+  explicit CanBusDrawing(double one_bit) : bit(one_bit) { pass(12); }
 
   void pass(std::size_t bits) { add(std::vector<bool>(bits, true)); }
   void add(const std::vector<bool>& bits) {
@@ -52,7 +52,7 @@ CanFrame any_frame(std::mt19937& random) {
   frame.id = static_cast<std::uint32_t>(random()) & (frame.extended ? 0x1FFFFFFF : 0x7FF);
   frame.remote = random() % 8 == 0;
   frame.size = static_cast<std::uint8_t>(random() % 9);
-  const bool constant = random() % 4 == 0;  // gives many stuff bits
+  const bool constant = random() % 4 == 0;  // equal data bytes cause many stuff bits
   for (std::size_t i = 0; i < frame.size && !frame.remote; ++i) {
     frame.data[i] = static_cast<std::uint8_t>(constant ? 0 : random());
   }
@@ -61,7 +61,7 @@ CanFrame any_frame(std::mt19937& random) {
 
 RC_GTEST_PROP(CanDecoderProperty, FindsEveryFrame, (std::uint32_t seed)) {
   std::mt19937 random(seed);
-  Bus bus(3 + static_cast<double>(random() % 4000) / 100);
+  CanBusDrawing bus(3 + static_cast<double>(random() % 4000) / 100);
   std::vector<std::pair<Tick, CanFrame>> sent;
   for (int i = 0; i < 50; ++i) {
     const CanFrame frame = any_frame(random);
@@ -79,7 +79,7 @@ RC_GTEST_PROP(CanDecoderProperty, FindsEveryFrame, (std::uint32_t seed)) {
 
 RC_GTEST_PROP(CanDecoderProperty, PartsMakeNoDifference, (std::uint32_t seed)) {
   std::mt19937 random(seed);
-  Bus bus(8);
+  CanBusDrawing bus(8);
   for (int i = 0; i < 20; ++i) bus.send(any_frame(random));
   CanDecoder decoder(bus.bit);
   Tick first = 0;
@@ -103,7 +103,7 @@ RC_GTEST_PROP(CanDecoderProperty, PartsMakeNoDifference, (std::uint32_t seed)) {
 // A flipped bit gives an error or splits the frame in two, but never a frame that was not sent.
 RC_GTEST_PROP(CanDecoderProperty, AFlippedBitIsNoFrame, (std::uint32_t seed)) {
   std::mt19937 random(seed);
-  Bus bus(10);
+  CanBusDrawing bus(10);
   const CanFrame frame{.id = static_cast<std::uint32_t>(random()) & 0x7FF, .size = 8, .data = {1, 2, 3, 4, 5, 6, 7, 8}};
   std::vector<bool> bits = sim::can_bits(frame);
   const std::size_t flipped = 1 + random() % (bits.size() - 8);
@@ -117,8 +117,8 @@ RC_GTEST_PROP(CanDecoderProperty, AFlippedBitIsNoFrame, (std::uint32_t seed)) {
   for (std::size_t i = 0; i + 1 < frames.size(); ++i) RC_ASSERT(frames[i].error_frame);
 }
 
-TEST(CanDecoder, NobodyAcknowledged) {
-  Bus bus(10);
+TEST(CanDecoder, ReportsMissingAcknowledge) {
+  CanBusDrawing bus(10);
   std::vector<bool> bits = sim::can_bits({.id = 0x5});
   bits[bits.size() - 9] = true;
   bus.add(bits);
@@ -130,8 +130,8 @@ TEST(CanDecoder, NobodyAcknowledged) {
   EXPECT_EQ(text_of_error(frames[0].frame).substr(0, 19), "nobody acknowledged");
 }
 
-TEST(CanDecoder, SaysWhereAFrameIsWrong) {
-  Bus bus(10);
+TEST(CanDecoder, ReportsPlaceOfError) {
+  CanBusDrawing bus(10);
   std::vector<bool> bits = sim::can_bits({.id = 0x555, .size = 1, .data = {0x55}});
   bits[26] = !bits[26];  // a bit of the CRC, where bits alternate
   bus.add(bits);
@@ -143,9 +143,9 @@ TEST(CanDecoder, SaysWhereAFrameIsWrong) {
 }
 
 TEST(CanDecoder, ACaptureMayBeginAndEndInsideAFrame) {
-  Bus bus(10);
+  CanBusDrawing bus(10);
   std::vector<bool> bits = sim::can_bits({.id = 0x111, .size = 8});
-  Bus cut(10);
+  CanBusDrawing cut(10);
   cut.count = 0;
   cut.add(std::vector<bool>(bits.begin() + 20, bits.end()));
   cut.pass(3);

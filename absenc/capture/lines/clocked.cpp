@@ -129,7 +129,7 @@ void ClockedDecoder::take(Tick at, std::vector<Burst>& bursts) {
 }
 
 // Stores the level behind the last clock change. A previous part may have ended too early for that.
-void ClockedDecoder::look_behind() {
+void ClockedDecoder::sample_last_bit() {
   if (format_.settle == 0 || burst_.has_last || !has_in_) return;
   burst_.last = in_.before(last_ + format_.settle);
   burst_.has_last = true;
@@ -137,9 +137,9 @@ void ClockedDecoder::look_behind() {
 
 // Detects a change of the data line during a rest, until `until`. A data line that changes together with the clock was
 // sampled too coarsely to tell which changed first.
-void ClockedDecoder::look_for_change(Tick until) {
+void ClockedDecoder::detect_data_change(Tick until) {
   if (format_.change_pause == 0 || !has_in_ || until - last_ <= format_.settle) return;
-  if (open_) look_behind();
+  if (open_) sample_last_bit();
   in_.before(last_ + format_.settle);
   changed_ = changed_ || in_.next() <= until;
 }
@@ -150,11 +150,11 @@ bool ClockedDecoder::is_over(Tick rest) const {
 
 bool ClockedDecoder::clock_changes(Tick at, Targets* targets, std::vector<Burst>& bursts) {
   if (!format_.has_select) {
-    look_for_change(at);
+    detect_data_change(at);
     if (is_over(at - last_)) {
       seen_pause_ = true;
       if (open_) {
-        look_behind();
+        sample_last_bit();
         close(last_, false, bursts);
       }
     }
@@ -185,8 +185,8 @@ bool ClockedDecoder::run(const ClockedPart& part, Targets* targets, std::vector<
     if (clock == no_change && select == no_change) break;
     if (clock <= select ? clock_changes(clock, targets, bursts) : select_changes(select, targets, bursts)) return true;
   }
-  if (!format_.has_select && open_ && part.end - last_ > format_.settle) look_behind();
-  look_for_change(part.end);
+  if (!format_.has_select && open_ && part.end - last_ > format_.settle) sample_last_bit();
+  detect_data_change(part.end);
   // Data changes behind the last clock change count for the next part.
   in_.before(no_change);
   out_.before(no_change);

@@ -58,7 +58,7 @@ class ClockedDecoder {
   /// Works like `decode` with the result of `other`, which has decoded the same part into `guessed` after a restart.
   /// The correct part of the guess is taken over with its state. The result equals that of `decode` exactly.
   void join(const ClockedPart& part, ClockedDecoder& other, std::vector<Burst>& guessed, std::vector<Burst>& bursts);
-  /// Ends the capture.
+  /// Ends the capture; a burst in progress is returned as cut.
   void finish(std::vector<Burst>& bursts);
   /// Returns a time before which no further burst begins; `end` is the end of the last part.
   [[nodiscard]] Tick settled(Tick end) const { return open_ ? burst_.begin : end; }
@@ -67,7 +67,7 @@ class ClockedDecoder {
   // The changes of one wire within a part.
   struct Wire {
     bool level = false;
-    std::span<const Tick> left{};  // changes not yet handled
+    std::span<const Tick> left{};  // changes of the wire that are not handled yet
     std::optional<Tick> border{};  // additional change at the border of two parts with different levels
 
     void begin(const Changes* changes, Tick first, bool known);
@@ -89,9 +89,9 @@ class ClockedDecoder {
   bool open(Tick at, bool cut, Targets* targets);
   void close(Tick at, bool cut, std::vector<Burst>& bursts);
   void take(Tick at, std::vector<Burst>& bursts);
-  void look_for_change(Tick until);
+  void detect_data_change(Tick until);
   [[nodiscard]] bool is_over(Tick rest) const;
-  void look_behind();
+  void sample_last_bit();
 
   ClockedFormat format_;
   bool begun_ = false;

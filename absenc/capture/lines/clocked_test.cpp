@@ -12,7 +12,7 @@ namespace absenc::capture {
 namespace {
 
 // Draws a clock with data and optional chip select, with 4 ticks per period.
-struct Drawing {
+struct ClockedDrawing {
   Wires wires{std::vector<Drawn>(4)};  // wires in the order clock, in, out, select
 
   void hold(bool clock, bool in, bool out, bool select, std::size_t ticks) {
@@ -39,14 +39,14 @@ struct Drawing {
   }
 };
 
-struct Decoded {
+struct DecodedBursts {
   std::vector<Burst> bursts;
   ClockedOutcome outcome;
 };
 
-Decoded decoded(const Wires& wires, const ClockedLine& line, unsigned threads = 2) {
+DecodedBursts decoded(const Wires& wires, const ClockedLine& line, unsigned threads = 2) {
   MemoryReader reader(wires, Content::samples, 50, 1);
-  Decoded all;
+  DecodedBursts all;
   all.outcome = decode_clocked(reader, line, threads, [&](const Part& part) {
     all.bursts.insert(all.bursts.end(), part.bursts.begin(), part.bursts.end());
     return true;
@@ -55,13 +55,13 @@ Decoded decoded(const Wires& wires, const ClockedLine& line, unsigned threads = 
 }
 
 TEST(Clocked, SsiWordsEndAtPauses) {
-  Drawing drawing;
+  ClockedDrawing drawing;
   drawing.idle(100);
   for (const std::uint32_t word : {0x1EFu, 0xA5Au, 0x800u}) {
     drawing.ssi(word, 12);
     drawing.idle(100);
   }
-  const Decoded all = decoded(drawing.wires, {.clock = 0, .in = 1, .rising = false});
+  const DecodedBursts all = decoded(drawing.wires, {.clock = 0, .in = 1, .rising = false});
   EXPECT_EQ(all.outcome.problem, "");
   EXPECT_EQ(all.outcome.pause, 12u);
   ASSERT_EQ(all.bursts.size(), 3u);
@@ -75,15 +75,15 @@ TEST(Clocked, SsiWordsEndAtPauses) {
   EXPECT_FALSE(all.bursts[0].cut || all.bursts[2].cut);
 }
 
-TEST(Clocked, WhatBeginsOrEndsOutsideIsCut) {
-  Drawing drawing;
+TEST(Clocked, MarksIncompleteWordsAsCut) {
+  ClockedDrawing drawing;
   drawing.idle(3);
   drawing.ssi(0x1EF, 12);
   drawing.idle(100);
   drawing.ssi(0x1EF, 12);
   drawing.idle(100);
   drawing.ssi(0x1EF, 12);
-  const Decoded all = decoded(drawing.wires, {.clock = 0, .in = 1, .rising = false});
+  const DecodedBursts all = decoded(drawing.wires, {.clock = 0, .in = 1, .rising = false});
   ASSERT_EQ(all.bursts.size(), 3u);
   EXPECT_TRUE(all.bursts[0].cut);
   EXPECT_FALSE(all.bursts[1].cut);
@@ -93,7 +93,7 @@ TEST(Clocked, WhatBeginsOrEndsOutsideIsCut) {
 
 TEST(Clocked, SpiTakesBothDirectionsBetweenEdgesOfChipSelect) {
   for (const bool idle_clock : {false, true}) {
-    Drawing drawing;
+    ClockedDrawing drawing;
     drawing.idle(20, idle_clock);
     drawing.spi(0x12, 0xF1);
     drawing.hold(idle_clock, true, true, false, 60);  // a pause within the exchange
@@ -103,7 +103,7 @@ TEST(Clocked, SpiTakesBothDirectionsBetweenEdgesOfChipSelect) {
     drawing.idle(10, idle_clock);
     drawing.spi(0x56, 0x81);
     drawing.idle(10, idle_clock);
-    const Decoded all = decoded(drawing.wires, {.clock = 0, .in = 1, .out = 2, .select = 3, .rising = true});
+    const DecodedBursts all = decoded(drawing.wires, {.clock = 0, .in = 1, .out = 2, .select = 3, .rising = true});
     ASSERT_EQ(all.bursts.size(), 2u) << idle_clock;
     EXPECT_EQ(all.bursts[0].bits, 16u);
     EXPECT_EQ(all.bursts[0].in, (std::vector<std::uint8_t>{0xF1, 0x0E}));
@@ -115,7 +115,7 @@ TEST(Clocked, SpiTakesBothDirectionsBetweenEdgesOfChipSelect) {
 }
 
 TEST(Clocked, AClockThatNeverPausesIsCutIntoPieces) {
-  Drawing drawing;
+  ClockedDrawing drawing;
   drawing.idle(100);
   for (std::size_t i = 0; i < ClockedDecoder::most_bits + 100; ++i) {
     drawing.hold(false, true, true, true, 1);
@@ -123,7 +123,7 @@ TEST(Clocked, AClockThatNeverPausesIsCutIntoPieces) {
   }
   drawing.idle(100);
   for (const unsigned threads : {1u, 3u}) {
-    const Decoded all = decoded(drawing.wires, {.clock = 0, .in = 1, .rising = false}, threads);
+    const DecodedBursts all = decoded(drawing.wires, {.clock = 0, .in = 1, .rising = false}, threads);
     ASSERT_EQ(all.bursts.size(), 2u);
     EXPECT_EQ(all.bursts[0].bits, ClockedDecoder::most_bits);
     EXPECT_EQ(all.bursts[1].bits, 100u);
@@ -131,8 +131,8 @@ TEST(Clocked, AClockThatNeverPausesIsCutIntoPieces) {
   }
 }
 
-TEST(Clocked, WhatCannotBeDecodedIsExplained) {
-  Drawing drawing;
+TEST(Clocked, ReportsWhyLineCannotBeDecoded) {
+  ClockedDrawing drawing;
   drawing.idle(200);
   const std::string no_clock =
       "D0 never changes its level, so there is no clock: is it the right channel, and was it connected?";

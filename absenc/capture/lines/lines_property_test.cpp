@@ -71,12 +71,13 @@ Line any_line(Random& random, std::uint64_t ticks_per_second) {
   return line;
 }
 
-struct Way {
+struct DecodeSetup {
   unsigned threads;
   Content content;
 };
-constexpr std::array ways{Way{1, Content::samples}, Way{1, Content::changes}, Way{2, Content::samples},
-                          Way{3, Content::changes}, Way{5, Content::samples}};
+constexpr std::array decode_setups{DecodeSetup{1, Content::samples}, DecodeSetup{1, Content::changes},
+                                   DecodeSetup{2, Content::samples}, DecodeSetup{3, Content::changes},
+                                   DecodeSetup{5, Content::samples}};
 
 std::size_t any_block_size(Random& random, std::size_t ticks) {
   const std::size_t least = ticks / 200 + 1;  // with smaller blocks a test case would take a second
@@ -106,7 +107,7 @@ bool same(const AsyncOutcome& a, const AsyncOutcome& b) {
   return a.measured_baud == b.measured_baud;
 }
 
-RC_GTEST_PROP(LinesProperty, AsynchronousIsTheSameHoweverItIsDecoded, (std::uint64_t seed)) {
+RC_GTEST_PROP(LinesProperty, AsyncResultDoesNotDependOnThreadsAndBlocks, (std::uint64_t seed)) {
   Random random(seed);
   Wires wires;
   std::vector<AsyncLine> lines;
@@ -135,10 +136,10 @@ RC_GTEST_PROP(LinesProperty, AsynchronousIsTheSameHoweverItIsDecoded, (std::uint
   std::stable_sort(wanted.begin(), wanted.end(), [](const auto& a, const auto& b) { return a.begin < b.begin; });
 
   AsyncOutcome first;
-  for (const Way& way : ways) {
-    MemoryReader reader(wires, way.content, any_block_size(random, ticks), random());
+  for (const DecodeSetup& setup : decode_setups) {
+    MemoryReader reader(wires, setup.content, any_block_size(random, ticks), random());
     AsyncOutcome outcome;
-    const auto found = decoded(reader, lines, way.threads, outcome);
+    const auto found = decoded(reader, lines, setup.threads, outcome);
     RC_ASSERT(equal(found, wanted));
     if (first.formats.empty()) first = outcome;
     RC_ASSERT(same(outcome, first));
@@ -183,7 +184,7 @@ RC_GTEST_PROP(LinesProperty, BaudAndIdleLevelAreFound, (std::uint64_t seed)) {
   }
 }
 
-RC_GTEST_PROP(LinesProperty, ClockedIsTheSameHoweverItIsDecoded, (std::uint64_t seed)) {
+RC_GTEST_PROP(LinesProperty, ClockedResultDoesNotDependOnThreadsAndBlocks, (std::uint64_t seed)) {
   Random random(seed);
   Wires wires;
   wires.levels.resize(4);
@@ -235,10 +236,10 @@ RC_GTEST_PROP(LinesProperty, ClockedIsTheSameHoweverItIsDecoded, (std::uint64_t 
                          .pause = format.pause,
                          .settle = format.settle,
                          .change_pause = format.change_pause};
-  for (const Way& way : ways) {
-    MemoryReader reader(wires, way.content, any_block_size(random, ticks), random());
+  for (const DecodeSetup& setup : decode_setups) {
+    MemoryReader reader(wires, setup.content, any_block_size(random, ticks), random());
     std::vector<Burst> found;
-    decode_clocked(reader, line, way.threads, [&](const Part& part) {
+    decode_clocked(reader, line, setup.threads, [&](const Part& part) {
       found.insert(found.end(), part.bursts.begin(), part.bursts.end());
       return true;
     });

@@ -52,9 +52,9 @@ struct PauseReading {
 
 struct ClockedLine {
   unsigned clock = 0;
-  std::optional<unsigned> in{};      // the encoder's data
-  std::optional<unsigned> out{};     // SPI: the host's data
-  std::optional<unsigned> select{};  // SPI: chip select
+  std::optional<unsigned> in{};      // channel of the encoder's data
+  std::optional<unsigned> out{};     // channel of the host's data, for SPI
+  std::optional<unsigned> select{};  // channel of chip select, for SPI
   bool rising = false;               // the clock edge that samples a bit
   bool select_high = false;          // chip select is active high
   Tick pause = 0;                    // without chip select: a clock that rests longer ends a word; 0: `choose` decides

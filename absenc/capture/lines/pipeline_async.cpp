@@ -12,7 +12,7 @@ namespace {
 
 constexpr std::size_t enough_changes = 16384;     // number of changes of a line that suffice to detect its settings
 constexpr std::size_t most_changes = 64 * 16384;  // limit for one line while another has too few changes
-constexpr double fewest_ticks = 2.5;              // shortest bit time
+constexpr double fewest_ticks = 2.5;              // shortest bit time, in ticks
 
 class AsyncDecoding {
  public:

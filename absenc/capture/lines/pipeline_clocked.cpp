@@ -14,8 +14,8 @@ constexpr std::size_t enough_clocks = 8194;    // number of clock changes that s
 constexpr std::size_t most_data = 64 * 16384;  // limit for data changes while the clock has too few
 
 // Indices of the wires among the channels.
-struct Wires {
-  explicit Wires(const ClockedLine& line) : channels{line.clock} {
+struct WireIndices {
+  explicit WireIndices(const ClockedLine& line) : channels{line.clock} {
     const auto add = [this](const std::optional<unsigned>& channel) -> std::optional<std::size_t> {
       if (!channel) return std::nullopt;
       channels.push_back(*channel);
@@ -43,7 +43,7 @@ class ClockedDecoding {
     std::vector<Burst> bursts;
   };
 
-  ClockedDecoding(const Wires& wires, const ClockedFormat& format, const Sink& sink)
+  ClockedDecoding(const WireIndices& wires, const ClockedFormat& format, const Sink& sink)
       : wires_(wires), format_(format), sink_(sink), decoder_(format) {}
 
   bool decode(const Levels& levels) {
@@ -92,7 +92,7 @@ class ClockedDecoding {
     return wanted;
   }
 
-  const Wires& wires_;
+  const WireIndices& wires_;
   ClockedFormat format_;
   const Sink& sink_;
   ClockedDecoder decoder_;
@@ -109,7 +109,7 @@ std::string no_clock(const std::string& name) {
 }
 
 // Returns the bursts in the first parts, up to the clock change at `last`.
-std::vector<Burst> bursts_until(Tick last, const std::vector<Levels>& parts, const Wires& wires,
+std::vector<Burst> bursts_until(Tick last, const std::vector<Levels>& parts, const WireIndices& wires,
                                 const ClockedFormat& format) {
   std::vector<Burst> bursts;
   ClockedDecoder decoder(format);
@@ -130,7 +130,7 @@ std::vector<Burst> bursts_until(Tick last, const std::vector<Levels>& parts, con
 }
 
 // Returns whether the data line changed in each rest between two of these words, independently of clock edges.
-bool changes_in_rests(const std::vector<Burst>& bursts, const std::vector<Levels>& parts, const Wires& wires,
+bool changes_in_rests(const std::vector<Burst>& bursts, const std::vector<Levels>& parts, const WireIndices& wires,
                       Tick settle) {
   if (!wires.in || bursts.size() < 2) return false;
   std::vector<Tick> changes;
@@ -146,8 +146,8 @@ bool changes_in_rests(const std::vector<Burst>& bursts, const std::vector<Levels
 }
 
 // Finds the times of `format`. Returns the problem as a sentence, or "".
-std::string look_for_pause(LevelReader& reader, const Wires& wires, const ClockedLine& line, std::vector<Levels>& parts,
-                           ClockedFormat& format) {
+std::string find_pause(LevelReader& reader, const WireIndices& wires, const ClockedLine& line,
+                       std::vector<Levels>& parts, ClockedFormat& format) {
   Changes clock;
   bool begun = false;
   std::size_t others = 0;
@@ -169,31 +169,32 @@ std::string look_for_pause(LevelReader& reader, const Wires& wires, const Clocke
   format.pause = rests->pauses.front();
   if (!line.choose) return {};
   const Tick last = clock.at[std::min(clock.at.size(), enough_clocks) - 1];
-  std::vector<ClockedFormat> ways;
+  std::vector<ClockedFormat> candidates;
   for (const Tick pause : rests->pauses) {
-    ways.push_back(format);
-    ways.back().pause = pause;
+    candidates.push_back(format);
+    candidates.back().pause = pause;
   }
   // Rests in words and between them may be of any length, but a timeout or a monoflop ends only between words.
   if (wires.in) {
-    ways.push_back(ways.back());
+    candidates.push_back(candidates.back());
     // An encoder that does not drive the line changes nothing: rests of at least half the longest length end its words.
-    ways.back().pause = std::max(rests->longest / 2, *std::max_element(rests->pauses.begin(), rests->pauses.end()));
-    ways.back().change_pause = 2 * rests->half_period;
+    candidates.back().pause =
+        std::max(rests->longest / 2, *std::max_element(rests->pauses.begin(), rests->pauses.end()));
+    candidates.back().change_pause = 2 * rests->half_period;
   }
   std::vector<PauseReading> readings;
-  for (const ClockedFormat& way : ways) {
-    readings.push_back({way.pause, way.change_pause != 0, bursts_until(last, parts, wires, way)});
+  for (const ClockedFormat& candidate : candidates) {
+    readings.push_back({candidate.pause, candidate.change_pause != 0, bursts_until(last, parts, wires, candidate)});
     readings.back().timed_out = changes_in_rests(readings.back().bursts, parts, wires, format.settle);
   }
-  format = ways[line.choose(readings)];
+  format = candidates[line.choose(readings)];
   return {};
 }
 
 }  // namespace
 
 ClockedOutcome decode_clocked(Reader& source, const ClockedLine& line, unsigned threads, const Sink& sink) {
-  const Wires wires(line);
+  const WireIndices wires(line);
   LevelReader reader(source, wires.channels);
   ClockedOutcome outcome{reader.problem(), line.pause};
   if (outcome.problem.empty() && !line.in && !line.out) {
@@ -205,7 +206,7 @@ ClockedOutcome decode_clocked(Reader& source, const ClockedLine& line, unsigned 
   ClockedFormat format{line.rising, line.select.has_value(), line.select_high, line.pause,
                        line.settle, line.change_pause};
   if (!line.select && line.pause == 0) {
-    outcome.problem = look_for_pause(reader, wires, line, parts, format);
+    outcome.problem = find_pause(reader, wires, line, parts, format);
     if (!outcome.problem.empty()) return outcome;
   }
   outcome.pause = format.pause;

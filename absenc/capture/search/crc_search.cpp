@@ -44,7 +44,8 @@ class CrcSearch {
     bool init_open;
     auto operator<=>(const Key&) const = default;
   };
-  using Firsts = std::map<std::uint32_t, std::map<Key, std::vector<std::size_t>>>;  // solutions by polynomial
+  // Possible covered beginnings, by polynomial and by init and xorout.
+  using Firsts = std::map<std::uint32_t, std::map<Key, std::vector<std::size_t>>>;
 
   void each_order(Shape shape) {
     const unsigned orders = frames_.of_bits ? 1 : 2;

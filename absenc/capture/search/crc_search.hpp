@@ -20,8 +20,8 @@ struct CheckedFrame {
 };
 
 /// Limits of the search; callers must refuse longer frames.
-inline constexpr std::size_t longest_checked_frame = 64;  // bytes
-inline constexpr std::size_t longest_checked_word = 128;  // for frames of bits
+inline constexpr std::size_t longest_checked_frame = 64;  // longest frame of bytes, in bytes
+inline constexpr std::size_t longest_checked_word = 128;  // longest frame of bits, in bits
 
 enum class CheckKind : std::uint8_t {
   crc,
@@ -45,7 +45,7 @@ struct CheckSolution {
 };
 
 struct CheckSearch {
-  std::vector<CheckSolution> solutions;  // the least likely to be chance first
+  std::vector<CheckSolution> solutions;  // sorted: the solution that is least likely to be chance comes first
   std::size_t open = 0;  // number of layouts for which the frames determine too little to list solutions
 };
 

@@ -13,16 +13,16 @@
 namespace absenc::capture {
 namespace {
 
-struct Made {
+struct GeneratedCheck {
   CrcParameters parameters{};
   bool low_first = true;
   bool padded = false;
   std::size_t first = 0;     // number of bytes before the covered part
-  std::size_t covered = 8;   // number of covered bytes
+  std::size_t covered = 8;   // number of bytes that the checksum covers
   std::size_t trailing = 0;  // number of bytes behind the checksum
 };
 
-CheckedFrame frame_of(const Made& made, std::mt19937& random, std::size_t longer = 0) {
+CheckedFrame frame_of(const GeneratedCheck& made, std::mt19937& random, std::size_t longer = 0) {
   CheckedFrame frame;
   const auto byte = [&random] { return static_cast<std::uint8_t>(random()); };
   for (std::size_t i = 0; i < made.first + made.covered + longer; ++i) frame.bytes.push_back(byte());
@@ -37,7 +37,7 @@ CheckedFrame frame_of(const Made& made, std::mt19937& random, std::size_t longer
   return frame;
 }
 
-std::vector<CheckedFrame> frames_of(const Made& made, std::size_t count, std::mt19937& random) {
+std::vector<CheckedFrame> frames_of(const GeneratedCheck& made, std::size_t count, std::mt19937& random) {
   std::vector<CheckedFrame> frames;
   for (std::size_t i = 0; i < count; ++i) frames.push_back(frame_of(made, random));
   return frames;
@@ -46,7 +46,7 @@ std::vector<CheckedFrame> frames_of(const Made& made, std::size_t count, std::mt
 // A CRC with the polynomial x^8 + 1 is an exclusive or and is reported as such.
 bool is_exclusive_or(const CrcParameters& crc) { return crc.width == 8 && crc.poly == 1 && crc.refin == crc.refout; }
 
-bool says(const CheckSolution& solution, const Made& made) {
+bool describes(const CheckSolution& solution, const GeneratedCheck& made) {
   if (is_exclusive_or(made.parameters)) {
     return solution.kind == CheckKind::exclusive_or && solution.trailing == made.trailing &&
            solution.parameters.init == (made.parameters.init ^ made.parameters.xorout) &&
@@ -58,28 +58,28 @@ bool says(const CheckSolution& solution, const Made& made) {
          std::find(solution.first.begin(), solution.first.end(), made.first) != solution.first.end();
 }
 
-bool found(const CheckSearch& search, const Made& made) {
+bool found(const CheckSearch& search, const GeneratedCheck& made) {
   return std::any_of(search.solutions.begin(), search.solutions.end(),
-                     [&](const CheckSolution& solution) { return says(solution, made); });
+                     [&](const CheckSolution& solution) { return describes(solution, made); });
 }
 
 constexpr CrcParameters esl_8{8, 0x2F, 0, true, true, 0};
 constexpr CrcParameters esl_16_channel_2{16, 0x5935, 0xFFFF, true, true, 0};
 constexpr CrcParameters rls{8, 0x97, 0, false, false, 0xFF};
 
-TEST(CrcSearch, FourFramesTellTheChecksOfEslAndRls) {
+TEST(CrcSearch, FindsChecksOfEslAndRlsFromFourFrames) {
   std::mt19937 random(1);
-  for (const Made& made :
-       {Made{.parameters = esl_8}, Made{.parameters = esl_16_channel_2, .padded = true, .covered = 7},
-        Made{.parameters = rls, .covered = 5}}) {
+  for (const GeneratedCheck& made : {GeneratedCheck{.parameters = esl_8},
+                                     GeneratedCheck{.parameters = esl_16_channel_2, .padded = true, .covered = 7},
+                                     GeneratedCheck{.parameters = rls, .covered = 5}}) {
     const CheckSearch search = find_checks(frames_of(made, 4, random));
     ASSERT_FALSE(search.solutions.empty());
-    EXPECT_TRUE(says(search.solutions.front(), made)) << search.solutions.front().parameters.poly;
+    EXPECT_TRUE(describes(search.solutions.front(), made)) << search.solutions.front().parameters.poly;
     EXPECT_EQ(frames_to_settle(search.solutions.front()), made.parameters.width == 16 ? 0u : 1u);
   }
 }
 
-TEST(CrcSearch, FourWordsTellTheCheckOfBiss) {
+TEST(CrcSearch, FindsCheckOfBissFromFourWords) {
   constexpr CrcParameters biss{6, 0x03, 0, false, false, 0x3F};
   std::mt19937 random(2);
   std::vector<CheckedFrame> frames;
@@ -106,8 +106,8 @@ TEST(CrcSearch, AConstantAddressMayBeCoveredOrNot) {
   EXPECT_EQ(search.solutions.front().first, (std::vector<std::size_t>{0, 1}));
 }
 
-TEST(CrcSearch, FramesOfTwoLengthsTellInitFromXorout) {
-  const Made made{.parameters = {8, 0x07, 0x55, false, false, 0x1A}};
+TEST(CrcSearch, SeparatesInitFromXoroutWithTwoLengths) {
+  const GeneratedCheck made{.parameters = {8, 0x07, 0x55, false, false, 0x1A}};
   std::mt19937 random(4);
   std::vector<CheckedFrame> frames = frames_of(made, 4, random);
   const CheckSearch before = find_checks(frames);
@@ -116,18 +116,18 @@ TEST(CrcSearch, FramesOfTwoLengthsTellInitFromXorout) {
   for (std::size_t i = 0; i < 3; ++i) frames.push_back(frame_of(made, random, i + 1));
   const CheckSearch after = find_checks(frames);
   ASSERT_FALSE(after.solutions.empty());
-  EXPECT_TRUE(says(after.solutions.front(), made));
+  EXPECT_TRUE(describes(after.solutions.front(), made));
   EXPECT_FALSE(after.solutions.front().init_open);
 }
 
 TEST(CrcSearch, FramesOfDifferentLengthsOnlyAreTriedWithTheUsualInits) {
-  const Made made{.parameters = {16, 0x8005, 0xFFFF, true, true, 0}};
+  const GeneratedCheck made{.parameters = {16, 0x8005, 0xFFFF, true, true, 0}};
   std::mt19937 random(5);
   std::vector<CheckedFrame> frames;
   for (std::size_t i = 0; i < 4; ++i) frames.push_back(frame_of(made, random, i));
   const CheckSearch search = find_checks(frames);
   ASSERT_FALSE(search.solutions.empty());
-  EXPECT_TRUE(says(search.solutions.front(), made));
+  EXPECT_TRUE(describes(search.solutions.front(), made));
 }
 
 TEST(CrcSearch, FindsASum) {
@@ -184,11 +184,11 @@ TEST(CrcSearch, AnExclusiveOrIsFoundWithItsComplement) {
   EXPECT_EQ(search.solutions.front().parameters.init, 0xFF);
 }
 
-TEST(CrcSearch, TheCrcThatIsAnExclusiveOrIsFoundWhicheverWayItsBitsGo) {
+TEST(CrcSearch, FindsExclusiveOrCrcInBothBitOrders) {
   for (const bool refin : {false, true}) {
     for (const bool refout : {false, true}) {
       std::mt19937 random(10);
-      const Made made{.parameters = {8, 0x01, 0, refin, refout, 0xFF}, .covered = 11};
+      const GeneratedCheck made{.parameters = {8, 0x01, 0, refin, refout, 0xFF}, .covered = 11};
       EXPECT_TRUE(found(find_checks(frames_of(made, 5, random)), made)) << refin << refout;
     }
   }
@@ -197,7 +197,7 @@ TEST(CrcSearch, TheCrcThatIsAnExclusiveOrIsFoundWhicheverWayItsBitsGo) {
 // Eight frames that differ only in the same bit count as two frames.
 TEST(CrcSearch, FramesThatDifferInOneWayOnlyCountOnce) {
   std::mt19937 random(9);
-  const Made made{.parameters = esl_8};
+  const GeneratedCheck made{.parameters = esl_8};
   std::vector<CheckedFrame> frames = frames_of(made, 2, random);
   const double two = find_checks(frames).solutions.front().chance_log2;
   frames.push_back(frames[0]);
@@ -214,7 +214,7 @@ TEST(CrcSearch, NothingExplainsNoise) {
   EXPECT_TRUE(find_checks(frames).solutions.empty());
 }
 
-TEST(CrcSearch, SaysWhenFramesTellTooLittle) {
+TEST(CrcSearch, ReportsTooLittleEvidence) {
   std::mt19937 random(8);
   std::vector<CheckedFrame> frames = frames_of({.parameters = esl_8, .covered = 16}, 2, random);
   EXPECT_NE(find_checks(frames).open, 0u);
@@ -226,7 +226,7 @@ TEST(CrcSearch, SaysWhenFramesTellTooLittle) {
 
 RC_GTEST_PROP(CrcSearchProperty, FindsEveryCheckOf3To16Bits, (std::uint32_t seed)) {
   std::mt19937 random(seed);
-  Made made;
+  GeneratedCheck made;
   const unsigned width = *rc::gen::inRange<unsigned>(3, 17);
   const auto any = [&] { return static_cast<std::uint16_t>(random() & low_mask(width)); };
   const auto usual = [&] { return static_cast<std::uint16_t>(random() % 2 != 0 ? low_mask(width) : 0); };

@@ -12,8 +12,9 @@ namespace absenc::capture {
 
 namespace {
 
-constexpr unsigned many_attempts = 1u << 20;  // used when there are only one or two frames
-constexpr unsigned enough_accepted = 256;     // gives a rate with an error of some percent
+constexpr unsigned many_attempts = 1u << 20;  // number of random replies tried if there are only one or two frames
+constexpr unsigned enough_accepted = 256;  // number of accepted random replies that gives a rate with an error of some
+                                           // percent
 
 /// Stores the position of a good reply.
 struct PositionSink final : FieldSink {
@@ -37,7 +38,7 @@ std::size_t repeated(const ObservedExchange& exchange) {
 double position_of(const Reading& reading) { return static_cast<double>(reading.singleturn); }
 
 // Returns the shortest distance between two positions, as a fraction of the whole range.
-double way(const Reading& from, const Reading& to) {
+double relative_distance(const Reading& from, const Reading& to) {
   const double all = std::ldexp(1.0, static_cast<int>(from.singleturn_bits));
   const double difference = std::abs(position_of(to) - position_of(from));
   return (from.unit_um > 0 ? difference : std::min(difference, all - difference)) / all;
@@ -49,7 +50,7 @@ std::optional<double> weigh_motion(std::span<const Reading> positions) {
   double longest = 0;
   std::size_t steps = 0;
   for (std::size_t i = 1; i < positions.size(); ++i) {
-    const double one = way(positions[i - 1], positions[i]);
+    const double one = relative_distance(positions[i - 1], positions[i]);
     if (one <= 0) continue;
     ++steps;
     longest = std::max(longest, one);
@@ -79,13 +80,13 @@ class Distinct {
   }
 
  private:
-  struct Known {
+  struct KnownAcceptance {
     const ObservedExchange* exchange;
     double acceptance;
   };
 
   double acceptance_like(const ObservedExchange& exchange) {
-    for (const Known& known : known_) {
+    for (const KnownAcceptance& known : known_) {
       const ObservedExchange& other = *known.exchange;
       const bool alike = other.request == exchange.request && other.reply.bytes.size() == exchange.reply.bytes.size() &&
                          other.reply.bits == exchange.reply.bits && repeated(other) == repeated(exchange);
@@ -99,7 +100,7 @@ class Distinct {
   const Unit& unit_;
   const Options& options_;
   std::vector<const ObservedExchange*> all_;
-  std::vector<Known> known_;
+  std::vector<KnownAcceptance> known_;
 };
 
 }  // namespace

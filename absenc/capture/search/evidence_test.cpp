@@ -46,7 +46,7 @@ struct Toy {
   }
 };
 
-ObservedExchange heard(std::uint8_t value, std::uint8_t first = 7) {
+ObservedExchange exchange_of(std::uint8_t value, std::uint8_t first = 7) {
   return {.request = {.bytes = {7}}, .reply = {.bytes = {first, value}}};
 }
 
@@ -56,15 +56,15 @@ Options with_bits(std::int64_t bits) {
   return options;
 }
 
-TEST(Evidence, AcceptanceIsThatOfNoiseBehindWhatTheRequestFixes) {
-  EXPECT_NEAR(acceptance(Toy::unit(), with_bits(4), heard(1)), 16.0 / 256, 0.01);
-  EXPECT_DOUBLE_EQ(acceptance(Toy::unit(), with_bits(8), heard(1)), 1);
+TEST(Evidence, AcceptanceIsThatOfNoiseBehindRepeatedBytes) {
+  EXPECT_NEAR(acceptance(Toy::unit(), with_bits(4), exchange_of(1)), 16.0 / 256, 0.01);
+  EXPECT_DOUBLE_EQ(acceptance(Toy::unit(), with_bits(8), exchange_of(1)), 1);
   // Without a request no byte of the reply is fixed.
   const ObservedExchange unsolicited{.reply = {.bytes = {7, 1}}};
   EXPECT_NEAR(acceptance(Toy::unit(), with_bits(4), unsolicited), 16.0 / 256, 0.01);
 }
 
-TEST(Evidence, AcceptanceIsNeverNothing) {
+TEST(Evidence, AcceptanceIsNeverZero) {
   const Unit& real = *find_unit("tformat");
   const ObservedExchange good{.request = {.bytes = {0x1A}},
                               .reply = {.bytes = {0x1A, 0, 0x45, 0x23, 1, 0x11, 0x34, 0x12, 0, 0, 0x4A}}};
@@ -76,19 +76,20 @@ TEST(Evidence, AcceptanceIsNeverNothing) {
   EXPECT_LT(acceptance_of, 1e-3);
 }
 
-TEST(Evidence, AFrameThatComesAgainProvesNothingMore) {
-  const std::vector<ObservedExchange> same(5, heard(1));
+TEST(Evidence, RepeatedFrameAddsNoEvidence) {
+  const std::vector<ObservedExchange> same(5, exchange_of(1));
   const Evidence once = weigh(Toy::unit(), with_bits(4), std::span(same).first(1));
   const Evidence often = weigh(Toy::unit(), with_bits(4), same);
   EXPECT_EQ(often.explained, 5u);
   EXPECT_EQ(often.distinct, 1u);
   EXPECT_DOUBLE_EQ(once.frames, often.frames);
-  const std::vector<ObservedExchange> other{heard(1), heard(2), heard(3)};
+  const std::vector<ObservedExchange> other{exchange_of(1), exchange_of(2), exchange_of(3)};
   EXPECT_NEAR(weigh(Toy::unit(), with_bits(4), other).frames, 3 * once.frames, 1e-9);
 }
 
-TEST(Evidence, WhatIsNotExplainedCountsAgainst) {
-  const std::vector<ObservedExchange> mixed{heard(1), heard(200), heard(201), heard(202), heard(203)};
+TEST(Evidence, UnexplainedExchangesCountAgainst) {
+  const std::vector<ObservedExchange> mixed{exchange_of(1), exchange_of(200), exchange_of(201), exchange_of(202),
+                                            exchange_of(203)};
   const Evidence evidence = weigh(Toy::unit(), with_bits(4), mixed);
   EXPECT_EQ(evidence.tried, 5u);
   EXPECT_EQ(evidence.explained, 1u);
@@ -104,10 +105,10 @@ TEST(Evidence, TailOfTheBinomialDistribution) {
   EXPECT_NEAR(tail(900, 1000, 0.9), std::log10(0.53), 0.02);
 }
 
-TEST(Evidence, OfFramesThatSayNothingTheMotionTells) {
+TEST(Evidence, UsesMotionWhereFramesProveNothing) {
   const auto motion_of = [](std::initializer_list<std::uint8_t> values) {
     std::vector<ObservedExchange> exchanges;
-    for (const std::uint8_t value : values) exchanges.push_back(heard(value));
+    for (const std::uint8_t value : values) exchanges.push_back(exchange_of(value));
     return weigh(Toy::unit(), with_bits(8), exchanges);
   };
   EXPECT_FALSE(motion_of({9, 9, 9}).motion);
@@ -119,7 +120,7 @@ TEST(Evidence, OfFramesThatSayNothingTheMotionTells) {
 // A stream of random bytes of any length is attributed to no unit.
 class RandomStream : public ::testing::TestWithParam<unsigned> {};
 
-TEST_P(RandomStream, IsNobodys) {
+TEST_P(RandomStream, MatchesNoUnit) {
   for (const Unit* unit : all_units()) {
     if (unit->link != LinkKind::half_duplex && unit->link != LinkKind::full_duplex) continue;
     for (unsigned seed = GetParam(); seed < GetParam() + 4; ++seed) {
@@ -137,12 +138,12 @@ TEST_P(RandomStream, IsNobodys) {
 // Builds with sanitizers run only the first series.
 INSTANTIATE_TEST_SUITE_P(Seeds, RandomStream, ::testing::Range(0u, 40u, 4u));
 
-TEST(Hypotheses, WhatMeansTheSameIsListedOnce) {
+TEST(Hypotheses, ListsEqualMeaningsOnce) {
   static constexpr std::array<std::string_view, 2> names{"one", "other"};
   static constexpr std::array<Option, 3> options{{Toy::options[0], Toy::options[1], {"name", "", 0, 0, 0, names}}};
   Unit unit = Toy::unit();
   unit.options = options;
-  const std::vector<ObservedExchange> all{heard(254), heard(253), heard(250), heard(3, 8)};
+  const std::vector<ObservedExchange> all{exchange_of(254), exchange_of(253), exchange_of(250), exchange_of(3, 8)};
   const std::vector<Hypothesis> found = find_hypotheses(unit, {}, all);
   ASSERT_FALSE(found.empty());
   for (const Hypothesis& one : found) EXPECT_EQ(one.options[2], 0);
@@ -157,7 +158,7 @@ TEST(Hypotheses, FramesThatProveThemselvesGoFirst) {
 }
 
 TEST(Hypotheses, ModelsComeFirst) {
-  const std::vector<ObservedExchange> small{heard(1), heard(2)};
+  const std::vector<ObservedExchange> small{exchange_of(1), exchange_of(2)};
   const std::vector<Hypothesis> found = find_hypotheses(Toy::unit(), {}, small);
   ASSERT_EQ(found.size(), 1u);
   ASSERT_NE(found[0].options.model, nullptr);
@@ -166,7 +167,7 @@ TEST(Hypotheses, ModelsComeFirst) {
 }
 
 TEST(Hypotheses, TheFewestBitsWhereNoModelFits) {
-  const std::vector<ObservedExchange> large{heard(1), heard(40)};
+  const std::vector<ObservedExchange> large{exchange_of(1), exchange_of(40)};
   const std::vector<Hypothesis> found = find_hypotheses(Toy::unit(), {}, large);
   ASSERT_FALSE(found.empty());
   EXPECT_EQ(found[0].options.model, nullptr);
@@ -176,14 +177,14 @@ TEST(Hypotheses, TheFewestBitsWhereNoModelFits) {
 }
 
 TEST(Hypotheses, ASingleChoiceThatExplainsMore) {
-  const std::vector<ObservedExchange> downwards{heard(254), heard(253), heard(250)};
+  const std::vector<ObservedExchange> downwards{exchange_of(254), exchange_of(253), exchange_of(250)};
   const std::vector<Hypothesis> found = find_hypotheses(Toy::unit(), {}, downwards);
   ASSERT_FALSE(found.empty());
   EXPECT_EQ(found[0].options[1], 1);
 }
 
 TEST(Hypotheses, NothingWhereNothingIsExplained) {
-  const std::vector<ObservedExchange> other{heard(1, 8)};
+  const std::vector<ObservedExchange> other{exchange_of(1, 8)};
   EXPECT_TRUE(find_hypotheses(Toy::unit(), {}, other).empty());
 }
 
@@ -202,7 +203,7 @@ TEST(Hypotheses, EveryVectorOfEveryUnitIsFoundByItsUnit) {
   }
 }
 
-TEST(Stream, FramesAreCutOutOfWhatIsAroundThem) {
+TEST(Stream, ExtractsFramesFromNoise) {
   const Unit& unit = *find_unit("raa38");
   std::vector<std::uint8_t> bytes{0x12, 0x81};
   for (unsigned i = 0; i < 8; ++i) {

@@ -147,7 +147,7 @@ class HypothesisSearch {
     std::optional<Options> fewest;
     std::size_t most = 0;
     unsigned sum = 0;
-    const auto look = [&](const Options& options) {
+    const auto try_options = [&](const Options& options) {
       ++tried_;
       const std::size_t count = explained(options);
       const Resolution resolution = unit_.resolution(options);
@@ -158,25 +158,25 @@ class HypothesisSearch {
       fewest = options;
     };
     for (std::size_t i = 0; i < bits.size(); ++i) {
-      for (std::size_t j = i; j < bits.size(); ++j) look_at_pair(base, bits[i], bits[j], look);
+      for (std::size_t j = i; j < bits.size(); ++j) try_pair(base, bits[i], bits[j], try_options);
     }
     if (fewest) add(*fewest, true);
   }
 
-  template <class Look>
-  void look_at_pair(Options options, std::size_t one, std::size_t other, const Look& look) const {
+  template <class TryOptions>
+  void try_pair(Options options, std::size_t one, std::size_t other, const TryOptions& try_options) const {
     options.model = nullptr;
     const Option& first = unit_.options[one];
     const Option& second = unit_.options[other];
     for (std::int64_t a = first.minimum; a <= first.maximum; ++a) {
       options.values[one] = a;
       if (one == other) {
-        look(options);
+        try_options(options);
         continue;
       }
       for (std::int64_t b = second.minimum; b <= second.maximum; ++b) {
         options.values[other] = b;
-        look(options);
+        try_options(options);
       }
     }
   }

@@ -66,7 +66,7 @@ std::vector<std::uint32_t> divisors_of_degree(std::uint64_t value, unsigned degr
   };
   for (const std::uint32_t factor : irreducible_polynomials()) {
     if (width_of(factor) > degree + 1) break;
-    if (2 * (width_of(factor) - 1) > width_of(value) - 1) break;  // the rest is irreducible
+    if (2 * (width_of(factor) - 1) > width_of(value) - 1) break;  // the remaining polynomial is irreducible
     unsigned power = 0;
     for (std::uint64_t rest = value, quotient = divide(rest, factor); rest == 0; quotient = divide(rest, factor)) {
       ++power;

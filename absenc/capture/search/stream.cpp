@@ -40,7 +40,7 @@ double acceptance_of_noise(const Unit& unit, const Options& options) {
 
 // Returns whether the options themselves state the number of bits of a position, which cannot be requested from the
 // encoder.
-bool says_bits(const Unit& unit, const Options& options, std::span<const std::size_t> of_bits) {
+bool states_bits(const Unit& unit, const Options& options, std::span<const std::size_t> of_bits) {
   const Resolution resolution = unit.resolution(options);
   return std::all_of(of_bits.begin(), of_bits.end(), [&](std::size_t option) {
     return options[option] == resolution.singleturn_bits || options[option] == resolution.multiturn_bits;
@@ -54,7 +54,7 @@ std::vector<Options> stream_options(const Unit& unit) {
   const std::vector<std::size_t> of_bits = resolution_options(unit);
   if (unit.streams == nullptr || all.empty() || of_bits.empty() || of_bits.size() > 2) return all;
   const Options base = all.front();
-  std::erase_if(all, [&](const Options& one) { return !says_bits(unit, one, of_bits); });
+  std::erase_if(all, [&](const Options& one) { return !states_bits(unit, one, of_bits); });
   const Option& first = unit.options[of_bits.front()];
   const Option& second = unit.options[of_bits.back()];
   for (std::int64_t a = first.minimum; a <= first.maximum; ++a) {
@@ -64,7 +64,7 @@ std::vector<Options> stream_options(const Unit& unit) {
       options.values[of_bits.front()] = a;
       options.values[of_bits.back()] = b;
       options.model = nullptr;
-      if (says_bits(unit, options, of_bits)) all.push_back(options);
+      if (states_bits(unit, options, of_bits)) all.push_back(options);
     }
   }
   return all;
