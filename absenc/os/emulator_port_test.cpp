@@ -134,7 +134,7 @@ TEST(EmulatorPort, ReportsSchedulingDelayAsLate) {
   ASSERT_EQ(::sched_setaffinity(0, sizeof one, &one), 0);
   EmulatorPort device;
   SerialPort host(device.path(), fast);
-  const auto hear = [&] {
+  const auto receives = [&] {
     host.begin(transfer(request));
     return device.wait({.at = never, .answer = 5s}).late;
   };
@@ -145,7 +145,7 @@ TEST(EmulatorPort, ReportsSchedulingDelayAsLate) {
     });
     const Time end = os::now() + 60s;
     Time late{};
-    while (late < 1ms && os::now() < end) late = hear();
+    while (late < 1ms && os::now() < end) late = receives();
     EXPECT_GE(late, 1ms);
   }
   ::sched_setaffinity(0, sizeof before, &before);

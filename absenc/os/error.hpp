@@ -63,7 +63,7 @@ struct Interrupted : std::exception {
   [[nodiscard]] const char* what() const noexcept override { return "interrupted"; }
 };
 
-/// Thrown by a port when the time set by `StreamPort::set_end` is reached, and by every wait when an EndQuestion
+/// Thrown by a port when the time set by `StreamPort::set_end` is reached, and by every wait when a CancelCheck
 /// returns true.
 struct Ended : std::exception {
   /// Returns what happened.

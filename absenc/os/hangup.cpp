@@ -24,8 +24,8 @@ Descriptor catch_hangups() {
 }
 
 bool take_hangup(const Descriptor& hangups) {
-  signalfd_siginfo came{};
-  return ::read(hangups.get(), &came, sizeof came) > 0;
+  signalfd_siginfo received{};
+  return ::read(hangups.get(), &received, sizeof received) > 0;
 }
 
 }  // namespace absenc::os

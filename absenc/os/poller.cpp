@@ -44,11 +44,11 @@ std::span<const int> Poller::wait(Time deadline) {
   // only checks which descriptors are ready.
   const bool over = deadline < armed_ && now() >= deadline;
   if (!over && deadline < armed_) arm(deadline);
-  const Time patience = EndQuestion::patience();
-  const int look = over ? 0 : patience == never ? -1 : static_cast<int>(patience / std::chrono::milliseconds(1));
+  const Time patience = CancelCheck::interval();
+  const int timeout_ms = over ? 0 : patience == never ? -1 : static_cast<int>(patience / std::chrono::milliseconds(1));
   for (;;) {
     std::array<epoll_event, most_ready> events;
-    const int count = ::epoll_wait(epoll_.get(), events.data(), most_ready, look);
+    const int count = ::epoll_wait(epoll_.get(), events.data(), most_ready, timeout_ms);
     if (count < 0 && errno != EINTR) throw system_failure("epoll_wait", errno);
     std::size_t ready = 0;
     bool rang = false;
@@ -69,7 +69,7 @@ std::span<const int> Poller::wait(Time deadline) {
     }
     if (ready > 0) return {ready_.data(), ready};
     if (over) return {};
-    if (count == 0) EndQuestion::ask();
+    if (count == 0) CancelCheck::check();
     if (!rang) continue;
     if (now() >= deadline) return {};
     if (deadline != never) arm(deadline);

@@ -41,7 +41,7 @@ TEST(Poller, ReturnsReadableDescriptors) {
 TEST(Poller, ChecksForCancellation) {
   int calls = 0;
   const std::function<bool()> over = [&] { return ++calls == 3; };
-  const EndQuestion question(over);
+  const CancelCheck cancel_check(over);
   Poller poller;
   EXPECT_THROW(static_cast<void>(poller.wait(never)), Ended);
   EXPECT_EQ(calls, 3);

@@ -161,7 +161,7 @@ std::string holder_of(const std::string& path) {
   return holder;
 }
 
-ListedPort look_at(const std::string& path, const fs::path& sys, const fs::path& links) {
+ListedPort inspect_port(const std::string& path, const fs::path& sys, const fs::path& links) {
   const std::string terminal = fs::path(path).filename();
   ListedPort port{path, link_to(path, links), driver_of(terminal, sys), usb_adapter(terminal, sys),
                   latency_timer(terminal, sys)};

@@ -41,8 +41,8 @@ struct ListedPort {
 };
 
 /// Reads the properties of the port at `path`. `sys` and `links` are parameters for tests.
-[[nodiscard]] ListedPort look_at(const std::string& path, const std::filesystem::path& sys = "/sys/class/tty",
-                                 const std::filesystem::path& links = "/dev/serial/by-id");
+[[nodiscard]] ListedPort inspect_port(const std::string& path, const std::filesystem::path& sys = "/sys/class/tty",
+                                      const std::filesystem::path& links = "/dev/serial/by-id");
 
 /// Returns a Failure that explains why `path` did not open, with what to try. `error` is the errno of open(2), flock(2)
 /// or ioctl(2).

@@ -49,7 +49,7 @@ class ListedPorts : public ::testing::Test {
 
   [[nodiscard]] fs::path root() const { return directory_.path(); }
   [[nodiscard]] fs::path sys() const { return root() / "class"; }
-  [[nodiscard]] ListedPort look() const { return look_at(root() / "dev/ttyUSB0", sys(), root() / "by-id"); }
+  [[nodiscard]] ListedPort look() const { return inspect_port(root() / "dev/ttyUSB0", sys(), root() / "by-id"); }
 
  private:
   testing::TemporaryDirectory directory_;
@@ -86,7 +86,7 @@ TEST_F(ListedPorts, UnknownChipHasNoRate) {
 TEST_F(ListedPorts, AUartHasTheRateOfItsClock) {
   write("class/ttyS0/uartclk", "1843200");
   write("dev/ttyS0", "");
-  const ListedPort port = look_at(root() / "dev/ttyS0", sys(), root() / "by-id");
+  const ListedPort port = inspect_port(root() / "dev/ttyS0", sys(), root() / "by-id");
   EXPECT_FALSE(port.usb);
   EXPECT_EQ(port.highest_rate, 115'200u);
 }

@@ -73,13 +73,13 @@ namespace {
 thread_local const std::function<bool()>* is_over = nullptr;
 }  // namespace
 
-EndQuestion::EndQuestion(const std::function<bool()>& over) : outer_(std::exchange(is_over, over ? &over : nullptr)) {}
+CancelCheck::CancelCheck(const std::function<bool()>& over) : outer_(std::exchange(is_over, over ? &over : nullptr)) {}
 
-EndQuestion::~EndQuestion() { is_over = outer_; }
+CancelCheck::~CancelCheck() { is_over = outer_; }
 
-Time EndQuestion::patience() { return is_over == nullptr ? never : std::chrono::milliseconds(20); }
+Time CancelCheck::interval() { return is_over == nullptr ? never : std::chrono::milliseconds(20); }
 
-void EndQuestion::ask() {
+void CancelCheck::check() {
   if (is_over != nullptr && (*is_over)()) throw Ended{};
 }
 
@@ -96,11 +96,11 @@ bool wait_for(std::span<pollfd> watched, Time deadline) {
   pollfd& signal = all[watched.size()];
   signal = {interrupt_descriptor(), POLLIN, 0};  // -1 is ignored by poll
   for (;;) {
-    const Time patience = EndQuestion::patience();
-    const Time look = patience == never ? deadline : std::min(deadline, now() + patience);
+    const Time patience = CancelCheck::interval();
+    const Time poll_deadline = patience == never ? deadline : std::min(deadline, now() + patience);
     timespec timeout{};
-    if (look != never) timeout = time_left(look);
-    const int ready = ::ppoll(all.data(), watched.size() + 1, look == never ? nullptr : &timeout, nullptr);
+    if (poll_deadline != never) timeout = time_left(poll_deadline);
+    const int ready = ::ppoll(all.data(), watched.size() + 1, poll_deadline == never ? nullptr : &timeout, nullptr);
     if (ready < 0) {
       // SIGINT and SIGTERM have made the eventfd readable; other signals do not matter here.
       if (errno == EINTR) continue;
@@ -110,8 +110,8 @@ bool wait_for(std::span<pollfd> watched, Time deadline) {
       if (take_interrupt()) throw Interrupted{};
       continue;
     }
-    if (ready == 0 && look < deadline) {
-      EndQuestion::ask();
+    if (ready == 0 && poll_deadline < deadline) {
+      CancelCheck::check();
       continue;
     }
     std::copy_n(all.begin(), watched.size(), watched.begin());

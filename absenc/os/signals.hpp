@@ -26,18 +26,18 @@ bool take_interrupt();
 
 /// While an object exists, every longer wait of this thread calls `over` every 20 ms and throws Ended if it returns
 /// true: for conditions that no descriptor reports, such as a signal handled by an interpreter, or another thread.
-class EndQuestion {
+class CancelCheck {
  public:
   /// `over` must outlive the object; an empty function is never called.
-  explicit EndQuestion(const std::function<bool()>& over);
-  ~EndQuestion();
-  EndQuestion(const EndQuestion&) = delete;
-  EndQuestion& operator=(const EndQuestion&) = delete;
+  explicit CancelCheck(const std::function<bool()>& over);
+  ~CancelCheck();
+  CancelCheck(const CancelCheck&) = delete;
+  CancelCheck& operator=(const CancelCheck&) = delete;
 
-  /// Returns how long a wait may take before it must call `ask`; `never` if no object exists.
-  [[nodiscard]] static Time patience();
+  /// Returns how long a wait may take before it must call `check`; `never` if no object exists.
+  [[nodiscard]] static Time interval();
   /// Calls `over`. Throws Ended if it returns true.
-  static void ask();
+  static void check();
 
  private:
   const std::function<bool()>* outer_;
@@ -51,7 +51,7 @@ inline constexpr std::size_t most_watched = 32;
 /// Blocks until one of `watched` (at most `most_watched`) has an event, then sets `revents` of all and returns true;
 /// returns false if `deadline` (`never`: no deadline) is reached first. Events that are ready at once are seen even
 /// after the deadline. Throws Interrupted once for each signal, or for several that arrived together, so that unwinding
-/// code may wait again; throws Ended (EndQuestion) and Failure.
+/// code may wait again; throws Ended (CancelCheck) and Failure.
 bool wait_for(std::span<pollfd> watched, Time deadline);
 
 /// Sleeps until `time`: late by the kernel's timer slack (50 us) and scheduling, never early. Throws as `wait_for`

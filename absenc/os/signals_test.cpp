@@ -89,12 +89,12 @@ TEST_F(Signals, OfOtherKindsDoNotEndAWait) {
   ::sigaction(SIGALRM, &before, nullptr);
 }
 
-TEST(EndQuestion, EndsAWaitWithoutEvents) {
+TEST(CancelCheck, EndsAWaitWithoutEvents) {
   int calls = 0;
   const std::function<bool()> over = [&] { return ++calls == 3; };
-  const EndQuestion question(over);
+  const CancelCheck cancel_check(over);
   {
-    const EndQuestion none({});
+    const CancelCheck none({});
     EXPECT_FALSE(wait_for({}, now() + 50ms));
     EXPECT_EQ(calls, 0);
   }

@@ -110,11 +110,11 @@ TEST(SocketCan, ReportsQueuedFramesBeforeTheRequest) {
   SocketCan port("can0", line, kernel);
   kernel.put(raw(0x120, {1}));
   kernel.age = 5ms;
-  const Time asked = port.now();
+  const Time requested = port.now();
   port.begin(sending(request));
   const FrameEvent old = port.wait({.at = never});
   EXPECT_EQ(old.kind, EventKind::received);
-  EXPECT_LT(old.at, asked);
+  EXPECT_LT(old.at, requested);
   EXPECT_EQ(port.wait({.at = never}).kind, EventKind::sent);
 }
 

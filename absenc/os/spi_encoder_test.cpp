@@ -230,16 +230,16 @@ TEST_F(SpiEncoder, BytesBothWays) {
   });
   kernel.connect(LinkKind::spi, {.rate = 1'000'000, .spi_mode = 1}, device);
   SpiPort port(FakeSpi::path, LinkKind::spi, {.rate = 1'000'000, .spi_mode = 1}, {}, kernel);
-  Data heard;
+  Data received_bytes;
   toy::Toy<std::uint8_t> host([&](auto& self, const ByteEvent& event) {
     if (event.kind != ByteEvent::Kind::received) return;
-    heard = data(event.items);
+    received_bytes = data(event.items);
     self.finish();
   });
   host.idle.at = never;
   host.send({0x11, 0x22}, {}, 0, 4);
   ASSERT_TRUE(run(host, port));
-  EXPECT_EQ(heard, (Data{0xA1, 0xB2, 0xC3, 0xFF}));
+  EXPECT_EQ(received_bytes, (Data{0xA1, 0xB2, 0xC3, 0xFF}));
   EXPECT_NE(device.log.find("received 11 22 00 00"), std::string::npos) << device.log;
 }
 

@@ -30,7 +30,7 @@ class LatePort final : public Port<Item> {
       rest(std::max(time_, step.at));
       quiet_since_ = time_;
       received_ = silence_reported_ = false;
-      answering_ = false;
+      reply_begun_ = false;
     }
     inner_->begin(step);
   }
@@ -81,7 +81,7 @@ class LatePort final : public Port<Item> {
   };
 
   void enqueue(const Event<Item>& event) {
-    if (!std::exchange(answering_, true)) late_ = delay_();
+    if (!std::exchange(reply_begun_, true)) late_ = delay_();
     if (late_ == never) return;
     const Time at = std::max(event.at + late_, delayed_.empty() ? Time{} : delayed_.back().at);
     delayed_.push_back({at, {event.items.begin(), event.items.end()}});
@@ -102,7 +102,7 @@ class LatePort final : public Port<Item> {
   Time late_{};
   bool received_ = false;
   bool silence_reported_ = false;
-  bool answering_ = false;  // an item was received since the last request
+  bool reply_begun_ = false;  // an item was received since the last request
 };
 
 }  // namespace absenc::sim::testing

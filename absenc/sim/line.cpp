@@ -125,11 +125,11 @@ bool Line<Item>::step() {
     deadline(late);
     return true;
   }
-  const ScheduledEvent happening = scheduled_.top();
+  const ScheduledEvent scheduled = scheduled_.top();
   scheduled_.pop();
-  const Node node = happening.node;
-  const bool current = happening.generation == nodes_[node]->begin_generation;
-  switch (happening.kind) {
+  const Node node = scheduled.node;
+  const bool current = scheduled.generation == nodes_[node]->begin_generation;
+  switch (scheduled.kind) {
     case Kind::begin:
       if (current) begin(node);
       break;

@@ -51,7 +51,7 @@ Annotator::Annotator(const Unit& unit, const Options& options, const Settings& s
 
 void Annotator::put(const Character& character) {
   if (character.channel >= settings_.channel_count) return;
-  if (channels_[0].carries == Carries::one) {
+  if (channels_[0].carries == Carries::detect) {
     store_undecided(character);
   } else {
     take(character);
@@ -59,7 +59,7 @@ void Annotator::put(const Character& character) {
 }
 
 void Annotator::finish(Tick end) {
-  if (channels_[0].carries == Carries::one) find_roles();
+  if (channels_[0].carries == Carries::detect) find_roles();
   Channel* first = channels_.data();
   Channel* second = channels_.data() + 1;
   if (!second->run.empty() && (first->run.empty() || second->run.end() < first->run.end())) std::swap(first, second);

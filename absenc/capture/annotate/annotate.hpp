@@ -21,7 +21,7 @@ enum class Carries : std::uint8_t {
   both,
   requests,
   replies,
-  one,  // unknown: of two channels, one carries requests and the other replies; detected from their content
+  detect,  // unknown: of two channels, one carries requests and the other replies; detected from their content
 };
 
 /// Returns the times of the unit's line in ticks of a capture. `ticks_per_bit` 0: the characters have no lengths, and
@@ -63,10 +63,10 @@ class Annotator {
   /// Ends the capture at `end`.
   void finish(Tick end);
   /// by_arrival: reports all complete good frames so far, without waiting for further characters.
-  void hand_out();
+  void report_complete();
   /// by_arrival: the line was silent for so long that no frame continues and no reply can follow.
-  void fall_silent();
-  /// Returns what a channel carries; `one` while it is not known.
+  void report_after_silence();
+  /// Returns what a channel carries; `detect` while it is not known.
   [[nodiscard]] Carries carries(std::size_t channel) const { return channels_[channel].carries; }
 
  private:

@@ -9,12 +9,12 @@
 
 namespace absenc::capture {
 
-void Annotator::hand_out() {
+void Annotator::report_complete() {
   Channel& channel = channels_[0];
   if (!channel.run.empty()) parse(channel, false, false);
 }
 
-void Annotator::fall_silent() {
+void Annotator::report_after_silence() {
   Channel& channel = channels_[0];
   close(channel, false);
   is_first_ = false;

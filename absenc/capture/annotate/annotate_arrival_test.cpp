@@ -105,7 +105,7 @@ class Arrival : public ::testing::TestWithParam<const Unit*> {
 
   void receive(const Wire& bytes) {
     for (const std::uint8_t byte : bytes) annotator->put({.begin = now, .end = now, .value = byte});
-    annotator->hand_out();
+    annotator->report_complete();
   }
 
   [[nodiscard]] std::vector<Exchange> good() const {
@@ -153,7 +153,7 @@ TEST_P(Arrival, ExchangesInPartsAndSeveralAtOnce) {
     at += size;
     now += random.below(10) == 0 ? 5 * gap : 1;  // the pauses also lie within frames
   }
-  annotator->fall_silent();
+  annotator->report_after_silence();
   EXPECT_EQ(difference(good(), exchanges), "");
   EXPECT_EQ(others(), 0u);
 }
@@ -184,7 +184,7 @@ TEST_P(Arrival, CaptureBeginsWithinAnExchange) {
     now += 1000;
     start(false);
     receive({all.begin() + static_cast<std::ptrdiff_t>(from), all.end()});
-    annotator->fall_silent();
+    annotator->report_after_silence();
     const std::vector<Exchange> found = good();
     ASSERT_GE(found.size() + 3, exchanges.size()) << from << " " << hex(collector.found[0].reply) << " " << hex(all);
     // Each exchange found was really sent, and the last ones are in their order.
@@ -220,7 +220,7 @@ TEST_P(Arrival, ADamagedReplyCostsNoOtherExchange) {
     receive(reply);
     now += 2 * gap;
   }
-  annotator->fall_silent();
+  annotator->report_after_silence();
   EXPECT_EQ(difference(good(), whole), "");
   std::size_t bad = 0;
   for (const FoundAnnotation& one : collector.found) bad += one.error != Error::none ? 1u : 0u;
@@ -239,7 +239,7 @@ TEST_P(Arrival, ReportsUnansweredRequests) {
     receive(exchanges[0].request);
   }
   EXPECT_GE(collector.found.size() + 3, count) << "they are handed out while it goes on";
-  annotator->fall_silent();
+  annotator->report_after_silence();
   EXPECT_EQ(good().size(), 1u);
   EXPECT_EQ(collector.found.size(), 1 + count);
   for (std::size_t i = 1; i < collector.found.size(); ++i) {
@@ -275,7 +275,7 @@ TEST_P(Arrival, ReportsUnsolicitedFrames) {
     now += 5 * gap;
     receive({frame.begin() + 2, frame.end()});
   }
-  annotator->fall_silent();
+  annotator->report_after_silence();
   ASSERT_EQ(collector.found.size(), frames.size());
   for (std::size_t i = 0; i < frames.size(); ++i) {
     EXPECT_EQ(collector.found[i].error, Error::none);

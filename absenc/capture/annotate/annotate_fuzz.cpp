@@ -56,7 +56,7 @@ void annotate(const Unit& unit, const Options& options, Annotator::Settings sett
   annotator->finish(at);
   const std::size_t all = times * data.size();
   const bool is_complete = check.bytes <= all && check.bytes + check.hidden >= all;
-  require(is_complete || all > Exchanges::Asked::capacity);
+  require(is_complete || all > Exchanges::PendingRequest::capacity);
 }
 
 }  // namespace
@@ -71,12 +71,12 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     static_cast<void>(resolve_options(*unit, {}, {}, options));
     Annotator::Settings settings;
     settings.ticks = {.pause = length / 2, .character = length, .turnaround = 3, .limit = 20};
-    constexpr std::array lines{Carries::both, Carries::requests, Carries::replies, Carries::one};
+    constexpr std::array lines{Carries::both, Carries::requests, Carries::replies, Carries::detect};
     const Carries carries = lines[turn++ % lines.size()];
     settings.channels[0] = carries;
     settings.begins_silent = carries == Carries::both;
-    if (carries == Carries::one) {
-      settings.channels = {Carries::one, Carries::one};
+    if (carries == Carries::detect) {
+      settings.channels = {Carries::detect, Carries::detect};
       settings.channel_count = 2;
     }
     annotate(*unit, options, settings, bytes, true, 1);

@@ -39,13 +39,14 @@ struct OwnedAnnotation {
 
 struct AnnotationCollector final : AnnotationSink {
   void put(const Annotation& annotation) override {
-    kept.push_back({annotation.kind, annotation.remark, annotation.error, annotation.begin, annotation.end,
-                    Wire(annotation.request.bytes.begin(), annotation.request.bytes.end()),
-                    Wire(annotation.reply.bytes.begin(), annotation.reply.bytes.end()),
-                    annotation.contents.reading == nullptr ? std::nullopt : std::optional(*annotation.contents.reading),
-                    annotation.turnaround});
+    collected.push_back(
+        {annotation.kind, annotation.remark, annotation.error, annotation.begin, annotation.end,
+         Wire(annotation.request.bytes.begin(), annotation.request.bytes.end()),
+         Wire(annotation.reply.bytes.begin(), annotation.reply.bytes.end()),
+         annotation.contents.reading == nullptr ? std::nullopt : std::optional(*annotation.contents.reading),
+         annotation.turnaround});
   }
-  std::vector<OwnedAnnotation> kept;
+  std::vector<OwnedAnnotation> collected;
 };
 
 std::string to_text(const Wire& bytes) {
@@ -98,8 +99,8 @@ class Truth {
     const bool clocked = unit.link == LinkKind::clocked;
     const Frame request{.bytes = clocked ? Bytes{} : Bytes(burst.out).first(2)};
     const std::optional<std::size_t> place = judge_.control_bit({.bytes = bits, .bits = burst.bits - idle});
-    const bool says_one = place && (bits[*place / 8] >> (7 - *place % 8) & 1) != 0;
-    if (says_one && control_.may_answer()) bits[*place / 8] &= static_cast<std::uint8_t>(~(0x80u >> *place % 8));
+    const bool bit_is_one = place && (bits[*place / 8] >> (7 - *place % 8) & 1) != 0;
+    if (bit_is_one && control_.may_answer()) bits[*place / 8] &= static_cast<std::uint8_t>(~(0x80u >> *place % 8));
     Error error = judge_.decode(request, {.bytes = bits, .bits = clocked ? burst.bits - idle : 0});
     // A host may clock on behind a frame.
     const std::size_t size = clocked ? 0 : judge_.frame_size(Direction::reply, bits);
@@ -117,7 +118,7 @@ class Truth {
                         bits,
                         reading(error),
                         {}});
-    if (unit.control_bit != nullptr) control_.put(burst, says_one, error);
+    if (unit.control_bit != nullptr) control_.put(burst, bit_is_one, error);
   }
 
   std::vector<OwnedAnnotation> expected;
@@ -170,38 +171,39 @@ class Truth {
     add(Kind::reply, Remark::none, Error::none, {sent.by, last, turn, sent.end}, reading(Error::none));
   }
 
-  void answered(const Transmission& asked, const Transmission& sent) {
+  void answered(const Transmission& request_sent, const Transmission& sent) {
     Wire reply = sent.bytes;
-    OwnedAnnotation one{Kind::exchange, Remark::none, Error::none, asked.begin, sent.end, asked.bytes, {}, {}, {}};
-    one.turnaround = sent.begin - asked.end;
+    OwnedAnnotation one{
+        Kind::exchange, Remark::none, Error::none, request_sent.begin, sent.end, request_sent.bytes, {}, {}, {}};
+    one.turnaround = sent.begin - request_sent.end;
     const Tick each = (sent.end - sent.begin) / reply.size();
     const auto good = [&](const Wire& bytes) {
-      return judge_.decode({.bytes = asked.bytes}, {.bytes = bytes}) == Error::none;
+      return judge_.decode({.bytes = request_sent.bytes}, {.bytes = bytes}) == Error::none;
     };
     const Wire half(reply.begin(), reply.begin() + static_cast<std::ptrdiff_t>(reply.size() / 2));
     const Wire second(reply.begin() + static_cast<std::ptrdiff_t>(reply.size() / 2), reply.end());
     bool twice = half == second && !half.empty() && good(half);
     if (twice) reply = half;
     if (twice) one.end = sent.begin + each * half.size();
-    if (!good(reply) && reply.size() > asked.bytes.size() &&
-        std::equal(asked.bytes.begin(), asked.bytes.end(), reply.begin())) {
-      const Wire behind(reply.begin() + static_cast<std::ptrdiff_t>(asked.bytes.size()), reply.end());
+    if (!good(reply) && reply.size() > request_sent.bytes.size() &&
+        std::equal(request_sent.bytes.begin(), request_sent.bytes.end(), reply.begin())) {
+      const Wire behind(reply.begin() + static_cast<std::ptrdiff_t>(request_sent.bytes.size()), reply.end());
       if (good(behind)) {
         one.remark = Remark::echo;
-        one.turnaround = *one.turnaround + each * asked.bytes.size();
+        one.turnaround = *one.turnaround + each * request_sent.bytes.size();
         reply = behind;
       }
     }
-    one.error = judge_.decode({.bytes = asked.bytes}, {.bytes = reply});
+    one.error = judge_.decode({.bytes = request_sent.bytes}, {.bytes = reply});
     one.reply = reply;
-    if (one.error == Error::unsupported && !judge_.is_answered({.bytes = asked.bytes})) {
+    if (one.error == Error::unsupported && !judge_.is_answered({.bytes = request_sent.bytes})) {
       one.error = Error::none;
       one.remark = Remark::undocumented;
     }
     one.reading = reading(one.error);
     // The reply equals its request, so this may be a late reply or the repeated request.
     if (one.error == Error::none && *one.turnaround > static_cast<Tick>(limit_.count()) && one.request == one.reply) {
-      add(Kind::request, Remark::unanswered, Error::timeout, asked, {});
+      add(Kind::request, Remark::unanswered, Error::timeout, request_sent, {});
       return add(Kind::request, Remark::unanswered, Error::timeout, sent, {});
     }
     if (one.error == Error::none && *one.turnaround > static_cast<Tick>(limit_.count())) {
@@ -285,7 +287,7 @@ Annotator::Settings settings_of(const Unit& unit) {
   settings.ticks = line_ticks(unit, 1e9 / testing::line_of(unit).rate, 1'000'000'000);
   settings.begins_silent = true;
   if (unit.link == LinkKind::full_duplex) {
-    settings.channels = {Carries::one, Carries::one};
+    settings.channels = {Carries::detect, Carries::detect};
     settings.channel_count = 2;
   }
   return settings;
@@ -316,11 +318,11 @@ class Characters : public ::testing::TestWithParam<const Unit*> {
     end = talker.now();
   }
   std::vector<OwnedAnnotation> annotate(const Annotator::Settings& settings) const {
-    AnnotationCollector keeper;
-    const auto annotator = std::make_unique<Annotator>(unit, options, settings, keeper);
+    AnnotationCollector collector;
+    const auto annotator = std::make_unique<Annotator>(unit, options, settings, collector);
     for (const Character& character : characters) annotator->put(character);
     annotator->finish(end);
-    return keeper.kept;
+    return collector.collected;
   }
 
   Truth truth{unit, options};
@@ -439,15 +441,15 @@ TEST_P(Bursts, EveryExchange) {
   const Options options = testing::options_of(unit);
   Talker talker(unit, options, faults_of(unit, options), 6);
   Truth truth(unit, options);
-  AnnotationCollector keeper;
-  BurstAnnotator annotator(unit, options, keeper);
+  AnnotationCollector collector;
+  BurstAnnotator annotator(unit, options, collector);
   while (truth.expected.size() < 5000) {
     for (const Burst& burst : talker.talk().bursts) {
       truth.add(burst, unit);
       annotator.put(burst);
     }
   }
-  expect_same(keeper.kept, truth.expected);
+  expect_same(collector.collected, truth.expected);
   EXPECT_GT(talker.faulty().damaged_replies(), 100u);
 }
 

@@ -11,8 +11,8 @@
 
 #include "absenc/capture/annotate/annotate.hpp"
 #include "absenc/capture/annotate/annotate_frames.hpp"
+#include "absenc/capture/annotate/completed_readings.hpp"
 #include "absenc/capture/annotate/conversation_test.hpp"
-#include "absenc/capture/annotate/remembering.hpp"
 #include "absenc/protocol/all.hpp"
 
 namespace absenc::capture {
@@ -188,7 +188,7 @@ TEST_P(OfUnit, FindsWireOfRequests) {
       }
     }
     Annotator::Settings settings;
-    settings.channels = {Carries::one, Carries::one};
+    settings.channels = {Carries::detect, Carries::detect};
     settings.channel_count = 2;
     settings.begins_silent = true;
     settings.ticks = line_ticks(unit, 1e9 / testing::line_of(unit).rate, 1'000'000'000);
@@ -332,7 +332,7 @@ TEST(Can, NodesAnswerInAnyOrder) {
 
 // A toy whose replies with bit 0 report its only alarm and are valid then; replies without it depend on an earlier one
 // of the same node.
-TEST(Remembering, CompletesAReadingByWhatTheSameEncoderReported) {
+TEST(CompletedReadings, CompletesAReadingByWhatTheSameEncoderReported) {
   static constexpr std::array<FieldInfo, 1> fields{
       {{.name = "node", .kind = FieldInfo::Kind::number, .unit = "", .meaning = "", .role = Role::encoder}}};
   Unit unit = toy();
@@ -347,7 +347,7 @@ TEST(Remembering, CompletesAReadingByWhatTheSameEncoderReported) {
     }
     bool known = false;
   } last;
-  Remembering remembering(unit, {}, last);
+  CompletedReadings remembering(unit, {}, last);
   const auto is_known_after = [&](std::int64_t node, std::uint32_t reported, Error error = Error::none) {
     const Reading reading{.singleturn_known = false, .alarms_reported = reported};
     const FieldValue value{.info = &fields[0], .number = node};
@@ -368,16 +368,16 @@ TEST(Remembering, CompletesAReadingByWhatTheSameEncoderReported) {
 
 // The capture has an ID 3 reply with counter_overflow, resets of all errors, and an ID 0 reply, which does not carry
 // that alarm.
-TEST(Remembering, ForgetsAlarmsThatWereCleared) {
+TEST(CompletedReadings, ForgetsAlarmsThatWereCleared) {
   const Unit& unit = *find_unit("tformat");
   const Options options = testing::options_of(unit);
   struct Last final : AnnotationSink {
     void put(const Annotation& one) override { reading = *one.contents.reading; }
     Reading reading{};
   } last;
-  Remembering remembering(unit, options, last);
-  const auto after = [&](std::uint8_t asked, std::vector<std::uint8_t> reply) {
-    const std::vector<std::uint8_t> request{asked};
+  CompletedReadings remembering(unit, options, last);
+  const auto after = [&](std::uint8_t command, std::vector<std::uint8_t> reply) {
+    const std::vector<std::uint8_t> request{command};
     std::uint8_t check = 0;
     for (const std::uint8_t byte : reply) check ^= byte;
     reply.push_back(check);
@@ -408,7 +408,7 @@ TEST(Can, EachReplyBelongsToTheNewestRequest) {
   ASSERT_EQ(resolve_options(unit, {}, {}, options).kind, OptionError::Kind::none);
   AnnotationCollector collector;
   CanAnnotator annotator(unit, options, {.limit = 100'000}, collector);
-  const auto ask = [&](Tick at) {
+  const auto send_request = [&](Tick at) {
     CanRecord one = record(at, 0x220, 0xFF);
     one.frame.data[0] = 0x80;
     one.frame.data[1] = 0x20;
@@ -420,7 +420,7 @@ TEST(Can, EachReplyBelongsToTheNewestRequest) {
     annotator.put(one);
   };
   for (Tick i = 0; i < 6; ++i) {
-    ask(1000 * i);
+    send_request(1000 * i);
     if (i != 3) reply(1000 * i + 70, i != 1);
   }
   annotator.finish(1'000'000);

@@ -60,10 +60,10 @@ class WireLevels {
   [[nodiscard]] Tick next_change() const { return std::min(next_, drawing_.end()); }
   /// Applies all changes up to and including `time`.
   void advance(Tick time) {
-    constexpr unsigned now_and_then = 4096;
+    constexpr unsigned changes_per_report = 4096;
     for (; next_ <= time && next_ != none; take()) {
       levels[wire_] = !levels[wire_];
-      if (++taken_ % now_and_then == 0) drawing_.look();
+      if (++taken_ % changes_per_report == 0) drawing_.report_progress();
     }
   }
 
@@ -109,7 +109,7 @@ class Samples {
 
   /// Writes as many whole samples as fit. Returns the number of bytes.
   std::size_t fill(std::uint8_t* bytes, std::size_t room) {
-    drawing_.look();
+    drawing_.report_progress();
     const std::size_t wanted = room / size;
     for (std::size_t done = 0; done < wanted;) {
       if (sample_ >= changes_at_) take_change();
@@ -128,7 +128,7 @@ class Samples {
 
   const std::size_t size;  // number of bytes per sample
   const std::uint64_t count;
-  std::exception_ptr trouble{};  // exception that ended the computation
+  std::exception_ptr exception{};  // exception that ended the computation
 
  private:
   // Returns the index of the first sample that is not before `time`.
@@ -180,7 +180,7 @@ zip_int64_t provide(void* state, void* data, zip_uint64_t size, zip_source_cmd_t
         part.given += filled;
         return static_cast<zip_int64_t>(filled);
       } catch (...) {  // no exception may pass through libzip, which is C
-        part.samples->trouble = std::current_exception();
+        part.samples->exception = std::current_exception();
         return -1;
       }
     }
@@ -336,7 +336,7 @@ void write_sigrok(const std::string& path, Drawing& drawing, std::uint64_t rate)
   }
   // Compresses all files, in their order.
   if (zip_close(archive.get()) != 0) {
-    if (samples.trouble != nullptr) std::rethrow_exception(samples.trouble);
+    if (samples.exception != nullptr) std::rethrow_exception(samples.exception);
     fail(path, zip_strerror(archive.get()));
   }
   static_cast<void>(archive.release());

@@ -47,13 +47,13 @@ class Drawing {
   void label(Tick at, std::string_view words);
   void set_end(Tick end) { end_ = end; }
   /// Sets a function that is called regularly while the drawing is written; an exception from it ends the writing.
-  void watch(std::function<void()> look) { look_ = std::move(look); }
+  void watch(std::function<void()> report_progress) { on_progress_ = std::move(report_progress); }
 
   [[nodiscard]] const std::string& title() const { return title_; }
   [[nodiscard]] const std::vector<Wire>& wires() const { return wires_; }
   [[nodiscard]] Tick end() const { return end_; }
-  void look() const {
-    if (look_) look_();
+  void report_progress() const {
+    if (on_progress_) on_progress_();
   }
 
   /// Restarts the iteration over the changes at the first one.
@@ -71,7 +71,7 @@ class Drawing {
   Tick last_change_ = 0;
   Tick last_label_ = 0;
   Tick end_ = 0;
-  std::function<void()> look_;
+  std::function<void()> on_progress_;
 };
 
 /// Stores the changes and comments of a sim::Waveform, or of a class with the same interface, in a drawing, shifted by

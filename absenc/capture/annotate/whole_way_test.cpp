@@ -77,7 +77,7 @@ class WholeWay : public ::testing::TestWithParam<const Unit*> {
     BurstAnnotator bursts(unit, options, lines);
     const auto characters = std::make_unique<Annotator>(unit, options, settings, lines);
     Tick end = 0;
-    const Sink sink = [&](const Part& part) {
+    const PartSink sink = [&](const DecodedPart& part) {
       for (const Burst& burst : part.bursts) bursts.put(burst);
       for (const Character& character : part.characters) characters->put(character);
       end = part.end;

@@ -13,7 +13,7 @@ namespace absenc::capture {
 namespace {
 
 constexpr std::size_t block_frames = 1 << 14;
-constexpr std::uint64_t times_looked_at = 1 << 16;
+constexpr std::uint64_t times_examined = 1 << 16;
 
 bool parse_identifier(std::string_view text, CanRecord& record) {
   if (text.size() != 3 && text.size() != 8) return false;
@@ -104,9 +104,9 @@ class CandumpReader final : public ParsedReader {
       if (!take_line(block)) {
         done_ = true;
         others_.report(damages_, "frames of CAN FD or CAN XL are left out");
-        strangers_.report(
-            damages_,
-            "frames are of interfaces that the first 64 KiB do not name, and left out; the first: " + stranger_);
+        unknown_frames_.report(damages_,
+                               "frames are of interfaces that the first 64 KiB do not name, and left out; the first: " +
+                                   unknown_interface_);
         break;
       }
     }
@@ -124,7 +124,7 @@ class CandumpReader final : public ParsedReader {
     std::optional<Instant> last;
     bool first = true;
     bool rises = true;
-    while (lines.next(line) && lines.offset() < times_looked_at) {
+    while (lines.next(line) && lines.offset() < times_examined) {
       if (trim(line).empty()) continue;
       if (!parse_candump(line, parsed)) break;
       if (std::exchange(first, false)) timed_ = parsed.timed;
@@ -168,8 +168,8 @@ class CandumpReader final : public ParsedReader {
     if (parsed.kind == CandumpLine::Kind::other_can) {
       others_.add(lines_.offset(), at_);
     } else if (channel == layout_.channels.size()) {
-      if (strangers_.count == 0) stranger_ = parsed.channel.substr(0, 32);
-      strangers_.add(lines_.offset(), at_);
+      if (unknown_frames_.count == 0) unknown_interface_ = parsed.channel.substr(0, 32);
+      unknown_frames_.add(lines_.offset(), at_);
     } else {
       parsed.record.at = at_;
       parsed.record.channel = static_cast<std::uint8_t>(channel);
@@ -202,9 +202,9 @@ class CandumpReader final : public ParsedReader {
   std::optional<Instant> origin_;
   std::uint64_t index_ = 0;
   Tick at_ = 0;
-  std::string stranger_;
+  std::string unknown_interface_;
   Occurrences others_;
-  Occurrences strangers_;
+  Occurrences unknown_frames_;
 };
 
 }  // namespace

@@ -61,7 +61,7 @@ bool append_groups(std::string_view text, std::vector<std::uint8_t>& bytes) {
 // Parses a line like "00000010  48 65 6c  |Hel|".
 bool parse_dump(std::string_view line, HexLine& parsed) {
   if (line == "*") {
-    parsed.trouble = "'*' stands for lines that the dump left out: write it with hexdump -v -C or od -v";
+    parsed.problem = "'*' stands for lines that the dump left out: write it with hexdump -v -C or od -v";
     return false;
   }
   line = line.substr(0, line.find('|'));
@@ -70,7 +70,7 @@ bool parse_dump(std::string_view line, HexLine& parsed) {
   if (!parsed.offset || offset.size() < 6) return false;
   for (std::string_view word = take_word(line); !word.empty(); word = take_word(line)) {
     if (word.size() != 2 || !append_group(word, parsed.bytes)) {
-      parsed.trouble = "a dump needs single bytes: write it with hexdump -v -C or xxd";
+      parsed.problem = "a dump needs single bytes: write it with hexdump -v -C or xxd";
       return false;
     }
   }
@@ -80,7 +80,7 @@ bool parse_dump(std::string_view line, HexLine& parsed) {
 // Parses a line like "00000010: 4865 6c6c 6f0a            Hello." The text begins behind two blanks.
 bool parse_xxd(std::string_view line, HexLine& parsed) {
   if (line == "*") {
-    parsed.trouble = "'*' stands for lines that the dump left out: write it without -a";
+    parsed.problem = "'*' stands for lines that the dump left out: write it without -a";
     return false;
   }
   const std::size_t colon = line.find(':');
@@ -161,7 +161,7 @@ bool parse_hex_line(HexForm form, std::string_view line, HexLine& parsed) {
   parsed.offset.reset();
   parsed.bytes.clear();
   parsed.source.clear();
-  parsed.trouble.clear();
+  parsed.problem.clear();
   switch (form) {
     case HexForm::plain:
       return parse_log_line(line, parsed);

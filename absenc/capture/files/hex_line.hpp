@@ -23,7 +23,7 @@ struct HexLine {
   std::optional<std::uint64_t> offset;
   std::vector<std::uint8_t> bytes;
   std::string source;   // name of the port in a terminal log; "": none
-  std::string trouble;  // reason why the line is invalid
+  std::string problem;  // reason why the line is invalid
 };
 
 /// Parses a group: two digits, or more with a prefix: 1A, 1A00, 0x1A, \x1A, $1A. Returns false and leaves `bytes` if it
@@ -36,7 +36,7 @@ bool append_group(std::string_view group, std::vector<std::uint8_t>& bytes);
 /// Returns the form of a file, found from its first line; nothing if the form is unknown.
 [[nodiscard]] std::optional<HexForm> hex_form(std::string_view line);
 
-/// Parses a line. Returns false if it does not have this form; `trouble` may contain the reason.
+/// Parses a line. Returns false if it does not have this form; `problem` may contain the reason.
 [[nodiscard]] bool parse_hex_line(HexForm form, std::string_view line, HexLine& parsed);
 
 }  // namespace absenc::capture

@@ -81,8 +81,8 @@ class HexTextReader final : public ParsedReader {
     line = content_of(line, form_);
     if (line.empty()) return true;
     if (!parse_hex_line(form_, line, line_)) {
-      return fail(!line_.trouble.empty()
-                      ? line_.trouble
+      return fail(!line_.problem.empty()
+                      ? line_.problem
                       : "this line does not hold bytes in the form of the first: is the file cut here?");
     }
     if (line_.bytes.empty()) {
@@ -151,12 +151,12 @@ class HexTextReader final : public ParsedReader {
 
 }  // namespace
 
-std::string hex_text_trouble(std::string_view head) {
+std::string hex_text_problem(std::string_view head) {
   for (std::size_t lines = 0; !head.empty() && lines < 100; ++lines) {
     const std::string_view whole = head.substr(0, head.find('\n'));
     const std::string_view line = strip_comment(whole);
     HexLine parsed;
-    if (!line.empty()) return parse_hex_line(HexForm::plain, line, parsed) ? "" : parsed.trouble;
+    if (!line.empty()) return parse_hex_line(HexForm::plain, line, parsed) ? "" : parsed.problem;
     head.remove_prefix(std::min(whole.size() + 1, head.size()));
   }
   return "";

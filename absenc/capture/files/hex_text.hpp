@@ -17,7 +17,7 @@ namespace absenc::capture {
 [[nodiscard]] bool is_hex_text(std::string_view head);
 
 /// Returns the reason why the first line with content cannot be read; "" if it can.
-[[nodiscard]] std::string hex_text_trouble(std::string_view head);
+[[nodiscard]] std::string hex_text_problem(std::string_view head);
 
 /// Reads lines of one of the forms below; the first line decides which. Empty lines, and text behind `#` or `//`, are
 /// ignored. HEX is any number of bytes: pairs of digits, adjacent or separated by blanks, commas or semicolons, each

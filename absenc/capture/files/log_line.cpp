@@ -95,13 +95,13 @@ bool take_bytes(std::string_view text, HexLine& parsed) {
     if (text.empty()) return true;
     const std::string_view group = text.substr(0, text.find_first_of(separators));
     if (wide && is_bytes(group) && is_text_of(text, parsed.bytes)) {
-      parsed.trouble = quoted(text) + " may be bytes, or the text of those before it: leave it away";
+      parsed.problem = quoted(text) + " may be bytes, or the text of those before it: leave it away";
       return false;
     }
     if (group.empty() || !append_any(group, parsed.bytes)) {
       const bool apart = wide || std::string_view("|\"'").find(text[0]) != std::string_view::npos;
       if (apart && is_column(text, parsed.bytes)) return true;
-      parsed.trouble = quoted(text) + " is neither bytes nor the text of the bytes before it";
+      parsed.problem = quoted(text) + " is neither bytes nor the text of the bytes before it";
       return false;
     }
     text.remove_prefix(group.size());
@@ -255,10 +255,10 @@ class Prefix {
       skip_separators();
       if (text_.empty()) return has_something();
       if (take_time() || take_arrow()) continue;
-      if (!parsed_.trouble.empty()) return false;
+      if (!parsed_.problem.empty()) return false;
       if (text_[0] == '[' || text_[0] == '(') {
         if (take_bracket()) return true;
-        if (!parsed_.trouble.empty()) return false;
+        if (!parsed_.problem.empty()) return false;
         continue;
       }
       const std::string_view word = text_.substr(0, text_.find_first_of(separators));
@@ -266,7 +266,7 @@ class Prefix {
         if (take_bytes(text_, parsed_)) return true;
         if (!all_digits(word) || !(is_count(word) || (first && !bytes_follow(word)))) return false;
         parsed_.bytes.clear();
-        parsed_.trouble.clear();
+        parsed_.problem.clear();
         text_.remove_prefix(word.size());
       } else if (!take_word_of_prefix(word)) {
         return false;
@@ -277,7 +277,7 @@ class Prefix {
  private:
   bool has_something() {
     if (parsed_.at || parsed_.channel >= 0 || !parsed_.source.empty()) return true;
-    parsed_.trouble = "a line without bytes";
+    parsed_.problem = "a line without bytes";
     return false;
   }
 
@@ -297,7 +297,7 @@ class Prefix {
     const std::string_view clock = text_.substr(0, taken.size);
     const bool nothing_behind = trim(text_.substr(taken.size)).empty();
     if (nothing_behind && is_bytes(clock)) {
-      parsed_.trouble = quoted(clock) + " may be a time or bytes: write bytes with blanks between them";
+      parsed_.problem = quoted(clock) + " may be a time or bytes: write bytes with blanks between them";
       return false;
     }
     parsed_.at = taken.at;
@@ -308,7 +308,7 @@ class Prefix {
 
   bool set_direction(int direction) {
     if (parsed_.channel >= 0 && parsed_.channel != direction) {
-      parsed_.trouble = "it has two directions";
+      parsed_.problem = "it has two directions";
       return false;
     }
     parsed_.channel = direction;
@@ -350,7 +350,7 @@ class Prefix {
       add_source(word);
       return true;
     }
-    parsed_.trouble = quoted(word) + " before the bytes is no time, port or direction";
+    parsed_.problem = quoted(word) + " before the bytes is no time, port or direction";
     return false;
   }
 
@@ -359,7 +359,7 @@ class Prefix {
     const char closing = text_[0] == '[' ? ']' : ')';
     const std::size_t end = text_.find(closing);
     if (end == std::string_view::npos) {
-      parsed_.trouble = quoted(text_) + " has a bracket that nothing closes";
+      parsed_.problem = quoted(text_) + " has a bracket that nothing closes";
       return false;
     }
     const std::string_view inner = trim(text_.substr(1, end - 1));
@@ -368,7 +368,7 @@ class Prefix {
     if (trim(text_).empty()) return take_bytes(inner, parsed_);
     if (is_bytes(inner.substr(0, inner.find_first_of(separators))) && !is_filler(inner) &&
         inner.find("byte") == std::string_view::npos && !match_time(inner).at) {
-      parsed_.trouble = quoted(inner) + " in brackets may be bytes, or none";
+      parsed_.problem = quoted(inner) + " in brackets may be bytes, or none";
       return false;
     }
     HexLine inner_line;

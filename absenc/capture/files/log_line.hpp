@@ -23,7 +23,7 @@ namespace absenc::capture {
 /// `:` or `-`. The text of the bytes may follow, and must match them: printable bytes as they are, others as a dot or a
 /// similar character.
 ///
-/// Returns false if the line is invalid or ambiguous: `trouble` contains the reason.
+/// Returns false if the line is invalid or ambiguous: `problem` contains the reason.
 bool parse_log_line(std::string_view line, HexLine& parsed);
 
 }  // namespace absenc::capture

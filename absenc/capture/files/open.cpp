@@ -102,8 +102,8 @@ std::unique_ptr<Reader> open_capture(std::unique_ptr<Source> source, std::string
   if (is_candump(head)) return read_candump(std::move(source), name);
   if (is_hex_text(head)) return read_hex_text(std::move(source), name, choices.samples_per_second);
   if (is_text(head)) {
-    if (const std::string trouble = hex_text_trouble(head); !trouble.empty()) {
-      throw OpenError(std::string(name) + " is no capture that is known, and no bytes as text, because " + trouble);
+    if (const std::string problem = hex_text_problem(head); !problem.empty()) {
+      throw OpenError(std::string(name) + " is no capture that is known, and no bytes as text, because " + problem);
     }
   }
   throw OpenError(

@@ -20,7 +20,7 @@ FileBytes noise(std::size_t size) {
   return bytes;
 }
 
-std::string trouble(FileBytes bytes, const OpenChoices& choices) {
+std::string problem(FileBytes bytes, const OpenChoices& choices) {
   try {
     static_cast<void>(open_bytes(std::move(bytes), choices));
   } catch (const OpenError& error) {
@@ -54,10 +54,10 @@ TEST(Raw, BytesThatMakeNoSampleAreADamage) {
 }
 
 TEST(Raw, IsRefusedWithASentence) {
-  EXPECT_NE(trouble(noise(10), {}).find("number of channels and the sample rate"), std::string::npos);
-  EXPECT_NE(trouble(noise(10), {.channels = 8}).find("give the sample rate"), std::string::npos);
-  EXPECT_NE(trouble(noise(10), {.channels = 65, .samples_per_second = 1}).find("1 to 64 channels"), std::string::npos);
-  EXPECT_NE(trouble({}, {.channels = 8, .samples_per_second = 1}).find("is empty"), std::string::npos);
+  EXPECT_NE(problem(noise(10), {}).find("number of channels and the sample rate"), std::string::npos);
+  EXPECT_NE(problem(noise(10), {.channels = 8}).find("give the sample rate"), std::string::npos);
+  EXPECT_NE(problem(noise(10), {.channels = 65, .samples_per_second = 1}).find("1 to 64 channels"), std::string::npos);
+  EXPECT_NE(problem({}, {.channels = 8, .samples_per_second = 1}).find("is empty"), std::string::npos);
 }
 
 TEST(Raw, ASourceThatFailsCutsItsBlockShort) {

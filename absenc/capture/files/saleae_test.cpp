@@ -25,7 +25,7 @@ std::unique_ptr<Reader> open_channels(const std::vector<FileBytes>& files) {
   return read_saleae(std::move(channels));
 }
 
-std::string trouble(FileBytes bytes) {
+std::string problem(FileBytes bytes) {
   try {
     static_cast<void>(open_bytes(std::move(bytes)));
   } catch (const OpenError& error) {
@@ -113,11 +113,11 @@ TEST(Saleae, RefusesInvalidTimes) {
 }
 
 TEST(Saleae, IsRefusedWithASentence) {
-  EXPECT_NE(trouble(saleae_header(2).bytes).find("has version 2"), std::string::npos);
-  EXPECT_NE(trouble(saleae_header(0, 1).bytes).find("analog"), std::string::npos);
-  EXPECT_NE(trouble(saleae_header(0).bytes).find("ends in a header"), std::string::npos);
-  EXPECT_NE(trouble(saleae_file(false, 2, 1, {})).find("impossible time"), std::string::npos);
-  EXPECT_NE(trouble(saleae_header(1).put(std::uint64_t{0}).bytes).find("no chunk"), std::string::npos);
+  EXPECT_NE(problem(saleae_header(2).bytes).find("has version 2"), std::string::npos);
+  EXPECT_NE(problem(saleae_header(0, 1).bytes).find("analog"), std::string::npos);
+  EXPECT_NE(problem(saleae_header(0).bytes).find("ends in a header"), std::string::npos);
+  EXPECT_NE(problem(saleae_file(false, 2, 1, {})).find("impossible time"), std::string::npos);
+  EXPECT_NE(problem(saleae_header(1).put(std::uint64_t{0}).bytes).find("no chunk"), std::string::npos);
 }
 
 TEST(Saleae, AFolderIsOneCapture) {

@@ -127,7 +127,7 @@ class SigrokReader final : public Reader {
     block.samples.resize(
         std::max(static_cast<std::size_t>(block.end - block.first) * bytes_per_sample_, size + piece.tail));
     const std::span<std::uint8_t> into(block.samples);
-    std::unique_ptr<ZipArchive> archive = take();
+    std::unique_ptr<ZipArchive> archive = take_handle();
     bool whole = archive != nullptr && archive->expand(piece.entry, into.first(size));
     std::size_t count = size;
     if (!whole) {
@@ -145,7 +145,7 @@ class SigrokReader final : public Reader {
     if (piece.skip != 0) std::memmove(into.data(), into.data() + piece.skip, count);
     finish(block, count / unit_size_);
     if (is_cut(piece)) report_cut(piece, block.end, whole);
-    give_back(std::move(archive));
+    return_handle(std::move(archive));
   }
 
  private:
@@ -160,16 +160,16 @@ class SigrokReader final : public Reader {
 
   // Opens the archive; a file without a directory at its end gets a new one.
   void open_archive(std::string_view name) {
-    std::unique_ptr<ZipArchive> archive = take();
+    std::unique_ptr<ZipArchive> archive = take_handle();
     if (archive == nullptr) {
       cut_ = mend_zip(std::move(source_));
       source_ = std::move(cut_->archive);
-      archive = take();
+      archive = take_handle();
     }
     if (archive == nullptr) {
       throw OpenError(std::string(name) + " is a zip archive that is too damaged to be read: " + copy_again);
     }
-    give_back(std::move(archive));
+    return_handle(std::move(archive));
   }
 
   [[nodiscard]] bool has_lost_entries() const { return cut_ && !cut_->complete; }
@@ -336,7 +336,7 @@ class SigrokReader final : public Reader {
   }
 
   void begin_stream(const SamplePiece& piece) {
-    stream_ = take();
+    stream_ = take_handle();
     stream_tick_ = piece.first;
     stream_left_ = piece.entry.size - piece.skip;
     std::array<std::uint8_t, 8> skipped{};
@@ -344,7 +344,7 @@ class SigrokReader final : public Reader {
     if (stream_ != nullptr && stream_->open(piece.entry) && stream_->read(skip) == skip.size()) return;
     if (!ends_at_cut(piece, stream_.get())) report(piece, piece.first, stream_.get());
     if (is_cut(piece)) report_cut(piece, piece.first, false);
-    give_back(std::move(stream_));
+    return_handle(std::move(stream_));
   }
 
   // Reads the next part of a large piece.
@@ -367,11 +367,11 @@ class SigrokReader final : public Reader {
     stream_left_ -= wanted;
     if (whole && !last) return;
     if (is_cut(piece)) report_cut(piece, block.end, good);
-    give_back(std::move(stream_));
+    return_handle(std::move(stream_));
   }
 
   void report(const SamplePiece& piece, Tick at, const ZipArchive* archive) {
-    const std::string why = archive == nullptr ? "the file cannot be opened again" : archive->trouble();
+    const std::string why = archive == nullptr ? "the file cannot be opened again" : archive->problem();
     damages_.add({.offset = archive == nullptr ? 0 : archive->offset(),
                   .tick = at,
                   .what = piece.name + ", which ends at sample " +
@@ -389,7 +389,7 @@ class SigrokReader final : public Reader {
   }
 
   // Takes an unused libzip handle, which only one thread may use at a time.
-  std::unique_ptr<ZipArchive> take() {
+  std::unique_ptr<ZipArchive> take_handle() {
     {
       const std::lock_guard lock(mutex_);
       if (!idle_.empty()) {
@@ -405,7 +405,7 @@ class SigrokReader final : public Reader {
     }
   }
 
-  void give_back(std::unique_ptr<ZipArchive> archive) {
+  void return_handle(std::unique_ptr<ZipArchive> archive) {
     if (archive == nullptr) return;
     const std::lock_guard lock(mutex_);
     idle_.push_back(std::move(archive));

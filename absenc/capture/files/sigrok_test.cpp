@@ -26,7 +26,7 @@ FileBytes session(const std::string& metadata, std::vector<std::pair<std::string
   return make_zip(pieces, deflate);
 }
 
-std::string trouble(FileBytes bytes, const OpenChoices& choices = {}) {
+std::string problem(FileBytes bytes, const OpenChoices& choices = {}) {
   try {
     static_cast<void>(open_bytes(std::move(bytes), choices));
   } catch (const OpenError& error) {
@@ -244,7 +244,7 @@ TEST(Sigrok, ReadsEverythingBeforeACut) {
       SCOPED_TRACE(size);
       const FileBytes file = cut_at(good, size);
       if (size < first + 39) {  // the first piece is missing completely
-        const std::string why = trouble(file);
+        const std::string why = problem(file);
         const std::size_t seen = size + (deflate ? 1 : 0);  // the last byte of deflated data only marks the end
         EXPECT_NE(why.find("cut off at byte "), std::string::npos) << why;
         EXPECT_NE(why.find(seen < metadata - 30 ? "version:"
@@ -383,14 +383,14 @@ TEST(Sigrok, ACutArchiveEndsBeforeAnEntryOfUnknownSize) {
 
 TEST(Sigrok, IsRefusedWithASentence) {
   const std::string metadata = sigrok_metadata("1 MHz", 8, 1);
-  EXPECT_NE(trouble(session(metadata, {{"logic-1-1", wave(9)}}, "3")).find("has version 3"), std::string::npos);
-  EXPECT_NE(trouble(session(metadata, {})).find("no logic samples"), std::string::npos);
-  EXPECT_NE(trouble(make_zip({{"other", wave(9)}})).find("no session of sigrok"), std::string::npos);
-  EXPECT_NE(trouble(session(sigrok_metadata("1 MHz", 80, 10), {{"logic-1-1", wave(90)}})).find("80 channels"),
+  EXPECT_NE(problem(session(metadata, {{"logic-1-1", wave(9)}}, "3")).find("has version 3"), std::string::npos);
+  EXPECT_NE(problem(session(metadata, {})).find("no logic samples"), std::string::npos);
+  EXPECT_NE(problem(make_zip({{"other", wave(9)}})).find("no session of sigrok"), std::string::npos);
+  EXPECT_NE(problem(session(sigrok_metadata("1 MHz", 80, 10), {{"logic-1-1", wave(90)}})).find("80 channels"),
             std::string::npos);
-  EXPECT_NE(trouble(session(metadata, {{"logic-1-1", wave(9)}}), {.channels = 4}).find("8 channels, not 4"),
+  EXPECT_NE(problem(session(metadata, {{"logic-1-1", wave(9)}}), {.channels = 4}).find("8 channels, not 4"),
             std::string::npos);
-  EXPECT_NE(trouble(to_bytes("PK\x03\x04")).find("cut off at byte 0, before the end of its version"),
+  EXPECT_NE(problem(to_bytes("PK\x03\x04")).find("cut off at byte 0, before the end of its version"),
             std::string::npos);
 }
 

@@ -157,9 +157,9 @@ bool TextLines::next(std::string_view& line) {
       begin_ = at + 1;
       break;
     }
-    const std::size_t kept = end_ - begin_;
+    const std::size_t remaining = end_ - begin_;
     if (refill()) {
-      searched = begin_ + kept;
+      searched = begin_ + remaining;
       continue;
     }
     offset_ = base_ + begin_;

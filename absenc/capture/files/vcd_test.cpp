@@ -24,7 +24,7 @@ std::string with_header(std::string_view body) {
          std::string(body);
 }
 
-std::string trouble(std::string_view text) {
+std::string problem(std::string_view text) {
   try {
     static_cast<void>(open_text(text));
   } catch (const OpenError& error) {
@@ -94,7 +94,7 @@ TEST(Vcd, AHeaderThatNeverEndsIsRefused) {
 TEST(Vcd, ScopesMayNotNestForEver) {
   std::string deep;
   for (int i = 0; i < 50'000; ++i) deep += "$scope begin x $end ";
-  EXPECT_NE(trouble(deep).find("1000 deep"), std::string::npos);
+  EXPECT_NE(problem(deep).find("1000 deep"), std::string::npos);
 }
 
 TEST(Vcd, BeginsAtItsFirstTime) {
@@ -154,11 +154,11 @@ TEST(Vcd, ReadsEverythingBeforeADamage) {
 }
 
 TEST(Vcd, RefusesInvalidHeaders) {
-  EXPECT_NE(trouble("$timescale 1 us $end $var wire 1 ! a $end").find("cut off"), std::string::npos);
-  EXPECT_NE(trouble("$var wire 1 ! a $end $enddefinitions $end #0 1!").find("no $timescale"), std::string::npos);
-  EXPECT_NE(trouble("$timescale 3 us $end $enddefinitions $end").find("1, 10 or 100"), std::string::npos);
-  EXPECT_NE(trouble("$timescale 1 us $end $enddefinitions $end").find("no channels"), std::string::npos);
-  EXPECT_NE(trouble("$timescale 1 us $end $var wire 999999999 ! a $end").find("impossible width"), std::string::npos);
+  EXPECT_NE(problem("$timescale 1 us $end $var wire 1 ! a $end").find("cut off"), std::string::npos);
+  EXPECT_NE(problem("$var wire 1 ! a $end $enddefinitions $end #0 1!").find("no $timescale"), std::string::npos);
+  EXPECT_NE(problem("$timescale 3 us $end $enddefinitions $end").find("1, 10 or 100"), std::string::npos);
+  EXPECT_NE(problem("$timescale 1 us $end $enddefinitions $end").find("no channels"), std::string::npos);
+  EXPECT_NE(problem("$timescale 1 us $end $var wire 999999999 ! a $end").find("impossible width"), std::string::npos);
 }
 
 // Many blocks, words across the borders of the read buffer, and identifiers of one to three characters.

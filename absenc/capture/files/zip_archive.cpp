@@ -108,7 +108,7 @@ struct ZipArchive::State {
   std::unique_ptr<zip_file_t, Close> file;  // must be closed before its archive
   std::unique_ptr<libdeflate_decompressor, Close> inflater;
   std::vector<std::uint8_t> packed;
-  std::string trouble;
+  std::string problem;
   bool ran_out = false;
 
   std::span<std::uint8_t> room(std::size_t size) {
@@ -185,7 +185,7 @@ bool ZipArchive::open(const Entry& entry) {
   state_->window.mark = true;
   state_->file.reset(zip_fopen_index(state_->archive.get(), entry.index, 0));
   if (state_->file != nullptr) return true;
-  state_->trouble = zip_error_strerror(zip_get_error(state_->archive.get()));
+  state_->problem = zip_error_strerror(zip_get_error(state_->archive.get()));
   return false;
 }
 
@@ -198,7 +198,7 @@ std::size_t ZipArchive::read(std::span<std::uint8_t> into) {
       // At the end of an entry libzip checks its checksum and size.
       const int code = zip_error_code_zip(zip_file_get_error(state_->file.get()));
       state_->ran_out = got == 0 || code == ZIP_ER_CRC || code == ZIP_ER_INCONS;
-      state_->trouble = got == 0 ? "it ends early" : zip_error_strerror(zip_file_get_error(state_->file.get()));
+      state_->problem = got == 0 ? "it ends early" : zip_error_strerror(zip_file_get_error(state_->file.get()));
       break;
     }
     done += static_cast<std::size_t>(got);
@@ -212,12 +212,12 @@ bool ZipArchive::at_good_end() {
   std::uint8_t more = 0;
   const zip_int64_t got = zip_fread(state_->file.get(), &more, 1);
   if (got == 0) return true;
-  state_->trouble =
+  state_->problem =
       got > 0 ? "it is longer than the archive says" : zip_error_strerror(zip_file_get_error(state_->file.get()));
   return false;
 }
 
-std::string ZipArchive::trouble() const { return state_->trouble; }
+std::string ZipArchive::problem() const { return state_->problem; }
 
 std::uint64_t ZipArchive::offset() const { return state_->window.entry; }
 

@@ -36,9 +36,9 @@ class ZipArchive {
   /// as possible and report the error.
   [[nodiscard]] bool expand(const Entry& entry, std::span<std::uint8_t> into);
 
-  /// Begins to read an entry and closes the previous one. Returns false on error, see `trouble`.
+  /// Begins to read an entry and closes the previous one. Returns false on error, see `problem`.
   [[nodiscard]] bool open(const Entry& entry);
-  /// Expands the next bytes into `into` and returns their number; fewer on error or at the end, see `trouble`.
+  /// Expands the next bytes into `into` and returns their number; fewer on error or at the end, see `problem`.
   [[nodiscard]] std::size_t read(std::span<std::uint8_t> into);
   /// Returns whether `read` returned fewer bytes because the data ended, not because it is damaged.
   [[nodiscard]] bool ran_out() const;
@@ -46,7 +46,7 @@ class ZipArchive {
   [[nodiscard]] bool at_good_end();
 
   /// Returns libzip's message about the last error.
-  [[nodiscard]] std::string trouble() const;
+  [[nodiscard]] std::string problem() const;
   /// Returns the offset of the present entry in the file.
   [[nodiscard]] std::uint64_t offset() const;
 

@@ -35,7 +35,7 @@ struct Expanded {
   bool whole = false;
   FileBytes bytes;
   bool found_by_reading = false;  // result of `open`, `read` and the checks at the end
-  std::string trouble;
+  std::string problem;
 };
 
 Expanded expanded(FileBytes file) {
@@ -49,7 +49,7 @@ Expanded expanded(FileBytes file) {
   FileBytes read(result.bytes.size());
   result.found_by_reading =
       archive.open(entry) && archive.read(read) == read.size() && archive.at_good_end() && read == content;
-  result.trouble = archive.trouble();
+  result.problem = archive.problem();
   return result;
 }
 
@@ -67,13 +67,13 @@ TEST(ZipArchive, ReadingReportsDamage) {
     in_directory(file, checksum) ^= 1;
     Expanded result = expanded(file);
     EXPECT_FALSE(result.whole);
-    EXPECT_EQ(result.trouble, "CRC error");
+    EXPECT_EQ(result.problem, "CRC error");
 
     file = good;
     file[200] ^= 0x10;  // damages a byte of the compressed data
     result = expanded(file);
     EXPECT_FALSE(result.whole || result.found_by_reading);
-    EXPECT_NE(result.trouble, "");
+    EXPECT_NE(result.problem, "");
   }
   for (const int change : {-1, 1}) {
     FileBytes file = make_zip({{"entry", content}});

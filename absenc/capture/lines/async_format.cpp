@@ -103,7 +103,7 @@ bool longest_level(const Stretch& part) {
   Tick since = part.first;
   bool level = part.changes.before;
   bool found = level;
-  const auto look = [&](Tick until) {
+  const auto update = [&](Tick until) {
     if (until - since > longest) {
       longest = until - since;
       found = level;
@@ -111,8 +111,8 @@ bool longest_level(const Stretch& part) {
     since = until;
     level = !level;
   };
-  for (const Tick at : part.changes.at) look(at);
-  look(part.end);
+  for (const Tick at : part.changes.at) update(at);
+  update(part.end);
   return found;
 }
 

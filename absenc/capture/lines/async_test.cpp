@@ -39,7 +39,7 @@ struct DecodedCharacters {
 
 DecodedCharacters decoded(Reader& reader, const std::vector<AsyncLine>& lines, unsigned threads = 2) {
   DecodedCharacters all;
-  all.outcome = decode_async(reader, lines, threads, [&](const Part& part) {
+  all.outcome = decode_async(reader, lines, threads, [&](const DecodedPart& part) {
     all.characters.insert(all.characters.end(), part.characters.begin(), part.characters.end());
     return true;
   });
@@ -243,7 +243,7 @@ TEST(Async, StopsWhenSinkReturnsFalse) {
     MemoryReader reader(wires, Content::samples, 100, 1);
     unsigned parts = 0;
     decode_async(reader, std::vector<AsyncLine>{{0, {.baud = 125e6, .idle = Idle::high}}}, threads,
-                 [&](const Part&) { return ++parts < 5; });
+                 [&](const DecodedPart&) { return ++parts < 5; });
     EXPECT_EQ(parts, 5u);
   }
 }
@@ -326,7 +326,7 @@ TEST(Async, ClaimingDoesNotBlockDecoding) {
   const Wires wires{{pen.levels}};
   MemoryReader memory(wires, Content::samples, 1000, 1);
   Slow reader(memory);
-  decode_async(reader, std::vector<AsyncLine>{{0, {.baud = 125e6, .idle = Idle::high}}}, 2, [&](const Part&) {
+  decode_async(reader, std::vector<AsyncLine>{{0, {.baud = 125e6, .idle = Idle::high}}}, 2, [&](const DecodedPart&) {
     reader.arrive();
     return true;
   });

@@ -47,7 +47,7 @@ struct DecodedBursts {
 DecodedBursts decoded(const Wires& wires, const ClockedLine& line, unsigned threads = 2) {
   MemoryReader reader(wires, Content::samples, 50, 1);
   DecodedBursts all;
-  all.outcome = decode_clocked(reader, line, threads, [&](const Part& part) {
+  all.outcome = decode_clocked(reader, line, threads, [&](const DecodedPart& part) {
     all.bursts.insert(all.bursts.end(), part.bursts.begin(), part.bursts.end());
     return true;
   });

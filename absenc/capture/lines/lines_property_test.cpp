@@ -88,7 +88,7 @@ std::vector<Character> decoded(Reader& reader, std::span<const AsyncLine> lines,
                                AsyncOutcome& outcome) {
   std::vector<Character> found;
   Tick end = 0;
-  outcome = decode_async(reader, lines, threads, [&](const Part& part) {
+  outcome = decode_async(reader, lines, threads, [&](const DecodedPart& part) {
     for (const Character& c : part.characters) RC_ASSERT(c.begin >= end);
     found.insert(found.end(), part.characters.begin(), part.characters.end());
     end = part.end;
@@ -239,7 +239,7 @@ RC_GTEST_PROP(LinesProperty, ClockedResultDoesNotDependOnThreadsAndBlocks, (std:
   for (const DecodeSetup& setup : decode_setups) {
     MemoryReader reader(wires, setup.content, any_block_size(random, ticks), random());
     std::vector<Burst> found;
-    decode_clocked(reader, line, setup.threads, [&](const Part& part) {
+    decode_clocked(reader, line, setup.threads, [&](const DecodedPart& part) {
       found.insert(found.end(), part.bursts.begin(), part.bursts.end());
       return true;
     });

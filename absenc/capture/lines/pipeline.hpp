@@ -15,7 +15,7 @@
 namespace absenc::capture {
 
 /// Items decoded since the previous part.
-struct Part {
+struct DecodedPart {
   Tick end = 0;  // no later item begins before this time
   std::span<const Character> characters;
   std::span<const Burst> bursts;
@@ -23,7 +23,7 @@ struct Part {
 };
 
 /// Receives parts in the order of time, in the calling thread. Returns false to end the decoding.
-using Sink = std::function<bool(const Part& part)>;
+using PartSink = std::function<bool(const DecodedPart& part)>;
 
 struct AsyncLine {
   unsigned channel = 0;  // index of the file's channel
@@ -40,7 +40,7 @@ struct AsyncOutcome {
 /// Decodes the characters of several lines, ordered by their start bits; `Character::channel` is the index in `lines`.
 /// Unknown settings are detected from the first 16384 changes of a line; a line with too few changes uses the baud rate
 /// of another. Memory does not grow with the file. Throws exceptions of the reader.
-AsyncOutcome decode_async(Reader& reader, std::span<const AsyncLine> lines, unsigned threads, const Sink& sink);
+AsyncOutcome decode_async(Reader& reader, std::span<const AsyncLine> lines, unsigned threads, const PartSink& sink);
 
 /// The beginning of a capture, split into words at rests longer than `pause`.
 struct PauseReading {
@@ -70,6 +70,6 @@ struct ClockedOutcome {
   Tick pause = 0;       // length of a rest that ended words
 };
 
-ClockedOutcome decode_clocked(Reader& reader, const ClockedLine& line, unsigned threads, const Sink& sink);
+ClockedOutcome decode_clocked(Reader& reader, const ClockedLine& line, unsigned threads, const PartSink& sink);
 
 }  // namespace absenc::capture

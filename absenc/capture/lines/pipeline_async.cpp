@@ -21,7 +21,7 @@ class AsyncDecoding {
     std::vector<std::vector<Character>> characters;
   };
 
-  AsyncDecoding(std::span<const AsyncFormat> formats, const Sink& sink)
+  AsyncDecoding(std::span<const AsyncFormat> formats, const PartSink& sink)
       : formats_(formats), sink_(sink), characters_(formats.size()) {
     for (const AsyncFormat& format : formats) {
       decoders_.emplace_back(format, static_cast<std::uint8_t>(decoders_.size()));
@@ -104,7 +104,7 @@ class AsyncDecoding {
   }
 
   std::span<const AsyncFormat> formats_;
-  const Sink& sink_;
+  const PartSink& sink_;
   std::vector<AsyncDecoder> decoders_;
   std::vector<std::vector<Character>> characters_;
   std::vector<Character> ready_;
@@ -224,7 +224,7 @@ std::string find_formats(const LevelReader& reader, std::span<const AsyncLine> l
 
 }  // namespace
 
-AsyncOutcome decode_async(Reader& source, std::span<const AsyncLine> lines, unsigned threads, const Sink& sink) {
+AsyncOutcome decode_async(Reader& source, std::span<const AsyncLine> lines, unsigned threads, const PartSink& sink) {
   std::vector<unsigned> channels;
   for (const AsyncLine& line : lines) channels.push_back(line.channel);
   LevelReader reader(source, channels);

@@ -43,7 +43,7 @@ class ClockedDecoding {
     std::vector<Burst> bursts;
   };
 
-  ClockedDecoding(const WireIndices& wires, const ClockedFormat& format, const Sink& sink)
+  ClockedDecoding(const WireIndices& wires, const ClockedFormat& format, const PartSink& sink)
       : wires_(wires), format_(format), sink_(sink), decoder_(format) {}
 
   bool decode(const Levels& levels) {
@@ -94,7 +94,7 @@ class ClockedDecoding {
 
   const WireIndices& wires_;
   ClockedFormat format_;
-  const Sink& sink_;
+  const PartSink& sink_;
   ClockedDecoder decoder_;
   std::vector<Burst> bursts_;
   bool begun_ = false;
@@ -169,31 +169,32 @@ std::string find_pause(LevelReader& reader, const WireIndices& wires, const Cloc
   format.pause = rests->pauses.front();
   if (!line.choose) return {};
   const Tick last = clock.at[std::min(clock.at.size(), enough_clocks) - 1];
-  std::vector<ClockedFormat> candidates;
+  std::vector<ClockedFormat> word_formats;
   for (const Tick pause : rests->pauses) {
-    candidates.push_back(format);
-    candidates.back().pause = pause;
+    word_formats.push_back(format);
+    word_formats.back().pause = pause;
   }
   // Rests in words and between them may be of any length, but a timeout or a monoflop ends only between words.
   if (wires.in) {
-    candidates.push_back(candidates.back());
+    word_formats.push_back(word_formats.back());
     // An encoder that does not drive the line changes nothing: rests of at least half the longest length end its words.
-    candidates.back().pause =
+    word_formats.back().pause =
         std::max(rests->longest / 2, *std::max_element(rests->pauses.begin(), rests->pauses.end()));
-    candidates.back().change_pause = 2 * rests->half_period;
+    word_formats.back().change_pause = 2 * rests->half_period;
   }
   std::vector<PauseReading> readings;
-  for (const ClockedFormat& candidate : candidates) {
-    readings.push_back({candidate.pause, candidate.change_pause != 0, bursts_until(last, parts, wires, candidate)});
+  for (const ClockedFormat& word_format : word_formats) {
+    readings.push_back(
+        {word_format.pause, word_format.change_pause != 0, bursts_until(last, parts, wires, word_format)});
     readings.back().timed_out = changes_in_rests(readings.back().bursts, parts, wires, format.settle);
   }
-  format = candidates[line.choose(readings)];
+  format = word_formats[line.choose(readings)];
   return {};
 }
 
 }  // namespace
 
-ClockedOutcome decode_clocked(Reader& source, const ClockedLine& line, unsigned threads, const Sink& sink) {
+ClockedOutcome decode_clocked(Reader& source, const ClockedLine& line, unsigned threads, const PartSink& sink) {
   const WireIndices wires(line);
   LevelReader reader(source, wires.channels);
   ClockedOutcome outcome{reader.problem(), line.pause};

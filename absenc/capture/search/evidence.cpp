@@ -110,7 +110,7 @@ double Evidence::chance() const { return motion && explains_all() ? frames + *mo
 double acceptance(const Unit& unit, const Options& options, const ObservedExchange& good, unsigned attempts) {
   std::mt19937_64 random(good.reply.bytes.size());  // fixed seed: the same result each time
   ObservedExchange noise = good;
-  const std::size_t kept = repeated(good);
+  const std::size_t repeated_size = repeated(good);
   unsigned accepted = 0;
   unsigned tried = 0;
   for (; tried < attempts && accepted < enough_accepted; ++tried) {
@@ -125,7 +125,7 @@ double acceptance(const Unit& unit, const Options& options, const ObservedExchan
         *byte = static_cast<std::uint8_t>(bits);
       }
     };
-    fill(noise.reply.bytes.begin() + static_cast<std::ptrdiff_t>(kept), noise.reply.bytes.end());
+    fill(noise.reply.bytes.begin() + static_cast<std::ptrdiff_t>(repeated_size), noise.reply.bytes.end());
     if (noise.reply.can) fill(noise.reply.can->data.begin(), noise.reply.can->data.begin() + noise.reply.can->size);
     if (unit.check(options, noise.request.frame(), noise.reply.frame()) == Error::none) ++accepted;
   }

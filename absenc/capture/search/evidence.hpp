@@ -48,7 +48,7 @@ struct Evidence {
 };
 
 /// log10 of a chance below which frames suffice as evidence without motion.
-inline constexpr double frames_say_enough = -2;
+inline constexpr double frames_suffice = -2;
 
 /// Number of random replies tried where several frames multiply their chances.
 inline constexpr unsigned usual_attempts = 1u << 14;

@@ -248,7 +248,7 @@ std::vector<Hypothesis> find_hypotheses(const Unit& unit, std::span<const Option
   if (!search.explains_all() && !likely.empty()) search.vary(likely.back());
   std::vector<Hypothesis> found(search.best().begin(), search.best().end());
   for (const Hypothesis& one : found) {
-    if (one.evidence.frames > frames_say_enough && one.evidence.motion) search.vary_motion(one.options);
+    if (one.evidence.frames > frames_suffice && one.evidence.motion) search.vary_motion(one.options);
   }
   return search.take();
 }

@@ -29,13 +29,13 @@ double acceptance_of_noise(const Unit& unit, const Options& options) {
   std::vector<std::uint8_t> noise(noise_size);
   for (std::uint8_t& byte : noise) byte = static_cast<std::uint8_t>(random());
   std::size_t good = 0;
-  std::size_t looked = 0;
-  for (std::size_t at = 0; at < noise.size(); ++looked) {
+  std::size_t examined = 0;
+  for (std::size_t at = 0; at < noise.size(); ++examined) {
     const std::size_t size = reply_size(unit, options, Bytes(noise).subspan(at));
     good += size != 0 ? 1 : 0;
     at += std::max<std::size_t>(size, 1);
   }
-  return static_cast<double>(std::max<std::size_t>(good, 1)) / static_cast<double>(looked);
+  return static_cast<double>(std::max<std::size_t>(good, 1)) / static_cast<double>(examined);
 }
 
 // Returns whether the options themselves state the number of bits of a position, which cannot be requested from the

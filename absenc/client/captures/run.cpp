@@ -11,8 +11,8 @@
 
 #include "absenc/capture/annotate/annotate.hpp"
 #include "absenc/capture/annotate/annotate_frames.hpp"
-#include "absenc/capture/annotate/following.hpp"
-#include "absenc/capture/annotate/remembering.hpp"
+#include "absenc/capture/annotate/completed_readings.hpp"
+#include "absenc/capture/annotate/composed_frames.hpp"
 #include "absenc/capture/files/open.hpp"
 #include "absenc/capture/lines/blocks.hpp"
 #include "absenc/capture/lines/can_line.hpp"
@@ -29,7 +29,7 @@ namespace {
 
 using capture::Carries;
 using capture::Content;
-using capture::Part;
+using capture::DecodedPart;
 using capture::Tick;
 
 // What the sink throws must not pass through a decoder that has threads.
@@ -150,8 +150,8 @@ CaptureRun::~CaptureRun() = default;
 std::uint64_t CaptureRun::ticks_per_second() const { return reader_->layout().ticks_per_second; }
 
 CaptureOutcome CaptureRun::run(capture::AnnotationSink& all, const std::function<void(Tick)>& progress) {
-  capture::Remembering remembering(unit_, options_, all);
-  capture::Following sink(unit_, options_, remembering);
+  capture::CompletedReadings remembering(unit_, options_, all);
+  capture::ComposedFrames sink(unit_, options_, remembering);
   const Content content = reader_->layout().content;
   const bool clocked = unit_.link == LinkKind::clocked || unit_.link == LinkKind::spi;
   CaptureOutcome outcome = content == Content::bytes     ? run_bytes(sink, progress)
@@ -174,7 +174,7 @@ CaptureRun::Lines CaptureRun::find_lines() const {
   }
   const std::size_t count = lines.settings.channel_count = lines.channels.size();
   if (count == 1 && (wires.found || unit_.link == LinkKind::half_duplex)) lines.settings.channels[0] = Carries::both;
-  if (count == 2 && wires.found) lines.settings.channels = {Carries::one, Carries::one};
+  if (count == 2 && wires.found) lines.settings.channels = {Carries::detect, Carries::detect};
   return lines;
 }
 
@@ -188,7 +188,7 @@ CaptureOutcome CaptureRun::decode_lines(capture::Reader& reader, Lines lines, Sp
   CaptureOutcome outcome;
   Guard guard;
   std::unique_ptr<capture::Annotator> annotator;
-  const auto take = [&](const Part& part) {
+  const auto take = [&](const DecodedPart& part) {
     const std::size_t count = std::min(characters, part.characters.size());
     characters -= count;
     return guard([&] {
@@ -208,7 +208,7 @@ CaptureOutcome CaptureRun::decode_lines(capture::Reader& reader, Lines lines, Sp
   outcome.baud = decoded.measured_baud;
   if (annotator == nullptr) return outcome;
   annotator->finish(outcome.end);
-  const bool were_found = lines.settings.channels[0] == Carries::one && lines.channels.size() == 2;
+  const bool were_found = lines.settings.channels[0] == Carries::detect && lines.channels.size() == 2;
   for (std::size_t i = 0; were_found && i < 2; ++i) {
     const std::string_view whose = annotator->carries(i) == Carries::requests ? "the host's" : "the encoder's";
     outcome.carries.push_back(fmt::format("{} is {}", reader.layout().channels[lines.channels[i]], whose));
@@ -239,7 +239,7 @@ CaptureOutcome CaptureRun::run_bursts(capture::AnnotationSink& sink, const std::
   Guard guard;
   line.choose = [&](std::span<const capture::PauseReading> readings) { return likely_pause(readings, outcome.notes); };
   capture::BurstAnnotator annotator(unit_, options_, sink);
-  const auto take = [&](const Part& part) {
+  const auto take = [&](const DecodedPart& part) {
     return guard([&] {
       for (const capture::Burst& burst : part.bursts) annotator.put(burst);
       outcome.end = std::max(outcome.end, part.end);

@@ -141,7 +141,7 @@ std::optional<Finding> other_settings(const Case& one, const All& all) {
   if (found.empty()) return {};
   const capture::Hypothesis& best = found.front();
   const bool mostly = best.evidence.explained * 10 >= best.evidence.tried * 9;
-  if (!mostly || best.evidence.frames > capture::frames_say_enough) return {};
+  if (!mostly || best.evidence.frames > capture::frames_suffice) return {};
   const std::vector<std::string> settings = settings_to_set(one.unit, best.options, one.options);
   if (settings.empty()) return {};
   return finding(Ailment::wrong_settings,

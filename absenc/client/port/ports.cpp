@@ -16,7 +16,7 @@ std::string Port::next_command() const {
 
 std::vector<Port> ports() {
   std::vector<Port> all;
-  for (const std::string& path : os::serial_ports()) all.push_back({path, "serial", os::look_at(path)});
+  for (const std::string& path : os::serial_ports()) all.push_back({path, "serial", os::inspect_port(path)});
   for (const std::string& interface : os::can_interfaces()) all.push_back({interface, "can"});
   for (const std::string& device : os::spi_devices()) all.push_back({device, "spi"});
   return all;

@@ -127,7 +127,7 @@ class WatchedPort final : public Port<Item> {
     for (;;) {
       try {
         if (over && over()) throw os::Ended{};
-        const os::EndQuestion question(over);
+        const os::CancelCheck cancel_check(over);
         return port_->wait(bounded(step));
       } catch (const os::Interrupted&) {
         if (!abort()) throw;

@@ -59,10 +59,10 @@ std::optional<Received> Receiver::next(Time deadline) {
   constexpr Time longest = 1h;
   for (;;) {
     const Time patience =
-        std::min({deadline == never ? longest : deadline - os::now(), os::EndQuestion::patience(), longest});
+        std::min({deadline == never ? longest : deadline - os::now(), os::CancelCheck::interval(), longest});
     if (changed_.wait_for(lock, std::max(patience, Time{}), has_something)) break;
     if (os::now() >= deadline) return std::nullopt;
-    os::EndQuestion::ask();
+    os::CancelCheck::check();
   }
   if (cancelled_ || waiting_.empty()) return std::nullopt;
   Received first = std::move(waiting_.front());
@@ -74,7 +74,7 @@ std::optional<Received> Receiver::next(Time deadline) {
 // ---- In the thread that receives
 
 void Receiver::receive() {
-  const os::EndQuestion question(is_over_);
+  const os::CancelCheck cancel_check(is_over_);
   try {
     if (link_.bytes != nullptr) {
       receive_from_port();

@@ -9,8 +9,8 @@
 #include <utility>
 
 #include "absenc/capture/annotate/annotate.hpp"
-#include "absenc/capture/annotate/following.hpp"
-#include "absenc/capture/annotate/remembering.hpp"
+#include "absenc/capture/annotate/completed_readings.hpp"
+#include "absenc/capture/annotate/composed_frames.hpp"
 #include "absenc/client/captures/sequence_watch.hpp"
 #include "absenc/client/error.hpp"
 #include "absenc/client/identify/capture.hpp"
@@ -69,8 +69,8 @@ struct TapRun::Sinks {
   }
 
   SequenceWatch watched;
-  capture::Remembering remembering;
-  capture::Following following;
+  capture::CompletedReadings remembering;
+  capture::ComposedFrames following;
   Untimed untimed;
   capture::Annotator annotator;
 };
@@ -274,12 +274,12 @@ bool TapRun::advance() {
   if (!received) {
     annotator.finish(now_);
   } else if (received->bytes.empty()) {
-    annotator.fall_silent();
+    annotator.report_after_silence();
   } else {
     if (!first_at_) first_at_ = received->at;
     now_ = arrival_tick(received->at - *first_at_);
     for (const std::uint8_t byte : received->bytes) annotator.put({.begin = now_, .end = now_, .value = byte});
-    annotator.hand_out();
+    annotator.report_complete();
   }
   if (record_ != nullptr) record_->flush();
   return received.has_value();

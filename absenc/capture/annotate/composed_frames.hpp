@@ -14,10 +14,10 @@ namespace absenc::capture {
 
 /// Passes annotations on. Before the annotation with which a composed frame ends, it inserts an annotation of that
 /// frame, whose content is known from then on.
-class Following final : public AnnotationSink {
+class ComposedFrames final : public AnnotationSink {
  public:
   /// `unit` and `sink` must outlive this object.
-  Following(const Unit& unit, const Options& options, AnnotationSink& sink)
+  ComposedFrames(const Unit& unit, const Options& options, AnnotationSink& sink)
       : judge_(unit, options), sink_(sink), storage_(std::make_unique<std::byte[]>(unit.follower_storage)) {
     if (unit.follower != nullptr) follower_ = unit.follower(options, {storage_.get(), unit.follower_storage});
   }
@@ -39,10 +39,10 @@ class Following final : public AnnotationSink {
     if (begins_.size() > most_begins) begins_.pop_front();
     follower_->follow(count_++, annotation.request.bytes, annotation.reply.bytes);
     Composed one;
-    while (follower_->take(one)) tell(one, annotation.end);
+    while (follower_->take(one)) report(one, annotation.end);
   }
 
-  void tell(const Composed& one, Tick end) {
+  void report(const Composed& one, Tick end) {
     using Kind = Annotation::Kind;
     const std::uint64_t ago = count_ - one.first;
     Annotation annotation{.kind = one.request.empty() ? Kind::reply : Kind::exchange,

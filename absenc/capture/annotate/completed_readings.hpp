@@ -20,10 +20,10 @@ namespace absenc::capture {
 /// No frame reports that an encoder was switched off and on, but it sends no replies meanwhile: an unanswered request
 /// clears the stored alarms. A request that clears alarms does the same for its encoder, after its reply. Otherwise the
 /// encoder is assumed to have stayed on.
-class Remembering final : public AnnotationSink {
+class CompletedReadings final : public AnnotationSink {
  public:
   /// `unit` and `sink` must outlive this object.
-  Remembering(const Unit& unit, const Options& options, AnnotationSink& sink) : unit_(&unit), sink_(&sink) {
+  CompletedReadings(const Unit& unit, const Options& options, AnnotationSink& sink) : unit_(&unit), sink_(&sink) {
     if (unit.remembered == nullptr) return;
     for (const Command& command : unit.commands) {
       if (command.verb != Verb::clear_alarms && command.verb != Verb::reset_multiturn) continue;
