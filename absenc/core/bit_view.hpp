@@ -81,7 +81,7 @@ struct BitView {
 /// A bit sequence of up to 64 bits in one number, the first bit as the most significant. Has `load` like BitView.
 struct BitNumber {
   std::uint64_t number;  ///< The bits as a number, the first bit highest.
-  unsigned size;         ///< 1 to 64
+  unsigned size;         ///< number of bits, 1 to 64
 
   /// Returns `count` bits from `first` as a number, the first bit highest.
   [[nodiscard]] constexpr std::uint64_t load(std::size_t first, unsigned count) const {

@@ -40,14 +40,13 @@ struct Step {
   std::size_t expect = 0;       ///< transfer, wait: number of items still expected; 0: unknown, or none
   std::size_t bits = 0;    ///< transfer on a clocked link: number of clocks; a device sets how many of its bits hosts
                            ///< read, if it drives more
-  std::uint32_t rate = 0;  ///< configure: bits per second
+  std::uint32_t rate = 0;  ///< configure: new rate in bits per second
   Time at{};      ///< transfer, pulse: earliest time to begin; wait: time of the `timer` event, if it is in the future
   Time answer{};  ///< transfer, wait: `silence` is reported when nothing is received for this time after `sent`; 0: no
                   ///< limit
-  Time
-      gap{};  ///< transfer, wait: `silence` is reported when the line is quiet for this time after an item; 0: no limit
-  Time width{};  ///< pulse: its duration; transfer of a device on a clocked link: after `out` the device drives the
-                 ///< data line low until this time after the last clock edge
+  Time gap{};     ///< transfer, wait: `silence` is reported when the line is quiet this long after an item; 0: no limit
+  Time width{};   ///< pulse: its duration; transfer of a device on a clocked link: after `out` the device drives the
+                  ///< data line low until this time after the last clock edge
 
   /// Transfer of a device on an SPI or clocked link: returns the byte that the host samples after `out` has ended. A
   /// line that no side drives is pulled up.

@@ -22,8 +22,7 @@ struct RoughRates {
                        ///< is lost
   double talker = 0;   ///< another sender sends random bytes during the frame or beyond its end; the host receives the
                        ///< AND of both
-  double late =
-      0;  ///< the frame arrives 10 us to 10 s late, each decade equally likely; later frames do not overtake it
+  double late = 0;     ///< the frame is 10 us to 10 s late, each decade equally likely; later frames do not overtake it
 };
 
 /// Counts of the disturbances of a rough line.
