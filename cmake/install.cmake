@@ -58,7 +58,21 @@ if(TARGET absenc-command)
                        COMMAND absenc-write-manual "${absenc_man_page}" "${absenc_completion}"
                        DEPENDS absenc-write-manual
                        COMMENT "Writing the man page and the bash completion")
-    add_custom_target(absenc-manual ALL DEPENDS "${absenc_man_page}" "${absenc_completion}")
+    # Each page of the guide is a man page too: docs/read.md is absenc-read(7).
+    file(GLOB absenc_guide CONFIGURE_DEPENDS "${PROJECT_SOURCE_DIR}/docs/*.md")
+    set(absenc_guide_pages)
+    foreach(page IN LISTS absenc_guide)
+      cmake_path(GET page STEM name)
+      set(guide_page "${CMAKE_CURRENT_BINARY_DIR}/manual/absenc-${name}.7")
+      add_custom_command(OUTPUT "${guide_page}"
+                         COMMAND "${Python3_EXECUTABLE}" -B "${PROJECT_SOURCE_DIR}/cmake/guide_page.py"
+                                 "${PROJECT_VERSION}" "${page}" "${guide_page}"
+                         DEPENDS cmake/guide_page.py "${page}"
+                         COMMENT "")
+      list(APPEND absenc_guide_pages "${guide_page}")
+    endforeach()
+    add_custom_target(absenc-manual ALL DEPENDS "${absenc_man_page}" "${absenc_completion}" ${absenc_guide_pages})
+    install(FILES ${absenc_guide_pages} DESTINATION "${CMAKE_INSTALL_MANDIR}/man7" COMPONENT absenc)
     install(FILES "${absenc_man_page}" DESTINATION "${CMAKE_INSTALL_MANDIR}/man1" COMPONENT absenc)
     install(FILES "${absenc_completion}" DESTINATION "${CMAKE_INSTALL_DATADIR}/bash-completion/completions"
             COMPONENT absenc)

@@ -9,7 +9,7 @@ include(GoogleTest)
 set(absenc_long_python_tests
     can_peers modbus_peers wave  # use clients, nodes and decoders of other projects
     doctor_faults doctor_healthy identify speed  # many faults, loaded machines, repetitions on every line
-    install mutants_script new_protocol packages python_wheel  # compile, install or configure
+    docs install mutants_script new_protocol packages python_wheel  # compile, install or configure
     python python_units record_hdf5  # need mypy, pytest, pandas, matplotlib, h5py
     serve_broker serve_cluster serve_history serve_mqtt serve_others serve_proxy serve_spool  # need brokers, proxies, full disks
     serve_browser serve_client serve_look  # need a browser, npm

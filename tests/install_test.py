@@ -17,6 +17,8 @@ from command_support import absenc
 SOURCE = Path(os.environ["ABSENC_SOURCE_DIR"])
 BUILD = Path(os.environ["ABSENC"]).parent.parent
 VERSION = re.search(r"^project\(absenc VERSION ([\d.]+)", (SOURCE / "CMakeLists.txt").read_text(), re.MULTILINE)[1]
+# Each page of docs/ is a man page too.
+GUIDE = {f"share/man/man7/absenc-{page.stem}.7" for page in (SOURCE / "docs").glob("*.md")}
 
 BY_NAME = SOURCE / "examples/read_by_name.cpp"
 BY_NAME_SAYS = r"^(0\.0000 degrees\n)+0\.0 rpm, within \d"  # the speed appears as soon as its averaging window is full
@@ -217,7 +219,7 @@ class Installed(Case):
             "lib/absencConfig.cmake", "lib/absencConfig-release.cmake", "lib/absencConfigVersion.cmake",
             "share/man/man1/absenc.1", "share/bash-completion/completions/absenc", "share/doc/absenc/README.md",
             "share/doc/absenc/LICENSE", "share/doc/absenc/serve.md", "share/doc/absenc/mqtt.md",
-            "share/doc/absenc/mqtt-schema.json", "share/doc/absenc/grafana-dashboard.json", "lib/absenc.service"})
+            "share/doc/absenc/mqtt-schema.json", "share/doc/absenc/grafana-dashboard.json", "lib/absenc.service", *GUIDE})
         self.assertEqual(headers, public_headers())
 
     def test_headers_include_only_installed_ones(self):
@@ -285,10 +287,10 @@ class ManPage(Case):
         super().setUpClass()
         cls.path = cls.root / "share/man/man1/absenc.1"
 
-    def shown(self, *options):
+    def shown(self, *options, path=None):
         """Returns the page as shown by `man`, with warnings on standard error."""
         environment = {**os.environ, "LC_ALL": "C.UTF-8", "MANWIDTH": "1000", "MANROFFOPT": "", "MANOPT": ""}
-        return subprocess.run(["man", "-l", *options, self.path], stdin=subprocess.DEVNULL, capture_output=True,
+        return subprocess.run(["man", "-l", *options, path or self.path], stdin=subprocess.DEVNULL, capture_output=True,
                               text=True, timeout=60, check=True, env=environment)
 
     def test_has_no_warnings(self):
@@ -298,6 +300,27 @@ class ManPage(Case):
 
     def test_is_found_by_name(self):
         self.assertIn('"absenc - ', run("lexgrog", self.path))
+
+    def test_guide_has_no_warnings(self):
+        self.assertGreater(len(GUIDE), 15)
+        for page in sorted(GUIDE):
+            path = self.root / page
+            with self.subTest(path.name):
+                self.assertEqual(self.shown("--warnings=w", path=path).stderr, "")
+                done = subprocess.run(["groff", "-t", "-man", "-ww", "-z", "-Tutf8", path], capture_output=True, text=True, timeout=60)
+                self.assertEqual((done.returncode, done.stdout, done.stderr), (0, "", ""))
+                self.assertIn(f'"{path.stem} - ', run("lexgrog", path))
+
+    def test_guide_shows_headings_code_and_tables(self):
+        text = self.shown(path=self.root / "share/man/man7/absenc-read.7").stdout
+        self.assertIn("$ absenc read sim:tformat --count 3 --json", text)
+        self.assertRegex(text, r"│ *sim:tformat *│")
+        self.assertNotRegex(text, r"```|\]\(|\*\*|<!--")
+
+    def test_pages_that_it_names_exist(self):
+        named = set(re.findall(r"(absenc-[\w-]+)\(7\)", self.shown().stdout))
+        self.assertGreater(len(named), 8)
+        self.assertLessEqual({f"share/man/man7/{name}.7" for name in named}, GUIDE)
 
     def test_agrees_with_help(self):
         shown = [line.strip() for line in self.shown().stdout.splitlines()]
@@ -419,9 +442,9 @@ class Packages(unittest.TestCase):
 
     def test_each_installed_file_is_in_one_package(self):
         run("cmake", "--install", BUILD, "--prefix", self.folder / "installed")
-        installed = files_below(self.folder / "installed") - {"share/doc/absenc/LICENSE", "share/man/man1/absenc.1"}
+        installed = files_below(self.folder / "installed") - {"share/doc/absenc/LICENSE", "share/man/man1/absenc.1", *GUIDE}
         added = {"share/doc/absenc/copyright", "share/man/man1/absenc.1.gz", "share/doc/libabsenc-dev/copyright",
-                 "share/doc/python3-absenc/copyright"}
+                 "share/doc/python3-absenc/copyright", *(f"{page}.gz" for page in GUIDE)}
         command, development, python = map(files_below, (self.command, self.development, self.python))
         self.assertEqual(len(command | development | python), len(command) + len(development) + len(python))
         self.assertEqual(command | development | python, installed | added)
@@ -430,7 +453,7 @@ class Packages(unittest.TestCase):
             "bin/absenc", "share/man/man1/absenc.1.gz", "share/bash-completion/completions/absenc",
             "share/doc/absenc/README.md", "share/doc/absenc/serve.md", "share/doc/absenc/copyright",
             "share/doc/absenc/mqtt.md", "share/doc/absenc/mqtt-schema.json", "share/doc/absenc/grafana-dashboard.json",
-            "lib/systemd/system/absenc.service"})
+            "lib/systemd/system/absenc.service", *(f"{page}.gz" for page in GUIDE)})
         for name, held in (("absenc", command), ("libabsenc-dev", development), ("python3-absenc", python)):
             self.assertEqual(files_below(self.folder / name), {"usr/" + path for path in held})
 

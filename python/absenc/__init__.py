@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Absolute encoders of servo motors: read them, emulate them, decode captures of their lines.
+"""Absolute encoders of servo motors: read them, emulate them, decode captures of their lines::
 
     import absenc
 

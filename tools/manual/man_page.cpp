@@ -3,6 +3,8 @@
 
 #include <fmt/format.h>
 
+#include <array>
+
 #include "absenc/client/port/address.hpp"
 #include "tools/absenc/help.hpp"
 
@@ -11,6 +13,11 @@ namespace absenc::tool {
 using namespace client;
 
 namespace {
+
+// Pages of docs/ for people who use the command.
+constexpr std::array<std::string_view, 12> guide{"read",   "set-up",   "record",   "serve",
+                                                 "mqtt",   "tap",      "decode",   "test-a-drive",
+                                                 "doctor", "encoders", "firmware", "add-an-encoder"};
 
 std::string tagged(std::string_view tag, std::string_view meaning) {
   return fmt::format(".TP\n\\fB{}\\fR\n{}\n", to_roff(tag), to_roff(meaning));
@@ -117,7 +124,10 @@ std::string man_page(std::string_view version, std::span<const Subcommand* const
   for (const Example& variable : environment) text += tagged(variable.command, variable.meaning);
   text += ".SH EXIT STATUS\n";
   for (std::size_t i = 0; i < exit_statuses.size(); ++i) text += tagged(fmt::format("{}", i), exit_statuses[i]);
-  return text;
+  text += ".SH SEE ALSO\nThe guide:";
+  for (std::string_view page : guide)
+    text += fmt::format("\n.BR absenc\\-{} (7){}", page, page == guide.back() ? "" : ",");
+  return text + "\n";
 }
 
 }  // namespace absenc::tool

@@ -144,11 +144,16 @@ struct FrameInRoutine {
 /// The result of a coroutine that is a whole command: `Procedure name(Dialog& dialog, Found& found, ...)`. Ends by
 /// `co_return done;` or `co_return {Error::..., "..."};`.
 struct Procedure {
+  /// The interface that the compiler requires of a coroutine.
   struct promise_type : FrameInRoutine {
     using FrameInRoutine::FrameInRoutine;
+    /// Returns the procedure to its caller.
     [[nodiscard]] Procedure get_return_object() { return {std::coroutine_handle<promise_type>::from_promise(*this)}; }
+    /// Returns a procedure without a coroutine: there was no room.
     [[nodiscard]] static Procedure get_return_object_on_allocation_failure() { return {}; }
+    /// Stays suspended at its end.
     [[nodiscard]] std::suspend_always final_suspend() const noexcept { return {}; }
+    /// Ends the procedure.
     void return_value(const Outcome& outcome) { routine.end_with(outcome); }
   };
   std::coroutine_handle<> handle{};  ///< The coroutine; null: there was no room.
@@ -157,10 +162,14 @@ struct Procedure {
 /// A part of a procedure, with a result: `const Reply reply = co_await look(dialog);`. At most one of a procedure runs.
 template <class T>
 struct [[nodiscard]] Part {
+  /// The interface that the compiler requires of a coroutine.
   struct promise_type : FrameInRoutine {
     using FrameInRoutine::FrameInRoutine;
+    /// Returns the part to its caller.
     [[nodiscard]] Part get_return_object() { return {std::coroutine_handle<promise_type>::from_promise(*this)}; }
+    /// Returns a part without a coroutine: there was no room.
     [[nodiscard]] static Part get_return_object_on_allocation_failure() { return {}; }
+    /// Continues with the caller.
     [[nodiscard]] auto final_suspend() const noexcept {
       struct Back {
         [[nodiscard]] bool await_ready() const noexcept { return false; }
@@ -171,10 +180,11 @@ struct [[nodiscard]] Part {
       };
       return Back{};
     }
+    /// Keeps the result.
     void return_value(const T& value) { result.emplace(value); }
 
-    std::coroutine_handle<> caller{};
-    std::optional<T> result{};
+    std::coroutine_handle<> caller{};  ///< The coroutine that awaits the part.
+    std::optional<T> result{};         ///< The result, when the part has ended.
   };
 
   /// Returns false: the part always runs.
