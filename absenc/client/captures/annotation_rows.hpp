@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Annotations as rows.
+// Converts annotations of a capture to rows.
 #pragma once
 
 #include <cstddef>
@@ -12,10 +12,10 @@
 
 namespace absenc::client {
 
-/// Makes rows of annotations, with the columns that decode.hpp describes.
+/// Converts annotations to rows with the columns that decode.hpp describes.
 class AnnotationRows {
  public:
-  /// `unit` must outlive it.
+  /// `unit` must outlive the object.
   AnnotationRows(const Unit& unit, const Options& options, const TickClock& clock);
 
   [[nodiscard]] std::span<const Column> columns() const { return columns_; }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Which channel of a capture is which wire of a link.
+// Assigns the channels of a capture to the wires of a link.
 #pragma once
 
 #include <cstddef>
@@ -13,21 +13,21 @@
 
 namespace absenc::client {
 
-/// The wires of a link, by the names that --channel has for them.
+/// Returns the wires of a link by their names in --channel.
 [[nodiscard]] std::span<const std::string_view> wires_of(LinkKind link);
 
-/// The channel of each wire of the link, in the order of `wires_of`; nothing where a wire was not recorded.
+/// The channel of each wire of the link, in the order of `wires_of`; nothing for a wire that was not recorded.
 struct WireChannels {
   std::vector<std::optional<unsigned>> wires;
-  bool found = false;  // full duplex: nobody said which of the two is whose, and their names do not tell
+  bool found = false;  // full duplex: false if neither --channel nor the names tell the host's wire from the device's
 };
 
-/// From what --channel says ("D0", "clock=D0"), and where it says nothing, from the names and the number of the
-/// channels. Throws UsageError, which lists the channels.
+/// Assigns channels by --channel ("D0", "clock=D0"), otherwise by their names and their number. Throws UsageError,
+/// which lists the channels.
 [[nodiscard]] WireChannels find_wires(LinkKind link, std::span<const std::string> channels,
                                       std::span<const std::string> wanted);
 
-/// A channel by its name, in any case, or its number. Throws UsageError.
+/// Returns a channel by its name, in upper or lower case, or by its number. Throws UsageError.
 [[nodiscard]] unsigned find_channel(std::span<const std::string> channels, std::string_view name);
 
 }  // namespace absenc::client

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Clocked lines as masters really clock them: drawn here edge by edge from the documents, without the virtual encoder,
-// and decoded as `absenc decode` decodes them.
+// Decodes clocked lines as real masters clock them. The test draws them edge by edge from the documents, without the
+// virtual encoder, and decodes them as `absenc decode` does.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -21,15 +21,15 @@ namespace {
 
 using capture::Annotation;
 
-/// A clock that idles high, and data, in nanoseconds.
+/// Draws a clock that idles high and a data line; times are in nanoseconds.
 class Wires {
  public:
   void wait(std::int64_t ns) { now_ += ns; }
   void clock(bool level) { changes_[{now_, 'c'}] = level; }
-  // A little behind the clock that brings it.
+  // Data changes shortly after the clock edge that outputs it.
   void data(bool level, std::int64_t behind = 5) { changes_[{now_ + behind, 'd'}] = level; }
 
-  /// `count` clocks; `bit(i)` stands on the line before the rising edge of clock i.
+  /// Draws `count` clocks; the line has `bit(i)` before the rising edge of clock i.
   template <class Bit>
   void burst(std::int64_t period, std::size_t count, Bit&& bit) {
     for (std::size_t i = 0; i < count; ++i) {
@@ -56,22 +56,22 @@ class Wires {
 
 // ---- BiSS
 
-// From TI's table: slave 0 is asked for register 44, and answers 0A.
+// From TI's table: the host reads register 44 of slave 0, whose reply is 0A.
 constexpr std::string_view read_44 = "0000000000000011000100010011011010000000000000000";
 constexpr std::string_view read_44_answer = "0000000000000001000000000000000101000010100010000";
 
 struct Master {
   std::int64_t period;
   std::int64_t timeout;
-  std::int64_t falls = 0;  // for a CDM of 1, so long behind the last rising edge; 0: half a period
-  bool releases = false;   // MA rises again when the timeout is over; else it is held until the next frame
-  int clocks = 0;          // more than the frame has bits and the idle one
-  std::int64_t pause = 0;  // behind the timeout, and behind an MA that is released
+  std::int64_t falls = 0;  // time from the last rising edge to the falling edge that sends CDM 1; 0: half a period
+  bool releases = false;   // MA rises when the timeout has elapsed; otherwise it is held until the next frame
+  int clocks = 0;          // clocks in addition to the frame's bits and the idle bit
+  std::int64_t pause = 0;  // pause after the timeout, and after MA was released
 };
 
-constexpr int biss_bits = 32;  // of the frame, with the one idle bit behind which it begins
+constexpr int biss_bits = 32;  // bits of the frame, including the idle bit before it
 
-// Idle, one ACK bit, start, CDS, 19 bits, nError, nWarning, and the CRC, bit by bit.
+// Computes the frame bit by bit: idle, one ACK bit, start, CDS, 19 bits, nError, nWarning and the CRC.
 std::string biss_frame(std::uint32_t position, bool cds) {
   std::string word;
   for (int bit = 18; bit >= 0; --bit) word += (position >> bit & 1) != 0 ? '1' : '0';
@@ -159,7 +159,7 @@ TEST_F(ClockedLines, BissOfAnyClockTimeoutAndMaster) {
     const std::int64_t period = 1'000'000 / khz;
     for (const std::int64_t timeout :
          {3 * period / 2, std::int64_t{12'500}, std::int64_t{20'000}, std::int64_t{40'000}}) {
-      if (timeout < 6 * period / 10) continue;  // it would be over between two edges of the clock
+      if (timeout < 6 * period / 10) continue;  // the timeout would elapse between two edges of the clock
       for (const bool releases : {false, true}) {
         for (const int more : {-1, 0, biss_bits - 1}) {
           for (const std::int64_t pause : {0, 300'000}) {
@@ -182,14 +182,14 @@ TEST_F(ClockedLines, BissOfAnyClockTimeoutAndMaster) {
   EXPECT_GT(cells, 300u);
 }
 
-// The encoder looks at MA when its timeout is over: until then it may fall at any time.
+// The encoder samples MA when its timeout elapses, so MA may fall at any time before.
 TEST_F(ClockedLines, AControlBitMayComeLateInTheTimeout) {
   for (const std::int64_t khz : {100, 250, 1000, 10'000}) {
     const std::int64_t period = 1'000'000 / khz;
     for (const std::int64_t timeout : {3 * period / 2, std::int64_t{20'000}, std::int64_t{40'000}}) {
       for (const std::int64_t falls : {5 * timeout / 10, 6 * timeout / 10}) {
         for (const bool releases : {false, true}) {
-          if (falls < 6 * period / 10) continue;  // it would be one more clock
+          if (falls < 6 * period / 10) continue;  // the falling edge would be one more clock
           SCOPED_TRACE(std::to_string(khz) + " kHz, timeout " + std::to_string(timeout) + " ns, CDM behind " +
                        std::to_string(falls) + " ns, " + (releases ? "released" : "held"));
           Wires wires;
@@ -205,8 +205,8 @@ TEST_F(ClockedLines, AControlBitMayComeLateInTheTimeout) {
   }
 }
 
-// A host that is interrupted: its clock rests in a word for as long as the timeout allows, and between words for
-// hardly longer. SLO alone shows where the timeout is over.
+// A host that is interrupted: its clock pauses inside a word for nearly the timeout, and between words hardly longer.
+// Only SLO shows where the timeout has elapsed.
 TEST_F(ClockedLines, ATimeoutThatIsOverEndsAWordWhoseClockRestsAsLong) {
   constexpr std::int64_t timeout = 12'500;
   const std::string frame = biss_frame(17, false);
@@ -247,7 +247,7 @@ TEST_F(ClockedLines, AControlFrameThatTheFileCutsIsCut) {
 
 constexpr unsigned ssi_bits = 13;
 
-// `copies` words with a zero between them; the monoflop runs from the last edge of the clock.
+// Draws `copies` words with a zero between them; the monoflop time starts at the last clock edge.
 void draw_ssi(Wires& wires, std::int64_t period, std::int64_t monoflop, std::int64_t pause, std::size_t clocks,
               unsigned words) {
   for (unsigned word = 0; word < words; ++word) {
@@ -267,7 +267,7 @@ TEST_F(ClockedLines, SsiOfAnyClockMonoflopAndNumberOfClocks) {
   for (const std::int64_t khz : {30, 50, 80, 100, 250, 1000, 2000, 10'000}) {
     const std::int64_t period = 1'000'000 / khz;
     for (const std::int64_t monoflop : {9'000, 12'500, 20'000, 25'000, 41'000, 500'000}) {
-      if (monoflop < 6 * period / 10) continue;  // it would be over between two edges of the clock
+      if (monoflop < 6 * period / 10) continue;  // the timeout would elapse between two edges of the clock
       for (const std::size_t clocks : {ssi_bits, ssi_bits + 1, 2 * ssi_bits + 1, 2 * ssi_bits + 2}) {
         for (const std::int64_t pause : {0, 30'000}) {
           ++cells;
@@ -288,7 +288,7 @@ TEST_F(ClockedLines, SsiOfAnyClockMonoflopAndNumberOfClocks) {
   EXPECT_GT(cells, 300u);
 }
 
-// The monoflop runs out behind the second copy alone: the first rest ends no word.
+// The monoflop time elapses only after the second copy, so the first pause ends no word.
 TEST_F(ClockedLines, AMonoflopThatIsOverEndsAWord) {
   Wires wires;
   for (unsigned word = 0; word < 12; ++word) {
@@ -305,7 +305,7 @@ TEST_F(ClockedLines, AMonoflopThatIsOverEndsAWord) {
   EXPECT_EQ(rows.words, 12u);
 }
 
-// Two words with a shorter rest between them are two words, or one that was read twice.
+// Two words with a shorter pause between them are either two words or one word read twice.
 TEST_F(ClockedLines, TwoWaysToCutAreSaid) {
   Wires wires;
   for (unsigned word = 0; word < 12; ++word) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Compares what commands said live with the rows of a capture of the same conversation.
+// Compares results of live commands with the rows of a capture of the same conversation.
 #pragma once
 
 #include <algorithm>
@@ -37,16 +37,16 @@ inline std::string to_text(const Said& said) {
   return text;
 }
 
-/// Compares one result with the rows of its time.
+/// Compares one result with the rows of the same time.
 class Comparison {
  public:
   Comparison(const Unit& unit, const LineSettings& line, bool faulty, const std::vector<Said>& rows)
       : rows_(rows), faulty_(faulty) {
-    // The row of a CAN frame is there where the waveform's frame ends, whose receiver waits for the bus to be idle.
+    // The row of a CAN frame ends where the frame in the waveform ends; the live receiver waits until the bus is idle.
     tolerance_ = unit.link == LinkKind::can ? line.bits(160) : 2 * line.character();
   }
 
-  /// The contradiction in words; "" if there is none.
+  /// Returns the contradiction in words; "" if there is none.
   std::string operator()(const Said& live) {
     within_.clear();
     for (const Said& row : rows_) {
@@ -70,13 +70,13 @@ class Comparison {
     if (told) return {};
     const bool any =
         std::any_of(within_.begin(), within_.end(), [](const Said* row) { return row->error != Error::none; });
-    // A host may be more careful: what answers a request that it repeated may answer the one before.
+    // A live host may reject a reply to a repeated request, because it may belong to the request before.
     return (any || faulty_) && live.exchanges != 1 ? "" : "no row has the error";
   }
 
   std::string compare_good(const Said& live) const {
     for (const Said* row : within_) {
-      // A procedure may ask for somebody who is not there, or wake an encoder that is silent at first.
+      // A procedure may send requests to a missing encoder, or wake one that does not reply at first.
       const bool silent = row->error == Error::timeout || row->error == Error::line_stuck;
       const bool is_silence = silent && live.exchanges > 1;
       if (row->error != Error::none && !is_silence && !faulty_ && !live.is_special) return "a row has an error";
@@ -106,14 +106,14 @@ class Comparison {
     return row.end > reading.received - tolerance_ && row.end < reading.received + tolerance_;
   }
 
-  // The last row has it, or its parts are in several.
+  // The value is in the last row, or its parts are in several rows.
   std::string compare_position(const Said& live) const {
     const Said* row = nullptr;
     for (const Said* one : within_) {
       const bool fits = live.exchanges != 0 || is_of(*one, *live.reading);
       if (one->reading && one->error == Error::none && fits) row = one;
     }
-    // How long the frames of a stream are the first good one tells.
+    // The first good frame of a stream determines the length of its frames.
     const bool knows_size = std::any_of(
         rows_.begin(), rows_.end(), [&](const Said& one) { return one.reading && one.end < live.reading->received; });
     if (row == nullptr) return live.exchanges != 0 || knows_size ? "no row has a position" : "";
@@ -127,13 +127,13 @@ class Comparison {
       }
     }
     const Reading& known = *live.reading;
-    // A command of one unit alone may leave turns out that the reply carries: a safe position has none.
+    // A special command may omit turns that the reply carries: a safe position has none.
     if (live.is_special && known.multiturn_bits == 0) {
       all.multiturn = known.multiturn;
       all.multiturn_bits = known.multiturn_bits;
       all.multiturn_valid = known.multiturn_valid;
     }
-    // A capture remembers earlier conversations; a host that reads once does not.
+    // A capture knows alarms from earlier conversations; a host that reads once does not.
     all.alarms &= known.alarms_reported;
     all.alarms_reported &= known.alarms_reported;
     all.status &= known.status_reported;

@@ -18,7 +18,7 @@
 namespace absenc::client {
 
 struct Decoded::Work {
-  /// Some rows at a time: each goes from thread to thread.
+  /// A batch of rows, which one thread passes to the other.
   using Batch = std::vector<Row>;
   struct Stopped {};
 
@@ -92,7 +92,7 @@ struct Decoded::Work {
 
   // ---- In the thread that takes the rows
 
-  /// Null at the end. Throws what the other thread threw, behind the rows that came before.
+  /// Returns the next row, null at the end. Throws an exception of the decoding thread after the rows before it.
   const Row* take() {
     if (++at < taken.size()) return &taken[at];
     std::unique_lock lock(mutex);
@@ -118,24 +118,24 @@ struct Decoded::Work {
   CaptureRun run;
   TickClock clock;
   AnnotationRows rows;
-  std::vector<std::string> notes;  // when it has ended
+  std::vector<std::string> notes;  // set when decoding has ended
 
-  // Of the thread that decodes.
+  // Used by the decoding thread:
   Batch batch;
   std::size_t filled = 0;
-  // Of the thread that takes.
+  // Used by the thread that takes rows:
   Batch taken;
   std::size_t at = 0;
 
-  std::mutex mutex;  // guards what follows
+  std::mutex mutex;  // guards the members down to the thread
   std::condition_variable changed;
   std::deque<Batch> ready;
-  std::vector<Batch> used;  // to be filled again
+  std::vector<Batch> used;  // empty batches to be filled again
   std::exception_ptr thrown;
   bool ended = false;
   bool stopped = false;
 
-  std::jthread thread;  // last: it uses all of the others
+  std::jthread thread;  // last member: the thread uses all others
 };
 
 Decoded::Decoded(const std::string& path, std::string_view protocol, const DecodeChoices& choices)

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Captures as rows, and who sent what is in them.
+// Decodes captures to rows, and finds the sender of each frame.
 #include <gmock/gmock-more-matchers.h>
 #include <gtest/gtest.h>
 
@@ -18,7 +18,7 @@ using testing::HasSubstr;
 
 namespace {
 
-/// A file of this test alone.
+/// A file with a name unique to the test.
 class TestFile {
  public:
   explicit TestFile(const std::string& text) { std::ofstream(path_) << text; }
@@ -55,7 +55,7 @@ TEST(ClientDecode, RowsHaveTypedColumns) {
 TEST(ClientIdentify, SaysHowToOpenWhatItFound) {
   const Emulation emulation = emulate("tformat?motion=rpm=60");
   Identified all;
-  // Every question that nobody answers takes several times the latency: much of it only on a machine that needs it.
+  // Every request without a reply takes several times the latency, so the latency is long only on a slow machine.
   for (const char* const latency : {"20", "200", "1000"}) {
     all = identify(emulation.path() + "?latency=" + latency, {.limit = std::chrono::minutes(5)});
     if (!all.found.empty() && all.found[0].sure) break;

@@ -122,8 +122,8 @@ CheckFindings find_crc(std::span<const CheckedFrame> frames) {
 
 namespace {
 
-// Frames of one length do not tell a start value from what is added at the end: the start value that goes with
-// `xorout` over `covered` bits.
+// Returns the initial value that, with `xorout`, fits frames of `covered` bits. Frames of one length cannot distinguish
+// an initial value from a final XOR.
 CrcParameters with_xorout(CrcParameters crc, std::uint32_t xorout, std::size_t covered) {
   std::uint32_t change = crc.xorout ^ xorout;
   for (std::size_t i = 0; i < covered; ++i) {

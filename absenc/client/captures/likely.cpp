@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a capture itself tells of its line and of its encoder, found by reading its beginning.
+// Finds properties of the line and the encoder by reading the beginning of a capture.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -16,7 +16,7 @@ namespace {
 
 using capture::Tick;
 
-// Those that a checksum or the like has proved, requests that nobody answered, and those with characters that are none.
+// Counts good frames, unanswered requests, and frames with characters that have framing or parity errors.
 struct Frames final : capture::AnnotationSink {
   void put(const capture::Annotation& annotation) override {
     if (annotation.remark == capture::Remark::damaged) ++damaged;
@@ -30,14 +30,14 @@ struct Frames final : capture::AnnotationSink {
   std::uint64_t damaged = 0;
 };
 
-// Whether the rate that the document states reads a host whom nobody answers, where the other rate reads next to
-// nothing: the few changes of its requests fit many rates.
+// Returns whether the document's rate decodes requests of a host without replies while the other rate decodes almost
+// nothing. The few level changes of such requests fit many rates.
 bool reads_silence(const Frames& at_own, const Frames& at_other) {
   return at_own.damaged == 0 && at_own.unanswered > at_other.unanswered &&
          at_other.good <= std::min(at_other.damaged, at_own.unanswered);
 }
 
-/// Good replies with their requests, and an end when there are enough of them.
+/// Collects good replies with their requests and ends when there are enough.
 struct Sample final : capture::AnnotationSink {
   struct Enough {};
 
@@ -57,7 +57,7 @@ struct Sample final : capture::AnnotationSink {
   std::vector<std::pair<std::vector<std::uint8_t>, std::vector<std::uint8_t>>> frames;
 };
 
-/// Which values frames can have, of which options.
+/// The values of each option that the frames allow.
 struct Possible final : EvidenceSink {
   void put(const OptionEvidence& evidence) override { values.insert({evidence.option, evidence.value}); }
   [[nodiscard]] bool is_open(std::size_t option, std::int64_t value) const {
@@ -69,9 +69,9 @@ struct Possible final : EvidenceSink {
 
 }  // namespace
 
-// Of the unit's own rate and that which the changes suggest, the one with more good frames at the beginning: few
-// changes fit many rates, but only one gives checksums that are right. So with the parity, where characters are
-// damaged: a parity bit that is taken for a stop bit is wrong half of the time.
+// Selects the rate with more good frames at the beginning: the unit's own, or the one that the level changes suggest.
+// Few changes fit many rates, but only one rate gives right checksums. If characters are damaged, selects the parity
+// likewise: a parity bit taken for a stop bit is wrong half of the time.
 CaptureRun::Speed CaptureRun::likely_speed(const Lines& lines) const {
   constexpr std::size_t enough_characters = 20'000;
   Speed best{choices_.how.baud, choices_.how.parity.value_or(line_.parity)};
@@ -103,9 +103,9 @@ CaptureRun::Speed CaptureRun::likely_speed(const Lines& lines) const {
   return best;
 }
 
-// The rests of a clock have several lengths: pauses between words, and between the bytes of a host that gives eight
-// clocks at a time. Only one way to cut makes frames of all of them. Lengths come first: the data line also changes in
-// a rest of a word when it is long, and late.
+// A clock has pauses of several lengths: between words, and between the bytes of a host that sends eight clocks at a
+// time. Only one division makes frames of all words. Pause lengths are tried first, because the data line may also
+// change in a long pause inside a word.
 std::size_t CaptureRun::likely_pause(std::span<const capture::PauseReading> readings,
                                      std::vector<std::string>& notes) const {
   struct Words final : capture::AnnotationSink {
@@ -123,7 +123,7 @@ std::size_t CaptureRun::likely_pause(std::span<const capture::PauseReading> read
     const Options& options;
     std::uint64_t good = 0;
     std::uint64_t bad = 0;
-    bool is_proved = false;  // by a checksum
+    bool is_proved = false;  // a checksum confirms the frames
 
     Words(const Unit& unit_of, const Options& with) : unit(unit_of), options(with) {}
   };
@@ -138,7 +138,7 @@ std::size_t CaptureRun::likely_pause(std::span<const capture::PauseReading> read
     annotator.finish();
     is_proved = is_proved || words.is_proved;
     if (words.bad == 0 && words.good > 1) faultless.push_back(i);
-    // That fewer are bad is no reason: a longer pause hides a silent word in the next.
+    // Fewer bad frames are no reason to prefer a division: a longer pause merges a silent word into the next.
     if (i > 0 && words.good <= most) continue;
     best = i;
     most = words.good;
@@ -146,7 +146,8 @@ std::size_t CaptureRun::likely_pause(std::span<const capture::PauseReading> read
   const auto differs = [&](std::size_t i) { return readings[i].bursts.size() != readings[best].bursts.size(); };
   const auto other = std::find_if(faultless.begin(), faultless.end(), differs);
   if (other == faultless.end() || is_proved) return best;
-  // The shortest of those whose rests the data line shows to be over: in a shorter rest the old word would go on.
+  // Takes the shortest pause in which the data line shows the end of the timeout: in a shorter pause the old word would
+  // continue.
   const auto shown =
       std::find_if(faultless.begin(), faultless.end(), [&](std::size_t i) { return readings[i].timed_out; });
   if (shown != faultless.end()) return *shown;

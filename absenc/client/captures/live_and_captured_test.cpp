@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Live and captured agree: each command of each unit is run against its virtual encoder in virtual time, the same
-// conversation is drawn as `absenc wave` draws it, and decoded as `absenc decode` decodes it.
+// Runs each command of each unit against its virtual encoder in virtual time, draws the conversation as `absenc wave`
+// does, decodes it as `absenc decode` does, and compares both results.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -71,7 +71,7 @@ std::vector<Said> decode(const Stage& stage, const std::string& path) {
   return std::move(captured.rows);
 }
 
-/// A virtual encoder, and whether it differs from another one of the list in a detail alone.
+/// A virtual encoder, and whether it differs from another one of the list only in a detail.
 struct Encoder {
   std::string address;
   bool is_detail = false;
@@ -99,7 +99,8 @@ std::vector<Encoder> encoders_of(const Unit& unit) {
     }
     if (!is_first) continue;
     for (const std::string_view fault : sim::fault_names) {
-      if (fault == "echo" && unit.link != LinkKind::half_duplex) continue;  // an adapter's, on one pair of wires
+      if (fault == "echo" && unit.link != LinkKind::half_duplex)
+        continue;  // echo occurs only with an adapter on one pair of wires
       const std::string rate = fault == "request_corrupt" ? "0.1" : fault == "echo" ? "1" : "0.4";
       for (const char seed : {'1', '2'}) {
         all.push_back({moved + "&fault=" + std::string(fault) + "=" + rate + "&seed=" + seed, seed != '1'});
@@ -116,12 +117,12 @@ std::vector<Encoder> encoders_of(const Unit& unit) {
   return all;
 }
 
-constexpr std::uintmax_t long_file = 300'000;  // bytes of a capture
+constexpr std::uintmax_t long_file = 300'000;  // size of a capture in bytes
 
-/// Commands of one capture: all that change nothing, and each of the others.
+/// The commands of one capture: all that change nothing, or one that does.
 struct Together {
   std::vector<const Command*> commands;
-  bool is_long = false;  // then it is not repeated for details
+  bool is_long = false;  // not repeated for encoders that differ only in a detail
 };
 
 std::vector<Together> commands_of(const Unit& unit) {
@@ -144,7 +145,7 @@ class LiveAndCaptured : public ::testing::TestWithParam<const Unit*> {
     try {
       stage.emplace(address);
     } catch (const UsageError&) {
-      return;  // options that exclude each other
+      return;  // the options exclude each other
     }
     stage->run(together.commands);
     if (stage->live.empty()) return;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// How a position went over the time of a capture of any length, in as many columns as a terminal has.
+// Plots a position over the time of a capture of any length, in the columns of a terminal.
 #pragma once
 
 #include <algorithm>
@@ -17,7 +17,7 @@ class PositionTrace {
  public:
   static constexpr std::size_t columns = 64;
 
-  /// Times must not be before the first. What is not valid leaves a gap.
+  /// Adds a position. `tick` must not be before the first. An invalid position leaves a gap.
   void add(std::uint64_t tick, const Reading& reading) {
     if (!reading.singleturn_valid() || !reading.ready) return;
     if (count_ == 0) {
@@ -40,9 +40,9 @@ class PositionTrace {
   }
 
   [[nodiscard]] std::uint64_t count() const { return count_; }
-  /// A small plot with its scale; "" when there was no valid position.
+  /// Returns a small plot with its scale; "" if no position was valid.
   [[nodiscard]] std::string plot() const;
-  /// Ticks of the first and the last valid position.
+  /// The ticks of the first and the last valid position.
   [[nodiscard]] std::uint64_t first() const { return first_; }
   [[nodiscard]] std::uint64_t last() const { return last_; }
 
@@ -54,19 +54,19 @@ class PositionTrace {
   };
 
   void halve();
-  // Added, so that turns below zero are less than those above.
+  // Offset that makes negative turns smaller than positive ones.
   [[nodiscard]] std::uint64_t offset() const { return turns_ && signed_ ? std::uint64_t{1} << 63 : 0; }
   [[nodiscard]] double value(std::uint64_t counts) const;
   [[nodiscard]] std::string_view unit() const;
 
   std::array<Column, columns> columns_{};
-  unsigned shift_ = 0;  // a column has 2^shift_ ticks
+  unsigned shift_ = 0;  // each column covers 2^shift_ ticks
   std::uint64_t first_ = 0;
   std::uint64_t last_ = 0;
   std::uint64_t count_ = 0;
   unsigned bits_ = 1;
   bool signed_ = false;
-  bool turns_ = false;  // as the first one: with turns, those without leave a gap
+  bool turns_ = false;  // whether the first position had turns; positions without turns then leave a gap
   double unit_um_ = 0;
 };
 

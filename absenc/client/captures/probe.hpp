@@ -14,18 +14,18 @@ namespace absenc::client {
 
 struct Probed {
   const Unit* unit = nullptr;
-  bool explained = false;                  // some options explain all frames
-  std::vector<OptionEvidence> evidence{};  // of each value of each open option
-  std::vector<std::string> settled{};      // "name=value": what must be said to go on; none: the defaults will do
+  bool explained = false;                  // at least one set of options explains all frames
+  std::vector<OptionEvidence> evidence{};  // evidence for each value of each open option
+  std::vector<std::string> settled{};      // "name=value": options that must be given; none: the defaults suffice
 };
 
-/// `replies` as for `absenc decode`, "" where none came; `requests`: as many in the same order, "" where one is not
-/// known, or none. Throws UsageError, also of a protocol whose document leaves nothing open.
+/// Judges captured frames. `replies` are as for `absenc decode`, "" for a missing reply; `requests` are as many in the
+/// same order, "" if unknown, or none at all. Throws UsageError, also for a protocol without open options.
 [[nodiscard]] Probed probe(std::string_view protocol, std::string_view model, std::span<const std::string> settings,
                            std::span<const std::string> replies, std::span<const std::string> requests);
 
-/// {"protocol","ok","evidence":[{"option","value","possible","why","frame"}],"settled"}; "frame", from 1 on, of the
-/// values that it excludes.
+/// Returns {"protocol","ok","evidence":[{"option","value","possible","why","frame"}],"settled"}; "frame" is the number
+/// of the frame, from 1, that excludes the value.
 [[nodiscard]] Json to_json(const Probed& probed);
 
 }  // namespace absenc::client

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Characters that were received just now, as a capture.
+// Live received characters as a capture.
 #pragma once
 
 #include <cstdint>
@@ -13,7 +13,7 @@
 
 namespace absenc::client {
 
-/// Finer than any time of arrival is.
+/// The ticks are finer than arrival times can be measured.
 inline constexpr std::uint64_t arrival_ticks_per_second = 1'000'000;
 
 [[nodiscard]] constexpr capture::Tick arrival_tick(Time time) {
@@ -21,8 +21,8 @@ inline constexpr std::uint64_t arrival_ticks_per_second = 1'000'000;
 }
 
 struct ReceivedCharacters {
-  std::vector<capture::Character> characters{};  // times are arrival_tick
-  capture::Tick gap = 1;                         // as Annotator::Settings::gap
+  std::vector<capture::Character> characters{};  // characters with times in arrival ticks
+  capture::Tick gap = 1;                         // the pause that ends a frame, as Annotator::Settings::gap
 };
 
 class ReceivedReader final : public capture::ParsedReader {

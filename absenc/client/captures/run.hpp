@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// From a capture to its annotations: opens it, finds which channel is which, and sends all of it through the decoders.
+// Decodes a capture to annotations: opens it, assigns its channels, and runs the decoders.
 #pragma once
 
 #include <cstdint>
@@ -21,19 +21,20 @@
 
 namespace absenc::client {
 
-/// A capture, and what is said of it.
+/// A capture and its description by the user.
 struct CaptureChoices {
-  std::string path;     // "-": standard input
-  DecodeChoices how{};  // its model and options are not looked at: they are given as Options
-  std::shared_ptr<const ReceivedCharacters> received{};  // in place of a file
+  std::string path;  // "-": standard input
+  DecodeChoices
+      how{};  // description of the capture; its model and options are ignored, because they are given as Options
+  std::shared_ptr<const ReceivedCharacters> received{};  // received characters, instead of a file
 };
 
 struct CaptureOutcome {
-  std::string problem;               // why nothing could be decoded; "": it could
-  capture::Tick end = 0;             // of what was decoded
-  std::vector<double> baud;          // measured, of each asynchronous line
-  std::vector<std::string> carries;  // "D0 carries requests", where it was found out
-  std::vector<std::string> notes;    // sentences: what else was found out
+  std::string problem;               // why nothing could be decoded; "": no problem
+  capture::Tick end = 0;             // tick of the end of the decoded part
+  std::vector<double> baud;          // measured baud rate of each asynchronous line
+  std::vector<std::string> carries;  // "D0 carries requests", for each channel whose sender was found
+  std::vector<std::string> notes;    // further results, one sentence each
   std::vector<capture::Damage> damages;
 };
 
@@ -42,23 +43,23 @@ struct CaptureOutcome {
 
 class CaptureRun {
  public:
-  /// Opens it. Throws UsageError, Failure.
+  /// Opens the capture. Throws UsageError, Failure.
   CaptureRun(const Unit& unit, const Options& options, const CaptureChoices& choices);
   ~CaptureRun();
 
   [[nodiscard]] const Options& options() const { return options_; }
-  /// 0: the capture has no times.
+  /// Returns the ticks per second; 0: the capture has no times.
   [[nodiscard]] std::uint64_t ticks_per_second() const;
-  /// What the user did not say and only the encoder could be asked for, taken from the frames of the capture; the
-  /// options with it. Before anything is decoded: where only a checksum tells a length, the first that fits may be an
-  /// accident. Not from standard input, which can be read once only.
+  /// Returns `options` completed by values that a live host would read from the encoder and that the frames of the
+  /// capture report. Runs before decoding: where only a checksum determines a length, the first that fits may be
+  /// chance. Does nothing for standard input, which can be read only once.
   const Options& settle_options();
-  /// Decodes all of it into `sink`; `progress` is called now and then with how far it is. Throws UsageError,
-  /// Failure and what `sink` throws.
+  /// Decodes the whole capture into `all`; calls `progress` now and then with the tick reached. Throws UsageError,
+  /// Failure and the exceptions of `all`.
   CaptureOutcome run(capture::AnnotationSink& all, const std::function<void(capture::Tick)>& progress);
 
  private:
-  // The lines of the capture and who speaks on them.
+  // The asynchronous lines of the capture and the sender on each.
   struct Lines {
     std::vector<unsigned> channels;
     capture::Annotator::Settings settings;
@@ -66,14 +67,14 @@ class CaptureRun {
 
   [[nodiscard]] Lines find_lines() const;
   struct Speed {
-    double baud = 0;  // 0: that which the changes suggest
+    double baud = 0;  // baud rate; 0: the one that the level changes suggest
     Parity parity = Parity::none;
   };
   [[nodiscard]] Speed likely_speed(const Lines& lines) const;
-  /// At most so many characters.
+  /// Decodes at most `characters` characters.
   CaptureOutcome decode_lines(capture::Reader& reader, Lines lines, Speed speed, std::size_t characters,
                               capture::AnnotationSink& sink, const std::function<void(capture::Tick)>& progress) const;
-  /// Returns the pause that reads the beginning of the capture best, by its index.
+  /// Returns the index of the pause with which the beginning of the capture decodes best.
   [[nodiscard]] std::size_t likely_pause(std::span<const capture::PauseReading> readings,
                                          std::vector<std::string>& notes) const;
   CaptureOutcome run_characters(capture::AnnotationSink& sink, const std::function<void(capture::Tick)>& progress);
@@ -84,7 +85,7 @@ class CaptureRun {
 
   const Unit& unit_;
   Options options_;
-  LineSettings line_;  // as the options describe it
+  LineSettings line_;  // line settings of the options
   CaptureChoices choices_;
   std::unique_ptr<capture::Reader> reader_;
 };

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Looks at the counters that replies carry: a reply that was seen before is good by itself, and yet says nothing new.
+// Checks the counters in replies: a repeated reply is good by itself but holds no new reading.
 #pragma once
 
 #include <cstdint>
@@ -10,13 +10,13 @@
 
 namespace absenc::client {
 
-/// Hands annotations on. A reply becomes a `sequence_mismatch`, as a host that looks at counters would have it, when
-/// the first of its fields of the role sequence stands where that encoder's last one stood, or when a field of the role
-/// life_counter is not one further than in the frame before. Where damaged frames lie between, that may have moved on
-/// by any number, but may not stand.
+/// Forwards annotations. A reply becomes `sequence_mismatch`, as for a live host, in two cases: the first field with
+/// the role sequence equals that of the encoder's last reply, or a field with the role life_counter is not one more
+/// than in the frame before. After damaged frames a life counter may have advanced by any number, but must have
+/// advanced.
 class SequenceWatch final : public capture::AnnotationSink {
  public:
-  /// `sink` must outlive it.
+  /// `sink` must outlive the object.
   explicit SequenceWatch(capture::AnnotationSink& sink) : sink_(sink) {}
 
   void put(const capture::Annotation& annotation) override {
@@ -32,7 +32,7 @@ class SequenceWatch final : public capture::AnnotationSink {
   }
 
  private:
-  // With more in between, a counter of 7 bits may have come round.
+  // After more frames than this, a counter of 7 bits may have wrapped.
   static constexpr std::uint64_t most_between = 100;
   static constexpr std::int64_t life_counter_end = 64;
 
@@ -63,7 +63,7 @@ class SequenceWatch final : public capture::AnnotationSink {
   }
 
   capture::AnnotationSink& sink_;
-  // By the address of the encoder; life counters also by their field.
+  // Last values by the encoder's address; those of life counters also by their field.
   std::map<std::pair<std::int64_t, const FieldInfo*>, Seen> last_;
   std::uint64_t count_ = 0;
   std::uint64_t damaged_at_ = 0;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Runs commands of a unit against its virtual encoder in virtual time, keeps what each of them said, and draws the
-// conversation as `absenc wave` draws it.
+// Runs commands of a unit against its virtual encoder in virtual time, stores their results, and draws the conversation
+// as `absenc wave` does.
 #pragma once
 
 #include <algorithm>
@@ -25,20 +25,20 @@ namespace absenc::client {
 
 /// The values of one result of a conversation, or of one exchange of a capture.
 struct Said {
-  std::string what;  // the command, or the kind of the exchange and its frames
+  std::string what;  // the command, or the kind of exchange and its frames
   Time begin{};
   Time end{};
   Error error = Error::none;
   std::string words{};
   Answer answer{};
   std::optional<Reading> reading{};
-  bool reads = false;       // it tells what the encoder says, and nothing of its own
-  bool is_special = false;  // a command of this unit alone: it may try what does not work
-  unsigned exchanges = 0;   // requests, pulses or transfers of the conversation
-  bool is_verdict = false;  // the error is not that of the last reply
+  bool reads = false;       // the result holds only values of the encoder's replies
+  bool is_special = false;  // a command that only this unit has; it may try requests that fail
+  unsigned exchanges = 0;   // number of requests, pulses or transfers of the conversation
+  bool is_verdict = false;  // the error is a verdict of the procedure, not of the last reply
 };
 
-/// Looks at what a host does.
+/// Records the steps of a host.
 template <class Item>
 class HostEnd final : public Port<Item> {
  public:
@@ -56,13 +56,13 @@ class HostEnd final : public Port<Item> {
 
   std::uint32_t rate;
   unsigned transfers = 0;
-  bool moved = false;  // it has set another rate, which no capture follows
+  bool moved = false;  // the host has set another rate, which a capture cannot follow
 
  private:
   Port<Item>& port_;
 };
 
-/// A virtual encoder, its host and their wires.
+/// Connects a virtual encoder and its host by wires.
 class Stage {
  public:
   explicit Stage(const std::string& text)
@@ -76,7 +76,7 @@ class Stage {
 
   [[nodiscard]] LineSettings line() const { return address.line.with_some_rate(); }
 
-  /// One after the other, with pauses in which no reply is under way.
+  /// Runs the commands one after the other, with pauses long enough for every reply.
   void run(const std::vector<const Command*>& commands) {
     if (device_.bytes() != nullptr) {
       run_on(*device_.bytes(), commands);
@@ -91,7 +91,7 @@ class Stage {
     capture::write_vcd(out, drawing_);
   }
 
-  /// Before the first and behind the last character, so that decoders see a silent line.
+  /// The silence before the first and after the last character, which decoders need.
   [[nodiscard]] Time idle() const { return std::max<Time>(std::chrono::milliseconds(1), 5 * line().character()); }
   EncoderAddress address;
   std::vector<Said> live;
@@ -121,7 +121,7 @@ class Stage {
     }
   }
 
-  // The least values, or else the greatest: not every number between is one that the encoder has.
+  // Uses the smallest or the greatest values, because the encoder may lack numbers in between.
   static std::vector<std::vector<std::int64_t>> arguments_of(const Command& command) {
     std::vector<std::vector<std::int64_t>> all(2);
     for (const Argument& argument : command.arguments) {
@@ -131,7 +131,7 @@ class Stage {
     return all;
   }
 
-  // False: the command cannot be run so.
+  // Returns false if the command cannot be run with these arguments.
   template <class Item>
   bool converse(host::Session<Item>& session, HostEnd<Item>& port, const Command& command,
                 const std::vector<std::int64_t>& arguments) {
@@ -154,14 +154,14 @@ class Stage {
     if constexpr (std::is_same_v<Item, CanFrame>) {
       said.is_verdict = said.error == Error::cross_check_failed;
     } else {
-      // Only the last reply is compared: a procedure adds a verdict of its own.
+      // Compares only the last reply, because a procedure adds a verdict of its own.
       const Exchange<Item> last = conversation->exchange();
       const bool has_bytes = address.unit->link != LinkKind::clocked && !last.received.empty();
       said.is_verdict = has_bytes && address.unit->check(address.options, {.bytes = last.sent},
                                                          {.bytes = last.received}) == Error::none;
     }
-    said.is_verdict = said.is_verdict || said.error == Error::not_still;  // of two good replies
-    // A clock is in the capture.
+    said.is_verdict = said.is_verdict || said.error == Error::not_still;  // a verdict about two good replies
+    // A clocked reading appears in the capture even if it failed.
     const bool can_follow = !port.moved || address.unit->link == LinkKind::clocked;
     if (can_follow && said.error != Error::unsupported) live.push_back(std::move(said));
     return true;

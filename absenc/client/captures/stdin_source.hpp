@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Standard input as the bytes of a capture: read once, from the front to the back.
+// Reads standard input as the bytes of a capture, once and in order.
 #pragma once
 
 #include <cstdint>
@@ -10,15 +10,14 @@
 
 namespace absenc::client {
 
-/// Keeps the last 2 MiB, so that the beginning can be looked at more than once. What is further back is as good as
-/// not there.
+/// Buffers the last 2 MiB, so that the beginning can be read several times. Earlier bytes are no longer available.
 class StdinSource final : public capture::Source {
  public:
   StdinSource() : window_(capacity) {}
 
-  /// Not known: as much as can be asked for.
+  /// Returns the greatest number, because the size is unknown.
   [[nodiscard]] std::uint64_t size() const override { return UINT64_MAX; }
-  /// Waits until all of it has come, or the end. Throws Failure.
+  /// Waits until the requested bytes have arrived, or the end. Throws Failure.
   [[nodiscard]] std::size_t read(std::uint64_t offset, std::span<std::uint8_t> into) override;
 
  private:
@@ -26,7 +25,7 @@ class StdinSource final : public capture::Source {
 
   bool pull(std::uint64_t until);
 
-  std::vector<std::uint8_t> window_;  // byte n of the input stands at n modulo capacity
+  std::vector<std::uint8_t> window_;  // ring buffer: byte n of the input is at n modulo capacity
   std::uint64_t end_ = 0;             // bytes read so far
   bool ended_ = false;
 };

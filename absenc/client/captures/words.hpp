@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A capture in words: times, damages, what is wrong with an exchange.
+// Describes a capture in words: times, damage, errors of an exchange.
 #pragma once
 
 #include <cstdint>
@@ -11,18 +11,18 @@
 
 namespace absenc::client {
 
-/// The time of a tick.
+/// Converts ticks of a capture to seconds and to text.
 class TickClock {
  public:
-  /// 0: there is none, ticks are counted.
+  /// `ticks_per_second` is 0 for a capture without times; then `text` prints the number of the tick.
   explicit TickClock(std::uint64_t ticks_per_second);
 
   [[nodiscard]] bool has_time() const { return ticks_per_second_ != 0; }
   [[nodiscard]] double seconds(capture::Tick tick) const;
   [[nodiscard]] Time time(capture::Tick ticks) const;
-  /// Seconds with as many digits as it takes, or the number of the tick.
+  /// Returns seconds with the digits that a tick needs, or the number of the tick.
   [[nodiscard]] std::string text(capture::Tick tick) const;
-  /// Of seconds, for `Column::Look`.
+  /// Returns the format of seconds, for `Column::Look`.
   [[nodiscard]] std::string format() const;
 
  private:
@@ -30,16 +30,16 @@ class TickClock {
   int digits_ = 0;
 };
 
-/// "the capture is damaged at byte 600, second 0.005: the file is cut off", or "note: byte 600, ..."
+/// Returns "the capture is damaged at byte 600, second 0.005: the file is cut off", or "note: byte 600, ...".
 [[nodiscard]] std::string to_text(const capture::Damage& damage, const TickClock& clock);
 
-/// "exchange"
+/// Returns the kind as in rows: "exchange".
 [[nodiscard]] std::string_view name_of(capture::Annotation::Kind kind);
 
-/// Whether its frames say something that may be shown.
+/// Returns whether the fields of an annotation may be shown.
 [[nodiscard]] bool has_fields(const capture::Annotation& annotation);
 
-/// What is wrong with it and what to try; "" of a good one that needs no words.
+/// Returns the error of an annotation and what to try; "" for a good one.
 [[nodiscard]] std::string message_of(const Unit& unit, const Options& options, const capture::Annotation& annotation);
 
 }  // namespace absenc::client

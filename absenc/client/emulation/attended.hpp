@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// How a virtual encoder is driven by a port: others can do something to it between its steps.
+// Runs a virtual encoder on a port and lets other code act on it between its steps.
 #pragma once
 
 #include <algorithm>
@@ -10,21 +10,20 @@
 
 namespace absenc::client {
 
-/// A host on a pseudo-terminal waits milliseconds for what takes microseconds on a wire: a transfer due so soon is sent
-/// at once.
+/// A transfer due within this time is sent at once: a host on a pseudo-terminal waits milliseconds anyway.
 inline constexpr Time send_slack = std::chrono::microseconds(500);
 
-/// Nothing else runs while `look` does: no thread touches an encoder beside its carrier, and every carrier has timers.
+/// Runs an encoder and calls `look` between its steps, in the same thread, so that no second thread touches the
+/// encoder.
 template <class Item>
 class Attended final : public Machine<Item> {
  public:
-  /// `look` is called every 20 ms and at each step that comes later; it returns false when it is not to be called
-  /// again.
+  /// Calls `look` every 20 ms, or at the next step after that, until it returns false.
   Attended(Machine<Item>& machine, std::function<bool(Time now)> look) : machine_(machine), look_(std::move(look)) {}
 
   void feed(const Event<Item>& event) override {
     if (event.kind == Event<Item>::Kind::timer) {
-      if (event.at < timer_) return;  // only to look
+      if (event.at < timer_) return;  // the timer was only for `look`
       timer_ = never;
     }
     machine_.feed(event);
@@ -35,7 +34,7 @@ class Attended final : public Machine<Item> {
     if (now >= look_at_) look_at_ = look_(now) ? now + between_looks : never;
     Step<Item> step = machine_.next(now);
     if (step.kind != Step<Item>::Kind::wait) return step;
-    // As ports have it: a timer that was due in the moment of another event stays due.
+    // As on ports, a timer that is due at the time of another event remains due.
     timer_ = step.at > now || step.at == timer_ ? step.at : never;
     step.at = std::min(look_at_, timer_);
     return step;
@@ -44,7 +43,7 @@ class Attended final : public Machine<Item> {
  private:
   Machine<Item>& machine_;
   std::function<bool(Time)> look_;
-  Time timer_ = never;  // of the machine's last wait
+  Time timer_ = never;  // timer of the machine's last wait
   Time look_at_{};
 };
 

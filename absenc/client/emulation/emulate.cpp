@@ -28,7 +28,7 @@ namespace absenc::client {
 
 namespace {
 
-constexpr Time between_tries_to_look = std::chrono::milliseconds(20);  // while the interface is away
+constexpr Time between_tries_to_look = std::chrono::milliseconds(20);  // period of retries while the interface is down
 
 EncoderAddress virtual_address(std::string_view text) {
   EncoderAddress address = parse_address("sim:" + std::string(text));
@@ -121,7 +121,7 @@ struct Emulation::Service {
     serve_forever(attended, open, wait, [](Served, std::string_view) {});
   }
 
-  // Between two steps of the encoder.
+  // Runs the waiting orders between two steps of the encoder.
   bool look(Time now) {
     const std::lock_guard lock(mutex);
     if (stopped) throw Cancelled{};
@@ -132,7 +132,7 @@ struct Emulation::Service {
     return true;
   }
 
-  /// Does the work there, and returns when it is done.
+  /// Runs `work` in the encoder's thread and returns when it is done.
   void carry_out(const std::function<void(Time)>& work) {
     const std::lock_guard turn(wishes);
     std::unique_lock lock(mutex);
@@ -155,19 +155,19 @@ struct Emulation::Service {
   EncoderAddress address;
   RuleCounter rules;
   VirtualDevice device;
-  std::string interface;  // or else
+  std::string interface;  // the CAN interface; otherwise "" and `emulator` is set
   std::shared_ptr<os::EmulatorPort> port;
-  std::unique_ptr<os::SocketCan> can;  // not served yet
+  std::unique_ptr<os::SocketCan> can;  // the opened interface, before the thread takes it
 
-  std::mutex wishes;  // one at a time
-  std::mutex mutex;   // guards what follows
+  std::mutex wishes;  // one order at a time
+  std::mutex mutex;   // guards the members down to the thread
   std::condition_variable changed;
   std::function<void(Time)> wish;
   bool stopped = false;
   std::exception_ptr thrown;
-  std::function<RequestCounts()> count_requests;  // as long as it serves, in its thread
+  std::function<RequestCounts()> count_requests;  // set while the thread runs
 
-  std::jthread thread;  // last: it uses all of the others
+  std::jthread thread;  // last member: it uses all others
 };
 
 Emulation::Emulation(std::string_view text, const EmulateChoices& choices)

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A virtual encoder that others open: half a second for the way, because others may use the machine.
+// Tests a virtual encoder on a port. The latency is half a second, because the computer may be busy.
 #include <gmock/gmock-more-matchers.h>
 #include <gtest/gtest.h>
 

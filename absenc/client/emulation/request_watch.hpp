@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Looks at everything that a host sends to a virtual encoder, and counts what is a request of the document and what is
-// none.
+// Counts the requests of a host to a virtual encoder, and everything it sends that is no request of the document.
 #pragma once
 
 #include <algorithm>
@@ -19,12 +18,11 @@
 
 namespace absenc::client {
 
-/// Stands between the line and the virtual encoder. On a clocked line, where nothing but the clock asks, each time that
-/// it begins is a request.
+/// Stands between the line and the virtual encoder. On a clocked line each start of the clock is a request.
 template <class Item>
 class RequestWatch final : public Machine<Item> {
  public:
-  /// Both must outlive the watch.
+  /// All arguments must outlive the object.
   RequestWatch(Machine<Item>& device, const EncoderAddress& address)
       : device_(device),
         unit_(*address.unit),
@@ -44,7 +42,7 @@ class RequestWatch final : public Machine<Item> {
 
  private:
   using Kind = typename Event<Item>::Kind;
-  static constexpr int most_in_reply = 24;  // characters
+  static constexpr int most_in_reply = 24;  // maximum number of characters
 
   void look(const Event<Item>& event) {
     if (unit_.link == LinkKind::clocked) {
@@ -66,7 +64,7 @@ class RequestWatch final : public Machine<Item> {
     }
   }
 
-  // Frames that no host sends to such an encoder are those of other devices on the bus.
+  // Ignores frames that no host sends to such an encoder: they belong to other devices on the bus.
   void look_at_frames(std::span<const CanFrame> frames) {
     for (const CanFrame& frame : frames) {
       const Error error = error_of({.can = &frame});
@@ -75,7 +73,7 @@ class RequestWatch final : public Machine<Item> {
     }
   }
 
-  // A request is what its transfer begins with.
+  // The request is the beginning of its transfer.
   void look_at_transfer(Bytes bytes) {
     const FrameEnd end = unit_.frame_end(options_, Direction::request, bytes);
     const bool good = end.kind == FrameEnd::Kind::complete && error_of({.bytes = bytes.first(end.size)}) == Error::none;
@@ -83,11 +81,11 @@ class RequestWatch final : public Machine<Item> {
     note_bad(to_hex(bytes));
   }
 
-  // What collides with a reply arrives garbled: that is another fault of the host than a wrong request.
+  // Bytes that collide with a reply arrive damaged. The host's fault is then the collision, not a wrong request.
   void look_at_bytes(Bytes bytes, Time at, Time late) {
     const Time pause = at - character_ * static_cast<std::int64_t>(bytes.size()) - heard_at_;
     heard_at_ = at;
-    // Had this program been let run, the reply might have been out between two requests.
+    // If this program had run in time, the reply might have been sent between the two requests.
     const bool may_have_waited = late > unit_.timing.turnaround + most_in_reply * character_;
     if (pause > 2 * character_ || may_have_waited) skipping_ = waits_ = false;
     if (sending_ && unit_.link == LinkKind::half_duplex) skipping_ = true;
@@ -97,7 +95,7 @@ class RequestWatch final : public Machine<Item> {
     }
   }
 
-  // Whether there may be more of them.
+  // Returns whether the request may still be incomplete.
   bool take_one() {
     if (pending_.empty()) return false;
     const FrameEnd end = unit_.frame_end(options_, Direction::request, pending_);
@@ -129,7 +127,7 @@ class RequestWatch final : public Machine<Item> {
 
   [[nodiscard]] Error error_of(const Frame& request) const { return unit_.check(options_, request, {}); }
 
-  // A port that is opened may bring a few bytes before the host has said anything.
+  // Opening a port may produce a few bytes before the host sends anything.
   void note_good() {
     if (++counts_.good > 1) return;
     counts_.before += counts_.bad;
@@ -146,8 +144,9 @@ class RequestWatch final : public Machine<Item> {
   Time character_;
   bool sending_ = false;
   Time heard_at_{};
-  bool waits_ = false;     // for a reply, as its host should
-  bool skipping_ = false;  // until the line is silent: of what begins no request, and of what collided
+  bool waits_ = false;  // the encoder's reply is outstanding, so the host should wait
+  bool skipping_ =
+      false;  // bytes are ignored until the line is silent, after a collision or bytes that begin no request
   std::vector<std::uint8_t> pending_{};
   RequestCounts counts_{};
 };

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// How often a virtual encoder looked at each rule of its host.
+// Counts how often a virtual encoder checked each rule of its host.
 #pragma once
 
 #include <algorithm>
@@ -11,7 +11,7 @@
 
 namespace absenc::client {
 
-/// That of this rule: a new one where there is none yet.
+/// Returns the counter of this rule; adds one if there is none.
 [[nodiscard]] inline RuleCount& count_of(std::vector<RuleCount>& counts, std::string_view rule) {
   const auto found = std::ranges::find(counts, rule, &RuleCount::rule);
   return found != counts.end() ? *found : *counts.insert(found, {.rule = rule});

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A virtual encoder on a port that may go away and come back.
+// Runs a virtual encoder on a port that may be lost and come back.
 #pragma once
 
 #include <algorithm>
@@ -12,10 +12,11 @@
 
 namespace absenc::client {
 
-/// What has become of the port.
+/// A change of the port that is reported.
 enum class Served : std::uint8_t { opened, away, back };
 
-/// Goes from one port to the next: the last one may have gone away between a transfer and its `sent`.
+/// Moves an encoder from one port to the next. If the last port was lost between a transfer and its `sent`, `left`
+/// feeds the missing `sent`.
 template <class Item>
 class Movable final : public Machine<Item> {
  public:
@@ -37,7 +38,7 @@ class Movable final : public Machine<Item> {
     if (sending_) feed({.kind = Event<Item>::Kind::sent, .at = now});
   }
 
-  /// What it has set the last port to; 0: nothing.
+  /// Returns the rate that the encoder set on the last port; 0: none.
   [[nodiscard]] std::uint32_t rate() const { return rate_; }
 
  private:
@@ -46,8 +47,8 @@ class Movable final : public Machine<Item> {
   std::uint32_t rate_ = 0;
 };
 
-/// Without end: what `open`, the port or `wait` throws ends it. `open()` makes the port; one that is lost, which
-/// os::Failure tells, is tried again. Between tries `wait(time)` is called. `told(what, why)` hears of the port.
+/// Never returns: an exception of `open`, the port or `wait` ends it. `open()` opens the port. When the port is lost
+/// (os::Failure), calls `wait(time)` and `open()` again. Calls `told(what, why)` for each change of the port.
 template <class Item, class Open, class Wait, class Told>
 [[noreturn]] void serve_forever(Machine<Item>& machine, const Open& open, const Wait& wait, const Told& told) {
   constexpr Time time_between_tries = std::chrono::milliseconds(250);
@@ -67,7 +68,7 @@ template <class Item, class Open, class Wait, class Told>
       is_open = was_open = true;
       host::drive(movable, *port, [] { return true; });
     } catch (const os::Failure& failure) {
-      // What the port cannot do, it cannot do later either.
+      // A rate that the port does not support now will not be supported later.
       const bool unable = is_open && failure.kind() == os::Failure::Kind::unsupported;
       if (!was_open || unable) throw;
       if (is_open) told(Served::away, failure.what());

@@ -29,11 +29,11 @@ namespace {
 
 using namespace std::chrono_literals;
 
-constexpr Time first_request = 20us;              // so long is the encoder switched on
-constexpr std::uint64_t fastest = 1'000'000'000;  // samples a second: those of the drawing
+constexpr Time first_request = 20us;              // time after power-on
+constexpr std::uint64_t fastest = 1'000'000'000;  // samples per second, the resolution of the drawing
 
-// Decoders want to see the line idle before and behind what they take for whole: CAN nodes 11 bits, Modbus 3.5
-// characters, whoever guesses the rate a little more.
+// Idle time at the beginning and the end, which decoders need: 11 bits for CAN, 3.5 characters for Modbus, and more to
+// detect the rate.
 Time idle_around(const LineSettings& line) { return std::max(first_request, 5 * line.character()); }
 
 enum class FileFormat : std::uint8_t { vcd, sigrok, saleae };
@@ -50,7 +50,7 @@ FileFormat format_of(const std::filesystem::path& path) {
                   path.string()));
 }
 
-/// A command with its arguments, as it was written in one text.
+/// A command with its arguments, parsed from one text.
 struct Spoken {
   const Command* command;
   std::vector<std::int64_t> arguments;
@@ -73,7 +73,7 @@ std::vector<Spoken> commands_of(const Unit& unit, std::span<const std::string> t
   return {{read, require_arguments(*read, {})}};
 }
 
-/// A virtual encoder and its host in virtual time.
+/// Runs a virtual encoder and its host in virtual time and draws their wires.
 struct Conversations {
   const EncoderAddress& uri;
   std::vector<Spoken> commands;
@@ -84,7 +84,7 @@ struct Conversations {
 
   std::uint64_t results = 0;
   std::uint64_t failures = 0;
-  Time end{};  // of the last of them, which may have waited for nothing
+  Time end{};  // end of the last conversation, which may have timed out
 
   template <class Item>
   void hold(Machine<Item>& device) {
@@ -103,7 +103,8 @@ struct Conversations {
     while (port.now() < until) static_cast<void>(port.wait({.at = until}));
   }
 
-  // One that never ends by itself, as a stream, ends with the last round; one that asks without end after a result.
+  // A stream, which never ends by itself, ends with the last round; a command that polls without end ends after a
+  // result.
   template <class Item>
   void hold(sim::SimPort<Item>& port, const Spoken& one) {
     std::vector<std::byte> storage(uri.unit->host_storage);
@@ -137,7 +138,7 @@ void converse(Conversations& conversations) {
   }
 }
 
-// Room on the disk that the file will be on.
+// Makes temporary files on the disk of the result, so that space is checked there.
 capture::ScratchFile scratch_file(const std::string& path) {
   os::Descriptor file = os::nameless_file(std::filesystem::path(path).parent_path());
   return capture::ScratchFile(::fdopen(file.release(), "w+"));
@@ -146,7 +147,7 @@ capture::ScratchFile scratch_file(const std::string& path) {
 void write_drawing(const WaveChoices& choices, const std::string& path, capture::Drawing& drawing,
                    const LineSettings& line) {
   const FileFormat format = format_of(path);
-  if (format == FileFormat::sigrok) {  // which takes the place of the old one by itself
+  if (format == FileFormat::sigrok) {  // the sigrok writer replaces the old file itself
     const std::uint64_t usual = std::min<std::uint64_t>(fastest, std::uint64_t{16} * line.rate);
     return capture::write_sigrok(path, drawing, choices.samples_per_second == 0 ? usual : choices.samples_per_second);
   }
@@ -158,7 +159,7 @@ void write_drawing(const WaveChoices& choices, const std::string& path, capture:
   file.take_place(os::Durable::no);
 }
 
-// "sim:" may be left out: no other encoder shows its wires.
+// "sim:" may be omitted, because only virtual encoders have wires to draw.
 EncoderAddress virtual_encoder(std::string_view text, std::span<const std::string> settings) {
   const std::string_view id = text.substr(0, text.find_first_of("?:"));
   const bool bare = find_unit(id) != nullptr && (id.size() == text.size() || text[id.size()] == '?');

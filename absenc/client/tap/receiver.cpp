@@ -17,12 +17,12 @@ using namespace std::chrono_literals;
 Receiver::Receiver(const EncoderAddress& uri) : link_(open_receiving(uri)), place_(link_.place) {}
 
 Receiver::Receiver() : place_("standard input") {
-  link_.latency = 20ms;  // a pipe between two programs, which a busy machine holds up
+  link_.latency = 20ms;  // a pipe between two programs, which a busy computer delays
 }
 
 Receiver::~Receiver() { cancel(); }
 
-// Programs and adapters may hold a part of a frame back for their latency, a busy machine for much longer.
+// Programs and adapters may delay a part of a frame for their latency, a busy computer for much longer.
 Time Receiver::quiet() const { return 500ms + 2 * link_.latency; }
 
 void Receiver::start(Time end) {
@@ -90,8 +90,7 @@ void Receiver::receive() {
   }
 }
 
-// The port looks for bytes once more before it says that the time is over: that this thread was not let run is no
-// silence.
+// The port checks for bytes once more before it reports the timeout: a thread that did not run has not seen silence.
 void Receiver::receive_from_port() {
   Time quiet_at = link_.bytes->now() + quiet();
   for (;;) {

@@ -20,48 +20,48 @@
 
 namespace absenc::client {
 
-/// Bytes that came at one time, or the fact that none came.
+/// Bytes that arrived at one time, or the report that none arrived.
 struct Received {
   Time at{};
-  std::vector<std::uint8_t> bytes{};  // none: nothing has come for `Receiver::quiet`
+  std::vector<std::uint8_t> bytes{};  // empty: no byte has arrived for `Receiver::quiet`
 };
 
 class Receiver {
  public:
   enum class End : std::uint8_t { none, input, time, interrupted, lost };
 
-  /// A port of the address. Throws os::Failure, UsageError.
+  /// Opens the port of the address. Throws os::Failure, UsageError.
   explicit Receiver(const EncoderAddress& uri);
-  /// Raw bytes from standard input.
+  /// Receives raw bytes from standard input.
   Receiver();
   ~Receiver();
   Receiver(const Receiver&) = delete;
   Receiver& operator=(const Receiver&) = delete;
 
-  /// From now on, until this time. Once.
+  /// Starts receiving, until `end`. Called once.
   void start(Time end = never);
-  /// The next, in order; nothing at the end, or when `deadline` came first.
+  /// Returns the next bytes in order; nothing at the end, or if `deadline` is reached first.
   [[nodiscard]] std::optional<Received> next(Time deadline = never);
-  /// From any thread: `next` returns nothing from now on.
+  /// Makes `next` return nothing from now on. May be called from any thread.
   void cancel();
 
-  /// Why no more comes; `none` while more may.
+  /// Returns why the port was lost; `none` while it is open.
   [[nodiscard]] End end() const;
-  /// In words, where the port was lost.
+  /// Returns in words why the port was lost.
   [[nodiscard]] std::string problem() const;
-  /// Bytes that were dropped, because whoever takes them was too slow for too long.
+  /// Returns the number of dropped bytes. Bytes are dropped if the reader is too slow for too long.
   [[nodiscard]] std::uint64_t dropped() const;
 
-  /// "/dev/ttyUSB0 at 2500000 baud"
+  /// Returns the place as "/dev/ttyUSB0 at 2500000 baud".
   [[nodiscard]] const std::string& place() const { return place_; }
   [[nodiscard]] const std::vector<std::string>& notes() const { return link_.notes; }
-  /// How late a byte may come to this program.
+  /// The greatest delay of a byte on its way to this program.
   [[nodiscard]] Time latency() const { return link_.latency; }
-  /// So long a silence is in no frame, and before no reply.
+  /// A silence of this length occurs neither in a frame nor before a reply.
   [[nodiscard]] Time quiet() const;
 
  private:
-  static constexpr std::size_t most_waiting = 64 << 20;  // bytes
+  static constexpr std::size_t most_waiting = 64 << 20;  // limit of waiting bytes
 
   void receive();
   void receive_from_port();
@@ -73,7 +73,7 @@ class Receiver {
   std::string place_;
   Time end_time_ = never;
 
-  mutable std::mutex mutex_;  // guards what follows
+  mutable std::mutex mutex_;  // guards the members down to the thread
   std::condition_variable changed_;
   std::deque<Received> waiting_;
   std::size_t waiting_size_ = 0;
@@ -83,7 +83,7 @@ class Receiver {
   bool cancelled_ = false;
 
   std::function<bool()> is_over_;
-  std::jthread thread_;  // last: it uses all of the others
+  std::jthread thread_;  // last member: it uses all others
 };
 
 }  // namespace absenc::client

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// How often a host sends each kind of request, by times of arrival.
+// Measures how often a host sends each kind of request, by arrival times.
 #pragma once
 
 #include <algorithm>
@@ -18,14 +18,14 @@ namespace absenc::client {
 class RequestRates final : public capture::AnnotationSink {
  public:
   struct Kind {
-    std::string name{};                 // of the command of the protocol; "": none of its commands sends that
+    std::string name{};                 // name of the protocol's command; "": no command sends such a request
     std::vector<std::uint8_t> first{};  // the first request of this kind
     std::uint64_t count = 0;
-    std::uint64_t errors = 0;  // of them: not answered, or badly
-    capture::Tick begin = 0;   // of the first
-    capture::Tick last = 0;    // begin of the last
+    std::uint64_t errors = 0;  // requests without a good reply
+    capture::Tick begin = 0;   // tick of the first request
+    capture::Tick last = 0;    // tick of the last request
 
-    /// Requests a second; 0: fewer than two.
+    /// Returns requests per second; 0 for fewer than two requests.
     [[nodiscard]] double per_second() const {
       return count > 1 && last > begin
                  ? static_cast<double>(count - 1) * static_cast<double>(arrival_ticks_per_second) /
@@ -56,7 +56,7 @@ class RequestRates final : public capture::AnnotationSink {
     kind.errors += annotation.error != Error::none ? 1 : 0;
   }
 
-  /// The most frequent first. A damaged request is a kind of its own, as far as there is room.
+  /// Returns the kinds, the most frequent first. A damaged request is a kind of its own while there is room.
   [[nodiscard]] std::vector<Kind> kinds() const {
     std::vector<Kind> all = kinds_;
     std::stable_sort(all.begin(), all.end(),
@@ -65,15 +65,15 @@ class RequestRates final : public capture::AnnotationSink {
   }
 
  private:
-  static constexpr std::size_t most_kinds = 64;  // those behind share the last
+  static constexpr std::size_t most_kinds = 64;  // further kinds are counted as the last one
 
   struct Sample {
     std::string_view command;
     std::vector<std::uint8_t> bytes;
-    bool varies;  // it has arguments
+    bool varies;  // the command has arguments
   };
 
-  // Requests of a command with arguments begin alike and are as long.
+  // Requests of a command with arguments have the same beginning and the same length.
   [[nodiscard]] std::string_view command_of(Bytes request) const {
     for (const Sample& one : samples_) {
       if (std::equal(one.bytes.begin(), one.bytes.end(), request.begin(), request.end())) return one.command;

@@ -34,7 +34,7 @@ struct Tap::Work final : capture::AnnotationSink {
       if (is_over) return end();
       filled = at = 0;
       is_over = !run.advance();
-      --at;  // the next is the first
+      --at;  // so that advance moves to the first
     }
     return &ready[at];
   }
@@ -50,7 +50,7 @@ struct Tap::Work final : capture::AnnotationSink {
   TapRun run;
   TickClock clock{arrival_ticks_per_second};
   AnnotationRows rows;
-  std::vector<Row> ready;  // filled again and again
+  std::vector<Row> ready;  // refilled by each step
   std::size_t filled = 0;
   std::size_t at = 0;
   bool is_over = false;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Everything that is received, as a file that decode reads again: a line for each frame, with its time of arrival.
+// Records all received bytes in a file that `decode` reads: one line for each frame, with its arrival time.
 #pragma once
 
 #include <fmt/format.h>
@@ -14,10 +14,10 @@
 
 namespace absenc::client {
 
-/// Takes annotations as the annotator hands them out: each received byte is in one of them. Times are arrival_tick.
+/// Writes the annotations of the annotator, which contain each received byte. Their times are arrival ticks.
 class TapRecord final : public capture::AnnotationSink {
  public:
-  /// Makes the file. Throws os::Failure: `in_use` when there is one already.
+  /// Creates the file. Throws os::Failure: `in_use` if it already exists.
   TapRecord(const std::string& path, const std::string& title) : file_(path) {
     lines_ = fmt::format(
         "# {}\n# seconds since its beginning, when the last byte of a frame had arrived at the computer; then the "
@@ -30,7 +30,7 @@ class TapRecord final : public capture::AnnotationSink {
     add(annotation.begin, annotation.request.bytes);
     add(annotation.end, annotation.reply.bytes);
   }
-  /// Hands what was put to the system. Throws os::Failure.
+  /// Writes the buffered lines to the file. Throws os::Failure.
   void flush() {
     if (!lines_.empty()) file_.append(lines_);
     lines_.clear();
@@ -38,7 +38,7 @@ class TapRecord final : public capture::AnnotationSink {
   [[nodiscard]] const std::string& path() const { return file_.path(); }
 
  private:
-  // No two frames at the same time: decode takes lines of one time for one frame.
+  // Gives each frame a time of its own, because `decode` joins lines of the same time to one frame.
   void add(capture::Tick at, Bytes bytes) {
     if (bytes.empty()) return;
     last_ = std::max(at, last_ + 1);

@@ -27,10 +27,10 @@ using namespace std::chrono_literals;
 
 namespace {
 
-constexpr std::size_t first_search = 64;     // bytes; the next are at twice as many each
-constexpr std::size_t last_search = 8192;    // more do not help
-constexpr std::size_t most_at_other = 2048;  // bytes at a rate that may be another
-constexpr Time patience_at_rate = 2s;        // until something comes, where there are more rates to try
+constexpr std::size_t first_search = 64;     // bytes before the first search; each further search has twice as many
+constexpr std::size_t last_search = 8192;    // bytes; more do not improve the search
+constexpr std::size_t most_at_other = 2048;  // bytes to try at a rate that may be wrong
+constexpr Time patience_at_rate = 2s;        // time to wait for bytes before the next rate is tried
 constexpr std::size_t enough_to_settle = 600;
 constexpr Time time_to_settle = 1s;
 
@@ -38,7 +38,7 @@ bool is_asynchronous(const Unit& unit) {
   return unit.link == LinkKind::half_duplex || unit.link == LinkKind::full_duplex;
 }
 
-// Times of arrival do not tell how long an encoder took to answer.
+// Arrival times do not allow to measure the response time of an encoder, so it is not printed.
 struct Untimed final : capture::AnnotationSink {
   Untimed(TapRecord* of_run, capture::AnnotationSink& next) : record(of_run), sink(next) {}
   void put(const capture::Annotation& annotation) override {
@@ -77,7 +77,7 @@ struct TapRun::Sinks {
 
 TapRun::TapRun(std::string_view place, TapChoices choices) : choices_(std::move(choices)) {
   if (choices_.duration > Time{}) end_time_ = os::now() + choices_.duration;
-  // "tformat:/dev/ttyUSB0", as in other verbs.
+  // Accepts "tformat:/dev/ttyUSB0", as in other verbs.
   const std::string_view first = place.substr(0, place.find(':'));
   if (choices_.protocol.empty() && first.size() < place.size() && find_unit(first) != nullptr) {
     choices_.protocol = first;
@@ -147,7 +147,7 @@ std::vector<TapRun::Line> TapRun::lines_to_try() {
                               one.settings.stop_bits == address.line.stop_bits);
       });
       if (!known) lines.push_back({address.line, std::move(address)});
-    } catch (const UsageError& error) {  // a rate that it cannot have
+    } catch (const UsageError& error) {  // the port cannot have this rate
       if (!refusal) refusal = error;
     }
   }
@@ -156,7 +156,7 @@ std::vector<TapRun::Line> TapRun::lines_to_try() {
 }
 
 void TapRun::open(const Line& line) {
-  receiver_.reset();  // the port is locked
+  receiver_.reset();  // closes the port first, because it is locked
   receiver_ = line.address ? std::make_unique<Receiver>(*line.address) : std::make_unique<Receiver>();
   receiver_->start(end_time_);
   collected_.clear();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Listens on a line: receives bytes, finds the protocol where none was given, and hands out exchanges as they come.
+// Listens on a line: receives bytes, identifies the protocol if none was given, and passes on exchanges.
 #pragma once
 
 #include <cstdint>
@@ -24,36 +24,36 @@ namespace absenc::client {
 struct TapOutcome {
   Receiver::End end = Receiver::End::none;
   std::string problem{};      // why the port was lost
-  std::uint64_t bytes = 0;    // received
-  std::uint64_t dropped = 0;  // received, but not looked at
+  std::uint64_t bytes = 0;    // number of received bytes
+  std::uint64_t dropped = 0;  // number of bytes received but dropped before decoding
 };
 
 class TapRun {
  public:
-  /// `place` is a port without its protocol, with settings behind ?: "/dev/ttyUSB0?baud=115200", "tcp:HOST:PORT"; "-"
-  /// is standard input. Opens it. Throws UsageError, os::Failure.
+  /// Opens `place`, a port without its protocol, with settings behind ?: "/dev/ttyUSB0?baud=115200", "tcp:HOST:PORT";
+  /// "-" is standard input. Throws UsageError, os::Failure.
   TapRun(std::string_view place, TapChoices choices);
   ~TapRun();
 
-  /// Waits for enough bytes to say which protocol it is, with which options. False: none explains what came, or nothing
-  /// did. Where the protocol was given, only options that nobody gave are found out. Before `run`.
+  /// Waits for enough bytes to identify the protocol and its options. Returns false if no byte arrived or no protocol
+  /// explains the bytes. If the protocol was given, only finds missing options. Called before `run`.
   bool settle(const std::function<void(const std::string&)>& progress);
-  /// From now on exchanges go to `sink`, which must outlive it. Once.
+  /// Starts decoding into `sink`, which must outlive the object. Called once.
   void begin(capture::AnnotationSink& sink);
-  /// Waits until something comes, or nothing did for `Receiver::quiet`, and hands out what is whole then. False: that
-  /// was the end. Throws os::Failure of the record, and what the sink throws.
+  /// Waits until bytes arrive or `Receiver::quiet` elapses, and passes on the complete exchanges. Returns false at the
+  /// end. Throws os::Failure of the record, and the exceptions of the sink.
   bool advance();
-  /// Behind the end.
+  /// Returns the outcome after the end.
   [[nodiscard]] TapOutcome outcome() const;
-  /// From any thread, behind `settle`: `advance` ends.
+  /// Makes `advance` end. May be called from any thread after `settle`.
   void cancel();
 
   [[nodiscard]] bool is_protocol_given() const { return !choices_.protocol.empty(); }
-  /// Once it is known.
+  /// Valid after `settle`.
   [[nodiscard]] const Unit& unit() const { return *unit_; }
   [[nodiscard]] const Options& options() const { return options_; }
   [[nodiscard]] const Receiver& receiver() const { return *receiver_; }
-  /// Where nobody said the protocol: the likeliest first.
+  /// Returns the candidates if no protocol was given, the likeliest first.
   [[nodiscard]] const std::vector<Candidate>& candidates() const { return candidates_; }
   [[nodiscard]] std::uint64_t received_bytes() const { return bytes_; }
   [[nodiscard]] const std::vector<std::string>& notes() const { return notes_; }
@@ -62,7 +62,7 @@ class TapRun {
   struct Sinks;
   struct Line {
     LineSettings settings;
-    std::optional<EncoderAddress> address;  // none: standard input
+    std::optional<EncoderAddress> address;  // address of the port; nothing: standard input
   };
 
   [[nodiscard]] std::vector<Line> lines_to_try();
@@ -83,8 +83,8 @@ class TapRun {
   std::vector<Line> lines_;
   std::unique_ptr<Receiver> receiver_;
   std::unique_ptr<TapRecord> record_;
-  std::deque<Received> collected_;  // while it is found out whose they are
-  std::optional<Time> first_at_;    // when the first byte came
+  std::deque<Received> collected_;  // bytes received before the protocol was identified
+  std::optional<Time> first_at_;    // arrival time of the first byte
   capture::Tick now_ = 0;
   std::unique_ptr<Sinks> sinks_;
   std::uint64_t bytes_ = 0;
