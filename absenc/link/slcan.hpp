@@ -14,7 +14,7 @@
 
 namespace absenc::slcan {
 
-inline constexpr std::uint8_t end_of_line = '\r';  // also the adapter's reply "accepted"
+inline constexpr std::uint8_t end_of_line = '\r';  // end of a line; alone it is the adapter's reply "accepted"
 inline constexpr std::uint8_t bell = 0x07;         // the adapter's reply "refused"
 
 /// Longest line: T, 8 digits, length, 16 digits, 4 digits of time, CR.
@@ -110,7 +110,7 @@ constexpr std::int64_t digits_of(Bytes text) {
 /// of the four letters occurs within a frame or a command.
 class LineReader {
  public:
-  /// What a byte completes.
+  /// Event that a byte completes.
   enum class LineEvent : std::uint8_t {
     nothing,
     line,     // `line()` is complete and valid until the next byte; may be empty

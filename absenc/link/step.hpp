@@ -23,7 +23,7 @@ namespace absenc {
 /// compares the time in `next` itself.
 template <class Item>
 struct Step {
-  /// What a machine wants from its port.
+  /// Actions that a machine requests from its port.
   enum class Kind : std::uint8_t {
     wait,       // no action until the next event
     transfer,   // not before `at`: send `out` (spi: and receive max(out, expect) items; clocked: clock `bits`)
@@ -33,7 +33,7 @@ struct Step {
     done,       // the conversation has ended
   };
 
-  Kind kind = Kind::wait;  ///< What the machine wants.
+  Kind kind = Kind::wait;  ///< requested action
   ExtraWire wire{};        ///< pulse: the wire to drive
   bool hold_low = false;   ///< transfer on a clocked link: the clock line, which idles high, is held low until `at`
   std::span<const Item> out{};  ///< transfer: items to send; valid until the next feed
@@ -60,7 +60,7 @@ struct Step {
 /// clock, so the time since `selected` does not give the clock rate.
 template <class Item>
 struct Event {
-  /// What happened at a port.
+  /// Kinds of events at a port.
   enum class Kind : std::uint8_t {
     sent,      // the transfer is complete (device side of spi and clocked: the host has stopped clocking)
     received,  // `items` were received from the line
@@ -71,7 +71,7 @@ struct Event {
     line_error,  // a character with a wrong stop or parity bit, or sent at another rate, was received
   };
 
-  Kind kind = Kind::timer;        ///< What happened.
+  Kind kind = Kind::timer;        ///< kind of the event
   Time at{};                      ///< Time at which it happened.
   std::span<const Item> items{};  ///< received: the items; valid during the call
   std::size_t bits = 0;           ///< sent, device side of a clocked link: number of clocks counted

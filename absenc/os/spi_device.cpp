@@ -13,7 +13,7 @@ namespace {
 
 constexpr Time deselected_time = std::chrono::microseconds(10);  // pause that the kernel makes between two transfers
 
-constexpr std::size_t most_received = 4096;  // in bytes, while a chip stays selected: no device reads more
+constexpr std::size_t most_received = 4096;  // limit in bytes for a chip that stays selected: no device reads more
 
 constexpr bool idles_high(std::uint8_t mode) { return (mode & 2) != 0; }
 constexpr bool samples_at_trailing_edge(std::uint8_t mode) { return (mode & 1) != 0; }

@@ -113,7 +113,7 @@ Motion Motion::sine(std::int64_t start, double amplitude_degrees, double frequen
 
 Motion Motion::path(std::int64_t start, std::istream& csv, std::string_view name) {
   constexpr std::size_t longest_line = 1024;
-  constexpr std::size_t most_knots = 4'000'000;  // one hour with a thousand points per second
+  constexpr std::size_t most_knots = 4'000'000;  // limit: one hour with a thousand points per second
   Path path;
   std::array<char, longest_line + 1> buffer;
   bool heading_allowed = true;
@@ -153,7 +153,7 @@ ShaftState Motion::offset_at(const Still&, Time) { return {}; }
 ShaftState Motion::offset_at(const ConstantSpeed& speed, Time time) {
   // position = micro_rpm * ns * 2^32 / (60 * 1e6 * 1e9), both sides divided by 2^17.
   constexpr std::int64_t numerator = std::int64_t{1} << 15;
-  constexpr std::uint64_t denominator = 457'763'671'875;  // 60e15 / 2^17
+  constexpr std::uint64_t denominator = 457'763'671'875;  // the divisor 60e15, divided by 2^17
   return {scale(speed.micro_rpm * numerator, time.count(), denominator),
           saturated(static_cast<double>(speed.micro_rpm) / 1e3), 0};
 }

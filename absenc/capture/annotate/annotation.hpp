@@ -33,7 +33,7 @@ enum class Remark : std::uint8_t {
 
 /// Decoded content of a good frame.
 struct Contents {
-  std::span<const FieldValue> fields{};  // in the order in which the unit outputs them
+  std::span<const FieldValue> fields{};  // decoded fields, in the order of the unit
   const Reading* reading = nullptr;      // the position, if the frame carries one
 };
 

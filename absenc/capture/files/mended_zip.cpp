@@ -21,8 +21,8 @@ constexpr std::uint64_t zip64_end_signature = 0x06064B50;
 constexpr std::uint64_t zip64_locator_signature = 0x07064B50;
 constexpr std::uint64_t end_signature = 0x06054B50;
 constexpr std::size_t local_bytes = 30;
-constexpr std::uint64_t size_behind = 1 << 3;   // flag: the sizes follow the entry
-constexpr std::uint64_t in_zip64 = 0xFFFFFFFF;  // in place of a size: the size is in the zip64 extra field
+constexpr std::uint64_t size_behind = 1 << 3;   // flag of an entry whose sizes follow its data
+constexpr std::uint64_t in_zip64 = 0xFFFFFFFF;  // value of a size that is stored in the zip64 extra field
 constexpr std::uint64_t zip64_version = 45;
 constexpr std::size_t largest_directory = 1 << 26;
 
@@ -82,7 +82,7 @@ struct Header {
 void add_entry(Directory& directory, const Header& header, std::uint64_t at, std::uint64_t packed) {
   directory.put(directory_signature, 4).put(zip64_version, 2);
   directory.put(Bytes(header.bytes).subspan(4, 14)).put(in_zip64, 4).put(in_zip64, 4);
-  directory.put(header.name().size(), 2).put(28, 2);  // length of the name, and of the extra field
+  directory.put(header.name().size(), 2).put(28, 2);  // lengths of the name and of the extra field
   directory.put(0, 10).put(in_zip64, 4);              // comment, disk, attributes; then the offset
   directory.put(header.name()).put(1, 2).put(24, 2).put(header.size, 8).put(packed, 8).put(at, 8);
 }

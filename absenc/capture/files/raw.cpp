@@ -12,8 +12,8 @@ namespace absenc::capture {
 
 namespace {
 
-// Fits into the cache of a core, so that the decoder finds the data there; large enough that the cost of the call does
-// not matter.
+// Block size in bytes: it fits into the cache of a core, so that the decoder finds the data there; large enough that
+// the cost of the call does not matter.
 constexpr std::uint64_t block_bytes = 1 << 20;
 
 class RawReader final : public Reader {

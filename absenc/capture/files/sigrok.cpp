@@ -25,7 +25,7 @@ namespace {
 
 // A piece takes memory in each thread, and libdeflate can expand it only as a whole: larger pieces are expanded by
 // libzip.
-constexpr std::uint64_t largest_piece = 1 << 24;  // sigrok-cli writes 4 MiB, PulseView 10 MiB
+constexpr std::uint64_t largest_piece = 1 << 24;  // sigrok-cli writes pieces of 4 MiB, PulseView of 10 MiB
 constexpr std::uint64_t streamed_bytes = 1 << 22;
 constexpr std::uint64_t longest_metadata = 1 << 20;
 constexpr std::uint64_t believable = std::uint64_t{1} << 60;  // limit for the bytes of a capture; larger sizes are

@@ -58,7 +58,7 @@ struct ClockedLine {
   bool rising = false;               // the clock edge that samples a bit
   bool select_high = false;          // chip select is active high
   Tick pause = 0;                    // without chip select: a clock that rests longer ends a word; 0: `choose` decides
-  Tick settle = 0;                   // used with `pause`; see ClockedFormat
+  Tick settle = 0;                   // sampling time of a word's last bit; see ClockedFormat
   Tick change_pause = 0;
   /// Returns the index of the reading to use, of all possible ways to split the beginning of the capture. Null: rests
   /// longer than three periods of the clock end a word.

@@ -16,7 +16,7 @@ namespace absenc::capture {
 /// A captured frame: its bytes, or its bits packed MSB first.
 struct CheckedFrame {
   std::vector<std::uint8_t> bytes;
-  std::size_t bits = 0;  // number of bits; 0: whole bytes
+  std::size_t bits = 0;  // number of bits of the frame; 0: it consists of whole bytes
 };
 
 /// Limits of the search; callers must refuse longer frames.

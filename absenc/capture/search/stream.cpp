@@ -12,7 +12,7 @@ namespace absenc::capture {
 namespace {
 
 constexpr std::size_t noise_size = 1 << 15;
-constexpr std::size_t least_frames = 3;  // least number of good frames
+constexpr std::size_t least_frames = 3;  // least number of good frames that suffices as evidence
 
 // Returns the size of the good reply that begins with the first byte, or 0.
 std::size_t reply_size(const Unit& unit, const Options& options, Bytes bytes) {
@@ -130,7 +130,7 @@ std::vector<Hypothesis> find_stream_hypotheses(const Unit& unit, Bytes bytes, Ti
     one.tried *= all.size();
     found.push_back(std::move(one));
   }
-  // Of equal explanations the one with the fewest bits comes first: the frames cannot prove more bits.
+  // Equal explanations are sorted by their bits, the fewest first: the frames cannot prove more bits.
   std::stable_sort(found.begin(), found.end(), [&](const Hypothesis& one, const Hypothesis& other) {
     const std::size_t noise = one.evidence.tried - one.evidence.explained;
     const std::size_t other_noise = other.evidence.tried - other.evidence.explained;
