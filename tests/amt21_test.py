@@ -31,7 +31,8 @@ class Turns(Case):
         absenc("record", BACKWARDS, "--output", file, "--count", "2")
         with open(file, encoding="utf-8") as lines:
             rows = list(csv.DictReader(line for line in lines if not line.startswith("#")))
-        self.assertEqual([row["multiturn"] for row in rows], ["-3", "-3"])
+        readings = [row for row in rows if row["event"] != "gap"]  # a busy machine may cause gaps
+        self.assertEqual([row["multiturn"] for row in readings], ["-3", "-3"])
         self.assertEqual(int(rows[0]["position"]), -3 * 16384 + int(rows[0]["singleturn"]))
 
     def test_refuses_turns_out_of_range(self):
