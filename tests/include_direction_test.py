@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
 """Checks that include lines follow the layers: core <- link <- protocol <- {host, sim, capture} <- client <- serve <-
-tools; os needs core and link. A public (installed) header may include public ones only. Folders of client must not
-include each other in a circle."""
+tools; os needs core and link. A public (installed) header may include public ones only, and may declare only types that
+a public header defines. Folders of client must not include each other in a circle."""
 
 import graphlib
 import os
@@ -40,6 +40,11 @@ OS_HEADER = re.compile(
     r"^(unistd|fcntl|termios|poll|pty|utmp|pwd|grp|netdb|dirent|gpiod|spawn|sched|pthread|signal)\.h(pp)?$"
 )
 INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]', re.MULTILINE)
+# Of a type, at the scope of a namespace: clang-format puts it at the beginning of the line. Those inside of a class are
+# its own, and `friend` may introduce a name too.
+NAMESPACE = re.compile(r"^namespace ([\w:]+) \{", re.MULTILINE)
+DECLARED = re.compile(r"^(?: +friend )?(?:class|struct|union|enum class|enum) (\w+)(?: : [\w:]+)?;", re.MULTILINE)
+DEFINED = re.compile(r"^(?:class|struct|union|enum class|enum) (\w+)[^;{()]*\{", re.MULTILINE)
 BUILT_ON = re.compile(r"^Built on: *(.+)$", re.MULTILINE)
 
 
@@ -120,8 +125,29 @@ def client_circles(root):
     return []
 
 
+def names_with_namespace(pattern, text):
+    """"absenc::client::Encoder" for each type that the pattern finds."""
+    namespaces = [(match.start(), match[1]) for match in NAMESPACE.finditer(text)]
+    for match in pattern.finditer(text):
+        before = [name for start, name in namespaces if start < match.start()]
+        yield "::".join(before[-1:] + [match[1]])
+
+
+def hidden_types(root):
+    """Types that a public header declares and no public header defines: a user of the library cannot use them."""
+    headers = [path for path in sorted((root / "absenc").rglob("*.hpp")) if is_public(path.relative_to(root))]
+    texts = {path.relative_to(root): path.read_text(encoding="utf-8") for path in headers}
+    defined = {name for text in texts.values() for name in names_with_namespace(DEFINED, text)}
+    return [
+        f"{path}: {name} is defined in no public header"
+        for path, text in texts.items()
+        for name in names_with_namespace(DECLARED, text)
+        if name not in defined
+    ]
+
+
 def faults(root):
-    found = client_circles(root)
+    found = client_circles(root) + hidden_types(root)
     heavy = {}
     for top in ("absenc", "tools", "tests", "bench", "examples"):
         for file in sorted((root / top).rglob("*.[ch]pp")):
@@ -166,7 +192,8 @@ class SelfTest(unittest.TestCase):
         "absenc/os/serial.hpp": '#include <poll.h>\n#include "absenc/os/error.hpp"\n',
         "absenc/capture/open.hpp": "",
         "absenc/client/encoder.hpp": '#include "absenc/client/row.hpp"\n#include "absenc/sim/line.hpp"\n',
-        "absenc/client/row.hpp": '#include "absenc/os/error.hpp"\n',
+        "absenc/client/row.hpp": '#include "absenc/os/error.hpp"\nnamespace absenc::client {\nclass Row {};\n}\n',
+        "absenc/client/memory.hpp": "namespace absenc::client {\nclass Row;\nclass Memory {\n  struct Parts;\n};\n}\n",
         "absenc/client/text/row.cpp": '#include <fmt/core.h>\n#include "absenc/client/text/rows.hpp"\n',
         "absenc/client/text/rows.hpp": '#include "absenc/capture/open.hpp"\n#include "absenc/os/serial.hpp"\n',
         "absenc/client/captures/run.hpp": '#include "absenc/client/text/rows.hpp"\n',
@@ -215,6 +242,11 @@ class SelfTest(unittest.TestCase):
             ("absenc/client/encoder.hpp", '#include "absenc/capture/open.hpp"'),
             ("absenc/client/encoder.hpp", '#include "absenc/os/serial.hpp"'),
             ("absenc/client/encoder.hpp", "#include <fmt/core.h>"),
+            ("absenc/client/memory.hpp", "class Connection;"),
+            ("absenc/client/memory.hpp", "struct Connection;"),
+            ("absenc/client/memory.hpp", "enum class Place : std::uint8_t;"),
+            ("absenc/client/memory.hpp", "class Memory {\n  friend struct Connection;\n};"),
+            ("absenc/sim/line.hpp", "namespace absenc::sim {\nclass Row;\n}"),
             ("absenc/client/encoder.hpp", "#include <poll.h>"),
             ("absenc/client/text/row.cpp", '#include "absenc/protocol/one/unit.hpp"'),
             ("absenc/client/text/row.cpp", '#include "absenc/serve/http.hpp"'),

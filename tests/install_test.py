@@ -10,6 +10,7 @@ import shutil
 import subprocess
 import tempfile
 import unittest
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 from command_support import absenc
@@ -230,6 +231,18 @@ class Installed(Case):
                 self.assertRegex(included, r"^(\w+|bits/chrono\.h)$", header)
             for included in re.findall(r'^#include "(.+)"', text, re.MULTILINE):
                 self.assertTrue((self.root / "include" / included).is_file(), f"{header}: {included}")
+
+    def test_each_header_compiles_alone(self):
+        def compile_alone(header):
+            include = f'#include "{header.relative_to(self.root / "include")}"\n'
+            return subprocess.run(["g++", "-std=c++20", "-fsyntax-only", "-I", self.root / "include", "-x", "c++", "-"],
+                                  input=include, capture_output=True, text=True, timeout=300).stderr
+
+        headers = sorted((self.root / "include").rglob("*.hpp"))
+        self.assertGreater(len(headers), 100)
+        with ThreadPoolExecutor(os.cpu_count()) as workers:
+            for header, errors in zip(headers, workers.map(compile_alone, headers)):
+                self.assertEqual(errors, "", header)
 
     def test_no_file_contains_build_paths(self):
         for path in files_below(self.root):

@@ -12,7 +12,7 @@
 #include <string>
 #include <vector>
 
-#include "absenc/client/encoder/connection.hpp"
+#include "absenc/client/encoder/parts.hpp"
 #include "absenc/client/port/virtual_link_test.hpp"
 #include "absenc/client/settings.hpp"
 #include "absenc/client/text/unit_text.hpp"
@@ -273,10 +273,10 @@ TEST(Change, NamesWhatToTryAfterItsResultWasLost) {
 }
 
 TEST(Change, IsKeptWhenOnlyReadingItAgainFails) {
-  const std::unique_ptr<Connection> connection = Connection::make(
-      parse_address("sim:tformat"), [](const EncoderAddress& one) { return breaking_link(virtual_link(one), 400); });
-  connection->connect();
-  Settings settings(*connection);
+  Encoder encoder = make_encoder(parse_address("sim:tformat"), Time{},
+                                 [](const EncoderAddress& one) { return breaking_link(virtual_link(one), 400); });
+  encoder.connect();
+  Settings settings = encoder.settings();
   bool failed = false;
   for (std::int64_t degrees = 80; degrees < 100 && !failed; ++degrees) {
     try {

@@ -3,7 +3,6 @@
 // the end of its counter, and told to run commands.
 #pragma once
 
-#include <atomic>
 #include <cstdint>
 #include <functional>
 #include <initializer_list>
@@ -23,8 +22,6 @@
 #include "absenc/client/trouble.hpp"
 #include "absenc/host/session.hpp"
 #include "absenc/host/statistics.hpp"
-#include "absenc/host/unwrap.hpp"
-#include "absenc/host/velocity.hpp"
 
 namespace absenc::client {
 
@@ -85,10 +82,6 @@ struct Sample {
   [[nodiscard]] std::string text() const { return kind == Kind::failed ? trouble.text() : message; }
 };
 
-class Pace;
-class Recording;
-struct EncoderAddress;
-
 /// How an encoder is to be read.
 struct SampleChoices {
   double rate_hz = 0;       ///< readings a second; 0: as fast as can be
@@ -101,17 +94,21 @@ class Samples;
 /// One thread at a time uses it; only `cancel` may come from another.
 class Encoder {
  public:
-  /// Nothing is opened yet. `period` is the distance of readings that is intended; 0: as near as can be.
-  Encoder(const EncoderAddress& address, Time period);
+  /// The connection and the state of an encoder. Only the library itself can use it.
+  struct Parts;
+
   /// Moves the encoder; the other one may only be destroyed or assigned to.
   Encoder(Encoder&&) noexcept;
   /// Moves the encoder; the other one may only be destroyed or assigned to.
   Encoder& operator=(Encoder&&) noexcept;
   ~Encoder();
 
-  /// Opens the port, so that a first failure can end the program instead of being waited out. Throws os::Failure,
-  /// UsageError.
+  /// Opens the port again after `disconnect`, or after it was lost. Throws os::Failure, UsageError.
   void connect();
+  /// Closes the port. Counters and statistics stay; a reading or a command opens it again.
+  void disconnect();
+  /// Whether the port is open: it is from `open` until `disconnect`, or until a sample reports it lost.
+  [[nodiscard]] bool connected() const;
 
   /// The position, with all alarms that the encoder can tell. A position that no second one confirmed is not valid. A
   /// port that was lost is opened again. Throws EncoderFailure, os::Failure, Cancelled; DeadlinePassed when there is
@@ -134,10 +131,10 @@ class Encoder {
   }
 
   /// Its bytes, of an encoder that is connected and while this object stays where it is.
-  [[nodiscard]] Memory memory() { return Memory(*connection_); }
+  [[nodiscard]] Memory memory() { return Memory(*this); }
 
   /// What it is set to, of an encoder that is connected and while this object stays where it is.
-  [[nodiscard]] Settings settings() { return Settings(*connection_); }
+  [[nodiscard]] Settings settings() { return Settings(*this); }
 
   /// From any thread: what waits, and all later waiting, ends with Cancelled, a loop over samples without.
   void cancel();
@@ -154,6 +151,8 @@ class Encoder {
   /// The position starts again from the next reading: after a command that moves the zero.
   void forget_position();
 
+  /// Returns protocol and port, without the settings: "tformat:/dev/ttyUSB0".
+  [[nodiscard]] std::string address() const;
   /// Returns the unit of the encoder.
   [[nodiscard]] const Unit& unit() const;
   /// Returns the options of the encoder.
@@ -169,49 +168,21 @@ class Encoder {
   /// The last bad exchanges, the newest first, with times of os::now.
   [[nodiscard]] std::vector<BadExchangeText> bad_exchanges() const;
   /// Good readings so far.
-  [[nodiscard]] std::uint64_t readings() const { return readings_; }
+  [[nodiscard]] std::uint64_t readings() const;
   /// How often the port went away.
-  [[nodiscard]] std::uint64_t losses() const { return losses_; }
+  [[nodiscard]] std::uint64_t losses() const;
   /// How often the position started again, because a pause was too long to know how often the shaft turned, or because
   /// it jumped.
-  [[nodiscard]] std::uint64_t restarts() const { return restarts_; }
+  [[nodiscard]] std::uint64_t restarts() const;
   /// Good readings a second.
   [[nodiscard]] double rate() const;
   /// A sentence when the shaft can turn too fast for the intended rate to follow its turns; otherwise "".
   [[nodiscard]] std::string rate_note() const;
 
-  /// Connected unless the last sample said otherwise.
-  [[nodiscard]] Connection& connection() { return *connection_; }
-  /// Returns the connection, which is shared with everything that reads this encoder.
-  [[nodiscard]] const Connection& connection() const { return *connection_; }
-
  private:
-  friend class Recording;
-  friend class Samples;
+  explicit Encoder(std::unique_ptr<Parts> parts);
 
-  /// Throws Cancelled, os::Interrupted.
-  void wait_until(Time time) const;
-  Sample search();
-  Reading read_now();
-  Sample take(Reading reading);
-  [[nodiscard]] JointAngles angles_of(const Sample& sample) const;
-  void note_restart(Sample& sample, bool jumped, Time pause);
-
-  std::unique_ptr<std::atomic<bool>> cancelled_;
-  std::function<bool()> over_{};
-  std::unique_ptr<Connection> connection_;
-  Time period_;
-  host::Unwrapper unwrapper_;
-  host::Velocity velocity_;
-  host::Rate rate_;
-  Time offset_{};  // from the port's clock to ours
-  Time lost_at_{};
-  Time next_try_{};
-  bool was_there_ = false;
-  std::uint64_t readings_ = 0;
-  std::uint64_t losses_ = 0;
-  Time unwrapped_at_{};  // the earliest time at which the last valid position was latched
-  std::uint64_t restarts_ = 0;
+  std::unique_ptr<Parts> parts_;
 };
 
 /// "tformat:/dev/ttyUSB0?model=23-bit", "sim:esl", or a name of absenc.toml, connected; `settings` ("name=value") count
@@ -239,18 +210,14 @@ class Samples {
   /// Returns the end of the range.
   [[nodiscard]] static Iterator::End end() { return {}; }
   /// Returns the sample at the iterator, or null at the end. It is valid until `advance`.
-  [[nodiscard]] const Sample* current() const { return ended_ ? nullptr : &sample_; }
+  [[nodiscard]] const Sample* current() const;
   /// Waits for the next sample.
   void advance();
 
  private:
-  Encoder* encoder_;
-  std::uint64_t count_;
-  Time deadline_;
-  std::unique_ptr<Pace> pace_;
-  Sample sample_{};
-  std::uint64_t taken_ = 0;
-  bool ended_ = false;
+  struct Parts;
+
+  std::unique_ptr<Parts> parts_;
 };
 
 /// "" of a reading; "lost", "back"; of a failed attempt the name of the error

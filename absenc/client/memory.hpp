@@ -63,7 +63,7 @@ enum class Access : std::uint8_t {
 void require_memory(const Unit& unit, Access access);
 void require_open(const Unit& unit, const MemoryImage& image, Access access);
 
-class Connection;
+class Encoder;
 
 /// Called with how many bytes of how many are done.
 using MemoryProgress = std::function<void(std::size_t done, std::size_t all)>;
@@ -72,8 +72,8 @@ using MemoryProgress = std::function<void(std::size_t done, std::size_t all)>;
 /// fails, and what the port throws.
 class Memory {
  public:
-  /// Reads and writes the memory behind `connection`, which must outlive this object.
-  explicit Memory(Connection& connection) : connection_(&connection) {}
+  /// Reads and writes the memory of `encoder`, which must outlive this object.
+  explicit Memory(Encoder& encoder) : encoder_(&encoder) {}
 
   /// Returns the unit of the encoder.
   [[nodiscard]] const Unit& unit() const;
@@ -92,7 +92,7 @@ class Memory {
  private:
   [[nodiscard]] std::vector<std::uint8_t> read_run(MemoryAddress at, std::size_t count);
 
-  Connection* connection_;
+  Encoder* encoder_;
 };
 
 /// Brings the memory to what is wanted: look, write, verify. Whatever one of them throws, the images say which bytes

@@ -13,12 +13,8 @@
 
 #include "absenc/client/encoder.hpp"
 #include "absenc/client/record_counts.hpp"
-#include "absenc/client/sample_rows.hpp"
 
 namespace absenc::client {
-
-class RecordFile;
-struct RecordHeader;
 
 /// Where a recording goes, and what of the readings is kept.
 struct RecordingSettings {
@@ -41,47 +37,27 @@ class Recording {
   ~Recording();
 
   /// Reads and writes until the settings end it, or Encoder::cancel, end_when, or an interrupt does; then waits for the
-  /// disk. `heard` is called with each sample once it is written. When the port is lost it waits for it to come back;
-  /// both are lines, and so are readings that were due and could not be taken. Returns whether the last sample was a
-  /// reading. Throws os::Failure: the disk, and `lost` when the file was removed or replaced; UsageError, Failure.
-  bool run(const std::function<void(const Sample&)>& heard = {});
+  /// disk. `on_written` is called with each sample after its row was written. When the port is lost it waits for it to
+  /// come back; both are lines, and so are readings that were due and could not be taken. Returns whether the last
+  /// sample was a reading. Throws os::Failure: the disk, and `lost` when the file was removed or replaced; UsageError,
+  /// Failure.
+  bool run(const std::function<void(const Sample&)>& on_written = {});
 
   /// Of what is in the files.
   [[nodiscard]] RecordCounts counts() const;
   /// Returns the number of bytes written so far.
   [[nodiscard]] std::uint64_t bytes() const;
-  [[nodiscard]] Time start() const { return start_; }  ///< of os::now
+  /// Returns when the recording began, in time of os::now.
+  [[nodiscard]] Time start() const;
   /// The file, or its parts so far in their order.
   [[nodiscard]] std::vector<std::string> paths() const;
   /// "log.csv", or "log-0001.csv to log-0003.csv"
   [[nodiscard]] std::string names() const;
 
  private:
-  [[nodiscard]] std::string part_path(unsigned part) const;
-  void refuse_parts_of_another_recording() const;
-  void open_part();
-  [[nodiscard]] RecordHeader header() const;
-  [[nodiscard]] bool wanted(const Sample& sample);
-  void take(const Sample& sample);
-  void miss(std::uint64_t readings);
-  void write_gap();
+  struct Parts;
 
-  RecordingSettings settings_;
-  Encoder& encoder_;
-  Time start_;
-  SampleRows rows_;
-  std::string started_;  // the same as date and time
-  std::unique_ptr<RecordFile> file_;
-  unsigned part_ = 0;
-  Time part_start_{};
-  std::uint64_t finished_bytes_ = 0;
-  RecordCounts finished_;  // of the files before
-  std::uint64_t seen_ = 0;
-  std::uint64_t taken_ = 0;  // readings
-  std::uint64_t gap_ = 0;    // missed, and not written yet
-  Time gap_at_{};
-  std::uint32_t alarms_ = 0;
-  std::uint32_t alarms_reported_ = 0;
+  std::unique_ptr<Parts> parts_;
 };
 
 }  // namespace absenc::client

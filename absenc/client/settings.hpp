@@ -44,14 +44,14 @@ struct SettingChange {
   std::string note{};                     ///< "from now on it is reached with address=3", or ""
 };
 
-class Connection;
+class Encoder;
 
 /// Of an open encoder (Encoder::settings), which must outlive it. Everything throws EncoderFailure when the encoder
 /// fails, UsageError, and what the port throws.
 class Settings {
  public:
-  /// Reads and writes the settings behind `connection`, which must outlive this object.
-  explicit Settings(Connection& connection) : connection_(&connection) {}
+  /// Reads and writes the settings of `encoder`, which must outlive this object.
+  explicit Settings(Encoder& encoder) : encoder_(&encoder) {}
 
   /// Returns the value of a setting.
   [[nodiscard]] Answer get(std::string_view name);
@@ -60,7 +60,7 @@ class Settings {
   SettingChange set(std::string_view name, std::span<const std::int64_t> arguments);
 
  private:
-  Connection* connection_;
+  Encoder* encoder_;
 };
 
 }  // namespace absenc::client

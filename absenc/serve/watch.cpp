@@ -8,8 +8,8 @@
 #include <utility>
 
 #include "absenc/client/doctor/examine.hpp"
-#include "absenc/client/encoder/connection.hpp"
 #include "absenc/client/encoder/pace.hpp"
+#include "absenc/client/encoder/parts.hpp"
 #include "absenc/client/text/nearest.hpp"
 #include "absenc/client/text/row_text.hpp"
 #include "absenc/client/text/unit_text.hpp"
@@ -197,7 +197,7 @@ void Watch::work(const std::stop_token& stop) {
 
 void Watch::read_on(const std::stop_token& stop) {
   Pace pace(rate_, offset_);
-  Encoder live(address_, pace.period());
+  Encoder live = client::make_encoder(address_, pace.period());
   live.end_when([&] { return stop.stop_requested() && !command_runs_; });
   Time next = os::now() + offset_;
   const auto read = [&] {
@@ -208,7 +208,7 @@ void Watch::read_on(const std::stop_token& stop) {
   const auto between = [&] {
     if (os::now() < next) return;
     read();
-    if (!live.connection().connected()) throw os::Failure(os::Failure::Kind::lost, "the port was lost meanwhile");
+    if (!live.connected()) throw os::Failure(os::Failure::Kind::lost, "the port was lost meanwhile");
   };
   while (!stop.stop_requested()) {
     std::optional<Order> order;
@@ -277,7 +277,7 @@ void Watch::publish(const Encoder& live, const Sample& sample) {
 }
 
 void Watch::summarize(const Encoder& live, const Sample& sample) {
-  const Connection& encoder = live.connection();
+  const Connection& encoder = connection_of(live);
   const std::uint64_t bad = encoder.counters().bad();
   const Time now = os::now();
   const std::lock_guard lock(mutex_);
@@ -390,7 +390,7 @@ void Watch::carry_out(Encoder& live, const Order& order, const std::function<voi
   command_runs_ = order.kind == Order::Kind::command;
   accept_orders(!is_examination);
   try {
-    if (!is_examination && !live.connection().connected()) live.connect();
+    if (!is_examination && !live.connected()) live.connect();
     has_begun = true;
     done = is_examination ? examine(live, stop) : serve::carry_out(live, order, between);
   } catch (const os::Failure& failure) {  // the next reading will find the port lost
@@ -418,14 +418,14 @@ void Watch::carry_out(Encoder& live, const Order& order, const std::function<voi
 OrderResult Watch::examine(Encoder& live, const std::stop_token& stop) {
   const std::string words = "the encoder is being examined, readings continue afterwards";
   set_state(State::examined, words);
-  const EncoderAddress address = live.connection().uri();
+  const EncoderAddress address = connection_of(live).uri();
   Surroundings surroundings;
   if (address.place == client::Place::sim) {
-    if (!live.connection().connected()) live.connect();
-    surroundings.open = [&](const EncoderAddress&) { return live.connection().lend(); };
+    if (!live.connected()) live.connect();
+    surroundings.open = [&](const EncoderAddress&) { return connection_of(live).lend(); };
   } else {
     surroundings.on_the_clock = true;
-    live.connection().disconnect();
+    live.disconnect();
   }
   DoctorChoices choices;
   choices.progress = [&](const std::string& what) { set_state(State::examined, fmt::format("{}: {}", words, what)); };
@@ -435,7 +435,7 @@ OrderResult Watch::examine(Encoder& live, const std::stop_token& stop) {
 }
 
 void Watch::reconnect(Encoder& live) {
-  if (live.connection().connected()) return;
+  if (live.connected()) return;
   try {
     live.connect();
   } catch (const os::Failure& failure) {

@@ -6,7 +6,7 @@
 #include <mutex>
 #include <utility>
 
-#include "absenc/client/encoder/connection.hpp"
+#include "absenc/client/encoder/parts.hpp"
 #include "absenc/client/error.hpp"
 #include "absenc/client/port/address.hpp"
 #include "absenc/client/recording.hpp"
@@ -56,7 +56,7 @@ class PyEncoder {
   }
 
   PyEncoder(const std::string& text, const std::vector<std::string>& settings)
-      : encoder_(client::parse_address(text, settings), Time{}) {
+      : encoder_(client::make_encoder(client::parse_address(text, settings), Time{})) {
     encoder_.end_when([this] { return stopping_ || watch_.wants_end(); });
     use([](client::Encoder& encoder) { encoder.connect(); });
   }
@@ -70,7 +70,7 @@ class PyEncoder {
     encoder_.cancel();  // allowed from any thread: ends the waits
     const py::gil_scoped_release released;
     const std::lock_guard lock(mutex_);
-    if (!std::exchange(closed_, true)) encoder_.connection().disconnect();
+    if (!std::exchange(closed_, true)) encoder_.disconnect();
   }
 
   /// Ends the current loop over samples (true), or permits new ones (false).
@@ -168,7 +168,7 @@ py::list scan(PyEncoder& encoder) {
   const std::vector<std::int64_t> arguments = client::complete_arguments(*command, {});
   const ScanReplies records = encoder.use([&](client::Encoder& one) {
     ScanReplies found;
-    client::run_into(one.connection(), *command, arguments, found);
+    client::run_into(connection_of(one), *command, arguments, found);
     return found;
   });
   py::list list;
@@ -262,7 +262,7 @@ py::tuple record(PyEncoder& encoder, const std::string& path, double rate_hz, st
                  std::optional<double> part_duration) {
   require_rate(rate_hz);
   const client::RecordingSettings settings{.path = path,
-                                           .encoder = client::address_of(encoder.encoder().connection().uri()),
+                                           .encoder = encoder.encoder().address(),
                                            .rate_hz = rate_hz,
                                            .every = every,
                                            .count = count,
@@ -334,8 +334,7 @@ void bind_encoder(py::module_& module) {
                                const Model* model = one.encoder().options().model;
                                return model == nullptr ? std::nullopt : std::optional<std::string>(model->name);
                              })
-      .def_property_readonly("address",
-                             [](const PyEncoder& one) { return client::address_of(one.encoder().connection().uri()); })
+      .def_property_readonly("address", [](const PyEncoder& one) { return one.encoder().address(); })
       .def_property_readonly(
           "options", [](const PyEncoder& one) { return client::option_texts(one.unit(), one.encoder().options()); })
       .def_property_readonly("notes", [](const PyEncoder& one) { return one.encoder().notes(); });

@@ -7,8 +7,7 @@
 #include <thread>
 
 #include "absenc/client/emulate.hpp"
-#include "absenc/client/encoder.hpp"
-#include "absenc/client/encoder/connection.hpp"
+#include "absenc/client/encoder/parts.hpp"
 #include "absenc/client/find_crc.hpp"
 #include "absenc/client/sample_rows.hpp"
 #include "absenc/client/test_support.hpp"
@@ -126,7 +125,7 @@ TEST(ClientEncoder, GoesOnAtTheRateThatItWasSetTo) {
       const std::int64_t baud[] = {57'600};
       EXPECT_THAT(encoder.settings().set("baud", baud).note, HasSubstr("baud=57600"));
     }
-    EXPECT_EQ(encoder.connection().uri().line.rate, 57'600u);
+    EXPECT_EQ(connection_of(encoder).uri().line.rate, 57'600u);
     EXPECT_TRUE(encoder.read().singleturn_valid());
   }
 }
@@ -152,7 +151,7 @@ TEST(ClientEncoder, IsReadAtItsRateWhenAChangeOfItsRateWasBrokenOff) {
     } catch (const EncoderFailure&) {
       is_read = false;
     }
-    const bool is_there = encoder.run("baud")["baud"] == Value(std::int64_t{encoder.connection().uri().line.rate});
+    const bool is_there = encoder.run("baud")["baud"] == Value(std::int64_t{connection_of(encoder).uri().line.rate});
     EXPECT_EQ(is_read, is_there) << end << " of " << whole;
     EXPECT_FALSE(is_there && elsewhere != 0) << end << ": it had the new rate already";
     (is_there ? there : elsewhere) += 1;
@@ -169,6 +168,24 @@ TEST(ClientEncoder, CancelIsAStandardExceptionAndTheEncoderCanBeUsedAgain) {
   EXPECT_THAT(thrown_by<std::exception>([] { throw os::Interrupted{}; }), HasSubstr("interrupted"));
   encoder.resume();
   EXPECT_EQ(encoder.read().singleturn, 7u);
+}
+
+TEST(ClientEncoder, DisconnectedEncoderOpensItsPortForTheNextReading) {
+  Encoder encoder = open("sim:tformat?singleturn=7&multiturn=3");
+  EXPECT_EQ(encoder.address(), "sim:tformat");
+  EXPECT_TRUE(encoder.connected());
+  EXPECT_EQ(encoder.read().singleturn, 7u);
+  const std::uint64_t good = encoder.counters().good;
+  encoder.disconnect();
+  EXPECT_FALSE(encoder.connected());
+  EXPECT_EQ(encoder.counters().good, good);
+  EXPECT_EQ(encoder.read().singleturn, 7u);
+  EXPECT_TRUE(encoder.connected());
+  encoder.disconnect();
+  const Sample sample = encoder.next();
+  EXPECT_EQ(sample.kind, Sample::Kind::back);
+  EXPECT_EQ(sample.message, "the port is open");  // it was not lost
+  EXPECT_EQ(encoder.losses(), 0u);
 }
 
 TEST(ClientEncoder, EndsAtItsDeadline) {

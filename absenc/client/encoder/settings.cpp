@@ -8,7 +8,7 @@
 #include <memory>
 #include <utility>
 
-#include "absenc/client/encoder/connection.hpp"
+#include "absenc/client/encoder/parts.hpp"
 #include "absenc/client/error.hpp"
 #include "absenc/client/text/nearest.hpp"
 #include "absenc/client/text/unit_text.hpp"
@@ -131,24 +131,25 @@ Setting require_setting(const Unit& unit, std::string_view name) {
 }
 
 Answer Settings::get(std::string_view name) {
-  return answer_to(*connection_, require_readable_setting(connection_->unit(), name));
+  return answer_to(connection_of(*encoder_), require_readable_setting(encoder_->unit(), name));
 }
 
 SettingChange Settings::set(std::string_view name, std::span<const std::int64_t> arguments) {
-  const Setting setting = require_setting(connection_->unit(), name);
+  Connection& connection = connection_of(*encoder_);
+  const Setting setting = require_setting(connection.unit(), name);
   const std::vector<std::int64_t> values = complete_arguments(*setting.setter, arguments);
-  const Options before = connection_->uri().options;
+  const Options before = connection.uri().options;
   Told told;
-  write(*connection_, *setting.setter, values, told);
+  write(connection, *setting.setter, values, told);
   const Answer& written = told.sink.answer;
-  SettingChange change{written, told.was_so, connection_->change().state,
-                       note_of(connection_->unit(), before, *setting.setter, values.front())};
+  SettingChange change{written, told.was_so, connection.change().state,
+                       note_of(connection.unit(), before, *setting.setter, values.front())};
   if (setting.getter == nullptr) return change;
   try {
-    change.now = answer_to(*connection_, *setting.getter);
+    change.now = answer_to(connection, *setting.getter);
     require_same(change.now, written, setting.name());
   } catch (const std::exception&) {
-    rethrow_with(connection_->change());
+    rethrow_with(connection.change());
   }
   return change;
 }

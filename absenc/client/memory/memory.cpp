@@ -5,7 +5,7 @@
 
 #include <algorithm>
 
-#include "absenc/client/encoder/connection.hpp"
+#include "absenc/client/encoder/parts.hpp"
 #include "absenc/client/error.hpp"
 #include "absenc/client/text/unit_text.hpp"
 
@@ -34,12 +34,12 @@ std::size_t most_at_once(const Unit& unit, const Command& command, MemoryAddress
 
 }  // namespace
 
-const Unit& Memory::unit() const { return connection_->unit(); }
+const Unit& Memory::unit() const { return connection_of(*encoder_).unit(); }
 
 void Memory::check_model() {
   if (find_command(unit(), Verb::read) == nullptr) return;
-  const Outcome outcome = connection_->read();
-  if (outcome.error != Error::none) throw EncoderFailure(connection_->trouble(outcome));
+  const Outcome outcome = connection_of(*encoder_).read();
+  if (outcome.error != Error::none) throw EncoderFailure(connection_of(*encoder_).trouble(outcome));
 }
 
 MemoryImage Memory::read(const MemoryImage& image, const MemoryProgress& progress) {
@@ -63,7 +63,7 @@ MemoryImage Memory::read(const MemoryImage& image, const MemoryProgress& progres
 std::vector<std::uint8_t> Memory::read_run(MemoryAddress at, std::size_t count) {
   const Command& command = *find_command(unit(), Verb::memory_read);
   ReadBytes bytes;
-  run_into(*connection_, command,
+  run_into(connection_of(*encoder_), command,
            role_arguments(
                command,
                {{Role::page, at.page}, {Role::address, at.address}, {Role::count, static_cast<std::int64_t>(count)}}),
@@ -74,10 +74,10 @@ std::vector<std::uint8_t> Memory::read_run(MemoryAddress at, std::size_t count) 
 }
 
 void Memory::write(MemoryAddress at, std::uint8_t value, Access access, std::optional<std::uint8_t> before) {
-  if (before) connection_->know_before(*before);
+  if (before) connection_of(*encoder_).know_before(*before);
   const Command& command = *find_command(unit(), Verb::memory_write);
   ReadBytes ignored;
-  run_into(*connection_, command,
+  run_into(connection_of(*encoder_), command,
            role_arguments(command, {{Role::page, at.page},
                                     {Role::address, at.address},
                                     {Role::value, value},

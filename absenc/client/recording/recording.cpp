@@ -12,11 +12,12 @@
 #include <utility>
 #include <vector>
 
-#include "absenc/client/encoder/connection.hpp"
 #include "absenc/client/encoder/end_at.hpp"
 #include "absenc/client/encoder/pace.hpp"
+#include "absenc/client/encoder/parts.hpp"
 #include "absenc/client/error.hpp"
 #include "absenc/client/recording/record_file.hpp"
+#include "absenc/client/sample_rows.hpp"
 #include "absenc/client/text/unit_text.hpp"
 #include "absenc/os/signals.hpp"
 
@@ -35,7 +36,44 @@ std::string date_and_time() {
 
 }  // namespace
 
-Recording::Recording(const RecordingSettings& settings, Encoder& encoder)
+struct Recording::Parts {
+  Parts(const RecordingSettings& settings, Encoder& encoder);
+
+  bool run(const std::function<void(const Sample&)>& on_written);
+  [[nodiscard]] RecordCounts counts() const;
+  [[nodiscard]] std::uint64_t bytes() const { return finished_bytes_ + file_->size(); }
+  [[nodiscard]] Time start() const { return start_; }
+  [[nodiscard]] std::vector<std::string> paths() const;
+
+ private:
+  [[nodiscard]] std::string part_path(unsigned part) const;
+  void refuse_parts_of_another_recording() const;
+  void open_part();
+  [[nodiscard]] RecordHeader header() const;
+  [[nodiscard]] bool wanted(const Sample& sample);
+  void take(const Sample& sample);
+  void miss(std::uint64_t readings);
+  void write_gap();
+
+  RecordingSettings settings_;
+  Encoder& encoder_;
+  Time start_;  // of os::now
+  SampleRows rows_;
+  std::string started_;  // `start_` as date and time
+  std::unique_ptr<RecordFile> file_;
+  unsigned part_ = 0;
+  Time part_start_{};
+  std::uint64_t finished_bytes_ = 0;  // in the files before `file_`
+  RecordCounts finished_;             // of the files before `file_`
+  std::uint64_t offered_ = 0;         // readings, of which `RecordingSettings::every` leaves some out
+  std::uint64_t taken_ = 0;           // readings that were written
+  std::uint64_t gap_ = 0;             // missed readings that are not written yet
+  Time gap_at_{};
+  std::uint32_t alarms_ = 0;  // of the reading before
+  std::uint32_t alarms_reported_ = 0;
+};
+
+Recording::Parts::Parts(const RecordingSettings& settings, Encoder& encoder)
     : settings_(settings),
       encoder_(encoder),
       start_(os::now()),
@@ -46,23 +84,19 @@ Recording::Recording(const RecordingSettings& settings, Encoder& encoder)
   open_part();
 }
 
-Recording::~Recording() = default;
-
-std::uint64_t Recording::bytes() const { return finished_bytes_ + file_->size(); }
-
-RecordCounts Recording::counts() const {
+RecordCounts Recording::Parts::counts() const {
   RecordCounts all = finished_;
   return all += file_->counts();
 }
 
-bool Recording::run(const std::function<void(const Sample&)>& heard) {
+bool Recording::Parts::run(const std::function<void(const Sample&)>& on_written) {
   const Time end = settings_.duration ? start_ + *settings_.duration : never;
   const EndAt end_at(encoder_, end);
   Pace pace(settings_.rate_hz);
-  encoder_.period_ = pace.period();
+  Encoder::Parts::of(encoder_).period = pace.period();
   pace.start_at(start_);
   Sample sample;
-  const auto tell_missed = [&] {
+  const auto note_missed = [&] {
     const std::uint64_t missed = pace.take_missed();
     // While the port is away, that it was lost says so.
     const bool was_there = sample.kind == Sample::Kind::reading || sample.kind == Sample::Kind::failed;
@@ -73,23 +107,23 @@ bool Recording::run(const std::function<void(const Sample&)>& heard) {
     while (os::now() < end && !os::interrupted()) {
       sample = encoder_.next();
       take(sample);
-      if (heard) heard(sample);
+      if (on_written) on_written(sample);
       has_all = settings_.count != 0 && taken_ >= settings_.count;
       if (has_all) break;
-      pace.wait(end, [this](Time time) { encoder_.wait_until(time); });
-      tell_missed();
+      pace.wait(end, [this](Time time) { Encoder::Parts::of(encoder_).wait_until(time); });
+      note_missed();
     }
   } catch (const os::Interrupted&) {
   } catch (const Cancelled&) {
   }
   if (!has_all) pace.leave_out(end);  // the end may have come while a reading was taken
-  tell_missed();
+  note_missed();
   write_gap();
   file_->finish();
   return sample.kind == Sample::Kind::reading;
 }
 
-std::string Recording::part_path(unsigned part) const {
+std::string Recording::Parts::part_path(unsigned part) const {
   if (!settings_.part_bytes && !settings_.part_time) return settings_.path;
   const fs::path path(settings_.path);
   const std::string name = fmt::format("{}-{:04}{}", path.stem().string(), part, path.extension().string());
@@ -97,7 +131,7 @@ std::string Recording::part_path(unsigned part) const {
 }
 
 // Later parts of an older recording would stand in the way in the middle of this one.
-void Recording::refuse_parts_of_another_recording() const {
+void Recording::Parts::refuse_parts_of_another_recording() const {
   const fs::path path(settings_.path);
   const std::string begin = path.stem().string() + "-";
   const std::string ending = path.extension();
@@ -113,7 +147,7 @@ void Recording::refuse_parts_of_another_recording() const {
   }
 }
 
-void Recording::open_part() {
+void Recording::Parts::open_part() {
   if (file_) {
     file_->finish();
     finished_bytes_ += file_->size();
@@ -124,7 +158,7 @@ void Recording::open_part() {
   file_ = make_record_file(part_path(part_), rows_.columns(), header());
 }
 
-RecordHeader Recording::header() const {
+RecordHeader Recording::Parts::header() const {
   const Model* known = encoder_.options().model;
   return {.encoder = settings_.encoder,
           .protocol = std::string(encoder_.unit().id),
@@ -137,29 +171,29 @@ RecordHeader Recording::header() const {
 }
 
 // Of the readings every so manieth, but none with other alarms is left out; of what went wrong everything but waiting.
-bool Recording::wanted(const Sample& sample) {
+bool Recording::Parts::wanted(const Sample& sample) {
   if (sample.kind == Sample::Kind::absent) return false;
   if (sample.kind != Sample::Kind::reading) return true;
   const Reading& reading = sample.reading;
   const bool other_alarms = reading.alarms != alarms_ || reading.alarms_reported != alarms_reported_;
   alarms_ = reading.alarms;
   alarms_reported_ = reading.alarms_reported;
-  return seen_++ % settings_.every == 0 || other_alarms;
+  return offered_++ % settings_.every == 0 || other_alarms;
 }
 
-void Recording::miss(std::uint64_t readings) {
+void Recording::Parts::miss(std::uint64_t readings) {
   if (readings == 0) return;
   gap_ += readings;
   gap_at_ = os::now();
 }
 
-void Recording::write_gap() {
+void Recording::Parts::write_gap() {
   if (gap_ == 0) return;
   const std::uint64_t missed = std::exchange(gap_, 0);
   file_->append(rows_.of_gap(gap_at_, missed), {.gaps = 1, .missed = missed});
 }
 
-void Recording::take(const Sample& sample) {
+void Recording::Parts::take(const Sample& sample) {
   if (!wanted(sample)) return file_->require_there();
   const bool full = settings_.part_bytes && file_->size() >= *settings_.part_bytes;
   const bool over = settings_.part_time && os::now() - part_start_ >= *settings_.part_time;
@@ -171,14 +205,25 @@ void Recording::take(const Sample& sample) {
   taken_ += is_reading;
 }
 
-std::vector<std::string> Recording::paths() const {
+std::vector<std::string> Recording::Parts::paths() const {
   std::vector<std::string> paths;
   for (unsigned part = 1; part <= part_; ++part) paths.push_back(part_path(part));
   return paths;
 }
 
+Recording::Recording(const RecordingSettings& settings, Encoder& encoder)
+    : parts_(std::make_unique<Parts>(settings, encoder)) {}
+Recording::~Recording() = default;
+
+bool Recording::run(const std::function<void(const Sample&)>& on_written) { return parts_->run(on_written); }
+RecordCounts Recording::counts() const { return parts_->counts(); }
+std::uint64_t Recording::bytes() const { return parts_->bytes(); }
+Time Recording::start() const { return parts_->start(); }
+std::vector<std::string> Recording::paths() const { return parts_->paths(); }
+
 std::string Recording::names() const {
-  return part_ == 1 ? part_path(1) : fmt::format("{} to {}", part_path(1), part_path(part_));
+  const std::vector<std::string> all = paths();
+  return all.size() == 1 ? all.front() : fmt::format("{} to {}", all.front(), all.back());
 }
 
 }  // namespace absenc::client

@@ -123,7 +123,7 @@ void Watch::notify(std::string text) {
 void Watch::work(const std::stop_token& stop) {
   try {
     Pace pace(rate_, offset_);
-    Encoder live(uri_, pace.period());
+    Encoder live = make_encoder(uri_, pace.period());
     live.end_when([&] { return stop.stop_requested() && !command_runs_; });
     Time next = start_ + offset_;
     for (;;) {
@@ -175,7 +175,7 @@ void Watch::publish(const Encoder& live, const Sample& sample) {
       known_.message = fmt::format("{}: {}", text_of(sample.trouble.error).name, sample.trouble.message);
       if (!sample.trouble.advice.empty()) known_.message += fmt::format(". Try: {}", sample.trouble.advice);
       if (!sample.trouble.finding.empty()) {
-        known_.message += fmt::format(". {}", finding_line(sample.trouble, live.connection().uri()));
+        known_.message += fmt::format(". {}", finding_line(sample.trouble, connection_of(live).uri()));
       }
       break;
     case Sample::Kind::lost:
@@ -187,7 +187,7 @@ void Watch::publish(const Encoder& live, const Sample& sample) {
     case Sample::Kind::back:
       break;
   }
-  const Connection& encoder = live.connection();
+  const Connection& encoder = connection_of(live);
   if (encoder.counters().bad() != known_.counters.bad()) known_.bad = live.bad_exchanges();
   known_.counters = encoder.counters();
   known_.losses = live.losses();
@@ -206,7 +206,7 @@ void Watch::publish(const Encoder& live, const Sample& sample) {
 }
 
 void Watch::trace(const Encoder& live, const Sample& sample) {
-  const Unit& unit = live.connection().unit();
+  const Unit& unit = live.unit();
   switch (sample.kind) {
     case Sample::Kind::reading: {
       if (sample.restarted && !restarted_) add_line(sample.at, sample.message);
@@ -239,7 +239,7 @@ void Watch::add_line(Time at, const std::string& text) {
 }
 
 std::string Watch::result_of(Encoder& live, const Command& command) {
-  Connection& connection = live.connection();
+  Connection& connection = connection_of(live);
   if (!connection.connected()) return fmt::format("{}: not sent: the port is away", command.name);
   try {
     const Outcome outcome = connection.run(command, {});
@@ -258,7 +258,7 @@ void Watch::run_command(Encoder& live, const Command& command) {
   add_line(os::now(), notice);
   const std::lock_guard lock(mutex_);
   known_.notice = notice;
-  known_.counters = live.connection().counters();
+  known_.counters = live.counters();
 }
 
 }  // namespace absenc::tool

@@ -11,8 +11,7 @@
 #include <thread>
 #include <vector>
 
-#include "absenc/client/encoder.hpp"
-#include "absenc/client/encoder/connection.hpp"
+#include "absenc/client/encoder/parts.hpp"
 
 namespace absenc::tool {
 

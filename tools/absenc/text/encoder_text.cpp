@@ -9,14 +9,25 @@
 
 namespace absenc::tool {
 
+namespace {
+
+void print_notes(const std::vector<std::string>& notes) {
+  for (const std::string& note : notes) print_message(fmt::format("note: {}", note));
+}
+
+}  // namespace
+
 std::unique_ptr<Connection> open_connection(const EncoderAddress& uri) {
   std::unique_ptr<Connection> encoder = Connection::open(uri);
-  print_notes(*encoder);
+  print_notes(encoder->notes());
   return encoder;
 }
 
-void print_notes(const Connection& encoder) {
-  for (const std::string& note : encoder.notes()) print_message(fmt::format("note: {}", note));
+Encoder open_encoder(const EncoderAddress& uri, Time period) {
+  Encoder encoder = make_encoder(uri, period);
+  encoder.connect();
+  print_notes(encoder.notes());
+  return encoder;
 }
 
 std::string summary(const host::Counters& counters) {

@@ -5,8 +5,7 @@
 #include <memory>
 #include <string>
 
-#include "absenc/client/encoder.hpp"
-#include "absenc/client/encoder/connection.hpp"
+#include "absenc/client/encoder/parts.hpp"
 #include "absenc/client/text/json.hpp"
 
 namespace absenc::tool {
@@ -15,9 +14,8 @@ using namespace client;
 
 /// Opens and connects the encoder and prints the notes of its port. Throws as Connection::connect.
 [[nodiscard]] std::unique_ptr<Connection> open_connection(const EncoderAddress& uri);
-
-/// Prints the notes on how the port could be improved.
-void print_notes(const Connection& encoder);
+/// The same for samples, memory and settings. `period`: as of make_encoder.
+[[nodiscard]] Encoder open_encoder(const EncoderAddress& uri, Time period = {});
 
 /// Returns {"ok":false,"error":...} with all texts of the failure.
 [[nodiscard]] Json to_json(const Trouble& trouble);

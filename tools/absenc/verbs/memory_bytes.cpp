@@ -90,8 +90,8 @@ int run_memory_read(const Invocation& invocation) {
   for (std::uint32_t i = 0; i < count; ++i) image[{first.page, first.address + i}] = 0;
   require_open(*uri.unit, image, Access::read);
 
-  const std::unique_ptr<Connection> encoder = open_connection(uri);
-  Memory memory(*encoder);
+  Encoder encoder = open_encoder(uri);
+  Memory memory = encoder.memory();
   image = read_memory(memory, image);
   if (!invocation.has("--json")) {
     print_line(hex_dump(image));

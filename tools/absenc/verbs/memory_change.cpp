@@ -58,8 +58,8 @@ class Change {
   int run() {
     const bool dry = invocation_.has("--dry-run");
     asks_ = !dry && must_ask(invocation_, uri_, "writing memory", "bytes that differ are overwritten");
-    encoder_ = before_change([&] { return open_connection(uri_); });
-    change_.emplace(Memory(*encoder_), wanted_, access_);
+    encoder_ = before_change([&] { return open_encoder(uri_); });
+    change_.emplace(encoder_->memory(), wanted_, access_);
     try {
       with_progress("reading", [&](const MemoryProgress& progress) { change_->look(progress); });
       show();
@@ -161,7 +161,7 @@ class Change {
   const MemoryImage& wanted_;
   Access access_;
   bool asks_ = false;
-  std::unique_ptr<Connection> encoder_;
+  std::optional<Encoder> encoder_;
   std::optional<MemoryChange> change_;
 };
 

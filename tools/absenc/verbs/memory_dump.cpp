@@ -27,8 +27,8 @@ int run_dump(const Invocation& invocation) {
   const std::string path = to_file ? link_target(std::string(invocation.text("--output"))) : "";
   if (to_file) require_replaceable(path);
 
-  const std::unique_ptr<Connection> encoder = open_connection(uri);
-  Memory memory(*encoder);
+  Encoder encoder = open_encoder(uri);
+  Memory memory = encoder.memory();
   memory.check_model();
   const MemoryImage image = read_memory(memory, dump_addresses(*uri.unit));
   const std::string text = to_dump(*uri.unit, uri.options, image);
@@ -70,8 +70,8 @@ int run_verify(const Invocation& invocation) {
   const EncoderAddress uri = parse_address(invocation.text("encoder"), invocation.texts("--option"));
   require_memory(*uri.unit, Access::read);
   const MemoryImage wanted = read_dump(invocation, uri, Access::read);
-  const std::unique_ptr<Connection> encoder = open_connection(uri);
-  Memory memory(*encoder);
+  Encoder encoder = open_encoder(uri);
+  Memory memory = encoder.memory();
   memory.check_model();
   const MemoryImage found = read_memory(memory, wanted);
   const MemoryImage wrong = differing(wanted, found);

@@ -6,7 +6,6 @@
 #include <string>
 
 #include "absenc/client/encoder.hpp"
-#include "absenc/client/encoder/connection.hpp"
 #include "absenc/client/encoder/pace.hpp"
 #include "absenc/client/sample_rows.hpp"
 #include "absenc/client/text/row_text.hpp"
@@ -73,7 +72,7 @@ class Display {
   }
 
   void show_reading(const Sample& sample) {
-    const Unit& unit = live_->connection().unit();
+    const Unit& unit = live_->unit();
     const Reading& reading = sample.reading;
     if (sample.doubtful && !told_doubt_) {
       print_message("no two readings in a row agree as well as the fastest shaft allows");
@@ -99,7 +98,7 @@ class Display {
     if (again) trouble.advice.clear();
     last_trouble_ = trouble.error;
     print_message(trouble.text());
-    if (!again && !trouble.finding.empty()) print_note("  " + finding_line(trouble, live_->connection().uri()));
+    if (!again && !trouble.finding.empty()) print_note("  " + finding_line(trouble, connection_of(*live_).uri()));
   }
 
   const Encoder* live_;
@@ -133,7 +132,7 @@ void read_all(Encoder& live, Display& display, std::uint64_t count, Pace& pace, 
 }
 
 void print_tally(const Encoder& live, const Tally& tally, Time time) {
-  const host::Counters& counters = live.connection().counters();
+  const host::Counters& counters = live.counters();
   print_message(fmt::format("{} good readings and {} failed ones in {}; exchanges: {}; the port went away: {}",
                             tally.good, tally.bad, to_text(time), exchanges_text(counters, live.readings()),
                             live.losses()));
@@ -147,16 +146,14 @@ int run_read(const Invocation& invocation) {
   if (invocation.has("--json") && invocation.has("--csv")) throw UsageError("--json and --csv exclude each other");
   const Format format = invocation.has("--json") ? Format::json : invocation.has("--csv") ? Format::csv : Format::human;
 
-  Encoder live(uri, pace.period());
-  live.connect();
-  print_notes(live.connection());
+  Encoder live = open_encoder(uri, pace.period());
   Display display(live, format, count == 0);
   Tally tally;
   const Time start = os::now();
   if (count != 0) {
     read_all(live, display, count, pace, tally);
     // Reports damaged replies that retries have hidden.
-    if (live.connection().counters().discarded != 0) print_tally(live, tally, os::now() - start);
+    if (live.counters().discarded != 0) print_tally(live, tally, os::now() - start);
     return tally.bad == 0 ? exit_good : exit_failed;
   }
   try {

@@ -4,7 +4,6 @@
 #include <array>
 
 #include "absenc/client/encoder.hpp"
-#include "absenc/client/encoder/connection.hpp"
 #include "absenc/client/encoder/pace.hpp"
 #include "absenc/client/recording.hpp"
 #include "absenc/client/text/unit_text.hpp"
@@ -29,7 +28,7 @@ class Report {
     const Time now = os::now();
     if (!progress_.visible() || now < next_) return;
     next_ = now + std::chrono::seconds(1);
-    const bool connected = live.connection().connected();
+    const bool connected = live.connected();
     progress_.show(fmt::format("{}: {} readings, {}, {} failures, {} bytes", to_text(now - recording.start()),
                                recording.counts().readings,
                                connected ? fmt::format("{:.1f} a second", live.rate()) : "the port is away",
@@ -87,16 +86,14 @@ void summarize_recording(const Recording& recording, const Encoder& live, bool w
                         live.restarts());
   }
   if (live.losses() != 0) text += fmt::format("; the port went away: {}", live.losses());
-  print_message(fmt::format("{}; exchanges: {}", text, exchanges_text(live.connection().counters(), live.readings())));
+  print_message(fmt::format("{}; exchanges: {}", text, exchanges_text(live.counters(), live.readings())));
 }
 
 int run_record(const Invocation& invocation) {
   os::catch_interrupts();
   const EncoderAddress uri = parse_address(invocation.text("encoder"), reading_settings(invocation));
   const RecordingSettings settings = settings_of(invocation);
-  Encoder live(uri, Pace(settings.rate_hz).period());
-  live.connect();
-  print_notes(live.connection());
+  Encoder live = open_encoder(uri, Pace(settings.rate_hz).period());
   if (const std::string note = live.rate_note(); !note.empty()) print_message(fmt::format("note: {}", note));
   Recording recording(settings, live);
   Report report;

@@ -5,7 +5,6 @@
 #include <array>
 #include <utility>
 
-#include "absenc/client/encoder/connection.hpp"
 #include "absenc/client/settings.hpp"
 #include "absenc/client/text/unit_text.hpp"
 #include "absenc/os/error.hpp"
@@ -29,11 +28,11 @@ int run_get(const Invocation& invocation) {
   std::vector<const Command*> settings = readable_settings(*uri.unit);
   if (invocation.has("name")) settings = {&require_readable_setting(*uri.unit, invocation.text("name"))};
 
-  const std::unique_ptr<Connection> encoder = open_connection(uri);
+  Encoder encoder = open_encoder(uri);
   Rows rows{{"SETTING", "FIELD", "VALUE", ""}};
   Json all = Json::object();
   for (const Command* command : settings) {
-    const Answer answer = Settings(*encoder).get(command->name);
+    const Answer answer = encoder.settings().get(command->name);
     all.set(command->name, to_json(answer.row()));
     std::string name(command->name);
     for (auto& row : to_table(answer.row())) {
@@ -87,8 +86,8 @@ int run_set(const Invocation& invocation) {
   tell_disturbance(uri, *setting.setter);
   const bool asks = must_ask(invocation, uri, name, setting.setter->meaning);
 
-  const std::unique_ptr<Connection> encoder = before_change([&] { return open_connection(uri); });
-  Settings settings(*encoder);
+  Encoder encoder = before_change([&] { return open_encoder(uri); });
+  Settings settings = encoder.settings();
   const Answer old = readable ? before_change([&] { return settings.get(name); }) : Answer{};
   if (asks) {
     std::string is;
@@ -105,9 +104,9 @@ int run_set(const Invocation& invocation) {
   try {
     change = settings.set(name, values);
   } catch (const os::Interrupted&) {
-    throw OfChange<Failure>(Failure(fmt::format("interrupted while {} was set", name)), encoder->change());
+    throw OfChange<Failure>(Failure(fmt::format("interrupted while {} was set", name)), encoder.change());
   }
-  if (const std::string& journal = encoder->change().note; !journal.empty()) {
+  if (const std::string& journal = encoder.change().note; !journal.empty()) {
     print_message(fmt::format("note: {}", journal));
   }
   if (!change.note.empty()) print_message(fmt::format("note: {}", change.note));

@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: Apache-2.0
+// The parts of an Encoder that only this library uses: its connection, and the state that turns readings into samples.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <utility>
+
+#include "absenc/client/encoder.hpp"
+#include "absenc/client/encoder/connection.hpp"
+#include "absenc/host/latch_time.hpp"
+#include "absenc/host/statistics.hpp"
+#include "absenc/host/unwrap.hpp"
+#include "absenc/host/velocity.hpp"
+
+namespace absenc::client {
+
+struct Encoder::Parts {
+  Parts(const EncoderAddress& address, Time reading_period, OpenLink open);
+  Parts(const Parts&) = delete;
+  Parts& operator=(const Parts&) = delete;
+
+  [[nodiscard]] static Encoder make(std::unique_ptr<Parts> parts) { return Encoder(std::move(parts)); }
+  [[nodiscard]] static Parts& of(Encoder& encoder) { return *encoder.parts_; }
+  [[nodiscard]] static const Parts& of(const Encoder& encoder) { return *encoder.parts_; }
+
+  void connect();
+  void disconnect();
+  /// Takes one sample; searches for the port while it is away.
+  Sample next();
+  /// Throws Cancelled, os::Interrupted.
+  void wait_until(Time time) const;
+  void forget_position();
+  /// Returns whether `Encoder::cancel` was called, or `over` is true.
+  [[nodiscard]] bool must_end() const;
+
+  std::atomic<bool> cancelled = false;
+  std::function<bool()> over{};
+  std::unique_ptr<Connection> connection;
+  Time period;  // intended time between readings; 0: as short as the line allows
+  host::Rate rate;
+  Time offset{};  // from the clock of the port to os::now
+  std::uint64_t readings = 0;
+  std::uint64_t losses = 0;
+  std::uint64_t restarts = 0;
+
+ private:
+  Sample search();
+  Sample sample_of(Reading reading);
+  [[nodiscard]] JointAngles angles_of(const Sample& sample) const;
+  void note_restart(Sample& sample, bool jumped, Time pause);
+
+  host::Unwrapper unwrapper_;
+  host::Velocity velocity_;
+  std::optional<Time> lost_at_{};  // unless it is connected, or was disconnected on purpose
+  Time next_try_{};
+  Time unwrapped_at_{};  // the earliest time at which the last valid position was latched
+};
+
+/// Returns an encoder that is not connected yet. `period` is the intended time between readings; 0: as short as the
+/// line allows. Without `open` the connection opens the port of the address.
+[[nodiscard]] Encoder make_encoder(const EncoderAddress& address, Time period, OpenLink open = {});
+
+/// Returns the connection of an encoder. It lives as long as the encoder, also when that is moved.
+[[nodiscard]] inline Connection& connection_of(Encoder& encoder) { return *Encoder::Parts::of(encoder).connection; }
+[[nodiscard]] inline const Connection& connection_of(const Encoder& encoder) {
+  return *Encoder::Parts::of(encoder).connection;
+}
+
+}  // namespace absenc::client
