@@ -54,8 +54,19 @@ def inline(text, page):
 
 
 def breakable(text, length):
-    """Text whose words of at least this length may be broken at punctuation."""
-    return re.sub(rf"\S{{{length},}}", lambda word: re.sub(r"(?<=[/:=?&_,.)])(?=\w)|(?<=\w)(?=\\-)", r"\\:", word[0]), text)
+    """Text whose words of at least this length may be broken at punctuation, and before a capital letter."""
+    return re.sub(rf"\S{{{length},}}", lambda word: broken(word[0]), text)
+
+
+def broken(word):
+    out, before = "", ""
+    for token in re.findall(r"\\f.|\\\(..|\\\[[^]]*\]|\\.|.", word):
+        if not token.startswith("\\f"):
+            if before and (before in "/:=?&_,.(\\-" or (before.islower() and token.isupper()) or token == "("):
+                out += "\\:"
+            before = token
+        out += token
+    return out
 
 
 def longest_word(text):
@@ -82,7 +93,7 @@ def table(lines, page):
     text = ["", ".TS", "allbox;", " ".join(["lb"] * len(head)), columns + "."] if any(head) else ["", ".TS", "allbox;", columns + "."]
     for row in ([head] if any(head) else []) + body:
         for i, cell in enumerate(row):
-            text.append(("T{\n.na\n" + line_of(breakable(inline(cell, page), 12)) + "\nT}") if cell else "\\&")
+            text.append(("T{\n.na\n" + line_of(breakable(inline(cell, page), 10)) + "\nT}") if cell else "\\&")
             if i + 1 < len(row):
                 text[-1] += "\t\0"
         text.append("\n")
