@@ -65,13 +65,13 @@ Rates rates_of(std::span<const std::string> written) {
   return rates;
 }
 
-/// Stands where it is put.
+/// A shaft at rest at a position that can be set.
 struct Hand final : Shaft {
   [[nodiscard]] ShaftState at(Time) const override { return {.position = position}; }
   std::int64_t position = 0;
 };
 
-/// Counts of readings that each find the shaft at another position.
+/// Counts results of readings for which the shaft is at a different position each time.
 template <class Item>
 class Campaign {
  public:
@@ -88,7 +88,7 @@ class Campaign {
     result.wrong.of = result.older.of = result.changed.of = result.exchanges;
   }
 
-  /// Good replies that carry a position, of an undamaged line.
+  /// Collects good replies with a position, from an undamaged line.
   std::vector<GoodReply> good_replies(unsigned count) {
     std::vector<GoodReply> replies;
     if constexpr (!std::is_same_v<Item, CanFrame>) {
@@ -112,13 +112,13 @@ class Campaign {
     std::int64_t position;
   };
 
-  // Somewhere else: whatever is taken for this place was never another.
+  // Moves the shaft to a position that it never had before, so that an older position is recognised.
   void move() {
     shaft_.position = static_cast<std::int64_t>(bench_.random.next());
-    constexpr Time longest = 30s;  // nothing is later
+    constexpr Time longest = 30s;  // no reply is later than this
     if (places_.size() > 1 && places_[1].since + longest < line_.now()) places_.pop_front();
     places_.push_back({line_.now(), shaft_.position});
-    // What is sent unsolicited has said where it was before; a chip is not selected again at once.
+    // Waits until unsolicited frames with the old position have passed, and as long as a chip select must be released.
     if (bench_.unsolicited) {
       line_.rest(line_.now() + 5ms);
       line_.drop();
@@ -172,7 +172,8 @@ class Campaign {
 
 std::optional<CheckWorth> worth_of(const Unit& unit, const Options& options, double bit_errors) {
   if (unit.link == LinkKind::can) return {};
-  constexpr unsigned frames = 20'000;  // one that is moved passes always or never: many of them
+  constexpr unsigned frames =
+      20'000;  // number of frames: a shifted frame passes in some positions and not in others, so many are needed
   constexpr unsigned samples = 500'000;
   const std::vector<GoodReply> replies = Campaign<std::uint8_t>(unit, options, {}, 7).good_replies(frames);
   if (replies.empty()) return {};

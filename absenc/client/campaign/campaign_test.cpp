@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A bad line: what is counted agrees with what is computed, and what is known of a fault is what comes.
+// Checks campaigns on a bad line: the counts agree with the computed rates, and each fault has its known effect.
 #include "absenc/client/campaign.hpp"
 
 #include <gtest/gtest.h>
@@ -30,7 +30,7 @@ void PrintTo(const Named& named, std::ostream* out) { *out << named.protocol << 
 
 class Computed : public ::testing::TestWithParam<Named> {};
 
-// Both have their chance: five standard deviations of the difference.
+// Counts and computed rates both vary by chance: allows five standard deviations of the difference.
 TEST_P(Computed, IsWhatIsCounted) {
   const Named& named = GetParam();
   const CampaignResult result = run(named.protocol, {named.fault}, 200'000);
@@ -53,7 +53,7 @@ INSTANTIATE_TEST_SUITE_P(Units, Computed,
                                            Named{"amt21", "bit=0.1", 2, 2}, Named{"ssi", "bit=0.01", 0, 1},
                                            Named{"biss", "bit=0.005", 6, 3}, Named{"biss", "bit=0.02", 6, 3}));
 
-// The exclusive OR of eleven bytes: two errors pass in the same bit of two bytes, three in none.
+// The exclusive OR of eleven bytes misses two errors at the same bit of two bytes, and no three errors.
 TEST(CheckCodeTest, ExclusiveOrHasTheWeightsOfItsColumns) {
   const Unit& unit = *find_unit("tformat");
   Options options;
@@ -64,12 +64,12 @@ TEST(CheckCodeTest, ExclusiveOrHasTheWeightsOfItsColumns) {
   EXPECT_EQ(code->bits(), 88u);
   const std::vector<double> words = code->weights(4);
   EXPECT_EQ(words, (std::vector<double>{1, 0, 8 * 55, 0, 8 * 330 + 28 * 55 * 55}));
-  // All words of it by their number of even columns, at an error rate where that is quick to say.
+  // Counts all code words by their number of even columns, at an error rate for which the formula is simple.
   const double even = (1 + std::pow(1 - 2 * 0.02, 11)) / 2;
   EXPECT_NEAR(code->unseen(0.02), std::pow(even, 8) - std::pow(0.98, 88), 1e-12);
 }
 
-// A cyclic code with a check of 16 bits: the polynomial of Modbus finds every error of 3 bits in a frame so short.
+// A cyclic code with 16 check bits: the polynomial of Modbus detects every error of 3 bits in a frame of this length.
 TEST(CampaignTest, KnowsOtherChecks) {
   const CampaignResult modbus = run("raa38-modbus", {"bit=0.01"}, 1000);
   ASSERT_TRUE(modbus.worth);
@@ -91,25 +91,25 @@ TEST(CampaignTest, AGoodLineFailsNowhere) {
   }
 }
 
-// One by one: each makes exchanges fail or is taken for what it is, and none makes a checked unit take an old position.
+// Tries each fault alone: it makes exchanges fail or is harmless, and no unit with a checksum accepts an old position.
 TEST(CampaignTest, EveryFaultIsThere) {
   for (const LineFault& fault : line_faults()) {
     const CampaignResult result = run("tformat", {std::string(fault.name) + "=0.1"}, 20'000);
-    const bool harmless = fault.name == "delay";  // 200 us: within what a host waits, or late
+    const bool harmless = fault.name == "delay";  // 200 us: within the timeout, or late
     EXPECT_GT(result.failed.count, harmless ? 0u : 500u) << fault.name;
     EXPECT_EQ(result.older.count, 0u) << fault.name;
     EXPECT_LT(result.failed.count, result.exchanges) << fault.name;
   }
 }
 
-// An encoder that sends by itself and whose frames are held up: nothing in them tells when they were sent.
+// Delayed frames of an encoder that sends by itself: the frames do not show when they were sent.
 TEST(CampaignTest, OldFramesAreCounted) {
   const CampaignResult result = run("raa38", {"late=0.1"}, 20'000);
   EXPECT_GT(result.older.count, 0u);
   EXPECT_LE(result.older.count, result.wrong.count);
 }
 
-// A request that is misheard may set the zero: what is read then is right, and every reading after it would be wrong.
+// A damaged request may set the zero: that reading is right, and every later one would be wrong.
 TEST(CampaignTest, EncodersThatWereChangedAreReplaced) {
   const CampaignResult result = run("raa38-can", {"request_corrupt=0.05"}, 100'000);
   EXPECT_GT(result.changed.count, 0u);

@@ -12,7 +12,7 @@ namespace absenc::client {
 
 namespace {
 
-constexpr unsigned most_check_bits = 16;  // 2^16 words of the dual, and so many frames for each bit
+constexpr unsigned most_check_bits = 16;  // limit, because the dual code has 2^bits words
 
 struct Position final : FieldSink {
   void put(const FieldValue&) override {}
@@ -31,7 +31,7 @@ bool has_position(const Unit& unit, const Options& options, const GoodReply& rep
   return unit.decode(options, {.bytes = reply.request}, frame, seen) == Error::none && seen.reading.has_value();
 }
 
-/// A reply with errors, and what the decoder says of it.
+/// Applies errors to a reply and returns the decoder's judgement.
 class CheckCode::Asked {
  public:
   Asked(const Unit& unit, const Options& options, const GoodReply& good)
@@ -75,8 +75,8 @@ std::optional<CheckCode> CheckCode::learn(const Unit& unit, const Options& optio
   return code;
 }
 
-// From the last bit on, because a check stands at the end; where it does not, any bits that are independent will do.
-// What stands before all that the check covers belongs to others, or shows where the frame begins.
+// Searches from the last bit, because most checks are at the end; otherwise any independent bits serve. Bits before the
+// covered ones belong to other frames, or mark the beginning of the frame.
 bool CheckCode::find_check(Asked& asked) {
   bool complete = false;
   bool before = false;
@@ -100,13 +100,13 @@ bool CheckCode::find_check(Asked& asked) {
   return true;
 }
 
-// With which of the check's bits an error of this one passes; nothing: with none.
+// Returns the check bits that compensate an error of this bit; nothing if none do.
 std::optional<std::uint32_t> CheckCode::syndrome_of(Asked& asked, std::size_t bit) const {
   asked.restore();
   asked.flip(bit);
   std::uint32_t pattern = 0;
   if (asked.passes()) return pattern;
-  // Gray code: one bit more or less at a time.
+  // Iterates in Gray code, which changes one bit at a time.
   for (std::uint32_t i = 1; i < std::uint32_t{1} << check_.size(); ++i) {
     const auto changed = static_cast<unsigned>(std::countr_zero(i));
     asked.flip(check_[changed]);
@@ -116,7 +116,7 @@ std::optional<std::uint32_t> CheckCode::syndrome_of(Asked& asked, std::size_t bi
   return {};
 }
 
-// Words of the code pass the checksum in every reply, and no others are taken.
+// Verifies that code words pass the checksum in every reply and that other errors do not.
 bool CheckCode::is_linear(const Unit& unit, const Options& options, std::span<const GoodReply> replies) const {
   sim::Random random(1);
   for (unsigned i = 0; i < 1000; ++i) {
@@ -127,7 +127,7 @@ bool CheckCode::is_linear(const Unit& unit, const Options& options, std::span<co
       asked.flip(bit);
       syndrome ^= syndromes_[bit];
     }
-    // Others may see it before.
+    // Another check may reject the error first.
     const Error error = asked.error();
     if (error == (syndrome == 0 ? Error::bad_checksum : Error::none)) return false;
     for (unsigned one = 0; one < check_.size(); ++one) {
@@ -138,7 +138,7 @@ bool CheckCode::is_linear(const Unit& unit, const Options& options, std::span<co
   return true;
 }
 
-// How many words of the dual have each weight.
+// Counts the words of the dual code by weight.
 std::vector<std::uint32_t> CheckCode::dual_weights() const {
   std::vector<std::uint32_t> count(free_bits() + 1);
   for (std::uint32_t word = 0; word < std::uint32_t{1} << check_.size(); ++word) {
@@ -157,7 +157,7 @@ std::vector<double> CheckCode::weights(unsigned most) const {
   std::vector<double> words(most + 1);
   for (std::size_t weight = 0; weight < dual.size(); ++weight) {
     if (dual[weight] == 0) continue;
-    // Krawtchouk's polynomials of this weight, each from the two before it.
+    // Computes the Krawtchouk polynomials of this weight, each from the two before it.
     double before = 0;
     double now = 1;
     for (unsigned k = 0; k <= most; ++k) {
@@ -187,10 +187,10 @@ bool CheckCode::is_check(std::size_t bit) const {
   return std::has_single_bit(syndrome) && check_[static_cast<unsigned>(std::countr_zero(syndrome))] == bit;
 }
 
-// All bits but the check's are damaged by chance, the check's so that it is right. Such a word comes as often as its
-// check's bits are damaged just so, which is what it counts. With an error among the fixed bits there may be another
-// frame: then the check's bits are damaged by chance too. An error that moves the frame passes in one frame and not in
-// another, whatever else is damaged: how much the frames differ is part of the deviation.
+// Draws errors of all bits but the check bits at random and sets the check bits so that the checksum is right. The
+// weight of such an error is the probability of these errors of the check bits. An error of fixed bits may shift the
+// frame; then the check bits are drawn at random too. A shifted frame passes in some frames and not in others, so the
+// difference between frames is part of the deviation.
 Estimated CheckCode::taken(const Unit& unit, const Options& options, std::span<const GoodReply> replies,
                            double bit_errors, unsigned samples) const {
   sim::Random random(2);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a unit's checksum does not see, as a linear code that its own decoder tells.
+// Finds the errors that a unit's checksum misses, as a linear code that is derived from its decoder.
 #pragma once
 
 #include <cstdint>
@@ -11,45 +11,47 @@
 
 namespace absenc::client {
 
-/// A good reply with its request, on links that carry bytes.
+/// A good reply with its request, on lines that carry bytes or bits.
 struct GoodReply {
   std::vector<std::uint8_t> request;
   std::vector<std::uint8_t> reply;
-  std::size_t bits = 0;  // clocked links: of the reply
+  std::size_t bits = 0;  // number of bits of the reply on clocked lines
 
   [[nodiscard]] std::size_t bit_count() const { return bits != 0 ? bits : reply.size() * 8; }
 };
 
-/// Whether it is good and has a position.
+/// Returns whether the reply is good and has a position.
 [[nodiscard]] bool has_position(const Unit& unit, const Options& options, const GoodReply& reply);
 
-/// A value with its standard deviation.
+/// A value and its standard deviation.
 struct Estimated {
   double value = 0;
   double deviation = 0;
 };
 
-/// The errors that the checksum passes are a linear code: an error is a word of it when all the syndromes of its bits
-/// together are nothing. Bits are numbered in the order of the bytes, from the most significant.
+/// The linear code of all errors that the checksum misses. An error is a code word if the exclusive OR of the syndromes
+/// of its bits is 0. Bits are numbered in the order of the bytes, from the most significant.
 class CheckCode {
  public:
-  /// Asks the decoder: the last bits of the frame whose errors no other among them make good are the check's own, and
-  /// of every other bit it is tried with which of these the check is right again. Nothing when the check has more than
-  /// 16 bits or covers less than half of the frame (each channel has its own), is not linear (a sum, digits as text),
-  /// or the replies are not of one length. At least one reply.
+  /// Derives the code from the decoder. The last independent bits of the frame are the check bits; for every other bit,
+  /// the check bits that compensate its error are its syndrome. Returns nothing if the check has more than 16 bits,
+  /// covers less than half of the frame (each channel has a check of its own), or is not linear (a sum, digits as
+  /// text), or if the replies differ in length. `replies` must not be empty.
   [[nodiscard]] static std::optional<CheckCode> learn(const Unit& unit, const Options& options,
                                                       std::span<const GoodReply> replies);
 
   [[nodiscard]] std::size_t bits() const { return syndromes_.size(); }
   [[nodiscard]] unsigned check_bits() const { return static_cast<unsigned>(check_.size()); }
-  /// Bits that the checksum does not speak of: those before the frame, and what is always the same.
+  /// Returns the bits that the checksum does not cover: those before the frame, and constant ones.
   [[nodiscard]] std::size_t fixed_bits() const { return fixed_; }
-  /// How many words of 0 to `most` bits the code has, by MacWilliams' identity from the 2^check_bits words of its dual.
+  /// Returns the number of code words of weight 0 to `most`, by MacWilliams' identity from the 2^check_bits words of
+  /// the dual code.
   [[nodiscard]] std::vector<double> weights(unsigned most) const;
-  /// How often independent errors of each bit damage a reply, none of them a fixed bit, and the checksum is right.
+  /// Returns the probability that independent bit errors damage a reply, none at a fixed bit, and the checksum is
+  /// right.
   [[nodiscard]] double unseen(double bit_errors) const;
-  /// How often they do and the decoder, with all its checks, takes the reply for good with another position: over words
-  /// of the code drawn by chance, each as often as it would come, and errors of fixed bits.
+  /// Returns the probability that the decoder, with all its checks, accepts a damaged reply with another position. It
+  /// is estimated from random code words, weighted by their probability, and errors of fixed bits.
   [[nodiscard]] Estimated taken(const Unit& unit, const Options& options, std::span<const GoodReply> replies,
                                 double bit_errors, unsigned samples) const;
 
@@ -63,9 +65,9 @@ class CheckCode {
   [[nodiscard]] std::vector<std::uint32_t> dual_weights() const;
   [[nodiscard]] std::size_t free_bits() const { return syndromes_.size() - fixed_; }
 
-  std::vector<std::uint32_t> syndromes_;  // of each bit; bit n: check_[n]
+  std::vector<std::uint32_t> syndromes_;  // syndrome of each bit of the frame; bit n stands for check_[n]
   std::vector<bool> is_fixed_;
-  std::vector<std::size_t> check_;  // the check's own bits
+  std::vector<std::size_t> check_;  // the check bits
   std::size_t fixed_ = 0;
 };
 

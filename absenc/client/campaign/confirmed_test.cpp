@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Compares each confirmed position on a bad line with the true shaft: every model, at rest and turning. Wrong positions
-// are no more than frame checks and speed limit together let through.
+// Compares each confirmed position on a bad line with the true shaft, for every model, at rest and turning. There are
+// no more wrong positions than frame checks and speed limit let through together.
 #include <gtest/gtest.h>
 
 #include <cctype>
@@ -17,7 +17,7 @@ namespace {
 
 struct Encoder {
   std::string unit;
-  std::string model;  // or ""
+  std::string model;  // name of the model, or ""
 };
 
 void PrintTo(const Encoder& encoder, std::ostream* out) { *out << encoder.unit << " " << encoder.model; }
@@ -47,7 +47,7 @@ class Confirmed : public ::testing::TestWithParam<Encoder> {
     return campaign(GetParam().unit, choices);
   }
 
-  // Those that agree come by chance: four standard deviations, and two where hardly any does.
+  // Wrong positions agree by chance: allows four standard deviations, and two more for very small counts.
   static double chance(const Guarded& guarded) { return 4 * std::sqrt(guarded.let_through) + 2; }
 };
 
@@ -67,7 +67,7 @@ TEST_P(Confirmed, IsNotWrongMoreOftenThanChecksAndLimitLetThrough) {
   }
 }
 
-// A limit that is near the speed of the shaft.
+// A speed limit near the speed of the shaft.
 TEST_P(Confirmed, IsWrongLessOftenWithALowerLimit) {
   const Guarded usual = *read(0.1, 60).guarded;
   const Guarded lower = *read(0.1, 60, 100).guarded;
@@ -78,8 +78,8 @@ TEST_P(Confirmed, IsWrongLessOftenWithALowerLimit) {
 
 INSTANTIATE_TEST_SUITE_P(Models, Confirmed, ::testing::ValuesIn(encoders()), name_of);
 
-// Words without any check, 12 bits: 4 counts of noise and the 3 that the fastest gets meanwhile leave damage of the
-// lowest bits alone, and of the others only what meets the same damage again.
+// Words of 12 bits without a check: 4 counts of noise and the 3 counts that the fastest shaft moves meanwhile hide only
+// damage of the lowest bits; other damage passes only if the next word has the same.
 TEST(ConfirmedWords, WithoutACheckOnlyTheLimitTells) {
   CampaignChoices choices{.faults = {"corrupt=0.1"}, .exchanges = 20'000};
   choices.rpm = 0;

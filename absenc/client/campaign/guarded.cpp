@@ -18,13 +18,13 @@ namespace {
 
 using namespace std::chrono_literals;
 
-// Positions of this many bits on a circle.
+// Positions of `bits` bits on a circle, whose distance wraps.
 std::int64_t wrapped(std::uint64_t difference, unsigned bits) {
   const unsigned unused = 64 - bits;
   return static_cast<std::int64_t>(difference << unused) >> unused;
 }
 
-/// Turns steadily, after a millisecond in which encoders are switched on, and remembers where it was measured.
+/// A shaft that turns steadily, after a millisecond for power-on, and records the positions that encoders measured.
 class MeasuredShaft final : public Shaft {
  public:
   MeasuredShaft(std::int64_t start, double turns_a_second) : start_(start), speed_(turns_a_second) {}
@@ -36,9 +36,9 @@ class MeasuredShaft final : public Shaft {
     return {.position = position, .speed_millirpm = seconds > 0 ? static_cast<std::int32_t>(60'000 * speed_) : 0};
   }
 
-  /// Whether the reading says where the shaft was when the encoder took it.
+  /// Returns whether the reading is the position of the shaft when the encoder measured it.
   [[nodiscard]] bool was_at(const Reading& reading) const { return find(reading) != nullptr; }
-  /// Where that was; of a reading that is wrong, where the encoder measured last.
+  /// Returns that position; for a wrong reading, the last measured one.
   [[nodiscard]] std::int64_t place_of(const Reading& reading) const {
     const Sample* found = find(reading);
     for (std::size_t i = 0; found == nullptr && i < count(); ++i) {
@@ -53,13 +53,14 @@ class MeasuredShaft final : public Shaft {
     std::int64_t position = 0;
   };
 
-  // The last one is number 0.
+  // Index 0 is the last measurement.
   [[nodiscard]] const Sample& last(std::size_t number) const {
     return samples_[(count_ - 1 - number) % samples_.size()];
   }
   [[nodiscard]] std::size_t count() const { return std::min(count_, samples_.size()); }
   [[nodiscard]] const Sample* find(const Reading& reading) const {
-    constexpr Time vague = 2ms;  // when it was taken: an encoder may measure more often than it is asked
+    constexpr Time vague =
+        2ms;  // uncertainty of the time of measurement: an encoder may measure more often than it is polled
     for (std::size_t i = 0; i < count(); ++i) {
       const bool then = last(i).at >= reading.latched - vague && last(i).at <= reading.latched + vague;
       if (then && sim::is_at(reading, last(i).position)) return &last(i);
@@ -73,24 +74,23 @@ class MeasuredShaft final : public Shaft {
   mutable std::size_t count_ = 0;
 };
 
-/// Positions that passed the checks of their frames, each compared with the one before: how many of the wrong ones
-/// agree with it?
+/// Computes how many of the wrong positions that passed the checks of their frames agree with the position before.
 class LetThrough {
  public:
   LetThrough(const Resolution& resolution, const host::SpeedLimit& limit, unsigned bits)
       : counts_per_second_(host::counts_per_second(resolution, limit)), bits_(bits) {}
 
   void add_position() { ++positions_; }
-  /// So far from the truth.
+  /// Distances of the wrong positions from the true one.
   void add_wrong(std::int64_t away) { away_.push_back(away); }
-  /// `moved` by the true shaft, and between the two before.
+  /// `moved` is the movement of the true shaft, also between the two positions before.
   void add_comparison(Time between, std::int64_t moved, std::int64_t before) {
     comparisons_.push_back({between, moved, before});
   }
 
   [[nodiscard]] Share wrong() const { return {away_.size(), positions_}; }
 
-  /// Each position is wrong by itself, as often as all are, and as far as any of the wrong ones.
+  /// Assumes that positions are wrong independently, with the rate and the distances of all wrong positions.
   [[nodiscard]] double expected() const {
     if (away_.empty()) return 0;
     constexpr unsigned draws = 16;
@@ -119,7 +119,7 @@ class LetThrough {
     std::int64_t before;
   };
 
-  // The formula of the README, in floating point.
+  // The reach of the fastest shaft, computed in floating point.
   [[nodiscard]] bool agrees(Time between, std::uint64_t step, std::uint64_t before) const {
     const double most = std::ldexp(15.0 / 32, static_cast<int>(bits_));
     const double reached = 4 + counts_per_second_ * std::chrono::duration<double>(between).count();
@@ -141,7 +141,7 @@ class LetThrough {
 
 double turns_a_second(const Resolution& resolution, double rpm) {
   if (resolution.unit_um == 0) return rpm / 60;
-  // Along the whole scale in one revolution.
+  // One revolution of the simulated shaft is the whole scale.
   return rpm * 1000 / resolution.unit_um / std::ldexp(1.0, static_cast<int>(resolution.singleturn_bits));
 }
 
@@ -178,7 +178,7 @@ class GuardedCampaign {
     return limit;
   }
 
-  // With its turns, as they are compared.
+  // Includes turns, as the comparison does.
   static unsigned bits_of(const Reading& reading) {
     return reading.singleturn_bits + (reading.multiturn_valid ? reading.multiturn_bits : 0);
   }

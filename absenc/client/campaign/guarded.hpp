@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A campaign in which positions are confirmed, beside what frame checks and speed limit can let through.
+// Runs a campaign with confirmed positions and computes how many wrong ones frame checks and speed limit let through.
 #pragma once
 
 #include "absenc/client/campaign.hpp"
@@ -7,7 +7,7 @@
 
 namespace absenc::client {
 
-/// Reads a turning shaft, one reading behind the other. Counts readings, exchanges and failures in `result`.
+/// Reads a turning shaft, one reading after the other. Counts readings, exchanges and failures in `result`.
 [[nodiscard]] Guarded read_guarded(const Unit& unit, const Options& options, const Rates& rates,
                                    const CampaignChoices& choices, CampaignResult& result);
 

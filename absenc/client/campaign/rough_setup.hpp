@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// One unit's host and its virtual encoder on a line with faults, in virtual time.
+// Connects one unit's host and its virtual encoder by a line with faults, in virtual time.
 #pragma once
 
 #include <algorithm>
@@ -18,11 +18,11 @@
 
 namespace absenc::client {
 
-/// How often each fault is injected.
+/// The rate of each fault.
 struct Rates {
   sim::RoughRates line;
   sim::FaultRates device;
-  bool by_device = false;  // any of `device`
+  bool by_device = false;  // one of the faults of `device` has a rate
 
   void set(std::string_view name, double rate) {
     if (double* const own = of_line(name)) {
@@ -47,7 +47,7 @@ struct Rates {
 
 template <class Item>
 struct RoughBench {
-  /// All must outlive it.
+  /// All arguments must outlive the object.
   RoughBench(const Unit& what, const Options& how, const Shaft& measured, const Rates& often, std::uint64_t seed)
       : unit(what),
         options(how),
@@ -75,13 +75,13 @@ struct RoughBench {
     return *one;
   }
 
-  /// So that nothing is damaged, or as it is given.
+  /// Switches all faults off, or to the given rates.
   void set_faults(bool on) {
     line.set_rates(on ? rates.line : sim::RoughRates{});
     faulty.set_rates(on ? rates.device : sim::FaultRates{});
   }
 
-  /// A stream is counted by its frames, since no request asks for them.
+  /// Counts the frames of a stream, because there are no requests.
   [[nodiscard]] std::uint64_t exchanges_since(const sim::RoughCounts& before) const {
     const std::uint64_t asked = line.counts().requests - before.requests;
     return asked != 0 ? asked : std::max<std::uint64_t>(1, line.counts().replies - before.replies);
@@ -95,24 +95,24 @@ struct RoughBench {
     }
   }
 
-  // A request that was misheard may be one that changes the encoder, and what it says is so from then on: seen over a
-  // good line. Then another takes its place.
+  // A damaged request may have changed the encoder for good. Checks that over a good line; if it has, replaces the
+  // encoder by a new one.
   template <class IsRight>
   bool was_changed(const Command& read, const IsRight& is_right) {
     using namespace std::chrono_literals;
     if (rates.device[sim::FaultKind::request_corrupt] <= 0) return false;
     set_faults(false);
-    line.rest(line.now() + (unsolicited ? 11s : 20s));  // nothing is late any more
+    line.rest(line.now() + (unsolicited ? 11s : 20s));  // no late reply is outstanding any more
     line.drop();
     const Conversation<Item>* now = session.run(read);
     const bool changed = now->error() != Error::none || (now->reading() != nullptr && !is_right(*now->reading()));
-    if (changed) (void)make_device(line.now());  // in the same place
+    if (changed) (void)make_device(line.now());  // at the same position
     set_faults(true);
     return changed;
   }
 
-  // Who has given up tries again after a while, of 10 us to 10 s, each decade as often: a line that holds up a reply
-  // holds up those behind it. What comes all the time holds up nobody so long.
+  // After a failure the host tries again after 10 us to 10 s, each decade with the same probability: a line that delays
+  // a reply also delays later ones. With unsolicited frames the pause is shorter.
   void pause() {
     const double decades = (unsolicited ? 4 : 6) * static_cast<double>(random.next() >> 11) * 0x1p-53;
     line.rest(line.now() + Time(static_cast<std::int64_t>(1e4 * std::pow(10.0, decades))));

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// One attempt to find somebody on a line: a unit at the settings of a port, asked in each way in which it may have to
-// be.
+// One attempt to find encoders of a unit on a line, at given port settings, with each set of options that changes the
+// request.
 #pragma once
 
 #include <fmt/format.h>
@@ -25,16 +25,16 @@ using namespace std::chrono_literals;
 using capture::Hypothesis;
 using capture::ObservedExchange;
 
-inline constexpr unsigned reads = 6;              // of each encoder that answers
-inline constexpr Time listening = 100ms;          // before anything is sent
-inline constexpr std::size_t stream_size = 2048;  // bytes: as much of a stream as is judged
-inline constexpr unsigned most_unanswered = 3;    // of them, until it is given up
-inline constexpr Time settled = 5ms;              // without a byte: nothing of what was asked before is under way
-inline constexpr Time longest_settling = 200ms;   // on a line that is never silent
-inline constexpr Time late_window = 100ms;        // behind a request that was not answered: its reply may be late
-inline constexpr Time most_allowance = 400ms;     // for replies that are
+inline constexpr unsigned reads = 6;              // number of readings of each encoder that replies
+inline constexpr Time listening = 100ms;          // time of listening before the first request
+inline constexpr std::size_t stream_size = 2048;  // bytes of an unsolicited stream that are judged
+inline constexpr unsigned most_unanswered = 3;    // readings without a reply, until the attempt ends
+inline constexpr Time settled = 5ms;              // silence after which no earlier reply is expected
+inline constexpr Time longest_settling = 200ms;   // limit of waiting for silence on a line that is never silent
+inline constexpr Time late_window = 100ms;        // time after an unanswered request in which its reply may arrive late
+inline constexpr Time most_allowance = 400ms;     // greatest extension of the timeout if replies are late
 
-/// Who was found by a scan.
+/// The encoders found by a scan.
 struct Addresses final : FieldSink {
   void put(const FieldValue& value) override {
     if (value.info->role == Role::encoder) all.push_back(value.number);
@@ -43,20 +43,20 @@ struct Addresses final : FieldSink {
   std::vector<std::int64_t> all;
 };
 
-/// Why a conversation was broken off.
+/// Why a conversation was aborted.
 enum class Stop : std::uint8_t {
-  silent,   // nobody answers, or nobody who makes sense
-  harmful,  // it was about to send what another encoder would take for a command
+  silent,   // no reply, or no valid one
+  harmful,  // its next request would be a changing command for another encoder
 };
 
-/// Who an encoder says it is, and whether that agrees with the options with which it was asked.
+/// The identity that an encoder reports, and whether it agrees with the options of the request.
 struct Introduction {
   Answer identity{};
-  bool agrees = false;          // it said something, and nothing that contradicts them
-  std::string contradiction{};  // in the words of the unit
+  bool agrees = false;          // the encoder reported an identity that does not contradict the options
+  std::string contradiction{};  // the unit's explanation of the contradiction
 };
 
-/// Of what an encoder says only who it is.
+/// Collects the identity fields of a reply.
 struct IdentitySink final : FieldSink {
   void put(const FieldValue& value) override {
     if (value.info->role == Role::identity) all.put(value);
@@ -64,7 +64,7 @@ struct IdentitySink final : FieldSink {
   AnswerSink all;
 };
 
-/// One attempt: a unit at the settings of a port.
+/// One attempt to find encoders of one unit at given port settings.
 template <class Item>
 class Attempt {
  public:
@@ -94,7 +94,7 @@ class Attempt {
   Attempt& operator=(const Attempt&) = delete;
 
   [[nodiscard]] const LineSettings& line() const { return address_.line; }
-  /// Whether a scan was ended before it had asked everybody.
+  /// Returns whether a scan ended before it had polled every address.
   [[nodiscard]] bool cut() const { return cut_; }
   void open() {
     link_ = search_.open(address_);
@@ -105,7 +105,7 @@ class Attempt {
     }
   }
 
-  /// What comes without being asked for.
+  /// Collects unsolicited bytes or frames.
   std::vector<Item> listen() {
     std::vector<Item> items;
     runner_.listen(listening, [&items](std::span<const Item> more) {
@@ -115,7 +115,7 @@ class Attempt {
     return items;
   }
 
-  /// In each way in which it may have to be asked, until somebody answers.
+  /// Tries each set of options that changes the request, until an encoder replies.
   void ask() {
     const Command* read = find_command(unit_, Verb::read);
     if (read == nullptr || read->changes_encoder) return;
@@ -134,7 +134,7 @@ class Attempt {
     }
   }
 
-  /// Who the encoder with these options says it is: who was found may be asked more than who is looked for.
+  /// Reads the identity of a found encoder with these options. More requests are allowed than during the search.
   Introduction introduce(const Options& options) {
     Introduction all;
     IdentitySink identity;
@@ -156,15 +156,15 @@ class Attempt {
  private:
   static constexpr bool is_can = std::is_same_v<Item, CanFrame>;
 
-  /// The conversation that is under way.
+  /// The running conversation.
   struct Talk {
     const Options& options;
     std::vector<ObservedExchange> exchanges{};
     Patience<Item> patience;
-    bool understood = false;  // a good reply came
+    bool understood = false;  // a good reply has arrived
   };
 
-  // Throws Stop.
+  // Checks each step and event; throws Stop to abort the conversation.
   void look_at(Step<Item>& step, Time now, Talk& talk) {
     using Kind = typename Step<Item>::Kind;
     if (step.kind == Kind::pulse && step.wire == ExtraWire::clear) throw Stop::harmful;
@@ -174,7 +174,7 @@ class Attempt {
     }
     if (step.answer != Time{}) step.answer += allowance_;
     talk.patience.see(step, now);
-    if constexpr (!is_can) {  // identifiers tell CAN nodes apart
+    if constexpr (!is_can) {  // not on CAN, where identifiers distinguish nodes
       if (step.kind == Kind::transfer && begins_harmful(step.out)) throw Stop::harmful;
     }
   }
@@ -192,13 +192,13 @@ class Attempt {
   }
 
   struct Conversed {
-    std::size_t heard = 0;  // items, when somebody sent them
+    std::size_t heard = 0;  // number of received items that an encoder sent
     Error error = Error::timeout;
-    std::string detail{};  // in the words of the unit
+    std::string detail{};  // the unit's explanation of the error
   };
 
-  // One conversation; its exchanges go to `exchanges`. Where a reply was late, all is asked once more, with more time
-  // for each reply.
+  // Runs one conversation and stores its exchanges in `exchanges`. If a reply was late, repeats the conversation with a
+  // longer timeout.
   Conversed converse(const Command& command, const Options& options, std::vector<ObservedExchange>& exchanges,
                      FieldSink* sink = nullptr) {
     for (;;) {
@@ -261,7 +261,7 @@ class Attempt {
     exchanges.insert(exchanges.end(), talk.exchanges.begin(), talk.exchanges.end());
   }
 
-  // Whether anybody sent it: what nobody drives is clocked in all the same.
+  // Returns whether an encoder sent the item: a clocked host also receives bits from an undriven line.
   [[nodiscard]] bool is_alive(const ObservedExchange& exchange) const {
     if (unit_.link != LinkKind::clocked && unit_.link != LinkKind::spi) return true;
     const auto& bytes = exchange.reply.bytes;
@@ -271,7 +271,7 @@ class Attempt {
     return !same_as(0x00) && !same_as(0xFF);
   }
 
-  // The settings of each encoder that answers to a scan.
+  // Returns the settings of each encoder that replies to a scan.
   std::vector<Settings> scanned(const Settings& settings, const Options& options) {
     std::vector<Settings> targets;
     const Command* command = find_command(unit_, Verb::scan);
@@ -291,20 +291,20 @@ class Attempt {
     return targets;
   }
 
-  // Returns whether anything came. `encoder`: which of those on the line is asked.
+  // Returns whether anything was received. `encoder` is the address setting of the polled encoder.
   bool ask_one(const Command& read, const Settings& settings, const std::string& encoder) {
     const std::vector<OptionText> known = option_settings(unit_, settings, false);
     const Options options = require_options(unit_, {}, option_settings(unit_, settings, true));
     std::vector<ObservedExchange> exchanges;
     if (converse(read, options, exchanges).heard == 0) {
-      exchanges.clear();  // it may have been late, or have missed the first request
+      exchanges.clear();  // the reply may have been late, or the encoder missed the first request
       if (converse(read, options, exchanges).heard == 0) return false;
     }
     read_all(read, options, exchanges);
     if (exchanges.empty()) return false;
     ++findings_.searches;
     std::vector<Hypothesis> found = capture::find_hypotheses(unit_, known, exchanges);
-    // What explains more than what was asked with may also ask better.
+    // Options that explain more replies than those of the request may also make better requests.
     if (!found.empty() && !found.front().evidence.explains_all() &&
         request_of(unit_, found.front().options, read) != request_of(unit_, options, read)) {
       std::vector<ObservedExchange> again;
@@ -323,13 +323,13 @@ class Attempt {
       if (os::interrupted()) throw os::Interrupted{};
       if (converse(read, options, exchanges).heard == 0 && ++unanswered == most_unanswered) break;
     }
-    // On a busy machine an answer may come too late for one of them.
+    // On a busy computer one reply may arrive too late.
     std::erase_if(exchanges, [&](const ObservedExchange& one) {
       return one.reply.frame().empty() || is_of_another(one, options);
     });
   }
 
-  // Whether it says that it is from another encoder than the one that was asked: one on a CAN bus sends by itself.
+  // Returns whether the reply is from another encoder than the polled one: CAN nodes may also send unsolicited frames.
   [[nodiscard]] bool is_of_another(const ObservedExchange& exchange, const Options& options) const {
     const Option* asked = find_role(unit_.options, Role::encoder);
     Addresses who;
@@ -354,14 +354,14 @@ class Attempt {
   Time patience_;
   LineFindings& findings_;
   EncoderAddress address_;
-  Link link_;  // outlives the runner
+  Link link_;  // must outlive the runner
   Runner<Item> runner_;
-  std::vector<std::vector<std::uint8_t>> harmful_;  // requests; on CAN none
+  std::vector<std::vector<std::uint8_t>> harmful_;  // requests that must not be sent; empty on CAN
   Talk* talk_ = nullptr;
   bool cut_ = false;
-  bool asked_ = false;          // anything
-  bool is_unanswered_ = false;  // the last request
-  Time allowance_{};            // beside the limit of each answer, where replies are late
+  bool asked_ = false;          // a request was sent
+  bool is_unanswered_ = false;  // the last request has no reply yet
+  Time allowance_{};            // extension of each timeout if replies are late
 };
 
 }  // namespace absenc::client

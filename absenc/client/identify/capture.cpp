@@ -19,10 +19,10 @@ namespace {
 using capture::Hypothesis;
 using capture::ObservedExchange;
 
-constexpr std::size_t enough = 300;         // replies, good or bad
-constexpr std::size_t enough_noise = 3000;  // bytes that are part of no frame
+constexpr std::size_t enough = 300;         // replies, good or bad, that suffice
+constexpr std::size_t enough_noise = 3000;  // bytes outside of frames that suffice
 
-/// Thrown when more of the capture would say no more.
+/// Thrown when enough of the capture was read.
 struct Enough {};
 
 capture::ObservedFrame owned(const Frame& frame) {
@@ -31,12 +31,12 @@ capture::ObservedFrame owned(const Frame& frame) {
   return heard;
 }
 
-/// Replies with what they answer; each byte of noise was a chance for a frame and is an exchange of its own.
+/// Collects replies with their requests. Each byte of noise could have begun a frame, so it counts as an exchange.
 struct Collector final : capture::AnnotationSink {
   void put(const capture::Annotation& annotation) override {
     using Kind = capture::Annotation::Kind;
     if (os::interrupted()) throw os::Interrupted{};
-    // A composed frame was on the line in the exchanges that carried its parts.
+    // Skips composed frames: the exchanges with their parts are already counted.
     if (annotation.remark == capture::Remark::cut || annotation.composed) return;
     if (annotation.kind == Kind::noise) {
       for (const std::uint8_t byte : annotation.reply.bytes) exchanges.push_back({.reply = {.bytes = {byte}}});
@@ -65,11 +65,11 @@ std::vector<ObservedExchange> heard_as(const Unit& unit, const Options& options,
     }
   } catch (const Enough&) {
   }
-  if (collector.replies == 0) return {};  // single bytes, which no options make a frame of
+  if (collector.replies == 0) return {};  // only single bytes, which are a frame with no options
   return std::move(collector.exchanges);
 }
 
-// The models, and what the document leaves open: a frame may not even be recognised as one otherwise.
+// Tries the models and the options that the document leaves open: with wrong options a frame may not be recognised.
 std::vector<Options> bases(const Unit& unit) {
   std::vector<Options> all = capture::likely_options(unit, {});
   if (all.empty()) return all;
@@ -86,8 +86,8 @@ std::vector<Options> bases(const Unit& unit) {
   return all;
 }
 
-// Where frames begin and end depends on the options, and the options on the frames: what is found by the frames of one
-// model is looked for again.
+// The division into frames depends on the options, and the options on the frames: searches again with the options
+// found.
 std::vector<Hypothesis> search_unit(const Unit& unit, const CaptureChoices& choices, std::size_t& searches,
                                     Sentences& damages) {
   std::vector<Hypothesis> best;
@@ -120,7 +120,7 @@ CaptureFindings search_capture(const CaptureChoices& choices, const std::functio
       for (Hypothesis& one : search_unit(*unit, choices, searches, findings.damages)) {
         findings.candidates.push_back({unit, std::move(one), {}, false, line_of(*unit)});
       }
-    } catch (const UsageError& error) {  // it is spoken on another kind of link
+    } catch (const UsageError& error) {  // the protocol is of another kind of line
       findings.refusals.emplace_back(error.what());
     } catch (const Failure& failure) {
       findings.refusals.emplace_back(failure.what());

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Which protocols explain what is in a capture file.
+// Finds the protocols that explain the frames of a capture file.
 #pragma once
 
 #include <functional>
@@ -13,11 +13,11 @@ namespace absenc::client {
 
 struct CaptureFindings {
   std::vector<Candidate> candidates{};
-  std::vector<std::string> damages{};   // of the capture, as far as it was read, each once
-  std::vector<std::string> refusals{};  // why a protocol could not be looked for, each once
+  std::vector<std::string> damages{};   // damage in the part of the capture that was read, each once
+  std::vector<std::string> refusals{};  // why a protocol could not be tried, each reason once
 };
 
-/// As much of the capture as it takes. Throws UsageError, Failure, os::Interrupted.
+/// Reads the capture until the evidence suffices. Throws UsageError, Failure, os::Interrupted.
 [[nodiscard]] CaptureFindings search_capture(const CaptureChoices& choices,
                                              const std::function<void(const std::string&)>& progress);
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Who is found on lines in virtual time. Damage, echo and late replies are what the runner of all exchanges says.
+// Identifies encoders on lines in virtual time, with damage, echo and late replies.
 #include <gtest/gtest.h>
 
 #include "absenc/client/identify/attempt.hpp"
@@ -10,7 +10,7 @@
 namespace absenc::client {
 namespace {
 
-/// A line with one encoder, which is switched on anew each time the line is opened.
+/// A line with one encoder, which is powered on each time the line is opened.
 struct Place {
   explicit Place(const std::string& text, std::vector<std::string> faults = {}, VirtualPort between = {})
       : encoder(parse_address(text)), way(between) {
@@ -30,7 +30,7 @@ struct Place {
   VirtualClock clock;
 };
 
-/// Returns the evidence for the unit when it alone is asked, and the number of requests.
+/// Returns the evidence for the unit if only its requests are sent, and the number of requests.
 std::pair<capture::Evidence, std::size_t> asked(const std::string& text, const std::vector<std::string>& faults,
                                                 const VirtualPort& way = {}) {
   Place place(text, faults, way);
@@ -43,7 +43,7 @@ std::pair<capture::Evidence, std::size_t> asked(const std::string& text, const s
           findings.requests};
 }
 
-/// How many of so many readings the runner takes for damaged, and how many requests it sends for them.
+/// Returns how many of `readings` the runner takes for damaged, and the number of requests it sends.
 struct Counted {
   std::size_t damaged = 0;
   std::size_t requests = 0;
@@ -55,7 +55,7 @@ Counted damaged_by_runner(const std::string& text, const std::vector<std::string
   Runner<std::uint8_t> runner(place.encoder);
   runner.attach(*link.bytes, link.latency);
   std::size_t damaged = 0;
-  // Who scans first has the replies that come later.
+  // A scan also collects replies that arrive later.
   if (const Command* scan = find_command(*place.encoder.unit, Verb::scan)) static_cast<void>(runner.once(*scan));
   for (std::size_t i = 0; i < count; ++i) {
     runner.start_again();
@@ -87,7 +87,7 @@ TEST_P(Damage, IsWhatTheRunnerSaysWithAndWithoutEcho) {
       SCOPED_TRACE(fmt::format("{}{}", fault, echo ? " with echo" : ""));
       const auto [evidence, requests] = asked(text, {fault}, {.echo = echo});
       const Counted wanted = damaged_by_runner(text, {fault}, evidence.tried, {.echo = echo});
-      // Where the scan was repeated or found more than one, the faults do not meet the same readings.
+      // If the scan was repeated or found several encoders, the faults strike other readings.
       if (wanted.requests != requests) continue;
       EXPECT_EQ(evidence.tried - evidence.explained, wanted.damaged);
       damaged += wanted.damaged;
@@ -112,7 +112,7 @@ TEST(Identify, GivesLateRepliesMoreTimeAndTakesEachForItsOwnRequest) {
 
 // ---- Which encoder it is
 
-/// The setting of an encoder that has the last number of a bus; "": there is no bus, or who is on it is not asked.
+/// Returns the setting of the highest address of a bus; "" without a bus, or if its encoders are not polled.
 std::string at_last_number(const Unit& unit) {
   const Option* option = find_role(unit.options, Role::encoder);
   const Command* scan = find_command(unit, Verb::scan);
@@ -126,7 +126,7 @@ TEST_P(Found, TheFirstCandidateIsTheEncoderOfEachModelAndNumber) {
   const Unit& unit = *GetParam();
   if (unit.link == LinkKind::clocked || unit.link == LinkKind::spi) GTEST_SKIP() << "an SPI controller is needed";
   std::vector<std::string> settings{""};
-  // Who sends by himself tells no number, and takes the search seconds.
+  // An encoder that sends by itself has no address in its frames, and finding it takes seconds.
   if (!host::sends_unsolicited(unit, parse_address(fmt::format("sim:{}", unit.id)).options)) {
     settings.push_back(at_last_number(unit));
     for (const Model& model : unit.models) settings.push_back(fmt::format("model={}", model.name));

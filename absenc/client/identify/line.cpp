@@ -21,19 +21,19 @@ namespace absenc::client {
 
 namespace {
 
-constexpr Time short_patience = 700ms;      // with a scan that nobody answers,
-constexpr Time brief_patience = 150ms;      // with others where one answers beyond doubt,
-constexpr Time long_patience = 5s;          // and at the end, when nothing was found
-constexpr std::size_t busy_line = 32;       // bytes while listening: nobody can be asked
-constexpr std::size_t most_introduced = 4;  // of candidates that explain the same encoder equally well
-constexpr double beyond_doubt = -3;         // log10 of chance: no further rates are tried then
+constexpr Time short_patience = 700ms;      // for a scan without replies
+constexpr Time brief_patience = 150ms;      // for other units after one has replied beyond doubt
+constexpr Time long_patience = 5s;          // at the end, if nothing was found
+constexpr std::size_t busy_line = 32;       // bytes received while listening, from which on no requests are sent
+constexpr std::size_t most_introduced = 4;  // candidates of one encoder that are asked for their identity
+constexpr double beyond_doubt = -3;         // log10 of chance, below which no further rates are tried
 constexpr std::array<std::uint32_t, 10> common_rates{9600,    19'200,  38'400,    57'600,    115'200,
                                                      230'400, 460'800, 1'000'000, 2'500'000, 5'000'000};
 
-/// Frames that one encoder sent by itself.
+/// Unsolicited frames of one encoder.
 struct Sender {
-  const Option* option = nullptr;  // that says which encoder is meant; null: there is none
-  std::string number{};            // its value
+  const Option* option = nullptr;  // the option with the encoder's address; null: none
+  std::string number{};            // value of that option
   std::vector<ObservedExchange> exchanges{};
 
   [[nodiscard]] std::string name() const {
@@ -41,7 +41,7 @@ struct Sender {
   }
 };
 
-// Who is meant stands in the frames: one encoder's must not be taken for those of another.
+// Groups frames by the address in them, so that frames of two encoders are not mixed.
 std::vector<Sender> senders(const Unit& unit, std::span<const CanFrame> frames) {
   const std::vector<Options> likely = capture::likely_options(unit, {});
   std::vector<Sender> all;
@@ -65,7 +65,7 @@ std::vector<Sender> senders(const Unit& unit, std::span<const CanFrame> frames) 
   return all;
 }
 
-/// All attempts, the usual settings of every unit first.
+/// Makes all attempts, first with the usual settings of every unit.
 class Search {
  public:
   explicit Search(const LineSearch& search) : search_(search), deadline_(search.now() + search.limit) {}
@@ -104,8 +104,8 @@ class Search {
     for (const Unit* unit : std::exchange(cut_, {})) attempt(*unit, search_.settings);
   }
 
-  // Who was found: the likeliest candidate of each, and those that explain what came as well. What an encoder says of
-  // itself may tell them apart.
+  // Reads the identity for the likeliest candidate of each encoder and for equally likely ones, which the identity may
+  // distinguish.
   void ask_who_they_are() {
     std::vector<Candidate>& all = findings_.candidates;
     std::set<std::pair<const Unit*, std::string>> asked;
@@ -122,7 +122,7 @@ class Search {
     std::erase_if(all, [](const Candidate& one) { return one.unit == nullptr; });
   }
 
-  // The candidate and all others of this encoder that are as likely.
+  // Returns the candidate and all equally likely ones of the same encoder.
   [[nodiscard]] std::vector<std::size_t> same_as(std::size_t first) const {
     const std::vector<Candidate>& all = findings_.candidates;
     std::vector<std::size_t> alike;
@@ -133,7 +133,8 @@ class Search {
     return alike;
   }
 
-  // Those that the encoder contradicts are dropped, where it agrees with another one; else the contradiction is said.
+  // Drops candidates that the encoder's identity contradicts if it agrees with another one; otherwise reports the
+  // contradiction.
   void judge(const std::vector<std::size_t>& alike, const std::vector<Introduction>& said) {
     const bool known = std::any_of(said.begin(), said.end(), [](const Introduction& one) { return one.agrees; });
     for (std::size_t i = 0; i < alike.size(); ++i) {
@@ -152,7 +153,7 @@ class Search {
     if (candidate.unit->link == LinkKind::can) return introduce_on<CanFrame>(candidate);
     return introduce_on<std::uint8_t>(candidate);
   }
-  // A port that was open a moment ago may be gone: what was found stays.
+  // The port may be lost meanwhile; the candidates found so far remain.
   template <class Item>
   Introduction introduce_on(const Candidate& candidate) {
     try {
@@ -177,7 +178,7 @@ class Search {
       for (const std::uint32_t one : common_rates) rates.push_back(fmt::format("{}", one));
     }
     for (const std::string& value : rates) {
-      // Who answers well at one rate is at that one.
+      // An encoder that replies well at one rate is not searched at others.
       if (is_beyond_doubt() || is_explained(unit)) return;
       Settings settings = search_.settings;
       settings.push_back(fmt::format("{}={}", rate_setting, value));
@@ -191,7 +192,7 @@ class Search {
     attempt_on<std::uint8_t>(unit, settings);
   }
 
-  // Whether the user's rate is one that the unit can have.
+  // Returns whether the unit supports the user's rate.
   [[nodiscard]] bool takes_rate(const Unit& unit) const {
     const Option* rate = find_role(unit.options, Role::rate);
     if (rate == nullptr || rate->choices.empty()) return true;
@@ -207,7 +208,7 @@ class Search {
     if (search_.now() >= deadline_) throw OutOfTime{};
     const Time patience = is_beyond_doubt() ? brief_patience : patience_;
     Attempt<Item> one(search_, unit, settings, patience, deadline_, findings_);
-    if (one.line().rate == 0 && medium_of(search_) == Medium::serial) return;  // the rates come later
+    if (one.line().rate == 0 && medium_of(search_) == Medium::serial) return;  // other rates are tried later
     const std::string line = line_of(unit.link, one.line());
     if (search_.progress) {
       search_.progress(fmt::format("{}, {}: {} found so far", unit.id, line, findings_.candidates.size()));
@@ -226,8 +227,8 @@ class Search {
     if (one.cut() && settings == search_.settings) cut_.push_back(&unit);
   }
 
-  // Once for all units with these settings of the line. Returns whether somebody sends by himself: then nobody would
-  // hear a question.
+  // Listens once for all units with these line settings. Returns whether an encoder sends by itself: then no request
+  // would be received.
   template <class Item>
   bool listen(Attempt<Item>& attempt, const Unit& unit) {
     const LineSettings& line = attempt.line();
@@ -282,7 +283,7 @@ class Search {
     }
   }
 
-  // Who answers is better known than who only sends; and one encoder may have been found in several ways.
+  // Prefers candidates that reply to those that only send, and removes duplicates of one encoder.
   void drop_repeated() {
     std::vector<Candidate> kept;
     for (const Candidate& one : findings_.candidates) {
@@ -294,7 +295,7 @@ class Search {
     findings_.candidates = std::move(kept);
   }
 
-  // Whether one of this unit answers, and all that it answers is explained.
+  // Returns whether an encoder of this unit replies and all its replies are explained.
   [[nodiscard]] bool is_explained(const Unit& unit) const {
     return std::any_of(findings_.candidates.begin(), findings_.candidates.end(), [&](const Candidate& one) {
       return one.unit == &unit && !one.unsolicited && one.hypothesis.evidence.explains_all();
@@ -312,7 +313,7 @@ class Search {
   LineFindings findings_;
   std::vector<std::pair<std::tuple<std::uint32_t, Parity, std::uint8_t>, bool>> listened_;
   Time patience_ = short_patience;
-  std::vector<const Unit*> cut_;  // those that have more addresses than the time allowed to ask
+  std::vector<const Unit*> cut_;  // units that have more addresses than could be polled in time
   std::optional<os::Failure> failure_;
   bool opened_ = false;
 };

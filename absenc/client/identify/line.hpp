@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Who answers on a line that nobody knows anything about: asks in every protocol that fits, by reads that change
-// nothing.
+// Finds the encoders on an unknown line: sends read requests, which change nothing, of every protocol that fits.
 #pragma once
 
 #include <cstdint>
@@ -18,31 +17,32 @@ namespace absenc::client {
 
 struct LineSearch {
   std::string place;                    // "/dev/ttyUSB0", "tcp:HOST:PORT", "spi:/dev/spidev0.0"
-  std::vector<std::string> settings{};  // of the port: "latency=5"
-  Time limit{};                         // of the whole search
+  std::vector<std::string> settings{};  // settings of the port, such as "latency=5"
+  Time limit{};                         // time limit of the whole search
   std::function<void(const std::string&)> progress{};
   OpenLink open = open_link;
-  std::function<Time()> now = os::now;  // the clock of the ports
-  std::function<bool()> over{};         // true: it ends with os::Ended. Empty: never
+  std::function<Time()> now = os::now;  // the clock of the port
+  std::function<bool()> over{};         // the search ends with os::Ended when it returns true; empty: never
 };
 
 struct LineFindings {
   std::vector<Candidate> candidates{};
-  std::size_t requests = 0;        // sent
-  std::size_t heard = 0;           // bytes that came, echo taken off
-  std::size_t unsolicited = 0;     // of them, before anything was sent
-  std::size_t searches = 0;        // for what explains what came: protocols, settings, encoders
-  bool only_echo = false;          // all that ever came back was what was sent
-  std::set<std::string> lines{};   // that were tried
-  std::vector<std::string> notes;  // what could not be tried, and why
+  std::size_t requests = 0;     // number of requests sent
+  std::size_t heard = 0;        // number of bytes received, without echo
+  std::size_t unsolicited = 0;  // number of them received before the first request
+  std::size_t searches =
+      0;                   // number of combinations of protocol, settings and encoder that were tried as an explanation
+  bool only_echo = false;  // only the adapter's echo was received
+  std::set<std::string> lines{};   // the kinds of lines that were tried
+  std::vector<std::string> notes;  // protocols that could not be tried, and why
   bool out_of_time = false;
   bool interrupted = false;
 };
 
-/// A port with its settings: "/dev/ttyUSB0?latency=50". Throws UsageError for what says a protocol.
+/// Parses a port with its settings: "/dev/ttyUSB0?latency=50". Throws UsageError, also if it names a protocol.
 [[nodiscard]] LineSearch parse_search(std::string_view text);
 
-/// Throws os::Failure when the place cannot be opened at all, UsageError.
+/// Runs the search. Throws os::Failure if the port cannot be opened, UsageError.
 [[nodiscard]] LineFindings search_line(const LineSearch& search);
 
 }  // namespace absenc::client

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// How long a conversation with somebody unknown is gone on with.
+// Limits how long a conversation with an unknown encoder continues.
 #pragma once
 
 #include <algorithm>
@@ -9,19 +9,19 @@
 
 namespace absenc::client {
 
-/// Ends a conversation that nobody answers, or nobody who makes sense. Time in which nobody looked, because this
-/// process did not run, counts neither as quiet nor as nonsense.
+/// Ends a conversation without replies, or without valid ones. Time in which this process did not run counts neither as
+/// silence nor as invalid replies.
 template <class Item>
 class Patience {
  public:
   struct Limits {
-    Time quiet{};     // without a single item
-    Time nonsense{};  // without a good reply
-    Time latency{};   // that the port adds to the limits of a step
+    Time quiet{};     // limit of time without any received item
+    Time nonsense{};  // limit of time without a good reply
+    Time latency{};   // latency that the port adds to the timeouts of a step
   };
   explicit Patience(const Limits& limits) : limits_(limits) {}
 
-  /// Each event of the conversation, without echo.
+  /// Takes each event of the conversation, without echo.
   void see(const Event<Item>& event) {
     using Kind = typename Event<Item>::Kind;
     if (event.at > due_) missed_ += event.at - due_;
@@ -32,13 +32,13 @@ class Patience {
     if (event.kind == Kind::sent) asked_ = true;
     if (event.kind == Kind::sent || event.kind == Kind::received) quiet_since_ = event.at;
   }
-  /// Each step of the conversation.
+  /// Takes each step of the conversation.
   void see(const Step<Item>& step, Time now) {
     using Kind = typename Step<Item>::Kind;
     if (step.kind == Kind::transfer) asked_ = answered_ = false;
     due_ = step.kind == Kind::wait ? due(step, now) : never;
   }
-  /// Whether it has lasted too long, unless somebody was understood.
+  /// Returns whether the conversation has lasted too long without a good reply.
   [[nodiscard]] bool is_over(Time now) {
     if (begun_ == never) begun_ = now;
     return now - begun_ - missed_ >= (heard_ == 0 ? limits_.quiet : limits_.nonsense);
@@ -46,7 +46,7 @@ class Patience {
   [[nodiscard]] std::size_t heard() const { return heard_; }
 
  private:
-  // When the port is to be back at the latest.
+  // The time at which the port must return from waiting.
   [[nodiscard]] Time due(const Step<Item>& step, Time now) const {
     const Time limit = answered_ ? step.gap : step.answer;
     const Time quiet_end = asked_ && limit != Time{} ? quiet_since_ + limit + limits_.latency : never;
@@ -55,11 +55,11 @@ class Patience {
   }
 
   Limits limits_;
-  std::size_t heard_ = 0;  // items
-  bool asked_ = false;     // the last request has left
-  bool answered_ = false;  // something came behind it
+  std::size_t heard_ = 0;  // number of received items
+  bool asked_ = false;     // the last request was sent
+  bool answered_ = false;  // something was received after it
   Time begun_ = never;
-  Time missed_{};  // between what was due and when it was looked at
+  Time missed_{};  // total delay between events that were due and their handling
   Time due_ = never;
   Time quiet_since_{};
 };

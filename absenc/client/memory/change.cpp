@@ -10,7 +10,7 @@ namespace absenc::client {
 
 namespace {
 
-// Longer than an encoder is busy with a byte and its reply is under way.
+// Longer than the busy time of a byte write and its reply.
 constexpr Time settling = std::chrono::milliseconds(50);
 
 }  // namespace
@@ -80,7 +80,7 @@ void MemoryChange::settle() {
     if (!there) return;
     written_[at] = value;
     left_.erase(at);
-  } catch (const std::exception&) {  // the encoder does not say, or this is to end: it stays in flight
+  } catch (const std::exception&) {  // no reply, or cancelled: the state of the byte remains unknown
   }
 }
 

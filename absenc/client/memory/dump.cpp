@@ -19,7 +19,7 @@ namespace {
 constexpr std::string_view checksum_name = "checksum: ";
 constexpr std::string_view edited = "edited";
 
-/// CRC-16/IBM-3740 of the lines that count, each with one line feed.
+/// Computes the CRC-16/IBM-3740 of the lines that are not ignored, each with one line feed.
 class Checksum {
  public:
   void add(std::string_view line) {
@@ -36,7 +36,7 @@ class Checksum {
 
 std::string_view model_name(const Options& options) { return options.model != nullptr ? options.model->name : "none"; }
 
-// What the encoder must have in common with the file. A model stands for its options.
+// Header lines that must match the encoder: protocol and model, or the options if no model matches.
 std::vector<std::string> header(const Unit& unit, const Options& options) {
   std::vector<std::string> lines{fmt::format("protocol: {}", unit.id), fmt::format("model: {}", model_name(options))};
   if (options.model != nullptr) return lines;
@@ -101,7 +101,7 @@ class Parser {
     sum_.add(lines_.line);
   }
 
-  // Takes "name NUMBER" and the character behind it from the front of `text`.
+  // Removes "name NUMBER" and the character after it from the front of `text`, and returns the number.
   static std::optional<std::uint32_t> take(std::string_view& text, std::string_view name, char behind) {
     if (!text.starts_with(name) || text.substr(name.size()).find(behind) == std::string_view::npos) return std::nullopt;
     const std::string_view number = text.substr(name.size(), text.find(behind, name.size()) - name.size());
@@ -159,7 +159,7 @@ class Parser {
   Access access_;
   Checksum sum_;
   Dump dump_;
-  std::map<MemoryAddress, std::size_t> given_in_;  // line
+  std::map<MemoryAddress, std::size_t> given_in_;  // the line in which each address was given
 };
 
 }  // namespace

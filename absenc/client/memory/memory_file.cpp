@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Lines "protocol: tformat", "model: NAME", "size: BYTES" after a first one that says what it is, then the bytes in
-// hexadecimal with the address of the first: "0010: 00 5A ...". Empty lines and those that begin with # do not count.
+// Format: a first line with the kind of file; lines "protocol: tformat", "model: NAME", "size: BYTES"; then bytes in
+// hexadecimal after the address of the first: "0010: 00 5A ...". Empty lines and lines that begin with # are ignored.
 #include "absenc/client/memory/memory_file.hpp"
 
 #include <fmt/format.h>

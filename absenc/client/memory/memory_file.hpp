@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The memory of a virtual encoder in a file, for people to read and edit. memory_file.cpp describes the format.
+// Stores the memory of a virtual encoder in a text file that people can edit. memory_file.cpp describes the format.
 #pragma once
 
 #include <optional>
@@ -13,15 +13,15 @@ namespace absenc::client {
 
 class MemoryFile {
  public:
-  /// `path` may be a symbolic link. Nothing is opened yet.
+  /// `path` may be a symbolic link. The constructor opens nothing.
   MemoryFile(const std::string& path, std::string_view protocol, std::string_view model);
 
-  /// Fills `memory` from the file, or makes the file from `memory` when there is none. From then on it is locked.
-  /// Throws Failure, and leaves both as they are, when the file is none of ours, damaged, of another model or size,
-  /// kept by another emulator, or cannot be written.
+  /// Fills `memory` from the file, or creates the file from `memory` if there is none. The file is then locked. Throws
+  /// Failure, and changes neither, if the file is of another kind, damaged, of another model or size, locked by another
+  /// emulator, or not writable.
   void load(MutableBytes memory);
 
-  /// Replaces the file, which was loaded, in one go. Throws Failure.
+  /// Replaces the loaded file atomically. Throws Failure.
   void save(Bytes memory, os::Durable durable);
 
  private:

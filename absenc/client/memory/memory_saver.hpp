@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Stands in front of a virtual encoder and saves its memory before anybody can know what it holds.
+// Saves the memory of a virtual encoder before its reply confirms a change.
 #pragma once
 
 #include "absenc/client/memory/memory_file.hpp"
@@ -7,12 +7,12 @@
 
 namespace absenc::client {
 
-/// Whatever becomes of this process, what its host was told is in the file. Throws Failure out of `next`, and with
-/// that gives no reply, when it cannot be saved.
+/// Every change that a reply confirms is in the file, even if this process is killed. If saving fails, `next` throws
+/// Failure and the encoder sends no reply.
 template <class Item>
 class MemorySaver final : public Machine<Item> {
  public:
-  /// `line` is the device, or what stands in front of it.
+  /// `line` is the device, or a machine in front of it.
   MemorySaver(Machine<Item>& line, Device<Item>& device, MemoryFile& file)
       : line_(&line), device_(&device), file_(&file), saved_(device.memory_version()), finished_(saved_) {}
 
@@ -20,11 +20,12 @@ class MemorySaver final : public Machine<Item> {
 
   Step<Item> next(Time now) override {
     const Step<Item> step = line_->next(now);
-    if (saved_ != device_->memory_version()) save(os::Durable::no);  // to wait for the disk would make the reply late
+    if (saved_ != device_->memory_version())
+      save(os::Durable::no);  // does not wait for the disk, which would delay the reply
     return step;
   }
 
-  /// Waits until the disk has it. Throws Failure.
+  /// Saves the memory and waits for the disk. Throws Failure.
   void finish() {
     if (finished_ != device_->memory_version()) save(os::Durable::yes);
     finished_ = saved_;

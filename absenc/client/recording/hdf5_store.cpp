@@ -12,7 +12,7 @@ namespace absenc::client {
 namespace {
 
 struct DriverFile {
-  H5FD_t common;  // the library takes a pointer to the whole for one to it
+  H5FD_t common;  // first member: the library casts a pointer to it to a pointer to the whole struct
   Hdf5Store* store;
 };
 
@@ -28,7 +28,7 @@ herr_t close_file(H5FD_t* file) {
   return 0;
 }
 
-// No features: the library must not put blocks of several types together.
+// Declares no features: otherwise the library combines blocks of several types.
 herr_t query(const H5FD_t*, unsigned long* features) {
   *features = 0;
   return 0;
@@ -45,7 +45,7 @@ herr_t read(H5FD_t* file, H5FD_mem_t, hid_t, haddr_t at, std::size_t size, void*
   try {
     store_of(file).read(at, {static_cast<std::uint8_t*>(buffer), size});
     return 0;
-  } catch (...) {  // it is C that calls
+  } catch (...) {  // C code calls this function, so no exception may leave it
     return -1;
   }
 }
@@ -74,7 +74,7 @@ const H5FD_class_t& driver_class() {
     made.get_eof = allocated;
     made.read = read;
     made.write = write;
-    // Every type is allocated by itself.
+    // Each type of block is allocated separately.
     const H5FD_mem_t types[] = H5FD_FLMAP_DICHOTOMY;
     std::copy(std::begin(types), std::end(types), std::begin(made.fl_map));
     return made;
@@ -82,7 +82,7 @@ const H5FD_class_t& driver_class() {
   return driver;
 }
 
-constexpr std::size_t level_of_node = 5;  // in a node of a B-tree, version 1: "TREE", type, level
+constexpr std::size_t level_of_node = 5;  // offset of the level in a B-tree node of version 1: "TREE", type, level
 
 }  // namespace
 
@@ -93,7 +93,7 @@ void Hdf5Store::attach(hid_t access) {
 }
 
 void Hdf5Store::write(H5FD_mem_t type, std::uint64_t at, Bytes bytes) {
-  // The library writes whole objects, so that blocks are the same or inside each other.
+  // The library writes whole objects, so two blocks are either equal or one is inside the other.
   auto next = blocks_.upper_bound(at);
   if (next != blocks_.begin()) {
     auto& [begin, block] = *std::prev(next);
@@ -121,9 +121,9 @@ void Hdf5Store::read(std::uint64_t at, MutableBytes bytes) {
   }
 }
 
-// What leads to others comes after them. Of a B-tree the upper node first: when the lower one was split it leads to
-// both halves, and the half that the lower one still has too is not looked for there. Object headers, which say how
-// many rows there are, are the last.
+// A block is written after the blocks that it points to. An exception is the B-tree: the upper node is written first.
+// After a split it points to both halves, and a reader does not search the old node for the moved half. Object headers,
+// which hold the number of rows, are written last.
 int Hdf5Store::rank(const Block& block) {
   constexpr int last = 1000;
   switch (block.type) {
@@ -143,7 +143,7 @@ int Hdf5Store::rank(const Block& block) {
 void Hdf5Store::commit() {
   using Entry = std::pair<const std::uint64_t, Block>;
   std::vector<const Entry*> again;
-  // What is new is seen by nobody before the rest.
+  // New blocks are invisible to readers until the remaining blocks are written.
   for (const Entry& one : blocks_) {
     if (one.first < committed_end_) {
       again.push_back(&one);

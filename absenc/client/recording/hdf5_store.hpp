@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Where the HDF5 library puts a file whose every state on disk can be opened: what it writes is collected, and reaches
-// the file by `commit` in an order of which every beginning is a whole file.
+// Stores an HDF5 file so that it can be opened after a crash at any point. Collects the writes of the HDF5 library;
+// `commit` writes them in an order in which the file is consistent after every single write.
 #pragma once
 
 #include <hdf5.h>
@@ -23,17 +23,17 @@ class Hdf5Store {
   };
   explicit Hdf5Store(Disk disk) : disk_(std::move(disk)) {}
 
-  /// Makes `access`, a list of properties for H5Fcreate, lead here. The store outlives the file.
+  /// Sets `access`, a property list for H5Fcreate, to use this store. The store must outlive the file.
   void attach(hid_t access);
 
-  /// Throws what `disk` throws: then what was committed before is still whole, and nothing more can be committed.
+  /// Throws the exceptions of `disk`. The data committed before then remains intact, and nothing more can be committed.
   void commit();
 
-  // For the driver.
+  // Called by the HDF5 driver:
   void write(H5FD_mem_t type, std::uint64_t at, Bytes bytes);
   void read(std::uint64_t at, MutableBytes bytes);
 
-  std::uint64_t end = 0;  // of what the library has allocated
+  std::uint64_t end = 0;  // end of the space that the library has allocated
 
  private:
   struct Block {

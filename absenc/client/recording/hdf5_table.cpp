@@ -13,10 +13,10 @@ namespace absenc::client {
 namespace {
 
 constexpr hsize_t rows_of_a_chunk = 1024;
-constexpr hsize_t page = 4096;  // a write inside one is whole or not at all, even when the process is killed meanwhile
-constexpr std::size_t text_bytes = 48;  // more than the name of any error has
+constexpr hsize_t page = 4096;          // bytes; a write inside one page is atomic even if the process is killed
+constexpr std::size_t text_bytes = 48;  // longer than the name of any error
 
-// Debian's library must not be called from two threads at once.
+// Debian's HDF5 library is not thread-safe.
 std::mutex& library() {
   static std::mutex mutex;
   return mutex;
@@ -26,7 +26,7 @@ void require(herr_t result) {
   if (result < 0) throw Failure("HDF5 could not go on writing: record to a name that ends in .csv");
 }
 
-/// An identifier that is released.
+/// Owns an HDF5 identifier and releases it.
 class Handle {
  public:
   using Release = herr_t (*)(hid_t);
@@ -34,7 +34,7 @@ class Handle {
   ~Handle() { release_(id_); }
   Handle(const Handle&) = delete;
   Handle& operator=(const Handle&) = delete;
-  operator hid_t() const { return id_; }  // it is passed as what it is
+  operator hid_t() const { return id_; }  // converts implicitly, as HDF5 functions take hid_t
 
  private:
   hid_t id_;
@@ -71,7 +71,7 @@ using Elements = std::vector<std::uint8_t>;
 
 template <class T>
 void append(Elements& elements, T value) {
-  const auto* const bytes = reinterpret_cast<const std::uint8_t*>(&value);  // the hosts of Debian are little endian
+  const auto* const bytes = reinterpret_cast<const std::uint8_t*>(&value);  // all hosts of Debian are little endian
   elements.insert(elements.end(), bytes, bytes + sizeof value);
 }
 
@@ -82,7 +82,7 @@ void append_text(Elements& elements, std::string_view text) {
   elements.resize(end);
 }
 
-// What stands where nothing was told.
+// Returns the value that stands for a missing one.
 void append_missing(Elements& elements, Type type) {
   switch (type) {
     case Type::int64:
@@ -166,10 +166,10 @@ void Hdf5Rows::clear() {
 Hdf5Table::Hdf5Table(Hdf5Store::Disk disk, std::span<const Column> columns, const Hdf5Attributes& attributes)
     : store_(std::move(disk)) {
   const std::lock_guard lock(library());
-  require(H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr));  // errors are told by us
+  require(H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr));  // absenc reports errors itself
   const Handle access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose);
   store_.attach(access);
-  // The oldest format: without checksums over several blocks, and every reader knows it.
+  // Uses the oldest format: it has no checksums over several blocks, and every reader supports it.
   require(H5Pset_libver_bounds(access, H5F_LIBVER_EARLIEST, H5F_LIBVER_V18));
   require(H5Pset_meta_block_size(access, 0));
   require(H5Pset_alignment(access, 1, page));
@@ -186,7 +186,7 @@ Hdf5Table::Hdf5Table(Hdf5Store::Disk disk, std::span<const Column> columns, cons
     make(column);
     names += (names.empty() ? "" : ",") + std::string(column.name);
   }
-  put_attribute(file_, "columns", names);  // in their order, which the oldest format does not keep
+  put_attribute(file_, "columns", names);  // in the order of columns, which the oldest format does not store
   require(H5Fflush(file_, H5F_SCOPE_GLOBAL));
   store_.commit();
 }
@@ -194,7 +194,7 @@ Hdf5Table::Hdf5Table(Hdf5Store::Disk disk, std::span<const Column> columns, cons
 Hdf5Table::~Hdf5Table() {
   const std::lock_guard lock(library());
   for (const hid_t dataset : datasets_) H5Dclose(dataset);
-  if (file_ >= 0) H5Fclose(file_);  // what it writes now is not committed, and need not be
+  if (file_ >= 0) H5Fclose(file_);  // the library's last writes are not committed; the file is complete without them
 }
 
 void Hdf5Table::make(const Column& column) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Rows as an HDF5 file: one dataset for each column, which h5py, MATLAB and h5dump read.
+// Writes rows as an HDF5 file with one dataset for each column, which h5py, MATLAB and h5dump read.
 #pragma once
 
 #include <cstdint>
@@ -15,7 +15,7 @@
 
 namespace absenc::client {
 
-/// Elements of some rows, column by column, as they stand in the file. Details are left out.
+/// Elements of several rows, column by column, in the file's format, without details.
 class Hdf5Rows {
  public:
   explicit Hdf5Rows(std::span<const Column> columns);
@@ -26,7 +26,7 @@ class Hdf5Rows {
 
  private:
   friend class Hdf5Table;
-  std::vector<std::size_t> columns_;  // which of those of a row
+  std::vector<std::size_t> columns_;  // indexes of the columns in a row
   std::vector<Type> types_;
   std::vector<std::vector<std::uint8_t>> elements_;
   std::uint64_t count_ = 0;
@@ -34,21 +34,22 @@ class Hdf5Rows {
 
 using Hdf5Attributes = std::vector<std::pair<std::string, std::variant<std::string, double, std::uint64_t>>>;
 
-/// In the attribute `rows` of a file that is still written, or whose writer was killed.
+/// Value of the attribute `rows` while the file is being written, and forever if the writer was killed.
 constexpr std::uint64_t hdf5_not_ended = UINT64_MAX;
 
 class Hdf5Table {
  public:
-  /// `attributes`: of the file, which has `columns` too, their names. Columns have `unit`, `meaning`, and
-  /// `missing_value`: what stands where nothing was told, NaN of reals. Throws Failure, and what `disk` throws.
+  /// Creates the datasets. The file has `attributes`, and `columns` with the column names. Each column has `unit`,
+  /// `meaning`, and `missing_value`, which stands for a missing value (NaN for reals). Throws Failure and the
+  /// exceptions of `disk`.
   Hdf5Table(Hdf5Store::Disk disk, std::span<const Column> columns, const Hdf5Attributes& attributes);
   ~Hdf5Table();
   Hdf5Table(const Hdf5Table&) = delete;
   Hdf5Table& operator=(const Hdf5Table&) = delete;
 
-  /// Afterwards they are in the file. Throws as the constructor: then those of before are.
+  /// Writes rows to the file. Throws as the constructor; the rows written before then remain in the file.
   void commit(const Hdf5Rows& rows);
-  /// Sets the attribute `rows` of the file, which is `hdf5_not_ended` until then. Throws as `commit`.
+  /// Sets the attribute `rows` of the file, which was `hdf5_not_ended`. Throws as `commit`.
   void finish();
 
  private:

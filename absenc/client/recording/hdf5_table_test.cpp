@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A file of which the process is killed between any two writes can be opened, and holds what was committed before.
+// If the process is killed between any two writes, the file can be opened and holds the rows committed before.
 #include "absenc/client/recording/hdf5_table.hpp"
 
 #include <gtest/gtest.h>
@@ -20,7 +20,7 @@ constexpr std::array<Column, 3> columns{
 
 struct Write {
   std::uint64_t at;
-  std::vector<std::uint8_t> bytes;  // empty: the file grows to `at`
+  std::vector<std::uint8_t> bytes;  // bytes to write; empty: the file grows to `at`
 };
 
 struct Bench {
@@ -59,7 +59,7 @@ Hdf5Rows rows_from(std::int64_t first, std::int64_t count) {
   return rows;
 }
 
-/// How many rows a dataset has, each as it was written; -1: it cannot be opened, or holds something else.
+/// Returns the number of rows of a dataset if all are as written; -1 if it cannot be opened or has other values.
 template <class T>
 std::int64_t whole_rows(const fs::path& path, const char* name, hid_t type, T (*expected)(std::int64_t)) {
   const hid_t file = H5Fopen(path.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT);
@@ -81,7 +81,7 @@ std::int64_t whole_rows(const fs::path& path, const char* name, hid_t type, T (*
   return found;
 }
 
-// 32 chunks of 1024 rows fill a node of the tree that leads to them: nodes are split, and the tree gets a level.
+// 32 chunks of 1024 rows fill a B-tree node, so nodes are split and the tree gets another level.
 TEST(Hdf5Table, EveryBeginningOfACommitIsAWholeFile) {
   Bench bench("prefix");
   Hdf5Table table(bench.disk(), columns, {{"encoder", std::string("elbow")}, {"rate_hz", 100.0}});
@@ -111,7 +111,7 @@ TEST(Hdf5Table, EveryBeginningOfACommitIsAWholeFile) {
   EXPECT_GT(states, 200u);
 }
 
-// The disk is full at any write: what was committed before stays.
+// If the disk is full at any write, the rows committed before remain.
 TEST(Hdf5Table, AWriteThatFailsLosesOnlyItsCommit) {
   for (int failing = 0;; ++failing) {
     ASSERT_LT(failing, 1000);
@@ -140,7 +140,7 @@ TEST(Hdf5Table, AWriteThatFailsLosesOnlyItsCommit) {
     EXPECT_GE(rows, 900) << failing;
     if (failed) continue;
     EXPECT_EQ(rows, 5900) << failing;
-    return;  // all writes were there
+    return;  // no write failed any more
   }
 }
 

@@ -79,7 +79,7 @@ Recording::Parts::Parts(const RecordingSettings& settings, Encoder& encoder)
       start_(os::now()),
       rows_(encoder.unit(), encoder.options(), start_, SampleRows::With::motion, encoder.joint()),
       started_(date_and_time()) {
-  static_cast<void>(record_form(settings.path));  // before the folder is looked at
+  static_cast<void>(record_form(settings.path));  // checks the ending of the name before the folder is read
   if (settings_.part_bytes || settings_.part_time) refuse_parts_of_another_recording();
   open_part();
 }
@@ -98,7 +98,7 @@ bool Recording::Parts::run(const std::function<void(const Sample&)>& on_written)
   Sample sample;
   const auto note_missed = [&] {
     const std::uint64_t missed = pace.take_missed();
-    // While the port is away, that it was lost says so.
+    // While the port is lost, the row of the loss replaces rows of missed readings.
     const bool was_there = sample.kind == Sample::Kind::reading || sample.kind == Sample::Kind::failed;
     if (was_there) miss(missed);
   };
@@ -116,7 +116,7 @@ bool Recording::Parts::run(const std::function<void(const Sample&)>& on_written)
   } catch (const os::Interrupted&) {
   } catch (const Cancelled&) {
   }
-  if (!has_all) pace.leave_out(end);  // the end may have come while a reading was taken
+  if (!has_all) pace.leave_out(end);  // the end may be reached while a reading is taken
   note_missed();
   write_gap();
   file_->finish();
@@ -130,12 +130,12 @@ std::string Recording::Parts::part_path(unsigned part) const {
   return path.parent_path() / name;
 }
 
-// Later parts of an older recording would stand in the way in the middle of this one.
+// Refuses to start if later parts of an older recording exist, because this one would reach their names.
 void Recording::Parts::refuse_parts_of_another_recording() const {
   const fs::path path(settings_.path);
   const std::string begin = path.stem().string() + "-";
   const std::string ending = path.extension();
-  std::error_code error;  // a folder that cannot be read will be told when the file is made
+  std::error_code error;  // an unreadable folder is reported when the file is created
   for (const fs::directory_entry& entry :
        fs::directory_iterator(path.has_parent_path() ? path.parent_path() : ".", error)) {
     const std::string name = entry.path().filename();
@@ -170,7 +170,7 @@ RecordHeader Recording::Parts::header() const {
           .part = part_};
 }
 
-// Of the readings every so manieth, but none with other alarms is left out; of what went wrong everything but waiting.
+// Keeps every Nth reading, every change of an alarm, and all failures except repeated waiting.
 bool Recording::Parts::wanted(const Sample& sample) {
   if (sample.kind == Sample::Kind::absent) return false;
   if (sample.kind != Sample::Kind::reading) return true;

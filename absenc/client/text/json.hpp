@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A JSON value to be printed on one line. The library behind it is seen by json.cpp alone: it is slow to compile.
+// A JSON value to be printed on one line. Only json.cpp includes nlohmann-json, which is slow to compile.
 #pragma once
 
 #include <concepts>
@@ -13,7 +13,7 @@ namespace absenc::client {
 
 class Json {
  public:
-  /// null
+  /// Makes a null.
   Json();
   Json(bool value);
   Json(std::int64_t value);
@@ -26,7 +26,7 @@ class Json {
   Json(const std::string& text) : Json(std::string_view(text)) {}
   [[nodiscard]] static Json object();
   [[nodiscard]] static Json array();
-  /// An array of what `make` makes of each of them.
+  /// Returns an array of `make(item)` for each item.
   template <class All, class Make>
   [[nodiscard]] static Json list(const All& all, const Make& make) {
     Json made = array();
@@ -49,7 +49,7 @@ class Json {
   [[nodiscard]] bool empty() const;
   [[nodiscard]] bool is_text() const;
 
-  /// One line without its end. Bytes that are no UTF-8 become U+FFFD.
+  /// Returns the JSON text on one line, without a line end. Bytes that are not UTF-8 become U+FFFD.
   [[nodiscard]] std::string line() const;
 
  private:

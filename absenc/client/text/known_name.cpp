@@ -13,7 +13,7 @@ namespace absenc::client {
 
 namespace {
 
-// In small letters: what people mean when they write a name in another way.
+// Returns the name in lower case without '-' and spaces, for comparison.
 std::string letters_and_digits(std::string_view name) {
   std::string text;
   for (const unsigned char c : name) {

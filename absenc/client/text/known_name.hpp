@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Names that people know instead of that of a protocol: of makers, families and models.
+// Finds protocols by the names of makers, families and models.
 #pragma once
 
 #include <optional>
@@ -17,11 +17,12 @@ struct KnownName {
   bool is_model = false;
   std::vector<const Unit*> units;
 
-  /// "AksIM-2 is a model of encolink and encolink-spi", "RLS: the protocols are encolink, e201 and biss"
+  /// Returns "AksIM-2 is a model of encolink and encolink-spi" or "RLS: the protocols are encolink, e201 and biss".
   [[nodiscard]] std::string sentence() const;
 };
 
-/// Upper and lower case, '-' and spaces make no difference. Empty for a word that is none, also for a protocol.
+/// Returns the known name that equals `written` without regard to case, '-' and spaces; nothing if there is none, also
+/// for the name of a protocol.
 [[nodiscard]] std::optional<KnownName> find_known_name(std::string_view word);
 
 }  // namespace absenc::client

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the user most likely meant by a name that does not exist.
+// Suggests the name that the user most likely meant by an unknown one.
 #pragma once
 
 #include <span>
@@ -8,10 +8,10 @@
 
 namespace absenc::client {
 
-/// The name nearest to `written` by edit distance, or "" when none is near. Upper and lower case are the same.
+/// Returns the name nearest to `written` by edit distance, ignoring case; "" if none is near.
 [[nodiscard]] std::string_view nearest(std::string_view written, std::span<const std::string_view> names);
 
-/// "; did you mean X?" when one is near, otherwise "; known are: A, B, C", and nothing when there is no name.
+/// Returns "; did you mean X?" if a name is near, otherwise "; known are: A, B, C"; "" without names.
 [[nodiscard]] std::string suggestion(std::string_view written, std::span<const std::string_view> names);
 
 }  // namespace absenc::client

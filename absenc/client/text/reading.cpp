@@ -14,7 +14,7 @@ std::uint32_t flag_mask(const FieldInfo& field) {
   return static_cast<std::uint32_t>(low_mask(static_cast<unsigned>(field.flags.size())));
 }
 
-// Those that every encoder has.
+// Columns of every reading.
 std::uint32_t required(const FieldInfo& field) {
   std::uint32_t mask = 0;
   for (std::size_t i = 0; i < field.flags.size(); ++i) {
@@ -68,7 +68,7 @@ Reading checked(Reading reading, bool confirmed) {
   if (confirmed || !reading.ready || !reading.singleturn_valid()) return reading;
   reading.singleturn_valid_bits = 0;
   reading.singleturn_known = false;
-  if (reading.multiturn_valid) reading.multiturn_known = false;  // else the encoder has said that they do not hold
+  if (reading.multiturn_valid) reading.multiturn_known = false;  // otherwise the encoder has reported invalid turns
   reading.multiturn_valid = false;
   return reading;
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Alarms and validity have three states, in values, rows, CSV and JSON.
+// Checks the three states of alarms and validity in values, rows, CSV and JSON.
 #include "absenc/client/reading.hpp"
 
 #include <gtest/gtest.h>
@@ -124,7 +124,7 @@ TEST(ClientReading, AnswersTellInvalidFromUnknown) {
   EXPECT_EQ(sink.answer["turns"], Value(Unknown{}));
 }
 
-// The encoder has not said that an unconfirmed position is wrong, but of turns that it called invalid it has.
+// An unconfirmed position has unknown validity, but turns that the encoder reports invalid are invalid.
 TEST(ClientReading, AnUnconfirmedPositionIsUnknown) {
   const Reading unconfirmed = checked(reading(0, 5), false);
   EXPECT_EQ(unconfirmed.singleturn_validity(), Validity::unknown);

@@ -6,8 +6,8 @@
 
 namespace absenc::client {
 
-/// Returns the number that the whole text is, as "12.5" or "1e-3"; nothing where it is none, is not finite, or is too
-/// large or too small for a double.
+/// Parses the whole text as a number such as "12.5" or "1e-3"; returns nothing if it is not a number, not finite, or
+/// out of a double's range.
 [[nodiscard]] std::optional<double> parse_real(std::string_view text);
 
 }  // namespace absenc::client

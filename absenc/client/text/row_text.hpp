@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Rows as lines of a table with commas between, and as JSON.
+// Prints rows as CSV lines and as JSON.
 #pragma once
 
 #include <span>
@@ -12,21 +12,21 @@
 
 namespace absenc::client {
 
-/// The names of the columns, without details.
+/// Returns the CSV line with the names of the columns, without details.
 [[nodiscard]] std::string csv_header(std::span<const Column> columns);
-/// The values under them; what is not told, or does not hold, is empty. Without its end.
+/// Returns the CSV line of the values, without a line end. A missing or invalid value is empty.
 void append_csv(std::string& text, const Row& row);
 [[nodiscard]] std::string to_csv(const Row& row);
 
-/// {"name":"over_heat","meaning":...,"action":...}
+/// Returns {"name":"over_heat","meaning":...,"action":...}.
 [[nodiscard]] Json flag_to_json(const FlagInfo* flag);
-/// ["over_heat","battery_alarm"]
+/// Returns ["over_heat","battery_alarm"].
 [[nodiscard]] Json flags_to_json(const FieldInfo& field, std::uint64_t bits);
 [[nodiscard]] Json to_json(const Value& value);
-/// What is not told is left out; what does not hold is null.
+/// Returns the row as a JSON object. A missing value is left out, an invalid one is null.
 [[nodiscard]] Json to_json(const Row& row);
 
-/// Returns the value of an option: a number, the name of a choice, or true and false.
+/// Returns the value of an option: a number, the name of a choice, or a boolean.
 [[nodiscard]] Json to_json(const Option& option, std::int64_t value);
 
 }  // namespace absenc::client

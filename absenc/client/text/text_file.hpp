@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Text files that people read and edit: lines of "name: value" and bytes; what begins with # does not count.
+// Reads text files that people may edit: lines of "name: value" and of bytes; lines that begin with # are ignored.
 #pragma once
 
 #include <cstddef>
@@ -8,21 +8,22 @@
 
 namespace absenc::client {
 
-// The first line says what a file is.
-inline constexpr std::string_view memory_file_title = "absenc memory 1";  // of a virtual encoder
-inline constexpr std::string_view dump_title = "absenc dump 1";           // copied from an encoder
+// First lines, which name the kind of file:
+inline constexpr std::string_view memory_file_title = "absenc memory 1";  // memory of a virtual encoder
+inline constexpr std::string_view dump_title = "absenc dump 1";           // copy of an encoder's memory
 
-/// Throws Failure, which begins with `what` and the path; also for what is larger than any such file (16 MiB).
+/// Returns the content of a file. Throws Failure, whose text begins with `what` and the path, also for a file of more
+/// than 16 MiB.
 [[nodiscard]] std::string read_text_file(std::string_view what, const std::string& path);
 
-/// The file that a chain of symbolic links leads to, whether it is there or not: what is to be replaced.
+/// Returns the path at the end of a chain of symbolic links, whether the file exists or not.
 [[nodiscard]] std::string link_target(const std::string& path);
 
-/// For before work is done for nothing. Throws Failure when a file cannot be put there, or in the place of what is
-/// there; only a regular file is ever replaced.
+/// Checks before long work that a file can be written to this path. Throws Failure if not; only a regular file may be
+/// replaced.
 void require_replaceable(const std::string& path);
 
-/// Hands out the lines that count, without blanks at their end.
+/// Iterates over the lines that are not ignored, without blanks at their end.
 class LineReader {
  public:
   explicit LineReader(std::string_view text) : rest_(text) {}
@@ -30,7 +31,7 @@ class LineReader {
   bool next();
 
   std::string_view line;
-  std::size_t number = 0;  // of `line`, from 1
+  std::size_t number = 0;  // number of `line` in the file, from 1
 
  private:
   std::string_view rest_;
