@@ -16,8 +16,8 @@ using Time = std::chrono::nanoseconds;
 
 inline constexpr Time never = Time::max();
 
-// Compares the counts as numbers: the operators of chrono use <=>, which costs a call on a small core instead of three
-// instructions.
+/// Compares the counts as numbers: the operators of chrono use <=>, which costs a call on a small core instead of three
+/// instructions.
 [[nodiscard]] constexpr bool operator<(Time one, Time other) { return one.count() < other.count(); }
 [[nodiscard]] constexpr bool operator>(Time one, Time other) { return one.count() > other.count(); }
 [[nodiscard]] constexpr bool operator<=(Time one, Time other) { return one.count() <= other.count(); }

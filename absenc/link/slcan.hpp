@@ -14,8 +14,8 @@
 
 namespace absenc::slcan {
 
-inline constexpr std::uint8_t end_of_line = '\r';  // end of a line; alone it is the adapter's reply "accepted"
-inline constexpr std::uint8_t bell = 0x07;         // the adapter's reply "refused"
+inline constexpr std::uint8_t end_of_line = '\r';  ///< end of a line; alone it is the adapter's reply "accepted"
+inline constexpr std::uint8_t bell = 0x07;         ///< the adapter's reply "refused"
 
 /// Longest line: T, 8 digits, length, 16 digits, 4 digits of time, CR.
 inline constexpr std::size_t line_capacity = 31;

@@ -54,7 +54,7 @@ struct Model {
   std::span<const OptionValue> values;  ///< Options that it sets.
 };
 
-inline constexpr std::size_t maximum_options = 68;  // twelve of biss-chain, and seven of each of its eight words
+inline constexpr std::size_t maximum_options = 68;  ///< twelve of biss-chain, and seven of each of its eight words
 
 /// What a word format is given as, beside the options of units that take one.
 inline constexpr std::string_view word_option_name = "word";

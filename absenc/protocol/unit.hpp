@@ -46,7 +46,7 @@ struct Argument {
   Role role = Role::other;         ///< Role by which generic programs find it.
 };
 
-using Arguments = std::span<const std::int64_t>;  // one value for each Argument of the command, defaults filled in
+using Arguments = std::span<const std::int64_t>;  ///< one value for each Argument of the command, defaults filled in
 
 /// Description of a command of a unit.
 struct Command {
@@ -225,7 +225,7 @@ struct Any {
   }
 };
 
-inline constexpr std::size_t longest_encoded = 1024;  // bytes of a request that `encode` writes
+inline constexpr std::size_t longest_encoded = 1024;  ///< bytes of a request that `encode` writes
 
 /// Bits of a position; 0: it has no such part.
 struct Resolution {

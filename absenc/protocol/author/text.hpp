@@ -26,7 +26,7 @@ struct VectorText {
   std::string_view fields;   ///< Wanted values as `name=value` separated by blanks, or the wanted error.
 };
 
-// Not constexpr, and not defined: who calls one when compiling reads its name in the compiler's message.
+/// Not constexpr, and not defined: who calls one when compiling reads its name in the compiler's message.
 void fields_of_a_vector_are_name_equals_value_or_the_name_of_an_error();
 void a_frame_of_a_vector_is_hexadecimal_and_has_at_most_128_bytes();
 void this_model_has_an_option_or_a_value_that_the_unit_does_not_have();

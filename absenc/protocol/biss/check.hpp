@@ -11,7 +11,7 @@
 
 namespace absenc::biss {
 
-// Bits of the life counter: before the CRC and covered by it, counts 0 to 63, then 0 again.
+/// Bits of the life counter: before the CRC and covered by it, counts 0 to 63, then 0 again.
 inline constexpr unsigned life_counter_bits = 6;
 
 /// Check after a word. The default is used by nearly all encoders: x^6 + x + 1, inverted.

@@ -10,7 +10,7 @@ namespace absenc::biss {
 
 inline constexpr Errors header_errors = any_of(Error::bad_framing, Error::line_stuck);
 
-// Clauses of the registers that every encoder has.
+/// Clauses of the registers that every encoder has.
 inline constexpr std::array<Clause, 3> register_clauses{{
     {.id = "bank",
      .paragraph = "BiSS C Protocol Description rev D2, register 40",
@@ -60,7 +60,7 @@ inline constexpr auto clauses = with_registers(std::array<Clause, 3>{{
      .shown_with = "life_counter=true"},
 }});
 
-// Clauses of BiSS Safety: a control word and a safety word, each with its own check.
+/// Clauses of BiSS Safety: a control word and a safety word, each with its own check.
 inline constexpr auto safety_clauses = with_registers(std::array<Clause, 4>{{
     {"crc", "BiSS Safety, CPW and SPW", "CRC-6 over the control word, CRC-16 over the safety word, both inverted",
      Demand::checked},
@@ -93,7 +93,7 @@ inline constexpr auto chain_clauses = with_registers(std::array<Clause, 2>{{
      .errors = header_errors},
 }});
 
-// Clauses for the host of all BiSS units: they share the line's timing.
+/// Clauses for the host of all BiSS units: they share the line's timing.
 inline constexpr std::array<HostClause, 7> host_clauses{{
     {"silence", "BiSS C timing diagram", "after SLO that stayed as it was it clocks again", HostDemand::after_silence},
     {"damage", "BiSS C timing diagram, CRC", "after a frame with a wrong CRC it clocks again",

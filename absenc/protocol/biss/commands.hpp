@@ -47,7 +47,7 @@ constexpr author::NoRequest no_request(const F&, Arguments) {
   return {};
 }
 
-// Options of all BiSS units.
+/// Options of all BiSS units.
 template <auto member>
 inline constexpr auto clock_option = author::option<member>("ma_khz", "clock, kHz", 10, 10'000);
 /// The BiSS timeout in the form of its options.

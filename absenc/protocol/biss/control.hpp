@@ -16,9 +16,10 @@
 
 namespace absenc::biss {
 
-inline constexpr unsigned control_pause = 14;  // zeros before a start bit; within a control frame, as many zeros end it
-inline constexpr unsigned control_slaves = 8;  // the most slaves that can have an ID
-inline constexpr std::size_t control_most = 64;  // the most bytes of one control frame
+inline constexpr unsigned control_pause =
+    14;  ///< zeros before a start bit; within a control frame, as many zeros end it
+inline constexpr unsigned control_slaves = 8;    ///< the most slaves that can have an ID
+inline constexpr std::size_t control_most = 64;  ///< the most bytes of one control frame
 
 /// CRC of control frames: x^4 + x + 1, inverted; over CTS and the ten bits after it, and over each byte.
 inline constexpr Check crc4{4, 0x3};
@@ -43,7 +44,7 @@ struct ControlRequest {
   friend constexpr bool operator==(const ControlRequest&, const ControlRequest&) = default;
 };
 
-inline constexpr unsigned header_bits = 15;  // bits after the start bit: CTS, ten bits, CRC
+inline constexpr unsigned header_bits = 15;  ///< bits after the start bit: CTS, ten bits, CRC
 
 [[nodiscard]] constexpr std::uint16_t header_of(const ControlRequest& request) {
   std::uint32_t bits = 0;

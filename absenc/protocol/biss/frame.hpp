@@ -20,13 +20,13 @@ namespace absenc::biss {
 
 using namespace std::chrono_literals;
 
-inline constexpr unsigned idle_bits = 2;  // idle samples before the ACK: SLO goes low on the second rising edge of MA
+inline constexpr unsigned idle_bits = 2;  ///< idle samples before the ACK: SLO goes low on the second rising edge of MA
 
 inline constexpr LineSettings line_settings{.rate = 1'000'000, .spi_mode = 3};
-inline constexpr Time shortest_period = 100ns;  // shortest period of MA: 10 MHz
-// Longest BiSS timeout: SLO stays low for 12.5 to 40 us after the last clock.
+inline constexpr Time shortest_period = 100ns;  ///< shortest period of MA: 10 MHz
+/// Longest BiSS timeout: SLO stays low for 12.5 to 40 us after the last clock.
 inline constexpr Time timeout_maximum = 40us;
-// Start sequence: pulses of MA after power on, with 40 us before and after them.
+/// Start sequence: pulses of MA after power on, with 40 us before and after them.
 inline constexpr unsigned start_pulses = 2;
 
 /// BiSS timeout, the time for which SLO stays low after the last clock: fixed, or one and a half periods of MA

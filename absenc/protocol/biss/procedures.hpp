@@ -17,7 +17,7 @@ using author::Procedure;
 
 /// Longest time of an encoder until its start bit; the host waits twice as long.
 inline constexpr Time start_limit = 20ms;
-inline constexpr unsigned control_attempts = 4;  // attempts of a control frame that may be repeated
+inline constexpr unsigned control_attempts = 4;  ///< attempts of a control frame that may be repeated
 
 inline constexpr std::string_view no_registers =
     "no encoder answers: it has no registers (or a line that only goes one way), or another ID (slave)";
@@ -158,7 +158,7 @@ Procedure read_memory(ControlDialog<F>& dialog, ControlResults& found, Arguments
   co_return done;
 }
 
-// Writes a byte unless it has this value already: a register may wear out, and only its maker knows how fast.
+/// Writes a byte unless it has this value already: a register may wear out, and only its maker knows how fast.
 template <class F>
 Procedure write_memory(ControlDialog<F>& dialog, ControlResults& found, Arguments arguments) {
   const auto address = static_cast<unsigned>(arguments[0]);
@@ -192,7 +192,7 @@ Procedure write_memory(ControlDialog<F>& dialog, ControlResults& found, Argument
   co_return done;
 }
 
-// Reads a named register. A refusal means that the encoder does not have it, which is a result too.
+/// Reads a named register. A refusal means that the encoder does not have it, which is a result too.
 template <class F>
 Procedure read_setting(ControlDialog<F>& dialog, ControlResults& found, unsigned address) {
   ControlMaster master;
@@ -220,7 +220,7 @@ Procedure write_bank(ControlDialog<F>& dialog, ControlResults& found, Arguments 
   co_return done;
 }
 
-// Reads the registers that identify the encoder. Leaves out those that it refuses.
+/// Reads the registers that identify the encoder. Leaves out those that it refuses.
 template <class F>
 Procedure read_info(ControlDialog<F>& dialog, ControlResults& found) {
   ControlMaster master;

@@ -46,18 +46,18 @@ inline constexpr std::string_view answered_by_a_line = "vse?>mb";
 }  // namespace letter
 
 inline constexpr std::size_t sample_bits = 64;
-inline constexpr std::size_t samples_length = 17;  // length of the reply to `4`: 16 hexadecimal digits and CR
+inline constexpr std::size_t samples_length = 17;  ///< length of the reply to `4`: 16 hexadecimal digits and CR
 
 // ---- Times. No document gives any: the interface clocks 64 bits and replies as fast as USB does.
 
 /// Line of a virtual COM port; its rate has no effect on the interface.
 inline constexpr LineSettings line_settings{.rate = 115'200};
 
-inline constexpr Time answer_limit = 50ms;  // timeout of a reply; 64 clocks at 35 kHz take 1.8 ms
-inline constexpr Time gap_limit = 20ms;     // timeout between two characters of a reply
-inline constexpr Time reply_limit = 100ms;  // longest time of a reply, even if characters still arrive
-inline constexpr Time silent_limit = 10ms;  // timeout of a command that may have no reply
-inline constexpr Time supply_time = 200ms;  // time after `n` and `f` until the encoder is ready or the supply is down
+inline constexpr Time answer_limit = 50ms;  ///< timeout of a reply; 64 clocks at 35 kHz take 1.8 ms
+inline constexpr Time gap_limit = 20ms;     ///< timeout between two characters of a reply
+inline constexpr Time reply_limit = 100ms;  ///< longest time of a reply, even if characters still arrive
+inline constexpr Time silent_limit = 10ms;  ///< timeout of a command that may have no reply
+inline constexpr Time supply_time = 200ms;  ///< time after `n` and `f` until the encoder is ready or the supply is down
 
 /// Returns the period of MA at clock 1 to 8.
 [[nodiscard]] constexpr Time clock_period(unsigned clock) {
@@ -71,8 +71,8 @@ enum class Carries : std::uint8_t { biss, ssi };
 
 /// Encoders for which the maker recommends certain clocks of this interface.
 enum class Kind : std::uint8_t { other, resolute };
-inline constexpr unsigned resolute_slowest = 4;  // slowest clock recommended for a Renishaw Resolute: 280 kHz
-inline constexpr unsigned resolute_fastest = 5;  // fastest clock recommended for a Renishaw Resolute: 560 kHz
+inline constexpr unsigned resolute_slowest = 4;  ///< slowest clock recommended for a Renishaw Resolute: 280 kHz
+inline constexpr unsigned resolute_fastest = 5;  ///< fastest clock recommended for a Renishaw Resolute: 560 kHz
 
 /// Format of the encoder: the values of its options.
 struct Format {
@@ -143,7 +143,7 @@ struct Reply {
   Text text{};                ///< text of a reply line, trimmed
 };
 
-inline constexpr unsigned widest = 64;  // largest width of a position in bits
+inline constexpr unsigned widest = 64;  ///< largest width of a position in bits
 
 /// Decodes the reply to `4`. Errors: wrong_length (not 16 characters and CR), bad_framing (not hexadecimal).
 [[nodiscard]] constexpr Result<std::uint64_t> decode_samples(Bytes reply) {

@@ -35,7 +35,7 @@ inline constexpr std::string_view not_described =
     "protocol version 4 (AksIM-4) has its registers at other addresses, which are not described here: its positions "
     "may be read";
 
-// The advice is not from the vendor, who only names the bits.
+/// The advice is not from the vendor, who only names the bits.
 inline constexpr std::array<FlagInfo, 16> alarm_flags{{
     {"acceleration_error", "the position changed faster than a shaft can", "check the fixing of ring and readhead"},
     {"magnetic_pattern_error", "the magnetic pattern of the ring is not what it should be",

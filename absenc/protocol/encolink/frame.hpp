@@ -22,27 +22,27 @@ using namespace std::chrono_literals;
 
 // ---- Times that the host keeps and the virtual encoder demands
 
-inline constexpr LineSettings uart_settings{.rate = 1'000'000};  // line of interface variant L
-inline constexpr Time spi_lead = 5us;  // t_s: shortest time from NCS low to the first edge of SCK
-// SPI mode 1 (CPOL 0, CPHA 1), at most 4 MHz.
+inline constexpr LineSettings uart_settings{.rate = 1'000'000};  ///< line of interface variant L
+inline constexpr Time spi_lead = 5us;  ///< t_s: shortest time from NCS low to the first edge of SCK
+/// SPI mode 1 (CPOL 0, CPHA 1), at most 4 MHz.
 inline constexpr LineSettings spi_settings{
     .rate = 1'000'000, .spi_mode = 1, .select_lead = spi_lead, .highest_rate = 4'000'000};
 inline constexpr Time shortest_clock = 250ns;
-inline constexpr Time spi_pause = 5us;  // t_p: shortest time that NCS stays high between two frames
+inline constexpr Time spi_pause = 5us;  ///< t_p: shortest time that NCS stays high between two frames
 
-// The document gives no reply times. The virtual encoder replies `answer_time` after a request; the host waits up to
-// `answer_limit`.
+/// The document gives no reply times. The virtual encoder replies `answer_time` after a request; the host waits up to
+/// `answer_limit`.
 inline constexpr Time answer_time = 5us;
 inline constexpr Time answer_limit = 500us;
 inline constexpr Time gap_limit = 30us;
 
-inline constexpr Time start_up = 100ms;  // the encoder sends well-formed zeros for this time after power on; assumed
-inline constexpr Time save_time = 50ms;  // the encoder is busy for this time after `save`; assumed
+inline constexpr Time start_up = 100ms;  ///< the encoder sends well-formed zeros for this time after power on; assumed
+inline constexpr Time save_time = 50ms;  ///< the encoder is busy for this time after `save`; assumed
 inline constexpr Time busy_limit = 2s;
-inline constexpr Time calibration_time = 1s;    // duration of the virtual encoder's self-calibration
-inline constexpr Time calibration_limit = 15s;  // timeout of a self-calibration; the vendor allows the shaft 10 s
+inline constexpr Time calibration_time = 1s;    ///< duration of the virtual encoder's self-calibration
+inline constexpr Time calibration_limit = 15s;  ///< timeout of a self-calibration; the vendor allows the shaft 10 s
 inline constexpr Time calibration_poll = 100ms;
-inline constexpr Time listen_limit = 500ms;  // longest time without a valid frame of a streaming encoder
+inline constexpr Time listen_limit = 500ms;  ///< longest time without a valid frame of a streaming encoder
 
 // ---- Frames
 
@@ -64,9 +64,9 @@ enum class Config : std::uint8_t {
 };
 [[nodiscard]] constexpr bool is_config(std::uint8_t byte) { return byte == 0x00 || byte == 0xAA || byte == 0xBB; }
 
-inline constexpr std::size_t request_bytes = 2;    // bytes of a request: config, ra
-inline constexpr std::size_t identity_bytes = 19;  // bytes of an identity, checksum included
-// Bytes of an identity as the vendor's library reads it: one more.
+inline constexpr std::size_t request_bytes = 2;    ///< bytes of a request: config, ra
+inline constexpr std::size_t identity_bytes = 19;  ///< bytes of an identity, checksum included
+/// Bytes of an identity as the vendor's library reads it: one more.
 inline constexpr std::size_t padded_identity_bytes = 20;
 inline constexpr std::size_t reply_capacity = 20;
 inline constexpr unsigned maximum_resolution = 22;

@@ -99,8 +99,8 @@ enum RegisterIndex : std::size_t {
   serial_number_extended,
 };
 
-// Addresses and sizes are from rls-encolink 1.0.1, product_aksim2_map.h. Some registers overlap; each is accessed as a
-// whole. The vendor does not state which registers can be written: README.md lists the assumptions.
+/// Addresses and sizes are from rls-encolink 1.0.1, product_aksim2_map.h. Some registers overlap; each is accessed as a
+/// whole. The vendor does not state which registers can be written: README.md lists the assumptions.
 inline constexpr auto registers = [] {
   using enum Access;
   using enum Content;
@@ -133,7 +133,7 @@ inline constexpr auto registers = [] {
       {"voltage_compensation_n", 0x1218, 4, read_only},
   });
 }();
-inline constexpr std::size_t largest_register = 20;  // bytes of the largest register
+inline constexpr std::size_t largest_register = 20;  ///< bytes of the largest register
 
 /// Values of the command register.
 namespace commands {
@@ -157,7 +157,7 @@ inline constexpr std::uint8_t out_of_range = 0x08;  ///< Calibration: out of ran
   return nullptr;
 }
 
-inline constexpr std::size_t access_capacity = 100;  // most data bytes of one access; limit of the vendor's library
+inline constexpr std::size_t access_capacity = 100;  ///< most data bytes of one access; limit of the vendor's library
 
 /// A request on channel 3.
 struct RegisterRequest {
@@ -170,7 +170,7 @@ struct RegisterRequest {
 };
 
 inline constexpr std::array<std::uint8_t, 5> access_keys{0x00, 0xCD, 0xEF, 0x89, 0xAB};
-// Bytes of keys, operation, length and address.
+/// Bytes of keys, operation, length and address.
 inline constexpr std::size_t access_header = access_keys.size() + 1 + 2 + 4;
 using AccessBytes = ByteBuffer<access_header + access_capacity + 1>;
 

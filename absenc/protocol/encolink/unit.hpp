@@ -6,7 +6,7 @@
 
 namespace absenc::encolink {
 
-extern constinit const Unit unit;      // UART
-extern constinit const Unit spi_unit;  // SPI
+extern constinit const Unit unit;      ///< UART
+extern constinit const Unit spi_unit;  ///< SPI
 
 }  // namespace absenc::encolink

@@ -33,7 +33,7 @@ inline Result<std::size_t> unknown_id(const Options& values, MutableBytes reques
 }
 }  // namespace request
 
-// Table 8: the others need more than command C. Of both channels.
+/// Table 8: the others need more than command C. Of both channels.
 inline constexpr std::int64_t cleared_by_c = alarms::xc_error | alarms::xc_error << 8;
 
 inline constexpr auto clauses = std::array{

@@ -12,7 +12,7 @@
 
 namespace absenc::esl {
 
-// Table 5
+/// Table 5
 inline constexpr std::array<FlagInfo, 8> status_flags{{
     {"parity_error", "the encoder received the request with a wrong parity bit and did not execute it",
      "send the same request again; if it stays, set parity_scope"},
@@ -29,7 +29,7 @@ inline constexpr std::array<FlagInfo, 8> status_flags{{
     {"forced_test_passed", "the forced test has passed", ""},
 }};
 
-// Tables 7 and 8
+/// Tables 7 and 8
 inline constexpr std::array<FlagInfo, 8> alarm_flags{{
     {"xc_error", "the turn counter missed five times in a row: turns may be wrong",
      "return to the origin, then `absenc clear-alarms`, and check the turns"},

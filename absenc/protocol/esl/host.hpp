@@ -56,7 +56,7 @@ author::Procedure read_error_info(Dialog& dialog, Found& found);
 
 // ---- Several encoders on one line
 
-inline constexpr unsigned most_encoders = 8;  // 3 address bits
+inline constexpr unsigned most_encoders = 8;  ///< 3 address bits
 
 /// Addresses at which encoders answered.
 struct Nodes {

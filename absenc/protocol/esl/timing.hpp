@@ -16,17 +16,17 @@ namespace absenc::esl {
 
 using namespace std::chrono_literals;
 
-inline constexpr LineSettings line_settings{.rate = 10'000'000};  // Table 1
+inline constexpr LineSettings line_settings{.rate = 10'000'000};  ///< Table 1
 
-inline constexpr Time answer_time = 2us;         // from the request to the reply's start bit, typical (Figure 2)
-inline constexpr Time position_time = 4300ns;    // from the end bit of CF to the finished position, typical (Figure 2)
-inline constexpr unsigned reset_requests = 8;    // of one kind make a reset (Table 4)
-inline constexpr Time reset_interval = 40us;     // between them, typical (Table 4)
-inline constexpr Time eeprom_read_time = 200us;  // between the two read requests (Figure 3)
-inline constexpr Time eeprom_write_time = 6ms;   // Figure 5; Figure 15 asks for 6 to 10 ms
-inline constexpr Time eeprom_read_pause = eeprom_read_time + 20us;   // what a host leaves: "more than 200 us"
-inline constexpr Time eeprom_write_pause = eeprom_write_time + 1ms;  // "6~10ms" (Figure 15)
-inline constexpr Time page_time = 18ms;                              // after a page change (Table 11, note 3)
+inline constexpr Time answer_time = 2us;       ///< from the request to the reply's start bit, typical (Figure 2)
+inline constexpr Time position_time = 4300ns;  ///< from the end bit of CF to the finished position, typical (Figure 2)
+inline constexpr unsigned reset_requests = 8;  ///< of one kind make a reset (Table 4)
+inline constexpr Time reset_interval = 40us;   ///< between them, typical (Table 4)
+inline constexpr Time eeprom_read_time = 200us;                      ///< between the two read requests (Figure 3)
+inline constexpr Time eeprom_write_time = 6ms;                       ///< Figure 5; Figure 15 asks for 6 to 10 ms
+inline constexpr Time eeprom_read_pause = eeprom_read_time + 20us;   ///< what a host leaves: "more than 200 us"
+inline constexpr Time eeprom_write_pause = eeprom_write_time + 1ms;  ///< "6~10ms" (Figure 15)
+inline constexpr Time page_time = 18ms;                              ///< after a page change (Table 11, note 3)
 
 /// Not in the document: how long the host waits for an answer, and for the next character of one.
 inline constexpr Time answer_limit = 20us;
@@ -43,8 +43,8 @@ inline constexpr Time request_pause = line_settings.bits(2);
 inline constexpr std::uint8_t page_select_address = 0x7F;
 inline constexpr std::uint8_t last_page = 14;
 inline constexpr std::uint8_t last_address = 0x7E;
-inline constexpr std::uint8_t register_page = 8;          // selected after power on (Table 9)
-inline constexpr std::uint8_t error_info_address = 0x1A;  // on the register page (Table 8)
+inline constexpr std::uint8_t register_page = 8;          ///< selected after power on (Table 9)
+inline constexpr std::uint8_t error_info_address = 0x1A;  ///< on the register page (Table 8)
 inline constexpr std::uint8_t error_info_led = 0x02;
 inline constexpr std::uint8_t error_info_lissajous = 0x08;
 

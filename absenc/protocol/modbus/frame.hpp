@@ -14,18 +14,18 @@
 
 namespace absenc::modbus {
 
-inline constexpr CrcParameters crc_parameters{16, 0x8005, 0xFFFF, true, true, 0x0000};  // CRC of Modbus RTU (S 6.2.2)
+inline constexpr CrcParameters crc_parameters{16, 0x8005, 0xFFFF, true, true, 0x0000};  ///< CRC of Modbus RTU (S 6.2.2)
 
-inline constexpr std::size_t frame_capacity = 256;  // longest frame in bytes (S 2.5.1)
-inline constexpr std::size_t shortest_frame = 4;    // bytes of the shortest frame: address, function, CRC
+inline constexpr std::size_t frame_capacity = 256;  ///< longest frame in bytes (S 2.5.1)
+inline constexpr std::size_t shortest_frame = 4;    ///< bytes of the shortest frame: address, function, CRC
 inline constexpr std::size_t crc_size = 2;
 using FrameBytes = ByteBuffer<frame_capacity>;
 
-inline constexpr std::uint8_t first_address = 1;   // lowest address of a server; 0 is broadcast and never answered
-inline constexpr std::uint8_t last_address = 247;  // highest address of a server (S 2.2)
+inline constexpr std::uint8_t first_address = 1;   ///< lowest address of a server; 0 is broadcast and never answered
+inline constexpr std::uint8_t last_address = 247;  ///< highest address of a server (S 2.2)
 
 inline constexpr std::uint8_t read_holding_registers = 0x03;
-inline constexpr std::uint16_t most_registers = 125;  // most registers of one read request (A 6.3)
+inline constexpr std::uint16_t most_registers = 125;  ///< most registers of one read request (A 6.3)
 /// Bit that a refusal sets in the function code; functions of the standard are below it.
 inline constexpr std::uint8_t refusal_bit = 0x80;
 

@@ -183,7 +183,7 @@ inline constexpr std::array<HostClause, 7> modbus_host_clauses{{
      .breaks = {script::direction_often, script::zero_often}},
 }};
 
-// Host clauses of the serial unit. Only in bus mode do bytes request a position.
+/// Host clauses of the serial unit. Only in bus mode do bytes request a position.
 inline constexpr std::array<HostClause, 4> serial_host_clauses{{
     {"asks", "3.1.5 (1)", "requests are as drawn", HostDemand::asks},
     {"silence", "3.1.5 (1)", "after no reply it asks again", HostDemand::after_silence},

@@ -16,7 +16,7 @@ namespace absenc::ssi {
 using namespace std::chrono_literals;
 
 inline constexpr LineSettings line_settings{.rate = 200'000, .spi_mode = 3, .idle_clocks = 1};
-inline constexpr Time pause_margin = 10us;  // time that the host adds to the pause
+inline constexpr Time pause_margin = 10us;  ///< time that the host adds to the pause
 
 /// Bits that the encoder sends if the clock continues after the word.
 enum class AfterWord : std::uint8_t {

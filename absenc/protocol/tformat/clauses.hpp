@@ -9,7 +9,7 @@
 
 namespace absenc::tformat {
 
-// What a reset clears. Over-heat is raised again as long as it is hot.
+/// What a reset clears. Over-heat is raised again as long as it is hot.
 inline constexpr std::int64_t latched_alarms = alarms::latched & ~alarms::over_heat;
 
 inline constexpr auto clauses = std::array{

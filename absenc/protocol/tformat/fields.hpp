@@ -11,7 +11,7 @@
 
 namespace absenc::tformat {
 
-// 6.3.2
+/// 6.3.2
 inline constexpr std::array<FlagInfo, 8> status_flags{{
     {"", "", ""},
     {"", "", ""},
@@ -24,7 +24,7 @@ inline constexpr std::array<FlagInfo, 8> status_flags{{
     {"delimiter_error", "the encoder received the request with a wrong stop bit", "send the same request again"},
 }};
 
-// 6.5. One that is declared to have no battery reports nothing of it.
+/// 6.5. One that is declared to have no battery reports nothing of it.
 inline constexpr std::array<FlagInfo, 8> alarm_flags{{
     {"over_speed", "the shaft turned faster than the counter follows while the power was off: turns may be wrong",
      "return to the origin, then `absenc reset-multiturn` or `absenc clear-alarms`"},

@@ -21,8 +21,8 @@
 
 namespace absenc::tformat {
 
-inline constexpr std::uint8_t busy_bit = 0x80;     // of ADF, in replies
-inline constexpr unsigned full_absolute_bits = 5;  // of the position hold with full_absolute_status (5.4.1)
+inline constexpr std::uint8_t busy_bit = 0x80;     ///< of ADF, in replies
+inline constexpr unsigned full_absolute_bits = 5;  ///< of the position hold with full_absolute_status (5.4.1)
 inline constexpr std::size_t request_capacity = 4;
 inline constexpr std::size_t reply_capacity = 11;
 using RequestBytes = ByteBuffer<request_capacity>;

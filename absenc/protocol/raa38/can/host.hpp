@@ -14,8 +14,8 @@ namespace absenc::raa38::can {
 using namespace std::chrono_literals;
 
 // The document gives no times; these are far longer than any controller needs.
-inline constexpr Time answer_limit = 50ms;  // timeout of a reply on a bus without other frames
-inline constexpr Time busy_limit = 250ms;   // timeout of a reply on a bus that others keep busy
+inline constexpr Time answer_limit = 50ms;  ///< timeout of a reply on a bus without other frames
+inline constexpr Time busy_limit = 250ms;   ///< timeout of a reply on a bus that others keep busy
 inline constexpr Time listening_time = 1200ms;
 
 /// The protocol, as author layers use it: frames, lengths and times.

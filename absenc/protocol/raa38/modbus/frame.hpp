@@ -28,7 +28,7 @@ inline constexpr std::uint8_t set_parameter = 0xCC;
 }
 }  // namespace function
 
-inline constexpr std::uint8_t any_address = 0xFF;  // address in the request for the encoder's address
+inline constexpr std::uint8_t any_address = 0xFF;  ///< address in the request for the encoder's address
 
 namespace parameter {
 inline constexpr std::uint8_t zero = 0x00;

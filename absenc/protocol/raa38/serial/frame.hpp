@@ -38,9 +38,9 @@ enum class Zeroing : std::uint8_t {
 
 inline constexpr std::uint8_t header = 0xFF;
 inline constexpr std::uint8_t fixed_second_byte = 0x81;
-inline constexpr std::uint8_t number_mark = 0xB0;  // bx: read unit x
-inline constexpr std::uint8_t clear_mark = 0xC0;   // cx: set the zero of unit x
-inline constexpr unsigned unit_count = 16;         // x is one hexadecimal digit
+inline constexpr std::uint8_t number_mark = 0xB0;  ///< bx: read unit x
+inline constexpr std::uint8_t clear_mark = 0xC0;   ///< cx: set the zero of unit x
+inline constexpr unsigned unit_count = 16;         ///< x is one hexadecimal digit
 inline constexpr unsigned least_bits = 10;
 inline constexpr unsigned most_bits = 21;
 inline constexpr std::size_t request_bytes = 3;
@@ -48,24 +48,24 @@ inline constexpr std::size_t frame_capacity = 6;
 
 // ---- Times. The document states only T2; all others are assumed.
 
-inline constexpr Time trigger_width = 10us;  // T2: shortest pulse on CLK (3.1.3)
-inline constexpr Time clear_width = 1ms;     // width of the pulse on CLR
+inline constexpr Time trigger_width = 10us;  ///< T2: shortest pulse on CLK (3.1.3)
+inline constexpr Time clear_width = 1ms;     ///< width of the pulse on CLR
 
 // Timeouts of the host if the options do not give the ordered times.
-inline constexpr Time answer_limit = 100ms;  // timeout of a reply: T3, or from a request to its reply
-inline constexpr Time answer_slack = 5ms;    // added to a T3 that the options give
-inline constexpr Time gap_limit = 10ms;      // timeout between two characters; suits 1200 baud
-inline constexpr Time patience = 1s;      // timeout on a line that is never silent; two frames at 1200 baud take 130 ms
-inline constexpr Time listen_limit = 1s;  // timeout of a stream without a valid frame
-inline constexpr Time scan_silence = 200ms;  // listening before a scan; longer than the period of most refresh rates
-inline constexpr Time zero_limit = 500ms;    // time within which the position must become zero
+inline constexpr Time answer_limit = 100ms;  ///< timeout of a reply: T3, or from a request to its reply
+inline constexpr Time answer_slack = 5ms;    ///< added to a T3 that the options give
+inline constexpr Time gap_limit = 10ms;      ///< timeout between two characters; suits 1200 baud
+inline constexpr Time patience = 1s;  ///< timeout on a line that is never silent; two frames at 1200 baud take 130 ms
+inline constexpr Time listen_limit = 1s;     ///< timeout of a stream without a valid frame
+inline constexpr Time scan_silence = 200ms;  ///< listening before a scan; longer than the period of most refresh rates
+inline constexpr Time zero_limit = 500ms;    ///< time within which the position must become zero
 inline constexpr Time zero_poll = 10ms;
 
 // Times of the virtual encoder if the options do not give them.
-inline constexpr Time virtual_period = 10ms;        // time between frames: refresh rate 100 Hz
-inline constexpr Time virtual_acquisition = 100us;  // T3 of the virtual encoder
-inline constexpr Time most_backlog = 50ms;          // a stream that was delayed longer drops frames
-inline constexpr Time request_gap = 2ms;            // silence after which an incomplete request is dropped
+inline constexpr Time virtual_period = 10ms;        ///< time between frames: refresh rate 100 Hz
+inline constexpr Time virtual_acquisition = 100us;  ///< T3 of the virtual encoder
+inline constexpr Time most_backlog = 50ms;          ///< a stream that was delayed longer drops frames
+inline constexpr Time request_gap = 2ms;            ///< silence after which an incomplete request is dropped
 
 /// Configuration of an encoder, as it was ordered.
 struct Format {
