@@ -23,7 +23,7 @@ std::optional<std::int64_t> integer_in(const Value& value) {
   return std::nullopt;
 }
 
-// The encoder's answer; none when it gives none.
+// Returns the encoder's reply; nothing if there is none.
 std::optional<Answer> ask(Connection& connection, const Command& reader, Arguments arguments) {
   AnswerSink sink;
   try {
@@ -34,7 +34,7 @@ std::optional<Answer> ask(Connection& connection, const Command& reader, Argumen
   return std::move(sink.answer);
 }
 
-// With this setting in the place of the one of that name.
+// Returns the address with this setting in place of the one of the same name.
 std::string with_setting(const std::string& address, std::string_view name, std::int64_t value) {
   const std::size_t question = std::min(address.find('?'), address.size());
   std::string result = address.substr(0, question);
@@ -78,8 +78,8 @@ void ChangeRecord::look_at_memory() {
   }
 }
 
-// The number of the setting that its argument writes: the one that the setter shows as it was written, else the only
-// one.
+// Returns the value of the setting that the argument writes: the field that equals the argument after writing, or else
+// the only field.
 void ChangeRecord::find_old_value(bool good) {
   if (!old_ || arguments_.empty()) return;
   if (std::ranges::count_if(command_.arguments, &Argument::required) != 1) return;

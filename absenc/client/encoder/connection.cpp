@@ -25,7 +25,7 @@ Frame to_frame(std::span<const CanFrame> frames, std::size_t = 0) {
   return {.can = frames.empty() ? nullptr : &frames.front()};
 }
 
-// "it is reached with baud=57600 now", or "".
+// Returns "it is reached with baud=57600 now", or "" if the address has not changed.
 std::string new_way(const EncoderAddress& before, const Command& command, Arguments arguments) {
   if (command.changes_option.empty()) return {};
   const Options behind = options_behind(*before.unit, before.options, command, arguments.front());
@@ -33,7 +33,7 @@ std::string new_way(const EncoderAddress& before, const Command& command, Argume
   return fmt::format("it is reached with {} now", option_text(*before.unit, behind, command.changes_option));
 }
 
-// Says how to look at an encoder that may have been changed.
+// Returns how to check whether an encoder was changed.
 std::string advice_to_look(const EncoderAddress& before, const Command& command, Arguments arguments) {
   const Unit& unit = *before.unit;
   const std::string address = address_of(before);
@@ -54,11 +54,11 @@ std::string advice_to_look(const EncoderAddress& before, const Command& command,
   return fmt::format("`absenc read {}` shows how the encoder is now; look before you send it again", address);
 }
 
-/// The life counters of one reading against those of the good one before it.
+/// Compares the life counters of a reading with those of the good reading before.
 class LifeCounters final : public FieldSink {
  public:
   void clear() { before_.clear(); }
-  /// A reading is over; `put` takes its fields, if it was good.
+  /// Ends a reading; `put` has received its fields if it was good.
   void begin() { stand_ = false; }
   void put(const FieldValue& field) override {
     if (field.info->role != Role::life_counter) return;
@@ -66,7 +66,8 @@ class LifeCounters final : public FieldSink {
     stand_ = stand_ || (!is_first && known->second == field.number);
     known->second = field.number;
   }
-  /// Whether one of them is what it was. Any number further on is right: there may have been errors and other hosts.
+  /// Returns whether a life counter has not changed. It may have advanced by any number, because of errors and other
+  /// hosts.
   [[nodiscard]] bool stand() const { return stand_; }
 
  private:
@@ -108,7 +109,7 @@ class ConnectionOn final : public Connection {
     const Command* command = uri().reads != nullptr ? uri().reads : find_command(unit(), Verb::read);
     if (command == nullptr) throw UsageError(fmt::format("{} has no command that reads the position", unit().id));
     Outcome ended = read_once(*command, take);
-    // Another host may have taken 64 frames since the last reading, but not since this one.
+    // Another host may have read 64 frames since the last reading, so that the counter wrapped; reading again decides.
     if (life_counters_.stand()) ended = read_once(*command, take);
     if (!life_counters_.stand()) return ended;
     session_.refuse_last(Error::sequence_mismatch);
@@ -211,7 +212,7 @@ class ConnectionOn final : public Connection {
     return trouble;
   }
 
-  // The clock of a virtual encoder is that of its line, on which nothing keeps its request waiting.
+  // The clock of a virtual encoder is the simulated line's, on which requests are not delayed.
   void keep_latch_time(const Reading& reading, bool was_asked) {
     if (!was_asked) {
       arrivals_.add(reading.received, port_.nothing_until);
@@ -252,7 +253,7 @@ class ConnectionOn final : public Connection {
     return ended;
   }
 
-  // `before`: how the encoder was reached.
+  // `before` is the address before the change.
   Change change_after(const EncoderAddress& before, const Command& command, Arguments arguments, bool good) const {
     const ChangeSent sent = port_.requests != requests_before_ ? session_.change_sent() : ChangeSent::no;
     if (sent == ChangeSent::no) return {ChangeState::not_sent};
@@ -261,7 +262,7 @@ class ConnectionOn final : public Connection {
     return {ChangeState::unknown, advice_to_look(before, command, arguments)};
   }
 
-  // Others have the same line open.
+  // Other encoders share the line, whose settings must not change.
   void tell_of_company() {
     Options options = uri().options;
     tell_shared(unit(), options);
@@ -277,7 +278,7 @@ class ConnectionOn final : public Connection {
             port_.take_aborted(),  conversation->reading(), {}};
   }
 
-  // A reply that comes, only too late, is another trouble than one that never comes.
+  // A late reply needs another explanation than a missing one.
   void tell_lateness(Trouble& trouble) const {
     const Time lateness = session_.lateness();
     if (trouble.error != Error::timeout || lateness == Time{}) return;
@@ -290,7 +291,7 @@ class ConnectionOn final : public Connection {
         std::chrono::ceil<std::chrono::milliseconds>(lateness * 3 / 2).count());
   }
 
-  // As `absenc doctor` would call it.
+  // Adds the finding that `absenc doctor` would report.
   [[nodiscard]] std::string finding_text(const Outcome& outcome) const {
     Attempted last{.error = outcome.error, .detail = std::string(outcome.detail)};
     runner_.keep_exchange(last);
@@ -301,7 +302,7 @@ class ConnectionOn final : public Connection {
     return fmt::format("{}: {}", found.id, found.cause);
   }
 
-  // Of a conversation that sent nothing.
+  // The conversation failed before it sent anything.
   [[nodiscard]] Trouble unasked_trouble(const Outcome& outcome) const {
     const std::span<const Item> damaged = last_->exchange().received;
     const std::span<const Item> received = damaged.empty() ? std::span<const Item>(line_.received) : damaged;
@@ -342,7 +343,7 @@ class ConnectionOn final : public Connection {
     return fmt::format("{}; received {}{}", sent, trouble.received, later);
   }
 
-  // What the last clocks brought.
+  // The bits received by the last clocks.
   [[nodiscard]] std::string clocked_text() const {
     return to_wire_text(unit().link, to_frame(std::span<const Item>(line_.received), line_.clocks));
   }
@@ -364,7 +365,7 @@ class ConnectionOn final : public Connection {
   static constexpr unsigned attempts = 3;
 
   bool is_journaled_;
-  bool is_exact_;  // the times of its line
+  bool is_exact_;  // the times of the line are exact
   OpenLink open_;
   std::shared_ptr<SharedLink> link_;
   Runner<Item> runner_;
@@ -375,9 +376,9 @@ class ConnectionOn final : public Connection {
   const Conversation<Item>* last_ = nullptr;
   LifeCounters life_counters_;
   ArrivalSpread arrivals_;
-  host::LatchTime latch_time_{};  // of the last position
+  host::LatchTime latch_time_{};  // latch time of the last position
   Change change_{};
-  std::uint64_t requests_before_ = 0;  // the last command that changes the encoder
+  std::uint64_t requests_before_ = 0;  // request count before the last changing command
 };
 
 }  // namespace
@@ -389,7 +390,7 @@ std::string Trouble::text() const {
   return with_change(lines, change);
 }
 
-// What the user said of the line stays, but where the encoder has another rate now.
+// Keeps the user's line settings, except for the rate if the encoder now has another.
 void Connection::set_options(const Options& options) {
   const std::uint32_t rate = line_settings(unit(), options).rate;
   if (rate != line_settings(unit(), uri_.options).rate) uri_.line.rate = rate;

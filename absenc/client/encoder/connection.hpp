@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// An opened encoder: runs the commands of its unit, whatever its link carries, and explains what went wrong.
+// Connects to an encoder on any kind of line, runs the commands of its unit, and explains failures.
 #pragma once
 
 #include <functional>
@@ -17,70 +17,69 @@
 
 namespace absenc::client {
 
-/// How a command ended; valid until the next one.
+/// The result of a command; valid until the next command.
 struct Outcome {
   Error error = Error::none;
   std::string_view detail{};
-  std::string_view advice{};         // "": that of the error
-  bool aborted = false;              // ended early because of a signal, and left the encoder as it was
-  const Reading* reading = nullptr;  // null when it failed, or is no position
-  Change change{};                   // of a command that changes the encoder
+  std::string_view advice{};         // what to try; "": the advice of the error
+  bool aborted = false;              // ended early by a signal, without changing the encoder
+  const Reading* reading = nullptr;  // null if the command failed or reads no position
+  Change change{};                   // state of the change, for a command that changes the encoder
 };
 
 class Connection {
  public:
-  /// Not connected yet.
-  /// Without `open`: over its own way, and its changes are kept in the journal (journal.hpp), but for those of sim:.
+  /// Returns a connection that is not open yet. Without `open` it opens the port of the address and writes changes to
+  /// the journal (journal.hpp), except those of sim:.
   [[nodiscard]] static std::unique_ptr<Connection> make(const EncoderAddress& uri, OpenLink open = {});
-  /// Connected. Throws as `connect`.
+  /// Returns an open connection. Throws as `connect`.
   [[nodiscard]] static std::unique_ptr<Connection> open(const EncoderAddress& uri);
   virtual ~Connection() = default;
 
-  /// Opens the way to it, again after `disconnect`; counters and statistics go on. Throws os::Failure, UsageError.
+  /// Opens the port, also again after `disconnect`; counters and statistics continue. Throws os::Failure, UsageError.
   virtual void connect() = 0;
   virtual void disconnect() = 0;
   [[nodiscard]] virtual bool connected() const = 0;
-  /// What could be better about the port, a sentence each.
+  /// Returns hints on how to improve the port, one sentence each.
   [[nodiscard]] virtual const std::vector<std::string>& notes() const = 0;
 
-  // All of the following only while it is connected, but for counters and statistics.
+  // The following members require an open connection, except for counters and statistics.
 
-  /// The position, with all the alarms the unit can tell, or what the address says is read in its place; of those that
-  /// an encoder transmits by itself, which. Throws UsageError when the unit has none.
+  /// Reads the position with all alarms that the unit reports, or runs the command that the address gives instead.
+  /// `take` selects among positions that an encoder sends by itself. Throws UsageError if the unit has no position.
   virtual Outcome read(host::Take take = host::Take::newest) = 0;
-  /// `on_emit` is called for each result but the last; `report` then tells of it. What reaches the encoder by what the
-  /// command sets reaches it by the new value from now on.
+  /// Runs a command. Calls `on_emit` for each result but the last; `report` then has that result. If the command sets a
+  /// value by which the encoder is reached, the connection uses the new value from then on.
   virtual Outcome run(const Command& command, Arguments arguments, const std::function<void()>& on_emit = {}) = 0;
-  /// For the journal: what the next command that changes the encoder will overwrite, so that it is not read again.
+  /// Gives the journal the value that the next changing command overwrites, so that it is not read again.
   void know_before(std::int64_t value) { known_before_ = value; }
-  /// The state of the last command that changes the encoder, also when it has thrown.
+  /// Returns the state of the last changing command, also if it threw.
   [[nodiscard]] virtual const Change& change() const = 0;
-  /// The fields of the last outcome, and its reading.
+  /// Passes the fields of the last outcome and its reading to `sink`.
   virtual void report(FieldSink& sink) const = 0;
-  /// After `run` threw: what the encoder was left with. Nothing for most commands.
+  /// After `run` threw: passes the values that the encoder was left with; none for most commands.
   virtual void report_left(FieldSink& sink) const = 0;
-  /// Of the last outcome.
+  /// Explains the failure of the last outcome.
   [[nodiscard]] virtual Trouble trouble(const Outcome& outcome) const = 0;
-  /// Between which times of its clock the last position was latched.
+  /// Returns the interval, by the port's clock, in which the encoder latched the last position.
   [[nodiscard]] virtual host::LatchTime latch_time() const = 0;
-  /// Whether the last position was compared with another, and agreed as well as the fastest shaft allows.
+  /// Returns whether the last position was compared with another one and the fastest shaft can have moved between them.
   [[nodiscard]] virtual bool confirmed() const = 0;
   [[nodiscard]] virtual const host::Counters& counters() const = 0;
   [[nodiscard]] virtual const host::Latencies& latencies() const = 0;
-  /// The last bad exchanges, the newest first.
+  /// Returns the last bad exchanges, the newest first.
   [[nodiscard]] virtual std::vector<BadExchangeText> bad_exchanges() const = 0;
-  /// Bytes or frames over the line so far, both ways.
+  /// Returns the number of bytes or frames sent and received so far.
   [[nodiscard]] virtual std::uint64_t items() const = 0;
-  /// Its way, open as it is, for others who converse over it while this does not.
+  /// Returns the open link, for other conversations while this connection runs none.
   [[nodiscard]] virtual Link lend() const = 0;
-  /// The clock of the readings.
+  /// Returns the time of the clock of the readings.
   [[nodiscard]] virtual Time now() = 0;
 
-  /// What waits on the line throws os::Ended from the moment on in which `over` is true, also when the line is never
-  /// silent. Empty: never.
+  /// Makes waiting throw os::Ended as soon as `over` returns true, also if the line is never silent. Empty: never.
   virtual void end_when(std::function<bool()> over) = 0;
 
-  /// From now on, without opening it again: it was set to something else itself.
+  /// Uses these options from now on without opening the port again, after the encoder's own settings were changed.
   virtual void set_options(const Options& options);
 
   [[nodiscard]] const EncoderAddress& uri() const { return uri_; }
@@ -95,11 +94,11 @@ class Connection {
   EncoderAddress uri_;
 };
 
-/// A reading for its alarms: by the command that reads them, where the unit has one and these options allow it, else as
-/// `read`. Throws EncoderFailure, Failure, and as Connection::run.
+/// Reads the alarms: by the command for alarms if the unit has one that these options allow, otherwise by `read`.
+/// Throws EncoderFailure, Failure, and as Connection::run.
 [[nodiscard]] Reading read_alarms(Connection& connection);
 
-/// The fields that a command tells, into `sink`. Throws EncoderFailure, and as Connection::run.
+/// Runs a command and passes its fields to `sink`. Throws EncoderFailure, and as Connection::run.
 void run_into(Connection& connection, const Command& command, Arguments arguments, FieldSink& sink);
 
 }  // namespace absenc::client

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Life counters from one live reading to the next, of each unit that has them, with frames that are played again.
+// Checks life counters from one live reading to the next, for each unit that has them, with repeated frames.
 #include "absenc/client/encoder/connection.hpp"
 
 #include <gtest/gtest.h>
@@ -15,14 +15,14 @@
 namespace absenc::client {
 namespace {
 
-/// Whether a unit reports one.
+/// Returns whether a unit reports a life counter.
 class Seen final : public FieldSink {
  public:
   void put(const FieldValue& field) override { any = any || field.info->role == Role::life_counter; }
   bool any = false;
 };
 
-/// Hands through what an encoder drives, and keeps it; from `play` on it drives these of its frames again.
+/// Forwards and records the frames of an encoder; after `play` it repeats the chosen frames.
 class Recorder final : public Machine<std::uint8_t> {
  public:
   explicit Recorder(Machine<std::uint8_t>& encoder) : encoder_(&encoder) {}
@@ -60,7 +60,7 @@ struct Counting {
         })) {
     encoder.power_on(Time{});
     connection->connect();
-    // Frames 0 and 1 are those of the first reading: none with a start sequence, none that is read again.
+    // Frames 0 and 1 are those of the first reading, without a start sequence or a repetition.
     first = connection->read();
     connection->report(seen);
   }
@@ -102,7 +102,7 @@ TEST_P(LifeCounters, OneThatStandsStillIsAnError) {
 TEST_P(LifeCounters, OneThatHasComeRoundIsReadAgain) {
   Counting line(*GetParam());
   for (int i = 0; i < 2; ++i) EXPECT_EQ(line.connection->read().error, Error::none);
-  line.recorder.play({0, 1, 0, 1, 2, 3, 0, 1});  // behind the first reading another host took 62 frames
+  line.recorder.play({0, 1, 0, 1, 2, 3, 0, 1});  // after the first reading another host read 62 frames
   for (int i = 0; i < 3; ++i) EXPECT_EQ(line.connection->read().error, Error::none);
   EXPECT_EQ(line.recorder.left(), 0u);
 }

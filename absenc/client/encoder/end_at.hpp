@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Lets what waits for an encoder end at a time too.
+// Ends the waiting for an encoder at a deadline.
 #pragma once
 
 #include <functional>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// When readings were latched, as far as the times of their exchanges tell: bounds, not estimates.
+// Computes when readings were latched from the times of their exchanges, as bounds, not as estimates.
 #pragma once
 
 #include <algorithm>
@@ -11,26 +11,25 @@
 
 namespace absenc::client {
 
-/// An encoder that was asked latches between the end of the request and the beginning of its reply. `character`: the
-/// time of a character on the line; 0 where it is not known, or where bytes take no time. The delay that the document
-/// gives between the request and the latching is the same each time and does not count.
+/// Returns the bounds for a requested reading: the encoder latches between the end of the request and the beginning of
+/// its reply. `character` is the duration of a character on the line; 0 if unknown, or if bytes take no time. A
+/// constant delay between request and latching, as in the document, is ignored.
 template <class Item>
 [[nodiscard]] host::LatchTime asked_latch_time(const LineExchange<Item>& exchange, Time latched, Time character) {
-  // Before the end of the request it latches where the host clocks it, or where an earlier request asked for the
-  // position.
+  // The encoder latches before the end of the request if the host clocks it, or if an earlier request triggered it.
   const Time earliest = std::min(exchange.sent_at, latched) - exchange.sent_late;
-  // The last character may be reported before its stop bit has ended, and the clock of an encoder may be a little fast.
+  // The last character may be reported before its stop bit ends, and the encoder's clock may be slightly fast.
   const auto characters = static_cast<std::int64_t>(std::max<std::size_t>(exchange.reply().size(), 1)) - 1;
   const Time reply = characters * character * 15 / 16;
   return {earliest, std::max(earliest, exchange.received_at - reply)};
 }
 
-/// Readings that an encoder sends by itself: when one was latched, only the spread of their arrival tells. It was not
-/// before the one before came, if that came in time; and in the last seconds they were late by no more than all pauses
-/// together that were longer than usual.
+/// Bounds for readings that an encoder sends by itself, from the spread of their arrivals. A reading was not latched
+/// before the one before arrived, if that arrived in time. Its delay is at most the sum of the excess of all longer
+/// pauses in the last seconds.
 class ArrivalSpread {
  public:
-  /// `arrived` of a reading; nothing had come until `nothing_until`. In the order of their arrival.
+  /// Adds the arrival of a reading, in order; no byte had arrived until `nothing_until`.
   void add(Time arrived, Time nothing_until) {
     const Time pause = arrived - std::max(arrived_, nothing_until);
     if (arrived_ == Time{}) usual_ = pause;
@@ -45,17 +44,17 @@ class ArrivalSpread {
   }
   void restart() { *this = {}; }
 
-  /// The latch time of the last reading.
+  /// Returns the bounds of the last reading.
   [[nodiscard]] host::LatchTime latch_time() const { return {arrived_ - usual_ - before_ - now_, arrived_}; }
 
  private:
   static constexpr Time one_second = std::chrono::seconds(1);
-  static constexpr int average = 16;  // readings
+  static constexpr int average = 16;  // number of readings in the average pause
 
   Time arrived_{};
-  Time usual_{};  // pause between two readings
+  Time usual_{};  // usual pause between two readings
   Time second_ends_{};
-  Time now_{};  // longer pauses of this second, what is longer of them
+  Time now_{};  // sum of the excess of longer pauses in this second
   Time before_{};
 };
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// When readings were latched, of every unit in virtual time: the true instant lies within the bounds that are measured,
-// however late a request leaves, an encoder answers or the host looks; and no speed is farther off than it says.
+// Checks latch times for every unit in virtual time: the true instant is within the measured bounds, however late a
+// request leaves, an encoder replies or the host runs; and no speed is farther off than its uncertainty.
 #include "absenc/client/encoder/latch_times.hpp"
 
 #include <gtest/gtest.h>
@@ -30,7 +30,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-/// A motion by seconds, in revolutions, that remembers when it was looked at.
+/// A motion in revolutions over seconds, which records when the encoder sampled it.
 struct WatchedShaft final : Shaft {
   explicit WatchedShaft(std::function<double(double)> motion) : turns(std::move(motion)) {}
   [[nodiscard]] double place(Time at) const { return turns(std::chrono::duration<double>(at).count()); }
@@ -42,8 +42,7 @@ struct WatchedShaft final : Shaft {
   mutable std::vector<Time> looked_at;
 };
 
-/// A computer with little time for this program: requests leave late, their end is noted late, and what has come is
-/// looked at late.
+/// A busy computer: requests leave late, their end is noticed late, and received bytes are read late.
 template <class Item>
 class BusyPort final : public Port<Item> {
  public:
@@ -70,7 +69,7 @@ class BusyPort final : public Port<Item> {
   }
 
  private:
-  // Mostly little.
+  // Most delays are short.
   Time lateness() {
     const Time most = random_() % 8 == 0 ? most_ : most_ / 50;
     return Time(std::uniform_int_distribution<Time::rep>(0, most.count())(random_));
@@ -108,13 +107,13 @@ std::vector<Case> cases() {
   return all;
 }
 
-// The revolution of a linear encoder is its whole range, which is metres.
+// One revolution of a linear encoder is its whole range, several metres.
 double revolutions_a_second(const Case& one) {
   const EncoderAddress address = parse_address(one.address);
   return address.unit->resolution(address.options).unit_um > 0 ? 0.05 : 0.5;
 }
 
-/// An encoder of a kind on a busy way.
+/// An encoder on a line of a busy computer.
 class Busy {
  public:
   Busy(const Case& one, std::function<double(double)> motion, Time most, std::uint64_t seed)
@@ -132,7 +131,7 @@ class Busy {
 
   [[nodiscard]] bool is_unsolicited() const { return host::sends_unsolicited(*address_.unit, address_.options); }
 
-  /// Reads so often, and calls `use(reading, bounds)` for good ones. Returns how many were.
+  /// Reads `count` times, calls `use(reading, bounds)` for each good reading, and returns their number.
   template <class Use>
   std::size_t read(std::size_t count, Time pause, const Use& use) {
     std::size_t good = 0;
@@ -148,7 +147,7 @@ class Busy {
     return good;
   }
 
-  /// The speed behind each reading, in counts a second; empty without one.
+  /// Returns the speed after each reading, in counts per second; nothing if there is none.
   [[nodiscard]] const host::Velocity& measured(const Reading& reading, const host::LatchTime& at) {
     if (unwrapper_.add(reading, at) != host::Unwrapper::Joined::continued) velocity_.restart();
     velocity_.add(unwrapper_.position(), at);
@@ -191,7 +190,7 @@ constexpr std::array most_late{0us, 400us, 8'000us};
 
 class LatchTimes : public ::testing::TestWithParam<Case> {};
 
-// The last instant within the bounds at which the encoder looked at its shaft and saw this position.
+// Returns the last instant within the bounds at which the encoder sampled this position.
 std::optional<Time> true_instant(const WatchedShaft& shaft, const Reading& reading, const host::LatchTime& at) {
   const std::vector<Time> all = shaft.looked_at;
   const auto shows = [&](Time time) {
@@ -242,14 +241,14 @@ TEST_P(LatchTimes, MakeNoSpeedThatIsFartherOffThanItSays) {
   }
 }
 
-// The speed is the mean between the two instants, whether the shaft is steady or not.
+// The speed is the mean between the two instants, also if the shaft accelerates.
 TEST_P(LatchTimes, MakeTheMeanSpeedOfAShaftThatSwings) {
   const double swing = revolutions_a_second(GetParam()) / 5;
   for (const Time most : most_late) {
     Busy busy(
         GetParam(), [=](double seconds) { return swing * std::sin(2 * M_PI * seconds); }, most, 1);
     if (busy.is_unsolicited()) GTEST_SKIP() << "it sends by itself: only its arrival is known";
-    std::map<Time, Time> truths;  // by the earliest time of a reading
+    std::map<Time, Time> truths;  // true instants by the earliest time of their reading
     std::size_t compared = 0;
     busy.read(600, 3ms, [&](const Reading& reading, const host::LatchTime& at) {
       const std::optional<Time> instant = true_instant(busy.shaft(), reading, at);

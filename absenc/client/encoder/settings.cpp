@@ -39,7 +39,7 @@ std::size_t place_of(const Answer& answer, std::string_view name) {
                                   answer.columns.begin());
 }
 
-// What the encoder is left with when the port is lost in the middle.
+// Reports the state of the encoder if the port is lost during the command.
 void write(Connection& encoder, const Command& setter, Arguments arguments, Told& told) {
   try {
     run_into(encoder, setter, arguments, told);
@@ -59,7 +59,7 @@ void write(Connection& encoder, const Command& setter, Arguments arguments, Told
   }
 }
 
-// The setter has read back what it wrote; this is what the encoder says when it is asked anew.
+// The setter has verified its write; this reads the setting again with its own command.
 void require_same(const Answer& now, const Answer& written, std::string_view name) {
   for (std::size_t i = 0; i < written.columns.size(); ++i) {
     const std::size_t place = place_of(now, written.columns[i].name);
@@ -71,7 +71,7 @@ void require_same(const Answer& now, const Answer& written, std::string_view nam
   }
 }
 
-// What the encoder was set to may be what it is reached with.
+// The new setting may be part of the address, such as a rate.
 std::string note_of(const Unit& unit, const Options& before, const Command& setter, std::int64_t value) {
   if (options_behind(unit, before, setter, value).values == before.values) return {};
   return fmt::format("from now on it is reached with {}={}", setter.changes_option, value);

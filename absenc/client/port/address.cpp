@@ -20,7 +20,7 @@ namespace absenc::client {
 
 namespace {
 
-// What stands behind the name of the line: "", "_us" or "_active".
+// Returns the suffix of a wire setting after its name: "", "_us" or "_active".
 void set_pulse_wire(os::PulseWire& wire, std::string_view what, const OptionText& setting) {
   using Kind = os::PulseWire::Kind;
   constexpr std::string_view gpio = "gpio:";
@@ -39,7 +39,7 @@ void set_pulse_wire(os::PulseWire& wire, std::string_view what, const OptionText
   }
 }
 
-// What can be asked again and again.
+// Returns whether a command can be run repeatedly.
 const Command& reading_command(const Unit& unit, std::string_view name) {
   const Command& command = require_command(unit, name);
   if (command.changes_encoder || !command.arguments.empty()) {
@@ -121,7 +121,7 @@ bool allowed(const LinkParameter& parameter, Place place) {
   }
 }
 
-// A limit in the other unit would be ignored.
+// Refuses a speed limit in the wrong unit, which would be ignored.
 void check_speed_limit(const EncoderAddress& uri) {
   const bool linear = uri.unit->resolution(uri.options).unit_um > 0;
   if (linear && uri.maximum_rpm != 0) {
@@ -132,7 +132,7 @@ void check_speed_limit(const EncoderAddress& uri) {
   }
 }
 
-// Takes what is a link parameter; the rest are options of the unit, also its rate where its conversations depend on it.
+// Takes the link parameters. The others are options of the unit, including its rate if its conversations depend on it.
 void take_settings(EncoderAddress& uri, std::span<const OptionText> settings) {
   std::vector<OptionText> options;
   std::vector<OptionText> of_link;
@@ -179,7 +179,7 @@ std::string examples(const Unit& unit) {
   return fmt::format("{0}:spi:{1} or sim:{0}", unit.id, first(os::spi_devices(), "/dev/spidev0.0"));
 }
 
-// What a place carries, and what the unit speaks.
+// Checks that the place can carry the unit's kind of line.
 void check_place(const EncoderAddress& uri, std::string_view address) {
   const bool is_can = uri.place == Place::can || uri.place == Place::slcan;
   const bool fits = is_can                    ? uri.unit->link == LinkKind::can
@@ -197,7 +197,7 @@ void check_place(const EncoderAddress& uri, std::string_view address) {
 void parse_tcp(EncoderAddress& uri, std::string_view where) {
   const std::size_t colon = where.rfind(':');
   const std::string_view host = where.substr(0, colon);
-  // The colons of an IPv6 address are not the one before the port.
+  // The last colon precedes the port; the others belong to an IPv6 address.
   const bool bare_ipv6 = !host.starts_with('[') && host.find(':') != std::string_view::npos;
   if (colon == std::string_view::npos || host.empty() || bare_ipv6 || (host.starts_with('[') && !host.ends_with(']'))) {
     throw UsageError(
@@ -260,13 +260,13 @@ EncoderAddress parse_place(std::string_view address) {
   return uri;
 }
 
-// Without ':' and '/', and no protocol.
+// Returns whether the text may be a name of absenc.toml: without ':' and '/', and not a protocol.
 bool is_name(std::string_view address) {
   return !address.empty() && address.find_first_of(":/") == std::string_view::npos && address != "sim" &&
          find_unit(address) == nullptr;
 }
 
-// A name that somebody gave to an encoder counts more than that of a port.
+// A name in absenc.toml has priority over that of a port.
 bool is_in_settings_file(std::string_view name) {
   const std::optional<SettingsFile> file = load_settings_file();
   return file && std::any_of(file->encoders.begin(), file->encoders.end(),
@@ -293,7 +293,7 @@ void require_once(std::span<const OptionText> settings) {
   }
 }
 
-// So that what is wrong can be said of the last of them. A virtual encoder wants all of its options first.
+// Applies settings in order, so that an error names the last wrong one. A virtual encoder needs all options first.
 void try_settings(EncoderAddress uri, std::span<const OptionText> settings) {
   take_settings(uri, settings);
   const bool options_are_set = find_link_parameter(settings.back().name) != nullptr;
@@ -307,7 +307,7 @@ EncoderAddress parse_named(std::string_view name, std::span<const OptionText> wr
   std::vector<FileSetting> settings = std::move(named.settings);
   std::copy_if(named.defaults.begin(), named.defaults.end(), std::back_inserter(settings),
                [&](const FileSetting& setting) { return fits(uri, setting.name); });
-  // What a virtual encoder can be set to depends on its options: they come first.
+  // The settings of a virtual encoder depend on its options, so the options are applied first.
   std::stable_partition(settings.begin(), settings.end(),
                         [](const FileSetting& setting) { return find_link_parameter(setting.name) == nullptr; });
   std::vector<OptionText> all;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// An encoder as the user writes it: tformat:/dev/ttyUSB0?model=23-bit&echo=on, tformat:tcp:host:4001,
+// Parses the address of an encoder: tformat:/dev/ttyUSB0?model=23-bit&echo=on, tformat:tcp:host:4001,
 // ssi:spi:/dev/spidev0.0, raa38-can:can0, raa38-can:slcan:/dev/ttyACM0, sim:tformat, or a name of absenc.toml.
 #pragma once
 
@@ -23,15 +23,15 @@ namespace absenc::client {
 enum class Place : std::uint8_t { serial, tcp, spi, can, slcan, sim };
 inline constexpr std::array<std::string_view, 6> place_names{"serial", "tcp", "spi", "can", "slcan", "sim"};
 
-/// The setting that is the rate of an asynchronous line.
+/// Name of the setting for the rate of an asynchronous line.
 inline constexpr std::string_view rate_setting = "baud";
 
-/// A setting of the way to the encoder, beside the options of its protocol.
+/// A setting of the port or the line, besides the options of the protocol.
 struct LinkParameter {
   std::string_view name;
   std::string_view value;
   std::string_view meaning;
-  std::string_view places;  // where it may be given, by the names of `place_names`
+  std::string_view places;  // places for which it is allowed, by the names of `place_names`
   bool repeatable = false;
 };
 
@@ -81,19 +81,19 @@ inline constexpr std::array<LinkParameter, 30> link_parameters{{
     {"seed", "N", "another series of faults", "sim"},
 }};
 
-/// The option that a setting of this name sets; null: none. Where the rate is an option, because silences are measured
-/// in characters, `rate_setting` sets it, whatever the unit calls it.
+/// Returns the option that a setting of this name sets; null if none. If the unit has an option for the rate, because
+/// its silences are measured in characters, `rate_setting` sets it, whatever its name.
 [[nodiscard]] const Option* find_option(const Unit& unit, std::string_view name);
 
-/// Null when there is none with this name.
+/// Returns the link parameter of this name; null if there is none.
 [[nodiscard]] const LinkParameter* find_link_parameter(std::string_view name);
 
 struct EncoderAddress {
   const Unit* unit = nullptr;
   Options options;
   Place place = Place::serial;
-  std::string path;  // serial, spi, slcan; can: the interface
-  std::string host;  // tcp
+  std::string path;  // path for serial, spi, slcan; name of the interface for can
+  std::string host;  // host name for tcp
   std::uint16_t port = 0;
 
   LineSettings line;
@@ -101,33 +101,33 @@ struct EncoderAddress {
   os::PulseWires wires;
   std::optional<Time> latency;
   os::SpiChoice spi;
-  std::uint32_t adapter_rate = 115'200;  // slcan: of the serial port, not of the bus
-  std::string log;                       // "": none
+  std::uint32_t adapter_rate = 115'200;  // slcan: rate of the serial port, not of the bus
+  std::string log;                       // CAN log file; "": none
   host::EchoMode echo = host::EchoMode::off;
-  std::uint32_t maximum_rpm = 0;   // 0: as the model says, or as is usual
-  std::uint32_t maximum_mm_s = 0;  // of linear encoders; 0: as is usual
-  Joint joint;                     // how the encoder sits in its drive
-  const Command* reads = nullptr;  // what is read again and again; null: the first command with Verb::read
+  std::uint32_t maximum_rpm = 0;   // limit in rpm; 0: the model's, or the default
+  std::uint32_t maximum_mm_s = 0;  // limit in mm/s for linear encoders; 0: the default
+  Joint joint;                     // how the encoder is mounted in its drive
+  const Command* reads = nullptr;  // the command for repeated reading; null: the first command with Verb::read
   DeviceSettings device;
-  std::string written;  // as the user wrote it, with all settings: "elbow?baud=57600"
+  std::string written;  // the address as the user wrote it, with all settings: "elbow?baud=57600"
 };
 
-/// How fast the encoder may be taken to move: what the user says, or else as host::speed_limit.
+/// Returns the speed limit of the encoder: the user's, or else that of host::speed_limit.
 [[nodiscard]] host::SpeedLimit speed_limit(const EncoderAddress& uri);
 
-/// Where the text names a port of this computer, or one on the network, and no protocol: that port with what stands
-/// behind ?, as `absenc identify` takes it. Empty for all others.
+/// Returns the port with its settings behind ?, as `absenc identify` takes it, if the text names a port of this
+/// computer or of the network without a protocol; otherwise "".
 [[nodiscard]] std::optional<std::string> bare_port(std::string_view text);
 
-/// `settings` ("name=value") count as if they stood behind the text; both override what absenc.toml says of a name.
-/// Throws UsageError, which names what is wrong and the nearest name that would be right.
+/// Parses an address. `settings` ("name=value") are appended to the text; both override the settings of absenc.toml.
+/// Throws UsageError, which names the error and the nearest right name.
 [[nodiscard]] EncoderAddress parse_address(std::string_view text, std::span<const std::string> settings = {});
 
 class NamedEncoders;
-/// The same of a name of absenc.toml that was read already.
+/// Returns the address of a name in absenc.toml that was read before.
 [[nodiscard]] EncoderAddress parse_address(std::string_view name, const NamedEncoders& names);
 
-/// Without its settings: "tformat:/dev/ttyUSB0"
+/// Returns the address without its settings: "tformat:/dev/ttyUSB0".
 [[nodiscard]] std::string address_of(const EncoderAddress& uri);
 
 }  // namespace absenc::client

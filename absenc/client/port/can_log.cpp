@@ -31,7 +31,7 @@ void CanLog::begin(const Step<CanFrame>& step) {
   port_->begin(step);
 }
 
-// What os::Failure would say is that the port is lost, which is waited for.
+// Throws Failure, because os::Failure would mean a lost port, for which callers wait.
 void CanLog::write(const std::string& line) {
   try {
     file_->append(line);

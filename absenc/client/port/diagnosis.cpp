@@ -17,7 +17,7 @@ bool is_good(const Unit& unit, const Options& options, const Frame& request, con
 
 std::string bytes_text(std::size_t count) { return fmt::format("{} byte{}", count, count == 1 ? "" : "s"); }
 
-// An echo before it, or something else before or behind it.
+// Returns whether a good reply has an echo before it, or other bytes before or after it.
 Diagnosis surrounded(const Unit& unit, const Options& options, const Frame& request, Bytes reply) {
   const Bytes sent = request.bytes;
   const bool echoed =
@@ -66,7 +66,7 @@ Diagnosis other_settings(const Unit& unit, const Options& options, const Frame& 
   return {};
 }
 
-// On clocked links and CAN there is one kind of frame, and bits or data bytes are counted.
+// On clocked lines and CAN the text counts bits or data bytes.
 std::string meaning(LinkKind link, Subject subject, Error error) {
   const std::string_view frame = link == LinkKind::clocked || link == LinkKind::can ? "frame"
                                  : subject == Subject::request                      ? "request"
@@ -96,7 +96,7 @@ std::string meaning(LinkKind link, Subject subject, Error error) {
 }  // namespace
 
 Diagnosis diagnose(const Unit& unit, const Options& options, const Frame& request, const Frame& reply) {
-  // A procedure may fail although each of its replies was good.
+  // The last reply may be good, because a procedure can fail with good replies.
   if (reply.empty() || is_good(unit, options, request, reply)) return {};
   if (!reply.bytes.empty() && reply.bits == 0) {
     Diagnosis found = surrounded(unit, options, request, reply.bytes);

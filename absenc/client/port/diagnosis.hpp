@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What is wrong with an exchange, in words, and which setting would make it right.
+// Explains a bad exchange in words and suggests the setting that would make it good.
 #pragma once
 
 #include <cstdint>
@@ -10,30 +10,29 @@
 
 namespace absenc::client {
 
-/// All are empty when nothing fits.
+/// The explanation of a bad reply; all texts are empty if none fits.
 struct Diagnosis {
-  std::string finding;    // what the reply turns out to be
-  std::string advice;     // what would make it right
-  std::string setting{};  // "NAME=VALUE", where another setting would
+  std::string finding;    // what the reply really is
+  std::string advice;     // what to try
+  std::string setting{};  // "NAME=VALUE", the setting with which the reply would be good
 };
 
-/// What a reply that failed turns out to be: an echo, a good reply with something around it, one of another model or
-/// with another option.
+/// Explains a failed reply: an echo, a good reply with other bytes around it, or a good one of another model or option.
 [[nodiscard]] Diagnosis diagnose(const Unit& unit, const Options& options, const Frame& request, const Frame& reply);
 
-/// Which frame an error is about.
+/// The frame that an error is about.
 enum class Subject : std::uint8_t { request, reply };
 
-/// Of frames that `decode` refuses: a request without a reply, or one that is bad itself.
+/// Returns the frame of an error of `decode`: the reply, or a bad request.
 [[nodiscard]] Subject subject_of(const Unit& unit, const Options& options, const Frame& request, const Frame& reply);
 
-/// "<what the error means for this frame of this link>: <detail>; <finding>", each part only if there is one,
-/// and the finding only where the detail does not name its setting already.
+/// Returns "<meaning of the error for this frame and line>: <detail>; <finding>", without empty parts, and without the
+/// finding if the detail already names its setting.
 [[nodiscard]] std::string describe(LinkKind link, Subject subject, Error error, std::string_view detail = {},
                                    const Diagnosis& diagnosis = {});
 
-/// Of a reply that failed with this error, or with an empty reply of the request, in one sentence: the same with what
-/// the document says of it, and what to try.
+/// Explains a reply that failed with this error (or a missing reply) in one sentence, with the document's explanation
+/// and what to try.
 [[nodiscard]] std::string sentence_for(const Unit& unit, const Options& options, Error error, const Frame& request,
                                        const Frame& reply);
 

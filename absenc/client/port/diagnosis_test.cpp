@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What people are told of an exchange that failed: each thing once.
+// Checks the messages about failed exchanges: each fact is stated once.
 #include "absenc/client/port/diagnosis.hpp"
 
 #include <gtest/gtest.h>
@@ -33,7 +33,7 @@ Message message_of(const Unit& unit, const Options& options, const ConversationR
   return {describe(unit.link, Subject::reply, ended.error, ended.detail, diagnosis), diagnosis};
 }
 
-/// The clauses that stand in a message more than once. What checks a frame has two names.
+/// Returns the clauses that a message repeats. Checksum and CRC count as the same word.
 std::set<std::string> repeated_clauses(std::string message) {
   for (std::size_t at = 0; (at = message.find("CRC", at)) != std::string::npos;) message.replace(at, 3, "checksum");
   std::set<std::string> once;
@@ -61,7 +61,7 @@ std::vector<const Unit*> units_of_bytes() {
   return units;
 }
 
-// An encoder that is set up otherwise than its host: each choice of each option.
+// Encoders set up differently from their host: each choice of each option.
 TEST(Diagnosis, ASettingThatWouldHelpIsNamedOnce) {
   std::set<std::string> named;
   for (const Unit* unit : units_of_bytes()) {
@@ -88,7 +88,7 @@ TEST(Diagnosis, ASettingThatWouldHelpIsNamedOnce) {
   EXPECT_GE(named.size(), 2u);
 }
 
-// A line that damages what comes, in each way.
+// A line with each kind of fault.
 TEST(Diagnosis, AMessageSaysNothingTwice) {
   unsigned messages = 0;
   for (const Unit* unit : units_of_bytes()) {
@@ -133,14 +133,14 @@ std::vector<std::string> words_of(std::string_view text) {
   return {std::istream_iterator<std::string>(in), {}};
 }
 
-// What is said of frames that are refused for their length; "" for others.
+// Returns the message for a frame of wrong length; "" for other errors.
 std::string said_of(const Unit& unit, const Options& options, const WireFrame& request, const WireFrame& reply) {
   NoFields ignored;
   const Error error = unit.decode(options, request.frame(), reply.frame(), ignored);
   return error == Error::wrong_length ? sentence_for(unit, options, error, request.frame(), reply.frame()) : "";
 }
 
-// The good vectors of every unit, cut short.
+// Truncates the good vectors of every unit.
 TEST(FrameWords, WrongLengthIsSaidOfTheFrameThatHasIt) {
   std::set<LinkKind> links;
   for (const Unit* const unit : all_units()) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The settings behind an encoder that say how it sits in its drive.
+// Parses the settings that describe how an encoder is mounted in its drive.
 #pragma once
 
 #include <span>
@@ -9,11 +9,11 @@
 
 namespace absenc::client {
 
-/// Takes the setting, if it is one of these; returns whether it is. Throws UsageError.
+/// Applies the setting if it is a joint setting; returns whether it is one. Throws UsageError.
 bool set_joint(Joint& joint, const OptionText& setting);
 
-/// Refuses a setting that would be ignored, because it is one of linear encoders and this one turns, or the reverse.
-/// Throws UsageError.
+/// Throws UsageError for a setting of linear encoders given to a rotary one, or the reverse, because it would be
+/// ignored.
 void check_joint(std::span<const OptionText> settings, bool is_linear);
 
 }  // namespace absenc::client

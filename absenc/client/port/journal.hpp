@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// The journal of changes: a line for each command that was to change an encoder, whoever sent it (the command, a
-// program, Python, serve). Fields are separated by tabs: time (UTC), encoder, what, value before, value after, result,
-// command that puts it back; a value that is not known is empty.
+// The journal of changes: one line for each changing command that was sent by the command, a program, Python or serve.
+// Fields are separated by tabs: time (UTC), encoder, what, old value, new value, result, command that restores the old
+// value. An unknown value is empty.
 #pragma once
 
 #include <cstddef>
@@ -12,28 +12,28 @@
 namespace absenc::client {
 
 struct JournalEntry {
-  std::string time{};  // "2026-11-24T13:27:47.123Z"
+  std::string time{};  // UTC time, "2026-11-24T13:27:47.123Z"
   std::string encoder{};
   std::string what{};
   std::string before{};
   std::string after{};
-  std::string result{};    // the word of its ChangeState
-  std::string put_back{};  // a command; "": there is no value before that a command could write
+  std::string result{};    // name of its ChangeState
+  std::string put_back{};  // the command that restores the old value; "": there is none
 };
 
-/// $ABSENC_CHANGES; else changes.tsv in $STATE_DIRECTORY, $XDG_STATE_HOME/absenc or ~/.local/state/absenc. "": none is
-/// kept, because ABSENC_CHANGES is "none" or there is no home.
+/// Returns the path of the journal: $ABSENC_CHANGES, or else changes.tsv in $STATE_DIRECTORY, $XDG_STATE_HOME/absenc or
+/// ~/.local/state/absenc. "" if ABSENC_CHANGES is "none" or there is no home directory.
 [[nodiscard]] std::string journal_path();
 
-/// Appends one line by one write. Returns "", or a sentence that says why it is not there; throws nothing: the change
-/// has been made already.
+/// Appends one line with a single write. Returns "", or a sentence with the reason of a failure. Throws nothing,
+/// because the change has already been made.
 [[nodiscard]] std::string append_to_journal(const std::string& path, JournalEntry entry);
 
 struct Journal {
-  std::vector<JournalEntry> entries{};  // the oldest first
-  std::size_t damaged = 0;              // lines that are no entry, as a full disk leaves them
+  std::vector<JournalEntry> entries{};  // entries, the oldest first
+  std::size_t damaged = 0;              // number of damaged lines, such as a full disk leaves
 };
-/// Empty when there is no file. Throws Failure.
+/// Reads the journal; empty if there is no file. Throws Failure.
 [[nodiscard]] Journal read_journal(const std::string& path);
 
 }  // namespace absenc::client

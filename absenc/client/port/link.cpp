@@ -37,7 +37,7 @@ ExtraWires extra_wires(const EncoderAddress& uri) {
   return uri.unit->extra_wires == nullptr ? ExtraWires{} : uri.unit->extra_wires(uri.options);
 }
 
-// A port that was not there when its address was looked at may turn out to be a pseudo-terminal.
+// A port that did not exist when its address was parsed may be a pseudo-terminal.
 LineSettings line_of_serial(const EncoderAddress& uri) {
   if (uri.line.rate != 0 || os::is_pseudo_terminal(uri.path)) return uri.line.with_some_rate();
   throw UsageError(
@@ -98,7 +98,7 @@ Link open_spi(const EncoderAddress& uri) {
 
 Link open_can(const EncoderAddress& uri) {
   Link link;
-  link.place = uri.path;  // its bit rate is not ours
+  link.place = uri.path;  // absenc does not set the bit rate of the interface
   take(link, std::make_shared<os::SocketCan>(uri.path, uri.line), uri);
   return link;
 }
@@ -116,8 +116,8 @@ Link open_slcan(const EncoderAddress& uri) {
   return link;
 }
 
-// A line that was lost and is back goes on in the file that it began; a file that is in use is made again, which is
-// refused. Called under the lock of connect_link.
+// After a loss the log continues in its file. A file that another link uses is created again, which fails. Called with
+// the lock of connect_link held.
 std::shared_ptr<os::LineFile> log_file(const std::string& path) {
   static std::map<std::string, std::shared_ptr<os::LineFile>> files;
   std::shared_ptr<os::LineFile>& file = files[path];
@@ -125,7 +125,7 @@ std::shared_ptr<os::LineFile> log_file(const std::string& path) {
   return file;
 }
 
-// Puts the log in front of the port.
+// Inserts the CAN log in front of the port.
 void keep_log(Link& link, const EncoderAddress& uri) {
   const std::string name = uri.place == Place::sim ? "sim" : std::filesystem::path(uri.path).filename().string();
   auto log = std::make_shared<CanLog>(*link.frames, link.owner, log_file(uri.log), name);
@@ -133,7 +133,7 @@ void keep_log(Link& link, const EncoderAddress& uri) {
   link.owner = std::move(log);
 }
 
-// Virtual time keeps pace with ours, so that a moving shaft moves.
+// Virtual time follows the clock, so that a moving shaft moves.
 Link open_sim(const EncoderAddress& uri) {
   Link link;
   link.place = "the virtual encoder";

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Opens the way to an encoder and owns it.
+// Opens the port of an address and owns it.
 #pragma once
 
 #include <functional>
@@ -13,22 +13,21 @@
 namespace absenc::client {
 
 struct Link {
-  std::unique_ptr<VirtualDevice> device;  // sim; outlives the port
+  std::unique_ptr<VirtualDevice> device;  // virtual encoder of sim:; must outlive the port
   std::shared_ptr<void> owner;
-  Port<std::uint8_t>* bytes = nullptr;  // exactly one is set
+  Port<std::uint8_t>* bytes = nullptr;  // exactly one of bytes and frames is set
   Port<CanFrame>* frames = nullptr;
-  Time latency{};                  // of the way to the line
-  Time character{};                // of a character on the line; 0: not known, or it takes no time
-  std::string place;               // "/dev/ttyUSB0 at 2500000 baud"
-  std::vector<std::string> notes;  // what could be better about it
+  Time latency{};                  // latency between this computer and the line
+  Time character{};                // duration of a character on the line; 0: unknown, or bytes take no time
+  std::string place;               // the place in words, "/dev/ttyUSB0 at 2500000 baud"
+  std::vector<std::string> notes;  // hints on how to improve the port
 };
 
-/// Throws os::Failure, UsageError.
+/// Opens the port of the address. Throws os::Failure, UsageError.
 [[nodiscard]] Link open_link(const EncoderAddress& uri);
-/// Opens a serial port without writing, or a TCP connection to which nothing is written: exactly `bytes` is set. Throws
-/// os::Failure, UsageError.
+/// Opens a serial port or a TCP connection for reading only; `bytes` is set. Throws os::Failure, UsageError.
 [[nodiscard]] Link open_receiving(const EncoderAddress& uri);
-/// In its place, a test has its own.
+/// A replacement for open_link, used by tests.
 using OpenLink = std::function<Link(const EncoderAddress&)>;
 
 }  // namespace absenc::client

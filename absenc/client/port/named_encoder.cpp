@@ -19,7 +19,7 @@ namespace {
 
 using Names = std::vector<std::string_view>;
 
-constexpr std::string_view rate_name = "rate_hz";  // of `serve`, beside the settings of the encoder
+constexpr std::string_view rate_name = "rate_hz";  // a setting for `serve` among the settings of an encoder
 
 void add_options(Names& names, const Unit& unit) {
   for (const Option& option : unit.options) names.push_back(option.name);
@@ -61,7 +61,7 @@ void check_bus(const FileSection& bus) {
   if (bus.find("port") == nullptr) refuse(bus.place, fmt::format("the bus {} has no port", bus.name));
 }
 
-// What stands without ':' on the command line, and is no protocol.
+// A valid name has no ':' and is not a protocol.
 void check_name(const FileSection& encoder) {
   if (encoder.name == "sim" || find_unit(encoder.name) != nullptr) {
     refuse(encoder.place, fmt::format("\"{}\" is a protocol: give the encoder another name", encoder.name));
@@ -106,7 +106,7 @@ void NamedEncoders::check_encoder(const FileSection& encoder) const {
 
 namespace {
 
-// Those of `from` that are not in `over`.
+// Returns the settings of `from` that `over` does not have.
 std::vector<FileSetting> not_overridden(const FileSection& from, const std::vector<FileSetting>& over) {
   std::vector<FileSetting> settings;
   std::copy_if(

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a name of absenc.toml stands for, and the check that all of the file makes sense.
+// Resolves the names of absenc.toml and checks the whole file.
 #pragma once
 
 #include <string>
@@ -13,29 +13,29 @@
 namespace absenc::client {
 
 struct NamedEncoder {
-  std::string address;                // "tformat:/dev/ttyUSB0"
-  std::string place;                  // where the file says where it is connected
-  std::vector<FileSetting> settings;  // its own, and those of its bus that it does not override
-  std::vector<FileSetting> defaults;  // that it may be given, where they fit
-  bool has_company = false;           // other encoders are on its bus
-  double rate_hz = 0;                 // how often a service shall read it; 0: the file does not say
+  std::string address;                // its address, "tformat:/dev/ttyUSB0"
+  std::string place;                  // position in the file of its port, for errors
+  std::vector<FileSetting> settings;  // its own settings, and those of its bus that it does not override
+  std::vector<FileSetting> defaults;  // defaults of the file, used where they apply
+  bool has_company = false;           // whether other encoders are on its bus
+  double rate_hz = 0;                 // readings per second for `serve`; 0: not in the file
 };
 
-/// A file that was checked, by its names: read once for all of them.
+/// The encoders of a checked file, which is read once for all of them.
 class NamedEncoders {
  public:
-  /// Throws UsageError, which names the place in the file: settings that do not exist, protocols and buses that do not
-  /// exist, whether they are used or not: a misspelt name must not be silent, wherever it stands. Values are left to
-  /// whoever uses them, because they may depend on more than the file: the model behind `?`, a file of motion.
+  /// Checks all names of settings, protocols and buses, used or not, so that a misspelt name is always reported. Values
+  /// are checked when they are used, because they may depend on more than the file: the model behind `?`, a motion
+  /// file. Throws UsageError, which names the position in the file.
   explicit NamedEncoders(SettingsFile file);
   NamedEncoders(NamedEncoders&&) noexcept = default;
   NamedEncoders& operator=(NamedEncoders&&) noexcept = default;
-  NamedEncoders(const NamedEncoders&) = delete;  // the indices point into the file
+  NamedEncoders(const NamedEncoders&) = delete;  // the maps refer to strings of the file
   NamedEncoders& operator=(const NamedEncoders&) = delete;
   ~NamedEncoders() = default;
 
   [[nodiscard]] const SettingsFile& file() const { return file_; }
-  /// Throws UsageError, which names the nearest.
+  /// Returns the encoder of this name. Throws UsageError, which names the nearest.
   [[nodiscard]] NamedEncoder require(std::string_view name) const;
 
  private:
@@ -46,13 +46,13 @@ class NamedEncoders {
   SettingsFile file_;
   Index buses_;
   Index encoders_;
-  std::unordered_map<std::string_view, std::size_t> on_bus_;  // how many encoders
+  std::unordered_map<std::string_view, std::size_t> on_bus_;  // number of encoders on each bus
 };
 
-/// absenc.toml; throws UsageError also when there is none: then `purpose` says who needs it.
+/// Reads absenc.toml. Throws UsageError, also if there is no file; `purpose` then says why one is needed.
 [[nodiscard]] NamedEncoders require_names(std::string_view purpose);
 
-/// Does the work; a UsageError gets the place put before it.
+/// Runs `work` and puts `place` before the text of a UsageError.
 template <class Work>
 auto at(const std::string& place, const Work& work) {
   try {

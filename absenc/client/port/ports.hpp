@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The ports of this computer behind which an encoder may be.
+// Lists the ports of this computer to which an encoder may be connected.
 #pragma once
 
 #include <string>
@@ -12,20 +12,20 @@
 namespace absenc::client {
 
 struct Port {
-  std::string path{};       // "/dev/ttyUSB0", "can0", "/dev/spidev0.0"
-  std::string_view kind{};  // "serial", "can", "spi"
-  os::ListedPort serial{};  // of a serial one
+  std::string path{};       // path or name: "/dev/ttyUSB0", "can0", "/dev/spidev0.0"
+  std::string_view kind{};  // "serial", "can" or "spi"
+  os::ListedPort serial{};  // details of a serial port
 
-  /// "absenc identify /dev/ttyUSB0"; "" where nobody can be asked behind it: it may not be opened, is in use, or is a
+  /// Returns the next command, "absenc identify /dev/ttyUSB0"; "" for a port that may not be opened, is in use, or is a
   /// mobile modem.
   [[nodiscard]] std::string next_command() const;
 };
 
-/// All of them, without opening any: that would reset some boards.
+/// Returns all ports without opening any, because that would reset some boards.
 [[nodiscard]] std::vector<Port> ports();
 
-/// {"port","kind"}, of a serial one also "lasting_name","maker","adapter","serial_number","chip","driver",
-/// "latency_timer_ms","highest_rate","may_open","refusal","in_use_by", null where it is not known.
+/// Returns {"port","kind"}; for a serial port also "lasting_name","maker","adapter","serial_number","chip","driver",
+/// "latency_timer_ms","highest_rate","may_open","refusal","in_use_by". Unknown values are null.
 [[nodiscard]] Json to_json(const Port& port);
 
 }  // namespace absenc::client

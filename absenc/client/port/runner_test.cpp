@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// One exchange after the other in virtual time: what is echo, what is late, and what of a stream is damaged are the
-// same for all who look.
+// Runs exchanges in virtual time and checks how the runner classifies echo, late replies and damaged frames of a
+// stream, for readings, doctor, conform and identify alike.
 #include "absenc/client/port/runner.hpp"
 
 #include <fmt/format.h>
@@ -26,7 +26,7 @@ EncoderAddress with_faults(EncoderAddress address, std::vector<std::string> faul
   return address;
 }
 
-/// An encoder of bytes behind a runner.
+/// A runner with an encoder that sends bytes.
 struct Bench {
   explicit Bench(const std::string& text, const VirtualPort& way = {}, unsigned attempts = 1)
       : Bench(parse_address(text), way, attempts) {}
@@ -55,7 +55,7 @@ TEST(Runner, SilenceIsATimeoutInEveryUnit) {
 
 // ---- Echo
 
-// Its replies begin as its requests do.
+// The unit's replies begin like its requests.
 TEST(Runner, TakesTheEchoFromTheFirstExchangeOn) {
   for (const bool echo : {false, true}) {
     for (const char* const mode : {"auto", "on", "off"}) {
@@ -88,7 +88,7 @@ TEST(Runner, AReplyThatComesTwiceIsNotTakenForAnEcho) {
   EXPECT_EQ(one.exchange.reply.bytes, one.raw);
   EXPECT_EQ(one.raw.front(), 0x1A);
   for (int i = 0; i < 2; ++i) {
-    bench.runner.settle(1ms, 10ms);  // or the next request meets it
+    bench.runner.settle(1ms, 10ms);  // otherwise the reply would meet the next request
     EXPECT_EQ(bench.once().error, Error::none);
   }
   EXPECT_EQ(bench.runner.session().echo().mode(), host::EchoMode::off);
@@ -128,7 +128,7 @@ TEST(Runner, AReplyThatBeginsAfterItsLimitIsLate) {
   EXPECT_LT(bench.runner.lateness(), 21ms);
 }
 
-// What waits for a quiet line before it asks again hears it.
+// A host that waits for a quiet line before it repeats a request receives the late reply.
 TEST(Runner, CountsALateReplyThatComesBeforeTheNextRequest) {
   Bench bench(delayed(120us));
   for (int i = 0; i < 10; ++i) EXPECT_EQ(bench.once().error, Error::timeout);
@@ -146,7 +146,7 @@ TEST(Runner, ARequestThatIsRepeatedAtOnceIsUnanswered) {
 // ---- A line that is never silent
 
 TEST(Runner, EndsByTheClockOfItsPort) {
-  const EncoderAddress address = parse_address("sim:raa38");  // which listens a second for a good frame
+  const EncoderAddress address = parse_address("sim:raa38");  // listens for a good frame for a second
   auto port = std::make_shared<ScriptedPort<std::uint8_t>>();
   port->babble = {0x55, 0x12};
   Runner<std::uint8_t> runner(address);
@@ -166,7 +166,7 @@ TEST(Runner, EndsByTheClockOfItsPort) {
 
 // ---- Streams
 
-/// An address at which the unit transmits by itself; none: it does not, or there is no virtual encoder that does.
+/// Returns an address at which the unit sends by itself; nothing if it never does, or if no virtual encoder does.
 std::optional<EncoderAddress> streaming(const Unit& unit) {
   if (unit.streams == nullptr) return {};
   std::vector<std::vector<OptionText>> settings{{}};
@@ -183,7 +183,7 @@ std::optional<EncoderAddress> streaming(const Unit& unit) {
       address.options = options;
       address.line = line_settings(unit, options);
       if (Bench(address).once().error == Error::none) return address;
-      // One that nobody can ask has to be told.
+      // An encoder that cannot be polled must report damaged frames.
       for (const std::size_t index : capture::resolution_options(unit)) {
         address.options.values[index] = std::min<std::int64_t>(unit.options[index].maximum, 16);
       }
@@ -209,14 +209,14 @@ TEST_P(Streams, AGoodOneHasNoDamage) {
   EXPECT_EQ(bench.runner.session().counters().discarded, 0u);
 }
 
-// Two good ones that stand together are found again; one that stands alone is discarded with the damaged ones.
+// Synchronisation needs two adjacent good frames; a single good frame is discarded with the damaged ones.
 TEST_P(Streams, EachDamagedFrameIsCounted) {
   for (const char* const fault : {"corrupt=0.02", "corrupt=0.3", "truncate=0.1", "drop=0.1"}) {
     Bench bench(with_faults(address, {fault}));
     std::uint64_t discarded = 0;
     for (int i = 0; i < 500; ++i) discarded += bench.once().discarded;
     const std::uint64_t damaged = bench.link.device->damaged_replies().value();
-    // The last ones may still be under way, and two that were cut short may be as long as one.
+    // The last frames may still be in transit, and two truncated frames may be as long as one.
     EXPECT_GE((discarded + 2) * 5, damaged * 4) << fault;
     EXPECT_LE(discarded, 4 * damaged) << fault;
     EXPECT_EQ(bench.runner.session().counters().discarded, discarded);
@@ -304,7 +304,7 @@ TEST(ConformTime, OfALineThatIsNeverSilentEndsWithinTenSeconds) {
   }
 }
 
-// 107 s before it looked at the clock.
+// It took 107 s before the limit of time was checked.
 TEST(ConformTime, OfADamagedStreamEndsWithinTenSecondsOfOurs) {
   const Time begin = os::now();
   static_cast<void>(conform("sim:raa38?fault=corrupt=1"));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The only file that includes toml++: it is slow to compile.
+// The only file that includes toml++, which is slow to compile.
 #include "absenc/client/port/settings_file.hpp"
 
 #include <fmt/format.h>
@@ -18,7 +18,7 @@ namespace absenc::client {
 
 namespace {
 
-// What is a name in the file, or a path: a number there is a slip.
+// Settings whose value must be a text, such as a name or a path; a number there is a mistake.
 constexpr std::array<std::string_view, 4> text_only{"protocol", "model", "bus", "port"};
 
 constexpr const char* variable = "ABSENC_CONFIG";
@@ -42,7 +42,7 @@ std::string_view type_of(const toml::node& node) {
   }
 }
 
-// A table is sorted by name; what is wrong first shall be found first.
+// Sorts entries by their position, because a table is sorted by name and the first error must be reported first.
 std::vector<std::pair<const toml::key*, const toml::node*>> in_file_order(const toml::table& table) {
   std::vector<std::pair<const toml::key*, const toml::node*>> entries;
   for (const auto& [key, node] : table) entries.emplace_back(&key, &node);
@@ -52,7 +52,7 @@ std::vector<std::pair<const toml::key*, const toml::node*>> in_file_order(const 
   return entries;
 }
 
-/// One file being read.
+/// Reads one file.
 class Reader {
  public:
   explicit Reader(const std::string& path) : path_(path) {}
@@ -131,7 +131,7 @@ class Reader {
   std::string path_;
 };
 
-// The last character of the string that begins at `at`, or of the text.
+// Returns the index of the last character of the string that begins at `at`, or of the text.
 std::size_t end_of_string(std::string_view text, std::size_t at) {
   const char quote = text[at];
   const bool lines = text.substr(at).starts_with(std::string(3, quote));
@@ -141,17 +141,18 @@ std::size_t end_of_string(std::string_view text, std::size_t at) {
     } else if (!lines && (text[i] == quote || text[i] == '\n')) {
       return i;
     } else if (lines && text.substr(i).starts_with(std::string(3, quote))) {
-      return std::min(text.find_first_not_of(quote, i), i + 5) - 1;  // two more may belong to it
+      return std::min(text.find_first_not_of(quote, i), i + 5) - 1;  // up to two more quotes may belong to the string
     }
   }
   return text.size();
 }
 
-// The library recurses as deep as what it reads: nothing of ours is deeper than a list behind [encoder.NAME]. Throws.
+// Refuses deep nesting, because the library recurses as deep as the file; absenc.toml needs only a list in
+// [encoder.NAME]. Throws UsageError.
 void check_depth(std::string_view text, const Reader& reader) {
   constexpr std::size_t deepest = 16;
   std::size_t brackets = 0;
-  std::size_t dots = 0;  // in a row of names
+  std::size_t dots = 0;  // number of dots in a dotted name
   for (std::size_t at = 0; at < text.size(); ++at) {
     switch (text[at]) {
       case '#':
@@ -190,7 +191,7 @@ void check_depth(std::string_view text, const Reader& reader) {
   }
 }
 
-// "": not set.
+// Returns the environment variable; "" if it is not set.
 std::string environment(const char* name) {
   const char* value = std::getenv(name);
   return value == nullptr ? "" : value;
@@ -234,10 +235,10 @@ std::optional<SettingsFile> load_settings_file() {
     std::error_code ignored;
     if (fs::symlink_status(path, ignored).type() != fs::file_type::not_found) {
       const fs::file_type type = fs::status(path, ignored).type();
-      if (type == fs::file_type::not_found || type == fs::file_type::none) {  // none: a link to itself
+      if (type == fs::file_type::not_found || type == fs::file_type::none) {  // none: a link that leads to itself
         throw UsageError(fmt::format("{} is a link that leads to no file: correct it or remove it", path));
       }
-      if (type == fs::file_type::fifo || type == fs::file_type::socket) {  // one might wait for its writer without end
+      if (type == fs::file_type::fifo || type == fs::file_type::socket) {  // reading it might wait forever for a writer
         throw UsageError(fmt::format("{} is no regular file: write the encoders' names into a file", path));
       }
       try {

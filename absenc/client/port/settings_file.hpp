@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// absenc.toml as data: the names it gives to encoders and buses, and what stands below them. The library that reads
-// TOML is seen by settings_file.cpp alone.
+// Reads absenc.toml to data: the names of encoders and buses, with their settings. Only settings_file.cpp includes
+// toml++.
 #pragma once
 
 #include <optional>
@@ -10,41 +10,42 @@
 
 namespace absenc::client {
 
-/// Values are texts, as they would stand behind ? in an encoder.
+/// A setting of the file; values are texts, as behind ? in an address.
 struct FileSetting {
   std::string name;
-  std::vector<std::string> values;  // one, or those of a list
-  std::string place;                // "absenc.toml:3:1": file, line and column of the name
+  std::vector<std::string> values;  // one value, or those of a list
+  std::string place;                // position of the name, "absenc.toml:3:1": file, line and column
   bool is_list = false;
 };
 
 struct FileSection {
   std::string name;
-  std::vector<FileSetting> settings;  // in the order of the file
+  std::vector<FileSetting> settings;  // settings in the order of the file
   std::string place;
 
-  /// Null when it is not there.
+  /// Returns the setting of this name; null if it is missing.
   [[nodiscard]] const FileSetting* find(std::string_view setting) const;
 };
 
 struct SettingsFile {
   std::string path;
-  FileSection defaults;               // [defaults]
-  std::vector<FileSection> buses;     // [bus.NAME]
-  std::vector<FileSection> encoders;  // [encoder.NAME]
-  std::vector<FileSection> services;  // [serve.NAME]
+  FileSection defaults;               // the section [defaults]
+  std::vector<FileSection> buses;     // the sections [bus.NAME]
+  std::vector<FileSection> encoders;  // the sections [encoder.NAME]
+  std::vector<FileSection> services;  // the sections [serve.NAME]
 };
 
-/// Syntax, sections and types are right afterwards, what stands in the sections is not looked at. Throws UsageError,
-/// which begins with the place in the file.
+/// Reads a file and checks syntax, sections and types, but not the settings in the sections. Throws UsageError, which
+/// begins with the position in the file.
 [[nodiscard]] SettingsFile parse_settings_file(std::string_view text, const std::string& path);
 
-/// Where absenc.toml is looked for, in this order: the file that ABSENC_CONFIG names and no other, or the working
-/// directory and the user's configuration.
+/// Returns the paths where absenc.toml is searched, in this order: only the file of ABSENC_CONFIG if that is set;
+/// otherwise the working directory and the user's configuration directory.
 [[nodiscard]] std::vector<std::string> settings_file_paths();
 
-/// The first that is there; none: nullopt. Throws UsageError also when the file of ABSENC_CONFIG is not there, or one
-/// that is there cannot be read, is a link that leads nowhere, or a FIFO: it is never passed over for the next.
+/// Reads the first existing file; returns nothing if there is none. Throws UsageError, also if the file of
+/// ABSENC_CONFIG is missing, or if an existing file cannot be read, is a broken link, or a FIFO: such a file is never
+/// skipped.
 [[nodiscard]] std::optional<SettingsFile> load_settings_file();
 
 }  // namespace absenc::client

@@ -15,14 +15,14 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// The device behind the links of udev.
+// Resolves udev's links to the device.
 fs::path device(const std::string& path) {
   std::error_code error;
   const fs::path canonical = fs::weakly_canonical(path, error);
   return error ? fs::path(path) : canonical;
 }
 
-// The same for encoders at the same place; "": for no other.
+// Returns a key that is equal for encoders at the same place; "" if the place cannot be shared.
 std::string place_key(const EncoderAddress& one) {
   const std::string_view place = place_names[static_cast<std::size_t>(one.place)];
   switch (one.place) {
@@ -55,7 +55,7 @@ struct Opened {
   std::weak_ptr<SharedLink> link;
 };
 
-/// Every link that is open.
+/// All open links.
 struct Registry {
   std::mutex mutex;
   std::vector<Opened> opened;
@@ -76,7 +76,7 @@ bool SharedLink::lost() const {
 void SharedLink::lose(const os::Failure& failure) {
   const std::lock_guard lock(mutex_);
   loss_ = {failure.kind(), failure.what()};
-  link_.owner.reset();  // an exclusive port could not be opened again while it is held
+  link_.owner.reset();  // releases the port first, because an exclusive port can be opened only once
 }
 
 bool share_line(const EncoderAddress& one, const EncoderAddress& other) {
@@ -99,7 +99,7 @@ bool share_line(const EncoderAddress& one, const EncoderAddress& other) {
   return true;
 }
 
-// Opening is done under the lock, so that encoders which come back at the same time open one port.
+// Opens under the lock, so that encoders that reconnect at the same time open one port.
 void require_different(std::span<const EncoderAddress> encoders, std::span<const std::string> names) {
   std::unordered_map<std::string, std::vector<std::size_t>> at_place;
   for (std::size_t i = 0; i < encoders.size(); ++i) {

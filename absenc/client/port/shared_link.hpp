@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// One open port for all encoders on one line, and whose turn it is to have the line.
+// Shares one open port between all encoders on a line, which take turns.
 #pragma once
 
 #include <condition_variable>
@@ -18,8 +18,8 @@
 
 namespace absenc::client {
 
-/// A lock that is given in the order in which it was asked for: a mutex goes to whoever has just had it, and the others
-/// would wait without end.
+/// A fair lock, granted in the order of requests. With a mutex the thread that has just released it would often get it
+/// again, and the others would starve.
 class Turns {
  public:
   void lock() {
@@ -42,15 +42,14 @@ class Turns {
   std::uint64_t current_ = 0;
 };
 
-/// Whoever converses has the line for himself. A cycle of all encoders in one machine would be faster on a wire, but
-/// would know one protocol; with turns each keeps its own thread, session and statistics, and a silent one costs the
-/// others its time and nothing else.
+/// An open port whose users take turns: each conversation has the line exclusively. Each encoder has its own thread,
+/// session and statistics, and a silent one only delays the others by its timeout.
 class SharedLink {
  public:
   explicit SharedLink(Link link) : link_(std::move(link)) {}
 
-  /// Does one conversation while nobody else has the line. When it loses the port, so have all: the port is closed, and
-  /// each gets the os::Failure at its next turn.
+  /// Runs one conversation with exclusive use of the line. If it loses the port, the port is closed and every other
+  /// user gets the os::Failure at its next turn.
   template <class Work>
   auto take_turn(const Work& work) {
     const std::lock_guard turn(turns_);
@@ -63,12 +62,12 @@ class SharedLink {
     }
   }
 
-  /// Whoever connects now needs a new one.
+  /// Returns whether the port was lost, so that a new link is needed.
   [[nodiscard]] bool lost() const;
 
   [[nodiscard]] const Link& link() const { return link_; }
 
-  /// What is known of late replies on this line; to be used in one's turn.
+  /// The state of late replies on this line; only used during a turn.
   template <class Item>
   [[nodiscard]] host::ReplyGuard<Item>& guard() {
     if constexpr (std::is_same_v<Item, CanFrame>) {
@@ -85,23 +84,23 @@ class SharedLink {
   host::ReplyGuard<std::uint8_t> byte_guard_;
   host::ReplyGuard<CanFrame> frame_guard_;
   Turns turns_;
-  // Not the exception itself: threads must not share one.
+  // Stores the data of the exception, because threads must not share an exception object.
   struct Loss {
     os::Failure::Kind kind;
     std::string sentence;
   };
-  mutable std::mutex mutex_;  // guards the loss against those who have no turn
+  mutable std::mutex mutex_;  // guards the loss, which users without a turn read
   std::optional<Loss> loss_;
 };
 
-/// Whether both are on one line. Throws UsageError when they are, but need other settings of it.
+/// Returns whether both encoders are on one line. Throws UsageError if they are, but need different settings of it.
 [[nodiscard]] bool share_line(const EncoderAddress& one, const EncoderAddress& other);
 
-/// For encoders that are read at the same time. Throws UsageError when two of them are one encoder, or cannot share
-/// their line.
+/// Checks encoders that are read at the same time. Throws UsageError if two are the same encoder or cannot share a
+/// line.
 void require_different(std::span<const EncoderAddress> encoders, std::span<const std::string> names);
 
-/// The link to this encoder: that of an encoder on the same line, if there is one and it is not lost. Throws
+/// Returns the link to this encoder: an open one of the same line if there is one, otherwise a new one. Throws
 /// os::Failure, UsageError.
 [[nodiscard]] std::shared_ptr<SharedLink> connect_link(const EncoderAddress& uri, const OpenLink& open = open_link);
 

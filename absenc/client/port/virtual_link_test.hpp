@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// For tests of whoever converses over a Link: any unit's virtual encoder, or any machine in its place, in virtual time.
+// A Link in virtual time for tests, with any unit's virtual encoder or another machine.
 #pragma once
 
 #include <algorithm>
@@ -15,7 +15,7 @@
 
 namespace absenc::client {
 
-/// One clock for ports that are opened one after the other, as `identify` does. It stands still while nobody waits.
+/// A clock for ports that are opened one after the other, as in `identify`. It advances only while a port waits.
 struct VirtualClock {
   [[nodiscard]] sim::RealTime real_time() {
     return {.now = [this] { return time; }, .sleep_until = [this](Time until) { time = std::max(time, until); }};
@@ -23,17 +23,18 @@ struct VirtualClock {
   Time time{};
 };
 
-/// What is between a virtual encoder and who converses with it.
+/// The properties of the port between the host and the virtual encoder.
 struct VirtualPort {
-  bool echo = false;                       // the adapter echoes
-  std::optional<std::uint64_t> pauses{};   // each request begins a random while later: the seed
-  std::optional<sim::RoughRates> rough{};  // a line of whole frames, which is faster and can be bad; without echo
-  std::uint64_t seed = 1;                  // of the bad line
-  VirtualClock* clock = nullptr;           // null: time begins with the link, and jumps from event to event
-  std::uint32_t rate = 0;                  // of the host's end; 0: that of the encoder
+  bool echo = false;                      // the adapter echoes
+  std::optional<std::uint64_t> pauses{};  // seed of random delays before each request; none: no delays
+  std::optional<sim::RoughRates>
+      rough{};                    // use a line of whole frames, which is faster and can have faults; without echo
+  std::uint64_t seed = 1;         // seed of the faults
+  VirtualClock* clock = nullptr;  // the clock; null: time begins with the link and jumps from event to event
+  std::uint32_t rate = 0;         // rate of the host's end; 0: the encoder's
 };
 
-/// Begins each request a random while later.
+/// A port that delays each request by a random time.
 template <class Item>
 class UnevenPort final : public Port<Item> {
  public:
@@ -41,7 +42,7 @@ class UnevenPort final : public Port<Item> {
   Time now() override { return port_->now(); }
   void begin(const Step<Item>& step) override {
     Step<Item> later = step;
-    // On SPI and clocked links pauses have a meaning; so they have within a procedure.
+    // Does not delay SPI and clocked lines, or requests inside a procedure, because pauses have a meaning there.
     if (step.kind == Step<Item>::Kind::transfer && step.at <= port_->now()) {
       later.at = port_->now() + Time(std::uniform_int_distribution<std::int64_t>(0, 400'000)(random_));
     }
@@ -64,7 +65,7 @@ void take_port(Link& link, std::shared_ptr<AnyPort> port) {
   link.owner = std::move(port);
 }
 
-/// `device` stands where the encoder of this address would, and must outlive the link.
+/// Returns a link to `device` in place of the encoder of this address. `device` must outlive the link.
 template <class Item>
 void put_on_line(Link& link, const EncoderAddress& encoder, Machine<Item>& device, const VirtualPort& way = {}) {
   const LinkKind kind = encoder.unit->link;
@@ -85,7 +86,7 @@ void put_on_line(Link& link, const EncoderAddress& encoder, Machine<Item>& devic
   take_port<Item>(link, std::shared_ptr<sim::SimPort<Item>>(std::move(line)));
 }
 
-/// A virtual encoder as its address describes it, with options, motion, conditions, alarms and faults.
+/// Returns a link to the virtual encoder of an address, with options, motion, conditions, alarms and faults.
 inline Link virtual_link(const EncoderAddress& encoder, const VirtualPort& way = {}) {
   Link link;
   link.device = std::make_unique<VirtualDevice>(*encoder.unit, encoder.options, encoder.device);

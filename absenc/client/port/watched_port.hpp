@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A port in front of a port: keeps the last exchange as it was on the line, and ends what takes too long.
+// Wraps a port: records the last exchange as it was on the line, and ends waits that take too long.
 #pragma once
 
 #include <algorithm>
@@ -16,18 +16,18 @@
 
 namespace absenc::client {
 
-/// A request and all that came behind it, up to the next one.
+/// A request and everything received until the next request.
 template <class Item>
 struct LineExchange {
   std::vector<Item> request{};
-  std::vector<Item> received{};  // the adapter's echo included
-  std::size_t echo = 0;          // so many items of `received` are that echo
-  std::size_t clocks = 0;        // of a clocked link, which sends nothing else
-  Time answer{};                 // how long the protocol waits for the beginning of a reply; 0: it does not wait
+  std::vector<Item> received{};  // received items, including the adapter's echo
+  std::size_t echo = 0;          // number of items of `received` that are echo
+  std::size_t clocks = 0;        // number of clocks, on a clocked line
+  Time answer{};                 // timeout for the beginning of a reply; 0: no reply is expected
   Time sent_at{};                // end of the request
-  Time sent_late{};              // which may have been so much earlier
-  Time received_at{};            // end of the last item
-  /// When how many items of `received` were there.
+  Time sent_late{};              // uncertainty of `sent_at`: the request may have ended this much earlier
+  Time received_at{};            // time of the end of the last received item
+  /// The number of items of `received` at a time.
   struct Mark {
     Time at{};
     std::size_t items = 0;
@@ -37,14 +37,14 @@ struct LineExchange {
   [[nodiscard]] std::span<const Item> reply() const {
     return std::span<const Item>(received).subspan(std::min(echo, received.size()));
   }
-  /// From the end of the request to the first character of the reply; `character`: the time of one, 0 for frames. 0
-  /// without a reply.
+  /// Returns the time from the end of the request to the first character of the reply; 0 without a reply. `character`
+  /// is the duration of a character, 0 for frames.
   [[nodiscard]] Time answered_after(Time character) const {
     const auto first = std::find_if(marks.begin(), marks.end(), [this](const Mark& one) { return one.items > echo; });
     if (first == marks.end()) return {};
     return first->at - sent_at - character * static_cast<std::int64_t>(first->items - echo);
   }
-  /// Forgets all, and keeps the memory.
+  /// Clears the record without releasing memory.
   void clear() {
     request.clear();
     received.clear();
@@ -54,19 +54,20 @@ struct LineExchange {
   }
 };
 
-/// Thrown by a wait that reached the deadline.
+/// Thrown when a wait reaches the deadline.
 struct OutOfTime {};
 
-/// Lets a conversation that first has to leave the encoder as it was do so when Ctrl-C comes.
+/// Wraps a port. After Ctrl-C, a conversation that must restore the encoder first may finish.
 template <class Item>
 class WatchedPort final : public Port<Item> {
  public:
-  /// The port to use from now on.
+  /// Sets the port to use from now on.
   void attach(Port<Item>& port) {
     port_ = &port;
     rate_ = 0;
   }
-  /// Before a conversation: one that was broken off may have left the port at another rate than that of its encoder.
+  /// Called before a conversation: restores the encoder's rate, because an aborted conversation may have left another
+  /// rate.
   void return_to(std::uint32_t rate) {
     if (rate_ != 0 && rate_ != rate) begin({.kind = Step<Item>::Kind::configure, .rate = rate});
   }
@@ -109,14 +110,15 @@ class WatchedPort final : public Port<Item> {
     return event;
   }
 
-  /// Whether the conversation was asked to end early since this was asked last.
+  /// Returns whether the conversation was asked to end early since the last call.
   [[nodiscard]] bool take_aborted() { return std::exchange(aborted_, false); }
 
-  std::function<bool()> over;   // ends all waiting; may throw os::Interrupted, which asks the conversation to end
+  std::function<bool()>
+      over;  // ends all waiting when it returns true; if it throws os::Interrupted, the conversation is asked to end
   std::function<bool()> abort;  // asks the conversation to end early; returns whether it ends by itself
-  Time deadline = never;        // by the port's clock: a wait that reaches it throws OutOfTime
+  Time deadline = never;        // time of the port's clock; a wait that reaches it throws OutOfTime
   LineExchange<Item> last;
-  Time nothing_until{};  // when a wait ended last with nothing on the line
+  Time nothing_until{};  // time when the last wait ended without received items
   std::uint64_t requests = 0;
   std::uint64_t items_sent = 0;
   std::uint64_t items_received = 0;
@@ -135,7 +137,7 @@ class WatchedPort final : public Port<Item> {
       }
     }
   }
-  // The clock is not looked at between a step and its wait: the time of the step could pass then.
+  // Does not read the clock between a step and its wait, because the time of the step could pass in between.
   [[nodiscard]] Step<Item> bounded(const Step<Item>& step) const {
     if (deadline == never) return step;
     if (deadline <= looked_at_) throw OutOfTime{};
@@ -146,8 +148,8 @@ class WatchedPort final : public Port<Item> {
 
   static constexpr std::size_t most_kept = 1024;
   Port<Item>* port_ = nullptr;
-  Time looked_at_{};        // what the clock said last
-  std::uint32_t rate_ = 0;  // to which a conversation brought the port; 0: none did
+  Time looked_at_{};        // last time read from the clock
+  std::uint32_t rate_ = 0;  // rate that a conversation set; 0: none
   bool aborted_ = false;
 };
 
