@@ -44,7 +44,7 @@ SearchedFrames searched(std::span<const CheckedFrame> frames) {
   return all;
 }
 
-std::string_view name_of(CheckKind kind) {
+std::string_view check_name(CheckKind kind) {
   switch (kind) {
     case CheckKind::sum:
       return "sum";
@@ -59,7 +59,7 @@ std::string_view name_of(CheckKind kind) {
 }
 
 FoundCheck found(const capture::CheckSolution& solution) {
-  return {.name = name_of(solution.kind),
+  return {.name = check_name(solution.kind),
           .parameters = solution.parameters,
           .low_first = solution.low_first,
           .padded = solution.padded,

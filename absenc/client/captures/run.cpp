@@ -53,7 +53,7 @@ class Guard {
   std::exception_ptr thrown_;
 };
 
-std::string_view name_of(Parity parity) {
+std::string_view parity_name(Parity parity) {
   static constexpr std::array<std::string_view, 3> names{"none", "odd", "even"};
   return names[static_cast<std::size_t>(parity)];
 }
@@ -223,7 +223,7 @@ CaptureOutcome CaptureRun::run_characters(capture::AnnotationSink& sink, const s
   CaptureOutcome outcome = decode_lines(*reader_, lines, speed, SIZE_MAX, sink, progress);
   if (!choices_.how.parity && speed.parity != line_.parity) {
     outcome.notes.push_back(fmt::format("the characters have the parity {}, but those of {} usually {}",
-                                        name_of(speed.parity), unit_.id, name_of(line_.parity)));
+                                        parity_name(speed.parity), unit_.id, parity_name(line_.parity)));
   }
   return outcome;
 }
