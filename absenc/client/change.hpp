@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A command that changes an encoder ends in one of four states. Programs compare its word, people read its sentence,
-// and each exception of such a command carries it.
+// Reports whether a command changed its encoder: not sent, confirmed, refused or unknown. Programs compare the word of
+// the state, people read its sentence, and every exception of such a command carries it.
 #pragma once
 
 #include <cstdint>
@@ -15,31 +15,32 @@ namespace absenc::client {
 
 enum class ChangeState : std::uint8_t {
   none,       // the command changes no encoder
-  not_sent,   // the encoder is as it was
-  confirmed,  // sent, and as far as the encoder tells it was done
-  refused,    // sent, and the encoder said, or showed when it was read back, that it is as it was
-  unknown,    // sent, and nothing good came back: it was done or not
+  not_sent,   // no request was sent, so the encoder is unchanged
+  confirmed,  // the request was sent, and reply and read-back confirm the change
+  refused,    // the request was sent, but the encoder refused it or its read-back shows no change
+  unknown,    // the request was sent, but no good reply came: the change may be done or not
 };
 
-/// "not_sent", "confirmed", "refused", "unknown"; "" of none
+/// Returns "not_sent", "confirmed", "refused" or "unknown"; "" for `none`.
 [[nodiscard]] std::string_view word_of(ChangeState state);
 
-/// State of a change of the encoder, with the evidence.
+/// State of a change of the encoder, with the advice that follows from it.
 struct Change {
-  ChangeState state = ChangeState::none;  ///< How far the change came.
+  ChangeState state = ChangeState::none;  ///< Whether the encoder was changed.
   std::string
-      advice{};  ///< unknown: how to see what the encoder is now; confirmed: how it is reached from now on, or ""
+      /// For `unknown`, how to find out the state of the encoder; for `confirmed`, the address from now on; or "".
+      advice{};
 
-  std::string note{};  ///< why the journal does not have it, or ""
+  std::string note{};  ///< Reason why the journal has no entry of this change, or "".
 
-  /// "sent, result unknown: ..."; "" of none
+  /// Returns the sentence, as "sent, result unknown: ADVICE; NOTE"; "" for `none`.
   [[nodiscard]] std::string text() const;
 };
 
-/// Adds the change to the text of a failure, in a line of its own.
+/// Returns the text of a failure with the change on a line of its own.
 [[nodiscard]] std::string with_change(std::string_view what, const Change& change);
 
-/// A failure that knows what became of a change.
+/// The part of an exception that carries the state of a change.
 struct Changing {
   /// Adds the state of the change to an exception.
   explicit Changing(Change what_became) : change(std::move(what_became)) {}
@@ -47,11 +48,11 @@ struct Changing {
   Change change;  ///< The change and its state when the exception was thrown.
 };
 
-/// A failure of a changing command, caught as `Base` as ever.
+/// An exception of a command that changes the encoder. Handlers of `Base` catch it.
 template <class Base>
 class OfChange final : public Base, public Changing {
  public:
-  /// `text`: all of it, as of `with_change`.
+  /// `text` is the whole text, as `with_change` returns it.
   OfChange(const Base& failure, std::string text, Change what_became)
       : Base(failure), Changing(std::move(what_became)), text_(std::move(text)) {}
   /// Takes the text of `failure` and adds that of the change.
@@ -64,13 +65,14 @@ class OfChange final : public Base, public Changing {
   std::string text_;
 };
 
-/// Null: it is no failure of a changing command.
+/// Returns the change that the exception carries; null if it carries none.
 [[nodiscard]] const Change* change_of(const std::exception& failure);
 
-/// Throws the exception that is being handled with `change`, if nothing was said of a change yet. From within a catch.
+/// Throws the exception that is being handled again, with `change` added unless it already carries one. Call this only
+/// in a catch block.
 [[noreturn]] void rethrow_with(const Change& change);
 
-/// `work` comes before anything is sent that changes the encoder: what it throws says so.
+/// Runs `work`, which sends nothing that changes the encoder. Marks its exceptions as `not_sent`.
 template <class Work>
 auto before_change(const Work& work) {
   try {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Whether an encoder keeps to its document: each clause tested, each verdict with what was seen.
+// Tests whether an encoder complies with its document: a verdict and its evidence for each clause.
 #pragma once
 
 #include <cstddef>
@@ -13,54 +13,58 @@
 namespace absenc::client {
 
 enum class Verdict : std::uint8_t {
-  kept,      // what the clause is about was seen, and was as the document says
-  broken,    // it was seen, and was not
-  untested,  // it was not seen
+  kept,      // the tested behaviour was observed, and the clause was satisfied
+  broken,    // the tested behaviour was observed, and the clause was violated
+  untested,  // the tested behaviour was not observed
 };
 
 /// Result of one clause of a document.
 struct ClauseResult {
-  std::string_view id{};         ///< "crc"
+  std::string_view id{};         ///< Name of the clause, as "crc".
   std::string_view document{};   ///< Name of the document.
   std::string_view paragraph{};  ///< Paragraph of the document.
-  std::string_view words{};      ///< The demand in words.
+  std::string_view words{};      ///< The requirement in words.
   Verdict verdict{};             ///< Whether the encoder complies.
-  std::string evidence{};        ///< what was seen and how often, or why nothing was
+  std::string evidence{};        ///< What was observed and how often, or why nothing was.
 };
 
 /// Results of all clauses of a unit.
 struct Conformance {
   std::string protocol{};               ///< Identifier of the unit.
   std::vector<ClauseResult> clauses{};  ///< Results in the order of the unit's clauses.
-  std::vector<std::string> left{};      ///< commands that put back by hand what could not be: the encoder is changed
+  /// Commands with which the user restores values that could not be restored. If there are any, the encoder is left
+  /// changed.
+  std::vector<std::string> left{};
 
   /// Returns the number of clauses with this verdict.
   [[nodiscard]] std::size_t count(Verdict verdict) const;
-  /// `broken` where any clause is, or the encoder is left changed; else `kept` where any is; else `untested`: nothing
-  /// was seen that could be judged.
+  /// Returns `broken` if any clause is broken or the encoder is left changed; otherwise `kept` if any clause is kept;
+  /// otherwise `untested`.
   [[nodiscard]] Verdict verdict() const;
-  /// As the Test Anything Protocol, version 13. It bails out when nothing could be judged.
+  /// Returns the results in the Test Anything Protocol, version 13, with "Bail out!" if no clause could be judged.
   [[nodiscard]] std::string tap() const;
-  /// As JUnit's XML. It has an error when nothing could be judged.
+  /// Returns the results as JUnit XML, with an error if no clause could be judged.
   [[nodiscard]] std::string junit() const;
-  /// For people.
+  /// Returns the results as text for people.
   [[nodiscard]] std::string report() const;
 };
 
-/// What a conformance test may do and how long it lasts.
+/// What a conformance test of an encoder may change and how long it lasts.
 struct ConformChoices {
-  std::size_t readings = 100;    ///< at least 1
-  bool changes = false;          ///< also the clauses that change the encoder, which is put back as it was
-  bool resets = false;           ///< of these also what loses a zero, turns and alarms, which nothing brings back
-  std::function<bool()> over{};  ///< from the moment on in which it is true, all ends with Cancelled; empty: never
+  std::size_t readings = 100;  ///< Number of readings, at least 1.
+  bool changes = false;        ///< Also test clauses that change the encoder, and restore it afterwards.
+  /// With `changes`, also test clauses that erase zero, turns or alarms, which nothing can restore.
+  bool resets = false;
+  /// Polled during the test; once it returns true, the test ends with Cancelled. Empty: never.
+  std::function<bool()> over{};
 };
 
-/// "kept", "broken", "untested"
+/// Returns "kept", "broken" or "untested".
 [[nodiscard]] std::string_view name_of(Verdict verdict);
 
-/// Without `changes` nothing is ever written to the encoder. `text` and `settings` as those of `open`. Throws
-/// UsageError, Cancelled, what the port throws; what was changed is put back first, and where it cannot be, Failure
-/// says so with the commands that do it by hand.
+/// Tests an encoder. Writes to it only with `changes`. `text` and `settings` are those of `open`. Restores changed
+/// values before it throws UsageError, Cancelled or an exception of the port. If it cannot restore them, it throws a
+/// Failure with the commands that do.
 [[nodiscard]] Conformance conform(std::string_view text, std::span<const std::string> settings = {},
                                   const ConformChoices& choices = {});
 

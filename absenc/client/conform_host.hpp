@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Whether a host keeps to the document of a protocol: a virtual encoder is played to it, and what it does is judged.
+// Tests whether a host complies with the document of a protocol: a virtual encoder serves the host and judges its
+// requests.
 #pragma once
 
 #include <cstddef>
@@ -12,17 +13,18 @@
 
 namespace absenc::client {
 
-/// What a conformance test of a host looks at, and how long it lasts.
+/// How long a conformance test of a host lasts.
 struct ConformHostChoices {
-  std::size_t answers = 100;                      ///< so many requests are answered well, at least 2
-  Time patience = std::chrono::seconds(10);       ///< so long a silence of the host is its last
-  std::function<void(const Emulation&)> ready{};  ///< the host can connect now
-  std::function<bool()> over{};                   ///< from the moment on in which it is true, it is judged
+  std::size_t answers = 100;                      ///< Number of requests that get a good reply, at least 2.
+  Time patience = std::chrono::seconds(10);       ///< The test ends when the host sends nothing for this long.
+  std::function<void(const Emulation&)> ready{};  ///< Called when the host can connect.
+  /// Polled during the test; once it returns true, the test ends and the host is judged. Empty: never.
+  std::function<bool()> over{};
 };
 
-/// Replies stay away for a while and are damaged for a while; the host has to go on. Returns when it was answered so
-/// often, or was silent for so long. `text` and `place` as those of `emulate`. Throws UsageError, what the port throws,
-/// os::Interrupted.
+/// Suppresses replies for a while and damages others; the host must continue with its requests. Returns when the number
+/// of answered requests or the silence of the host reaches its limit. `text` and `place` are those of `emulate`. Throws
+/// UsageError, os::Interrupted and exceptions of the port.
 [[nodiscard]] Conformance conform_host(std::string_view text, const EmulateChoices& place = {},
                                        const ConformHostChoices& choices = {});
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A capture as rows: what was said on a line, request by request, with its times.
+// Decodes a capture into rows: the requests and replies of a line with their times.
 #pragma once
 
 #include <cstdint>
@@ -16,29 +16,29 @@
 
 namespace absenc::client {
 
-/// What is said of a capture, and of the encoder whose frames are in it. What is left out is found in the capture, or
-/// is as the protocol has it.
+/// Properties of a capture and of the encoder in it. A property that is left out is detected in the capture or has the
+/// protocol's default.
 struct DecodeChoices {
-  std::vector<std::string> channels{};   ///< "D0", "clock=D0", or several of them with commas between
-  unsigned raw_channels = 0;             ///< 0: it is no file of raw samples
-  std::uint64_t samples_per_second = 0;  ///< 0: the file tells
+  /// Channels, as "D0" or "clock=D0"; one entry may hold several, separated by commas.
+  std::vector<std::string> channels{};
+  unsigned raw_channels = 0;             ///< Number of channels of a file of raw samples; 0: another kind of file.
+  std::uint64_t samples_per_second = 0;  ///< Sample rate; 0: as stated in the file.
   double baud = 0;                       ///< Rate of the line in bits per second; 0: found in the capture.
   std::optional<Parity> parity{};        ///< Parity of the line; without a value that of the unit.
   std::string model{};                   ///< Name of a model of the unit; empty: none.
-  std::vector<std::string> options{};    ///< "name=value"
+  std::vector<std::string> options{};    ///< Options of the unit, as "name=value".
 };
 
-/// An input range of rows, in the order in which they ended, while the file is read: its size does not matter. The file
-/// is decoded in other threads, ahead of whoever takes the rows by some thousands of them.
+/// An input range of rows, ordered by the end of their frames. Rows are produced while the file is read, so its size is
+/// unlimited. Other threads decode the file some thousands of rows ahead of the caller.
 ///
-/// Columns: `time_s` (of a capture without times `tick`), `end_s` (`end_tick`), `kind` ("exchange", "request", "reply",
-/// "noise"), `request` and `reply` (bytes; of CAN and clocked links text, as "1FF:022B" and "0001"), `turnaround_us`,
-/// `angle_deg` (of linear encoders `position_mm`), then each field of the unit under its name, and `error` with
-/// `message`, which are empty in a good row. A row with an error has no other values than these, its times and frames.
+/// Columns: `time_s` (`tick` in a capture without times), `end_s` (`end_tick`), `kind` ("exchange", "request", "reply",
+/// "noise"), `request` and `reply` (bytes; text for CAN and clocked links, as "1FF:022B" and "0001"), `turnaround_us`,
+/// `angle_deg` (`position_mm` for linear encoders), then each field of the unit under its name, and `error` with
+/// `message`, which are empty in a good row. A row with an error has only these two, its times and its frames.
 ///
-/// Where a reply does not carry the alarms, an earlier reply of the same encoder completes them, as
-/// long as requests are answered and clear none. Without such a reply, alarms and the position that depends on them are
-/// `Unknown`.
+/// If a reply does not carry the alarms, they come from an earlier reply of the same encoder, until a request is
+/// unanswered or clears alarms. Without such a reply, alarms and the position that depends on them are `Unknown`.
 class Decoded {
  public:
   /// Type of the items.
@@ -46,7 +46,7 @@ class Decoded {
   /// Iterator of the range.
   using Iterator = InputIterator<Decoded>;
 
-  /// As `decode`.
+  /// Opens the file like `decode`.
   Decoded(const std::string& path, std::string_view protocol, const DecodeChoices& choices);
   /// Moves the decoder; the other one may only be destroyed or assigned to.
   Decoded(Decoded&&) noexcept;
@@ -55,7 +55,7 @@ class Decoded {
   /// Ends the threads, also in the middle of the file.
   ~Decoded();
 
-  /// Waits for the first row. Once. Throws, as each step does, UsageError, Failure.
+  /// Waits for the first row; call it once. Throws UsageError or Failure, as every later step does.
   [[nodiscard]] Iterator begin();
   /// Returns the end of the range.
   [[nodiscard]] static Iterator::End end() { return {}; }
@@ -63,12 +63,13 @@ class Decoded {
   [[nodiscard]] const Row* current() const { return row_; }
   /// Goes to the next row.
   void advance();
-  /// From any thread: who waits for a row, now or later, gets Cancelled.
+  /// Cancels from any thread: a caller that waits for a row, now or later, gets Cancelled.
   void cancel();
 
   /// Returns the columns of each row, in their order.
   [[nodiscard]] std::span<const Column> columns() const;
-  /// When the range has ended: sentences about what is damaged or missing in the file, and what was found out.
+  /// Returns sentences about damaged or missing parts of the file and about detected properties. They are complete when
+  /// the range has ended.
   [[nodiscard]] const std::vector<std::string>& notes() const;
 
  private:
@@ -78,8 +79,8 @@ class Decoded {
   const Row* row_ = nullptr;
 };
 
-/// `path` is a session of sigrok, VCD, CSV or binary export of a logic analyser, a log of candump, or bytes as text.
-/// Throws UsageError, Failure.
+/// Decodes the file `path`: a sigrok session, a VCD, CSV or binary export of a logic analyser, a candump log, or bytes
+/// as text. Throws UsageError, Failure.
 [[nodiscard]] inline Decoded decode(const std::string& path, std::string_view protocol,
                                     const DecodeChoices& choices = {}) {
   return {path, protocol, choices};

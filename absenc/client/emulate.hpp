@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A virtual encoder that whoever opens it finds as a real one: for tests of programs that read encoders.
+// A virtual encoder that programs open like a real one, for tests of programs that read encoders.
 #pragma once
 
 #include <cstddef>
@@ -14,33 +14,36 @@
 
 namespace absenc::client {
 
-/// Where it is found.
+/// Where programs reach the virtual encoder.
 struct EmulateChoices {
-  std::string link{};                  ///< a path that leads to the pseudo-terminal; "": only that itself
-  std::optional<std::uint16_t> tcp{};  ///< listens there on 127.0.0.1 as well; 0: on a free port
-  std::string can{};                   ///< CAN: instead of an adapter this interface, "can0"
+  std::string link{};                  ///< Path of a symbolic link to the pseudo-terminal; "": no link.
+  std::optional<std::uint16_t> tcp{};  ///< Also listens on this port of 127.0.0.1; 0: on a free port.
+  /// Network interface of a CAN encoder, as "can0"; "": an emulated slcan adapter.
+  std::string can{};
 };
 
-/// How often the virtual encoder looked at whether its host keeps a rule of the document, which it names when it is
-/// broken.
+/// How often the virtual encoder checked a rule of the document, and how often its host broke it.
 struct RuleCount {
   std::string_view rule{};   ///< The rule, in words.
   std::uint64_t looked = 0;  ///< Number of times that the rule was checked.
   std::uint64_t broken = 0;  ///< Number of times that the host broke the rule.
 };
 
-/// What hosts sent to the virtual encoder. Frames that are for no such encoder (CAN) are not counted.
+/// Counts of requests that the virtual encoder received. CAN frames for other nodes are not counted.
 struct RequestCounts {
-  std::uint64_t good = 0;      ///< requests of the document, also for other encoders on the line
-  std::uint64_t bad = 0;       ///< runs of bytes that are none, and damaged characters, since the first good one
-  std::uint64_t before = 0;    ///< the same before it, once there was one
-  std::string first_bad = {};  ///< of `bad`, as it was on the wire
+  /// Number of requests that comply with the document, also for other encoders on the line.
+  std::uint64_t good = 0;
+  /// Number of byte runs that are no request, and of damaged characters, since the first good request.
+  std::uint64_t bad = 0;
+  std::uint64_t before = 0;    ///< The same before the first good request; 0 until there is one.
+  std::string first_bad = {};  ///< First byte run that counts in `bad`, as text.
 };
 
-/// Serves in a thread of its own until it is destroyed. What is done to it is so when the call returns; any thread may.
+/// A running virtual encoder, served by its own thread until destruction. Any thread may call the functions; a change
+/// is effective when the call returns.
 class Emulation {
  public:
-  /// As `emulate`.
+  /// Starts the virtual encoder like `emulate`.
   Emulation(std::string_view text, const EmulateChoices& choices);
   /// Moves the emulation; the other one may only be destroyed or assigned to.
   Emulation(Emulation&&) noexcept;
@@ -48,12 +51,12 @@ class Emulation {
   Emulation& operator=(Emulation&&) noexcept;
   ~Emulation();
 
-  /// The pseudo-terminal, or the link to it: of an encoder on a CAN bus that of an slcan adapter, or the name
-  /// of its interface.
+  /// Returns the path of the pseudo-terminal or of the link to it; for an encoder on a CAN bus, that of the slcan
+  /// adapter or the name of the network interface.
   [[nodiscard]] const std::string& path() const;
-  /// 0 without.
+  /// Returns the TCP port; 0 if there is none.
   [[nodiscard]] std::uint16_t tcp_port() const;
-  /// To open it by: "tformat:/dev/pts/3", "raa38-can:slcan:/dev/pts/3", without the options.
+  /// Returns the address for `open`, without options: "tformat:/dev/pts/3", "raa38-can:slcan:/dev/pts/3".
   [[nodiscard]] std::string address() const;
   /// Returns the unit that is emulated.
   [[nodiscard]] const Unit& unit() const;
@@ -62,29 +65,30 @@ class Emulation {
 
   /// Switches the virtual encoder off: it sends no replies until `power_on`.
   void power_off();
-  /// `real`: with the document's start-up time.
+  /// Switches the virtual encoder on. `real`: with the start-up time of the document.
   void power_on(bool real = false);
-  /// By the names of the unit; throws UsageError, which names the nearest.
+  /// Raises an alarm by its name in the unit. Throws UsageError, which suggests the nearest name.
   void raise_alarm(std::string_view name);
   /// Ends the cause of an alarm. An alarm that the encoder latches stays until a host clears it.
   void lower_alarm(std::string_view name);
-  /// "temperature", "battery" ... as `absenc list` has them, in their units. Throws UsageError.
+  /// Sets a condition such as "temperature" or "battery", in its unit; `absenc list` prints the names. Throws
+  /// UsageError.
   void set_condition(std::string_view name, std::int64_t value);
-  /// "corrupt", "drop" ... as those of `emulate --fault`: how often its replies are damaged from now on, 0 to 1. The
-  /// other kinds stay. Throws UsageError.
+  /// Sets the rate, 0 to 1, of a fault such as "corrupt" or "drop", named as in `emulate --fault`. Other faults keep
+  /// their rates. Throws UsageError.
   void set_fault(std::string_view kind, double rate);
-  /// None of any kind.
+  /// Sets the rate of every fault to 0.
   void clear_faults();
 
-  /// How often its replies had a fault of this kind.
+  /// Returns the number of replies with this fault.
   [[nodiscard]] std::uint64_t fault_count(std::string_view kind) const;
-  /// Requests that were answered.
+  /// Returns the number of answered requests.
   [[nodiscard]] std::uint64_t answer_count() const;
-  /// Rules of the document that the host broke, and the first of them; "": none.
+  /// Returns the number of violations of the document's rules by the host.
   [[nodiscard]] std::uint32_t violations() const;
   /// Returns the first rule that the host broke, in words; empty: none.
   [[nodiscard]] std::string first_violation() const;
-  /// Every rule that was looked at: the host did what it is about.
+  /// Returns the counts of each rule that the host's behaviour put to the test.
   [[nodiscard]] std::vector<RuleCount> rule_counts() const;
   /// Returns how many requests the virtual encoder received, answered and refused.
   [[nodiscard]] RequestCounts request_counts() const;
@@ -94,8 +98,9 @@ class Emulation {
   std::unique_ptr<Service> service_;
 };
 
-/// `text` is what stands behind `sim:`, "tformat?model=23-bit&motion=rpm=60&fault=corrupt=0.01". Of what goes over
-/// characters or CAN. Throws UsageError, os::Failure.
+/// Starts a virtual encoder. `text` is an address without `sim:`, as
+/// "tformat?model=23-bit&motion=rpm=60&fault=corrupt=0.01". The link must be one of characters or CAN. Throws
+/// UsageError, os::Failure.
 [[nodiscard]] inline Emulation emulate(std::string_view text, const EmulateChoices& choices = {}) {
   return {text, choices};
 }

@@ -8,20 +8,20 @@
 
 namespace absenc::client {
 
-/// The caller asked for something that cannot be: a sentence that names what and where.
+/// The caller requested something impossible. The text is a sentence with the wrong value and its place.
 struct UsageError : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// A file, or an encoder that answered well, is not what was expected: a sentence.
+/// The content of a file or a well-formed reply is not as expected. The text is a sentence.
 struct Failure : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// Another thread asked for it.
+/// Another thread or a callback cancelled the operation.
 using Cancelled = os::Ended;
 
-/// The deadline of the caller has come.
+/// The operation reached the caller's deadline.
 struct DeadlinePassed : Cancelled {
   /// Returns what happened.
   [[nodiscard]] const char* what() const noexcept override { return "the deadline passed before there was a reading"; }

@@ -7,16 +7,16 @@
 
 namespace absenc::client {
 
-/// A value, and how far the true one is from it at most.
+/// A measured value with its uncertainty.
 struct Estimate {
   double value = 0;        ///< The estimated value.
   double uncertainty = 0;  ///< Greatest distance of the true value from `value`.
 };
 
-/// "12.0 ± 0.3": as many digits as the uncertainty leaves, at most four behind the point. The uncertainty is rounded up
-/// and holds for the digits that are shown. `sign` stands between the two.
+/// Returns "12.0 ± 0.3", with as many digits as the uncertainty justifies, at most four decimals. The uncertainty is
+/// rounded up and covers the rounding of the value. `sign` separates the two.
 [[nodiscard]] std::string to_text(const Estimate& estimate, std::string_view sign = "±");
-/// The first of the two: "12.0".
+/// Returns the value without its uncertainty: "12.0".
 [[nodiscard]] std::string value_text(const Estimate& estimate);
 
 }  // namespace absenc::client

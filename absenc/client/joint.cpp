@@ -19,7 +19,7 @@ double electrical_degrees(const Joint& joint, double position) {
                                               : way * joint.pole_pairs;
   const double within = std::fmod(angle, 360);
   const double positive = within < 0 ? within + 360 : within;
-  return positive < 360 ? positive + 0.0 : 0;  // a tiny angle below 0 is rounded up to 360
+  return positive < 360 ? positive + 0.0 : 0;  // The sum of 360 and a tiny negative angle is rounded to 360.
 }
 
 Estimate joint_speed(const Joint& joint, const Estimate& speed) {

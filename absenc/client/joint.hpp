@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// How an encoder sits in a drive, and the angles of joint and motor that follow from its position.
+// Mechanics between an encoder and its drive, and the angles of joint and motor that follow from the position.
 #pragma once
 
 #include <optional>
@@ -9,47 +9,49 @@
 
 namespace absenc::client {
 
-/// Settings behind ? and in absenc.toml. What an encoder reports is never replaced: the angles stand beside it.
+/// Settings of an address, after `?`, and of absenc.toml. They add angles to a sample and leave the values of the
+/// encoder as they are.
 ///
 ///   joint_deg      = direction * (position_deg - offset_deg) / gear
 ///   electrical_deg = direction * (angle_deg - offset_deg) * pole_pairs  modulo 360, from 0 to below 360
 ///
-/// `position_deg` are degrees of the encoder's shaft that go on past the end of a turn, `angle_deg` those within the
-/// turn. Linear encoders: position_mm and offset_mm are millimetres.
+/// `position_deg` is the angle of the encoder's shaft, continued past the end of a turn; `angle_deg` is the angle
+/// within the turn. For linear encoders position_mm and offset_mm are millimetres.
 ///
 ///   joint_mm       = direction * (position_mm - offset_mm)
 ///   electrical_deg = direction * (position_mm - offset_mm) / pole_pair_mm * 360  modulo 360
 struct Joint {
-  int direction = 1;        ///< 1, or -1: the joint turns against the encoder
-  double offset = 0;        ///< degrees at the encoder where the joint is at 0; of linear encoders mm
-  double gear = 1;          ///< turns of the encoder for one of the joint, above 0; rotary encoders only
-  int pole_pairs = 0;       ///< of the motor on the encoder's shaft; 0: not set; rotary encoders only
-  double pole_pair_mm = 0;  ///< length of a pole pair of a linear motor; 0: not set; linear encoders only
-  bool is_set = false;      ///< direction, offset or gear: there is a joint to show
+  int direction = 1;        ///< 1, or -1 if the joint turns against the encoder.
+  double offset = 0;        ///< Position of the encoder where the joint is at 0, in degrees (mm for linear encoders).
+  double gear = 1;          ///< Turns of the encoder for one turn of the joint, above 0; rotary encoders only.
+  int pole_pairs = 0;       ///< Pole pairs of the motor on the encoder's shaft; 0: not set; rotary encoders only.
+  double pole_pair_mm = 0;  ///< Length of a pole pair of a linear motor, in mm; 0: not set; linear encoders only.
+  bool is_set = false;      ///< Whether direction, offset or gear was set, so that samples have joint angles.
 
   /// Returns whether the encoder of the motor is configured.
   [[nodiscard]] bool has_motor() const { return pole_pairs != 0 || pole_pair_mm > 0; }
 };
 
-/// Angles of joint and motor from one reading. A member is empty if it was not set, does not hold or is not known.
+/// Angles of joint and motor from one reading. A member is empty if it was not configured, is invalid or is unknown.
 struct JointAngles {
-  /// Empty too where the encoder has not reported in which turn it is, unless `gear` is 1: then the angle is right up
-  /// to whole turns.
+  /// Angle of a rotary joint, in degrees. Also empty if the turn is unknown and `gear` is not 1; with `gear` 1 the
+  /// angle is right up to whole turns.
   std::optional<double> joint_deg{};
-  std::optional<double> joint_mm{};  ///< of linear encoders
+  std::optional<double> joint_mm{};  ///< Position of a linear joint, in millimetres.
   /// Speed of a rotary joint in revolutions per minute; without a value if it is not known.
   std::optional<Estimate> joint_speed_rpm{};
   std::optional<Estimate> joint_speed_mm_s{};  ///< Speed of a linear joint in mm/s; without a value if it is not known.
-  std::optional<double> electrical_deg{};      ///< 0 to below 360
+  std::optional<double> electrical_deg{};      ///< Electrical angle of the motor, in degrees, from 0 to below 360.
 };
 
-/// Degrees of the joint. `position_deg`: of the encoder, past the end of a turn.
+/// Returns the angle of the joint, in degrees. `position_deg` is the encoder's angle, continued past the end of a turn.
 [[nodiscard]] double joint_degrees(const Joint& joint, double position_deg);
-/// Millimetres of the carriage.
+/// Returns the position of the carriage, in millimetres.
 [[nodiscard]] double joint_millimetres(const Joint& joint, double position_mm);
-/// The electrical angle, 0 to below 360. `position`: degrees within the turn, of linear encoders mm.
+/// Returns the electrical angle, in degrees, from 0 to below 360. `position` is the angle within the turn in degrees,
+/// or the position of a linear encoder in mm.
 [[nodiscard]] double electrical_degrees(const Joint& joint, double position);
-/// The speed of the joint, in the unit of `speed`.
+/// Returns the speed of the joint, in the unit of `speed`.
 [[nodiscard]] Estimate joint_speed(const Joint& joint, const Estimate& speed);
 
 }  // namespace absenc::client

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a reading says: flags by their channel, with three states each: reported and clear, reported and raised, not
-// reported.
+// Flags of a reading by channel. Each flag has one of three states: clear, raised, or not reported.
 #pragma once
 
 #include <cstdint>
@@ -12,31 +11,32 @@
 
 namespace absenc::client {
 
-/// What one field of flags of the unit says.
+/// Flags of one field of the unit.
 struct Flags {
-  const FieldInfo* field;                      ///< The field that names the bits; null: none.
-  std::uint32_t bits;                          ///< those that are raised
-  std::uint32_t reported = ~std::uint32_t{0};  ///< the others are neither raised nor clear: nobody has said
+  const FieldInfo* field;                      ///< Field that defines the names of the bits; null: none.
+  std::uint32_t bits;                          ///< Bits of raised flags.
+  std::uint32_t reported = ~std::uint32_t{0};  ///< Bits of reported flags; the state of the others is unknown.
 
-  /// Whether each flag that this encoder has was reported.
+  /// Returns whether each flag of this encoder was reported.
   [[nodiscard]] bool is_complete() const;
 
   /// Compares field and bits.
   friend bool operator==(const Flags&, const Flags&) = default;
 };
 
-/// One for each channel that the unit has flags of; none when it has no such field.
+/// Returns the alarms of each channel; empty if the unit has no such field.
 [[nodiscard]] std::vector<Flags> alarms_of(const Unit& unit, const Reading& reading);
 [[nodiscard]] std::vector<Flags> status_of(const Unit& unit, const Reading& reading);
 
-/// Both, channel by channel.
+/// Returns status and alarms, channel by channel.
 [[nodiscard]] std::vector<Flags> flags_of(const Unit& unit, const Reading& reading);
 
-/// The alarms of all channels together: raised if one channel raises them, reported if each channel reports them.
-/// Nothing when the unit has no alarms.
+/// Returns the joined alarms of all channels: raised if one channel raises them, reported if every channel reports
+/// them. Returns nothing if the unit has no alarms.
 [[nodiscard]] std::optional<Flags> joined_alarms(const Unit& unit, const Reading& reading);
 
-/// Whether a position that no second one confirmed holds is not known.
+/// Returns the reading; if its position was not confirmed by a second one, the validity of the position becomes
+/// unknown.
 [[nodiscard]] Reading checked(Reading reading, bool confirmed);
 
 }  // namespace absenc::client

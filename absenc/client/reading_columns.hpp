@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The columns of a reading, which rows of samples and of captures have in common.
+// The columns of a reading, which rows of samples and rows of captures share.
 #pragma once
 
 #include <span>
@@ -9,17 +9,17 @@
 
 namespace absenc::client {
 
-/// Position, turns and flags. Two channels have columns of their own for their flags, and `alarms` for those that
-/// either has.
+/// Columns of position, turns and flags. A unit with two channels has flag columns for each channel, and `alarms` with
+/// the alarms of either.
 class ReadingColumns {
  public:
-  /// `unit` must outlive it.
+  /// Makes the columns of a unit. `unit` must outlive this object.
   ReadingColumns(const Unit& unit, const Options& options);
 
   /// Returns the columns of each row, in their order.
   [[nodiscard]] std::span<const Column> columns() const { return columns_; }
-  /// One value for each column: nothing for what the reading does not carry. In place of a position in degrees or
-  /// millimetres that does not hold there is `Invalid`, of flags that nobody has reported `Unknown`.
+  /// Fills one value into each column. A value that the reading does not carry stays empty. An invalid position in
+  /// degrees or millimetres becomes `Invalid`, flags that no reply has reported become `Unknown`.
   void fill(const Reading& reading, std::span<Value> values) const;
 
  private:

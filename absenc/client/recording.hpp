@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Files of readings, for hours: a header, then a row for each reading and for each thing that went wrong. A line is
-// handed to the system at once, whole or not at all, so that nothing is lost when the process is killed; rows of HDF5
-// within a second.
+// Writes long recordings: files with a header and a row for each reading, failure and gap. Each text line is written by
+// one system call, so that a killed process loses none; HDF5 rows are written within a second.
 #pragma once
 
 #include <cstdint>
@@ -16,42 +15,44 @@
 
 namespace absenc::client {
 
-/// Where a recording goes, and what of the readings is kept.
+/// File, rate, and length of a recording.
 struct RecordingSettings {
-  std::string path;         ///< ending in .csv; .jsonl or .ndjson: JSON lines; .h5: HDF5. There is no such file yet
-  std::string encoder;      ///< what the header calls it
-  double rate_hz = 100;     ///< readings a second that are intended; 0: as many as can be
-  std::uint64_t every = 1;  ///< of so many readings one is written, and each with other alarms than the one before
-  std::uint64_t count = 0;  ///< written readings after which it ends; 0: without end
-  std::optional<Time> duration{};             ///< after which it ends
-  std::optional<std::uint64_t> part_bytes{};  ///< after which another file is begun
-  std::optional<Time> part_time{};            ///< after which another file is begun
+  /// Path that ends in .csv, .jsonl or .ndjson (JSON lines), or .h5 (HDF5). The file must not exist yet.
+  std::string path;
+  std::string encoder;      ///< Name of the encoder in the header.
+  double rate_hz = 100;     ///< Intended number of readings per second; 0: as many as possible.
+  std::uint64_t every = 1;  ///< Writes every Nth reading, and each reading whose alarms differ from those before.
+  std::uint64_t count = 0;  ///< Number of written readings after which the recording ends; 0: no limit.
+  std::optional<Time> duration{};             ///< Duration after which the recording ends.
+  std::optional<std::uint64_t> part_bytes{};  ///< Size in bytes after which the next part begins.
+  std::optional<Time> part_time{};            ///< Time after which the next part begins.
 };
 
-/// With parts, the files are NAME-0001.csv, NAME-0002.csv ...; each has the header and can be read alone.
+/// A recording in progress. With parts, the files are NAME-0001.csv, NAME-0002.csv and so on; each has the header and
+/// can be read alone.
 class Recording {
  public:
-  /// Makes the first file, of readings of `encoder`, which must outlive it. Throws UsageError, and os::Failure, also
-  /// when there is a file of that name already.
+  /// Creates the first file, for readings of `encoder`, which must outlive this object. Throws UsageError, and
+  /// os::Failure, also if the file exists.
   Recording(const RecordingSettings& settings, Encoder& encoder);
   ~Recording();
 
-  /// Reads and writes until the settings end it, or Encoder::cancel, end_when, or an interrupt does; then waits for the
-  /// disk. `on_written` is called with each sample after its row was written. When the port is lost it waits for it to
-  /// come back; both are lines, and so are readings that were due and could not be taken. Returns whether the last
-  /// sample was a reading. Throws os::Failure: the disk, and `lost` when the file was removed or replaced; UsageError,
-  /// Failure.
+  /// Reads and writes until the settings, Encoder::cancel, end_when or an interrupt end the recording; then flushes to
+  /// the disk. Calls `on_written` with each sample after its row was written. If the port is lost, waits until it is
+  /// back. Writes rows for loss and return of the port and for readings that were due but not taken. Returns whether
+  /// the last sample was a reading. Throws os::Failure from the disk, with kind `lost` if the file was removed or
+  /// replaced; UsageError, Failure.
   bool run(const std::function<void(const Sample&)>& on_written = {});
 
-  /// Of what is in the files.
+  /// Returns the counts of the rows in the files.
   [[nodiscard]] RecordCounts counts() const;
   /// Returns the number of bytes written so far.
   [[nodiscard]] std::uint64_t bytes() const;
   /// Returns when the recording began, in time of os::now.
   [[nodiscard]] Time start() const;
-  /// The file, or its parts so far in their order.
+  /// Returns the path of the file, or those of its parts so far in their order.
   [[nodiscard]] std::vector<std::string> paths() const;
-  /// "log.csv", or "log-0001.csv to log-0003.csv"
+  /// Returns "log.csv", or "log-0001.csv to log-0003.csv".
   [[nodiscard]] std::string names() const;
 
  private:
