@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// An encoder by its name: read once or for long, when it may be unplugged and come back and its position goes on past
-// the end of its counter, and told to run commands.
+// An encoder, opened by name: single readings, long series of samples that survive a lost port and a counter that
+// wraps, and commands.
 #pragma once
 
 #include <cstdint>
@@ -28,70 +28,74 @@ namespace absenc::client {
 /// Whether the position of a sample can be used; `text_of` has a sentence for each.
 enum class PositionState : std::uint8_t {
   good,
-  unconfirmed,  // `Sample::doubtful`
-  starting,     // not `Reading::ready`
-  invalid,      // `Validity::invalid`
-  unknown,      // `Validity::unknown`
-  none,         // the sample is no reading, or has no position
+  unconfirmed,  // `Sample::doubtful` is true
+  starting,     // `Reading::ready` is false
+  invalid,      // the validity is `Validity::invalid`
+  unknown,      // the validity is `Validity::unknown`
+  none,         // the sample is not a reading, or its reading has no position
 };
 
 [[nodiscard]] std::string_view text_of(PositionState state);
 
-/// What one attempt to read has brought. Times are those of os::now.
+/// Result of one attempt to read. Times are those of os::now.
 struct Sample {
   /// What a sample holds.
   enum class Kind : std::uint8_t {
     reading,
-    failed,  // the encoder or the line
-    lost,    // the port has just gone away
-    absent,  // it is still away
-    back,    // it is there again, but nothing was read yet
+    failed,  // the attempt failed because of the encoder or the line
+    lost,    // the port was lost during this attempt
+    absent,  // the port is still lost
+    back,    // the port is open again; nothing was read yet
   };
 
-  Kind kind = Kind::absent;      ///< What this sample holds.
-  Time at{};                     ///< a reading: when it was latched
-  Reading reading{};             ///< The reading; default if `kind` is not a reading.
-  bool confirmed = false;        ///< two readings in a row agreed
-  bool doubtful = false;         ///< it looked valid, but none agreed with it: it is marked invalid
-  bool position_valid = false;   ///< Whether the position holds.
-  std::int64_t position = 0;     ///< counts, continued past the end of the counter
-  bool restarted = false;        ///< it jumped, or how far it went meanwhile is not known: `position` starts again
-  bool speed_valid = false;      ///< the times of the positions leave little of it open; otherwise there is none
-  double speed = 0;              ///< rpm, of linear encoders mm/s: the mean between two positions, as it was
-                                 ///< `speed_delay` before `at`
-  double speed_uncertainty = 0;  ///< the same unit: how far that mean can be from the true one between the instants at
-                                 ///< which the two were latched. From the times of requests and replies and from one
-                                 ///< count of each position; errors and noise of the encoder are not in it
-  Time speed_delay{};            ///< Time by which the speed lags behind the position.
-  JointAngles angles{};          ///< of joint and motor, where the address says how the encoder sits in its drive
-  Trouble trouble{};             ///< failed
-  std::string message{};         ///< lost, absent, back, restarted
+  Kind kind = Kind::absent;  ///< What this sample holds.
+  Time at{};                 ///< Time at which a reading was latched, or of the event.
+  Reading reading{};         ///< The reading; default if `kind` is not a reading.
+  bool confirmed = false;    ///< Two consecutive readings agreed.
+  /// The position was valid but no second reading agreed with it, so it is marked invalid.
+  bool doubtful = false;
+  bool position_valid = false;  ///< Whether `position` is valid.
+  std::int64_t position = 0;    ///< Position in counts, continued past the end of the encoder's counter.
+  /// The position jumped, or the distance since the last reading is unknown, so `position` starts again.
+  bool restarted = false;
+  /// Whether `speed` is valid: the times of the positions must determine it closely enough.
+  bool speed_valid = false;
+  /// Mean speed between two positions in rpm (mm/s for linear encoders), `speed_delay` before `at`.
+  double speed = 0;
+  /// Greatest distance of `speed` from the true mean between the instants at which the two positions were latched, in
+  /// the same unit. It includes the times of requests and replies and one count of each position, but not errors and
+  /// noise of the encoder.
+  double speed_uncertainty = 0;
+  Time speed_delay{};     ///< Time by which the speed lags behind the position.
+  JointAngles angles{};   ///< Angles of joint and motor, if the address has settings of the drive.
+  Trouble trouble{};      ///< Description of a failed attempt.
+  std::string message{};  ///< Text of the event: lost, absent, back or restarted.
 
-  /// Whether `reading.singleturn` can be used. Of turns `reading.multiturn_validity()` says it, of the position that
-  /// goes on past the counter's end `position_valid`.
+  /// Returns whether `reading.singleturn` can be used. For turns see `reading.multiturn_validity()`; for the position
+  /// past the end of the counter see `position_valid`.
   [[nodiscard]] PositionState position_state() const;
 
-  /// The speed with its uncertainty where it is valid, in rpm, of linear encoders in mm/s.
+  /// Returns the speed with its uncertainty, in rpm (mm/s for linear encoders); nothing if it is invalid.
   [[nodiscard]] std::optional<Estimate> measured_speed() const;
-  /// The same of a rotary encoder; nothing of a linear one.
+  /// Returns the speed of a rotary encoder in rpm; nothing for a linear one.
   [[nodiscard]] std::optional<Estimate> speed_rpm() const;
-  /// The same of a linear encoder; nothing of a rotary one.
+  /// Returns the speed of a linear encoder in mm/s; nothing for a rotary one.
   [[nodiscard]] std::optional<Estimate> speed_mm_s() const;
 
-  /// Why there is no reading, or what happened; "" of a reading that goes on.
+  /// Returns the reason for a missing reading, or the event; "" for a reading without an event.
   [[nodiscard]] std::string text() const { return kind == Kind::failed ? trouble.text() : message; }
 };
 
-/// How an encoder is to be read.
+/// Rate and length of a series of samples.
 struct SampleChoices {
-  double rate_hz = 0;       ///< readings a second; 0: as fast as can be
-  std::uint64_t count = 0;  ///< 0: without end
-  Time deadline = never;    ///< of os::now; the loop ends there, whatever it waits for
+  double rate_hz = 0;       ///< Readings per second; 0: as fast as possible.
+  std::uint64_t count = 0;  ///< Number of samples; 0: no limit.
+  Time deadline = never;    ///< Time of os::now at which the series ends, even during a wait.
 };
 
 class Samples;
 
-/// One thread at a time uses it; only `cancel` may come from another.
+/// An open encoder. One thread at a time may use it; only `cancel` may be called from another thread.
 class Encoder {
  public:
   /// The connection and the state of an encoder. Only the library itself can use it.
@@ -103,27 +107,29 @@ class Encoder {
   Encoder& operator=(Encoder&&) noexcept;
   ~Encoder();
 
-  /// Opens the port again after `disconnect`, or after it was lost. Throws os::Failure, UsageError.
+  /// Opens the port again after `disconnect` or after its loss. Throws os::Failure, UsageError.
   void connect();
-  /// Closes the port. Counters and statistics stay; a reading or a command opens it again.
+  /// Closes the port and keeps counters and statistics. The next reading or command opens the port again.
   void disconnect();
-  /// Whether the port is open: it is from `open` until `disconnect`, or until a sample reports it lost.
+  /// Returns whether the port is open: from `open` until `disconnect`, or until a sample reports the loss of the port.
   [[nodiscard]] bool connected() const;
 
-  /// The position, with all alarms that the encoder can tell. A position that no second one confirmed is not valid. A
-  /// port that was lost is opened again. Throws EncoderFailure, os::Failure, Cancelled; DeadlinePassed when there is
-  /// none at `deadline` (of os::now), up to 20 ms and what one exchange takes later.
+  /// Reads the position and all alarms that the encoder can report. A position that a second one did not confirm is
+  /// invalid. Opens a lost port again. Throws EncoderFailure, os::Failure, Cancelled, and DeadlinePassed without a
+  /// reading at `deadline` (a time of os::now), up to 20 ms and the duration of one exchange later.
   [[nodiscard]] Reading read(Time deadline = never);
-  /// A reading for its alarms: where the unit has a command that reads all of them by name, by that one.
+  /// Reads the alarms, with the command that reads each alarm by name if the unit has one.
   [[nodiscard]] Reading read_alarms();
-  /// For a loop over samples that goes on when the port is lost and comes back. Ends after `count`, or by `cancel`.
+  /// Returns samples for a loop, which continues after a lost port is back. The loop ends after `count` samples, at the
+  /// deadline, or with `cancel`.
   [[nodiscard]] Samples samples(const SampleChoices& choices = {});
-  /// One sample: reads once, or waits a quarter of a second and tries to open the port again. Throws os::Interrupted,
-  /// UsageError, Failure, Cancelled.
+  /// Takes one sample: reads once, or waits a quarter of a second and tries to open the port again. Throws
+  /// os::Interrupted, UsageError, Failure, Cancelled.
   Sample next();
 
-  /// A command of the unit by its name; of arguments that are left out the defaults count. Nobody is asked, even if it
-  /// changes the encoder, but what is written is read back. Throws EncoderFailure, os::Failure, UsageError, Cancelled.
+  /// Runs a command of the unit by name. Arguments that are left out have their defaults. Does not ask the user for
+  /// confirmation, even if the command changes the encoder, but reads back written values. Throws EncoderFailure,
+  /// os::Failure, UsageError, Cancelled.
   Answer run(std::string_view command, std::span<const std::int64_t> arguments = {});
   /// Runs a command of the unit with arguments in their order.
   Answer run(std::string_view command, std::initializer_list<std::int64_t> arguments) {
@@ -133,22 +139,23 @@ class Encoder {
   /// Its bytes, of an encoder that is connected and while this object stays where it is.
   [[nodiscard]] Memory memory() { return Memory(*this); }
 
-  /// What it is set to, of an encoder that is connected and while this object stays where it is.
+  /// Returns the settings of the encoder, which must be connected. This object must stay where it is.
   [[nodiscard]] Settings settings() { return Settings(*this); }
 
-  /// From any thread: what waits, and all later waiting, ends with Cancelled, a loop over samples without.
+  /// Cancels from any thread: every wait, now or later, ends with Cancelled; a loop over samples ends without it.
   void cancel();
-  /// Ends what `cancel` began: the encoder can be used again.
+  /// Withdraws `cancel`, so that the encoder can be used again.
   void resume();
 
-  /// Waiting, also for the time of the next sample, ends with Cancelled also from the moment on in which `over` is
-  /// true. Empty: never. Returns what was so before.
+  /// Sets a function that is polled during every wait, also for the time of the next sample. Once it returns true, the
+  /// wait ends with Cancelled. Empty: none. Returns the previous function.
   std::function<bool()> end_when(std::function<bool()> over);
 
-  /// The state of the last command that changes the encoder; its exception carries the same (change.hpp).
+  /// Returns the state of the last command that changes the encoder; an exception of that command carries the same
+  /// (change.hpp).
   [[nodiscard]] const Change& change() const;
 
-  /// The position starts again from the next reading: after a command that moves the zero.
+  /// Starts the continued position again at the next reading; for use after a command that moves the zero.
   void forget_position();
 
   /// Returns protocol and port, without the settings: "tformat:/dev/ttyUSB0".
@@ -157,26 +164,26 @@ class Encoder {
   [[nodiscard]] const Unit& unit() const;
   /// Returns the options of the encoder.
   [[nodiscard]] const Options& options() const;
-  /// How it sits in its drive, as its address says.
+  /// Returns the settings of the drive in the address.
   [[nodiscard]] const Joint& joint() const;
-  /// What could be better about the port, a sentence each.
+  /// Returns a sentence for each setting of the port that could be better.
   [[nodiscard]] const std::vector<std::string>& notes() const;
-  /// Of all exchanges: good ones, errors by kind, repetitions.
+  /// Returns counts of all exchanges: good ones, errors by kind, repetitions.
   [[nodiscard]] const host::Counters& counters() const;
-  /// From the end of a request to the end of its reply.
+  /// Returns the latencies, from the end of a request to the end of its reply.
   [[nodiscard]] const host::Latencies& latencies() const;
-  /// The last bad exchanges, the newest first, with times of os::now.
+  /// Returns the last bad exchanges, the newest first, with times of os::now.
   [[nodiscard]] std::vector<BadExchangeText> bad_exchanges() const;
-  /// Good readings so far.
+  /// Returns the number of good readings so far.
   [[nodiscard]] std::uint64_t readings() const;
-  /// How often the port went away.
+  /// Returns how often the port was lost.
   [[nodiscard]] std::uint64_t losses() const;
-  /// How often the position started again, because a pause was too long to know how often the shaft turned, or because
-  /// it jumped.
+  /// Returns how often the continued position started again, because of a jump or of a pause too long to count the
+  /// turns.
   [[nodiscard]] std::uint64_t restarts() const;
-  /// Good readings a second.
+  /// Returns the rate of good readings, per second.
   [[nodiscard]] double rate() const;
-  /// A sentence when the shaft can turn too fast for the intended rate to follow its turns; otherwise "".
+  /// Returns a sentence if the shaft can turn too fast for the intended rate to follow its turns; otherwise "".
   [[nodiscard]] std::string rate_note() const;
 
  private:
@@ -185,11 +192,12 @@ class Encoder {
   std::unique_ptr<Parts> parts_;
 };
 
-/// "tformat:/dev/ttyUSB0?model=23-bit", "sim:esl", or a name of absenc.toml, connected; `settings` ("name=value") count
-/// as if they stood behind it. Throws os::Failure; UsageError, which names what is wrong and what is nearest.
+/// Opens an encoder and connects it. `text` is an address, "tformat:/dev/ttyUSB0?model=23-bit" or "sim:esl", or a name
+/// of absenc.toml; `settings` ("name=value") act as if appended to it. Throws os::Failure; UsageError, which names the
+/// wrong part and the nearest right one.
 [[nodiscard]] Encoder open(std::string_view text, std::span<const std::string> settings = {});
 
-/// An input range of samples, at equal distances that do not drift; one that was missed is left out.
+/// An input range of samples at equal distances in time, without drift. A sample whose time has passed is left out.
 class Samples {
  public:
   /// Type of the items.
@@ -205,7 +213,7 @@ class Samples {
   Samples& operator=(Samples&&) noexcept;
   ~Samples();
 
-  /// Takes the first sample. Once.
+  /// Takes the first sample; call it once.
   [[nodiscard]] Iterator begin();
   /// Returns the end of the range.
   [[nodiscard]] static Iterator::End end() { return {}; }
@@ -220,10 +228,10 @@ class Samples {
   std::unique_ptr<Parts> parts_;
 };
 
-/// "" of a reading; "lost", "back"; of a failed attempt the name of the error
+/// Returns "" for a reading, "lost" or "back" for those events, and the name of the error for a failed attempt.
 [[nodiscard]] std::string_view event_name(const Sample& sample);
 
-/// "rpm", or of linear encoders "mm/s"
+/// Returns "rpm", or "mm/s" for a linear encoder.
 [[nodiscard]] std::string_view speed_unit(const Reading& reading);
 
 }  // namespace absenc::client

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The memory of an encoder as an image that can be read, compared, written and verified.
+// The memory of an encoder as an image: read, compare, write and verify.
 #pragma once
 
 #include <cstddef>
@@ -35,41 +35,41 @@ struct MemoryRun {
   std::vector<std::uint8_t> bytes;  ///< The bytes, all on one page.
 };
 
-/// In order; a run ends after `longest` bytes.
+/// Returns the bytes as runs in order of address, each of at most `longest` bytes.
 [[nodiscard]] std::vector<MemoryRun> runs(const MemoryImage& image, std::size_t longest = SIZE_MAX);
 
-/// What a copy of the unit's memory has; the values are 0.
+/// Returns all addresses of a dump of the unit's memory, with values 0.
 [[nodiscard]] MemoryImage dump_addresses(const Unit& unit);
 
-/// The bytes of `wanted` that `found` has not, with the values of `wanted`.
+/// Returns the bytes of `wanted` that are missing or different in `found`.
 [[nodiscard]] MemoryImage differing(const MemoryImage& wanted, const MemoryImage& found);
 
-/// "page 2 address 0x05", or "address 0x05" where there are no pages
+/// Returns "page 2 address 0x05", or "address 0x05" for a memory without pages.
 [[nodiscard]] std::string to_text(const Unit& unit, MemoryAddress at);
 
-/// "page 0 to 5: 0x00 to 0x7E; page 7: 0x04, 0x06"
+/// Returns "page 0 to 5: 0x00 to 0x7E; page 7: 0x04, 0x06".
 [[nodiscard]] std::string addresses_in_words(const Unit& unit, const MemoryImage& image);
 
 enum class Access : std::uint8_t {
   read,
   write,
-  force,  // write also what is protected
+  force,  // also write protected bytes
 };
 
-/// Why this address cannot be reached so, or "".
+/// Returns the reason why this access to the address is impossible, or "".
 [[nodiscard]] std::string closed(const Unit& unit, MemoryAddress at, Access access);
 
-/// Throws UsageError.
+/// Throws UsageError if the unit has no memory that can be read or written.
 void require_memory(const Unit& unit, Access access);
 void require_open(const Unit& unit, const MemoryImage& image, Access access);
 
 class Encoder;
 
-/// Called with how many bytes of how many are done.
+/// Called with the number of finished bytes and the number of all bytes.
 using MemoryProgress = std::function<void(std::size_t done, std::size_t all)>;
 
-/// Of an open encoder (Encoder::memory), which must outlive it. Everything throws EncoderFailure when the encoder
-/// fails, and what the port throws.
+/// The memory of an open encoder, from Encoder::memory. Functions throw EncoderFailure if a command fails, and
+/// exceptions of the port.
 class Memory {
  public:
   /// Reads and writes the memory of `encoder`, which must outlive this object.
@@ -78,15 +78,15 @@ class Memory {
   /// Returns the unit of the encoder.
   [[nodiscard]] const Unit& unit() const;
 
-  /// Reads the position: an encoder of another model than was said shows itself by that. Its memory does not tell, and
-  /// would take the bytes all the same.
+  /// Checks the configured model by a reading of the position. The memory itself does not show a wrong model and would
+  /// accept the bytes.
   void check_model();
 
-  /// What the encoder has at the addresses of `image`, as dump_addresses has all of them. Throws UsageError for those
-  /// that cannot be read.
+  /// Reads the bytes at the addresses of `image`; dump_addresses returns all readable ones. Throws UsageError for
+  /// addresses that cannot be read.
   [[nodiscard]] MemoryImage read(const MemoryImage& image, const MemoryProgress& progress = {});
 
-  /// Returns when it was read back. `before`: what is there, where that is known.
+  /// Writes a byte and reads it back. `before` is the stored value, if it is known.
   void write(MemoryAddress at, std::uint8_t value, Access access, std::optional<std::uint8_t> before = {});
 
  private:
@@ -95,35 +95,35 @@ class Memory {
   Encoder* encoder_;
 };
 
-/// Brings the memory to what is wanted: look, write, verify. Whatever one of them throws, the images say which bytes
-/// are written, and which are not; to do all of it again writes only what still differs.
+/// Changes the memory to a wanted image: look, write, verify. After an exception the images still state which bytes
+/// were written and which were not. A repetition writes only bytes that still differ.
 class MemoryChange {
  public:
-  /// Throws UsageError for what cannot be written.
+  /// Prepares the change. Throws UsageError for addresses that cannot be written.
   MemoryChange(Memory memory, MemoryImage wanted, Access access);
 
-  /// Reads what is there.
+  /// Reads the stored bytes at the wanted addresses.
   void look(const MemoryProgress& progress = {});
-  /// Writes what differs, byte by byte, each read back.
+  /// Writes the differing bytes one by one and reads each back.
   void write(const MemoryProgress& progress = {});
-  /// Reads all that was written once more: a later byte may have changed an earlier one. Throws Failure.
+  /// Reads all written bytes again, because a later write may have changed an earlier byte. Throws Failure.
   void verify(const MemoryProgress& progress = {});
-  /// After a failure: asks whether the byte is there whose write was cut short.
+  /// Reads the byte whose write was interrupted by a failure.
   void settle();
 
   /// Returns the wanted bytes.
   [[nodiscard]] const MemoryImage& wanted() const { return wanted_; }
-  /// What the encoder had at the addresses of `wanted`.
+  /// Returns the bytes that `look` read at the wanted addresses.
   [[nodiscard]] const MemoryImage& found() const { return found_; }
-  /// What it had not, as it is wanted.
+  /// Returns the bytes that differ, with their wanted values.
   [[nodiscard]] const MemoryImage& differing() const { return differing_; }
   /// Returns the bytes that were written and verified.
   [[nodiscard]] const MemoryImage& written() const { return written_; }
   /// Returns the wanted bytes that were not written.
   [[nodiscard]] MemoryImage not_written() const;
-  /// The state of the last byte to be written; not_sent before the first.
+  /// Returns the state of the last byte that was written; not_sent before the first.
   [[nodiscard]] ChangeState state() const { return state_; }
-  /// At most one byte, of which nobody knows whether it was written.
+  /// Returns the byte for which it is unknown whether it was written; at most one.
   [[nodiscard]] MemoryImage unknown() const;
 
  private:

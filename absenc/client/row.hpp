@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Named and typed values: what a command told, or one exchange of a capture.
+// Named and typed values: the result of a command, or one exchange of a capture.
 #pragma once
 
 #include <cstdint>
@@ -18,17 +18,17 @@ enum class Type : std::uint8_t { int64, uint64, real, boolean, flags, text, byte
 
 /// Description of a value in each row.
 struct Column {
-  /// How it is shown where all is text.
+  /// How the value is printed as text.
   struct Look {
-    std::string_view format{};  ///< of a real, as for std::format: "{:.6f}"; "": as short as it is exact
-    bool is_detail = false;     ///< left out where a row is a line of a table
-    bool in_hex = false;        ///< a number that people read in hexadecimal; tables of values have it in decimal
-    /// It repeats the request, or shows the bytes of the answer: the encoder says nothing of itself by it.
+    std::string_view format{};  ///< Format of a real number, as for std::format, "{:.6f}"; "": the shortest exact text.
+    bool is_detail = false;     ///< Left out where each row is a line of a table.
+    bool in_hex = false;        ///< People read the number in hexadecimal; tables of values print it in decimal.
+    /// The value repeats the request or shows the bytes of the reply. It is no property of the encoder.
     bool is_exchange = false;
   };
 
   std::string_view name;     ///< Name of the column, in `snake_case`.
-  std::string_view unit;     ///< "" for a plain number
+  std::string_view unit;     ///< Unit of the value; "" for a plain number.
   Type type;                 ///< Type of the values.
   std::string_view meaning;  ///< Meaning of the value, as a phrase.
   Look look{};               ///< How a table for people shows it.
@@ -36,45 +36,48 @@ struct Column {
 
 using ByteVector = std::vector<std::uint8_t>;
 
-/// In place of a value that was told but does not hold: it is never shown.
+/// Replaces a value that the encoder reported as invalid. The value itself is never shown.
 struct Invalid {
   /// Compares equal: there is one kind of invalid value.
   friend bool operator==(const Invalid&, const Invalid&) = default;
 };
 
-/// In place of a value that no reply has reported so far: alarms that a reply does not carry, whether a position holds.
+/// Replaces a value that no reply has reported so far, such as alarms that a reply does not carry or the validity of a
+/// position.
 struct Unknown {
   /// Compares equal: there is one kind of unknown value.
   friend bool operator==(const Unknown&, const Unknown&) = default;
 };
 
-/// In the order of `Type`, between nothing, which the row does not have, and `Invalid` and `Unknown`.
+/// A value. The alternatives are: nothing, if the row has no value; those of `Type` in its order; `Invalid`; `Unknown`.
 using Value = std::variant<std::monostate, std::int64_t, std::uint64_t, double, bool, Flags, std::string, ByteVector,
                            Invalid, Unknown>;
 
-/// Whether it is one of the types of `Type`.
+/// Returns whether the value has one of the types of `Type`.
 [[nodiscard]] inline bool has_value(const Value& value) {
   return value.index() != 0 && !std::holds_alternative<Invalid>(value) && !std::holds_alternative<Unknown>(value);
 }
 
-/// Flags that are raised, or all clear; otherwise `Unknown`.
+/// Returns the flags if their state is known, otherwise `Unknown`.
 [[nodiscard]] Value value_of(const Flags& flags);
-/// Yes or no, or `Unknown`; nothing of what is absent.
+/// Returns true or false, or `Unknown`; no value if the field is absent.
 [[nodiscard]] Value value_of(Validity validity);
 
-/// "12.5", "yes", "over_heat battery_alarm", "1A 00"; "" where there is no value, and of flags of which none is raised.
+/// Returns "12.5", "yes", "over_heat battery_alarm" or "1A 00"; "" if there is no value or no flag is raised.
 [[nodiscard]] std::string to_text(const Value& value);
-/// The same with its unit: "80 degC".
+/// Returns the value with its unit: "80 degC".
 [[nodiscard]] std::string to_text(const Column& column, const Value& value);
 
-/// Values with their columns. Both are valid while their owner is unchanged.
+/// Values with their columns. Columns and values stay valid while their owner is unchanged.
 struct Row {
-  std::span<const Column> columns;  ///< of the maker of the row
-  std::vector<Value> values;        ///< one for each
+  std::span<const Column> columns;  ///< Descriptions of the values; the maker of the row owns them.
+  std::vector<Value> values;        ///< Values, one for each column.
 
-  /// Throws UsageError when there is no such column; it names the nearest.
+  /// Returns the value of the column `name`. Throws UsageError, which suggests the nearest name, if there is no such
+  /// column.
   [[nodiscard]] const Value& operator[](std::string_view name) const;
-  /// The same as a type of `Value`; throws std::bad_variant_access when it is another, or nothing.
+  /// Returns the value of the column `name` as type `T`. Throws std::bad_variant_access if the value has another type
+  /// or is missing.
   template <class T>
   [[nodiscard]] const T& get(std::string_view name) const {
     return std::get<T>((*this)[name]);
@@ -84,11 +87,11 @@ struct Row {
 [[nodiscard]] Column column_of(const FieldInfo& field);
 [[nodiscard]] Value value_of(const FieldValue& value);
 
-/// What a command told: a row that knows its columns.
+/// Result of a command: a row that owns its columns.
 struct Answer {
   std::vector<Column> columns;  ///< Descriptions of the values.
   std::vector<Value> values;    ///< Values in the order of the columns.
-  /// The names of the columns: those of a word that the user described are no longer there than the encoder is.
+  /// Owners of column names. Names from a described position word otherwise live only as long as the encoder.
   std::vector<std::shared_ptr<const std::string>> names;
 
   /// Returns columns and values as a row, which is valid while this answer is.
@@ -97,8 +100,8 @@ struct Answer {
   [[nodiscard]] const Value& operator[](std::string_view name) const;
 };
 
-/// Makes an answer of fields; those of a position that does not hold are `Invalid`, or `Unknown` where nobody has
-/// reported whether it does. A field that comes again, as in a list, has its last value.
+/// Collects the fields of a reply into an answer. Fields of an invalid position become `Invalid`; those of a position
+/// whose validity nobody has reported become `Unknown`. If a field repeats, as in a list, the last value is stored.
 class AnswerSink final : public FieldSink {
  public:
   /// Adds a column with its value.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Samples as rows of named and typed values: what is printed, recorded and handed on.
+// Converts samples to rows of named and typed values, for printing, recording and export.
 #pragma once
 
 #include <cstdint>
@@ -12,26 +12,26 @@
 
 namespace absenc::client {
 
-/// A row for each sample, and for readings that were due and not taken. Columns: `time_s`, `protocol`; `angle_deg`, of
-/// linear encoders `position_mm` and `position_um`; `singleturn`, `multiturn` with their bits and whether they are
-/// valid; flags; `confirmed`, `ok`; with motion `position`, `unwrapped_mm` (linear), `speed_rpm` or `speed_mm_s`,
-/// the same as `speed_uncertainty_...`, `speed_delay_s`, `missed`; `event`, `message`, `sent`, `received`, which tell
-/// what came in place of a reading.
+/// Rows of samples and of gaps, in which readings were due but not taken. Columns: `time_s`, `protocol`; `angle_deg`,
+/// or for linear encoders `position_mm` and `position_um`; `singleturn` and `multiturn` with their bits and validity;
+/// flags; `confirmed`, `ok`; with motion `position`, `unwrapped_mm` (linear), `speed_rpm` or `speed_mm_s`, the matching
+/// `speed_uncertainty_...`, `speed_delay_s`, `missed`; `event`, `message`, `sent` and `received`, which describe the
+/// failure or event of a row without a reading.
 class SampleRows {
  public:
   /// Whether rows also hold the motion that is computed from readings.
   enum class With : std::uint8_t { reading, motion };
 
-  /// Times count from `start`, which is one of os::now.
-  /// With `joint` there are columns of its angles: `joint_deg` or `joint_mm`, with motion `joint_speed_...` and its
-  /// uncertainty, `electrical_deg`.
+  /// Makes the columns. `time_s` counts from `start`, a time of os::now. With `joint` the rows also have its angles:
+  /// `joint_deg` or `joint_mm`, with motion `joint_speed_...` and its uncertainty, and `electrical_deg`.
   SampleRows(const Unit& unit, const Options& options, Time start, With with, const Joint& joint = {});
 
   /// Returns the columns of each row, in their order.
   [[nodiscard]] std::span<const Column> columns() const { return columns_; }
-  /// Valid until the next.
+  /// Returns the row of a sample. It is valid until the next call.
   [[nodiscard]] const Row& of(const Sample& sample);
-  /// Of rows with motion: so many readings were due and were not taken. Valid until the next.
+  /// Returns the row of a gap in which `missed` readings were due but not taken. Only for rows with motion. It is valid
+  /// until the next call.
   [[nodiscard]] const Row& of_gap(Time at, std::uint64_t missed);
 
  private:
@@ -43,17 +43,17 @@ class SampleRows {
   void fill_angles(const Sample& sample);
 
   const Unit* unit_;
-  double unit_um_;  // 0: rotary
+  double unit_um_;  // Length of a count of a linear encoder, in micrometres; 0: rotary.
   Time start_;
   With with_;
   Joint joint_;
   ReadingColumns reading_;
   std::vector<Column> columns_;
-  // Where they are.
+  // Indexes of columns; 0: the rows do not have the column.
   std::size_t protocol_, reading_at_, confirmed_, ok_;
-  std::size_t motion_ = 0;  // the first of it; 0: there is none
+  std::size_t motion_ = 0;  // first column of motion
   std::size_t missed_ = 0;
-  std::size_t angles_ = 0;  // the first of them; 0: there are none
+  std::size_t angles_ = 0;  // first column of joint angles
   std::size_t event_, message_, sent_, received_;
   Row row_;
 };

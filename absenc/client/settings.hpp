@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What an encoder is set to: read by name, written and read back.
+// Settings of an encoder: read by name, written, and read back.
 #pragma once
 
 #include <cstdint>
@@ -14,7 +14,7 @@
 
 namespace absenc::client {
 
-/// How a setting is written and how it is read: null when nothing reads it.
+/// The commands that write and read a setting.
 struct Setting {
   const Command* setter;  ///< Command that writes the setting; null: read only.
   const Command* getter;  ///< Command that reads the setting; null: write only.
@@ -23,31 +23,33 @@ struct Setting {
   [[nodiscard]] std::string_view name() const { return getter != nullptr ? getter->name : setter->name; }
 };
 
-/// By which an encoder is asked what it is and what it is set to, in the order in which that is best told: commands
-/// that need no argument.
+/// Returns the commands that read identity and settings of an encoder without arguments, in the order for a report.
 [[nodiscard]] std::vector<const Command*> questions(const Unit& unit);
-/// Those of them that there are with these options.
+/// Returns those of these commands that exist with the options.
 [[nodiscard]] std::vector<const Command*> questions(const Unit& unit, const Options& options);
 
-/// Those that can be read, at least one. Throws UsageError.
+/// Returns the settings that can be read, at least one. Throws UsageError if there are none.
 [[nodiscard]] std::vector<const Command*> readable_settings(const Unit& unit);
-/// Throws UsageError, which names the nearest, when there is none of that name; and when it cannot be read.
+/// Returns the command that reads the setting. Throws UsageError, which suggests the nearest name, if the setting does
+/// not exist or cannot be read.
 [[nodiscard]] const Command& require_readable_setting(const Unit& unit, std::string_view name);
-/// Throws UsageError, which names the nearest, when there is none of that name; and when it can only be read.
+/// Returns the setting. Throws UsageError, which suggests the nearest name, if the setting does not exist or is read
+/// only.
 [[nodiscard]] Setting require_setting(const Unit& unit, std::string_view name);
 
 /// A setting with its values before and after.
 struct SettingChange {
-  Answer now;           ///< as the encoder tells when it is asked anew; of what cannot be read, as it was written
-  bool was_so = false;  ///< nothing was sent, because it was so already
-  ChangeState state = ChangeState::none;  ///< not_sent where it was so already
-  std::string note{};                     ///< "from now on it is reached with address=3", or ""
+  Answer now;           ///< Value that was read back; for a setting that cannot be read, the written value.
+  bool was_so = false;  ///< Nothing was sent, because the encoder had this value already.
+  ChangeState state = ChangeState::none;  ///< State of the change; not_sent if the encoder had this value already.
+  /// A sentence about a new address, "from now on it is reached with address=3", or "".
+  std::string note{};
 };
 
 class Encoder;
 
-/// Of an open encoder (Encoder::settings), which must outlive it. Everything throws EncoderFailure when the encoder
-/// fails, UsageError, and what the port throws.
+/// The settings of an open encoder, from Encoder::settings. Functions throw EncoderFailure if a command fails,
+/// UsageError, and exceptions of the port.
 class Settings {
  public:
   /// Reads and writes the settings of `encoder`, which must outlive this object.
@@ -55,8 +57,9 @@ class Settings {
 
   /// Returns the value of a setting.
   [[nodiscard]] Answer get(std::string_view name);
-  /// Writes, and compares what the encoder is set to then, value by value. Nobody is asked. What reaches the encoder
-  /// by this setting reaches it by the new one. Throws also Failure: it says what was written, as far as that is known.
+  /// Writes a setting without confirmation by the user, reads it back and compares value by value. If the setting
+  /// changes how the encoder is reached, the connection uses the new value. Also throws Failure, whose text states what
+  /// was written, as far as it is known.
   SettingChange set(std::string_view name, std::span<const std::int64_t> arguments);
 
  private:

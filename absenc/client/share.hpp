@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// A share that was counted, and how sure it is.
+// A counted share with its confidence interval.
 #pragma once
 
 #include <cstdint>
 
 namespace absenc::client {
 
-/// How many of how many, with the interval of 95 % confidence in which the true rate is (Wilson).
+/// A number of hits among a number of tries. The true rate is in the Wilson interval with 95 % confidence.
 struct Share {
   std::uint64_t count = 0;  ///< Number of hits.
   std::uint64_t of = 0;     ///< Number of tries.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Listens to a line on which two others speak, and sends nothing.
+// Listens to the traffic between a host and its encoders, without sending.
 #pragma once
 
 #include <memory>
@@ -16,17 +16,18 @@ namespace absenc::client {
 
 /// What `tap` decodes, and how.
 struct TapChoices {
-  std::string protocol{};              ///< "": found out from what is received
+  std::string protocol{};              ///< Identifier of the unit; "": detected from the received bytes.
   std::string model{};                 ///< Name of a model of the unit; empty: none.
-  std::vector<std::string> options{};  ///< "name=value"
-  Time duration{};                     ///< 0: until `cancel`, or the end of the input
-  std::string record{};                ///< file to write all frames to, which `decode` reads; "": none
-  bool replaces = false;               ///< the file of `record` may be there already
+  std::vector<std::string> options{};  ///< Options of the unit, as "name=value".
+  Time duration{};                     ///< Time after which the tap ends; 0: at `cancel`, or at the end of the input.
+  /// File to which all frames are written, in a format that `decode` reads; "": none.
+  std::string record{};
+  bool replaces = false;  ///< Whether an existing file of `record` may be replaced.
 };
 
-/// An input range of rows, as `Decoded` has them, in the order in which they ended, each as soon as it is whole. What
-/// comes while nobody takes a row is kept. `time_s` is the time of arrival at this computer, since the first byte; how
-/// long an encoder took to answer cannot be told from that, so `turnaround_us` is empty.
+/// An input range of rows, with the columns of `Decoded`, ordered by the end of their frames and available as soon as
+/// the frame is complete. Bytes that arrive between two calls are stored. `time_s` is the time of arrival at this
+/// computer since the first byte. It is too coarse for the latency of an encoder, so `turnaround_us` is empty.
 class Tap {
  public:
   /// Type of the items.
@@ -35,8 +36,8 @@ class Tap {
   using Iterator = InputIterator<Tap>;
 
   /// Opens `place`, a port with its settings ("/dev/ttyUSB0?baud=115200", "tcp:HOST:PORT"), or "-" for raw bytes from
-  /// standard input, and waits until protocol and options are known. A serial port is opened without writing. Throws
-  /// os::Failure, UsageError, Failure: no protocol explains what came.
+  /// standard input, and waits until protocol and options are known. Writes nothing to a serial port. Throws
+  /// os::Failure, UsageError, and Failure if no protocol explains the received bytes.
   explicit Tap(const std::string& place, const TapChoices& choices = {});
   /// Moves the tap; the other one may only be destroyed or assigned to.
   Tap(Tap&&) noexcept;
@@ -44,7 +45,7 @@ class Tap {
   Tap& operator=(Tap&&) noexcept;
   ~Tap();
 
-  /// Waits for the first row. Once. Throws, as each step does, os::Failure, Failure.
+  /// Waits for the first row; call it once. Throws os::Failure or Failure, as every later step does.
   [[nodiscard]] Iterator begin();
   /// Returns the end of the range.
   [[nodiscard]] static Iterator::End end() { return {}; }
@@ -52,12 +53,12 @@ class Tap {
   [[nodiscard]] const Row* current() const { return row_; }
   /// Waits for the next row.
   void advance();
-  /// From any thread: who waits for a row, now or later, gets Cancelled.
+  /// Cancels from any thread: a caller that waits for a row, now or later, gets Cancelled.
   void cancel();
 
   /// Returns the identifier of the unit.
   [[nodiscard]] std::string_view protocol() const;
-  /// "name=value", the fewest that make its options.
+  /// Returns the shortest list of settings that yields the options, as "name=value".
   [[nodiscard]] std::vector<std::string> options() const;
   /// Returns the columns of each row, in their order.
   [[nodiscard]] std::span<const Column> columns() const;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// For tests.
+// Helpers that the tests of the client library share.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -10,7 +10,7 @@
 
 namespace absenc::client {
 
-/// A path of this test alone.
+/// Returns a path of a temporary file that no other test uses.
 inline std::string own_path(std::string_view what) {
   return testing::TempDir() + "absenc-client-" + std::string(what) + std::to_string(std::random_device{}());
 }

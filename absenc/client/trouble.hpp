@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Why an encoder did not do what it was asked, in words and with what went over the line.
+// Description of a failed command, in words and with the bytes on the line.
 #pragma once
 
 #include <string>
@@ -12,32 +12,33 @@
 
 namespace absenc::client {
 
-/// A failed command in words. The texts but `error` may be empty.
+/// A failed command in words. Every text may be empty.
 struct Trouble {
   Error error = Error::none;  ///< Why the conversation failed.
-  std::string message{};      ///< what happened, and what the reply turns out to be
-  std::string exchange{};     ///< what was sent, what came back and when
-  std::string advice{};       ///< what to try
-  std::string sent{};         ///< hexadecimal or as the link's wire text
+  std::string message{};      ///< What happened, and how the reply was identified.
+  std::string exchange{};     ///< Request and reply with their times.
+  std::string advice{};       ///< What the user can try.
+  std::string sent{};         ///< The sent bytes, as the link's wire text.
   std::string received{};     ///< The received bytes in hexadecimal; empty: none.
-  Change change{};            ///< of a command that changes the encoder
-  std::string finding{};      ///< of a reading: which of those of client/doctor.hpp it looks like, "only_echo: ..."
+  Change change{};            ///< State of the change; only of a command that changes the encoder.
+  /// Finding of client/doctor.hpp that a failed reading looks like, "only_echo: ..."; "": none.
+  std::string finding{};
 
-  /// Without the finding. Of several lines, without the last line end.
+  /// Returns the texts without the finding and without a last line end. May have several lines.
   [[nodiscard]] std::string text() const;
 };
 
-/// A bad exchange that was kept.
+/// A stored bad exchange.
 struct BadExchangeText {
   Error error = Error::none;  ///< Why the exchange failed.
-  Time at{};                  ///< on the clock of the readings
-  std::string sent{};         ///< as the link's wire text
+  Time at{};                  ///< Time of the exchange, on the clock of the readings.
+  std::string sent{};         ///< The sent bytes, as the link's wire text.
   std::string received{};     ///< The received bytes in hexadecimal; empty: none.
 };
 
-/// A command that the encoder did not do, or a reading that failed.
+/// A command that failed, or a reading that failed.
 struct EncoderFailure : Failure {
-  /// Describes `what_failed` in its text.
+  /// Makes an exception with the text of `what_failed`.
   explicit EncoderFailure(Trouble what_failed) : Failure(what_failed.text()), trouble(std::move(what_failed)) {}
   Trouble trouble;  ///< What failed, with the evidence.
 };

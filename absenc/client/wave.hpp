@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A conversation with a virtual encoder, in virtual time, as a waveform of its wires.
+// Draws the waveform of a conversation with a virtual encoder, in virtual time.
 #pragma once
 
 #include <cstdint>
@@ -13,27 +13,29 @@
 
 namespace absenc::client {
 
-/// What `wave` draws, and how many times.
+/// Commands that `wave` draws, and how often.
 struct WaveChoices {
-  std::vector<std::string> commands{};   ///< with arguments, as "memory-read 5", one after the other; none: reads
-  std::uint64_t count = 1;               ///< results, at least 1
-  double rate = 1000;                    ///< results a second; less where the line cannot
-  std::uint64_t samples_per_second = 0;  ///< of .sr files, up to 1e9; 0: 16 for each bit of the line
-  bool replaces = false;                 ///< the file may be there already
-  /// Called now and then with what is done; what it throws ends it, and no file is left.
+  /// Commands with their arguments, as "memory-read 5", drawn in this order; empty: readings.
+  std::vector<std::string> commands{};
+  std::uint64_t count = 1;               ///< Number of results, at least 1.
+  double rate = 1000;                    ///< Results per second; fewer if the line is slower.
+  std::uint64_t samples_per_second = 0;  ///< Sample rate of .sr files, up to 1e9; 0: 16 samples per bit of the line.
+  bool replaces = false;                 ///< Whether an existing file may be replaced.
+  /// Called from time to time with the present step. An exception of it ends the drawing and leaves no file.
   std::function<void(const std::string& what)> progress{};
 };
 
 /// Result of `wave`.
 struct Waved {
-  std::uint64_t results = 0;         ///< Number of readings that were drawn.
-  std::uint64_t failures = 0;        ///< of them
-  Time time{};                       ///< of the whole waveform
+  std::uint64_t results = 0;         ///< Number of results that were drawn, failures included.
+  std::uint64_t failures = 0;        ///< Number of results that are failures.
+  Time time{};                       ///< Duration of the whole waveform.
   std::vector<std::string> wires{};  ///< Names of the wires in the file.
 };
 
-/// Writes `file`, whose name ends in .vcd, .sr (sigrok) or .csv (as Saleae Logic 2). `text`: "tformat?motion=rpm=60",
-/// with or without "sim:" in front; `settings` as those of `open`. Throws UsageError, Failure, os::Failure.
+/// Draws a waveform into `file`, whose name ends in .vcd, .sr (sigrok) or .csv (like Saleae Logic 2). `text` is
+/// "tformat?motion=rpm=60", with or without a leading "sim:"; `settings` are those of `open`. Throws UsageError,
+/// Failure, os::Failure.
 [[nodiscard]] Waved draw_wave(std::string_view text, std::span<const std::string> settings, const std::string& file,
                               const WaveChoices& choices = {});
 
