@@ -159,7 +159,7 @@ Cost decode(const File& file, unsigned threads) {
   const std::vector<AsyncLine> lines{{0, {.baud = 2'500'000, .idle = Idle::high}}};
   AsyncOutcome outcome;
   const Cost cost = cost_of([&] {
-    outcome = decode_async(reader, lines, threads, [&](const Part& part) {
+    outcome = decode_async(reader, lines, threads, [&](const DecodedPart& part) {
       for (const Character& c : part.characters)
         wrong += c.bad_stop || c.value != byte_at(c.begin / ticks_per_character);
       count += part.characters.size();
