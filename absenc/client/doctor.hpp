@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What is wrong with an encoder, or with the way to it: looked for from the port up, each finding as data.
+// Diagnoses an encoder and its connection, from the port upwards. Each finding is data.
 #pragma once
 
 #include <cstddef>
@@ -15,7 +15,7 @@
 
 namespace absenc::client {
 
-/// What can be found, in the order in which it is looked for.
+/// Kinds of findings, in the order of the diagnosis.
 enum class Ailment : std::uint8_t {
   // The port
   port_missing,
@@ -74,7 +74,7 @@ enum class Ailment : std::uint8_t {
   reply_late,
   sometimes_late,
   reply_slow,
-  // What the encoder says
+  // The reports of the encoder
   starting,
   alarm,
   status,
@@ -88,76 +88,79 @@ enum class Ailment : std::uint8_t {
 };
 
 enum class Severity : std::uint8_t {
-  note,     // good to know
-  warning,  // it works, but less well than it could, or not for long
-  fault,    // it does not work, or what it says is not to be trusted
+  note,     // information, no action needed
+  warning,  // the encoder works, but not as well as it could, or not for long
+  fault,    // the encoder does not work, or its values cannot be trusted
 };
 
-/// Which of them, as data and in words.
+/// A finding, as data and in words.
 struct Finding {
   Ailment ailment{};       ///< The fault that was found.
-  std::string_view id{};   ///< "only_echo"
+  std::string_view id{};   ///< Identifier of the kind, as "only_echo".
   Severity severity{};     ///< How serious it is.
-  std::string evidence{};  ///< what was seen
-  std::string cause{};     ///< what is most likely behind it
-  std::string action{};    ///< what to do
+  std::string evidence{};  ///< What was observed.
+  std::string cause{};     ///< The most probable cause.
+  std::string action{};    ///< What the user should do.
 
-  /// "only_echo: EVIDENCE. Likely: CAUSE. Try: ACTION", on one line.
+  /// Returns "only_echo: EVIDENCE. Likely: CAUSE. Try: ACTION", on one line.
   [[nodiscard]] std::string sentence() const;
 };
 
-/// How much the readings reported: what none of them reports cannot be called good.
+/// Extent of the readings' reports. A property that no reading reports cannot be called good.
 struct Reported {
-  std::size_t alarms = 0;  ///< readings that report every alarm of the protocol
-  std::size_t valid = 0;   ///< readings that report that their position holds
-  std::string missing{};   ///< the alarms that no reading reports, as "over_speed, over_heat"
+  std::size_t alarms = 0;  ///< Number of readings that report every alarm of the protocol.
+  std::size_t valid = 0;   ///< Number of readings that report a valid position.
+  std::string missing{};   ///< Names of alarms that no reading reports, as "over_speed, over_heat".
 };
 
-/// How the readings were come by.
+/// Measurements of the readings and of the line.
 struct Measured {
-  Time time{};          ///< from the first to the last of them
-  double failures = 1;  ///< the share of failures is below it, at 95 % confidence (Wilson)
-  Time quickest{};      ///< from the end of a request to the end of its reply; 0: not known
-  Time slowest{};       ///< of good ones
-  double rate = 0;      ///< good readings a second; 0: not known
-  std::string echo{};   ///< of the adapter: "echo seen", "no echo", "echo=off" as it was said; "": a line that has none
-  std::optional<Time> latency{};  ///< of the way, as the latency timer or latency= says; nothing: not known
-  bool turned = false;            ///< the position was looked at while the shaft was turned
+  Time time{};          ///< Time from the first to the last reading.
+  double failures = 1;  ///< Upper limit of the share of failed readings, 0 to 1, at 95 % confidence (Wilson).
+  Time quickest{};      ///< Shortest time from the end of a request to the end of its good reply; 0: not known.
+  Time slowest{};       ///< Longest time from the end of a request to the end of its good reply; 0: not known.
+  double rate = 0;      ///< Good readings per second; 0: not known.
+  /// Echo of the adapter: "echo seen", "no echo", or the setting, "echo=off"; "": the line has none.
+  std::string echo{};
+  /// Latency of the connection, from the latency timer or the setting latency=; nothing: not known.
+  std::optional<Time> latency{};
+  bool turned = false;  ///< Whether positions were also read while the shaft was turned.
 };
 
 /// Result of `doctor`: its findings, and the measurements behind them.
 struct Examination {
-  std::vector<Finding> findings{};  ///< in the order in which they are to be mended
-  std::size_t tried = 0;            ///< readings
-  std::size_t good = 0;             ///< of them
+  std::vector<Finding> findings{};  ///< Findings, the first one to mend first.
+  std::size_t tried = 0;            ///< Number of attempts to read.
+  std::size_t good = 0;             ///< Number of good readings.
   Reported reported{};              ///< What the encoder reported about itself.
   Measured measured{};              ///< What was measured on the line.
-  bool complete = true;             ///< false: it was interrupted
+  bool complete = true;             ///< False if the diagnosis was interrupted.
 
-  /// Whether nothing is to be mended.
+  /// Returns whether no finding needs to be mended.
   [[nodiscard]] bool healthy() const;
-  /// The first thing to mend; null: nothing is.
+  /// Returns the first finding to mend; null if none.
   [[nodiscard]] const Finding* first() const;
-  /// "good: ..." or "first: ...", one line.
+  /// Returns one line, "good: ..." or "first: ...".
   [[nodiscard]] std::string verdict() const;
 };
 
-/// What `doctor` may do and how long it looks.
+/// Length of the diagnosis, and its callbacks.
 struct DoctorChoices {
-  std::size_t readings = 100'000;        ///< at most
-  Time limit = std::chrono::seconds(3);  ///< how long it reads
-  Time turning{};                        ///< how long the shaft is then read while somebody turns it by hand; 0: not
-  std::function<void(const std::string& what)> progress{};  ///< what is done now
-  std::function<bool()> over{};  ///< true: it ends with Cancelled. Asked all the time. Empty: never
+  std::size_t readings = 100'000;        ///< Greatest number of readings.
+  Time limit = std::chrono::seconds(3);  ///< Time limit of the readings.
+  Time turning{};                        ///< Time of further readings while the user turns the shaft by hand; 0: none.
+  std::function<void(const std::string& what)> progress{};  ///< Called with the present step.
+  /// Polled all the time; once it returns true, the diagnosis ends with Cancelled. Empty: never.
+  std::function<bool()> over{};
 };
 
-/// "note", "warning", "fault"
+/// Returns "note", "warning" or "fault".
 [[nodiscard]] std::string_view name_of(Severity severity);
-/// "only_echo"
+/// Returns the identifier of the kind, as "only_echo".
 [[nodiscard]] std::string_view id_of(Ailment ailment);
 
-/// Looks from the port up and reads; nothing is ever written to the encoder. `text` and `settings` as those of `open`.
-/// A port that does not open is a finding. Throws UsageError, Cancelled.
+/// Diagnoses an encoder from the port upwards, by readings; never writes to the encoder. `text` and `settings` are
+/// those of `open`. A port that does not open is a finding. Throws UsageError, Cancelled.
 [[nodiscard]] Examination examine(std::string_view text, std::span<const std::string> settings = {},
                                   const DoctorChoices& choices = {});
 

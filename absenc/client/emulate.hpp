@@ -35,7 +35,8 @@ struct RequestCounts {
   std::uint64_t good = 0;
   /// Number of byte runs that are no request, and of damaged characters, since the first good request.
   std::uint64_t bad = 0;
-  std::uint64_t before = 0;    ///< The same before the first good request; 0 until there is one.
+  /// Number of the same byte runs and characters before the first good request; 0 until there is one.
+  std::uint64_t before = 0;
   std::string first_bad = {};  ///< First byte run that counts in `bad`, as text.
 };
 

@@ -136,7 +136,7 @@ class Encoder {
     return run(command, std::span(arguments.begin(), arguments.size()));
   }
 
-  /// Its bytes, of an encoder that is connected and while this object stays where it is.
+  /// Returns the memory of the encoder, which must be connected. This object must stay where it is.
   [[nodiscard]] Memory memory() { return Memory(*this); }
 
   /// Returns the settings of the encoder, which must be connected. This object must stay where it is.

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Runs the commands of a unit on a port and keeps each exchange as it was on the line: for readings, doctor, conform
-// and identify, which differ in what they look at. Its only clock is that of the port.
+// Runs the commands of a unit on a port and stores each exchange as it was on the line. Readings, doctor, conform and
+// identify use it. The port is its only clock.
 #pragma once
 
 #include <algorithm>
@@ -21,33 +21,33 @@
 
 namespace absenc::client {
 
-/// A command that was run once: how it ended, and its last exchange.
+/// Result of a command that was run once, with its last exchange.
 struct Attempted {
   Error error = Error::none;
-  std::string detail{};                  // in the words of the unit
-  std::string advice{};                  // of the unit; "": none
-  Time began{};                          // on the port's clock
-  capture::ObservedExchange exchange{};  // the last one, without echo
-  std::vector<std::uint8_t> raw{};       // all bytes that came, echo included
-  bool heard = false;                    // something came, be it an echo
-  bool answered = false;                 // something came that is no echo
-  std::uint64_t unanswered = 0;          // requests before the last, behind which nothing came
-  std::uint64_t discarded = 0;  // damaged frames of a stream since the one before; `error` may report one of them
-  Time answered_after{};        // from the end of the request to the beginning of the reply
-  Time limit{};                 // of that: what the protocol and the way allow; 0: none
-  Time after{};                 // from the end of the request to the end of the reply
-  Time allowed{};               // that the protocol and the characters of the reply take at most
+  std::string detail{};                  // description of the error by the unit
+  std::string advice{};                  // advice of the unit; "": none
+  Time began{};                          // start of the command, on the port's clock
+  capture::ObservedExchange exchange{};  // last exchange, without echo
+  std::vector<std::uint8_t> raw{};       // all received bytes, including the echo
+  bool heard = false;                    // anything was received, even only an echo
+  bool answered = false;                 // something other than an echo was received
+  std::uint64_t unanswered = 0;          // number of requests without reply, not counting the last request
+  std::uint64_t discarded = 0;  // damaged frames of a stream since the previous result; `error` may report one of them
+  Time answered_after{};        // time from the end of the request to the beginning of the reply
+  Time limit{};                 // limit of `answered_after`, from protocol and connection; 0: none
+  Time after{};                 // time from the end of the request to the end of the reply
+  Time allowed{};               // greatest `after` that the protocol and the characters of the reply allow
   std::optional<Reading> reading{};
-  std::optional<std::int64_t> counter{};  // the first field that counts the replies
+  std::optional<std::int64_t> counter{};  // value of the first field that counts replies
   const FieldInfo* counter_field = nullptr;
-  bool possible = true;  // false: the unit cannot do it with these options
+  bool possible = true;  // false: the unit cannot run the command with these options
 
-  /// Whether the reply began after its limit.
+  /// Returns whether the reply began after its limit.
   [[nodiscard]] bool is_late() const { return answered && limit > Time{} && answered_after > limit; }
 };
 
-/// A request and its reply, without echo. `clocks`: of a clocked link. Of several CAN frames the last one is the reply:
-/// what came before it was for others.
+/// Returns a request and its reply, without echo. `clocks` is the number of clocks of a clocked link. Of several
+/// received CAN frames the last one is the reply; earlier ones were for other nodes.
 template <class Item>
 [[nodiscard]] capture::ObservedExchange heard_exchange(std::span<const Item> request, std::span<const Item> reply,
                                                        std::size_t clocks) {
@@ -67,7 +67,7 @@ template <class Item>
   return heard_exchange<Item>(line.request, line.reply(), line.clocks);
 }
 
-/// Takes the counter of the replies out of what a command reports.
+/// Stores the counter of replies from the fields that a command reports.
 class CounterSink final : public FieldSink {
  public:
   explicit CounterSink(Attempted& attempt) : attempt_(attempt) {}
@@ -82,14 +82,14 @@ class CounterSink final : public FieldSink {
   Attempted& attempt_;
 };
 
-/// How long a command is run again and again.
+/// Limits of a series of runs of one command.
 struct Series {
   std::size_t count = 0;
-  Time limit = never;                       // of all of them
-  Time patience = std::chrono::seconds(2);  // since the last good one
-  std::size_t most_silent = 8;              // in vain, until nobody is there,
-  Time least{};                             // but no sooner than this
-  std::size_t most_bad = 24;                // without a good one
+  Time limit = never;                       // duration of the series
+  Time patience = std::chrono::seconds(2);  // time since the last good reply
+  std::size_t most_silent = 8;              // runs without any received byte after which the series ends,
+  Time least{};                             // though not before this time
+  std::size_t most_bad = 24;                // runs without a good reply after which the series ends
 };
 
 template <class Item>
@@ -97,7 +97,7 @@ class Runner {
  public:
   static constexpr bool is_can = std::is_same_v<Item, CanFrame>;
 
-  /// `attempts`: how often a command that may be repeated is run.
+  /// `attempts` is how often a command that may be repeated is run.
   explicit Runner(const EncoderAddress& address, unsigned attempts = 1)
       : unit_(*address.unit),
         options_(address.options),
@@ -112,22 +112,23 @@ class Runner {
   Runner(const Runner&) = delete;
   Runner& operator=(const Runner&) = delete;
 
-  /// The port to use from now on. `latency`: of the way to the line.
+  /// Uses `port` from now on. `latency` is the latency of the connection to the line.
   void attach(Port<Item>& port, Time latency = {}) {
     port_.attach(port);
     latency_ = latency;
   }
 
-  // ---- Hooks, of `run` and `once`. They may throw, which ends the conversation.
+  // ---- Hooks of `run` and `once`. An exception of a hook ends the conversation.
 
-  std::function<void(std::vector<Item>& request)> edit{};                 // before it is sent
-  std::function<void(Step<Item>& step, Time now)> on_step{};              // each that the conversation takes
-  std::function<void(const Event<Item>& event)> on_event{};               // each that it is fed, without echo
-  std::function<void(const LineExchange<Item>& exchange)> on_exchange{};  // each that is over
+  std::function<void(std::vector<Item>& request)> edit{};     // called with each request before it is sent
+  std::function<void(Step<Item>& step, Time now)> on_step{};  // called with each step of the conversation
+  // called with each event for the conversation, without echo
+  std::function<void(const Event<Item>& event)> on_event{};
+  std::function<void(const LineExchange<Item>& exchange)> on_exchange{};  // called with each finished exchange
 
   // ---- Commands
 
-  /// What was sent before is forgotten: the reply to it is not waited for, nor kept away.
+  /// Starts a new session, which forgets earlier requests: it neither waits for their replies nor discards them.
   void start_again(unsigned attempts = 1) {
     if (session_) {
       echo_ = session_->echo().mode();
@@ -137,16 +138,17 @@ class Runner {
     session_.emplace(unit_, options_, port_, std::span(storage_.get(), unit_.host_storage), echo_, attempts);
     session_->set_filter(&filter_);
   }
-  /// From the next command on.
+  /// Sets the options, from the next command on.
   void set_options(const Options& options) {
     options_ = options;
     session_->set_options(options);
   }
 
-  /// `use(session)` runs one command and returns its conversation.
+  /// Calls `use(session)`, which runs one command and returns its conversation.
   template <class Use>
   const Conversation<Item>* converse(const Use& use) {
-    if (requests_before_ == port_.requests) port_.last.clear();  // nothing was asked: what came was for that command
+    // the last command sent no request, so the received bytes belong to it
+    if (requests_before_ == port_.requests) port_.last.clear();
     requests_before_ = port_.requests;
     received_before_ = port_.last.received.size();
     unanswered_ = 0;
@@ -162,11 +164,12 @@ class Runner {
     answered_ = ended != nullptr && ended->error() == Error::none ? port_.last.received.size() : 0;
     return ended;
   }
-  /// One command to its end; null when the unit cannot run it. A conversation that streams goes on to its next result.
+  /// Runs one command to its end; returns null if the unit cannot run it. A streaming conversation continues to its
+  /// next result.
   const Conversation<Item>* run(const Command& command, Arguments arguments = {}) {
     return converse([&](host::Session<Item>& session) { return session.next(command, arguments); });
   }
-  /// The same, as a record.
+  /// Runs one command to its end and returns its result and its last exchange.
   Attempted once(const Command& command, Arguments arguments = {}) {
     const std::uint64_t discarded = session_->counters().discarded;
     Attempted one;
@@ -191,12 +194,12 @@ class Runner {
     return one;
   }
 
-  /// `attempt()` returns an Attempted each time. Ends early when there is nobody, or nothing good comes.
+  /// Calls `attempt()`, which returns an Attempted, again and again. Ends early if no reply or no good reply comes.
   template <class Attempt>
   void repeat(const Series& series, const Attempt& attempt, std::vector<Attempted>& into) {
     const Time begin = port_.now();
     const Time end = series.limit == never ? never : begin + series.limit;
-    // On a line that is never silent.
+    // The deadline ends an attempt on a line that is never silent.
     const Time outer = port_.deadline;
     const Time latest = end == never ? never : begin + 2 * series.limit;
     port_.deadline = std::min(outer, latest);
@@ -226,9 +229,9 @@ class Runner {
     }
   }
 
-  // ---- Without asking
+  // ---- Listening without a request
 
-  /// Hears for so long; what comes belongs to the last exchange. `on_items(items)` returns whether to go on.
+  /// Listens for `time` and adds received items to the last exchange. `on_items(items)` returns whether to continue.
   template <class OnItems>
   void listen(Time time, const OnItems& on_items) {
     const Step<Item> step{.at = port_.now() + time};
@@ -241,7 +244,7 @@ class Runner {
   void listen(Time time) {
     listen(time, [](std::span<const Item>) { return true; });
   }
-  /// Until nothing has come for `quiet`, and no longer than `longest`. Returns whether anything came.
+  /// Waits until nothing was received for `quiet`, at most for `longest`. Returns whether anything was received.
   bool settle(Time quiet, Time longest) {
     bool heard = false;
     const Time end = port_.now() + longest;
@@ -255,27 +258,27 @@ class Runner {
     return heard;
   }
 
-  // ---- What was seen
+  // ---- Observations
 
-  /// The last exchange, with what came behind it until now.
+  /// Returns the last exchange with everything that was received since.
   [[nodiscard]] const LineExchange<Item>& last() const { return port_.last; }
-  /// How many replies came late: began after their limit, or answered an earlier request than the one behind which they
-  /// came.
+  /// Returns the number of late replies: those that began after their limit, or answered an earlier request than the
+  /// last one.
   [[nodiscard]] std::uint64_t late() const {
     const std::uint64_t seen = late_ + (lateness_of(last()) != Time{} ? 1 : 0);
     return std::max(seen, late_before_ + session_->counters().late);
   }
-  /// How long after its request the latest of them came; 0: none did.
+  /// Returns the longest time between a request and its late reply; 0: no reply was late.
   [[nodiscard]] Time lateness() const { return std::max({lateness_, lateness_of(last()), session_->lateness()}); }
 
-  /// How many good replies more came behind, though nobody had asked; not on a CAN bus.
+  /// Returns the number of good replies with further bytes after them that no request explains; 0 on a CAN bus.
   [[nodiscard]] std::uint64_t overfull() const { return overfull_; }
-  /// The most items that came behind one of them.
+  /// Returns the greatest number of items after such a good reply.
   [[nodiscard]] std::size_t most_behind() const { return most_behind_; }
-  /// All that came in the last such exchange.
+  /// Returns all items that were received in the last such exchange.
   [[nodiscard]] std::span<const Item> overfull_example() const { return overfull_example_; }
 
-  /// What is known of `one` by now, whose exchange was the last.
+  /// Copies the last exchange into `one`, which is its result.
   void keep_exchange(Attempted& one) const {
     const LineExchange<Item>& line = last();
     const bool asked = requests_before_ != port_.requests;
@@ -295,7 +298,7 @@ class Runner {
     if constexpr (!is_can) one.raw.assign(received.begin(), received.end());
   }
 
-  /// The time of a character on the line; 0: it carries none.
+  /// Returns the duration of a character on the line; 0: the line carries no characters.
   [[nodiscard]] Time character() const { return character_; }
   [[nodiscard]] WatchedPort<Item>& port() { return port_; }
   [[nodiscard]] const WatchedPort<Item>& port() const { return port_; }
@@ -332,7 +335,7 @@ class Runner {
     std::vector<Item> request_;
   };
 
-  // Bytes of a stream may hold several frames, of which each is a result.
+  // Stores the frame of this result, because the bytes of a stream may hold several frames, each with a result.
   static void keep_frame(Attempted& one, const Conversation<Item>& ended) {
     one.heard = one.answered = one.error != Error::timeout;
     if constexpr (!is_can) {
@@ -356,15 +359,17 @@ class Runner {
     open_ = true;
     opened_at_ = port_.requests;
   }
-  // A hook may have thrown before its request was sent: then the last exchange is the one before.
+  // Reports the open exchange. If a hook threw an exception before the request was sent, the last exchange is an
+  // earlier one that was reported already.
   void close_exchange() {
     if (std::exchange(open_, false) && opened_at_ != port_.requests && on_exchange) on_exchange(last());
   }
-  // With a session anew the last exchange may be of the one before.
+  // Stores the length of the echo. Takes the maximum, because a new session has not seen the echo of the last exchange.
   void keep_echo() {
     if constexpr (!is_can) port_.last.echo = std::max(port_.last.echo, session_->echo().echoed());
   }
-  // 0: it is not. On a CAN bus others send too.
+  // Returns how long after the request a late reply began; 0 if it was not late. On a CAN bus the frame may be from
+  // another node.
   [[nodiscard]] Time lateness_of(const LineExchange<Item>& exchange) const {
     if (is_can || exchange.answer == Time{} || exchange.reply().empty()) return {};
     const Time after = exchange.answered_after(character_);
@@ -374,21 +379,21 @@ class Runner {
   const Unit& unit_;
   Options options_;
   host::EchoMode echo_;
-  Time character_{};  // of the line; 0: it carries no characters
+  Time character_{};  // duration of a character; 0: the line carries no characters
   Time latency_{};
   WatchedPort<Item> port_;
   std::unique_ptr<std::byte[]> storage_;
   Filter filter_;
   std::optional<host::Session<Item>> session_;
-  bool open_ = false;                  // the last exchange was not handed to `on_exchange`
-  std::uint64_t opened_at_ = 0;        // requests before it
-  std::uint64_t requests_before_ = 0;  // the present run
-  std::size_t received_before_ = 0;    // that run, behind an older request
-  std::uint64_t unanswered_ = 0;       // in this run
-  std::uint64_t late_ = 0;             // before the last exchange
-  std::uint64_t late_before_ = 0;      // that sessions before this one kept away
+  bool open_ = false;                  // the last exchange was not reported to `on_exchange` yet
+  std::uint64_t opened_at_ = 0;        // number of requests before the open exchange
+  std::uint64_t requests_before_ = 0;  // number of requests before the present run
+  std::size_t received_before_ = 0;    // items received before the present run, for an older request
+  std::uint64_t unanswered_ = 0;       // requests without reply in the present run
+  std::uint64_t late_ = 0;             // late replies before the last exchange
+  std::uint64_t late_before_ = 0;      // late replies that earlier sessions discarded
   Time lateness_{};
-  std::size_t answered_ = 0;  // items when the last exchange ended well
+  std::size_t answered_ = 0;  // items received when the last exchange ended well; 0: it did not
   std::uint64_t overfull_ = 0;
   std::size_t most_behind_ = 0;
   std::vector<Item> overfull_example_;
