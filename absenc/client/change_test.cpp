@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Every command that changes an encoder, of every unit, with every fault and with a port that is lost at every step:
-// what it says of the change is compared with the memory of the virtual encoder. In virtual time.
+// Runs every changing command of every unit with every fault, and with a port that is lost at every step. Compares the
+// reported change with the memory of the virtual encoder, in virtual time.
 #include "absenc/client/change.hpp"
 
 #include <gtest/gtest.h>
@@ -25,7 +25,7 @@ namespace {
 using Values = std::vector<std::int64_t>;
 using Stored = std::vector<std::uint8_t>;
 
-/// Throws at the step of this number, as a port does whose adapter is pulled out.
+/// Fails after `left` steps, like a port whose adapter is unplugged.
 template <class Item>
 class BreakingPort final : public Port<Item> {
  public:
@@ -45,7 +45,7 @@ class BreakingPort final : public Port<Item> {
     if (left_ == 0) throw os::Failure(os::Failure::Kind::lost, "the port went away");
     --left_;
   }
-  Link link_;  // with the port
+  Link link_;  // owns the port
   Port<Item>& port_;
   std::size_t left_;
 };
@@ -78,7 +78,7 @@ Stored stored(VirtualDevice& device) {
   return one.bytes != nullptr ? of(one.bytes->memory()) : of(one.frames->memory());
 }
 
-/// `steps`: so many of the port go well.
+/// Runs a command. The port fails after `steps` steps; without a value it does not fail.
 Ended run(const std::string& address, const Command& command, const Values& values,
           std::optional<std::size_t> steps = {}) {
   VirtualDevice* device = nullptr;
@@ -108,7 +108,8 @@ Ended run(const std::string& address, const Command& command, const Values& valu
   return ended;
 }
 
-/// With which it does something on a good line; none: not without options that only its installation knows.
+/// Returns arguments with which the command changes something on a good line. Returns nothing if it needs options that
+/// only its installation knows.
 std::optional<Values> working_values(const Unit& unit, const Command& command) {
   std::vector<Values> candidates;
   for (const std::int64_t wanted : {INT64_MAX, std::int64_t{2}, std::int64_t{3}, std::int64_t{90}, INT64_MIN}) {
@@ -142,7 +143,7 @@ std::optional<Values> working_values(const Unit& unit, const Command& command) {
   for (const Values& values : candidates) {
     try {
       if (run(address, command, values).change.state == ChangeState::confirmed) return values;
-    } catch (const UsageError&) {  // not with these options
+    } catch (const UsageError&) {  // the command does not exist with these options
     }
   }
   return std::nullopt;
@@ -219,7 +220,7 @@ TEST_P(EveryUnit, ChangeWithFaultsIsNamedAsTheEncoderHasIt) {
             const Ended ended = run(bad, command, values);
             count(counts, ended);
             require_truth(ended, good, fmt::format("{} {}", bad, command.name));
-          } catch (const UsageError&) {  // there are no such faults on this link
+          } catch (const UsageError&) {  // this link has no such fault
           }
         }
       }
@@ -235,7 +236,7 @@ TEST_P(EveryUnit, ChangeWhosePortIsLostIsNamedAsTheEncoderHasIt) {
     const Ended good = run(address, command, values);
     Counts of_command{};
     const std::size_t all = steps_of(address, command, values);
-    // Each of the last, where the change is, and some of those before it.
+    // Tests each of the last steps, in which the change occurs, and some of the earlier ones.
     const std::size_t each = test_cases(60);
     const std::size_t last = all > each ? all - each : 0;
     for (std::size_t steps = 0; steps < all; steps = steps < last ? std::min(steps + 1 + all / 12, last) : steps + 1) {

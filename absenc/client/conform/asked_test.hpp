@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Addresses and names that the tests of conform share.
+// Addresses and names that the conform tests share.
 #pragma once
 
 #include <fmt/format.h>
@@ -15,7 +15,8 @@
 
 namespace absenc::client {
 
-/// The encoder of this address; where it sends by itself, with the first choice of an option with which it is asked.
+/// Returns the encoder of this address. If it sends unsolicited frames, sets the first choice of an option with which
+/// it is polled.
 inline EncoderAddress asked_address(const std::string& text) {
   const EncoderAddress usual = parse_address(text);
   const Unit& unit = *usual.unit;
@@ -30,8 +31,8 @@ inline EncoderAddress asked_address(const std::string& text) {
   return usual;
 }
 
-/// The unit with its defaults, and with each option at another value: each choice, both ends of a range, and beside its
-/// default. Those that no virtual encoder has are left out.
+/// Returns the unit with its default options, and with each option at other values: each choice, both ends of a range,
+/// and both neighbours of the default. Leaves out values that no virtual encoder has.
 inline std::vector<EncoderAddress> variations_of(const Unit& unit) {
   std::vector<EncoderAddress> all{parse_address(fmt::format("sim:{}", unit.id))};
   const auto add = [&](const Option& option, std::int64_t value) {
@@ -40,7 +41,7 @@ inline std::vector<EncoderAddress> variations_of(const Unit& unit) {
       EncoderAddress address = parse_address(text);
       const VirtualDevice device(unit, address.options, address.device);
       all.push_back(std::move(address));
-    } catch (const UsageError&) {  // such an encoder there is not
+    } catch (const UsageError&) {  // no such virtual encoder exists
     }
   };
   for (const Option& option : unit.options) {
@@ -53,7 +54,7 @@ inline std::vector<EncoderAddress> variations_of(const Unit& unit) {
   }
   return all;
 }
-/// "crc_width=0": in what it is not as usual.
+/// Returns the option that differs from its default, "UNIT crc_width=0".
 inline std::string variation_name(const EncoderAddress& address) {
   const EncoderAddress usual = parse_address(fmt::format("sim:{}", address.unit->id));
   for (std::size_t i = 0; i < address.unit->options.size(); ++i) {
@@ -65,7 +66,7 @@ inline std::string variation_name(const EncoderAddress& address) {
   return std::string(address.unit->id);
 }
 
-/// The name of a test that is made for each unit.
+/// Returns the name of a test that exists for each unit.
 inline std::string test_name(const Unit& unit) {
   std::string name(unit.id);
   for (char& letter : name) letter = letter == '-' ? '_' : letter;

@@ -19,13 +19,13 @@ namespace absenc::client {
 
 namespace {
 
-// Longer than any encoder is busy with a byte and its reply is under way.
+// Wait that is longer than any encoder is busy with a byte, including its reply.
 constexpr Time settling = std::chrono::milliseconds(50);
-constexpr unsigned tries = 3;        // to put back one thing
-constexpr std::uint32_t beside = 4;  // bytes before the one that is written
-constexpr unsigned nearness = 512;   // parts of a turn within which a position is the same
+constexpr unsigned tries = 3;        // attempts to restore one value
+constexpr std::uint32_t beside = 4;  // bytes before the written one that must stay unchanged
+constexpr unsigned nearness = 512;   // positions are equal within this fraction of a turn
 
-/// The encoder refused, or answered badly: the clause is broken.
+/// Thrown when the encoder refuses a command or its reply is bad: the clause is broken.
 struct Refused {
   std::string evidence;
 };
@@ -97,14 +97,14 @@ void Changes::test_one(const Clause& clause, ClauseResult& result) {
     conclude(result, false, refused.evidence);
   } catch (const os::Failure& failure) {
     if (failure.kind() != os::Failure::Kind::unsupported) throw;
-    result.evidence = failure.what();  // of the port, before the encoder was changed
+    result.evidence = failure.what();  // the port failed before the encoder was changed
   }
 }
 
 // ---- The memory
 
 void Changes::test_byte(const Clause& clause, ClauseResult& result) {
-  if (!clause.setting.empty()) save_setting(clause);  // which reading the memory changes
+  if (!clause.setting.empty()) save_setting(clause);  // reading the memory changes this setting
   const std::int64_t written = save_byte(clause.page, clause.address) ^ 0xFF;
   const Saved& byte = saved_.back();
   byte.write(written);
@@ -130,12 +130,12 @@ void Changes::test_bytes_beside(const Clause& clause, ClauseResult& result) {
   std::string seen = fmt::format("{} of {} others are as before, when 0x{:02X} was written and 0x{:02X} is read", same,
                                  others.size(), written, now);
   if (same != std::ssize(others)) return conclude(result, false, std::move(seen));
-  // A byte that was not written could not reach them.
+  // Without a write of the byte itself, unchanged neighbours prove nothing.
   result.evidence = seen;
   if (now == written) conclude(result, true, std::move(seen));
 }
 
-// The requests by themselves: the commands wait until the memory is ready.
+// Sends single requests, because the commands wait until the memory is ready.
 void Changes::test_busy(const Clause& clause, ClauseResult& result) {
   const std::int64_t written = save_byte(clause.page, clause.address) ^ 0xFF;
   const Command& reader = *find_command(unit_, Verb::memory_read);
@@ -154,20 +154,20 @@ void Changes::test_busy(const Clause& clause, ClauseResult& result) {
   const std::optional<BusyReply> reply = busy_reply(asked);
   result.evidence = "the byte could not be written: " + seen;
   if (!accepted || accepted->busy || now != written) return;
-  // It may be ready already: nothing says how long it takes at least.
+  // The memory may be ready already, because the document states no shortest duration.
   result.evidence = "it was not busy any more: " + seen;
   if (reply && !reply->busy && reply->value == written) return;
   conclude(result, reply && reply->busy, std::move(seen));
 }
 
-// The page that is selected after power on is selected again, by reading a byte of it.
+// Afterwards the test selects the page of power-on again, by reading a byte of it.
 void Changes::test_closed(const Clause& clause, ClauseResult& result) {
   save({.look = [this] { return std::int64_t{read_byte(0, 0)}; }, .write = [](std::int64_t) {}});
   static_cast<void>(read_byte(clause.page, clause.address));
   const Sent sent = line_.send(parse_wire_text(unit_.link, "a request", clause.ask.wire).bytes);
   const bool as_demanded = reply_error(unit_, line_.options(), clause.as, {sent.request, sent.reply}) == Error::none;
   const std::string seen = what_came(unit_.link, sent.request.frame(), sent.reply.frame());
-  static_cast<void>(read_byte(clause.page, clause.address));  // it answers, and this page is selected
+  static_cast<void>(read_byte(clause.page, clause.address));  // proves that the encoder replies, and selects the page
   conclude(result, as_demanded, seen);
 }
 
@@ -193,7 +193,7 @@ void Changes::test_offset(const Clause& clause, ClauseResult& result) {
   if (!is_near(before, 0)) conclude(result, true, seen);
 }
 
-// Only the position shows the direction: it is as it is now, or mirrored.
+// The direction shows in the position only, which is unchanged or mirrored.
 void Changes::test_direction(const Clause& clause, ClauseResult& result) {
   const Reading before = read();
   const std::uint64_t turn = std::uint64_t{1} << before.singleturn_bits;
@@ -211,7 +211,7 @@ void Changes::test_direction(const Clause& clause, ClauseResult& result) {
   const auto set = [this, &setter](std::int64_t value) {
     static_cast<void>(run(setter, complete_arguments(setter, std::array{value})));
   };
-  // The one that brings back the position as it was.
+  // Writes the direction that restores the position.
   save({.look = is_mirrored,
         .write =
             [is_mirrored, set, values = std::array{clause.other, clause.value}](std::int64_t wanted) {
@@ -233,7 +233,7 @@ void Changes::test_direction(const Clause& clause, ClauseResult& result) {
 }
 
 void Changes::test_pace(const Clause& clause, ClauseResult& result) {
-  constexpr Time heard_for = std::chrono::milliseconds(2200);  // of one a second two are heard
+  constexpr Time heard_for = std::chrono::milliseconds(2200);  // long enough for two frames at one frame per second
   const Command& start = *find_command(unit_, clause.command);
   const Command& stop = *find_command(unit_, clause.stop);
   const auto look = [this] { return line_.hear(heard_for).per_second(); };
@@ -254,9 +254,10 @@ void Changes::test_pace(const Clause& clause, ClauseResult& result) {
                        now, wanted, stopped));
 }
 
-// ---- What nothing can bring back
+// ---- Values that cannot be restored
 
-// Where there is nothing to lose, the command is sent all the same: it may be refused, or do harm.
+// Returns whether the test may erase `what`. Without a value to lose the command is sent anyway: it may be refused, or
+// do harm.
 bool Changes::may_lose(std::string_view what, ClauseResult& result) const {
   if (what.empty() || resets_) return true;
   result.evidence = fmt::format("there is {}, which nothing could bring back: --resets gives it up", what);
@@ -289,7 +290,7 @@ void Changes::test_reset(const Clause& clause, ClauseResult& result) {
   const Reading after = read();
   std::string seen = fmt::format("position {}, turns {}, alarms {:x} before; {}, {}, {:x} after", before.singleturn,
                                  before.turns(), before.alarms, after.singleturn, after.turns(), after.alarms);
-  // That other alarms remain, which this cannot clear, is said as an error too.
+  // The command also ends with an error if other alarms remain, which it cannot clear.
   const bool obeyed = ran.error == Error::none || (ran.error == Error::cross_check_failed && after.alarms != 0);
   const bool cleared = (after.alarms & demanded) == 0 && (!turns || after.multiturn == 0);
   const bool nothing_else = is_near(after, before.singleturn) && (turns || after.multiturn == before.multiturn);
@@ -314,7 +315,7 @@ void Changes::test_restart(const Clause& clause, ClauseResult& result) {
                        after.singleturn, before.singleturn));
 }
 
-// ---- What was there before
+// ---- Saved values
 
 std::int64_t Changes::save(Saved one) {
   one.value = one.look();
@@ -366,7 +367,7 @@ void Changes::put_back() {
   }
 }
 
-// Another wish to end has to wait until all is put back: the encoder would stay changed.
+// Restores one value. Delays an interrupt until all values are restored, because the encoder would stay changed.
 bool Changes::put_back(const Saved& one) {
   for (unsigned i = 0; i < tries; ++i) {
     try {
@@ -378,7 +379,7 @@ bool Changes::put_back(const Saved& one) {
       interrupted_ = true;
     } catch (const os::Ended&) {
       interrupted_ = true;
-    } catch (const Refused&) {  // once more
+    } catch (const Refused&) {  // try again
     } catch (const std::exception&) {
     }
   }
@@ -393,7 +394,7 @@ Ran Changes::run(const Command& command, Arguments arguments) const {
   throw Refused{fmt::format("{}: {} {}", command.name, text_of(ran.error).name, ran.detail)};
 }
 
-// Nothing: it is no good one.
+// Returns the decoded reply; nothing if it is not a good one.
 std::optional<BusyReply> Changes::busy_reply(const Sent& sent) const {
   if (sent.reply.frame().empty()) return std::nullopt;
   BusySink sink;

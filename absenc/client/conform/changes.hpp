@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests the clauses that change an encoder, and puts back what they changed, however they end.
+// Tests the clauses that change an encoder, and restores every changed value however the test ends.
 #pragma once
 
 #include <algorithm>
@@ -17,36 +17,36 @@
 
 namespace absenc::client {
 
-/// How a command ended, and what it told.
+/// Result of a command.
 struct Ran {
   Error error = Error::none;
   std::string detail{};
-  std::uint64_t requests = 0;  // that it sent
-  bool heard = false;          // something came behind the last of them
+  std::uint64_t requests = 0;  // number of requests that the command sent
+  bool heard = false;          // anything was received after the last request
   Answer answer{};
-  std::vector<std::uint8_t> data{};  // of a memory
+  std::vector<std::uint8_t> data{};  // bytes that were read from a memory
   std::optional<Reading> reading{};
 };
 
-/// A request that was sent by itself, and what came; both empty: nothing is asked with these options.
+/// A single request and its reply. Both are empty if no request exists with these options.
 struct Sent {
   capture::ObservedFrame request{};
   capture::ObservedFrame reply{};
 };
 
-/// A reply of the memory, with its busy bit.
+/// The reply of a memory, with its busy bit.
 struct BusyReply {
   bool busy = false;
   std::int64_t value = 0;
 };
 
-/// Frames that came by themselves.
+/// Unsolicited frames of a period.
 struct Heard {
   std::uint64_t frames = 0;
   Time first{};
   Time last{};
 
-  /// To the nearest, by the time between the first and the last.
+  /// Returns the rate in frames per second, rounded, from the time between the first and the last frame.
   [[nodiscard]] std::int64_t per_second() const {
     if (frames < 2) return static_cast<std::int64_t>(frames);
     const std::int64_t between = (last - first).count();
@@ -54,34 +54,36 @@ struct Heard {
   }
 };
 
-/// The line as Changes needs it, whatever that carries. All throw what the port throws; os::Interrupted once for each
-/// time that somebody asks to end.
+/// Access to the line, independent of its link. All functions throw the exceptions of the port, and os::Interrupted
+/// once for each request of the caller to end.
 struct ChangesLine {
   std::function<Ran(const Command&, Arguments)> run;
-  std::function<Sent(const std::vector<std::uint8_t>& request)> send;  // as Unit::encode makes it
+  std::function<Sent(const std::vector<std::uint8_t>& request)> send;  // a request in the form of Unit::encode
   std::function<Heard(Time)> hear;
   std::function<void(Time)> rest;
-  std::function<void(const Command& setter, std::int64_t value)> follow;  // it is set so now, and reached so
-  std::function<const Options&()> options;                                // as they are now
+  // reports a new value of a setting, which may change how the encoder is reached
+  std::function<void(const Command& setter, std::int64_t value)> follow;
+  std::function<const Options&()> options;  // returns the present options
 };
 
-/// Within what a shaft at rest may tremble.
+/// Returns whether the position equals `wanted` within the noise of a shaft at rest.
 [[nodiscard]] bool is_near(const Reading& reading, std::uint64_t wanted);
 
 class Changes {
  public:
-  /// `name` is how the user calls the encoder. `resets`: what nothing could bring back may be lost.
+  /// `name` is the encoder's name in commands for the user. `resets` permits tests that erase values which cannot be
+  /// restored.
   Changes(const Unit& unit, std::string_view name, ChangesLine line, bool resets)
       : unit_(unit), name_(name), line_(std::move(line)), resets_(resets) {}
 
-  /// Throws what ended it before its end; then, too, all is put back that could be.
+  /// Tests one clause and restores the changed values, also before an exception is passed on.
   void test(const Clause& clause, ClauseResult& result);
 
-  /// The commands that put back by hand what could not be.
+  /// Returns the commands with which the user restores values that the test could not restore.
   [[nodiscard]] const std::vector<std::string>& left() const { return left_; }
 
  private:
-  /// A value that was found, how to look at it, and how to write it.
+  /// A saved value, with functions to read and write it and the user's command to restore it.
   struct Saved {
     std::function<std::int64_t()> look{};
     std::function<void(std::int64_t)> write{};
@@ -120,7 +122,7 @@ class Changes {
   bool resets_;
   std::vector<Saved> saved_{};
   std::vector<std::string> left_{};
-  bool interrupted_ = false;  // while something was put back
+  bool interrupted_ = false;  // an interrupt came while values were restored
 };
 
 }  // namespace absenc::client

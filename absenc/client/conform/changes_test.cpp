@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The clauses that change an encoder: each is broken by two mutants, by one of them alone, and whatever ends them at
-// whatever step leaves the memory of the virtual encoder as it was.
+// Clauses that change an encoder: at least two mutants break each, one of them no other clause. An end at any step
+// leaves the memory of the virtual encoder unchanged.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
@@ -28,7 +28,7 @@ namespace {
 
 using ByteList = std::vector<std::uint8_t>;
 
-/// An encoder that obeys, but not all of it.
+/// An encoder that ignores some requests, damages some replies or corrupts some writes.
 template <class Item>
 class Disobedient final : public Machine<Item> {
  public:
@@ -38,7 +38,7 @@ class Disobedient final : public Machine<Item> {
       : line_(machine_of<Item>(device)), device_(*device.device().template of<Item>()) {}
 
   void feed(const Event<Item>& event) override {
-    // A request by clock has no bytes.
+    // A clocked request has no bytes.
     if (event.kind == Kind::received || event.kind == Kind::selected) {
       ++requests;
       const bool deaf = requests >= deaf_from && requests < deaf_until;
@@ -66,13 +66,14 @@ class Disobedient final : public Machine<Item> {
     return step;
   }
 
-  std::vector<Item> deaf_to{};                                 // a request that it does not hear
-  unsigned heard_before = 0;                                   // but the first times
-  unsigned deaf_from = 0;                                      // the number of a request that it does not hear, from 1
-  unsigned deaf_until = 0;                                     // and of the next that it does
-  unsigned damaged_at = 0;                                     // the request whose reply has a wrong bit; 0: none
-  unsigned change = 0;                                         // which change of its memory, from 1
-  std::function<void(MutableBytes, const ByteList&)> spoil{};  // what was the memory before
+  std::vector<Item> deaf_to{};  // a request that it ignores
+  unsigned heard_before = 0;    // how often it still obeys this request
+  unsigned deaf_from = 0;       // first ignored request, counted from 1
+  unsigned deaf_until = 0;      // first request after the ignored ones
+  // number of the request whose reply has a wrong bit; 0: none
+  unsigned damaged_at = 0;
+  unsigned change = 0;                                         // number of the memory change that is corrupted, from 1
+  std::function<void(MutableBytes, const ByteList&)> spoil{};  // gets the new and the previous content
   unsigned requests = 0;
 
  private:
@@ -89,7 +90,7 @@ class Disobedient final : public Machine<Item> {
   std::vector<Item> said_;
 };
 
-/// Somebody asks to end, or the line is lost, at the step of this number.
+/// Interrupts the test or loses the line at step `at`.
 template <class Item>
 class EndingPort final : public Port<Item> {
  public:
@@ -125,7 +126,8 @@ struct Bench {
   /// Returns the settings that clauses change, and the position, as the encoder reports them. Its memory is no measure:
   /// it may count how often it was written.
   [[nodiscard]] std::string settings() const {
-    // Conform may have been ended at another rate, or just after a restart. Who opens the port anew sets the rate.
+    // The test may have ended at another rate or just after a restart of the encoder. A program that opens the port
+    // sets the rate.
     line->begin({.kind = Step<Item>::Kind::configure, .rate = address.line.with_some_rate().rate});
     const Step<Item> rest{.at = line->now() + std::chrono::seconds(2)};
     while (line->now() < rest.at && line->wait(rest).kind != Event<Item>::Kind::timer) {
@@ -148,7 +150,7 @@ struct Bench {
     if (position != address.unit->fields.end()) tell(*find_command(*address.unit, Verb::read), position->name);
     return text;
   }
-  // The device stays, to be looked at.
+  // Runs the test on a link without the device, which stays available for inspection.
   [[nodiscard]] Conformance run(bool resets = false, const std::function<bool()>& over = {}) const {
     Link way;
     if constexpr (std::is_same_v<Item, CanFrame>) {
@@ -175,14 +177,14 @@ std::vector<const Clause*> changing(const Unit& unit) {
   return clauses;
 }
 
-/// At a third of a turn: a position that is neither zero nor its own mirror image.
+/// Returns the address of an encoder at a third of a turn, a position that is neither zero nor its own mirror image.
 EncoderAddress address_of_unit(const Unit& unit, std::string_view more = {}) {
   const std::string text = fmt::format("sim:{}?{}", unit.id, more);
   const Resolution resolution = unit.resolution(parse_address(text).options);
   return parse_address(fmt::format("{}{}singleturn={}", text, more.empty() ? "" : "&",
                                    (std::uint64_t{1} << resolution.singleturn_bits) / 3));
 }
-/// With what a reset has to reset.
+/// Returns an address whose encoder has turns and alarms that a reset must clear.
 EncoderAddress address_showing_change(const Unit& unit, const Clause& clause) {
   std::string more(clause.shown_with);
   const auto add = [&](const std::string& setting) { more += (more.empty() ? "" : "&") + setting; };
@@ -265,13 +267,13 @@ std::vector<Spoil<Item>> spoils_of(const EncoderAddress& address, const Clause& 
       });
     }
   }
-  // A setting may stand in no memory.
+  // Also ignores windows of requests, because a setting may have no place in the memory.
   const unsigned step = address.unit->link == LinkKind::clocked ? 20 : 5;
   for (const unsigned window : {30u, 1000u}) {
     for (unsigned from = 1; clause.demand >= Demand::set && from <= requests; from += step) {
       all.push_back([=](Encoder& one) {
         one.deaf_from = from;
-        one.deaf_until = from + window;  // longer than anybody repeats
+        one.deaf_until = from + window;  // longer than any repetition
       });
     }
   }
@@ -315,9 +317,9 @@ void check_ends(const EncoderAddress& address) {
   ASSERT_EQ(held.verdict(), Verdict::kept) << held.report();
   const unsigned steps = whole.port->steps;
   const std::string settings = whole.settings();
-  // A counter of writes is not put back.
+  // The write counter of an encoder is not restored.
   const bool counts = whole.memory() != before;
-  // In long runs each step has one of the three ends.
+  // In long runs each step has only one of the three kinds of end.
   const unsigned kinds = steps < 1000 ? 3 : 1;
   const unsigned stride = 10 / test_cases(10);
   for (unsigned i = 0; i < steps * kinds; i += stride) {
@@ -341,7 +343,7 @@ void check_ends(const EncoderAddress& address) {
     } catch (const Cancelled&) {
       ended = kind == 2;
     }
-    EXPECT_TRUE(ended || kind != 0) << at;  // while it puts back, a moment without a line does no harm
+    EXPECT_TRUE(ended || kind != 0) << at;  // a short loss of the line while values are restored does no harm
     if (!counts) {
       ASSERT_EQ(bench.memory(), before) << "end " << kind << " at " << at << " of " << steps;
     }
@@ -378,7 +380,7 @@ INSTANTIATE_TEST_SUITE_P(Units, ChangingClauses, ::testing::ValuesIn([] {
                          }()),
                          [](const auto& one) { return test_name(*one.param); });
 
-// A change that cannot be put back is named, with the command that does it.
+// If a value cannot be restored, the error contains the command that does.
 TEST(Conformance, SaysHowToPutBackWhatALostLineLeftChanged) {
   const EncoderAddress address = parse_address("sim:tformat");
   const Bench<std::uint8_t> whole(address);
@@ -404,7 +406,7 @@ TEST(Conformance, SaysHowToPutBackWhatALostLineLeftChanged) {
   EXPECT_GT(changed, 4U);
 }
 
-// A run loses values that nothing brings back only when it is asked to; a counter that is 0 already shows nothing.
+// A test erases values that cannot be restored only with `resets`. A counter that is already 0 proves nothing.
 TEST(Conformance, ResetsOnlyWhatMayBeLost) {
   const auto found = [](std::string_view text, bool resets) {
     const Bench<std::uint8_t> bench(parse_address(text));

@@ -58,7 +58,7 @@ Conformance judge_host(const Unit& unit, HostStage& stage, const ConformHostChoi
   while (!trial.over() && !(choices.over && choices.over())) {
     HostTrial::Seen seen = stage.seen();
     const std::uint64_t now_sent = seen.answered + seen.requests.good + seen.requests.bad;
-    // Nobody is impatient with a host that has not come yet.
+    // The silence counts only after the first request of the host.
     if (now_sent != sent || sent == 0) heard_at = os::now();
     sent = now_sent;
     if (os::now() - heard_at > choices.patience) break;

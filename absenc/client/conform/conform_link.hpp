@@ -7,7 +7,7 @@
 
 namespace absenc::client {
 
-/// `name` is how the user calls the encoder.
+/// Tests the clauses over `link`. `name` is the encoder's name in commands for the user.
 [[nodiscard]] Conformance conform(const EncoderAddress& address, Link link, const ConformChoices& choices,
                                   std::string_view name = {});
 

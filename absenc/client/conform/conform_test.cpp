@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Every clause holds for the virtual encoder, and is broken by two mutants that break it alone.
+// The virtual encoder satisfies every clause, and at least two mutants break each clause, one of them no other clause.
 #include <gtest/gtest.h>
 
 #include <cstdio>
@@ -34,7 +34,7 @@ void flip_bit(FrameList& items, std::size_t bit) {
   byte = static_cast<std::uint8_t>(byte ^ 1U << bit % 8);
 }
 
-/// Flips a bit and makes the check at the end right again, as far as its last two bytes can.
+/// Flips a bit of the reply and tries to repair the checksum in its last two bytes.
 template <class Item>
 void flip_and_repair(Mutant<Item>& mutant, const EncoderAddress& address, std::size_t bit) {
   if constexpr (std::is_same_v<Item, std::uint8_t>) {
@@ -53,8 +53,8 @@ void flip_and_repair(Mutant<Item>& mutant, const EncoderAddress& address, std::s
   }
 }
 
-/// Changes its reply to one request; or to all from the third on, as a host may ask again by itself; or from the eighth
-/// on, as some are spent to find the echo where nothing is asked.
+/// Adds mutants that change the reply to one request, to all from the third on (as a host may repeat its request), and
+/// to all from the eighth on (as some hosts use the first requests to detect the echo).
 template <class Item>
 void add_said(Changes<Item>& all, const std::function<void(Mutant<Item>&)>& change) {
   all.push_back({.change = change});
@@ -71,7 +71,7 @@ void add_said(Changes<Item>& all, void (*say)(std::vector<Item>&, Step<Item>&)) 
   add_said<Item>(all, [say](Mutant<Item>& m) { m.say = say; });
 }
 
-/// Repeats its first reply as a whole; or puts its first bits before the rest of a later one.
+/// Adds mutants that repeat their first reply, as a whole or with its first bits before the rest of a later reply.
 template <class Item>
 void add_stale(Changes<Item>& all, const Clause& clause) {
   if constexpr (std::is_same_v<Item, std::uint8_t>) {
@@ -136,7 +136,8 @@ Changes<Item> of_frames(const EncoderAddress& address, const Clause& clause) {
   return all;
 }
 
-/// Whatever is wrong inside the encoder, at both ends of its range; and bits that are always wrong on its way.
+/// Returns mutants with a defect inside the encoder, at both ends of its range, and mutants whose line always flips a
+/// bit.
 template <class Item>
 Changes<Item> of_commands(const EncoderAddress& address) {
   Changes<Item> all;
@@ -158,7 +159,8 @@ Changes<Item> of_commands(const EncoderAddress& address) {
   return all;
 }
 
-/// To requests that are not the first: what it does to the first, nothing, or something else.
+/// Returns mutants that treat requests other than the first one wrongly: like the first, not at all, or with another
+/// reply.
 template <class Item>
 Changes<Item> of_special(const Clause& clause) {
   using M = Mutant<Item>;
@@ -177,7 +179,7 @@ Changes<Item> of_special(const Clause& clause) {
     };
   }});
   if constexpr (std::is_same_v<Item, std::uint8_t>) {
-    // Right in its length alone.
+    // Only the length of the reply is right.
     all.push_back({.change = [hears_good](M& m) {
       hears_good(m);
       m.of_special = true;
@@ -198,7 +200,7 @@ Changes<Item> of_special(const Clause& clause) {
       }
     }
   } else {
-    // It answers in the name of whom was asked.
+    // It replies with the node number of the request.
     all.push_back({.change = [hears_good](M& m) {
       const auto asked = std::make_shared<std::uint32_t>(0);
       m.hear = [&m, asked](List& heard) {
@@ -250,7 +252,7 @@ Changes<Item> mutants_of(const EncoderAddress& address, const Clause& clause) {
     default:
       break;
   }
-  // All that are good requests, or one of those that are none.
+  // Valid requests that are not for this encoder.
   if (clause.demand == Demand::foreign_silent) {
     for (const ReplyChange<Item>& change : of_special<Item>(clause)) {
       all.push_back({.change = [change = change.change, &address](Mutant<Item>& m) {
@@ -282,7 +284,8 @@ Changes<Item> mutants_of(const EncoderAddress& address, const Clause& clause) {
   return all;
 }
 
-// A clause that rides on a broken one is broken too: registers on channel 2, and both on the identity.
+// Returns whether the mutant breaks only this clause. Clauses about commands may break together, because registers
+// depend on channel 2 and both on the identity.
 bool is_alone(const Unit& unit, const Clause& clause, const std::vector<std::string>& broken) {
   return std::all_of(broken.begin(), broken.end(), [&](const std::string& id) {
     const auto other = std::ranges::find(clauses_of(unit), id, &Clause::id);
@@ -332,13 +335,14 @@ TEST_P(Clauses, EachIsBrokenByTwoMutantsOneAlone) {
   }
 }
 
-// A clause that these options leave out is not kept: something can break each clause that is kept.
+// Checks that each clause with verdict `kept` can be broken: a clause that does not apply with these options must not
+// be kept.
 template <class Item>
 void check_kept(const EncoderAddress& address, std::set<std::string>& seen) {
   const Unit& unit = *address.unit;
   try {
     const Conformance good = conform_mutant<Item>(address, {}, {.readings = 3});
-    // Where all is as with other options, down to how many changes would be seen, so is the rest.
+    // An equal report, including the number of detectable changes, needs no second check.
     if (!seen.insert(good.report()).second) return;
     for (const Clause& clause : clauses_of(unit)) {
       if (verdict_of(good, clause.id) != Verdict::kept) continue;
@@ -368,7 +372,7 @@ TEST_P(Clauses, WhatIsKeptWithAnyOptionCouldBeBroken) {
 INSTANTIATE_TEST_SUITE_P(Units, Clauses, ::testing::ValuesIn(all_units().begin(), all_units().end()),
                          [](const auto& one) { return test_name(*one.param); });
 
-// The echo is neither a reply nor the time of one.
+// The echo must not count as a reply or in its time.
 TEST(Conformance, HoldsBehindAnAdapterThatEchoes) {
   for (const char* const text : {"sim:tformat?echo=auto", "sim:tformat?echo=on", "sim:amt21?echo=auto"}) {
     const EncoderAddress address = parse_address(text);
@@ -392,7 +396,7 @@ TEST(Conformance, HoldsBehindAnAdapterThatEchoes) {
   }
 }
 
-// As a TCP bridge or a pseudo-terminal.
+// A port that cannot change its rate, like a TCP bridge or a pseudo-terminal.
 class FixedRatePort final : public Port<std::uint8_t> {
  public:
   explicit FixedRatePort(Port<std::uint8_t>& port) : port_(port) {}
@@ -438,7 +442,7 @@ TEST(Conformance, TellsProgramsAndPeople) {
   EXPECT_EQ(one.verdict(), Verdict::broken);
 }
 
-// Programs that count tests take skipped ones for good.
+// Programs that count tests regard skipped tests as passed.
 TEST(Conformance, SaysWhenNothingCouldBeJudged) {
   const Conformance nothing{.protocol = "toy", .clauses = {{"a", "doc", "1", "x", Verdict::untested, "nothing came"}}};
   EXPECT_EQ(nothing.verdict(), Verdict::untested);
@@ -456,12 +460,13 @@ TEST(Conformance, SaysWhenNothingCouldBeJudged) {
   EXPECT_EQ(some.verdict(), Verdict::broken);
 }
 
-// A report prints the paragraph behind the document.
+// A report prints the paragraph after the document.
 TEST(Clauses, TheDocumentDoesNotNameTheParagraphAgain) {
   for (const Unit* unit : all_units()) {
     const auto look = [&](std::string_view id, std::string_view paragraph) {
       const std::string_view number = paragraph.substr(0, paragraph.find(' '));
-      if (number.find_first_not_of("0123456789.") != std::string_view::npos) return;  // it has a name
+      // the paragraph has a name instead of a number
+      if (number.find_first_not_of("0123456789.") != std::string_view::npos) return;
       EXPECT_EQ(unit->document.find(number), std::string_view::npos) << unit->id << " " << id << ": " << unit->document;
     };
     for (const Clause& clause : clauses_of(*unit)) look(clause.id, clause.paragraph);

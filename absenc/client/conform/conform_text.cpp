@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What was found, as text: for people and for the programs that count tests.
+// Prints the result for people and for programs that count tests.
 #include "absenc/client/conform/conform_text.hpp"
 
 #include <fmt/format.h>

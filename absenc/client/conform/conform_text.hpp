@@ -6,8 +6,8 @@
 
 namespace absenc::client {
 
-/// {"ok","protocol","verdict","kept","broken","untested","clauses":[{"id","document","paragraph","words","verdict",
-/// "evidence"}],"left"}
+/// Returns {"ok","protocol","verdict","kept","broken","untested","clauses":[{"id","document","paragraph","words",
+/// "verdict","evidence"}],"left"}.
 [[nodiscard]] Json to_json(const Conformance& conformance);
 
 }  // namespace absenc::client

@@ -21,7 +21,7 @@ std::size_t bits_of(const ObservedFrame& frame) {
   return frame.bits != 0 ? frame.bits : frame.bytes.size() * 8;
 }
 
-// On clocked links the first bit is the highest of its byte.
+// Flips a bit. On clocked links bit 0 is the highest bit of its byte.
 void flip(ObservedFrame& frame, std::size_t bit) {
   std::uint8_t& byte = frame.can ? frame.can->data[bit / 8] : frame.bytes[bit / 8];
   byte = static_cast<std::uint8_t>(byte ^ (frame.bits != 0 ? 0x80U >> bit % 8 : 1U << bit % 8));
@@ -35,7 +35,7 @@ void resize(ObservedFrame& frame, int by) {
   }
 }
 
-// Empty: there is none with these options.
+// Returns the request of a command; empty if it does not exist with these options.
 ObservedFrame request_of(const Unit& unit, const Options& options, const Command& command) {
   std::array<std::uint8_t, longest_request> bytes{};
   std::vector<std::int64_t> arguments;
@@ -43,14 +43,15 @@ ObservedFrame request_of(const Unit& unit, const Options& options, const Command
     arguments.push_back(one.required ? std::max<std::int64_t>(one.minimum, 1) : one.default_value);
   }
   const auto size = unit.encode(options, command, arguments, bytes);
-  if (!size || *size == 0 || unit.link == LinkKind::clocked) return {};  // there the bits are spread over frames
+  // on clocked links a request is spread over several frames
+  if (!size || *size == 0 || unit.link == LinkKind::clocked) return {};
   const Bytes request = Bytes(bytes).first(*size);
   if (unit.link != LinkKind::can) return {.bytes = {request.begin(), request.end()}};
   const std::string text(request.begin(), request.end());
   return {.can = parse_wire_text(unit.link, "a request", text).can};
 }
 
-// The requests of all commands, and of all of another address.
+// Returns the requests of all commands, for this encoder and for one with another address.
 std::vector<ObservedFrame> other_requests(const Unit& unit, const Options& options) {
   std::vector<ObservedFrame> requests;
   const auto add = [&](const Options& with, const Command& command) {
@@ -116,8 +117,9 @@ std::size_t changes_noticed(const Unit& unit, const Options& options, const Obse
     try_one(good.request, changed);
   }
   for (const ObservedFrame& request : other_requests(unit, options)) try_one(request, good.reply);
-  if (unit.link == LinkKind::clocked) return noticed;  // no check is the last byte there
-  // A checksum hides what stands before it: wrong bits with a last byte that makes it right again.
+  if (unit.link == LinkKind::clocked) return noticed;  // on clocked links the check is no byte at the end
+  // A checksum hides the fields before it. So this flips a bit and tries each last byte, one of which makes the
+  // checksum right.
   ObservedFrame changed = good.reply;
   for (std::size_t bit = 0; noticed == 0 && changed.bytes.size() > 2 && bit < bits_of(good.reply) - 8; ++bit) {
     flip(changed, bit);

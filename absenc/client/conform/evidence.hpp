@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The evidence of a verdict: how often the run saw the thing that a clause is about.
+// Evidence of a verdict: how often a run observed the subject of a clause.
 #pragma once
 
 #include <cstddef>
@@ -16,29 +16,29 @@
 
 namespace absenc::client {
 
-inline constexpr std::size_t longest_request = 64;  // bytes, of a unit or as text
+inline constexpr std::size_t longest_request = 64;  // bytes of a request or characters of its text
 
 inline void conclude(ClauseResult& result, bool kept, std::string evidence) {
   result.verdict = kept ? Verdict::kept : Verdict::broken;
   result.evidence = std::move(evidence);
 }
 
-/// Why these options leave out what the clause is about: "" where they do not.
+/// Returns the reason why the clause does not apply with these options; "" if it does.
 [[nodiscard]] std::string reason_against(const Unit& unit, const Options& options, const Clause& clause);
 
-/// In how many ways a good reply can be changed that then breaks it by one of these errors: a wrong bit, a missing or
-/// an additional byte, or that it answers another request. 0: these options have no such check.
+/// Returns how many changes of a good reply are detected as one of `errors`. Changes are a wrong bit, a missing or
+/// additional byte, and a request that it does not answer. 0: these options have no such check.
 [[nodiscard]] std::size_t changes_noticed(const Unit& unit, const Options& options,
                                           const capture::ObservedExchange& good, Errors errors);
 
-/// Returns the error of the reply as one to the request of this command; "": to its own request.
+/// Returns the error of the reply, checked as the reply to a request of `command`; "": to its own request.
 [[nodiscard]] Error reply_error(const Unit& unit, const Options& options, std::string_view command,
                                 const capture::ObservedExchange& exchange);
 
-/// Whose request this is, as it says itself. Nothing: it is none, or names nobody.
+/// Returns the encoder to which the request is addressed. Returns nothing if it is no request or has no address.
 [[nodiscard]] std::optional<std::int64_t> encoder_of(const Unit& unit, const Options& options, const Frame& request);
 
-/// "to 9a came 1a 40 ..."
+/// Returns "to 9a came 1a 40 ...".
 [[nodiscard]] std::string what_came(LinkKind link, const Frame& request, const Frame& reply);
 
 }  // namespace absenc::client

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Where a virtual encoder is played to a host that is judged.
+// The virtual encoder that serves a host during a test.
 #pragma once
 
 #include <cstdint>
@@ -15,20 +15,20 @@ namespace absenc::client {
 class HostStage {
  public:
   virtual HostTrial::Seen seen() = 0;
-  virtual void set_fault(HostTrial::Fault fault) = 0;  // in place of the last one
-  virtual void play(Time until) = 0;                   // throws os::Interrupted
+  virtual void set_fault(HostTrial::Fault fault) = 0;  // replaces the previous fault
+  virtual void play(Time until) = 0;                   // serves until this time; throws os::Interrupted
 
  protected:
   ~HostStage() = default;
 };
 
-/// Throws UsageError where there is no host to judge.
+/// Throws UsageError if the unit has no clauses for hosts, or its encoder is not polled.
 void require_host(const Unit& unit, const Options& options);
 
-/// Until it is over as `choices` say.
+/// Tests the host until the limits of `choices` end the test, and judges it.
 [[nodiscard]] Conformance judge_host(const Unit& unit, HostStage& stage, const ConformHostChoices& choices);
 
-/// With what only an SPI controller sees.
+/// Adds the count of the SPI mode rule, which only the SPI device can check.
 [[nodiscard]] inline std::vector<RuleCount> with_mode(std::vector<RuleCount> counts, const os::SpiDevice& device) {
   counts.push_back({.rule = spi_mode_rule, .looked = device.messages(), .broken = device.wrong_modes()});
   return counts;

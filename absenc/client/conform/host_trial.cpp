@@ -18,14 +18,15 @@ std::uint64_t HostTrial::length() const {
   return is_asked ? asked_again : 0;
 }
 
-// Returns how often the fault of this phase happened, or how many requests were answered.
+// Returns how often the fault of this phase occurred; in phases without a fault, how many requests were answered.
 std::uint64_t HostTrial::counted() const {
   if (phase_ == Phase::silence) return seen_.missing;
   if (phase_ == Phase::refusal) return seen_.requests.good + seen_.requests.bad;
   return phase_ == Phase::damage ? seen_.damaged : seen_.answered;
 }
 
-// A fault that made the host give up a sequence may still show in the first requests behind it.
+// Returns whether no fault has an effect. After a fault that made the host abort a sequence, the first requests may
+// still show it.
 bool HostTrial::is_calm() const {
   return phase_ == Phase::good || phase_ == Phase::over ||
          (phase_ == Phase::last && counted() - begun_at_ >= asked_again);
@@ -95,7 +96,7 @@ void HostTrial::judge_requests(ClauseResult& result) const {
   conclude(result, true, std::move(evidence));
 }
 
-// A host that also sends other things may have sent a request by chance, so its requests prove nothing.
+// Concludes `kept` only if the host sends nothing but requests: among other bytes a request may be there by chance.
 void HostTrial::conclude_if_all_are_requests(ClauseResult& result, bool kept, std::string evidence) const {
   if (!kept || seen_.requests.bad == 0) return conclude(result, kept, std::move(evidence));
   result.evidence = fmt::format("{}, but the host also sent what is no request", evidence);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The trial of a host: faults in phases, and the verdict on each clause.
+// Test of a host: injects faults in phases and judges each clause.
 #pragma once
 
 #include <cstddef>
@@ -21,31 +21,31 @@ class HostTrial {
 
   HostTrial(const Unit& unit, std::size_t answers) : unit_(unit), answers_(answers) {}
 
-  /// Counts up to now.
+  /// Counts since the start.
   struct Seen {
-    std::uint64_t answered = 0;  // requests that the encoder answered, also where a fault kept the reply from the host
-    std::uint64_t missing = 0;   // of these replies, by the fault `silence`
-    std::uint64_t damaged = 0;   // by the fault `damage`
+    std::uint64_t answered = 0;  // requests that the encoder answered, including replies that a fault suppressed
+    std::uint64_t missing = 0;   // replies that the fault `silence` suppressed
+    std::uint64_t damaged = 0;   // replies that the fault `damage` changed
     RequestCounts requests{};
     std::vector<RuleCount> rules{};
   };
-  /// The fault that requests or replies are to have from now on.
+  /// Takes new counts and returns the fault to inject from now on.
   Fault look(Seen seen);
   [[nodiscard]] bool over() const { return phase_ == Phase::over; }
 
-  /// By what the last look saw.
+  /// Judges each clause by the latest counts.
   [[nodiscard]] Conformance judge() const;
 
  private:
   enum class Phase : std::uint8_t { good, silence, after_silence, damage, after_damage, refusal, last, over };
-  static constexpr std::uint64_t asked_again = 3;  // requests that show that it goes on
+  static constexpr std::uint64_t asked_again = 3;  // requests after a fault that prove that the host continues
 
   [[nodiscard]] std::uint64_t counted() const;
   [[nodiscard]] std::uint64_t length() const;
   [[nodiscard]] bool is_calm() const;
   void judge_one(const HostClause& clause, ClauseResult& result) const;
   void judge_requests(ClauseResult& result) const;
-  /// `phase` had its fault `count` times.
+  /// Judges whether the host continued after `count` faults of `phase`.
   void judge_going_on(Phase phase, std::string_view what, std::uint64_t count, ClauseResult& result) const;
   void judge_rule(const HostClause& clause, ClauseResult& result) const;
   void conclude_if_all_are_requests(ClauseResult& result, bool kept, std::string evidence) const;
@@ -53,19 +53,20 @@ class HostTrial {
   const Unit& unit_;
   std::size_t answers_;
   Phase phase_ = Phase::good;
-  std::uint64_t begun_at_ = 0;  // of `counted`
-  std::uint64_t refused_ = 0;   // requests that came while each byte of them is damaged on its way
+  std::uint64_t begun_at_ = 0;  // value of `counted` when the phase began
+  std::uint64_t refused_ = 0;   // requests received while the fault damages every request byte
   Seen seen_{};
-  std::vector<RuleCount> calm_{};  // of them those while replies were good, and no host had to give anything up
+  // rule counts of the times with good replies, in which no earlier fault can have an effect
+  std::vector<RuleCount> calm_{};
 };
 
-/// How often the virtual encoder did so to a reply.
+/// Returns how often the virtual encoder injected this fault into a reply.
 [[nodiscard]] inline std::uint64_t count_of(const VirtualDevice& encoder, HostTrial::Fault fault) {
   const sim::FaultKind kind = fault == HostTrial::Fault::silence ? sim::FaultKind::silence : sim::FaultKind::corrupt;
   return encoder.faults() != nullptr ? (*encoder.faults())[static_cast<std::size_t>(kind)] : 0;
 }
 
-/// The virtual encoder's fault that does so: "" for none.
+/// Returns the virtual encoder's name of the fault; "" for none.
 [[nodiscard]] constexpr std::string_view name_of(HostTrial::Fault fault) {
   switch (fault) {
     case HostTrial::Fault::silence:

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Our own host holds every clause of a host, each is broken by two mutants of it alone, and none is kept by what is no
-// host of the protocol.
+// Our own host satisfies every clause of a host; two mutants break each clause and no other; senders that are no host
+// of the protocol keep none.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -20,7 +20,7 @@ namespace {
 
 Flaws doing(HostScript script) { return {.sends = {script.begin(), script.end()}}; }
 
-/// A controller that is wrong in ways that break a rule of one clock or another.
+/// Returns controllers with defects that break one of the rules about clock, length or mode.
 std::vector<Flaws> flaws_of_controllers() {
   using std::chrono::microseconds;
   using std::chrono::milliseconds;
@@ -69,7 +69,7 @@ std::vector<Flaws> flaws_for(const EncoderAddress& address) {
   return all;
 }
 
-/// Adds steps that our own host does not send, though a host may.
+/// Returns a host that also sends permitted requests which our own host does not send.
 Flaws polite(const Unit& unit) {
   Flaws flaws;
   for (const HostClause& clause : host_clauses_of(unit)) {
@@ -100,12 +100,12 @@ EncoderAddress address_of_unit(const Unit& unit, std::string_view motion) {
 }
 
 bool is_mistake_of(std::span<const std::string> broken, std::string_view clause) {
-  // A host that sends something else does not send requests as drawn either.
+  // A host that sends other bytes also violates the clause that requests must be as drawn.
   return std::find(broken.begin(), broken.end(), clause) != broken.end() &&
          std::all_of(broken.begin(), broken.end(), [&](const std::string& id) { return id == clause || id == "asks"; });
 }
 
-/// The request for a position.
+/// Returns the request for a position.
 template <class Item>
 std::vector<Item> request_of(const EncoderAddress& address) {
   const Unit& unit = *address.unit;
@@ -135,7 +135,7 @@ Error error_of(const EncoderAddress& address, const std::vector<CanFrame>& reque
   return address.unit->check(address.options, {.can = request.data()}, {});
 }
 
-/// The request for a position with one bit that makes it none.
+/// Returns requests for a position that one wrong bit makes invalid.
 template <class Item>
 std::vector<std::vector<Item>> damaged_requests(const EncoderAddress& address) {
   std::vector<std::vector<Item>> all;
@@ -150,7 +150,7 @@ std::vector<std::vector<Item>> damaged_requests(const EncoderAddress& address) {
   return all;
 }
 
-/// Hosts that send nothing but one damaged request, and those that send good ones too.
+/// Returns results for hosts that send only one damaged request, and for hosts that alternate it with good ones.
 template <class Item>
 std::vector<Conformance> judged_with_damaged_requests(const EncoderAddress& address) {
   std::vector<Conformance> all;
@@ -217,7 +217,7 @@ TEST_P(HostClauses, ScriptsBreakTheirClause) {
   }
 }
 
-// A host that never does what a rule is about has not kept it.
+// A rule that the host never put to the test is untested, not kept.
 TEST_P(HostClauses, WhatAHostNeverDidIsUntested) {
   const EncoderAddress address = address_of_unit(*GetParam(), "still");
   const Conformance silent = judged(address, {.is_silent = true});
@@ -226,7 +226,7 @@ TEST_P(HostClauses, WhatAHostNeverDidIsUntested) {
   EXPECT_EQ(read.verdict(), Verdict::kept) << read.report();
   for (const ClauseResult& one : read.clauses) {
     const HostClause& clause = *std::ranges::find(host_clauses_of(*GetParam()), one.id, &HostClause::id);
-    // This host only reads positions and memory; the rest only a script does.
+    // This host only reads positions and memory; other requests need a script.
     if (!clause.breaks[0].empty() && clause.options.empty() && one.verdict == Verdict::kept) {
       EXPECT_NE(one.evidence.find("looked at "), std::string::npos) << one.evidence;
       EXPECT_EQ(one.evidence.find("looked at 0"), std::string::npos) << one.evidence;
@@ -234,13 +234,13 @@ TEST_P(HostClauses, WhatAHostNeverDidIsUntested) {
   }
 }
 
-// ---- What is no host of the protocol
+// ---- Senders that are no host of the protocol
 
 void expect_none_kept(const Conformance& found, std::string_view who) {
   EXPECT_EQ(with_verdict(found, Verdict::kept), std::vector<std::string>{}) << who << "\n" << found.report();
 }
 
-/// Each of them sends again and again, whatever comes.
+/// Checks senders that send again and again and ignore replies.
 template <class Item>
 void let_strangers_come(const EncoderAddress& address) {
   const auto judged_sending = [&](const auto& next) { return Host<Item>(address, {}).judged_sending(next); };
@@ -262,7 +262,7 @@ void let_strangers_come(const EncoderAddress& address) {
   for (const Unit* const other : all_units()) {
     if (other->link == LinkKind::clocked || (other->link == LinkKind::can) != std::is_same_v<Item, CanFrame>) continue;
     const std::vector<Item> request = request_of<Item>(asked_address(fmt::format("sim:{}", other->id)));
-    // Where it is a request here too, nothing is wrong with it.
+    // Skips requests that this unit accepts too.
     if (request.empty() || error_of(address, request) == Error::none) continue;
     expect_none_kept(judged_sending([&] { return request; }), other->id);
   }
@@ -280,7 +280,7 @@ TEST_P(HostClauses, NoneIsKeptByWhatIsNoHost) {
   }
 }
 
-// Two requests in one write: the second does not wait for the reply.
+// Two requests in one write: the second does not wait for the first reply.
 TEST_P(HostClauses, TwoRequestsAtOnceBreakOne) {
   const Unit& unit = *GetParam();
   if (unit.link != LinkKind::half_duplex) GTEST_SKIP() << "its host need not wait";

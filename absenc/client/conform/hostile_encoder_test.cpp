@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Nothing is kept by what is no encoder of the protocol: what a verdict says was seen is looked for on the line itself.
+// Devices that are no encoder of the protocol keep no clause. For each kept clause the test checks its evidence on the
+// line.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -24,7 +25,7 @@ namespace {
 using capture::ObservedExchange;
 using capture::ObservedFrame;
 
-/// Keeps all exchanges of the line: each request with all that came until the next.
+/// Stores all exchanges of the line: each request with everything received until the next.
 template <class Item>
 class TapPort final : public Port<Item> {
  public:
@@ -50,13 +51,13 @@ class TapPort final : public Port<Item> {
     return event;
   }
 
-  std::vector<Exchange> exchanges{1};  // what comes before the first request belongs to none
+  std::vector<Exchange> exchanges{1};  // items before the first request belong to an empty request
 
  private:
   Port<Item>& port_;
 };
 
-/// Answers whatever it hears, and sends by itself where an encoder of the unit would.
+/// Replies to every request, and sends unsolicited where an encoder of the unit would.
 template <class Item>
 class Stranger final : public Machine<Item> {
  public:
@@ -110,7 +111,7 @@ class Stranger final : public Machine<Item> {
   bool sending_ = false;
 };
 
-/// Returns a good reply of this encoder; empty where it cannot be read.
+/// Returns a good reply of this encoder; empty if it cannot be read.
 template <class Item>
 std::vector<Item> said_by(const EncoderAddress& address) {
   VirtualDevice device(*address.unit, address.options, address.device);
@@ -166,7 +167,7 @@ ObservedFrame frame_of(const std::vector<Item>& items, std::size_t bits = 0) {
   return frame;
 }
 
-/// Good replies that were on the line, or frames of a stream, by these options.
+/// Returns the number of good replies or stream frames on the line, checked with the options of the clause.
 template <class Item>
 std::size_t good_replies(EncoderAddress address, const Clause& clause, const TapPort<Item>& tap) {
   const Unit& unit = *address.unit;
@@ -193,7 +194,7 @@ std::size_t good_replies(EncoderAddress address, const Clause& clause, const Tap
   return good;
 }
 
-/// Whether what the clause sends was sent.
+/// Returns whether the request of the clause was sent.
 template <class Item>
 bool was_sent(const EncoderAddress& address, const Clause& clause, const TapPort<Item>& tap) {
   const Unit& unit = *address.unit;
@@ -215,7 +216,7 @@ bool was_sent(const EncoderAddress& address, const Clause& clause, const TapPort
       return std::ranges::any_of(tap.exchanges, [&](const auto& one) { return one.request == wanted; });
     }
   }
-  // Without words of its own: other requests than those of readings.
+  // For a clause without a request text: whether requests other than those of readings were sent.
   std::set<std::string> different;
   for (const auto& one : tap.exchanges) {
     if (!one.request.empty()) different.insert(to_wire_text(unit.link, frame_of(one.request).frame()));
@@ -275,7 +276,7 @@ void let_strangers_answer(const EncoderAddress& address, const ConformChoices& c
   }
 }
 
-// A real one on a line that damages all it says, or every second reply.
+// A real encoder on a line that damages every reply, or every second one.
 template <class Item>
 void let_line_damage(const EncoderAddress& address, const ConformChoices& choices) {
   for (const unsigned every : {1u, 2u}) {
@@ -324,7 +325,7 @@ TEST_P(HostileEncoders, KeepNothingThatWasNotSeen) {
   }
 }
 
-// With each option with which the virtual encoder can be read.
+// Checks an encoder with each option with which it can be read.
 template <class Item>
 void check_good_one(const EncoderAddress& address) {
   if (said_by<Item>(address).empty()) return;

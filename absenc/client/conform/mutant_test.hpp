@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Encoders that break a clause: what stands between a virtual encoder and its line, in virtual time.
+// Encoders that break a clause: a mutant between virtual encoder and line that changes requests and replies, in virtual
+// time.
 #pragma once
 
 #include <fmt/format.h>
@@ -20,7 +21,7 @@
 
 namespace absenc::client {
 
-/// Changes what the encoder hears, and what it says for some of the requests.
+/// Changes the requests that an encoder receives, and its replies to some of them.
 template <class Item>
 class Mutant final : public Machine<Item> {
  public:
@@ -55,11 +56,11 @@ class Mutant final : public Machine<Item> {
       Step<Item> step = device_.next(now);
       if (step.kind != Step<Item>::Kind::transfer) return step;
       said.assign(step.out.begin(), step.out.end());
-      if (!driven && heard_.empty()) ++requests;  // it sends by itself
+      if (!driven && heard_.empty()) ++requests;  // an unsolicited frame
       if (say && mutates()) {
         say(said, step);
         if (said.empty() && driven) continue;
-        // A reply that is swallowed has left for the device.
+        // The device must see the suppressed reply as sent.
         if (said.empty()) {
           device_.feed({.kind = Kind::sent, .at = now});
           continue;
@@ -74,20 +75,21 @@ class Mutant final : public Machine<Item> {
 
   std::function<void(std::vector<Item>&)> hear{};
   std::function<void(std::vector<Item>&, Step<Item>&)> say{};
-  bool on_damage = false;   // a damaged request is heard as the good one
-  bool of_special = false;  // it says so to other requests than the first alone
-  bool always = false;      // it says so from request `mutated` on
-  unsigned mutated = 3;     // the first may be the one that finds the echo
+  bool on_damage = false;   // a damaged request is received as the good one
+  bool of_special = false;  // changes replies to requests that differ from the first
+  bool always = false;      // changes the replies to all requests from number `mutated` on
+  // number of the request whose reply is changed, from 1; the first request may only detect the echo
+  unsigned mutated = 3;
   bool driven = false;
   unsigned requests = 0;
   std::vector<Item> said;
-  std::vector<Item> good;  // the first request
-  int special = -1;        // which other request is meant, in the order in which they come; -1: each
-  std::function<bool(const std::vector<Item>&)> is_meant{};  // and of which kind; empty: any
-  bool is_special = false;                                   // the last request was that
+  std::vector<Item> good;  // the first request, a good one
+  int special = -1;        // index of the only special request, in order of arrival; -1: all
+  std::function<bool(const std::vector<Item>&)> is_meant{};  // further condition of special requests; empty: none
+  bool is_special = false;                                   // the last request is special
 
  private:
-  // Nothing is known about a damaged request.
+  // Decides whether the request is special. A damaged request has no items.
   void note_special(const std::vector<Item>& request) {
     is_special = false;
     if (!request.empty() && request == good) return;
@@ -148,7 +150,7 @@ inline Verdict verdict_of(const Conformance& conformance, std::string_view id) {
   return Verdict::untested;
 }
 
-/// "sim:raa38?mode=bus", which shows this clause.
+/// Returns an address, "sim:raa38?mode=bus", whose encoder shows the behaviour of the clause.
 inline std::string address_showing(const Unit& unit, const Clause& clause) {
   return fmt::format("sim:{}{}{}", unit.id, clause.shown_with.empty() ? "" : "?", clause.shown_with);
 }

@@ -27,7 +27,8 @@ std::size_t counters_seen(const Readings& readings) {
   return values.size();
 }
 
-// The first bits of one good reply and the rest of another, whose parts are each right.
+// Returns how many mixtures are detected as one of `errors`. A mixture has the first bits of one good reply and the
+// rest of another, so that each part alone is right.
 std::size_t mixtures_noticed(const Unit& unit, const Options& options, const Readings& readings, Errors errors) {
   const Attempted* const one = readings.first_good();
   std::size_t noticed = 0;
@@ -122,7 +123,8 @@ void judge_frames(const Unit& unit, const Options& options, const Readings& read
                         ? "no good reply came"
                         : "all bits were alike, as on a line that nobody drives: turn the shaft a little";
   if (good == nullptr) return;
-  const bool about_counters = errors == any_of(Error::sequence_mismatch);  // which no single reply shows
+  // a single reply cannot show an error of the counter
+  const bool about_counters = errors == any_of(Error::sequence_mismatch);
   const std::size_t noticed = about_counters ? 0 : changes_noticed(unit, options, good->exchange, errors);
   if (noticed != 0) {
     return conclude(result, true, fmt::format("{}; of one changed it would be seen in {} ways", seen, noticed));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Readings of a run, and the verdicts on the clauses that need nothing else.
+// Readings of a run, and the verdicts on clauses that need only readings.
 #pragma once
 
 #include <cstdint>
@@ -11,34 +11,35 @@
 
 namespace absenc::client {
 
-/// Whether all bits of a clocked word are alike: a line that nobody drives shows the same.
+/// Returns whether all bits of a clocked word are equal, as on a line that nothing drives.
 [[nodiscard]] bool is_flat(const capture::ObservedFrame& reply);
 
-/// Whether something came for the last request, and not only the level of a line that nobody drives.
+/// Returns whether the last request got a reply other than the constant level of an undriven line.
 [[nodiscard]] inline bool was_answered(const Attempted& one) { return one.answered && one.error != Error::line_stuck; }
 
-/// Readings with one set of options, and their replies.
+/// Readings with one set of options, with their replies.
 struct Readings {
   std::vector<Attempted> all{};
   std::uint64_t requests = 0;   // requests, pulses and transfers that were sent
-  std::uint64_t answered = 0;   // of them
-  std::uint64_t good = 0;       // replies, or frames that came by themselves, of which a reading was made
+  std::uint64_t answered = 0;   // number of answered requests
+  std::uint64_t good = 0;       // replies or unsolicited frames that yielded a reading
   std::uint64_t discarded = 0;  // damaged frames of a stream
 
-  /// Returns the first good reading; null: there is none, or its words have nothing but bits that are all alike.
+  /// Returns the first good reading; null if none is good, or all good words consist of equal bits.
   [[nodiscard]] const Attempted* first_good() const;
 };
 
 /// Judges whether each request was answered.
 void judge_answered(const Readings& readings, ClauseResult& result);
 
-/// Judges whether frames came by themselves, up to the last reading.
+/// Judges whether unsolicited frames were received, up to the last reading.
 void judge_streamed(const Readings& readings, ClauseResult& result);
 
-/// Judges the answer times of good replies against the limits of a host. `latency`: the port tells times to within it.
+/// Judges the time between request and good reply against the limit of a host. `latency` is the precision of the port's
+/// times.
 void judge_time(const Unit& unit, const Options& options, const Readings& readings, Time latency, ClauseResult& result);
 
-/// Judges whether a reply has one of `errors`. Kept only where a wrong bit of a good reply would show as one.
+/// Judges whether a reply has one of `errors`. Concludes `kept` only if a wrong bit in a good reply would show as one.
 void judge_frames(const Unit& unit, const Options& options, const Readings& readings, Errors errors,
                   ClauseResult& result);
 

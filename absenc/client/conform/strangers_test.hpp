@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Senders that speak no protocol, for tests of encoders and of hosts.
+// Random senders without a protocol, for tests of encoders and of hosts.
 #pragma once
 
 #include <cstddef>

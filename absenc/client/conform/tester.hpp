@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests the clauses about readings and about requests that no host sends, and carries what changes the encoder.
+// Tests the clauses about readings and about requests that no host sends, and gives Changes access to the line.
 #pragma once
 
 #include <fmt/format.h>
@@ -37,7 +37,7 @@ class Tester {
         read_(*find_command(unit_, Verb::read)),
         count_(std::max<std::size_t>(1, choices.readings)) {
     runner_.attach(port, latency);
-    // Once, so that what was changed can still be put back.
+    // Interrupts only once, so that changed values can still be restored.
     runner_.port().over = [this, over = choices.over] {
       if (!over || ended_ || !over()) return false;
       ended_ = true;
@@ -47,13 +47,13 @@ class Tester {
   Tester(const Tester&) = delete;
   Tester& operator=(const Tester&) = delete;
 
-  /// Before all tests.
+  /// Takes the readings that the tests judge; call this before them.
   void read() { readings_ = read_all(options_); }
 
-  /// Whether the choice `over` ended it.
+  /// Returns whether ConformChoices::over ended the test.
   [[nodiscard]] bool ended() const { return ended_; }
 
-  /// Returns the line as tests need it that change the encoder.
+  /// Returns access to the line for tests that change the encoder.
   [[nodiscard]] ChangesLine line() {
     return {.run = [this](const Command& command, Arguments arguments) { return run(command, arguments, 3); },
             .send = [this](const std::vector<std::uint8_t>& request) { return send(request); },
@@ -90,14 +90,13 @@ class Tester {
   }
 
  private:
-  static constexpr Time listening =
-      std::chrono::milliseconds(20);    // for what comes though nobody waits for it any more
-  static constexpr unsigned times = 3;  // that a request is sent which no host sends
+  static constexpr Time listening = std::chrono::milliseconds(20);  // time in which a late reply is still received
+  static constexpr unsigned times = 3;                              // repetitions of a request that no host sends
   static constexpr bool is_can = std::is_same_v<Item, CanFrame>;
 
   // ---- The line
 
-  // A conversation that changes the encoder for its own use leaves it as it was when somebody asks to end.
+  // Runs a command. On an interrupt the conversation first restores what it changed in the encoder for its own use.
   Ran run(const Command& command, Arguments arguments, unsigned attempts) {
     runner_.set_options(options_);
     runner_.start_again(attempts);
@@ -127,7 +126,7 @@ class Tester {
     AnswerSink sink;
   };
 
-  // Each request counts by itself. A reply that comes when the host has asked again is late, not missing.
+  // Runs one reading. Each request counts separately; a reply that comes after a repeated request is late, not missing.
   Attempted once(const Options& options, Time listen_for = listening) {
     runner_.set_options(options);
     if (!is_streamed(options)) runner_.start_again();
@@ -137,7 +136,7 @@ class Tester {
                                    one.detail));
     }
     if (one.error == Error::none || !is_asked() || is_streamed(options)) return one;
-    // Silence is a timeout, whatever error the host makes of it.
+    // No reply is a timeout, whatever error the host reports.
     if (!one.answered) one.error = Error::timeout;
     runner_.listen(listen_for);
     runner_.keep_exchange(one);
@@ -151,7 +150,7 @@ class Tester {
       const std::uint64_t requests = runner_.port().requests - before;
       const std::uint64_t unanswered = std::min(requests, one.unanswered + (was_answered(one) ? 0 : 1));
       readings.requests += requests;
-      // One that comes when the host has asked again is late, not missing.
+      // A reply that comes after a repeated request is late, not missing.
       readings.answered += was_answered(one) && one.is_late() ? requests : requests - unanswered;
       readings.good += one.error == Error::none ? std::max<std::uint64_t>(requests, 1) : 0;
       readings.discarded += one.discarded;
@@ -163,9 +162,9 @@ class Tester {
   [[nodiscard]] bool is_streamed(const Options& options) const {
     return unit_.streams != nullptr && unit_.streams(options);
   }
-  // Else the host is the clock.
+  // Returns whether the encoder replies to requests. On clocked and SPI links the host clocks the bits instead.
   [[nodiscard]] bool is_asked() const { return unit_.link != LinkKind::clocked && unit_.link != LinkKind::spi; }
-  // Silence tells only of an encoder that answers else.
+  // Returns whether the encoder replies to a reading: a missing reply to another request is no evidence otherwise.
   [[nodiscard]] bool answers() {
     for (unsigned i = 0; i < times; ++i) {
       if (once(options_).error == Error::none) return true;
@@ -173,7 +172,7 @@ class Tester {
     return false;
   }
 
-  /// In place of the first request of a reading. Nothing, where readings ask for nothing.
+  /// Sends an edited request in place of the first request of a reading. Returns nothing if readings send no request.
   std::optional<Attempted> send_instead(const std::function<void(std::vector<Item>&)>& edit, std::uint32_t permille = 0,
                                         Time listen_for = listening) {
     const std::uint64_t before = runner_.port().requests;
@@ -198,7 +197,7 @@ class Tester {
     return one;
   }
   void set_rate(std::uint32_t rate) { runner_.port().begin({.kind = Step<Item>::Kind::configure, .rate = rate}); }
-  /// As bytes, or on a CAN bus as text.
+  /// Sends a request, given as bytes or, for a CAN bus, as text.
   Sent send(const std::vector<std::uint8_t>& request) {
     Sent sent;
     const auto attempted = send_instead([&](std::vector<Item>& edited) { edited = items_of(request); }, 0,
@@ -214,7 +213,7 @@ class Tester {
       return request;
     }
   }
-  /// Frames that come by themselves as the replies of readings do.
+  /// Counts unsolicited frames with the identifier of the readings' replies, for `time`.
   Heard hear(Time time) {
     Heard heard;
     const Attempted* const good = readings_.first_good();
@@ -264,8 +263,8 @@ class Tester {
 
   // ---- Requests that no host sends
 
-  // A neighbour on the line answers at its own address: then another address is asked. What answers in our encoder's
-  // name, or at every address with its position, is our encoder.
+  // Requests other addresses, several of them because a neighbour on the line may reply at one. A reply in the name of
+  // our encoder, or replies with its position at every address, are from our encoder.
   void test_foreign(ClauseResult& result) {
     constexpr std::size_t most_addresses = 8;
     const auto role = std::find_if(unit_.options.begin(), unit_.options.end(),
@@ -317,7 +316,8 @@ class Tester {
     return unit_.check(options_, frame, {}) == Error::none &&
            encoder_of(unit_, options_, frame).value_or(value) == value;
   }
-  // On CAN not what comes counts, but what would be an answer: a node may say something else at any time.
+  // Returns whether no reply came. On CAN only a frame that can be the reply counts, because a node may send other
+  // frames at any time.
   [[nodiscard]] static bool is_silent(const Attempted& one) {
     if constexpr (is_can) return one.error == Error::timeout;
     return !one.answered;
@@ -351,7 +351,7 @@ class Tester {
       if (!one) return;
       last = what_came(unit_.link, one->exchange.request.frame(), one->exchange.reply.frame());
       const Seen seen = reaction_of(clause, *one);
-      // A port may not be at the right rate again when the reply begins.
+      // The port may return to the usual rate too late for the reply.
       const bool missed = slow && (is_silent(*one) || seen == Seen::unclear);
       result.evidence = last + ": a port that changes its rate may be too late to hear the reply";
       if (missed) return;
@@ -401,7 +401,7 @@ class Tester {
   Runner<Item> runner_;
   const Command& read_;
   std::size_t count_;
-  bool ended_ = false;  // because of the choice `over`
+  bool ended_ = false;  // ConformChoices::over ended the test
   Readings readings_{};
 };
 

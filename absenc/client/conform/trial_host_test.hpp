@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Hosts in virtual time that are judged: our own with something wrong in it, and such as are no hosts at all.
+// Hosts in virtual time for conformance tests: our own host with a defect, and senders that are no host of the
+// protocol.
 #pragma once
 
 #include <fmt/format.h>
@@ -29,22 +30,22 @@ namespace absenc::client {
 /// Defects of a host.
 struct Flaws {
   bool is_silent = false;
-  unsigned stops_at_silence = 0;  // when it has asked so often without a reply; 0: it goes on
-  unsigned stops_at_damage = 0;   // and with damaged ones
-  unsigned stops_at_refusal = 0;  // and of requests that came damaged
-  Time hasty{};                   // waits of up to so long are left out
+  unsigned stops_at_silence = 0;  // number of requests without reply after which it stops; 0: never
+  unsigned stops_at_damage = 0;   // number of damaged replies after which it stops; 0: never
+  unsigned stops_at_refusal = 0;  // number of damaged requests after which it stops; 0: never
+  Time hasty{};                   // waits up to this length are skipped
   std::vector<HostStep> sends{};
-  // Of an SPI controller:
-  Time early{};            // transfers begin so much too early
-  std::uint32_t rate = 0;  // Hz; 0: as it is told
-  int bytes = 0;           // more than it is told, at least one
+  // Defects of an SPI controller:
+  Time early{};            // time by which transfers begin too early
+  std::uint32_t rate = 0;  // clock rate in Hz; 0: that of the step
+  int bytes = 0;           // bytes added to each transfer, negative: removed; at least one byte remains
   bool other_mode = false;
   bool without_lead = false;
 };
 
 struct Stopped {};
 
-/// The port of a host that does not wait, or gives up.
+/// The port of a host that skips waits, or stops after some requests.
 template <class Item>
 class HastyPort final : public Port<Item> {
  public:
@@ -73,7 +74,7 @@ class HastyPort final : public Port<Item> {
   bool sending_ = false;
 };
 
-/// An SPI controller in virtual time, with what is wrong with it.
+/// An SPI controller in virtual time, with defects.
 class ControllerPort final : public Port<std::uint8_t> {
  public:
   ControllerPort(LinkKind kind, const LineSettings& line, Machine<std::uint8_t>& device, const Flaws& flaws)
@@ -147,7 +148,7 @@ class Host {
     port_.hasty = flaws_.early;
   }
 
-  /// One that sends `next()` again and again, whatever comes.
+  /// Judges a host that sends `next()` again and again and ignores replies.
   template <class Next>
   Conformance judged_sending(const Next& next) {
     constexpr unsigned most = 60;
@@ -155,13 +156,13 @@ class Host {
     for (unsigned i = 0; i < most; ++i) {
       set_fault(trial.look(seen()));
       send(next());
-      listen(std::chrono::milliseconds(25));  // longer than any encoder needs
+      listen(std::chrono::milliseconds(25));  // longer than the reply of any encoder
     }
     trial.look(seen());
     return trial.judge();
   }
 
-  /// `all`: at its end it runs every command once.
+  /// Judges our own host with its defects. `all`: it finally runs every command once.
   Conformance judged(bool all = false) {
     constexpr unsigned most_rounds = 40;
     HostTrial trial(unit_, 20);
@@ -171,7 +172,7 @@ class Host {
     device_.set_faults({});
     if (!flaws_.sends.empty()) send_all();
     for (const Command& command : unit_.commands) {
-      const bool moves = !command.changes_option.empty();  // then it would have to follow
+      const bool moves = !command.changes_option.empty();  // the host would have to change its options
       if (all && !moves) run(command, complete_arguments(command, given(command)));
     }
     trial.look(seen());
@@ -251,7 +252,7 @@ class Host {
     trial.look(seen());
   }
 
-  // Sends each step by itself, without waiting for what the encoder does then.
+  // Sends each step without waiting for the reply.
   void send_all() {
     listen(std::chrono::milliseconds(50));
     for (const HostStep& one : flaws_.sends) {
@@ -311,7 +312,7 @@ class Host {
   RuleCounter rules_;
   VirtualDevice device_;
   RequestWatch<Item> watch_;
-  std::shared_ptr<ControllerPort> controller_;  // of spi and clocked links
+  std::shared_ptr<ControllerPort> controller_;  // null on other links
   std::shared_ptr<Port<Item>> line_;
   HastyPort<Item> port_;
   std::vector<std::byte> storage_;
