@@ -49,11 +49,11 @@ class SampleRows {
   Joint joint_;
   ReadingColumns reading_;
   std::vector<Column> columns_;
-  // Indexes of columns; 0: the rows do not have the column.
+  // Indexes of columns in a row; 0: the rows do not have the column.
   std::size_t protocol_, reading_at_, confirmed_, ok_;
-  std::size_t motion_ = 0;  // first column of motion
+  std::size_t motion_ = 0;  // index of the first motion column
   std::size_t missed_ = 0;
-  std::size_t angles_ = 0;  // first column of joint angles
+  std::size_t angles_ = 0;  // index of the first joint-angle column
   std::size_t event_, message_, sent_, received_;
   Row row_;
 };

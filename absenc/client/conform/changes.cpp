@@ -379,7 +379,7 @@ bool Changes::put_back(const Saved& one) {
       interrupted_ = true;
     } catch (const os::Ended&) {
       interrupted_ = true;
-    } catch (const Refused&) {  // try again
+    } catch (const Refused&) {  // the encoder refused: try again
     } catch (const std::exception&) {
     }
   }

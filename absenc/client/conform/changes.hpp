@@ -58,7 +58,8 @@ struct Heard {
 /// once for each request of the caller to end.
 struct ChangesLine {
   std::function<Ran(const Command&, Arguments)> run;
-  std::function<Sent(const std::vector<std::uint8_t>& request)> send;  // a request in the form of Unit::encode
+  // sends a request, encoded by Unit::encode, and returns the exchange
+  std::function<Sent(const std::vector<std::uint8_t>& request)> send;
   std::function<Heard(Time)> hear;
   std::function<void(Time)> rest;
   // reports a new value of a setting, which may change how the encoder is reached

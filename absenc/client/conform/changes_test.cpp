@@ -66,14 +66,15 @@ class Disobedient final : public Machine<Item> {
     return step;
   }
 
-  std::vector<Item> deaf_to{};  // a request that it ignores
-  unsigned heard_before = 0;    // how often it still obeys this request
+  std::vector<Item> deaf_to{};  // a request that the encoder ignores
+  unsigned heard_before = 0;    // number of times that the encoder still obeys the request `deaf_to`
   unsigned deaf_from = 0;       // first ignored request, counted from 1
   unsigned deaf_until = 0;      // first request after the ignored ones
   // number of the request whose reply has a wrong bit; 0: none
   unsigned damaged_at = 0;
-  unsigned change = 0;                                         // number of the memory change that is corrupted, from 1
-  std::function<void(MutableBytes, const ByteList&)> spoil{};  // gets the new and the previous content
+  unsigned change = 0;  // number of the memory change that is corrupted, from 1
+  // corrupts the memory, given its new and its previous content
+  std::function<void(MutableBytes, const ByteList&)> spoil{};
   unsigned requests = 0;
 
  private:
@@ -267,7 +268,7 @@ std::vector<Spoil<Item>> spoils_of(const EncoderAddress& address, const Clause& 
       });
     }
   }
-  // Also ignores windows of requests, because a setting may have no place in the memory.
+  // Adds encoders that ignore a window of requests, because a setting may have no place in the memory.
   const unsigned step = address.unit->link == LinkKind::clocked ? 20 : 5;
   for (const unsigned window : {30u, 1000u}) {
     for (unsigned from = 1; clause.demand >= Demand::set && from <= requests; from += step) {

@@ -179,7 +179,7 @@ Changes<Item> of_special(const Clause& clause) {
     };
   }});
   if constexpr (std::is_same_v<Item, std::uint8_t>) {
-    // Only the length of the reply is right.
+    // This mutant's reply has the right length but wrong content.
     all.push_back({.change = [hears_good](M& m) {
       hears_good(m);
       m.of_special = true;
@@ -200,7 +200,7 @@ Changes<Item> of_special(const Clause& clause) {
       }
     }
   } else {
-    // It replies with the node number of the request.
+    // This mutant replies with the node number of the request.
     all.push_back({.change = [hears_good](M& m) {
       const auto asked = std::make_shared<std::uint32_t>(0);
       m.hear = [&m, asked](List& heard) {

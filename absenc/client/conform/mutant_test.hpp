@@ -56,7 +56,7 @@ class Mutant final : public Machine<Item> {
       Step<Item> step = device_.next(now);
       if (step.kind != Step<Item>::Kind::transfer) return step;
       said.assign(step.out.begin(), step.out.end());
-      if (!driven && heard_.empty()) ++requests;  // an unsolicited frame
+      if (!driven && heard_.empty()) ++requests;  // the device sends an unsolicited frame
       if (say && mutates()) {
         say(said, step);
         if (said.empty() && driven) continue;

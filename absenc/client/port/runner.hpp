@@ -87,8 +87,8 @@ struct Series {
   std::size_t count = 0;
   Time limit = never;                       // duration of the series
   Time patience = std::chrono::seconds(2);  // time since the last good reply
-  std::size_t most_silent = 8;              // runs without any received byte after which the series ends,
-  Time least{};                             // though not before this time
+  std::size_t most_silent = 8;              // runs without any received byte after which the series ends
+  Time least{};                             // shortest time before `most_silent` ends the series
   std::size_t most_bad = 24;                // runs without a good reply after which the series ends
 };
 
