@@ -26,6 +26,7 @@ struct Flags {
 
 /// Returns the alarms of each channel; empty if the unit has no such field.
 [[nodiscard]] std::vector<Flags> alarms_of(const Unit& unit, const Reading& reading);
+/// Returns the flags of the status of a reading, one entry for each field.
 [[nodiscard]] std::vector<Flags> status_of(const Unit& unit, const Reading& reading);
 
 /// Returns status and alarms, channel by channel.

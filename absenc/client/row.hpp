@@ -14,6 +14,7 @@
 
 namespace absenc::client {
 
+/// Type of a value.
 enum class Type : std::uint8_t { int64, uint64, real, boolean, flags, text, bytes };
 
 /// Description of a value in each row.
@@ -34,6 +35,7 @@ struct Column {
   Look look{};               ///< How a table for people shows it.
 };
 
+/// Bytes as a value.
 using ByteVector = std::vector<std::uint8_t>;
 
 /// Replaces a value that the encoder reported as invalid. The value itself is never shown.
@@ -84,7 +86,9 @@ struct Row {
   }
 };
 
+/// Returns the column of a field.
 [[nodiscard]] Column column_of(const FieldInfo& field);
+/// Returns the value of a field as a value of a row.
 [[nodiscard]] Value value_of(const FieldValue& value);
 
 /// Result of a command: a row that owns its columns.

@@ -11,10 +11,10 @@ namespace absenc {
 
 /// How far one part of a reading (single-turn position or turns) can be trusted.
 enum class Validity : std::uint8_t {
-  absent,   // the reply does not carry this part
-  unknown,  // no reply so far reports whether this part is valid: do not use it
-  invalid,  // a reported alarm or state marks this part as invalid
-  valid,    // every alarm and state that could make this part invalid was reported, and is clear
+  absent,   ///< the reply does not carry this part
+  unknown,  ///< no reply so far reports whether this part is valid: do not use it
+  invalid,  ///< a reported alarm or state marks this part as invalid
+  valid,    ///< every alarm and state that could make this part invalid was reported, and is clear
 };
 
 /// Returns the low `bits` (1 to 64) of `value` as a signed number in two's complement.
@@ -77,9 +77,11 @@ struct Reading {
 
 /// Converts counts of a linear encoder to micrometres, or counts per second to micrometres per second.
 [[nodiscard]] constexpr double micrometres(double counts, double unit_um) { return counts * unit_um; }
+/// Returns the position of a linear encoder in micrometres.
 [[nodiscard]] constexpr double micrometres(std::uint64_t counts, double unit_um) {
   return micrometres(static_cast<double>(counts), unit_um);
 }
+/// Returns the position of a linear encoder in micrometres.
 [[nodiscard]] constexpr double micrometres(std::int64_t counts, double unit_um) {
   return micrometres(static_cast<double>(counts), unit_um);
 }

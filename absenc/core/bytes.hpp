@@ -9,7 +9,9 @@
 
 namespace absenc {
 
+/// Bytes that belong to another object.
 using Bytes = std::span<const std::uint8_t>;
+/// Bytes that belong to another object and may be written.
 using MutableBytes = std::span<std::uint8_t>;
 
 /// Up to Capacity items, stored inside the object. Appending to a full buffer is refused, never truncated.
@@ -59,6 +61,7 @@ class Buffer {
   std::size_t size_ = 0;
 };
 
+/// Bytes, at most `Capacity`.
 template <std::size_t Capacity>
 using ByteBuffer = Buffer<std::uint8_t, Capacity>;
 

@@ -46,8 +46,8 @@ struct CrcParameters {
 
 /// Size of the constant table of `Crc`.
 enum class CrcTable {
-  byte,    // 256 entries, one look-up per byte: 256 bytes up to width 8, 512 above
-  nibble,  // 16 entries, two look-ups per byte: 16 or 32 bytes, for firmware
+  byte,    ///< 256 entries, one look-up per byte: 256 bytes up to width 8, 512 above
+  nibble,  ///< 16 entries, two look-ups per byte: 16 or 32 bytes, for firmware
 };
 
 /// Table-driven CRC. The remainder is stored reflected when `refin` is set, otherwise left-aligned in `Word`, so that

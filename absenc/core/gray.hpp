@@ -6,6 +6,7 @@
 
 namespace absenc {
 
+/// Returns the Gray code of a number.
 [[nodiscard]] constexpr std::uint64_t gray_encode(std::uint64_t binary) { return binary ^ (binary >> 1); }
 
 /// Decodes Gray code of any width up to 64 bits: the prefix XOR needs six shifts (four would stop at 16 bits).

@@ -73,6 +73,7 @@ inline constexpr std::array<ErrorText, 17> error_texts{{
   return (error >= Error::line_stuck && error <= Error::wrong_length) || error == Error::bad_checksum;
 }
 
+/// Returns the texts of an error.
 [[nodiscard]] constexpr const ErrorText& text_of(Error error) { return error_texts[static_cast<std::size_t>(error)]; }
 
 /// A value (initially T{}) or an Error other than `none`. Reading the value of a failed result is undefined, as in

@@ -12,15 +12,19 @@
 
 namespace absenc {
 
+/// A time since a start that all times of a program share, or a duration, in nanoseconds.
 using Time = std::chrono::nanoseconds;
 
-inline constexpr Time never = Time::max();
+inline constexpr Time never = Time::max();  ///< A time that never comes.
 
 /// Compares the counts as numbers: the operators of chrono use <=>, which costs a call on a small core instead of three
 /// instructions.
 [[nodiscard]] constexpr bool operator<(Time one, Time other) { return one.count() < other.count(); }
+/// Compares times.
 [[nodiscard]] constexpr bool operator>(Time one, Time other) { return one.count() > other.count(); }
+/// Compares times.
 [[nodiscard]] constexpr bool operator<=(Time one, Time other) { return one.count() <= other.count(); }
+/// Compares times.
 [[nodiscard]] constexpr bool operator>=(Time one, Time other) { return one.count() >= other.count(); }
 
 }  // namespace absenc

@@ -12,8 +12,9 @@
 
 namespace absenc::host {
 
+/// Whether the adapter receives what it sends.
 enum class EchoMode : std::uint8_t {
-  automatic,  // found out from the first good exchange
+  automatic,  ///< found out from the first good exchange
   on,
   off,
 };

@@ -50,8 +50,8 @@ struct Filter : Machine<Item> {
 /// Of an encoder that transmits by itself. Whoever reads at a rate of his own wants the newest: what waits in the port
 /// would be shown as of now.
 enum class Take : std::uint8_t {
-  newest,  // the first that comes from now on
-  every,   // the one after the last, however long ago it came
+  newest,  ///< the first that comes from now on
+  every,   ///< the one after the last, however long ago it came
 };
 
 /// Runs the commands of one encoder over a port and counts what happened.

@@ -18,10 +18,10 @@ class Unwrapper {
  public:
   /// How a reading joins the positions before it.
   enum class Joined : std::uint8_t {
-    ignored,    // the reading has no valid position
-    started,    // the first one: the position is the encoder's own
-    continued,  // the way since the reading before was added
-    restarted,  // too late after the one before to know how often it turned: the position is the encoder's own again
+    ignored,    ///< the reading has no valid position
+    started,    ///< the first one: the position is the encoder's own
+    continued,  ///< the way since the reading before was added
+    restarted,  ///< too late after the one before to know how often it turned: the position is the encoder's own again
   };
 
   /// Joins readings of a shaft that moves within `limit`.

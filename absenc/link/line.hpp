@@ -10,15 +10,16 @@ namespace absenc {
 
 /// How items (bytes, bits or frames) travel. The kind decides what `Step::Kind::transfer` means (link/step.hpp).
 enum class LinkKind : std::uint8_t {
-  half_duplex,  // one pair for both directions (RS-485): never send while the other side sends
-  full_duplex,  // a pair for each direction (RS-422, RS-232, USB serial)
-  spi,          // the host's clock moves one byte in each direction at once
-  clocked,      // the host clocks bits out of the encoder (SSI, BiSS); bits are packed MSB first, the last byte
-                // left-aligned; the clock idles high, its rising edge brings the next bit
-                // the clock idles high, its rising edge brings the next bit
+  half_duplex,  ///< one pair for both directions (RS-485): never send while the other side sends
+  full_duplex,  ///< a pair for each direction (RS-422, RS-232, USB serial)
+  spi,          ///< the host's clock moves one byte in each direction at once
+  clocked,      ///< the host clocks bits out of the encoder (SSI, BiSS); bits are packed MSB first, the last byte
+                ///< left-aligned; the clock idles high, its rising edge brings the next bit
+                ///< the clock idles high, its rising edge brings the next bit
   can,
 };
 
+/// Parity of a character.
 enum class Parity : std::uint8_t { none, odd, even };
 
 /// Wires beside the data; the host drives them.

@@ -19,6 +19,7 @@ inline constexpr std::uint8_t bell = 0x07;         ///< the adapter's reply "ref
 
 /// Longest line: T, 8 digits, length, 16 digits, 4 digits of time, CR.
 inline constexpr std::size_t line_capacity = 31;
+/// A line of text, without its end.
 using LineText = ByteBuffer<line_capacity>;
 
 /// Returns whether `byte` begins a frame: t and T for data frames, r and R for remote frames; capitals mean 29-bit
@@ -113,9 +114,9 @@ class LineReader {
   /// Event that a byte completes.
   enum class LineEvent : std::uint8_t {
     nothing,
-    line,     // `line()` is complete and valid until the next byte; may be empty
-    refused,  // the adapter refused a command (BEL)
-    garbage,  // bytes that cannot be a line were discarded
+    line,     ///< `line()` is complete and valid until the next byte; may be empty
+    refused,  ///< the adapter refused a command (BEL)
+    garbage,  ///< bytes that cannot be a line were discarded
   };
 
   /// Adds a byte; returns what it completes.

@@ -25,12 +25,12 @@ template <class Item>
 struct Step {
   /// Actions that a machine requests from its port.
   enum class Kind : std::uint8_t {
-    wait,       // no action until the next event
-    transfer,   // not before `at`: send `out` (spi: and receive max(out, expect) items; clocked: clock `bits`)
-    pulse,      // not before `at`: drive `wire` active for `width`
-    configure,  // switch this end of the line to `rate`; all else stays as it is
-    emit,       // a result is ready; the caller reads it and calls `next` again
-    done,       // the conversation has ended
+    wait,       ///< no action until the next event
+    transfer,   ///< not before `at`: send `out` (spi: and receive max(out, expect) items; clocked: clock `bits`)
+    pulse,      ///< not before `at`: drive `wire` active for `width`
+    configure,  ///< switch this end of the line to `rate`; all else stays as it is
+    emit,       ///< a result is ready; the caller reads it and calls `next` again
+    done,       ///< the conversation has ended
   };
 
   Kind kind = Kind::wait;  ///< requested action
@@ -62,13 +62,14 @@ template <class Item>
 struct Event {
   /// Kinds of events at a port.
   enum class Kind : std::uint8_t {
-    sent,      // the transfer is complete (device side of spi and clocked: the host has stopped clocking)
-    received,  // `items` were received from the line
-    silence,   // the `answer` or `gap` limit of the last step has passed
-    timer,     // the time `at` of the last wait step was reached
-    selected,  // device side: chip select or first clock edge; the next step should be the reply that the device drives
-    triggered,   // device side: a pulse on `wire` has begun
-    line_error,  // a character with a wrong stop or parity bit, or sent at another rate, was received
+    sent,        ///< the transfer is complete (device side of spi and clocked: the host has stopped clocking)
+    received,    ///< `items` were received from the line
+    silence,     ///< the `answer` or `gap` limit of the last step has passed
+    timer,       ///< the time `at` of the last wait step was reached
+    selected,    ///< device side: chip select or first clock edge; the next step should be the reply that the device
+                 ///< drives
+    triggered,   ///< device side: a pulse on `wire` has begun
+    line_error,  ///< a character with a wrong stop or parity bit, or sent at another rate, was received
   };
 
   Kind kind = Kind::timer;        ///< kind of the event
@@ -99,7 +100,9 @@ struct Machine {
   ~Machine() = default;  // a public virtual destructor would link operator delete
 };
 
+/// A step on a line of bytes.
 using ByteStep = Step<std::uint8_t>;
+/// An event on a line of bytes.
 using ByteEvent = Event<std::uint8_t>;
 
 }  // namespace absenc

@@ -15,13 +15,13 @@ class Failure : public std::runtime_error {
  public:
   /// Kind of a failure of a port.
   enum class Kind : std::uint8_t {
-    not_found,      // no such port, host or listener
-    no_permission,  // the port exists, but this user may not open it
-    in_use,         // another program uses the port
-    unsupported,    // this port cannot do what was requested
-    bad_rate,       // this port does not support the baud rate
-    lost,           // the port existed and has disappeared
-    system,         // any other error of the operating system
+    not_found,      ///< no such port, host or listener
+    no_permission,  ///< the port exists, but this user may not open it
+    in_use,         ///< another program uses the port
+    unsupported,    ///< this port cannot do what was requested
+    bad_rate,       ///< this port does not support the baud rate
+    lost,           ///< the port existed and has disappeared
+    system,         ///< any other error of the operating system
   };
 
   /// State of a CAN bus that caused the failure, if known.

@@ -9,6 +9,7 @@
 
 namespace absenc {
 
+/// Returns all units, in the order of `protocol/all.cpp`.
 [[nodiscard]] std::span<const Unit* const> all_units();
 
 /// Null when there is no unit of that id.

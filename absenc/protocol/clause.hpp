@@ -15,38 +15,40 @@ namespace absenc {
 /// Kind of a clause.
 enum class Demand : std::uint8_t {
   // About readings, whose requests any host sends
-  answered,  // each request, pulse or transfer gets a reply
-  streamed,  // frames come by themselves
-  in_time,   // the reply begins within the time that the unit waits for it: documents give typical times, no limits
-  whole,     // replies have the length of the document
-  checked,   // their checksum is right
-  as_drawn,  // fixed bits, echoes, ranges, and what must agree
-  does,      // `command` ends well each time, with all that it compares
+  answered,  ///< each request, pulse or transfer gets a reply
+  streamed,  ///< frames come by themselves
+  in_time,   ///< the reply begins within the time that the unit waits for it: documents give typical times, no limits
+  whole,     ///< replies have the length of the document
+  checked,   ///< their checksum is right
+  as_drawn,  ///< fixed bits, echoes, ranges, and what must agree
+  does,      ///< `command` ends well each time, with all that it compares
   // About requests that no host sends
-  foreign_silent,  // a request to another address is not answered
-  reacts,          // to `ask` the encoder does as `reaction` says
+  foreign_silent,  ///< a request to another address is not answered
+  reacts,          ///< to `ask` the encoder does as `reaction` says
   // About changes, which are put back
-  byte_written,  // what is written to the byte at `page` and `address` is read again
-  byte_alone,    // and the bytes beside it stay as they are
-  page_alone,    // and so does the byte of page `other` at the same address
-  byte_busy,     // while it is written, a request to read it is answered as busy, and the byte is read again later
-  page_closed,   // what `page` does not have at `address` is asked for by `ask`
-  set,           // `setting` is what it was set to: `value`, or `other` where it is that already
-  zeroed,        // the position is 0 after the zero command with the argument `value`; `setting` holds what it changes
-  mirrored,      // of the directions 0 and 1 of `setting`, which nothing reads, one mirrors the position
-  paced,         // after `command` with `value` so many frames a second come by themselves; `stop` ends them
+  byte_written,  ///< what is written to the byte at `page` and `address` is read again
+  byte_alone,    ///< and the bytes beside it stay as they are
+  page_alone,    ///< and so does the byte of page `other` at the same address
+  byte_busy,     ///< while it is written, a request to read it is answered as busy, and the byte is read again later
+  page_closed,   ///< what `page` does not have at `address` is asked for by `ask`
+  set,           ///< `setting` is what it was set to: `value`, or `other` where it is that already
+  zeroed,    ///< the position is 0 after the zero command with the argument `value`; `setting` holds what it changes
+  mirrored,  ///< of the directions 0 and 1 of `setting`, which nothing reads, one mirrors the position
+  paced,     ///< after `command` with `value` so many frames a second come by themselves; `stop` ends them
   // About values that nothing brings back
-  zero,     // after the zero command the position is 0, which it was not
-  reset,    // after `verb` what it resets is reset, and was not
-  restarts  // after the command `command` it is silent at first, and has the same position behind `value` ms
+  zero,     ///< after the zero command the position is 0, which it was not
+  reset,    ///< after `verb` what it resets is reset, and was not
+  restarts  ///< after the command `command` it is silent at first, and has the same position behind `value` ms
 };
 
+/// Returns whether a demand is about a change of the encoder.
 [[nodiscard]] constexpr bool changes_encoder(Demand demand) { return demand >= Demand::byte_written; }
 /// Whether something may be lost by it: a position, turns, an alarm.
 [[nodiscard]] constexpr bool loses(Demand demand) { return demand >= Demand::zero; }
 
 /// A bit for each Error.
 using Errors = std::uint32_t;
+/// Returns a set of errors.
 template <class... Some>
 [[nodiscard]] constexpr Errors any_of(Some... errors) {
   return ((Errors{1} << static_cast<unsigned>(errors)) | ...);
@@ -64,11 +66,12 @@ struct Ask {
   std::uint32_t permille = 0;  ///< sent at this part of the rate, so that its last bit is where the stop bit should be
 };
 
+/// Reaction to a bad request.
 enum class Reaction : std::uint8_t {
   silent,
-  reply,              // a good one to the request of the command `as`
-  refusal,            // the same, which says that the request was wrong
-  refusal_or_silent,  // the document says both
+  reply,              ///< a good one to the request of the command `as`
+  refusal,            ///< the same, which says that the request was wrong
+  refusal_or_silent,  ///< the document says both
 };
 
 /// A demand of the document on an encoder. It is kept only by a run that saw what it is about: the requests that it
@@ -99,12 +102,12 @@ struct Clause {
 
 /// What is looked at when a host is tested.
 enum class HostDemand : std::uint8_t {
-  asks,           // its requests are such that they are answered
-  after_silence,  // it asks again when no reply came
-  after_damage,   // and when the reply was damaged
-  after_refusal,  // and when its request was damaged, so that the encoder refused it
-  rule,           // it never breaks `rule`
-  row             // nor does it this one, of requests in a row: looked at while replies are good, as a host may give up
+  asks,           ///< its requests are such that they are answered
+  after_silence,  ///< it asks again when no reply came
+  after_damage,   ///< and when the reply was damaged
+  after_refusal,  ///< and when its request was damaged, so that the encoder refused it
+  rule,           ///< it never breaks `rule`
+  row  ///< nor does it this one, of requests in a row: looked at while replies are good, as a host may give up
 };
 
 /// A step of a host that does not look at replies: how a test makes a host that breaks a clause.
@@ -114,6 +117,7 @@ struct HostStep {
   std::span<const std::int64_t> arguments{};  ///< of the command; empty: the least that it takes
   unsigned times = 1;                         ///< it is sent so often, each time behind the pause
 };
+/// Requests of a host, with pauses.
 using HostScript = std::span<const HostStep>;
 
 /// What a document demands of the host.
@@ -136,6 +140,7 @@ inline constexpr std::string_view spi_mode_rule = "clock or sampling in another 
 
 /// Those of this unit, in the order in which they are tested; empty: none are known. Defined with the list of units.
 [[nodiscard]] std::span<const Clause> clauses_of(const Unit& unit);
+/// Returns the clauses of the document for the host; none: it has none.
 [[nodiscard]] std::span<const HostClause> host_clauses_of(const Unit& unit);
 
 }  // namespace absenc

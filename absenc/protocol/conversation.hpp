@@ -38,8 +38,8 @@ struct StreamCounts {
 /// Tells whether a conversation has sent a request that changes the encoder.
 enum class ChangeSent : std::uint8_t {
   no,
-  yes,      // or it may have been
-  refused,  // and the encoder said, or showed when it was read back, that it is as it was
+  yes,      ///< or it may have been
+  refused,  ///< and the encoder said, or showed when it was read back, that it is as it was
 };
 
 /// Host side. At `emit` and `done` the accessors describe the result; they stay valid until the next feed.
@@ -96,8 +96,8 @@ template <class Item>
 struct Device : Machine<Item> {
   /// Whether the encoder runs its start-up, or is ready at once.
   enum class PowerOn : std::uint8_t {
-    real,  // with the document's start-up time
-    skip,  // ready at once
+    real,  ///< with the document's start-up time
+    skip,  ///< ready at once
   };
   /// Switches the encoder on.
   virtual void power_on(Time now, PowerOn kind) = 0;

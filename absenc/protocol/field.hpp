@@ -30,12 +30,12 @@ struct FieldInfo {
   /// Type of the value.
   enum class Kind : std::uint8_t {
     number,
-    counts,  // a number of up to 64 bits without sign: the bits of `number`
+    counts,  ///< a number of up to 64 bits without sign: the bits of `number`
     boolean,
-    flags,  // bit n is flags[n]
+    flags,  ///< bit n is flags[n]
     real,
-    text,   // ASCII
-    bytes,  // shown as hexadecimal
+    text,   ///< ASCII
+    bytes,  ///< shown as hexadecimal
   };
   std::string_view name;              ///< Name of the field, in `snake_case`.
   Kind kind;                          ///< Type of the value.

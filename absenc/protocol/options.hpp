@@ -15,11 +15,13 @@
 
 namespace absenc {
 
+/// Words of options that are yes or no.
 inline constexpr std::array<std::string_view, 2> boolean_choices{"false", "true"};
 
 /// Of an option that says whether other encoders are on the line. `auto`: they are where somebody knows it
 /// (`tell_shared`): absenc.toml, an open link with several users, a virtual line with several encoders.
 inline constexpr std::array<std::string_view, 3> sharing_choices{"auto", "true", "false"};
+/// Whether several encoders share the line.
 enum Sharing : std::int64_t { sharing_automatic, sharing_yes, sharing_no };
 
 /// A number in a range, or one of `choices` (then the value is the index into it). With `decimals`, the user writes up
@@ -85,8 +87,8 @@ struct OptionError {
     unknown_model,
     unknown_option,
     bad_value,
-    bad_word,                      // `word` says why and where
-    beside_word,                   // the option or model `text` cannot be given together with a word
+    bad_word,                      ///< `word` says why and where
+    beside_word,                   ///< the option or model `text` cannot be given together with a word
   } kind = Kind::none;             ///< What is wrong.
   std::string_view text{};         ///< The part of the text that is wrong.
   const Option* option = nullptr;  ///< The option; null: it is unknown.

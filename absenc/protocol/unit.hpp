@@ -20,7 +20,7 @@ namespace absenc {
 
 /// What a command is for. The command-line verbs look a unit's commands up by this.
 enum class Verb : std::uint8_t {
-  read,  // the position, with all the alarms the unit can tell; the first such command is the one `read` uses
+  read,  ///< the position, with all the alarms the unit can tell; the first such command is the one `read` uses
   read_part,
   info,
   temperature,
@@ -31,8 +31,8 @@ enum class Verb : std::uint8_t {
   memory_write,
   config_get,
   config_set,
-  scan,  // who answers on a line: for each, a record that begins with its address
-  run,   // a procedure only this unit has
+  scan,  ///< who answers on a line: for each, a record that begins with its address
+  run,   ///< a procedure only this unit has
 };
 
 /// Description of an argument of a command.
@@ -195,15 +195,16 @@ struct Follower {
   ~Follower() = default;
 };
 
+/// Direction of a frame.
 enum class Direction : std::uint8_t { request, reply };
 
 /// Where a frame ends in a run of bytes.
 struct FrameEnd {
   /// Whether the end of a frame is known.
   enum class Kind : std::uint8_t {
-    complete,            // the first `size` bytes are one frame
-    incomplete,          // a frame may have begun; at least `size` bytes in all are needed
-    no_frame,            // the first byte begins no frame
+    complete,            ///< the first `size` bytes are one frame
+    incomplete,          ///< a frame may have begun; at least `size` bytes in all are needed
+    no_frame,            ///< the first byte begins no frame
   } kind;                ///< Whether the end of the frame is known.
   std::size_t size = 0;  ///< Length of the frame in bytes, if known.
 };
@@ -359,6 +360,7 @@ struct Unit {
   return nullptr;
 }
 
+/// Returns the command with this name, or null.
 [[nodiscard]] constexpr const Command* find_command(const Unit& unit, std::string_view name) {
   for (const Command& command : unit.commands) {
     if (command.name == name) return &command;

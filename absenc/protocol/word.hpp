@@ -30,17 +30,20 @@ struct WordWith {
   /// Compares all values.
   friend constexpr bool operator==(const WordWith&, const WordWith&) = default;
 };
+/// A word with room for the values of any format.
 using Word = WordWith<WordFormat::maximum_fields>;
 
 /// Bits of Reading::alarms.
 inline constexpr std::uint32_t word_error = 1;
-inline constexpr std::uint32_t word_warning = 2;
+inline constexpr std::uint32_t word_warning = 2;  ///< Bit of Reading::alarms: the warning bit of a word.
 
+/// Names of the alarms of a word.
 inline constexpr std::array<FlagInfo, 2> word_flags{{
     {"error", "the encoder says that its position is wrong", "see the encoder's manual: its status tells the cause"},
     {"warning", "the encoder works near its limits", "check distance, dirt, temperature and supply", true},
 }};
 
+/// Index of a field of a word.
 enum WordFieldIndex : std::size_t {
   word_field_multiturn,
   word_field_singleturn,
@@ -53,6 +56,7 @@ enum WordFieldIndex : std::size_t {
   word_field_alarms,
 };
 
+/// Fields of a word.
 inline constexpr std::array<FieldInfo, 9> word_fields{{
     {"multiturn", FieldInfo::Kind::counts, "revolutions", "turns", {}, Role::turns},
     {"singleturn", FieldInfo::Kind::counts, "counts", "position within the turn", {}, Role::position},
@@ -281,6 +285,7 @@ struct WordContents {
   PositionBits bits{};         ///< Widths of position and turns.
   std::uint32_t reported = 0;  ///< the alarms for which the word has a bit
 };
+/// Returns the widths and flags of a word.
 [[nodiscard]] constexpr WordContents contents_of(const WordFormat& format) {
   WordContents contents;
   for (const WordField& field : format.fields()) {
@@ -306,6 +311,7 @@ template <std::size_t size>
           .alarms = (word.error ? word_error : 0) | (word.warning ? word_warning : 0),
           .alarms_reported = contents.reported};
 }
+/// Returns the reading of a word.
 [[nodiscard]] constexpr Reading to_reading(const WordFormat& format, const Word& word, const Scale& scale) {
   return to_reading(contents_of(format), word, scale);
 }

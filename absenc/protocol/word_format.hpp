@@ -21,8 +21,10 @@
 
 namespace absenc {
 
+/// Meaning of a field of a word.
 enum class Meaning : std::uint8_t { position, multiturn, error, warning, parity, value, skip };
 
+/// Names of the meanings, as a format writes them.
 inline constexpr std::array<std::string_view, 7> meaning_names{"position", "multiturn", "error", "warning",
                                                                "parity",   "value",     "skip"};
 

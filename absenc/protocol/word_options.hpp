@@ -10,6 +10,7 @@
 
 namespace absenc {
 
+/// Option: bits of the single-turn position.
 inline constexpr Option singleturn_bits_option{.name = "singleturn_bits",
                                                .meaning = "bits of the position within the turn; 0: linear encoder",
                                                .default_value = 19,
@@ -17,32 +18,34 @@ inline constexpr Option singleturn_bits_option{.name = "singleturn_bits",
                                                .maximum = 64,
                                                .probeable = true,
                                                .describes_word = true};
-inline constexpr Option multiturn_bits_option{.name = "multiturn_bits",
+inline constexpr Option multiturn_bits_option{.name = "multiturn_bits",  ///< Option: bits of the turns.
                                               .meaning = "bits of the turns; 0: no turns",
                                               .default_value = 0,
                                               .minimum = 0,
                                               .maximum = 63,
                                               .probeable = true,
                                               .describes_word = true};
+/// Option: whether the turns stand before the position.
 inline constexpr Option multiturn_first_option{.name = "multiturn_first",
                                                .meaning = "whether the turns come before the position",
                                                .default_value = 1,
                                                .choices = boolean_choices,
                                                .describes_word = true};
-inline constexpr Option position_bits_option{.name = "position_bits",
+inline constexpr Option position_bits_option{.name = "position_bits",  ///< Option: bits of a linear position.
                                              .meaning = "linear encoders: bits of the position; 0: rotary encoder",
                                              .default_value = 0,
                                              .minimum = 0,
                                              .maximum = 64,
                                              .probeable = true,
                                              .describes_word = true};
-inline constexpr Option unit_um_option{.name = "unit_um",
+inline constexpr Option unit_um_option{.name = "unit_um",  ///< Option: micrometres per count.
                                        .meaning = "linear encoders: micrometres a count",
                                        .default_value = 0,
                                        .minimum = 0,
                                        .maximum = 1'000'000'000'000,
                                        .decimals = 6};
 
+/// Words of the option `after_word`.
 inline constexpr std::array<std::string_view, 4> after_word_choices{"repeat", "zero", "one", "separated"};
 /// In the order of ssi::AfterWord.
 inline constexpr Option after_word_option{.name = "after_word",
@@ -82,6 +85,7 @@ struct WordSettings : Format {
 /// Whether readings can be told from angles: a linear encoder needs its unit.
 [[nodiscard]] constexpr bool is_usable(const Scale& scale) { return !scale.linear || scale.unit_um > 0; }
 
+/// Returns the bits of position and turns of a word.
 [[nodiscard]] constexpr Resolution resolution_of(const WordFormat& word, const Scale& scale) {
   return {word.bits_of(Meaning::position), word.bits_of(Meaning::multiturn), scale.linear ? scale.unit_um : 0};
 }
@@ -114,6 +118,7 @@ struct WordSettings : Format {
   return ranges;
 }
 
+/// Returns two tables of fields as one.
 template <std::size_t a, std::size_t b>
 [[nodiscard]] constexpr std::array<FieldInfo, a + b> joined_fields(const std::array<FieldInfo, a>& first,
                                                                    const std::array<FieldInfo, b>& second) {

@@ -27,7 +27,7 @@ class Bus final : public Machine<std::uint8_t> {
  private:
   enum class SendState : std::uint8_t {
     waiting,
-    pending,  // has a transfer that has not begun
+    pending,  ///< has a transfer that has not begun
     sending,
     done,
   };

@@ -14,18 +14,20 @@
 
 namespace absenc::sim {
 
+/// Kind of a fault of the device's end of the line.
 enum class FaultKind : std::uint8_t {
-  drop,             // one byte is lost
-  corrupt,          // 1 to 3 bits are flipped
-  truncate,         // the reply stops at a random byte, at least one byte is sent
-  delay,            // the reply is sent late
-  echo,             // the bytes of the request are sent before the reply
-  garbage,          // 1 to 4 random bytes are sent before the reply
-  silence,          // the reply is not sent
-  repeat,           // the reply is sent twice
-  request_corrupt,  // 1 to 3 bits of a byte that the device receives are flipped
+  drop,             ///< one byte is lost
+  corrupt,          ///< 1 to 3 bits are flipped
+  truncate,         ///< the reply stops at a random byte, at least one byte is sent
+  delay,            ///< the reply is sent late
+  echo,             ///< the bytes of the request are sent before the reply
+  garbage,          ///< 1 to 4 random bytes are sent before the reply
+  silence,          ///< the reply is not sent
+  repeat,           ///< the reply is sent twice
+  request_corrupt,  ///< 1 to 3 bits of a byte that the device receives are flipped
 };
 
+/// Names of the faults.
 inline constexpr std::array<std::string_view, 9> fault_names{"drop",    "corrupt", "truncate", "delay",          "echo",
                                                              "garbage", "silence", "repeat",   "request_corrupt"};
 

@@ -13,6 +13,7 @@
 
 namespace absenc::sim {
 
+/// Whether a node is host or device.
 enum class Role : std::uint8_t { host, device };
 
 /// One shared line. Hosts and devices are machines of the same kind; the role only decides who drives the clock (SPI,

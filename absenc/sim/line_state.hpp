@@ -10,7 +10,9 @@
 
 namespace absenc::sim {
 
+/// Returns the level of two senders at once: 0 wins.
 [[nodiscard]] inline std::uint8_t combine(std::uint8_t a, std::uint8_t b) { return a & b; }
+/// Returns the frame of two senders at once.
 [[nodiscard]] inline CanFrame combine(const CanFrame& a, const CanFrame&) { return a; }
 
 /// State of one node.

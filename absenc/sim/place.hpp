@@ -17,6 +17,7 @@ namespace absenc::sim {
   return (bits <= 32 ? fraction >> (32 - bits) : static_cast<std::uint64_t>(position) << (bits - 32)) & low_mask(bits);
 }
 
+/// Returns the turns of a position, as the encoder counts them.
 [[nodiscard]] constexpr std::uint64_t turns_at(std::int64_t position, unsigned bits) {
   return bits == 0 ? 0 : static_cast<std::uint64_t>(position >> 32) & low_mask(bits);
 }

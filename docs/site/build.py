@@ -97,15 +97,15 @@ def doxygen(build, output, html, version):
 def doxygen_of(headers, output, html, version):
     """Writes the reference of a folder of headers; returns the warnings."""
     html.mkdir(exist_ok=True)
-    values = {"VERSION": version, "HEADERS": headers, "MAIN_PAGE": HERE / "api.md", "OUTPUT": html, "STYLE": AWESOME,
+    values = {"VERSION": version, "HEADERS": headers, "MAIN_PAGE": HERE / "api.md", "NAMESPACES": HERE / "namespaces.dox", "OUTPUT": html, "STYLE": AWESOME,
               "OWN_STYLE": HERE / "api.css"}
     text = re.sub(r"@(\w+)@", lambda name: str(values[name[1]]), (HERE / "Doxyfile.in").read_text(encoding="utf-8"))
     settings = output / "Doxyfile"
     settings.write_text(text, encoding="utf-8")
     status, said = run("doxygen", settings)
     warnings = html / "doxygen-warnings.txt"
-    found = warnings.read_text(encoding="utf-8").splitlines()
-    warnings.unlink()
+    found = warnings.read_text(encoding="utf-8").splitlines() if warnings.exists() else []
+    warnings.unlink(missing_ok=True)
     without_dead_links(html / "api")
     found = [line.replace(f"{headers}/", "") for line in found if line]
     return found or ([f"doxygen ended with status {status}: {said}"] if status else [])

@@ -8,6 +8,7 @@
 
 namespace absenc::amt21 {
 
+/// Clauses of the document for the encoder.
 inline constexpr std::array<Clause, 7> clauses{{
     {"answer", "serial interface", "a request is answered", Demand::answered},
     {"answer-time", "serial interface",
@@ -28,6 +29,7 @@ inline constexpr std::array<Clause, 7> clauses{{
      .command = "reset"},
 }};
 
+/// Clauses of the document for the host.
 inline constexpr std::array<HostClause, 4> host_clauses{{
     {"asks", "serial interface", "requests are as drawn", HostDemand::asks},
     {"silence", "serial interface", "after no reply it asks again", HostDemand::after_silence},

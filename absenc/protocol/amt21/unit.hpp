@@ -14,11 +14,12 @@ namespace absenc::amt21 {
 
 using namespace std::chrono_literals;
 
+/// Rates of the line in bits per second.
 inline constexpr std::array<std::uint32_t, 5> rates{2'000'000, 115'200, 38'400, 19'200, 9'600};
 /// Time from the end of a request to its reply, at each rate.
 inline constexpr std::array<Time, 5> turn_around{3us, 10'800ns, 30us, 56us, 110us};
-inline constexpr Time restart_time = 200ms;
-inline constexpr unsigned turns_bits = 14;
+inline constexpr Time restart_time = 200ms;  ///< Time that the encoder takes to restart.
+inline constexpr unsigned turns_bits = 14;   ///< Bits of the turns.
 
 /// Format of the encoder: the values of its options.
 struct Format {
@@ -145,6 +146,6 @@ struct Protocol {
   }
 };
 
-extern const Unit unit;
+extern const Unit unit;  ///< The unit.
 
 }  // namespace absenc::amt21

@@ -29,7 +29,7 @@ concept Clocked = requires {
 };
 
 struct Later {};
-inline constexpr Later later{};
+inline constexpr Later later{};  ///< Makes a host that begins its transfer later.
 
 /// A position with typed replies; a subclass says what becomes of the bits.
 template <Clocked P>

@@ -63,7 +63,7 @@ class Responder : public EncoderOn<std::uint8_t> {
     sent,
     none,
     for_others,
-    refused,  // when the line is silent: see `refuse`
+    refused,  ///< when the line is silent: see `refuse`
   };
   /// For `respond`: this reply takes so much longer.
   void take_longer(Time time) { longer_ = time; }
@@ -71,9 +71,9 @@ class Responder : public EncoderOn<std::uint8_t> {
   virtual Answer respond(Bytes request, Time at, ByteBuffer<64>& reply) = 0;
   /// What is wrong with a request.
   enum class Flaw : std::uint8_t {
-    damaged,    // a character
-    unknown,    // no request begins so
-    cut_short,  // by silence
+    damaged,    ///< a character
+    unknown,    ///< no request begins so
+    cut_short,  ///< by silence
   };
   /// Whether what is no request is refused. What is not is as if it had not come. Of a damaged one `heard` is what came
   /// before the damage, perhaps nothing.

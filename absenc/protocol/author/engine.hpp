@@ -108,13 +108,13 @@ class Engine : public Conversation<std::uint8_t> {
 
  private:
   enum class State : std::uint8_t {
-    receiving,  // the reply is due
-    settling,   // something is wrong: until the line is silent
-    ready,      // the next request is to be sent
-    sending,    // until its last bit is out
+    receiving,  ///< the reply is due
+    settling,   ///< something is wrong: until the line is silent
+    ready,      ///< the next request is to be sent
+    sending,    ///< until its last bit is out
     sleeping,
     listening,
-    ending,  // the result is known, but told only after a time the encoder needs
+    ending,  ///< the result is known, but told only after a time the encoder needs
     over,
   };
 

@@ -121,6 +121,7 @@ struct FieldsOf {
   }
 };
 
+/// Returns the fields as one table.
 template <class Values, auto... members>
 [[nodiscard]] constexpr FieldsOf<Values, members...> fields_of(const FieldOf<members>&... all) {
   return FieldsOf<Values, members...>(all...);

@@ -16,6 +16,7 @@ namespace absenc::author {
   reading.singleturn_bits = reading.singleturn_valid_bits = bits;
   return reading;
 }
+/// Returns a reading that has turns and no position.
 [[nodiscard]] constexpr Reading turns_reading(std::int64_t turns, Resolution resolution) {
   Reading reading;
   reading.multiturn = static_cast<std::uint64_t>(turns) & low_mask(resolution.multiturn_bits);

@@ -28,7 +28,9 @@ struct VectorText {
 
 /// Not constexpr, and not defined: who calls one when compiling reads its name in the compiler's message.
 void fields_of_a_vector_are_name_equals_value_or_the_name_of_an_error();
+/// Is never defined: its name is the error of the compiler.
 void a_frame_of_a_vector_is_hexadecimal_and_has_at_most_128_bytes();
+/// Is never defined: its name is the error of the compiler.
 void this_model_has_an_option_or_a_value_that_the_unit_does_not_have();
 
 /// Calls `take(name, value)` for each "name=value" of a text until it returns false; whether all were taken. A value

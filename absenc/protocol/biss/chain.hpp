@@ -34,6 +34,7 @@ struct ChainFormat {
   [[nodiscard]] constexpr unsigned shown() const { return slave < count ? count - 1u - slave : 0u; }
 };
 
+/// Returns whether the options of the chain go together.
 [[nodiscard]] constexpr bool is_usable(const ChainFormat& format) {
   if (format.count > ChainFormat::most || format.slave >= format.count) return false;
   for (unsigned i = 0; i < format.count; ++i) {
@@ -43,12 +44,14 @@ struct ChainFormat {
   return true;
 }
 
+/// Returns the number of data bits.
 [[nodiscard]] constexpr unsigned data_bits(const ChainFormat& format) {
   unsigned bits = 0;
   for (unsigned i = 0; i < format.count; ++i) bits += data_bits(format.channels[i]);
   return bits;
 }
 
+/// Returns the number of bits by which the data passes through the other slaves.
 [[nodiscard]] constexpr unsigned relay_bits(const ChainFormat& format) { return format.count - 1u; }
 
 /// A reply of several encoders in a chain.
@@ -72,6 +75,7 @@ struct ChainReply {
   return error == Error::none ? Result(reply) : error;
 }
 
+/// Writes the frame that carries a reply; returns whether it has room.
 template <std::size_t Capacity>
 constexpr bool encode(const ChainFormat& format, const ChainReply& reply, BitBuffer<Capacity>& out,
                       std::uint8_t silent = 0) {
@@ -91,11 +95,13 @@ constexpr void show(const ChainFormat& format, const ShaftState& state, std::uin
   }
 }
 
+/// Returns the life counter of a reply, or -1 if it has none.
 [[nodiscard]] constexpr int life_counter_of(const ChainFormat& format, const ChainReply& reply) {
   const unsigned shown = format.shown();
   return format.channels[shown].check.life_counter ? reply.channels[shown].life_counter : -1;
 }
 
+/// Returns the reading of a reply.
 [[nodiscard]] constexpr Reading reading_of(const ChainFormat& format, const ChainReply& reply) {
   const unsigned shown = format.shown();
   return to_reading(format.channels[shown].word, reply.channels[shown].word, format.scale);

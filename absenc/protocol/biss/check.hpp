@@ -31,10 +31,11 @@ struct Check {
 /// Returns whether the polynomial ends in 1; an even one does not detect every single bit error.
 [[nodiscard]] constexpr bool is_usable(const Check& check) { return check.width == 0 || (check.poly & 1) != 0; }
 
-inline constexpr Check crc6{};
+inline constexpr Check crc6{};  ///< The usual CRC of 6 bits.
 /// Check of the safety position word: polynomial 0x190D9, with a life counter.
 inline constexpr Check crc16{16, 0x90D9, 0, true, true};
 
+/// Returns the parameters of a CRC.
 [[nodiscard]] constexpr CrcParameters parameters_of(const Check& check) {
   const auto mask = static_cast<std::uint16_t>(low_mask(check.width));
   return {check.width, check.poly, check.init, false, false, check.inverted ? mask : std::uint16_t{0}};

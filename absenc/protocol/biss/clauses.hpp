@@ -8,6 +8,7 @@
 
 namespace absenc::biss {
 
+/// Errors of what frames the data.
 inline constexpr Errors header_errors = any_of(Error::bad_framing, Error::line_stuck);
 
 /// Clauses of the registers that every encoder has.
@@ -36,6 +37,7 @@ inline constexpr std::array<Clause, 3> register_clauses{{
      .field = "bank"},
 }};
 
+/// Returns the clauses with those of the registers behind them.
 template <std::size_t count>
 constexpr std::array<Clause, count + register_clauses.size()> with_registers(const std::array<Clause, count>& own) {
   std::array<Clause, count + register_clauses.size()> all{};
@@ -44,6 +46,7 @@ constexpr std::array<Clause, count + register_clauses.size()> with_registers(con
   return all;
 }
 
+/// Clauses of BiSS-C.
 inline constexpr auto clauses = with_registers(std::array<Clause, 3>{{
     {"crc", "BiSS C timing diagram, CRC", "six bits of CRC, inverted, over position and status", Demand::checked},
     {.id = "header",
@@ -83,6 +86,7 @@ inline constexpr auto safety_clauses = with_registers(std::array<Clause, 4>{{
      .shown_with = "motion=rpm=60"},
 }});
 
+/// Clauses of chains.
 inline constexpr auto chain_clauses = with_registers(std::array<Clause, 2>{{
     {"crc", "BiSS C timing diagram, CRC", "each encoder's CRC, inverted, over its own position and status",
      Demand::checked},

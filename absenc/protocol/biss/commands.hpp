@@ -12,18 +12,24 @@
 
 namespace absenc::biss {
 
+/// Argument: address of a register.
 inline constexpr Argument address_argument{"address", "of the register", 0, registers::end - 1, 0, true, Role::address};
+/// Argument: bank of registers.
 inline constexpr Argument bank_argument{"bank", "of addresses 0 to 63", 0, 255, 0, false, Role::page};
+/// Arguments of commands that read registers.
 inline constexpr std::array<Argument, 3> read_arguments{
     {address_argument,
      bank_argument,
      {"count", "registers from the address on", 1, control_most, 1, false, Role::count}}};
+/// Arguments of commands that write registers.
 inline constexpr std::array<Argument, 4> write_arguments{
     {address_argument,
      {"value", "the byte", 0, 255, 0, true, Role::value},
      bank_argument,
      {"force", "1: also registers that are defined by the maker", 0, 1, 0, false, Role::force}}};
+/// Arguments of the command that selects a bank.
 inline constexpr std::array<Argument, 1> select_arguments{{{"bank", "that addresses 0 to 63 mean", 0, 255}}};
+/// Arguments of BiSS commands.
 inline constexpr std::array<Argument, 2> command_arguments{
     {{"slaves", "bit n is slave n; 0: all, without acknowledgement", 0, 255}, {"command", "its number", 0, 3}}};
 
@@ -33,6 +39,7 @@ struct NamedRegister {
   unsigned address;          ///< Address of the register.
   std::string_view meaning;  ///< Content of the register, in words.
 };
+/// Registers with names.
 inline constexpr std::array<NamedRegister, 6> named_registers{{
     {"bank", registers::bank_select, "bank of addresses 0 to 63"},
     {"eds-bank", registers::eds_bank, "the bank of its electronic data sheet; 0: none"},
@@ -42,6 +49,7 @@ inline constexpr std::array<NamedRegister, 6> named_registers{{
     {"manufacturer", registers::manufacturer, "manufacturer of the encoder"},
 }};
 
+/// Returns the empty request of clocked links.
 template <class F>
 constexpr author::NoRequest no_request(const F&, Arguments) {
   return {};
@@ -61,37 +69,46 @@ struct TimeoutSettings {
     return timeout_tenths == 0 ? Timeout{} : Timeout::fixed(Time(timeout_tenths * 100));
   }
 };
+/// Option: timeout in microseconds.
 inline constexpr auto timeout_option = author::or_zero(author::decimal<
                                                        1>(author::option<&TimeoutSettings::timeout_tenths>(
     "timeout_us",
     "how long SLO stays low behind the last clock, us; 0: not known: the host leaves 40, the virtual encoder takes 20",
     125, 400, 5)));
+/// Option: whether the timeout adapts to the clock.
 inline constexpr auto adaptive_timeout_option = author::option<&TimeoutSettings::adaptive_timeout>(
     "adaptive_timeout", "it is one and a half periods of the clock instead, however fast that is");
+/// Option of the virtual encoder: stop bit.
 template <auto member>
 inline constexpr auto stop_bit_option = author::option<member>(
     "stop_bit",
     "virtual encoder: the bit P behind a register: next is 1 where the one behind it would be refused, as the document "
     "has it",
     stop_bit_choices);
+/// Option of the virtual encoder: delay of the line.
 template <auto member>
 inline constexpr auto line_delay_option = author::option<member>("line_delay_ns",
                                                                  "virtual encoder: delay of the line, there and back",
                                                                  0, 100'000);
+/// Option: order of the bytes of registers.
 template <auto member>
 inline constexpr auto register_order_option = author::option<member>(
     "register_byte_order", "of profile and serial number: some makers have the low byte first", register_order_choices);
+/// Option of the virtual encoder: delay of registers.
 template <auto member>
 inline constexpr auto register_delay_option = author::option<member>(
     "register_delay_us", "virtual encoder: the time until a register that is asked for is there, us", 0, 65'535);
+/// Option of the virtual encoder: start sequence.
 template <auto member>
 inline constexpr auto start_sequence_option = author::option<member>(
     "start_sequence", "virtual encoder: after power on it shows nothing before the start sequence");
 
+/// Puts the fields of register access.
 template <class F>
 constexpr void put_registers(FieldSink& sink, const F&, const ControlResults& found) {
   register_fields.put(sink, found);
 }
+/// Finding of register access.
 template <class F>
 inline constexpr author::Finding<F, ControlResults> control_results{.put = put_registers<F>};
 
@@ -134,6 +151,7 @@ template <const auto& report, class F>
   };
 }
 
+/// Returns what the document says about an error.
 template <class F>
 [[nodiscard]] Explanation explain_frame(const F& format, Error error, Bytes = {}, Bytes reply = {}) {
   switch (error) {
@@ -208,6 +226,7 @@ Result<std::size_t> encode_control(const F& format, const Command& command, Argu
   return bits.size();
 }
 
+/// Returns the settings of the line for a format.
 template <class F>
 constexpr LineSettings line_of(const F&) {
   return line_settings;  // the conversation sets the clock rate itself
@@ -230,6 +249,7 @@ constexpr Error decode_frame(const F& format, Frame asked, Frame answered, Field
   sink.put_reading(reading_of(format, *reply));
   return Error::none;
 }
+/// Returns the index of the bit by which the encoder answers in each frame.
 inline std::optional<std::size_t> control_bit(const Options&, Frame reply) { return place_of_cds(reply); }
 
 }  // namespace absenc::biss

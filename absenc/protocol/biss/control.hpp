@@ -24,6 +24,7 @@ inline constexpr std::size_t control_most = 64;  ///< the most bytes of one cont
 /// CRC of control frames: x^4 + x + 1, inverted; over CTS and the ten bits after it, and over each byte.
 inline constexpr Check crc4{4, 0x3};
 
+/// Returns the CRC of 4 bits.
 [[nodiscard]] constexpr std::uint8_t crc4_of(std::uint64_t bits, unsigned count) {
   return static_cast<std::uint8_t>(detail::crc_bit_by_bit(crc4, BitNumber{bits, count}, 0, count));
 }
@@ -46,6 +47,7 @@ struct ControlRequest {
 
 inline constexpr unsigned header_bits = 15;  ///< bits after the start bit: CTS, ten bits, CRC
 
+/// Returns the header of a control frame.
 [[nodiscard]] constexpr std::uint16_t header_of(const ControlRequest& request) {
   std::uint32_t bits = 0;
   if (request.is_command()) {

@@ -104,6 +104,7 @@ constexpr std::optional<Bytes> device_id(const ControlResults& found) {
 constexpr std::optional<std::string_view> manufacturer(const ControlResults& found) { return some(found.manufacturer); }
 }  // namespace shown
 
+/// Fields of register access.
 inline constexpr auto register_fields = author::fields_of<ControlResults>(
     author::field<&ControlResults::slaves>("slaves", "", "number of encoders with an ID"),
     author::field<&ControlResults::more_slaves>("more_slaves", "", "whether there are encoders without an ID"),

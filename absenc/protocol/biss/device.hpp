@@ -20,6 +20,7 @@ struct Behaviour {
   bool start_sequence = false;  ///< after power on, SLO stays idle until the start sequence
 };
 
+/// Bits that the encoder drives.
 using Samples = author::DrivenBits;
 
 /// Delays the samples by the line's delay: by whole clocks, and at random where an edge falls on a sample.
@@ -90,6 +91,7 @@ class EncoderOf {
   std::uint8_t life_counter_ = 0;
   LineDelay delay_;
 };
+/// An encoder of one word.
 using Encoder = EncoderOf<Format>;
 
 /// The registers of all slaves on a line. `memory` is what survives power off.
@@ -143,7 +145,9 @@ class VirtualRegisters final : public ControlTarget {
 
 /// Returns the number of slaves whose words the frames carry.
 [[nodiscard]] constexpr unsigned slaves_of(const Format&) { return 1; }
+/// Returns the number of slaves.
 [[nodiscard]] constexpr unsigned slaves_of(const SafetyFormat&) { return 2; }
+/// Returns the number of slaves.
 [[nodiscard]] constexpr unsigned slaves_of(const ChainFormat& format) { return format.count; }
 
 /// A virtual encoder, or a chain of them.
@@ -220,6 +224,7 @@ class VirtualEncoderOf final : public author::ClockedDevice {
   bool clocked_before_ = false;
   bool start_sequence_received_ = false;  // the start sequence was received
 };
+/// A virtual encoder of one word.
 using VirtualEncoder = VirtualEncoderOf<Format>;
 
 }  // namespace absenc::biss

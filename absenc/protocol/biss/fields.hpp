@@ -8,8 +8,10 @@
 
 namespace absenc::biss {
 
+/// Index of a field.
 enum FieldIndex : std::size_t { field_ack_bits, field_crc, field_life_counter, field_line_delay, field_line_delay_us };
 
+/// Fields of every BiSS unit.
 inline constexpr std::array<FieldInfo, 5> own_fields{{
     {"ack_bits", FieldInfo::Kind::number, "", "clocks until the encoder was ready"},
     {"crc", FieldInfo::Kind::number, "", "as sent: inverted"},

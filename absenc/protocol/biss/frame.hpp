@@ -22,8 +22,8 @@ using namespace std::chrono_literals;
 
 inline constexpr unsigned idle_bits = 2;  ///< idle samples before the ACK: SLO goes low on the second rising edge of MA
 
-inline constexpr LineSettings line_settings{.rate = 1'000'000, .spi_mode = 3};
-inline constexpr Time shortest_period = 100ns;  ///< shortest period of MA: 10 MHz
+inline constexpr LineSettings line_settings{.rate = 1'000'000, .spi_mode = 3};  ///< Settings of the line.
+inline constexpr Time shortest_period = 100ns;                                  ///< shortest period of MA: 10 MHz
 /// Longest BiSS timeout: SLO stays low for 12.5 to 40 us after the last clock.
 inline constexpr Time timeout_maximum = 40us;
 /// Start sequence: pulses of MA after power on, with 40 us before and after them.
@@ -67,10 +67,12 @@ class Timeout {
 
 /// The bit P that the virtual encoder sends after each register.
 enum class StopBit : std::uint8_t { next, zero, one };
+/// Words of the option `stop_bit`.
 inline constexpr std::array<std::string_view, 3> stop_bit_choices{"next", "zero", "one"};
 
 /// Byte order of registers that together are one number.
 enum class RegisterOrder : std::uint8_t { big, little };
+/// Words of the option `register_order`.
 inline constexpr std::array<std::string_view, 2> register_order_choices{"big", "little"};
 
 /// Format of the encoder: the values of its options.
@@ -144,7 +146,9 @@ struct ReplyWith {
   std::uint16_t crc = 0;          ///< CRC as sent
   unsigned delay_bits = 0;        ///< extra idle samples: the line's delay in clocks
 };
+/// A reply with one word.
 using Reply = ReplyWith<Word>;
+/// A reply to a host that knows the format at compile time.
 template <const Format& format>
 using ReplyTo = ReplyWith<typename Known<format>::Word>;
 
@@ -262,6 +266,7 @@ constexpr void show(const Format& format, const ShaftState& state, std::uint32_t
   reply.life_counter = life_counter;
 }
 
+/// Returns the reading of a reply.
 [[nodiscard]] constexpr Reading reading_of(const Format& format, const Reply& reply) {
   return to_reading(format.word, reply.word, format.scale);
 }
@@ -275,15 +280,18 @@ struct KnownFormat {
   /// Returns the period of the clock.
   [[nodiscard]] static constexpr Time period() { return known.period(); }
 };
+/// Returns the number of data bits.
 template <const Format& format>
 [[nodiscard]] constexpr unsigned data_bits(const KnownFormat<format>&) {
   constexpr unsigned bits = data_bits(format);
   return bits;
 }
+/// Decodes a frame whose format is known at compile time.
 template <const Format& format>
 [[nodiscard]] constexpr Result<ReplyTo<format>> decode(const KnownFormat<format>&, BitView samples, Cds cds) {
   return decode<format>(samples, cds);
 }
+/// Returns the reading of a reply.
 template <const Format& format>
 [[nodiscard]] constexpr Reading reading_of(const KnownFormat<format>&, const ReplyTo<format>& reply) {
   constexpr WordContents contents = contents_of(format.word);

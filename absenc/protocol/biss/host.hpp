@@ -54,12 +54,14 @@ struct ProtocolOf {
   /// Returns the position of a reply.
   static constexpr Reading reading(const F& format, const Reply& reply) { return reading_of(format, reply); }
 };
+/// The protocol of one word.
 using Protocol = ProtocolOf<Format>;
 
 /// Returns the life counter, which must advance with each frame; -1 if the frames have none.
 [[nodiscard]] constexpr int life_counter_of(const Format& format, const Reply& reply) {
   return format.check.life_counter ? reply.life_counter : -1;
 }
+/// Returns the life counter of a reply, or -1 if it has none.
 template <const Format& format>
 [[nodiscard]] constexpr int life_counter_of(const KnownFormat<format>&, const ReplyTo<format>& reply) {
   return format.check.life_counter ? reply.life_counter : -1;
@@ -155,6 +157,7 @@ class ReadKnownPosition final : public PositionReader<KnownFormat<format>, false
  public:
   ReadKnownPosition() : PositionReader<KnownFormat<format>, false>({}) {}
 };
+/// Reads a frame that may be later than expected, as the first one is.
 template <class F>
 using FindPosition = PositionReader<F, true>;
 

@@ -19,8 +19,10 @@ using author::Procedure;
 inline constexpr Time start_limit = 20ms;
 inline constexpr unsigned control_attempts = 4;  ///< attempts of a control frame that may be repeated
 
+/// Advice where an encoder has no registers.
 inline constexpr std::string_view no_registers =
     "no encoder answers: it has no registers (or a line that only goes one way), or another ID (slave)";
+/// Advice where an encoder refuses a control frame.
 inline constexpr std::string_view refused =
     "the encoder refuses this register: it does not have it, or it is read only";
 
@@ -46,6 +48,7 @@ Part<Error> run_control_frame(ControlDialog<F>& dialog, ControlMaster& master) {
   co_return master.error();
 }
 
+/// Returns the outcome of an error.
 [[nodiscard]] constexpr Outcome failure_of(Error error) {
   if (error == Error::timeout) return only(error, no_registers, "read positions without them, or say slave=N");
   if (error == Error::request_rejected) return only(error, refused);
@@ -134,6 +137,7 @@ Part<Error> select_bank(ControlDialog<F>& dialog, ControlMaster& master, unsigne
   co_return written;
 }
 
+/// Reads registers.
 template <class F>
 Procedure read_memory(ControlDialog<F>& dialog, ControlResults& found, Arguments arguments) {
   const auto address = static_cast<unsigned>(arguments[0]);
@@ -208,6 +212,7 @@ Procedure read_setting(ControlDialog<F>& dialog, ControlResults& found, unsigned
   co_return done;
 }
 
+/// Selects a bank.
 template <class F>
 Procedure write_bank(ControlDialog<F>& dialog, ControlResults& found, Arguments arguments) {
   ControlMaster master;

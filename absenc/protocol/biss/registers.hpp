@@ -11,15 +11,15 @@
 
 namespace absenc::biss::registers {
 
-inline constexpr unsigned bank_size = 0x40;  // addresses 00 to 3F belong to the selected bank
-inline constexpr unsigned bank_select = 0x40;
-inline constexpr unsigned eds_bank = 0x41;       // bank of the electronic data sheet; 0: none
-inline constexpr unsigned profile = 0x42;        // two registers
-inline constexpr unsigned serial_number = 0x44;  // four registers
-inline constexpr unsigned device = 0x48;         // to 77: defined by the maker
-inline constexpr unsigned device_id = 0x78;      // six registers
-inline constexpr unsigned manufacturer = 0x7E;
-inline constexpr unsigned end = 0x80;
+inline constexpr unsigned bank_size = 0x40;      ///< addresses 00 to 3F belong to the selected bank
+inline constexpr unsigned bank_select = 0x40;    ///< Register that selects the bank.
+inline constexpr unsigned eds_bank = 0x41;       ///< bank of the electronic data sheet; 0: none
+inline constexpr unsigned profile = 0x42;        ///< two registers
+inline constexpr unsigned serial_number = 0x44;  ///< four registers
+inline constexpr unsigned device = 0x48;         ///< to 77: defined by the maker
+inline constexpr unsigned device_id = 0x78;      ///< six registers
+inline constexpr unsigned manufacturer = 0x7E;   ///< Name of the maker: two registers.
+inline constexpr unsigned end = 0x80;            ///< First address that no register has.
 
 /// Returns the size in bytes of a named register.
 [[nodiscard]] constexpr unsigned size_of(unsigned address) {
@@ -36,7 +36,7 @@ inline constexpr unsigned end = 0x80;
   }
 }
 
-inline constexpr unsigned most_banks = 256;  // an encoder may have fewer banks, or none
+inline constexpr unsigned most_banks = 256;  ///< an encoder may have fewer banks, or none
 
 /// Memory areas of the commands: pages are banks, and addresses outside the banks are on page 0. A memory dump has only
 /// the bank that users may write; the other areas identify the encoder and must not be copied to another one.

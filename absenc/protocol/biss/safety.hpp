@@ -15,6 +15,7 @@ struct Channel {
   Check check{};                                             ///< Checksum of the word.
 };
 
+/// Returns the number of data bits.
 [[nodiscard]] constexpr unsigned data_bits(const Channel& channel) {
   return channel.word.bits() + channel.check.bits();
 }
@@ -48,6 +49,7 @@ struct SafetyFormat {
   [[nodiscard]] constexpr Time period() const { return Time((1'000'000 + ma_khz / 2) / ma_khz); }
 };
 
+/// Returns the number of data bits.
 [[nodiscard]] constexpr unsigned data_bits(const SafetyFormat& format) {
   return data_bits(format.cpw) + data_bits(format.spw);
 }
@@ -115,6 +117,7 @@ constexpr std::uint64_t compared_bits(const Channel& channel, const Word& word, 
   return reply;
 }
 
+/// Writes the frame that carries a reply; returns whether it has room.
 template <std::size_t Capacity>
 constexpr bool encode(const SafetyFormat& format, const SafetyReply& reply, BitBuffer<Capacity>& out,
                       std::uint8_t silent = 0) {
@@ -124,12 +127,14 @@ constexpr bool encode(const SafetyFormat& format, const SafetyReply& reply, BitB
   return true;
 }
 
+/// Puts position and alarms into a reply.
 constexpr void show(const SafetyFormat& format, const ShaftState& state, std::uint32_t alarms,
                     std::uint8_t life_counter, SafetyReply& reply) {
   reply.cpw = {.word = word_of(format.cpw.word, state, alarms), .life_counter = life_counter};
   reply.spw = {.word = word_of(format.spw.word, state, alarms), .life_counter = life_counter};
 }
 
+/// Returns the life counter of a reply, or -1 if it has none.
 [[nodiscard]] constexpr int life_counter_of(const SafetyFormat& format, const SafetyReply& reply) {
   return format.spw.check.life_counter ? reply.spw.life_counter : -1;
 }

@@ -6,7 +6,7 @@
 
 namespace absenc::biss {
 
-extern const Unit unit;
+extern const Unit unit;  ///< The unit.
 /// A control position word and a safety position word in one frame.
 extern const Unit safety_unit;
 /// Several encoders in one frame.

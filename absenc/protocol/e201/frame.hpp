@@ -21,31 +21,32 @@ namespace absenc::e201 {
 using namespace std::chrono_literals;
 
 namespace letter {
-inline constexpr std::uint8_t samples = '4';
-inline constexpr std::uint8_t version = 'v';
-inline constexpr std::uint8_t serial = 's';
-inline constexpr std::uint8_t supply = 'e';
-inline constexpr std::uint8_t supply_on = 'n';
-inline constexpr std::uint8_t supply_off = 'f';
-inline constexpr std::uint8_t decimal = '?';
-inline constexpr std::uint8_t zero = 'z';
-inline constexpr std::uint8_t clear_zero = 'a';
-inline constexpr std::uint8_t hexadecimal = '>';
-inline constexpr std::uint8_t stream_on = '1';
-inline constexpr std::uint8_t stream_off = '0';
-inline constexpr std::uint8_t set_clock = 'M';
-inline constexpr std::uint8_t clock = 'm';
-inline constexpr std::uint8_t width = 'b';
-inline constexpr std::uint8_t set_width = 'B';
-inline constexpr std::string_view all = "4vse?>mbnfza01MB";
-inline constexpr std::string_view answered_by_a_line = "vse?>mb";
+inline constexpr std::uint8_t samples = '4';                       ///< Reads the bits of one transfer.
+inline constexpr std::uint8_t version = 'v';                       ///< Reads the version.
+inline constexpr std::uint8_t serial = 's';                        ///< Reads the serial number.
+inline constexpr std::uint8_t supply = 'e';                        ///< Reads the state of the supply.
+inline constexpr std::uint8_t supply_on = 'n';                     ///< Switches the supply on.
+inline constexpr std::uint8_t supply_off = 'f';                    ///< Switches the supply off.
+inline constexpr std::uint8_t decimal = '?';                       ///< Reads the position as a decimal number.
+inline constexpr std::uint8_t zero = 'z';                          ///< Sets the zero of positions.
+inline constexpr std::uint8_t clear_zero = 'a';                    ///< Removes the zero of positions.
+inline constexpr std::uint8_t hexadecimal = '>';                   ///< Reads the position as a hexadecimal number.
+inline constexpr std::uint8_t stream_on = '1';                     ///< Starts the stream.
+inline constexpr std::uint8_t stream_off = '0';                    ///< Ends the stream.
+inline constexpr std::uint8_t set_clock = 'M';                     ///< Sets the clock.
+inline constexpr std::uint8_t clock = 'm';                         ///< Reads the clock.
+inline constexpr std::uint8_t width = 'b';                         ///< Reads the width of the position.
+inline constexpr std::uint8_t set_width = 'B';                     ///< Sets the width of the position.
+inline constexpr std::string_view all = "4vse?>mbnfza01MB";        ///< All letters.
+inline constexpr std::string_view answered_by_a_line = "vse?>mb";  ///< Letters whose reply is a line of text.
 
+/// Returns whether a letter is one of `letters`.
 [[nodiscard]] constexpr bool is_in(std::string_view letters, std::uint8_t one) {
   return index_of(letters, static_cast<char>(one)) < letters.size();
 }
 }  // namespace letter
 
-inline constexpr std::size_t sample_bits = 64;
+inline constexpr std::size_t sample_bits = 64;     ///< Bits of a sample.
 inline constexpr std::size_t samples_length = 17;  ///< length of the reply to `4`: 16 hexadecimal digits and CR
 
 // ---- Times. No document gives any: the interface clocks 64 bits and replies as fast as USB does.

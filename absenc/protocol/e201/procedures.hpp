@@ -12,6 +12,7 @@
 
 namespace absenc::e201 {
 
+/// Dialog of procedures.
 using Dialog = author::DialogOf<Protocol>;
 
 /// Results of a procedure. Values that were not requested or not answered stay empty.
@@ -75,6 +76,7 @@ author::Procedure set_zero(Dialog& dialog, InterfaceResults& found);
 /// `abort` too.
 author::Procedure sweep_clocks(Dialog& dialog, InterfaceResults& found, Arguments arguments);
 
+/// Advice about a stream of the interface.
 inline constexpr std::string_view check_stream =
     "check that it is an E201-9S and does not stream (`absenc run ... stream-off` ends it)";
 

@@ -16,7 +16,8 @@ namespace absenc::e201 {
 /// Frequencies of MA for M1 to M8, in kHz.
 inline constexpr std::array<std::uint16_t, 8> clocks_khz{35, 70, 140, 280, 560, 1100, 2200, 4400};
 
-inline constexpr char end_of_line = '\r';
+inline constexpr char end_of_line = '\r';  ///< End of each text.
+/// A text of the interface.
 using Text = ByteBuffer<64>;
 
 /// Returns the index after the first CR; 0 if there is none.
@@ -35,6 +36,7 @@ using Text = ByteBuffer<64>;
   return text;
 }
 
+/// Returns whether a character is a digit.
 [[nodiscard]] constexpr bool is_digit(std::uint8_t c) { return c >= '0' && c <= '9'; }
 
 namespace detail {

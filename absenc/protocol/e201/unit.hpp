@@ -6,6 +6,6 @@
 
 namespace absenc::e201 {
 
-extern const Unit unit;
+extern const Unit unit;  ///< The unit.
 
 }  // namespace absenc::e201

@@ -8,6 +8,7 @@
 
 namespace absenc::encolink {
 
+/// Clauses of the document for the encoder.
 inline constexpr auto clauses = std::array{
     Clause{"answer", "UART, Communication parameters", "a request is answered", Demand::answered},
     Clause{.id = "stream",
@@ -53,6 +54,7 @@ inline constexpr auto clauses = std::array{
            .field = "position_offset"},
 };
 
+/// Clauses of the document for the encoder on SPI.
 inline constexpr auto spi_clauses = std::array{
     Clause{"answer", "SPI timing diagram", "the encoder drives its output while it is selected", Demand::answered},
     Clause{"crc", "SPI, Channel 1", "the inverted CRC of polynomial 97 is right", Demand::checked},
@@ -92,6 +94,7 @@ inline constexpr std::array zeros_and_keys{
     HostStep{pause, "00 10"}, HostStep{pause, "00 00", {}, 3}, HostStep{pause, "00 cd"}};
 }  // namespace script
 
+/// Clauses of the document for the host on SPI.
 inline constexpr std::array<HostClause, 8> spi_host_clauses{{
     {"asks", "SPI, Channel 1", "the first byte of a frame is a command", HostDemand::asks},
     {"silence", "SPI, Channel 1", "after a data line that stayed as it was it asks again", HostDemand::after_silence},
@@ -111,6 +114,7 @@ inline constexpr std::array<HostClause, 8> spi_host_clauses{{
      .breaks = {script::keys_again, script::zeros_and_keys}},
 }};
 
+/// Clauses of the document for the host.
 inline constexpr std::array<HostClause, 4> host_clauses{{
     {"asks", "UART, Channel 1", "requests are two bytes, command and data", HostDemand::asks},
     {"silence", "UART, Channel 1", "after no reply it asks again", HostDemand::after_silence},

@@ -14,11 +14,13 @@
 
 namespace absenc::encolink {
 
+/// Conditions of the virtual encoder.
 inline constexpr std::array<Condition, 3> conditions{{
     {"temperature", "degC", "of the readhead", -100, 200, 35},
     {"busy", "", "a register access never ends", 0, 1, 0},
     {"channels_disagree", "", "channel 2 has another position than channel 1", 0, 1, 0},
 }};
+/// Index of a condition.
 enum ConditionIndex : std::size_t { condition_temperature, condition_busy, condition_channels_disagree };
 
 /// A virtual encoder.

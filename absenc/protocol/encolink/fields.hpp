@@ -17,6 +17,7 @@
 
 namespace absenc::encolink {
 
+/// Names of the bits of the general status.
 inline constexpr std::array<FlagInfo, 2> general_flags{{
     {"error", "the position is not valid", read_the_alarms, false, status::errors},
     {"warning", "the position is valid, but something is near its limit", read_the_alarms, false, status::warnings},
@@ -27,6 +28,7 @@ inline constexpr std::string_view wrong_resolution =
     "padding bits are set: the encoder has more bits than the options resolution and multiturn_bits say; `absenc info` "
     "asks it";
 
+/// Sentence where channels contradict each other.
 inline constexpr std::string_view channels_disagree =
     "channel 2 has another position than channel 1: positions go on, but the detailed status cannot be trusted";
 
@@ -58,6 +60,7 @@ inline constexpr std::array<FlagInfo, 16> alarm_flags{{
      "go to the origin, then `absenc reset-multiturn`"},
 }};
 
+/// Names of the bits of the calibration status.
 inline constexpr std::array<FlagInfo, 4> calibration_flags{{
     {"", "", ""},
     {"", "", ""},
@@ -88,6 +91,7 @@ struct Values {
   Maybe<std::uint64_t> value{};      ///< Value of the field `value`, if there is one.
 };
 
+/// Field: general status.
 inline constexpr FieldInfo general_status_field{"general_status", FieldInfo::Kind::flags, "",
                                                 "the two low bits of a position frame, active low", general_flags};
 
@@ -103,6 +107,7 @@ constexpr std::optional<Bytes> part_number_of(const Values& values) {
 }
 }  // namespace detail
 
+/// Fields of position frames.
 inline constexpr auto frame_fields = [] {
   using enum FieldInfo::Kind;
   using author::field;
@@ -133,10 +138,13 @@ inline constexpr auto frame_fields = [] {
       field<&Values::value>({"value", number, "", "the same as a number", {}, Role::value}));
 }();
 
+/// Field: number of calibrations.
 inline constexpr FieldInfo calibrations_field{"calibrations", FieldInfo::Kind::number, "",
                                               "self-calibrations that ended, modulo 4"};
+/// Field: whether a calibration runs.
 inline constexpr FieldInfo running_field{"running", FieldInfo::Kind::boolean, "",
                                          "whether the self-calibration is running"};
+/// Field: why no register is shown.
 inline constexpr FieldInfo not_described_field{"registers", FieldInfo::Kind::text, "", "why no register is shown"};
 
 /// Fields of the registers, in the order of the table `registers`.

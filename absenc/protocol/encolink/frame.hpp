@@ -27,28 +27,29 @@ inline constexpr Time spi_lead = 5us;  ///< t_s: shortest time from NCS low to t
 /// SPI mode 1 (CPOL 0, CPHA 1), at most 4 MHz.
 inline constexpr LineSettings spi_settings{
     .rate = 1'000'000, .spi_mode = 1, .select_lead = spi_lead, .highest_rate = 4'000'000};
-inline constexpr Time shortest_clock = 250ns;
-inline constexpr Time spi_pause = 5us;  ///< t_p: shortest time that NCS stays high between two frames
+inline constexpr Time shortest_clock = 250ns;  ///< Shortest period of the SPI clock.
+inline constexpr Time spi_pause = 5us;         ///< t_p: shortest time that NCS stays high between two frames
 
 /// The document gives no reply times. The virtual encoder replies `answer_time` after a request; the host waits up to
 /// `answer_limit`.
 inline constexpr Time answer_time = 5us;
-inline constexpr Time answer_limit = 500us;
-inline constexpr Time gap_limit = 30us;
+inline constexpr Time answer_limit = 500us;  ///< Longest time until a reply begins.
+inline constexpr Time gap_limit = 30us;      ///< Longest time between two characters of a reply.
 
 inline constexpr Time start_up = 100ms;  ///< the encoder sends well-formed zeros for this time after power on; assumed
 inline constexpr Time save_time = 50ms;  ///< the encoder is busy for this time after `save`; assumed
-inline constexpr Time busy_limit = 2s;
-inline constexpr Time calibration_time = 1s;    ///< duration of the virtual encoder's self-calibration
-inline constexpr Time calibration_limit = 15s;  ///< timeout of a self-calibration; the vendor allows the shaft 10 s
-inline constexpr Time calibration_poll = 100ms;
-inline constexpr Time listen_limit = 500ms;  ///< longest time without a valid frame of a streaming encoder
+inline constexpr Time busy_limit = 2s;   ///< Longest time that a register access may be busy.
+inline constexpr Time calibration_time = 1s;     ///< duration of the virtual encoder's self-calibration
+inline constexpr Time calibration_limit = 15s;   ///< timeout of a self-calibration; the vendor allows the shaft 10 s
+inline constexpr Time calibration_poll = 100ms;  ///< Time between two looks at a running calibration.
+inline constexpr Time listen_limit = 500ms;      ///< longest time without a valid frame of a streaming encoder
 
 // ---- Frames
 
 /// Checksum of all frames: "Inverted CRC, 0x97 polynom", in normal notation x8 + x7 + x4 + x2 + x + 1.
 inline constexpr CrcParameters crc_parameters{8, 0x97, 0, false, false, 0xFF};
 
+/// Returns the checksum.
 [[nodiscard]] constexpr std::uint8_t checksum(Bytes bytes) { return Crc<crc_parameters, CrcTable::nibble>::of(bytes); }
 
 /// Returns whether the last byte is the checksum of the bytes before it.
@@ -59,18 +60,20 @@ inline constexpr CrcParameters crc_parameters{8, 0x97, 0, false, false, 0xFF};
 /// First byte of a request.
 enum class Config : std::uint8_t {
   position = 0x00,
-  reset_channels = 0xAA,  // position; channels 2 and 3 begin anew in the next frame
-  identify = 0xBB,        // position; the next frame carries the identity
+  reset_channels = 0xAA,  ///< position; channels 2 and 3 begin anew in the next frame
+  identify = 0xBB,        ///< position; the next frame carries the identity
 };
+/// Returns whether a byte is a configuration byte.
 [[nodiscard]] constexpr bool is_config(std::uint8_t byte) { return byte == 0x00 || byte == 0xAA || byte == 0xBB; }
 
 inline constexpr std::size_t request_bytes = 2;    ///< bytes of a request: config, ra
 inline constexpr std::size_t identity_bytes = 19;  ///< bytes of an identity, checksum included
 /// Bytes of an identity as the vendor's library reads it: one more.
 inline constexpr std::size_t padded_identity_bytes = 20;
-inline constexpr std::size_t reply_capacity = 20;
-inline constexpr unsigned maximum_resolution = 22;
-inline constexpr unsigned maximum_multiturn_bits = 16;
+inline constexpr std::size_t reply_capacity = 20;       ///< Length of the longest reply in bytes.
+inline constexpr unsigned maximum_resolution = 22;      ///< Greatest number of bits of the position.
+inline constexpr unsigned maximum_multiturn_bits = 16;  ///< Greatest number of bits of the turns.
+/// Bytes of a reply.
 using ReplyBytes = ByteBuffer<reply_capacity>;
 
 /// On SPI, a transfer carries the frame of the moment at which it begins. On a UART, the reply follows the request.
@@ -80,6 +83,7 @@ enum class OffsetSign : std::uint8_t { add, subtract };
 /// Unit of the position offset. The register map does not state it; in the vendor's example the value FFFFFFFF is
 /// refused.
 enum class OffsetUnit : std::uint8_t { counts, turn_fraction };
+/// Generation of the encoder.
 enum class Generation : std::uint8_t { aksim2, aksim4 };
 
 /// Layout of an encoder's frames. Unknown members are read from the encoder's identity.
@@ -212,6 +216,7 @@ constexpr Result<Position> load_position(const Format& format, Bytes bytes) {
 
 }  // namespace detail
 
+/// Returns the frame of a position.
 [[nodiscard]] constexpr ReplyBytes encode_position(const Format& format, const Position& position) {
   ReplyBytes frame = detail::position_bytes(format, position);
   frame.push_back(checksum(frame));
@@ -228,6 +233,7 @@ constexpr Result<Position> load_position(const Format& format, Bytes bytes) {
   return position;
 }
 
+/// Returns the frame of a whole cycle.
 [[nodiscard]] constexpr ReplyBytes encode_cycle(const Format& format, const Cycle& cycle) {
   ReplyBytes bytes = detail::position_bytes(format, cycle.position);
   bytes.push_back(static_cast<std::uint8_t>(cycle.status >> 8));
@@ -247,6 +253,7 @@ constexpr Result<Position> load_position(const Format& format, Bytes bytes) {
   return Cycle{*position, static_cast<std::uint16_t>(load_big_endian(rest.first(2))), rest[2]};
 }
 
+/// Returns the reply that identifies the encoder.
 [[nodiscard]] constexpr ReplyBytes encode_identity(const Identity& identity) {
   ReplyBytes bytes;
   bytes.append(identity.text);

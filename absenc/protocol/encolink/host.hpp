@@ -14,8 +14,8 @@ namespace absenc::encolink {
 /// Purpose of a request.
 enum class Ask : std::uint8_t {
   position,
-  reset,     // position; channels 2 and 3 begin anew in the next frame
-  identify,  // position; the next frame is the identity
+  reset,     ///< position; channels 2 and 3 begin anew in the next frame
+  identify,  ///< position; the next frame is the identity
   identity,
 };
 

@@ -12,14 +12,15 @@
 
 namespace absenc::encolink {
 
+/// Dialog of procedures.
 using Dialog = author::DialogOf<Frames>;
 
 /// How a register access ended.
 enum class AccessOutcome : std::uint8_t {
-  good,     // the encoder executed the access
-  refused,  // the encoder did not execute the access
-  lost,     // frames arrive, but the answer does not: the access may have been executed
-  gone,     // no frames arrive; `was_sent` tells whether the access may have been executed
+  good,     ///< the encoder executed the access
+  refused,  ///< the encoder did not execute the access
+  lost,     ///< frames arrive, but the answer does not: the access may have been executed
+  gone,     ///< no frames arrive; `was_sent` tells whether the access may have been executed
 };
 
 /// State of a procedure and its results. Without other results the position is reported.
@@ -72,11 +73,13 @@ struct ProcedureState : Channels {
 /// of an AksIM-4.
 author::Part<AccessOutcome> attempt_read(Dialog& dialog, ProcedureState& found, std::uint32_t address,
                                          std::uint16_t size);
+/// Tries to write a register.
 author::Part<AccessOutcome> attempt_write(Dialog& dialog, ProcedureState& found, std::uint32_t address,
                                           std::uint16_t size, std::uint64_t value);
 
 /// Reads a cycle of channel 2 and compares it with channel 1.
 author::Procedure read_alarms(Dialog& dialog, ProcedureState& found);
+/// Reads the identity.
 author::Procedure read_identity(Dialog& dialog, ProcedureState& found);
 /// Reads the identity and every register with `in_info`. Leaves out registers that the encoder rejects.
 author::Procedure read_info(Dialog& dialog, ProcedureState& found);

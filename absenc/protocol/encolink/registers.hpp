@@ -31,7 +31,7 @@ enum class AccessStatus : std::uint8_t {
   out_of_range = 0x56,
   denied = 0x96,
   read_checksum = 0xE4,
-  read_checksum_too = 0xE6,  // same meaning as read_checksum; used in other code of the vendor
+  read_checksum_too = 0xE6,  ///< same meaning as read_checksum; used in other code of the vendor
   byte_count = 0xEE,
   locked = 0xF6,
   write_checksum = 0xF9,
@@ -43,6 +43,7 @@ enum class AccessStatus : std::uint8_t {
          status == AccessStatus::write_checksum;
 }
 
+/// Returns what an access status means.
 [[nodiscard]] constexpr std::string_view text_of(AccessStatus status) {
   constexpr auto texts = std::to_array<std::pair<AccessStatus, std::string_view>>({
       {AccessStatus::ok, "done"},
@@ -59,6 +60,7 @@ enum class AccessStatus : std::uint8_t {
   return "the encoder answered with an unknown status";
 }
 
+/// Whether hosts may read or write a register.
 enum class Access : std::uint8_t { read_only, read_write, write_only };
 
 /// How the bytes of a register are decoded; all are big endian.
@@ -74,6 +76,7 @@ struct Register {
   bool in_info = false;               ///< the command `info` reads it
 };
 
+/// Index of a register.
 enum RegisterIndex : std::size_t {
   position_offset,
   position_filter,
@@ -169,11 +172,14 @@ struct RegisterRequest {
   ByteBuffer<access_capacity> data{};     ///< written bytes, `length` of them; empty for a read
 };
 
+/// Bytes that open write access, in their order.
 inline constexpr std::array<std::uint8_t, 5> access_keys{0x00, 0xCD, 0xEF, 0x89, 0xAB};
 /// Bytes of keys, operation, length and address.
 inline constexpr std::size_t access_header = access_keys.size() + 1 + 2 + 4;
+/// Bytes of a register access.
 using AccessBytes = ByteBuffer<access_header + access_capacity + 1>;
 
+/// Returns a request that reads a register.
 [[nodiscard]] constexpr RegisterRequest read_request(std::uint32_t address, std::uint16_t length) {
   return {RegisterRequest::Operation::read, address, length};
 }

@@ -36,6 +36,7 @@ inline Result<std::size_t> unknown_id(const Options& values, MutableBytes reques
 /// Table 8: the others need more than command C. Of both channels.
 inline constexpr std::int64_t cleared_by_c = alarms::xc_error | alarms::xc_error << 8;
 
+/// Clauses of the document for the encoder.
 inline constexpr auto clauses = std::array{
     Clause{"answer", "Figure 2", "a read request is answered", Demand::answered},
     Clause{"answer-time", "Figure 2",
@@ -132,6 +133,7 @@ inline constexpr std::array asked_and_written{select, HostStep{milliseconds(20),
                                               HostStep{milliseconds(20), "memory-write", byte_2}};
 }  // namespace script
 
+/// Clauses of the document for the host.
 inline constexpr std::array<HostClause, 12> host_clauses{{
     {"asks", "Figure 2", "requests are as drawn", HostDemand::asks},
     {"silence", "Overview of Communication", "after no reply it asks again", HostDemand::after_silence},

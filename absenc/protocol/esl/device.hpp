@@ -23,7 +23,7 @@ enum Index : std::size_t {
   lissajous,
   id_d_clears_singleturn,
   redundant_offset,
-  ch1_stuck,  // of channel 2 what follows each
+  ch1_stuck,  ///< of channel 2 what follows each
   ch2_stuck,
   ch1_sequence,
   ch2_sequence,
@@ -36,6 +36,7 @@ enum Index : std::size_t {
 };
 }  // namespace condition
 
+/// Conditions of the virtual encoder.
 inline constexpr std::array<Condition, 16> conditions{{
     {"supply_voltage", "mV", "as the encoder measures it: alarms below 2900 and above 3700 (Table 8)", 0, 6000, 3300},
     {"temperature", "degC", "inside the encoder; above 105 it warns (assumed: the document gives no limit)", -128, 127,

@@ -116,6 +116,7 @@ constexpr std::optional<unsigned> of_encoder_id(const Shown& all) {
 }
 }  // namespace detail
 
+/// Fields of requests and replies.
 inline constexpr auto fields = [] {
   using author::field;
   using detail::in;

@@ -46,23 +46,27 @@ inline constexpr std::uint8_t turns_wrong = xc_error | multiturn_error;  ///< Al
 inline constexpr std::uint8_t unsafe = led_or_lissajous_error | memory_error | singleturn_error | voltage;
 }  // namespace alarms
 
-inline constexpr unsigned singleturn_bits = 24;
-inline constexpr unsigned multiturn_bits = 16;
-inline constexpr unsigned redundant_bits = 9;
-inline constexpr std::size_t request_capacity = 4;
-inline constexpr std::size_t reply_capacity = 18;
+inline constexpr unsigned singleturn_bits = 24;     ///< Bits of the position.
+inline constexpr unsigned multiturn_bits = 16;      ///< Bits of the turns.
+inline constexpr unsigned redundant_bits = 9;       ///< Bits of the redundant position.
+inline constexpr std::size_t request_capacity = 4;  ///< Length of the longest request in bytes.
+inline constexpr std::size_t reply_capacity = 18;   ///< Length of the longest reply in bytes.
+/// Bytes of a request.
 using RequestBytes = ByteBuffer<request_capacity>;
+/// Bytes of a reply.
 using ReplyBytes = ByteBuffer<reply_capacity>;
 
 // ---- Checksums. The document prints the polynomials in Koopman notation: 16'hAC9A is normal 5935, 8'h97 is 2F.
 
+/// Channel of the encoder.
 enum class Channel : std::uint8_t { one, two };
 
-inline constexpr CrcParameters crc16_lsb{16, 0x5935, 0, true, true, 0};
-inline constexpr CrcParameters crc16_msb{16, 0x5935, 0, false, false, 0};
-inline constexpr CrcParameters crc8_lsb{8, 0x2F, 0, true, true, 0};
-inline constexpr CrcParameters crc8_msb{8, 0x2F, 0, false, false, 0};
+inline constexpr CrcParameters crc16_lsb{16, 0x5935, 0, true, true, 0};    ///< CRC of 16 bits, lowest bit first.
+inline constexpr CrcParameters crc16_msb{16, 0x5935, 0, false, false, 0};  ///< CRC of 16 bits, highest bit first.
+inline constexpr CrcParameters crc8_lsb{8, 0x2F, 0, true, true, 0};        ///< CRC of 8 bits, lowest bit first.
+inline constexpr CrcParameters crc8_msb{8, 0x2F, 0, false, false, 0};      ///< CRC of 8 bits, highest bit first.
 
+/// Returns the value of the CRC register before the first byte.
 [[nodiscard]] constexpr std::uint16_t initial_value(Channel channel) { return channel == Channel::two ? 0xFFFF : 0; }
 
 namespace detail {
@@ -79,11 +83,13 @@ constexpr std::uint16_t crc_of_pairs(Channel channel, Bytes bytes, bool swapped)
 }
 }  // namespace detail
 
+/// Returns the CRC of 16 bits.
 [[nodiscard]] constexpr std::uint16_t checksum16(CrcBitOrder order, Channel channel, Bytes bytes) {
   return order == CrcBitOrder::lsb ? detail::crc_of_pairs<crc16_lsb>(channel, bytes, false)
                                    : detail::crc_of_pairs<crc16_msb>(channel, bytes, order == CrcBitOrder::word);
 }
 
+/// Returns the CRC of 8 bits.
 [[nodiscard]] constexpr std::uint8_t checksum8(CrcBitOrder order, Bytes bytes) {
   return order == CrcBitOrder::lsb ? Crc<crc8_lsb, CrcTable::nibble>::of(bytes)
                                    : Crc<crc8_msb, CrcTable::nibble>::of(bytes);
@@ -99,17 +105,17 @@ constexpr std::uint16_t crc_of_pairs(Channel channel, Bytes bytes, bool swapped)
 
 /// Data ID codes of Table 3, and 6 of Tables 6 and 12.
 enum class DataId : std::uint8_t {
-  position = 1,          // safety
-  singleturn = 2,        // safety
-  position_short = 4,    // non-safety
-  singleturn_short = 5,  // non-safety
-  calibration = 6,       // non-safety
-  encoder_id = 8,        // never eight times in a row: "dynamic addressing", which nothing describes
+  position = 1,          ///< safety
+  singleturn = 2,        ///< safety
+  position_short = 4,    ///< non-safety
+  singleturn_short = 5,  ///< non-safety
+  calibration = 6,       ///< non-safety
+  encoder_id = 8,        ///< never eight times in a row: "dynamic addressing", which nothing describes
   temperature = 9,
   alarms = 0xA,
-  zero = 0xB,             // eight times
-  clear_alarms = 0xC,     // eight times
-  reset_multiturn = 0xD,  // eight times
+  zero = 0xB,             ///< eight times
+  clear_alarms = 0xC,     ///< eight times
+  reset_multiturn = 0xD,  ///< eight times
   read_memory = 0xE,
   write_memory = 0xF,
 };
@@ -187,6 +193,7 @@ inline constexpr std::array<Layout, 16> layouts = [] {
 }();
 }  // namespace detail
 
+/// Returns the layout of replies to a request.
 [[nodiscard]] constexpr const Layout& layout_of(DataId id) { return detail::layouts[static_cast<std::size_t>(id)]; }
 
 /// The id of a control field, whatever its parity; nothing for one that the tables do not list.
@@ -196,12 +203,15 @@ inline constexpr std::array<Layout, 16> layouts = [] {
   return static_cast<DataId>(id);
 }
 
+/// Returns whether a request reads or writes the memory.
 [[nodiscard]] constexpr bool is_memory_access(DataId id) {
   return id == DataId::read_memory || id == DataId::write_memory;
 }
+/// Returns whether a request is one of those that reset.
 [[nodiscard]] constexpr bool is_reset(DataId id) {
   return id == DataId::zero || id == DataId::clear_alarms || id == DataId::reset_multiturn;
 }
+/// Returns whether a request is for a safety position.
 [[nodiscard]] constexpr bool is_safety_position(DataId id) {
   return id == DataId::position || id == DataId::singleturn;
 }
@@ -212,9 +222,11 @@ inline constexpr std::array<Layout, 16> layouts = [] {
 /// Ids whose replies carry the sequence counter (and count it, with sequence_step=safety).
 [[nodiscard]] constexpr bool has_sequence(DataId id) { return layout_of(id).crc_bytes == 2; }
 
+/// Returns the length of a reply in bytes.
 [[nodiscard]] constexpr std::size_t reply_length(DataId id) {
   return std::size_t{layout_of(id).length_one} + layout_of(id).length_two;
 }
+/// Returns the length of a request in bytes.
 [[nodiscard]] constexpr std::size_t request_length(const Profile& profile, DataId id) {
   if (id == DataId::write_memory) return 4;
   if (id == DataId::read_memory) return 3;
@@ -233,6 +245,7 @@ inline constexpr std::array<Layout, 16> layouts = [] {
   const unsigned turn_bytes = profile.turns ? multiturn_bits / 8 : 0;
   return static_cast<std::uint8_t>(safety | turn_bytes << 5 | singleturn_bits);
 }
+/// Returns the address in a control field.
 [[nodiscard]] constexpr std::uint8_t address_of(std::uint8_t field) { return field & 7; }
 
 /// A request of the protocol.
@@ -291,6 +304,7 @@ namespace detail {
 
 // ---- Encoding
 
+/// Returns the request as it is sent.
 [[nodiscard]] constexpr RequestBytes encode_request(const Profile& profile, const Request& request) {
   RequestBytes bytes;
   bytes.push_back(control_field(profile, request.encoder_address, request.id));
@@ -361,6 +375,7 @@ constexpr void encode_channel(const Profile& profile, const Reply& reply, std::u
   return bytes;
 }
 
+/// Returns the reply as it is sent.
 [[nodiscard]] constexpr ReplyBytes encode_reply(const Profile& profile, const Reply& reply) {
   return encode_reply(profile, reply, control_field(profile, reply.encoder_address, reply.id));
 }

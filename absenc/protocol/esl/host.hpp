@@ -11,6 +11,7 @@
 
 namespace absenc::esl {
 
+/// Dialog of procedures.
 using Dialog = author::DialogOf<Protocol>;
 
 /// What a procedure found.

@@ -12,22 +12,25 @@
 
 namespace absenc::esl {
 
+/// Order of the bits in which a CRC is computed.
 enum class CrcBitOrder : std::uint8_t {
-  lsb,   // every byte LSB first, as the wire has it
-  msb,   // every byte MSB first
-  word,  // 16-bit words of two bytes, low byte first on the wire, MSB first into the CRC; the 8-bit CRC: as msb
+  lsb,   ///< every byte LSB first, as the wire has it
+  msb,   ///< every byte MSB first
+  word,  ///< 16-bit words of two bytes, low byte first on the wire, MSB first into the CRC; the 8-bit CRC: as msb
 };
+/// Order of the bytes of a CRC.
 enum class CrcByteOrder : std::uint8_t {
-  low,      // low byte first
-  high,     // high byte first
-  table12,  // as Table 12 prints it: channel 1 low byte first, channel 2 high byte first
+  low,      ///< low byte first
+  high,     ///< high byte first
+  table12,  ///< as Table 12 prints it: channel 1 low byte first, channel 2 high byte first
 };
 /// Which end of a byte the lowest bit of the redundant position stands at.
 enum class RedundantBit : std::uint8_t { b7, b0 };
+/// When the sequence bit of a safety reply changes.
 enum class SequenceStep : std::uint8_t {
-  change,   // differs from the last one seen
-  safety,   // plus one for each reply to IDs 1, 2, 8, B
-  request,  // plus one for each request
+  change,   ///< differs from the last one seen
+  safety,   ///< plus one for each reply to IDs 1, 2, 8, B
+  request,  ///< plus one for each request
 };
 /// What the parity bit of CF covers.
 enum class ParityScope : std::uint8_t { command, all };

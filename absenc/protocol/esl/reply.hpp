@@ -106,7 +106,9 @@ inline constexpr std::array<Error, check_texts.size()> check_errors = [] {
   return errors;
 }();
 
+/// Returns the text of a check.
 [[nodiscard]] constexpr const CheckText& text_of(Check check) { return check_texts[static_cast<std::size_t>(check)]; }
+/// Returns the error of a check.
 [[nodiscard]] constexpr Error error_of(Check check) { return check_errors[static_cast<std::size_t>(check)]; }
 
 namespace detail {
@@ -291,6 +293,7 @@ constexpr Check check_reply_to(const Profile& profile, const Request& request, s
   return error_of(check) == Error::request_rejected ? check : Check::passed;
 }
 
+/// Returns the reply with all checks done, or the first error.
 [[nodiscard]] constexpr Result<Reply> decode_reply(const Profile& profile, const Request& request, Bytes bytes) {
   Result<Reply> result;
   const Error error = error_of(check_reply(profile, request, bytes, *result));
@@ -339,10 +342,12 @@ constexpr unsigned unsafe_alarms(const ChannelReply& channel) {
   }
   return reading;
 }
+/// Returns the reading of a reply.
 [[nodiscard]] constexpr Reading to_reading(const Reply& reply) { return to_reading(reply.id, reply); }
 
 // ---- As the author's layer takes it
 
+/// Returns whether a request selects a page of the memory.
 [[nodiscard]] constexpr bool selects_page(const Request& request) {
   return request.id == DataId::write_memory && request.memory_address == page_select_address;
 }

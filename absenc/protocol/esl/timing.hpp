@@ -30,7 +30,7 @@ inline constexpr Time page_time = 18ms;                              ///< after 
 
 /// Not in the document: how long the host waits for an answer, and for the next character of one.
 inline constexpr Time answer_limit = 20us;
-inline constexpr Time gap_limit = 3 * line_settings.character();
+inline constexpr Time gap_limit = 3 * line_settings.character();  ///< Longest time between two characters of a reply.
 /// Not in the document: what a host leaves between a reply and its next request. A missing start bit ends a frame set,
 /// so one bit would do.
 inline constexpr Time request_pause = line_settings.bits(2);
@@ -40,13 +40,13 @@ inline constexpr Time request_pause = line_settings.bits(2);
   return sent_at - (profile.request_crc ? line_settings.character() : Time{}) + position_time;
 }
 
-inline constexpr std::uint8_t page_select_address = 0x7F;
-inline constexpr std::uint8_t last_page = 14;
-inline constexpr std::uint8_t last_address = 0x7E;
-inline constexpr std::uint8_t register_page = 8;          ///< selected after power on (Table 9)
-inline constexpr std::uint8_t error_info_address = 0x1A;  ///< on the register page (Table 8)
-inline constexpr std::uint8_t error_info_led = 0x02;
-inline constexpr std::uint8_t error_info_lissajous = 0x08;
+inline constexpr std::uint8_t page_select_address = 0x7F;   ///< Address that selects a page.
+inline constexpr std::uint8_t last_page = 14;               ///< The last page.
+inline constexpr std::uint8_t last_address = 0x7E;          ///< The last address of a page.
+inline constexpr std::uint8_t register_page = 8;            ///< selected after power on (Table 9)
+inline constexpr std::uint8_t error_info_address = 0x1A;    ///< on the register page (Table 8)
+inline constexpr std::uint8_t error_info_led = 0x02;        ///< Bit of the error information: LED.
+inline constexpr std::uint8_t error_info_lissajous = 0x08;  ///< Bit of the error information: Lissajous figure.
 
 /// Permissible writing cycles (notes 6 and 7 of Table 11), which do not say of what. They tell how bytes are reached,
 /// too: in the EEPROM by two requests and a write of 6 ms, in the MTP alike (assumed), in registers, which are lost at
@@ -98,6 +98,7 @@ inline constexpr std::array<MemoryArea, 12> memory_map = [] {
       std::find_if(memory_map.begin(), memory_map.end(), [&](const MemoryArea& one) { return one.has(page, address); });
   return found == memory_map.end() ? nullptr : found;
 }
+/// Returns whether the memory has a page.
 [[nodiscard]] constexpr bool is_page(unsigned page) { return find_area(page, 0) != nullptr; }
 /// Nothing in the temporary register stands between such a byte and its reader.
 [[nodiscard]] constexpr bool is_immediate(unsigned page, unsigned address) {

@@ -6,6 +6,6 @@
 
 namespace absenc::esl {
 
-extern constinit const Unit unit;
+extern constinit const Unit unit;  ///< The unit.
 
 }  // namespace absenc::esl

@@ -9,6 +9,7 @@
 namespace absenc::esl {
 
 // clang-format off
+/// Frames with their meaning, from documents.
 inline constexpr std::array vectors{
     author::VectorText{"esl-001", "request ID1 EAD0", "derived", "", "0875", "", "data_id=1 control_field=8 encoder_address=0"},
     author::VectorText{"esl-002", "ID1 nominal", "derived", "", "0875", "084000efcdab34125646b3086000abd6cd84", "data_id=1 encoder_address=0 ch1_status=0x40 singleturn=11259375 multiturn=4660 ch1_alarms=0x00 ch1_sequence=86 ch2_status=0x60 ch2_alarms=0x00 redundant_singleturn=343 ch2_sequence=86"},

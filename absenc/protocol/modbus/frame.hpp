@@ -18,20 +18,22 @@ inline constexpr CrcParameters crc_parameters{16, 0x8005, 0xFFFF, true, true, 0x
 
 inline constexpr std::size_t frame_capacity = 256;  ///< longest frame in bytes (S 2.5.1)
 inline constexpr std::size_t shortest_frame = 4;    ///< bytes of the shortest frame: address, function, CRC
-inline constexpr std::size_t crc_size = 2;
+inline constexpr std::size_t crc_size = 2;          ///< Length of the CRC in bytes.
+/// Bytes of a frame.
 using FrameBytes = ByteBuffer<frame_capacity>;
 
 inline constexpr std::uint8_t first_address = 1;   ///< lowest address of a server; 0 is broadcast and never answered
 inline constexpr std::uint8_t last_address = 247;  ///< highest address of a server (S 2.2)
 
-inline constexpr std::uint8_t read_holding_registers = 0x03;
-inline constexpr std::uint16_t most_registers = 125;  ///< most registers of one read request (A 6.3)
+inline constexpr std::uint8_t read_holding_registers = 0x03;  ///< Function: read holding registers.
+inline constexpr std::uint16_t most_registers = 125;          ///< most registers of one read request (A 6.3)
 /// Bit that a refusal sets in the function code; functions of the standard are below it.
 inline constexpr std::uint8_t refusal_bit = 0x80;
 
 /// Byte order of a received CRC. Two equal bytes count as `low_first`, the order of Modbus.
 enum class CrcOrder : std::uint8_t { low_first, high_first, wrong };
 
+/// Returns the order of the CRC bytes with which a frame is right.
 [[nodiscard]] constexpr CrcOrder crc_order(Bytes frame) {
   if (frame.size() < shortest_frame) return CrcOrder::wrong;
   const Bytes crc = frame.last(crc_size);

@@ -8,6 +8,7 @@
 
 namespace absenc::raa38 {
 
+/// Clauses of the document for the encoder on RS-485.
 inline constexpr auto serial_clauses = std::array{
     Clause{.id = "frames",
            .paragraph = "3.1.3, 3.1.5",
@@ -46,6 +47,7 @@ inline constexpr auto serial_clauses = std::array{
            .shown_with = "mode=bus&zeroing=command"},
 };
 
+/// Clauses of the document for the encoder with Modbus RTU.
 inline constexpr std::array<Clause, 10> modbus_clauses{{
     {"answer", "3.1.7", "function 03 is answered", Demand::answered},
     {"length", "3.1.7 (5)", "an answer has as many bytes as its registers need", Demand::whole},
@@ -86,6 +88,7 @@ inline constexpr std::array<Clause, 10> modbus_clauses{{
      .demand = Demand::zero},
 }};
 
+/// Clauses of the document for the encoder on CAN.
 inline constexpr auto can_clauses = std::array{
     Clause{"answer", "3.4.1 (3)", "command 80 is answered", Demand::answered},
     Clause{.id = "stream",
@@ -161,6 +164,7 @@ inline constexpr std::array rate_9{enter, HostStep{milliseconds(1), "7e5:1300090
 inline constexpr std::array rate_3{enter, HostStep{milliseconds(1), "7e5:1300030000000000"}};
 }  // namespace script
 
+/// Clauses of the document for the host with Modbus RTU.
 inline constexpr std::array<HostClause, 7> modbus_host_clauses{{
     {"asks", "3.1.7", "requests are as drawn", HostDemand::asks},
     {"silence", "3.1.7", "after no reply it asks again", HostDemand::after_silence},
@@ -197,6 +201,7 @@ inline constexpr std::array<HostClause, 4> serial_host_clauses{{
      .options = "acquisition_us=20000"},
 }};
 
+/// Clauses of the document for the host on CAN.
 inline constexpr std::array<HostClause, 10> can_host_clauses{{
     {"asks", "3.4.1 (3)", "requests are as drawn", HostDemand::asks},
     {"silence", "3.4.1 (3)", "after no reply it asks again", HostDemand::after_silence},

@@ -7,7 +7,7 @@
 namespace absenc::raa38 {
 
 extern constinit const Unit serial_unit;  ///< RS-485, RS-232, RS-422
-extern constinit const Unit modbus_unit;
-extern constinit const Unit can_unit;
+extern constinit const Unit modbus_unit;  ///< The unit for Modbus RTU.
+extern constinit const Unit can_unit;     ///< The unit for CAN.
 
 }  // namespace absenc::raa38

@@ -8,6 +8,7 @@
 
 namespace absenc::ssi {
 
+/// Clauses of the document for the encoder.
 inline constexpr std::array<Clause, 1> clauses{{
     {.id = "repeat",
      .paragraph = "3.5",
@@ -19,6 +20,7 @@ inline constexpr std::array<Clause, 1> clauses{{
      .shown_with = "singleturn=1000"},
 }};
 
+/// Clauses of the document for the host.
 inline constexpr std::array<HostClause, 5> host_clauses{{
     {"silence", "3.5", "after a data line that stayed as it was it clocks again", HostDemand::after_silence},
     {"speed", "3.5", "the clock is within the limits of the encoder", HostDemand::rule,

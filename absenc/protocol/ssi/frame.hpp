@@ -15,6 +15,7 @@ namespace absenc::ssi {
 
 using namespace std::chrono_literals;
 
+/// Settings of the line.
 inline constexpr LineSettings line_settings{.rate = 200'000, .spi_mode = 3, .idle_clocks = 1};
 inline constexpr Time pause_margin = 10us;  ///< time that the host adds to the pause
 
@@ -23,7 +24,7 @@ enum class AfterWord : std::uint8_t {
   repeat,
   zero,
   one,
-  separated,  // a zero, then the word again
+  separated,  ///< a zero, then the word again
 };
 
 /// Format of the encoder: the values of its options.
@@ -48,7 +49,7 @@ struct Format {
   std::uint32_t fastest_khz = 250;  ///< Fastest clock that the encoder allows, in kHz.
 };
 
-inline constexpr std::size_t frame_capacity = 2 * WordFormat::maximum_bits;
+inline constexpr std::size_t frame_capacity = 2 * WordFormat::maximum_bits;  ///< Greatest number of bits of a frame.
 
 /// Returns the clocks of one reading.
 [[nodiscard]] constexpr unsigned clocks(const Format& format) { return format.word.bits() + format.extra_clocks; }
@@ -162,6 +163,7 @@ constexpr bool encode(const Format& format, const Word& word, std::size_t count,
   return true;
 }
 
+/// Whether a word has an error bit, and what it means.
 enum class ErrorBit : std::uint8_t { none, active_high, active_low };
 
 /// Returns the tree format, in which turns and position meet at a fixed clock: zeros before the turns and after the
@@ -187,6 +189,7 @@ enum class ErrorBit : std::uint8_t { none, active_high, active_low };
   if (parity != Parity::none) word.add({"parity", Meaning::parity, 1, parity == Parity::odd});
   return word;
 }
+/// Returns the format of a word of position, turns, error bit and parity.
 [[nodiscard]] constexpr WordFormat word_with(const PositionBits& bits, bool gray, ErrorBit error, Parity parity) {
   return word_with(word_format(bits), gray, error, parity);
 }

@@ -6,6 +6,6 @@
 
 namespace absenc::ssi {
 
-extern const Unit unit;
+extern const Unit unit;  ///< The unit.
 
 }  // namespace absenc::ssi

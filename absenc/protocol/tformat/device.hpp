@@ -13,7 +13,9 @@
 
 namespace absenc::tformat {
 
+/// Index of a condition.
 enum ConditionIndex : std::size_t { battery_voltage, temperature };
+/// Conditions of the virtual encoder.
 inline constexpr std::array<Condition, 2> conditions{{
     {"battery", "mV", "voltage of the external battery; 0: there is none, as always with battery=false", 0, 4750, 3600},
     {"temperature", "degC", "of the board", -20, 127, 35},

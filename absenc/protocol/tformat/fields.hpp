@@ -65,6 +65,7 @@ struct Values {
   std::optional<std::uint8_t> page_left{};           ///< Value of the field `page_left`, if there is one.
 };
 
+/// Fields of requests and replies.
 inline constexpr auto fields = [] {
   using author::field;
   using author::in_hex;
@@ -92,6 +93,7 @@ inline constexpr auto fields = [] {
           "memory page that is left selected, also for whoever reads next: which one was before is not known"));
 }();
 
+/// Returns the values of a request.
 [[nodiscard]] constexpr Values values_of(const Request& request) {
   Values all{.data_id = request.id, .control_field = control_field(request.id)};
   if (is_memory_access(request.id)) all.address = request.address;

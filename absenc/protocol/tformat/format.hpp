@@ -24,20 +24,21 @@ inline constexpr Time reset_interval = 40us;                       ///< at least
 inline constexpr std::uint32_t zero_tolerance_millidegrees = 349;  ///< 0.35 degrees (10): 127 counts of 17 bits
 inline constexpr Time memory_time = 18ms;  ///< at most, for a write, a page change or the zero position (9.1, 10)
 inline constexpr Time start_up_with_battery = 1s;  ///< no request is accepted (5.4)
+/// Time after power-on without a battery until requests are accepted.
 inline constexpr Time start_up_without_battery = 1500ms;
 
 /// Limits the host waits for; the document gives only the typical answer time.
 inline constexpr Time answer_limit = 100us;
-inline constexpr Time gap_limit = 3 * line_settings.character();
+inline constexpr Time gap_limit = 3 * line_settings.character();  ///< Longest time between two characters of a reply.
 
-inline constexpr std::uint8_t user_pages = 6;        ///< 0 to 5 (6.1.1)
-inline constexpr std::uint8_t page_addresses = 127;  ///< 0 to 126
-inline constexpr std::uint8_t page_select_address = 127;
-inline constexpr std::uint8_t service_page = 7;
-inline constexpr std::uint32_t write_life = 100'000;    ///< of all bytes together (6.1.1)
-inline constexpr std::uint8_t overheat_address = 4;     ///< on the service page (7.2)
-inline constexpr std::uint8_t temperature_address = 5;  ///< on the service page (7.3)
-inline constexpr std::uint8_t overheat_at_shipping = 0xDA;
+inline constexpr std::uint8_t user_pages = 6;               ///< 0 to 5 (6.1.1)
+inline constexpr std::uint8_t page_addresses = 127;         ///< 0 to 126
+inline constexpr std::uint8_t page_select_address = 127;    ///< Address that selects a page.
+inline constexpr std::uint8_t service_page = 7;             ///< Page of settings and temperature.
+inline constexpr std::uint32_t write_life = 100'000;        ///< of all bytes together (6.1.1)
+inline constexpr std::uint8_t overheat_address = 4;         ///< on the service page (7.2)
+inline constexpr std::uint8_t temperature_address = 5;      ///< on the service page (7.3)
+inline constexpr std::uint8_t overheat_at_shipping = 0xDA;  ///< Threshold of over-heat at shipping.
 /// Watched at 0 degC: the document wants 1 degC or more (7.4), or a byte below 0x80, which is "off" (7.2.2).
 inline constexpr std::uint8_t overheat_at_zero = 0x80;
 
@@ -57,6 +58,7 @@ inline constexpr std::array<MemoryArea, user_pages + 2> memory_areas = [] {
                                          [&](const MemoryArea& one) { return one.has(page, address); });
   return found == memory_areas.end() ? nullptr : found;
 }
+/// Returns whether the memory has a page.
 [[nodiscard]] constexpr bool is_page(unsigned page) { return page < user_pages || page == service_page; }
 
 /// Data ID codes of Table 1.

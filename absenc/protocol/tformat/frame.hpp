@@ -21,17 +21,20 @@
 
 namespace absenc::tformat {
 
-inline constexpr std::uint8_t busy_bit = 0x80;     ///< of ADF, in replies
-inline constexpr unsigned full_absolute_bits = 5;  ///< of the position hold with full_absolute_status (5.4.1)
-inline constexpr std::size_t request_capacity = 4;
-inline constexpr std::size_t reply_capacity = 11;
+inline constexpr std::uint8_t busy_bit = 0x80;      ///< of ADF, in replies
+inline constexpr unsigned full_absolute_bits = 5;   ///< of the position hold with full_absolute_status (5.4.1)
+inline constexpr std::size_t request_capacity = 4;  ///< Length of the longest request in bytes.
+inline constexpr std::size_t reply_capacity = 11;   ///< Length of the longest reply in bytes.
+/// Bytes of a request.
 using RequestBytes = ByteBuffer<request_capacity>;
+/// Bytes of a reply.
 using ReplyBytes = ByteBuffer<reply_capacity>;
 
 /// G(X) = X^8 + 1 (6.3.4): the same as the exclusive OR of all bytes, which is how `checksum` computes it: by `reduce`,
 /// whose order is free, because a loop waits for each byte in turn.
 inline constexpr CrcParameters crc_parameters{8, 0x01, 0, true, true, 0};
 
+/// Returns the checksum.
 [[nodiscard]] constexpr std::uint8_t checksum(Bytes bytes) {
   return std::reduce(bytes.begin(), bytes.end(), std::uint8_t{0},
                      [](std::uint8_t one, std::uint8_t other) -> std::uint8_t { return one ^ other; });
@@ -42,13 +45,17 @@ inline constexpr CrcParameters crc_parameters{8, 0x01, 0, true, true, 0};
   constexpr unsigned odd_parities = 0x6996;  // a bit for each id: a small core computes them in many steps
   return static_cast<std::uint8_t>(0x02u | (id & 0xFu) << 3 | (odd_parities >> (id & 0xF) & 1) << 7);
 }
+/// Returns the control field of a request.
 [[nodiscard]] constexpr std::uint8_t control_field(DataId id) { return control_field(static_cast<std::uint8_t>(id)); }
 
+/// Returns whether a control field has the sync code.
 [[nodiscard]] constexpr bool has_sync_code(std::uint8_t field) { return (field & 0x07) == 0x02; }
 
+/// Returns whether a request reads or writes the memory.
 [[nodiscard]] constexpr bool is_memory_access(DataId id) {
   return id == DataId::read_memory || id == DataId::write_memory;
 }
+/// Returns whether a request is one of those that reset.
 [[nodiscard]] constexpr bool is_reset(DataId id) {
   return id == DataId::clear_alarms || id == DataId::zero || id == DataId::reset_multiturn;
 }
@@ -70,9 +77,11 @@ inline constexpr std::array<Lengths, 16> lengths = [] {
 }();
 }  // namespace detail
 
+/// Returns the length of a request in bytes.
 [[nodiscard]] constexpr std::size_t request_length(DataId id) {
   return detail::lengths[static_cast<std::size_t>(id)].request;
 }
+/// Returns the length of a reply in bytes.
 [[nodiscard]] constexpr std::size_t reply_length(DataId id) {
   return detail::lengths[static_cast<std::size_t>(id)].reply;
 }
@@ -90,6 +99,7 @@ struct Request {
   std::uint8_t value = 0;          ///< write_memory
 };
 
+/// Returns whether a request selects a page of the memory.
 [[nodiscard]] constexpr bool selects_page(const Request& request) {
   return request.id == DataId::write_memory && request.address == page_select_address;
 }
@@ -107,6 +117,7 @@ struct Reply {
   std::uint8_t value = 0;          ///< Value of the memory byte.
 };
 
+/// Returns the request as it is sent.
 [[nodiscard]] constexpr RequestBytes encode_request(const Request& request) {
   RequestBytes bytes;
   bytes.push_back(control_field(request.id));
@@ -132,6 +143,7 @@ struct Reply {
   return Request{*id, bytes[1], *id == DataId::write_memory ? bytes[2] : std::uint8_t{0}};
 }
 
+/// Returns the reply as it is sent.
 [[nodiscard]] constexpr ReplyBytes encode_reply(const Reply& reply) {
   std::array<std::uint8_t, reply_capacity> frame{control_field(reply.id), reply.status};
   const auto store = [&frame](std::size_t at, std::uint32_t value) {
@@ -334,6 +346,7 @@ constexpr unsigned reported_status(const Format& format, bool has_alarms) {
   reading.alarms_reported &= ~expected_alarms(format);
   return reading;
 }
+/// Returns the reading of a reply.
 [[nodiscard]] constexpr Reading to_reading(const Format& format, const Reply& reply,
                                            std::optional<std::uint8_t> known_alarms = std::nullopt) {
   return to_reading(format, reply.id, reply, known_alarms);

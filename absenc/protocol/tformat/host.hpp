@@ -56,7 +56,7 @@ class ReadPosition : public author::HostOf<Protocol> {
   Reading reading_{};
 };
 
-inline constexpr Request everything{DataId::everything};
+inline constexpr Request everything{DataId::everything};  ///< Request for position, turns, identifier and alarms.
 /// Data ID 3 of a format that is known when the program is written: `static constexpr Format format{...};`.
 template <const Format& format>
 using ReadKnownPosition = author::ReadKnownPosition<Protocol, format, everything>;

@@ -10,6 +10,7 @@ namespace absenc::tformat {
 
 using author::VectorText;
 
+/// Frames with their meaning, from documents.
 inline constexpr std::array vectors{
     VectorText{"tformat-001", "request byte Data ID 0", "seed Table 1; public", "", "02", "",
                "data_id=0 control_field=2"},

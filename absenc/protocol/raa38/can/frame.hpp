@@ -16,22 +16,23 @@
 
 namespace absenc::raa38::can {
 
-inline constexpr std::uint8_t frame_size = 8;
+inline constexpr std::uint8_t frame_size = 8;  ///< Number of data bytes of a frame.
 
 /// Purpose of a frame by its identifier; from the table of COB-IDs, with its two wrong numbers corrected.
 enum class Function : std::uint8_t {
-  nmt,                  // identifier 000
-  sync,                 // identifier 080
-  emergency,            // identifiers 081 to 0FF
-  reply,                // identifiers 101 to 1FF: from the node
-  command,              // identifiers 201 to 2FF: to the node
-  sdo_reply,            // identifiers 581 to 5FF: from the node
-  sdo_request,          // identifiers 601 to 67F: to the node
-  configuration_reply,  // identifier 7E4, on which slaves of CiA 305 answer
-  configuration,        // identifier 7E5: to all nodes; RAA38S6 also answer on it
+  nmt,                  ///< identifier 000
+  sync,                 ///< identifier 080
+  emergency,            ///< identifiers 081 to 0FF
+  reply,                ///< identifiers 101 to 1FF: from the node
+  command,              ///< identifiers 201 to 2FF: to the node
+  sdo_reply,            ///< identifiers 581 to 5FF: from the node
+  sdo_request,          ///< identifiers 601 to 67F: to the node
+  configuration_reply,  ///< identifier 7E4, on which slaves of CiA 305 answer
+  configuration,        ///< identifier 7E5: to all nodes; RAA38S6 also answer on it
   unknown,
 };
 
+/// Returns the function of an identifier.
 [[nodiscard]] constexpr Function function_of(std::uint32_t id) {
   if (id == 0) return Function::nmt;
   if (id == 0x80) return Function::sync;
@@ -44,6 +45,7 @@ enum class Function : std::uint8_t {
   if (id == 0x7E5) return Function::configuration;
   return Function::unknown;
 }
+/// Returns the function of a frame.
 [[nodiscard]] constexpr Function function_of(const CanFrame& frame) {
   return frame.extended ? Function::unknown : function_of(frame.id);
 }
@@ -57,6 +59,7 @@ enum class Function : std::uint8_t {
 
 /// Names of the CANopen functions that this encoder only lists; empty for the functions it uses.
 inline constexpr std::array<std::string_view, 10> function_names{"NMT", "SYNC", "EMCY", "", "", "SDO RX", "SDO TX"};
+/// Returns whether the document only names a function.
 [[nodiscard]] constexpr bool is_only_named(Function function) {
   return !function_names[static_cast<std::size_t>(function)].empty();
 }
@@ -71,6 +74,7 @@ struct Rate {
   std::uint8_t index;             ///< Index of the rate in the table of CiA 305.
   std::uint32_t bits_per_second;  ///< The rate in bits per second.
 };
+/// Bit rates of the encoder.
 inline constexpr std::array<Rate, 3> rates{{{0, 1'000'000}, {2, 500'000}, {3, 250'000}}};
 
 /// Returns the rate of an index; null if the document does not have it.
@@ -80,6 +84,7 @@ inline constexpr std::array<Rate, 3> rates{{{0, 1'000'000}, {2, 500'000}, {3, 25
   }
   return nullptr;
 }
+/// Returns the rate with these bits per second, or null.
 [[nodiscard]] constexpr const Rate* rate_of_bits(std::int64_t bits_per_second) {
   for (const Rate& rate : rates) {
     if (rate.bits_per_second == bits_per_second) return &rate;
@@ -129,6 +134,7 @@ struct Values {
 
 // ---- Orders to a node
 
+/// An order to the encoder.
 enum class Order : std::uint8_t { start, zero, direction, cyclic, read, enter, node, rate };
 
 /// Kind of answer to an order.
@@ -146,6 +152,7 @@ struct OrderInfo {
   std::uint8_t most = 255;                  ///< Highest value.
   Values::Number Values::*shown = nullptr;  ///< Member that shows the value; null: none.
 };
+/// Descriptions of the orders.
 inline constexpr std::array<OrderInfo, 8> orders{{
     {Order::start, 0x01, "start", false, Answer::position},
     {Order::zero, 0x20, "zero", false, Answer::code},
@@ -156,6 +163,7 @@ inline constexpr std::array<OrderInfo, 8> orders{{
     {Order::node, 0x11, "set-node", true, Answer::error, 1, 1, 255, &Values::new_node},
     {Order::rate, 0x13, "bitrate", true, Answer::error, 2, 0, 255, &Values::bit_rate},
 }};
+/// Returns the description of an order.
 [[nodiscard]] constexpr const OrderInfo& info_of(Order order) { return orders[static_cast<std::size_t>(order)]; }
 
 /// Returns the order in a frame, or the one that a frame on 7E5 or 7E4 answers; null if there is none.
@@ -218,6 +226,7 @@ inline constexpr std::array<OrderInfo, 8> orders{{
   return frame.extended ? Error::unexpected_reply : Error::none;
 }
 
+/// Returns whether all data bytes from `first` on are 0.
 [[nodiscard]] constexpr bool is_zero_from(const CanFrame& frame, std::size_t first) {
   for (std::size_t i = first; i < frame_size; ++i) {
     if (frame.data[i] != 0) return false;
@@ -253,6 +262,7 @@ inline constexpr std::array<OrderInfo, 8> orders{{
 
 // ---- Fields of frames
 
+/// Returns the values of a position.
 [[nodiscard]] constexpr Values values_of(const Format& format, std::uint8_t node, std::uint64_t counts) {
   return {.node = node, .singleturn = static_cast<std::int64_t>(counts), .angle = degrees(counts, format.bits)};
 }

@@ -14,9 +14,9 @@ namespace absenc::raa38::can {
 using namespace std::chrono_literals;
 
 // The document gives no times; these are far longer than any controller needs.
-inline constexpr Time answer_limit = 50ms;  ///< timeout of a reply on a bus without other frames
-inline constexpr Time busy_limit = 250ms;   ///< timeout of a reply on a bus that others keep busy
-inline constexpr Time listening_time = 1200ms;
+inline constexpr Time answer_limit = 50ms;      ///< timeout of a reply on a bus without other frames
+inline constexpr Time busy_limit = 250ms;       ///< timeout of a reply on a bus that others keep busy
+inline constexpr Time listening_time = 1200ms;  ///< Time for which a survey listens.
 
 /// The protocol, as author layers use it: frames, lengths and times.
 struct Protocol {
@@ -82,6 +82,7 @@ class Read : public author::CanEngine {
   return mode == Read::Mode::start ? encode(Order::start, format.node) : encode(Order::read, format.node);
 }
 
+/// Dialog of procedures.
 using Dialog = author::DialogOf<Protocol>;
 
 // ---- One node

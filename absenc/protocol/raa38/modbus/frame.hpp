@@ -18,11 +18,12 @@ namespace absenc::raa38::rtu {
 using modbus::CrcOrder;
 
 namespace function {
-inline constexpr std::uint8_t read = modbus::read_holding_registers;
-inline constexpr std::uint8_t read_address = 0xA0;  // functions A0, A1 and CC are specific to the maker
-inline constexpr std::uint8_t set_address = 0xA1;
-inline constexpr std::uint8_t set_parameter = 0xCC;
+inline constexpr std::uint8_t read = modbus::read_holding_registers;  ///< Reads registers.
+inline constexpr std::uint8_t read_address = 0xA0;   ///< functions A0, A1 and CC are specific to the maker
+inline constexpr std::uint8_t set_address = 0xA1;    ///< Sets the address.
+inline constexpr std::uint8_t set_parameter = 0xCC;  ///< Sets a parameter.
 
+/// Returns whether a function exists.
 [[nodiscard]] constexpr bool is_known(std::uint8_t code) {
   return code == read || code == read_address || code == set_address || code == set_parameter;
 }
@@ -31,14 +32,16 @@ inline constexpr std::uint8_t set_parameter = 0xCC;
 inline constexpr std::uint8_t any_address = 0xFF;  ///< address in the request for the encoder's address
 
 namespace parameter {
-inline constexpr std::uint8_t zero = 0x00;
-inline constexpr std::uint8_t positive = 0x01;
-inline constexpr std::uint8_t negative = 0x02;
+inline constexpr std::uint8_t zero = 0x00;      ///< Sets the zero at this position.
+inline constexpr std::uint8_t positive = 0x01;  ///< Sets the positive direction.
+inline constexpr std::uint8_t negative = 0x02;  ///< Sets the negative direction.
 }  // namespace parameter
 
+/// Rates of the line in bits per second.
 inline constexpr std::array<std::uint32_t, 5> bauds{2400, 4800, 9600, 19'200, 57'600};
+/// Values of the setting for these rates.
 inline constexpr std::array<std::uint8_t, bauds.size()> baud_parameters{0x24, 0x48, 0x96, 0x19, 0x57};
-inline constexpr std::size_t baud_at_shipping = 3;
+inline constexpr std::size_t baud_at_shipping = 3;  ///< Index of the rate at shipping.
 
 /// Returns the meaning of a parameter of function CC, in words.
 [[nodiscard]] constexpr std::string_view name_of_setting(std::uint8_t value) {
@@ -60,13 +63,13 @@ inline constexpr std::size_t baud_at_shipping = 3;
   return std::nullopt;
 }
 
-inline constexpr LineSettings line_settings{.rate = bauds[baud_at_shipping]};
+inline constexpr LineSettings line_settings{.rate = bauds[baud_at_shipping]};  ///< Settings of the line.
 
 /// Form of the virtual encoder's reply to a request of two registers; the document has all three.
 enum class Data : std::uint8_t {
-  four_bytes,     // byte count 04, four bytes of data
-  three_bytes,    // byte count 03, three bytes of data
-  three_as_four,  // byte count 04, but three bytes of data
+  four_bytes,     ///< byte count 04, four bytes of data
+  three_bytes,    ///< byte count 03, three bytes of data
+  three_as_four,  ///< byte count 04, but three bytes of data
 };
 
 /// Format of the encoder: the values of its options.
@@ -96,13 +99,16 @@ struct Request {
   std::uint16_t registers = 1;             ///< Number of registers.
 };
 
+/// Bytes of a request.
 using RequestBytes = ByteBuffer<8>;
 
+/// Returns the length of a request in bytes.
 [[nodiscard]] constexpr std::size_t request_length(std::uint8_t code) {
   if (code == function::read) return 8;
   return code == function::read_address ? 4 : 5;
 }
 
+/// Returns the request as it is sent.
 [[nodiscard]] constexpr RequestBytes encode_request(const Request& request) {
   RequestBytes bytes;
   bytes.push_back(request.address);
@@ -119,6 +125,7 @@ using RequestBytes = ByteBuffer<8>;
   return bytes;
 }
 
+/// Returns a request that reads the position.
 [[nodiscard]] constexpr Request read_request(const Format& format) {
   return {.address = format.address, .registers = static_cast<std::uint16_t>(format.register_count())};
 }

@@ -21,9 +21,9 @@ using namespace std::chrono_literals;
 
 /// What starts a frame.
 enum class Mode : std::uint8_t {
-  timing,     // the encoder itself, at its refresh rate
-  handshake,  // a falling edge on CLK
-  bus,        // a request with the encoder's number
+  timing,     ///< the encoder itself, at its refresh rate
+  handshake,  ///< a falling edge on CLK
+  bus,        ///< a request with the encoder's number
 };
 
 /// Second byte of a frame: 81 in the document's tables, the encoder's number in its text about the bus.
@@ -32,19 +32,19 @@ enum class SecondByte : std::uint8_t { automatic, fixed, echo };
 /// How the zero of an encoder is set, as ordered.
 enum class Zeroing : std::uint8_t {
   none,
-  line,     // a pulse on CLR
-  command,  // BC AA Cx, on a bus
+  line,     ///< a pulse on CLR
+  command,  ///< BC AA Cx, on a bus
 };
 
-inline constexpr std::uint8_t header = 0xFF;
-inline constexpr std::uint8_t fixed_second_byte = 0x81;
-inline constexpr std::uint8_t number_mark = 0xB0;  ///< bx: read unit x
-inline constexpr std::uint8_t clear_mark = 0xC0;   ///< cx: set the zero of unit x
-inline constexpr unsigned unit_count = 16;         ///< x is one hexadecimal digit
-inline constexpr unsigned least_bits = 10;
-inline constexpr unsigned most_bits = 21;
-inline constexpr std::size_t request_bytes = 3;
-inline constexpr std::size_t frame_capacity = 6;
+inline constexpr std::uint8_t header = 0xFF;             ///< First byte of each frame.
+inline constexpr std::uint8_t fixed_second_byte = 0x81;  ///< Second byte of a position that has no other meaning.
+inline constexpr std::uint8_t number_mark = 0xB0;        ///< bx: read unit x
+inline constexpr std::uint8_t clear_mark = 0xC0;         ///< cx: set the zero of unit x
+inline constexpr unsigned unit_count = 16;               ///< x is one hexadecimal digit
+inline constexpr unsigned least_bits = 10;               ///< Lowest number of bits of the position.
+inline constexpr unsigned most_bits = 21;                ///< Highest number of bits of the position.
+inline constexpr std::size_t request_bytes = 3;          ///< Length of the longest request in bytes.
+inline constexpr std::size_t frame_capacity = 6;         ///< Length of the longest frame in bytes.
 
 // ---- Times. The document states only T2; all others are assumed.
 
@@ -59,7 +59,7 @@ inline constexpr Time patience = 1s;  ///< timeout on a line that is never silen
 inline constexpr Time listen_limit = 1s;     ///< timeout of a stream without a valid frame
 inline constexpr Time scan_silence = 200ms;  ///< listening before a scan; longer than the period of most refresh rates
 inline constexpr Time zero_limit = 500ms;    ///< time within which the position must become zero
-inline constexpr Time zero_poll = 10ms;
+inline constexpr Time zero_poll = 10ms;      ///< Time between two looks at a position that becomes zero.
 
 // Times of the virtual encoder if the options do not give them.
 inline constexpr Time virtual_period = 10ms;        ///< time between frames: refresh rate 100 Hz
@@ -106,7 +106,9 @@ struct Position {
   friend constexpr bool operator==(const Position&, const Position&) = default;
 };
 
+/// Bytes of a frame.
 using FrameBytes = ByteBuffer<frame_capacity>;
+/// Bytes of a request.
 using RequestBytes = ByteBuffer<request_bytes>;
 
 /// Returns the checksum: "Sum of the first n bytes, the bottom eight bits". It does not detect exchanged bytes.
@@ -116,6 +118,7 @@ using RequestBytes = ByteBuffer<request_bytes>;
   return static_cast<std::uint8_t>(sum);
 }
 
+/// Returns the frame of a position.
 [[nodiscard]] constexpr FrameBytes encode_position(const Format& format, const Position& position) {
   FrameBytes bytes;
   bytes.push_back(header);
@@ -130,6 +133,7 @@ using RequestBytes = ByteBuffer<request_bytes>;
 /// Matches a frame of any unit. Used without a request, where the frame itself shows its unit.
 inline constexpr int any_unit = -1;
 
+/// Returns whether the second byte is that of a unit.
 [[nodiscard]] constexpr bool second_byte_fits(const Format& format, int unit, std::uint8_t second_byte) {
   const bool numbered = unit == any_unit ? (second_byte & 0xF0) == number_mark : second_byte == (number_mark | unit);
   if (format.second_byte == SecondByte::fixed) return second_byte == fixed_second_byte;
@@ -151,10 +155,10 @@ inline constexpr int any_unit = -1;
 struct Request {
   /// Kind of the request.
   enum class Kind : std::uint8_t {
-    read,                 // BC AA Bx
-    zero_clear,           // BC AA Cx
-    trigger,              // a pulse on CLK, without bytes
-    clear,                // a pulse on CLR
+    read,                 ///< BC AA Bx
+    zero_clear,           ///< BC AA Cx
+    trigger,              ///< a pulse on CLK, without bytes
+    clear,                ///< a pulse on CLR
   } kind = Kind::read;    ///< Kind of the request.
   std::uint8_t unit = 0;  ///< number of the unit, 0 to 15
 };
@@ -194,6 +198,7 @@ struct Values {
   std::optional<std::uint64_t> skipped{};         ///< Value of the field `skipped`, if there is one.
 };
 
+/// Returns the values of a position.
 [[nodiscard]] constexpr Values values_of(const Format& format, const Position& position) {
   return {.singleturn = position.singleturn,
           .second_byte = position.second_byte,

@@ -11,6 +11,7 @@
 
 namespace absenc::raa38::serial {
 
+/// Fields of requests and replies.
 inline constexpr auto fields = author::fields_of<Values>(
     author::field<&Values::encoder_address>("encoder_address", "", "the number behind B", Role::encoder),
     author::field<&Values::clash>("clash", "", "every answer is damaged: two encoders, or a bad line", Role::clash),
@@ -76,6 +77,7 @@ class Listen final : public Conversation<std::uint8_t> {
   Explanation words_{};
 };
 
+/// Dialog of procedures.
 using Dialog = author::DialogOf<Protocol>;
 
 /// Reads the position, sets the zero, and reads until the position is zero. Errors: unsupported and invalid_argument
@@ -87,6 +89,7 @@ author::Procedure set_zero(Dialog& dialog, Values& found);
 /// mode. If all replies of a number are damaged, two encoders share it or the line is bad. Errors: timeout if no unit
 /// answers, unexpected_reply if an encoder transmits without a request.
 using Units = std::array<Values, unit_count>;
+/// Finds the encoders of a line.
 author::Procedure scan(Dialog& dialog, Units& found);
 
 }  // namespace absenc::raa38::serial
