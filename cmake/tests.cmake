@@ -53,11 +53,13 @@ function(absenc_test name)
   endif()
   set(environment "ABSENC_SOURCE_DIR=${PROJECT_SOURCE_DIR}")  # for tests that compare tables in documents with the code
   set(discovery TEST_PREFIX "${name}." DISCOVERY_MODE PRE_TEST DISCOVERY_TIMEOUT 60)
-  gtest_discover_tests(${name}_test ${discovery} TEST_FILTER "-${absenc_long_series}" PROPERTIES ENVIRONMENT "${environment}")
-  if(name STREQUAL "kit")
-    gtest_discover_tests(${name}_test ${discovery} TEST_FILTER "${absenc_long_series}" TEST_LIST ${name}_long_tests
+  set(long "${absenc_long_${name}_tests}")
+  if(long)
+    gtest_discover_tests(${name}_test ${discovery} TEST_FILTER "${long}" TEST_LIST ${name}_long_tests
                          PROPERTIES ENVIRONMENT "${environment}" LABELS long)
+    list(APPEND discovery TEST_FILTER "-${long}")
   endif()
+  gtest_discover_tests(${name}_test ${discovery} PROPERTIES ENVIRONMENT "${environment}")
 endfunction()
 
 # GLOB: only tests of the folder itself; GLOB_RECURSE: also those of subfolders. ABSENC_SPLIT_TESTS builds one

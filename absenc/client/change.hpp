@@ -13,12 +13,13 @@
 
 namespace absenc::client {
 
+/// How far a change of the encoder came.
 enum class ChangeState : std::uint8_t {
-  none,       // the command changes no encoder
-  not_sent,   // no request was sent, so the encoder is unchanged
-  confirmed,  // the request was sent, and reply and read-back confirm the change
-  refused,    // the request was sent, but the encoder refused it or its read-back shows no change
-  unknown,    // the request was sent, but no good reply came: the change may be done or not
+  none,       ///< the command changes no encoder
+  not_sent,   ///< no request was sent, so the encoder is unchanged
+  confirmed,  ///< the request was sent, and reply and read-back confirm the change
+  refused,    ///< the request was sent, but the encoder refused it or its read-back shows no change
+  unknown,    ///< the request was sent, but no good reply came: the change may be done or not
 };
 
 /// Returns "not_sent", "confirmed", "refused" or "unknown"; "" for `none`.

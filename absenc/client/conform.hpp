@@ -12,10 +12,11 @@
 
 namespace absenc::client {
 
+/// Whether the encoder, or a host, complies with a clause.
 enum class Verdict : std::uint8_t {
-  kept,      // the tested behaviour was observed, and the clause was satisfied
-  broken,    // the tested behaviour was observed, and the clause was violated
-  untested,  // the tested behaviour was not observed
+  kept,      ///< the tested behaviour was observed, and the clause was satisfied
+  broken,    ///< the tested behaviour was observed, and the clause was violated
+  untested,  ///< the tested behaviour was not observed
 };
 
 /// Result of one clause of a document.

@@ -87,10 +87,11 @@ enum class Ailment : std::uint8_t {
   stuck_bits,
 };
 
+/// How serious a finding is.
 enum class Severity : std::uint8_t {
-  note,     // information, no action needed
-  warning,  // the encoder works, but not as well as it could, or not for long
-  fault,    // the encoder does not work, or its values cannot be trusted
+  note,     ///< information, no action needed
+  warning,  ///< the encoder works, but not as well as it could, or not for long
+  fault,    ///< the encoder does not work, or its values cannot be trusted
 };
 
 /// A finding, as data and in words.

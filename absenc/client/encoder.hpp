@@ -28,13 +28,14 @@ namespace absenc::client {
 /// Whether the position of a sample can be used; `text_of` has a sentence for each.
 enum class PositionState : std::uint8_t {
   good,
-  unconfirmed,  // `Sample::doubtful` is true
-  starting,     // `Reading::ready` is false
-  invalid,      // the validity is `Validity::invalid`
-  unknown,      // the validity is `Validity::unknown`
-  none,         // the sample is not a reading, or its reading has no position
+  unconfirmed,  ///< `Sample::doubtful` is true
+  starting,     ///< `Reading::ready` is false
+  invalid,      ///< the validity is `Validity::invalid`
+  unknown,      ///< the validity is `Validity::unknown`
+  none,         ///< the sample is not a reading, or its reading has no position
 };
 
+/// Returns the state in words, for people.
 [[nodiscard]] std::string_view text_of(PositionState state);
 
 /// Result of one attempt to read. Times are those of os::now.
@@ -42,10 +43,10 @@ struct Sample {
   /// What a sample holds.
   enum class Kind : std::uint8_t {
     reading,
-    failed,  // the attempt failed because of the encoder or the line
-    lost,    // the port was lost during this attempt
-    absent,  // the port is still lost
-    back,    // the port is open again; nothing was read yet
+    failed,  ///< the attempt failed because of the encoder or the line
+    lost,    ///< the port was lost during this attempt
+    absent,  ///< the port is still lost
+    back,    ///< the port is open again; nothing was read yet
   };
 
   Kind kind = Kind::absent;  ///< What this sample holds.

@@ -27,6 +27,7 @@ struct MemoryAddress {
   }
 };
 
+/// Bytes of a memory by their places.
 using MemoryImage = std::map<MemoryAddress, std::uint8_t>;
 
 /// Consecutive addresses of one page.
@@ -50,10 +51,11 @@ struct MemoryRun {
 /// Returns "page 0 to 5: 0x00 to 0x7E; page 7: 0x04, 0x06".
 [[nodiscard]] std::string addresses_in_words(const Unit& unit, const MemoryImage& image);
 
+/// Whether bytes are read or written.
 enum class Access : std::uint8_t {
   read,
   write,
-  force,  // also write protected bytes
+  force,  ///< also write protected bytes
 };
 
 /// Returns the reason why this access to the address is impossible, or "".
@@ -61,6 +63,7 @@ enum class Access : std::uint8_t {
 
 /// Throws UsageError if the unit has no memory that can be read or written.
 void require_memory(const Unit& unit, Access access);
+/// Throws UsageError if a byte of `image` is not open to this access.
 void require_open(const Unit& unit, const MemoryImage& image, Access access);
 
 class Encoder;
