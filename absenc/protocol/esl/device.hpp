@@ -7,7 +7,7 @@
 #include <cstdint>
 
 #include "absenc/core/shaft.hpp"
-#include "absenc/protocol/author/device.hpp"
+#include "absenc/protocol/author/paged_memory.hpp"
 #include "absenc/protocol/esl/reply.hpp"
 
 namespace absenc::esl {
@@ -58,27 +58,39 @@ inline constexpr std::array<Condition, 16> conditions{{
     {"ch2_status_clear", "", "bits of SF of channel 2 that are stuck at 0", 0, 255, 0},
 }};
 
+/// The memory of the virtual encoder.
+inline constexpr author::PagedMemory paged_memory{
+    .areas = memory_map,
+    .select_address = page_select_address,
+    .start_page = register_page,
+    .page_time = page_time,
+    .write_time = eeprom_write_time,
+    .fetch_time = eeprom_read_time,
+    .exclusive = false,
+    .is_immediate = is_immediate,
+    .page_rule = "memory access before the page is ready",
+    .write_rule = "memory written less than 6 ms after the write before",
+    .fetch_rule = "an EEPROM byte asked for only once",
+    .fetch_time_rule = "memory read again less than 200 us after the request before",
+};
+
 /// A virtual encoder.
-class VirtualEncoder final : public author::Responder {
+class VirtualEncoder final : public author::PagedMemoryDevice {
  public:
   /// Switched off until `power_on`. `shaft` must outlive the encoder.
   VirtualEncoder(const Profile& profile, const Shaft& shaft)
-      : Responder({.character = line_settings.character(), .answer_time = answer_time}),
+      : PagedMemoryDevice({.character = line_settings.character(), .answer_time = answer_time}, paged_memory),
         profile_(profile),
         shaft_(&shaft) {
     for (std::size_t i = 0; i < conditions.size(); ++i) condition_[i] = static_cast<std::int32_t>(conditions[i].normal);
   }
   [[nodiscard]] MutableBytes memory() override { return memory_; }
-  /// The byte of a page; null for what does not exist.
+  /// Returns the byte of a page, or null if Table 11 does not list it.
   [[nodiscard]] std::uint8_t* stored(std::uint8_t page, std::uint8_t address) {
-    std::uint8_t* in_memory = memory_.data();
-    std::uint8_t* in_registers = registers_.data();
-    for (const MemoryArea& area : memory_map) {
-      std::uint8_t*& begin = area.write_life == life::registers ? in_registers : in_memory;
-      if (area.has(page, address)) return begin + (address - area.first);
-      begin += area.count;
-    }
-    return nullptr;
+    const MemoryArea* const area = find_area(page, address);
+    if (area == nullptr) return nullptr;
+    if (is_register(*area)) return &registers_[author::offset_of(memory_map, page, address, is_register)];
+    return &memory_[author::offset_of(memory_map, page, address, is_stored)];
   }
   void set_condition(std::size_t index, std::int64_t value, Time) override {
     condition_[index] = static_cast<std::int32_t>(value);
@@ -130,7 +142,7 @@ class VirtualEncoder final : public author::Responder {
 
   // Behind the EEPROM and the MTP: the zeros of the channels, 4 bytes each, little endian, and what is taken off the
   // turns of the shaft, 8 bytes.
-  static constexpr std::size_t zero_at = memory_size(false);
+  static constexpr std::size_t zero_at = stored_bytes;
   static constexpr std::size_t turns_at = zero_at + 8;
 
   // ---- Requests
@@ -231,57 +243,22 @@ class VirtualEncoder final : public author::Responder {
   std::optional<Reply> access_memory(const Request& request, Time at) {
     if (!expect(profile_.bus != sharing_yes, "memory access with several encoders on the line", at))
       return std::nullopt;
-    const bool writing = request.id == DataId::write_memory;
-    const bool exists = request.memory_address == page_select_address
-                            ? !writing || is_page(request.value)
-                            : stored(page_, request.memory_address) != nullptr;
-    if (!exists) return std::nullopt;
-    Reply reply{.id = request.id,
-                .encoder_address = profile_.address,
-                .memory_address = request.memory_address,
-                .value = request.value};
-    const bool immediate = is_immediate(page_, request.memory_address);
-    if (byte_pending_) {
-      const bool again = !writing && request.memory_address == pending_address_;
-      note(again, "an EEPROM byte asked for only once");
-    }
-    if (!page_changed_ && writing && !immediate && busy_until_ > Time{})
-      note(at >= busy_until_, "memory written less than 6 ms after the write before");
-    if (page_changed_) page_changed_ = !expect(at >= page_ready_at_, "memory access before the page is ready", at);
-    reply.busy = at < page_ready_at_ || (at < busy_until_ && !immediate);
-    if (!reply.busy) writing ? write_byte(request.memory_address, request.value, at) : read_byte(reply, at);
-    if (reply.busy) reply.value = 0;
-    return reply;
+    const Access wanted{request.id == DataId::write_memory, request.memory_address, request.value};
+    if (!exists(wanted)) return std::nullopt;
+    const std::optional<MemoryAnswer> answer = access(wanted, at, earliest(at));
+    if (!answer) return std::nullopt;
+    return Reply{.id = request.id,
+                 .encoder_address = profile_.address,
+                 .memory_address = request.memory_address,
+                 .busy = answer->busy,
+                 .value = answer->value};
   }
-  void read_byte(Reply& reply, Time at) {
-    const std::uint8_t address = reply.memory_address;
-    const bool fetched = byte_pending_ && at - pending_at_ >= eeprom_read_time;
-    if (!is_immediate(page_, address)) {
-      if (byte_pending_) expect(fetched, "memory read again less than 200 us after the request before", at);
-      byte_pending_ = reply.busy = !fetched || pending_address_ != address;
-      if (reply.busy) {
-        pending_address_ = address;
-        pending_at_ = earliest(at);
-      }
-    }
-    if (address == page_select_address) {
-      reply.value = page_;
-    } else {
-      reply.value = page_ == register_page && address == error_info_address ? error_info() : *stored(page_, address);
-    }
+  [[nodiscard]] std::uint8_t load(std::uint8_t page, std::uint8_t address) override {
+    return page == register_page && address == error_info_address ? error_info() : *stored(page, address);
   }
-  void write_byte(std::uint8_t address, std::uint8_t value, Time at) {
-    byte_pending_ = false;
-    if (address == page_select_address) {
-      page_ = value;
-      page_ready_at_ = earliest(at) + page_time;
-      page_changed_ = true;
-      return;
-    }
-    *stored(page_, address) = value;
-    if (is_immediate(page_, address)) return;
-    change_memory();
-    busy_until_ = earliest(at) + eeprom_write_time;
+  void store(std::uint8_t page, std::uint8_t address, std::uint8_t value) override {
+    *stored(page, address) = value;
+    if (!is_immediate(page, address)) change_memory();
   }
   void count_reset(DataId id, Time at) {
     last_reset_ = earliest(at);
@@ -305,7 +282,7 @@ class VirtualEncoder final : public author::Responder {
     }
     if (id == DataId::reset_multiturn) turns_cleared_ = true;
     set_turns(id == DataId::reset_multiturn ? 0 : turns_before, at);
-    busy_until_ = at + eeprom_write_time;
+    write_lasts(at + eeprom_write_time);
   }
 
   // ---- State
@@ -366,16 +343,13 @@ class VirtualEncoder final : public author::Responder {
   // ---- Power
 
   void started(Time) override {
-    page_ = register_page;
-    page_ready_at_ = busy_until_ = Time{};
-    page_changed_ = false;
+    restart_memory();
     registers_.fill(0);
     counters_.fill(0);
   }
   void stopped(Time) override {
     latches_ &= alarms::turns_wrong;  // the others need a power cycle; these an ID C
     turns_cleared_ = false;
-    byte_pending_ = false;
     in_a_row_ = resets_sent_ = 0;
   }
   // Of channel 2 the one behind that of channel 1.
@@ -387,21 +361,13 @@ class VirtualEncoder final : public author::Responder {
   const Shaft* shaft_;
   std::array<std::int32_t, conditions.size()> condition_{};
   std::array<std::uint8_t, turns_at + 8> memory_{};
-  std::array<std::uint8_t, memory_size(true)> registers_{};  // lost at power off
+  std::array<std::uint8_t, register_bytes> registers_{};  // lost at power off
 
   Time ready_at_{};
   std::uint8_t latches_ = 0;
   std::uint8_t forced_ = 0;     // voltage alarms raised from outside
   bool turns_cleared_ = false;  // ID D was done: ID C may clear multiturn_error
   std::array<std::uint8_t, 2> counters_{};
-
-  std::uint8_t page_ = register_page;
-  Time page_ready_at_{};
-  bool page_changed_ = false;  // and the memory not used since
-  Time busy_until_{};
-  bool byte_pending_ = false;  // an EEPROM byte is on its way into the temporary register
-  std::uint8_t pending_address_ = 0;
-  Time pending_at_{};
 
   DataId last_id_{};
   unsigned in_a_row_ = 0;           // requests of `last_id_`

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "absenc/protocol/esl/host.hpp"
 
+#include "absenc/protocol/author/busy_memory.hpp"
 #include "absenc/protocol/author/standstill.hpp"
 #include "absenc/protocol/esl/safety.hpp"
 
@@ -151,33 +152,27 @@ constexpr Time busy_limit = 2 * page_time;  // the document gives no maximum
 
 constexpr std::string_view unknown_area = "Table 11 lists no such page and address; nothing was sent";
 
-// What comes when the memory is no longer busy. A busy encoder has not executed the request, so even a write may be
-// sent again. `after_busy`: only what follows a busy answer is believed, because the temporary register may hold what
-// somebody else once asked for.
-author::Part<Result<Reply>> settled(Dialog& dialog, Request request, bool after_busy = false) {
+// `after_busy`: the temporary register may hold a byte that somebody else asked for, which only a busy reply excludes.
+author::Part<Result<Reply>> settled(Dialog& dialog, const Request& request, bool after_busy = false) {
   const bool writes = request.id == DataId::write_memory && !selects_page(request);
-  const Time busy_pause = Protocol::manner(dialog.format(), request).pause;
-  Time limit = never;
-  for (Time pause{};;) {
-    const Result<Reply> reply = co_await dialog.attempt(request).repeated(writes ? 1 : attempts).after(pause);
-    if (!reply || (!reply->busy && !after_busy)) co_return reply;
-    if (reply->busy) after_busy = false;
-    limit = std::min(limit, dialog.received_at() + busy_limit);
-    if (dialog.received_at() > limit) {
-      co_await dialog.stop({Error::busy,
-                            "the memory stays busy longer than a write may take; the last request was not executed",
-                            {},
-                            busy_pause});
-    }
-    pause = busy_pause;
-  }
+  return author::until_ready<Protocol>(dialog, request,
+                                       {.limit = busy_limit,
+                                        .pause = Protocol::manner(dialog.format(), request).pause,
+                                        .attempts = writes ? 1 : attempts,
+                                        .after_busy = after_busy});
+}
+
+author::Outcome failure(Error error, std::string_view words, Time hold) {
+  if (error == Error::busy)
+    words = "the memory stays busy longer than a write may take; the last request was not executed";
+  return {error, words, {}, hold};
 }
 
 // When the page is ready. `words`: what the error says where the procedure ends here.
 author::Part<std::uint8_t> turn_to(Dialog& dialog, std::uint8_t page, std::string_view words) {
   const Request request{DataId::write_memory, dialog.format().address, page_select_address, page};
   const Result<Reply> reply = co_await settled(dialog, request);
-  if (!reply) co_await dialog.stop({reply.error(), words, {}, page_time});
+  if (!reply) co_await dialog.stop(failure(reply.error(), words, page_time));
   co_await dialog.rest(page_time);
   co_return page;
 }
@@ -185,7 +180,7 @@ author::Part<std::uint8_t> turn_to(Dialog& dialog, std::uint8_t page, std::strin
 author::Part<std::uint8_t> read_byte(Dialog& dialog, std::uint8_t page, std::uint8_t address, std::string_view words) {
   const Request request{DataId::read_memory, dialog.format().address, address};
   const Result<Reply> reply = co_await settled(dialog, request, !is_immediate(page, address));
-  if (!reply) co_await dialog.stop({reply.error(), words, {}, eeprom_read_pause});
+  if (!reply) co_await dialog.stop(failure(reply.error(), words, eeprom_read_pause));
   co_return reply->value;
 }
 
@@ -232,7 +227,8 @@ Procedure write_memory(Dialog& dialog, Found& found, Arguments arguments) {
   // A lost reply does not tell whether the write was done: reading back does.
   const Request write{DataId::write_memory, dialog.format().address, address, value};
   dialog.changes();
-  static_cast<void>(co_await settled(dialog, write));
+  const Result<Reply> written = co_await settled(dialog, write);
+  if (written.error() == Error::busy) co_return failure(Error::busy, {}, eeprom_read_pause);
   if (!is_immediate(page, address)) co_await dialog.rest(eeprom_write_pause);
   const std::uint8_t now =
       co_await read_byte(dialog, page, address, "the byte was written, but could not be read back");
@@ -284,6 +280,7 @@ Procedure read_error_info(Dialog& dialog, Found& found) {
   constexpr std::string_view page_may_be_left = "page 8 may be left selected, where it was another before";
   const Request which{DataId::read_memory, dialog.format().address, page_select_address};
   const Result<Reply> before = co_await settled(dialog, which);
+  if (before.error() == Error::busy) co_return failure(Error::busy, {}, eeprom_read_pause);
   const bool known = before && is_page(before->value);
   co_await turn_to(dialog, register_page, page_may_be_left);
   const std::uint8_t flags = co_await read_byte(dialog, register_page, error_info_address, page_may_be_left);
@@ -294,9 +291,11 @@ Procedure read_error_info(Dialog& dialog, Found& found) {
   if (!known) co_return done;
   // What was asked for is known, whatever becomes of this: reading it back tells what the next user finds.
   const Request restore{DataId::write_memory, dialog.format().address, page_select_address, before->value};
-  static_cast<void>(co_await settled(dialog, restore));
+  const Result<Reply> restored = co_await settled(dialog, restore);
+  if (restored.error() == Error::busy) co_return failure(Error::busy, {}, page_time);
   co_await dialog.rest(page_time);
   const Result<Reply> after = co_await settled(dialog, which);
+  if (after.error() == Error::busy) co_return failure(Error::busy, {}, eeprom_read_pause);
   if (after && after->value == before->value) found.page_left.reset();
   co_return done;
 }

@@ -3,14 +3,14 @@
 // demands.
 #pragma once
 
-#include <algorithm>
 #include <array>
+#include <cstddef>
 #include <cstdint>
 
 #include "absenc/core/time.hpp"
 #include "absenc/link/line.hpp"
+#include "absenc/protocol/author/memory_map.hpp"
 #include "absenc/protocol/esl/profile.hpp"
-#include "absenc/protocol/unit.hpp"
 
 namespace absenc::esl {
 
@@ -85,25 +85,25 @@ inline constexpr std::array<MemoryArea, 12> memory_map = [] {
   };
 }();
 
-/// Bytes of the registers, or of all the rest.
-[[nodiscard]] constexpr std::size_t memory_size(bool registers) {
-  std::size_t size = 0;
-  for (const MemoryArea& area : memory_map) size += (area.write_life == life::registers) == registers ? area.count : 0;
-  return size;
-}
+/// Returns whether an area holds registers, which are lost at power off.
+[[nodiscard]] constexpr bool is_register(const MemoryArea& area) { return area.write_life == life::registers; }
+/// Returns whether an area survives power off.
+[[nodiscard]] constexpr bool is_stored(const MemoryArea& area) { return !is_register(area); }
+/// Number of bytes in EEPROM and MTP.
+inline constexpr std::size_t stored_bytes = author::size_of(memory_map, is_stored);
+/// Number of bytes in the registers.
+inline constexpr std::size_t register_bytes = author::size_of(memory_map, is_register);
 
 /// Null for an address that Table 11 does not list.
 [[nodiscard]] constexpr const MemoryArea* find_area(unsigned page, unsigned address) {
-  const auto* const found =
-      std::find_if(memory_map.begin(), memory_map.end(), [&](const MemoryArea& one) { return one.has(page, address); });
-  return found == memory_map.end() ? nullptr : found;
+  return author::find_area(memory_map, page, address);
 }
 /// Returns whether the memory has a page.
-[[nodiscard]] constexpr bool is_page(unsigned page) { return find_area(page, 0) != nullptr; }
+[[nodiscard]] constexpr bool is_page(unsigned page) { return author::has_page(memory_map, page); }
 /// Nothing in the temporary register stands between such a byte and its reader.
 [[nodiscard]] constexpr bool is_immediate(unsigned page, unsigned address) {
   const MemoryArea* const area = find_area(page, address);
-  return address == page_select_address || (area != nullptr && area->write_life == life::registers);
+  return address == page_select_address || (area != nullptr && is_register(*area));
 }
 
 }  // namespace absenc::esl

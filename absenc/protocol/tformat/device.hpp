@@ -7,9 +7,8 @@
 #include <optional>
 
 #include "absenc/core/shaft.hpp"
-#include "absenc/protocol/author/device.hpp"
+#include "absenc/protocol/author/paged_memory.hpp"
 #include "absenc/protocol/tformat/frame.hpp"
-#include "absenc/protocol/unit.hpp"
 
 namespace absenc::tformat {
 
@@ -21,12 +20,24 @@ inline constexpr std::array<Condition, 2> conditions{{
     {"temperature", "degC", "of the board", -20, 127, 35},
 }};
 
+/// The memory of the virtual encoder.
+inline constexpr author::PagedMemory paged_memory{
+    .areas = memory_areas,
+    .select_address = page_select_address,
+    .start_page = 0,
+    .page_time = memory_time,
+    .write_time = memory_time,
+    .page_rule = "memory access before the page is ready",
+    .write_rule = "memory written while the encoder writes",
+    .refused_rule = "what was refused as busy was not asked for again",
+};
+
 /// A virtual encoder.
-class VirtualEncoder final : public author::Responder {
+class VirtualEncoder final : public author::PagedMemoryDevice {
  public:
   /// Switched off until `power_on`. `shaft` must outlive the encoder.
   VirtualEncoder(const Format& format, const Shaft& shaft)
-      : Responder(Protocol::device_times(format)), format_(format), shaft_(&shaft) {
+      : PagedMemoryDevice(Protocol::device_times(format), paged_memory), format_(format), shaft_(&shaft) {
     if (format_.encoder_id < 0) format_.encoder_id = 0x11;
     for (std::size_t i = 0; i < conditions.size(); ++i) conditions_[i] = conditions[i].normal;
     memory_[threshold_at] = overheat_at_shipping;
@@ -81,9 +92,7 @@ class VirtualEncoder final : public author::Responder {
       set_turns(0, now);
     }
     battery_lost_ = false;
-    page_ = 0;
-    busy_until_ = Time{};
-    busy_with_ = Work::none;
+    restart_memory();
     Responder::power_on(now, kind);
     if (!has_battery() && kind == PowerOn::real) restart(now + start_up_without_battery);
   }
@@ -99,7 +108,6 @@ class VirtualEncoder final : public author::Responder {
     latches_ &= static_cast<std::uint8_t>(~(alarms::counting_error | alarms::multiturn_error));
     refused_status_ = 0;
     reset_count_ = resets_sent_ = 0;
-    refused_address_.reset();
   }
 
  private:
@@ -112,16 +120,14 @@ class VirtualEncoder final : public author::Responder {
   static constexpr std::int32_t power_off_timer_acceleration = 80'000;
   static constexpr Time power_off_timer = 5s;
 
-  static constexpr std::string_view page_rule = "memory access before the page is ready";
-  static constexpr std::string_view write_rule = "memory written while the encoder writes";
-  static constexpr std::string_view again_rule = "what was refused as busy was not asked for again";
   static constexpr std::string_view ten_rule = "reset not sent ten times in a row";
 
   static constexpr std::int32_t magnitude(std::int32_t value) { return value < 0 ? -value : value; }
 
   // EEPROM: the user's pages, the over-heat threshold, the zero position (4 bytes, little endian).
-  static constexpr std::size_t threshold_at = std::size_t{user_pages} * page_addresses;
-  static constexpr std::size_t zero_at = threshold_at + 1;
+  static constexpr std::size_t threshold_at =
+      author::offset_of(memory_areas, service_page, overheat_address, is_stored);
+  static constexpr std::size_t zero_at = stored_bytes;
   static constexpr std::size_t memory_size = zero_at + 4;
 
   // ---- Requests
@@ -162,43 +168,20 @@ class VirtualEncoder final : public author::Responder {
   // ---- Memory
 
   std::optional<Reply> access_memory(const Request& request, Time at) {
-    Reply reply{.id = request.id, .address = request.address, .value = request.value};
-    const bool writing = request.id == DataId::write_memory;
-    const bool busy = at < busy_until_;
-    if (refused_address_) note(!writing && request.address == *refused_address_, again_rule);
-    refused_address_.reset();
-    if (busy && !writing && busy_with_ == Work::write) refused_address_ = request.address;
-    if (writing && busy_with_ == Work::write) note(!busy, write_rule);
-    if (busy_with_ == Work::page && expect(!busy, page_rule, at)) busy_with_ = Work::none;
-    if (busy) {
-      reply.busy = true;
-      reply.value = 0;
-      return reply;
-    }
-    const bool of_page = request.address == page_select_address;
-    const MemoryArea* const area = find_area(page_, request.address);
-    const bool open = of_page ? !writing || is_page(request.value) : area != nullptr && (!writing || area->writable);
-    if (!open) return std::nullopt;
-    if (writing) {
-      busy_until_ = at + memory_time;
-      busy_with_ = of_page ? Work::page : Work::write;
-      write(request.address, request.value);
-    } else {
-      reply.value = value_at(request.address);
-    }
-    return reply;
+    const Access wanted{request.id == DataId::write_memory, request.address, request.value};
+    const std::optional<MemoryAnswer> answer = access(wanted, at, at);
+    if (!answer) return std::nullopt;
+    return Reply{.id = request.id, .address = request.address, .busy = answer->busy, .value = answer->value};
   }
-  [[nodiscard]] std::uint8_t value_at(std::uint8_t address) const {
-    if (address == page_select_address) return page_;
-    if (page_ != service_page) return memory_[std::size_t{page_} * page_addresses + address];
-    return address == overheat_address ? memory_[threshold_at] : static_cast<std::uint8_t>(conditions_[temperature]);
+  [[nodiscard]] std::uint8_t& stored(std::uint8_t page, std::uint8_t address) {
+    return memory_[author::offset_of(memory_areas, page, address, is_stored)];
   }
-  void write(std::uint8_t address, std::uint8_t value) {
-    if (address == page_select_address) {
-      page_ = value;
-      return;
-    }
-    memory_[page_ == service_page ? threshold_at : std::size_t{page_} * page_addresses + address] = value;
+  [[nodiscard]] std::uint8_t load(std::uint8_t page, std::uint8_t address) override {
+    const bool measured = page == service_page && address == temperature_address;
+    return measured ? static_cast<std::uint8_t>(conditions_[temperature]) : stored(page, address);
+  }
+  void store(std::uint8_t page, std::uint8_t address, std::uint8_t value) override {
+    stored(page, address) = value;
     changed_memory();
   }
   void changed_memory() {
@@ -230,8 +213,7 @@ class VirtualEncoder final : public author::Responder {
       zero_pending_ = true;
       zero_request_ = counts(at) + zero();
       zero_turns_ = turns(at);
-      busy_until_ = at + memory_time;
-      busy_with_ = Work::write;
+      write_lasts(at + memory_time);
       return;
     }
     latches_ = 0;
@@ -265,7 +247,7 @@ class VirtualEncoder final : public author::Responder {
   }
   // Brings everything that changes with time up to now.
   void update(Time now) {
-    if (zero_pending_ && now >= busy_until_) write_zero();
+    if (zero_pending_ && now >= written_at()) write_zero();
     if (magnitude(shaft_->at(now).speed_millirpm) < full_absolute_speed) full_absolute_ = false;
 
     // A whole lap between two requests goes unnoticed when it is undone before the next.
@@ -327,10 +309,6 @@ class VirtualEncoder final : public author::Responder {
   std::uint8_t forced_ = 0;  // unlatched alarms raised from outside
   bool full_absolute_ = false;
 
-  std::uint8_t page_ = 0;
-  Time busy_until_{};
-  enum class Work : std::uint8_t { none, page, write } busy_with_ = Work::none;  // or was last
-  std::optional<std::uint8_t> refused_address_{};                                // of a readout while it wrote
   bool zero_pending_ = false;
   std::int64_t zero_request_ = 0;  // counts to become zero when the EEPROM is written
   std::int64_t zero_turns_ = 0;    // to be kept then

@@ -3,14 +3,13 @@
 // models. Paragraph numbers are those of the TS5700N8500 specification.
 #pragma once
 
-#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
 
 #include "absenc/core/time.hpp"
 #include "absenc/link/line.hpp"
-#include "absenc/protocol/unit.hpp"
+#include "absenc/protocol/author/memory_map.hpp"
 
 namespace absenc::tformat {
 
@@ -52,14 +51,17 @@ inline constexpr std::array<MemoryArea, user_pages + 2> memory_areas = [] {
   areas[user_pages + 1] = {service_page, temperature_address, 1, "temperature", false, false};
   return areas;
 }();
+/// Returns whether the bytes of an area are stored; the temperature is not.
+[[nodiscard]] constexpr bool is_stored(const MemoryArea& area) { return area.writable; }
+/// Number of bytes in the stored areas.
+inline constexpr std::size_t stored_bytes = author::size_of(memory_areas, is_stored);
+
 /// Null for what is closed.
 [[nodiscard]] constexpr const MemoryArea* find_area(unsigned page, unsigned address) {
-  const auto* const found = std::find_if(memory_areas.begin(), memory_areas.end(),
-                                         [&](const MemoryArea& one) { return one.has(page, address); });
-  return found == memory_areas.end() ? nullptr : found;
+  return author::find_area(memory_areas, page, address);
 }
 /// Returns whether the memory has a page.
-[[nodiscard]] constexpr bool is_page(unsigned page) { return page < user_pages || page == service_page; }
+[[nodiscard]] constexpr bool is_page(unsigned page) { return author::has_page(memory_areas, page); }
 
 /// Data ID codes of Table 1.
 enum class DataId : std::uint8_t {

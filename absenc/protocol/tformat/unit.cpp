@@ -5,6 +5,7 @@
 #include <array>
 #include <optional>
 
+#include "absenc/protocol/author/busy_memory.hpp"
 #include "absenc/protocol/author/standstill.hpp"
 #include "absenc/protocol/author/unit.hpp"
 #include "absenc/protocol/tformat/device.hpp"
@@ -105,17 +106,12 @@ constexpr Time busy_pause = 1ms;              // between two looks at a busy enc
 
 constexpr std::uint8_t byte(std::int64_t argument) { return static_cast<std::uint8_t>(argument); }
 
-// A busy encoder has not executed the request, so even a write may be sent again. A page change must not be disturbed
-// by asking whether it is over.
-Part<Result<Reply>> persist(Dialog& dialog, Request request) {
-  const Time pause = selects_page(request) ? memory_time : busy_pause;
-  Result<Reply> reply = co_await dialog.attempt(request);
-  const Time give_up = dialog.received_at() + busy_limit;
-  while (reply && reply->busy) {
-    if (dialog.received_at() > give_up) co_return Error::busy;
-    reply = co_await dialog.attempt(request).after(pause);
-  }
-  co_return reply;
+// A page change must not be disturbed by asking whether it is over.
+Part<Result<Reply>> persist(Dialog& dialog, const Request& request) {
+  return until_ready<Protocol>(dialog, request,
+                               {.limit = busy_limit,
+                                .pause = selects_page(request) ? memory_time : busy_pause,
+                                .attempts = Protocol::manner(dialog.format(), request).repeats + 1});
 }
 
 Outcome failure(const Dialog& dialog, Error error, std::string_view step) {

@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: Apache-2.0
+// Where a byte of an encoder's memory is: in which of its areas, and at which offset of their bytes in a row.
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <span>
+
+#include "absenc/protocol/unit.hpp"
+
+namespace absenc::author {
+
+/// Returns the area of this byte, or null.
+[[nodiscard]] constexpr const MemoryArea* find_area(std::span<const MemoryArea> areas, unsigned page,
+                                                    unsigned address) {
+  const auto area =
+      std::find_if(areas.begin(), areas.end(), [&](const MemoryArea& each) { return each.has(page, address); });
+  return area == areas.end() ? nullptr : &*area;
+}
+
+/// Returns whether an area is on this page.
+[[nodiscard]] constexpr bool has_page(std::span<const MemoryArea> areas, unsigned page) {
+  return std::any_of(areas.begin(), areas.end(), [&](const MemoryArea& each) { return page - each.page < each.pages; });
+}
+
+/// Returns the number of bytes in the areas for which `counts` is true.
+template <class Counts>
+[[nodiscard]] constexpr std::size_t size_of(std::span<const MemoryArea> areas, Counts counts) {
+  std::size_t bytes = 0;
+  for (const MemoryArea& area : areas) bytes += counts(area) ? area.count : 0;
+  return bytes;
+}
+
+/// Returns the offset of a byte, where the areas of one page each for which `counts` is true are stored in a row. One
+/// of them must have the byte.
+template <class Counts>
+[[nodiscard]] constexpr std::size_t offset_of(std::span<const MemoryArea> areas, unsigned page, unsigned address,
+                                              Counts counts) {
+  const MemoryArea* const area = find_area(areas, page, address);
+  return size_of(areas.first(static_cast<std::size_t>(area - areas.data())), counts) + (address - area->first);
+}
+
+}  // namespace absenc::author
