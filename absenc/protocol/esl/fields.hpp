@@ -4,7 +4,6 @@
 
 #include <array>
 #include <optional>
-#include <utility>
 
 #include "absenc/protocol/author/bits.hpp"
 #include "absenc/protocol/author/field.hpp"
@@ -167,72 +166,80 @@ inline constexpr auto fields = [] {
 }();
 
 namespace detail {
-// As decode_parts walks through it; `byte` is the place of CF.
-template <Channel channel>
-constexpr BitRanges place_in(const Profile& profile, unsigned parts, std::size_t byte, const FieldInfo& field) {
+// Where this part, whose first byte is `here`, has the field.
+template <Channel channel, unsigned id>
+constexpr BitRanges place_in_part(const Profile& profile, std::size_t here, const FieldInfo& field) {
   using author::bits_of;
-  ++byte;
-  std::size_t here = 0;
-  const auto has = [&](unsigned one, std::size_t size) {
-    if ((parts & one) == 0) return false;
-    here = std::exchange(byte, byte + size);
-    return true;
-  };
   const auto is = [&field](const FieldInfo* one) { return one == &field; };
   // RS: its low bit in the second byte, the others in the first.
-  const auto redundant = [&](RedundantBit low) {
+  const auto redundant = [here](RedundantBit low) {
     BitRanges ranges = bits_of(here + 1, low == RedundantBit::b7 ? 7 : 0, 1);
     ranges.push_back({8 * here, 8});
     return ranges;
   };
-  if (has(part::status, 1) && is(fields.of<in<channel, part::status, &ChannelReply::status>>())) {
+  if constexpr (id == part::status) {
+    if (!is(fields.of<in<channel, part::status, &ChannelReply::status>>())) return {};
     if (profile.status_order == FieldOrder::document) return bits_of(here, 0, 8);
     BitRanges ranges = bits_of(here, 6, 2);
     ranges.push_back({8 * here + 4, 2});
     ranges.push_back({8 * here, 4});
     return ranges;
   }
-  const FieldInfo* const raised = fields.of<in<channel, part::alarms, &ChannelReply::alarms>>();
-  if (has(part::alarms, 1) && is(raised)) return bits_of(here, 0, 8);
+  if constexpr (id == part::alarms) {
+    if (is(fields.of<in<channel, part::alarms, &ChannelReply::alarms>>())) return bits_of(here, 0, 8);
+  }
   if constexpr (channel == Channel::one) {
-    const FieldInfo* const position = fields.of<in<channel, part::singleturn, &Reply::singleturn>>();
-    if (has(part::singleturn, 3) && is(position)) return bits_of(here, 0, singleturn_bits);
-    const FieldInfo* const turns = fields.of<turns_in>();
-    if (has(part::multiturn, 2) && is(turns)) return bits_of(here, 0, multiturn_bits);
-    if (has(part::encoder_id, 1)) {
+    if constexpr (id == part::singleturn) {
+      if (is(fields.of<in<channel, part::singleturn, &Reply::singleturn>>())) return bits_of(here, 0, singleturn_bits);
+    }
+    if constexpr (id == part::multiturn) {
+      if (is(fields.of<turns_in>())) return bits_of(here, 0, multiturn_bits);
+    }
+    if constexpr (id == part::encoder_id) {
       if (is(fields.of<in<channel, part::encoder_id, &ChannelReply::encoder_id>>())) return bits_of(here, 0, 8);
       if (is(fields.of<of_encoder_id<7, 1>>())) return bits_of(here, 7, 1);
       if (is(fields.of<of_encoder_id<5, 3>>())) return bits_of(here, 5, 2);
       if (is(fields.of<of_encoder_id<0, 0x1F>>())) return bits_of(here, 0, 5);
     }
-    const FieldInfo* const temperature = fields.of<in<channel, part::temperature, &Reply::temperature>>();
-    if (has(part::temperature, 1) && is(temperature)) return bits_of(here, 0, 8);
-    const FieldInfo* const sequence = fields.of<in<channel, part::sequence, &ChannelReply::sequence>>();
-    if (has(part::sequence, 1) && is(sequence)) return bits_of(here, 0, 8);
-    const bool as_document = profile.memory_address_order == FieldOrder::document;
-    if (has(part::memory_address, 1)) {
+    if constexpr (id == part::temperature) {
+      if (is(fields.of<in<channel, part::temperature, &Reply::temperature>>())) return bits_of(here, 0, 8);
+    }
+    if constexpr (id == part::sequence) {
+      if (is(fields.of<in<channel, part::sequence, &ChannelReply::sequence>>())) return bits_of(here, 0, 8);
+    }
+    if constexpr (id == part::memory_address) {
+      const bool as_document = profile.memory_address_order == FieldOrder::document;
       if (is(fields.of<&Shown::busy>())) return bits_of(here, as_document ? 0 : 7, 1);
       if (is(fields.of<&Shown::memory_address>())) return bits_of(here, as_document ? 1 : 0, 7);
     }
-    if (has(part::value, 1) && is(fields.of<&Shown::value>())) return bits_of(here, 0, 8);
+    if constexpr (id == part::value) {
+      if (is(fields.of<&Shown::value>())) return bits_of(here, 0, 8);
+    }
   } else {
-    has(part::encoder_id, 1);
+    const std::size_t lowest = profile.rs1_sc2 == RedundantBit::b7 ? 0 : 1;
     const bool is_sequence =
         is(fields.of<in<channel, part::zero_sequence | part::redundant_sequence, &ChannelReply::sequence>>());
     const bool is_redundant = is(fields.of<in<channel, part::redundant, &Reply::redundant>>());
-    const std::size_t lowest = profile.rs1_sc2 == RedundantBit::b7 ? 0 : 1;
-    if (has(part::zero_sequence, 1) && is_sequence) return bits_of(here, lowest, 7);
-    if (has(part::redundant_sequence, 2)) {
-      if (is_sequence) return bits_of(here + 1, lowest, 7);
-      if (is_redundant) return redundant(profile.rs1_sc2);
-    }
-    if (has(part::redundant_alone, 2) && is_redundant) return redundant(profile.idc_rs1);
-    if (has(part::redundant_calibration, 2) && is_redundant) {
+    if (id == part::zero_sequence && is_sequence) return bits_of(here, lowest, 7);
+    if (id == part::redundant_sequence && is_sequence) return bits_of(here + 1, lowest, 7);
+    if (id == part::redundant_sequence && is_redundant) return redundant(profile.rs1_sc2);
+    if (id == part::redundant_alone && is_redundant) return redundant(profile.idc_rs1);
+    if (id == part::redundant_calibration && is_redundant) {
       return profile.id6_rs == Id6Redundant::bits_16 ? author::big_endian_bits(here, 2, 16)
                                                      : redundant(RedundantBit::b0);
     }
   }
   return {};
+}
+
+template <Channel channel>
+constexpr BitRanges place_in(const Profile& profile, unsigned parts, std::size_t control_field,
+                             const FieldInfo& field) {
+  BitRanges place;
+  walk_parts(parts, control_field, [&]<class Part>(Part, std::size_t byte) {
+    if (place.empty()) place = place_in_part<channel, Part::id>(profile, byte, field);
+  });
+  return place;
 }
 }  // namespace detail
 

@@ -120,24 +120,60 @@ enum class DataId : std::uint8_t {
   write_memory = 0xF,
 };
 
-/// What stands behind CF and before the CRC, in the order of the wire. One byte where no other number is given.
+/// The parts between CF and CRC.
 namespace part {
-inline constexpr unsigned status = 0x0001;                 ///< Status.
-inline constexpr unsigned alarms = 0x0002;                 ///< Alarms.
-inline constexpr unsigned singleturn = 0x0004;             ///< 3 bytes
-inline constexpr unsigned multiturn = 0x0008;              ///< 2 bytes
-inline constexpr unsigned encoder_id = 0x0010;             ///< Encoder identifier.
-inline constexpr unsigned temperature = 0x0020;            ///< Temperature.
-inline constexpr unsigned sequence = 0x0040;               ///< Sequence bit.
-inline constexpr unsigned zero_sequence = 0x0080;          ///< {0, SC2}
-inline constexpr unsigned redundant_sequence = 0x0100;     ///< 2 bytes: RS0 {RS1, SC2}
-inline constexpr unsigned redundant_alone = 0x0200;        ///< 2 bytes: RS0 RS1 of ID C
-inline constexpr unsigned redundant_calibration = 0x0400;  ///< 2 bytes: RS0 RS1 of ID 6
-inline constexpr unsigned memory_address = 0x0800;         ///< Memory address.
-inline constexpr unsigned value = 0x1000;                  ///< Memory value.
+inline constexpr unsigned status = 0x0001;                 ///< Status (SF).
+inline constexpr unsigned alarms = 0x0002;                 ///< Alarms (ALM).
+inline constexpr unsigned singleturn = 0x0004;             ///< Position within the turn (ABS).
+inline constexpr unsigned multiturn = 0x0008;              ///< Turns (ABM).
+inline constexpr unsigned encoder_id = 0x0010;             ///< Encoder id (ENID).
+inline constexpr unsigned temperature = 0x0020;            ///< Temperature (TEMP).
+inline constexpr unsigned sequence = 0x0040;               ///< Sequence counter of channel 1 (SC1).
+inline constexpr unsigned zero_sequence = 0x0080;          ///< {0, SC2}.
+inline constexpr unsigned redundant_sequence = 0x0100;     ///< RS0 {RS1, SC2}.
+inline constexpr unsigned redundant_alone = 0x0200;        ///< RS0 RS1 of ID C.
+inline constexpr unsigned redundant_calibration = 0x0400;  ///< RS0 RS1 of ID 6.
+inline constexpr unsigned memory_address = 0x0800;         ///< Memory address and busy bit (ADF).
+inline constexpr unsigned value = 0x1000;                  ///< Byte in memory (EDF).
 /// Any redundant position.
 inline constexpr unsigned redundant = redundant_sequence | redundant_alone | redundant_calibration;
 }  // namespace part
+
+/// A part with its length on the wire.
+template <unsigned part_id, std::size_t part_size>
+struct WirePart {
+  static constexpr unsigned id = part_id;         ///< One of `part`.
+  static constexpr std::size_t size = part_size;  ///< Bytes.
+};
+
+namespace detail {
+template <class... Parts>
+struct PartsInOrder {
+  template <class Visit>
+  static constexpr std::size_t walk(unsigned parts, std::size_t at, const Visit& visit) {
+    const auto step = [&]<class Part>(Part here) {
+      if ((parts & Part::id) == 0) return;
+      visit(here, at);
+      at += Part::size;
+    };
+    (step(Parts{}), ...);
+    return at;
+  }
+};
+using WireOrder =
+    PartsInOrder<WirePart<part::status, 1>, WirePart<part::alarms, 1>, WirePart<part::singleturn, 3>,
+                 WirePart<part::multiturn, 2>, WirePart<part::encoder_id, 1>, WirePart<part::temperature, 1>,
+                 WirePart<part::sequence, 1>, WirePart<part::zero_sequence, 1>, WirePart<part::redundant_sequence, 2>,
+                 WirePart<part::redundant_alone, 2>, WirePart<part::redundant_calibration, 2>,
+                 WirePart<part::memory_address, 1>, WirePart<part::value, 1>>;
+}  // namespace detail
+
+/// Calls `visit(WirePart<...>{}, byte)` for each of `parts`, in the order of the wire. `control_field`: index of CF;
+/// `byte`: index of the part's first byte. Returns the index after the last part.
+template <class Visit>
+constexpr std::size_t walk_parts(unsigned parts, std::size_t control_field, const Visit& visit) {
+  return detail::WireOrder::walk(parts, control_field + 1, visit);
+}
 
 /// Which parts the reply of a request has, and in which order.
 struct Layout {
@@ -163,10 +199,7 @@ struct Layout {
 
  private:
   static constexpr std::uint8_t length(unsigned crc, unsigned parts) {
-    constexpr unsigned longer = part::singleturn | part::multiturn | part::redundant;
-    return static_cast<std::uint8_t>(1 + crc + static_cast<unsigned>(std::popcount(parts)) +
-                                     static_cast<unsigned>(std::popcount(parts & longer)) +
-                                     ((parts & part::singleturn) != 0 ? 1u : 0u));
+    return static_cast<std::uint8_t>(walk_parts(parts, 0, [](auto, std::size_t) {}) + crc);
   }
 };
 
@@ -318,33 +351,42 @@ namespace detail {
 
 namespace detail {
 
-constexpr void encode_parts(const Profile& profile, unsigned parts, const Reply& reply, const ChannelReply& channel,
-                            ReplyBytes& bytes) {
-  const auto put = [&](unsigned one, std::size_t size, std::uint32_t value) {
-    for (; (parts & one) != 0 && size > 0; --size, value >>= 8) bytes.push_back(static_cast<std::uint8_t>(value));
-  };
+// The bytes of one part, the first on the wire lowest.
+template <unsigned id>
+constexpr std::uint32_t part_to_wire(const Profile& profile, const Reply& reply, const ChannelReply& channel) {
+  const unsigned counter = channel.sequence & 0x7Fu;
   // In two bytes: its upper bits, and {RS1, SC2}.
-  const auto redundant = [&reply](RedundantBit order, unsigned counter) {
-    const unsigned second = to_wire(order == RedundantBit::b0, (reply.redundant & 1u) << 7 | counter);
+  const auto redundant = [&reply](RedundantBit order, unsigned sequence) {
+    const unsigned second = to_wire(order == RedundantBit::b0, (reply.redundant & 1u) << 7 | sequence);
     return reply.redundant >> 1 | second << 8;
   };
-  const unsigned counter = channel.sequence & 0x7Fu;
-  const bool wide = profile.id6_rs == Id6Redundant::bits_16;
-  put(part::status, 1, status_to_wire(profile, channel.status));
-  put(part::alarms, 1, channel.alarms);
-  put(part::singleturn, 3, reply.singleturn);
-  put(part::multiturn, 2, reply.multiturn);
-  put(part::encoder_id, 1, channel.encoder_id);
-  put(part::temperature, 1, static_cast<std::uint8_t>(reply.temperature));
-  put(part::sequence, 1, channel.sequence);
-  put(part::zero_sequence, 1, to_wire(profile.rs1_sc2 == RedundantBit::b0, counter));
-  put(part::redundant_sequence, 2, redundant(profile.rs1_sc2, counter));
-  put(part::redundant_alone, 2, redundant(profile.idc_rs1, 0));
-  put(part::redundant_calibration, 2,
-      wide ? reply.redundant >> 8 | (reply.redundant & 0xFFu) << 8 : redundant(RedundantBit::b0, 0));
-  put(part::memory_address, 1,
-      to_wire(profile.memory_address_order == FieldOrder::document, reply.memory_address | (reply.busy ? 0x80u : 0u)));
-  put(part::value, 1, reply.value);
+  if constexpr (id == part::status) return status_to_wire(profile, channel.status);
+  if constexpr (id == part::alarms) return channel.alarms;
+  if constexpr (id == part::singleturn) return reply.singleturn;
+  if constexpr (id == part::multiturn) return reply.multiturn;
+  if constexpr (id == part::encoder_id) return channel.encoder_id;
+  if constexpr (id == part::temperature) return static_cast<std::uint8_t>(reply.temperature);
+  if constexpr (id == part::sequence) return channel.sequence;
+  if constexpr (id == part::zero_sequence) return to_wire(profile.rs1_sc2 == RedundantBit::b0, counter);
+  if constexpr (id == part::redundant_sequence) return redundant(profile.rs1_sc2, counter);
+  if constexpr (id == part::redundant_alone) return redundant(profile.idc_rs1, 0);
+  if constexpr (id == part::redundant_calibration) {
+    const bool wide = profile.id6_rs == Id6Redundant::bits_16;
+    return wide ? reply.redundant >> 8 | (reply.redundant & 0xFFu) << 8 : redundant(RedundantBit::b0, 0);
+  }
+  if constexpr (id == part::memory_address) {
+    const unsigned field = reply.memory_address | (reply.busy ? 0x80u : 0u);
+    return to_wire(profile.memory_address_order == FieldOrder::document, field);
+  }
+  if constexpr (id == part::value) return reply.value;
+}
+
+constexpr void encode_parts(const Profile& profile, unsigned parts, const Reply& reply, const ChannelReply& channel,
+                            ReplyBytes& bytes) {
+  walk_parts(parts, 0, [&]<class Part>(Part, std::size_t) {
+    std::uint32_t value = part_to_wire<Part::id>(profile, reply, channel);
+    for (std::size_t i = 0; i < Part::size; ++i, value >>= 8) bytes.push_back(static_cast<std::uint8_t>(value));
+  });
 }
 
 constexpr void encode_channel(const Profile& profile, const Reply& reply, std::uint8_t field, Channel number,

@@ -152,42 +152,43 @@ constexpr std::uint8_t split_redundant(RedundantBit order, Bytes bytes, Reply& r
   return second & 0x7F;
 }
 
-constexpr void decode_parts(const Profile& profile, unsigned parts, Bytes bytes, Reply& reply, ChannelReply& channel) {
-  std::size_t at = 1;  // behind CF
-  Bytes here{};
-  const auto has = [&](unsigned one, std::size_t size) {
-    if ((parts & one) == 0) return false;
-    here = bytes.subspan(at, size);
-    at += size;
-    return true;
-  };
-  if (has(part::status, 1)) channel.status = status_from_wire(profile, here[0]);
-  if (has(part::alarms, 1)) channel.alarms = here[0];
-  if (has(part::singleturn, 3)) reply.singleturn = static_cast<std::uint32_t>(load_little_endian(here));
-  if (has(part::multiturn, 2)) reply.multiturn = static_cast<std::uint16_t>(here[0] | here[1] << 8);
-  if (has(part::encoder_id, 1)) channel.encoder_id = here[0];
-  if (has(part::temperature, 1)) reply.temperature = static_cast<std::int8_t>(here[0]);
-  if (has(part::sequence, 1)) channel.sequence = here[0];
-  if (has(part::zero_sequence, 1)) {
+template <unsigned id>
+constexpr void part_from_wire(const Profile& profile, Bytes here, Reply& reply, ChannelReply& channel) {
+  if constexpr (id == part::status) channel.status = status_from_wire(profile, here[0]);
+  if constexpr (id == part::alarms) channel.alarms = here[0];
+  if constexpr (id == part::singleturn) reply.singleturn = static_cast<std::uint32_t>(load_little_endian(here));
+  if constexpr (id == part::multiturn) reply.multiturn = static_cast<std::uint16_t>(here[0] | here[1] << 8);
+  if constexpr (id == part::encoder_id) channel.encoder_id = here[0];
+  if constexpr (id == part::temperature) reply.temperature = static_cast<std::int8_t>(here[0]);
+  if constexpr (id == part::sequence) channel.sequence = here[0];
+  if constexpr (id == part::zero_sequence) {
     const std::uint8_t byte = from_wire(profile.rs1_sc2 == RedundantBit::b0, here[0]);
     reply.unused_bits |= (byte & 0x80) != 0;
     channel.sequence = byte & 0x7F;
   }
-  if (has(part::redundant_sequence, 2)) channel.sequence = split_redundant(profile.rs1_sc2, here, reply);
-  if (has(part::redundant_alone, 2)) reply.unused_bits |= split_redundant(profile.idc_rs1, here, reply) != 0;
-  if (has(part::redundant_calibration, 2)) {
+  if constexpr (id == part::redundant_sequence) channel.sequence = split_redundant(profile.rs1_sc2, here, reply);
+  if constexpr (id == part::redundant_alone) {
+    reply.unused_bits |= split_redundant(profile.idc_rs1, here, reply) != 0;
+  }
+  if constexpr (id == part::redundant_calibration) {
     if (profile.id6_rs == Id6Redundant::bits_16) {
       reply.redundant = static_cast<std::uint16_t>(here[0] << 8 | here[1]);
     } else {
       reply.unused_bits |= split_redundant(RedundantBit::b0, here, reply) != 0;
     }
   }
-  if (has(part::memory_address, 1)) {
+  if constexpr (id == part::memory_address) {
     const std::uint8_t field = from_wire(profile.memory_address_order == FieldOrder::document, here[0]);
     reply.memory_address = field & 0x7F;
     reply.busy = (field & 0x80) != 0;
   }
-  if (has(part::value, 1)) reply.value = here[0];
+  if constexpr (id == part::value) reply.value = here[0];
+}
+
+constexpr void decode_parts(const Profile& profile, unsigned parts, Bytes bytes, Reply& reply, ChannelReply& channel) {
+  walk_parts(parts, 0, [&]<class Part>(Part, std::size_t byte) {
+    part_from_wire<Part::id>(profile, bytes.subspan(byte, Part::size), reply, channel);
+  });
 }
 
 constexpr bool checksum_holds(const Profile& profile, std::size_t crc_bytes, Channel channel, Bytes bytes) {
