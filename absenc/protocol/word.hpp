@@ -12,7 +12,7 @@
 #include "absenc/core/gray.hpp"
 #include "absenc/core/result.hpp"
 #include "absenc/core/shaft.hpp"
-#include "absenc/protocol/field.hpp"
+#include "absenc/protocol/author/field.hpp"
 #include "absenc/protocol/word_format.hpp"
 
 namespace absenc {
@@ -43,31 +43,30 @@ inline constexpr std::array<FlagInfo, 2> word_flags{{
     {"warning", "the encoder works near its limits", "check distance, dirt, temperature and supply", true},
 }};
 
-/// Index of a field of a word.
-enum WordFieldIndex : std::size_t {
-  word_field_multiturn,
-  word_field_singleturn,
-  word_field_angle,
-  word_field_position,
-  word_field_position_um,
-  word_field_position_mm,
-  word_field_error,
-  word_field_warning,
-  word_field_alarms,
+/// The fields of a word; those of Meaning::value have names of their own.
+struct WordValues {
+  std::uint64_t multiturn;   ///< Turns.
+  std::uint64_t singleturn;  ///< Position within the turn, in counts.
+  double angle;              ///< Position within the turn, in degrees.
+  std::uint64_t position;    ///< Position of a linear encoder, in counts.
+  double position_um;        ///< Position of a linear encoder, in micrometres.
+  double position_mm;        ///< Position of a linear encoder, in millimetres.
+  bool error;                ///< Error bit.
+  bool warning;              ///< Warning bit.
+  std::uint32_t alarms;      ///< Declared for its flags, which a reading has; never put.
 };
 
-/// Fields of a word.
-inline constexpr std::array<FieldInfo, 9> word_fields{{
-    {"multiturn", FieldInfo::Kind::counts, "revolutions", "turns", {}, Role::turns},
-    {"singleturn", FieldInfo::Kind::counts, "counts", "position within the turn", {}, Role::position},
-    {"angle_deg", FieldInfo::Kind::real, "deg", "position within the turn", {}, Role::of_position},
-    {"position", FieldInfo::Kind::counts, "counts", "position of a linear encoder", {}, Role::position},
-    {"position_um", FieldInfo::Kind::real, "um", "position of a linear encoder", {}, Role::of_position},
-    {"position_mm", FieldInfo::Kind::real, "mm", "position of a linear encoder", {}, Role::of_position},
-    {"error", FieldInfo::Kind::boolean, "", "the encoder says that its position is wrong"},
-    {"warning", FieldInfo::Kind::boolean, "", "the encoder works near its limits"},
-    {"alarms", FieldInfo::Kind::flags, "", "error and warning", word_flags},
-}};
+/// The fields of these values.
+inline constexpr auto word_fields = author::fields_of<WordValues>(
+    author::field<&WordValues::multiturn>("multiturn", "revolutions", "turns", Role::turns),
+    author::field<&WordValues::singleturn>("singleturn", "counts", "position within the turn", Role::position),
+    author::field<&WordValues::angle>("angle_deg", "deg", "position within the turn", Role::of_position),
+    author::field<&WordValues::position>("position", "counts", "position of a linear encoder", Role::position),
+    author::field<&WordValues::position_um>("position_um", "um", "position of a linear encoder", Role::of_position),
+    author::field<&WordValues::position_mm>("position_mm", "mm", "position of a linear encoder", Role::of_position),
+    author::field<&WordValues::error>("error", "", "the encoder says that its position is wrong"),
+    author::field<&WordValues::warning>("warning", "", "the encoder works near its limits"),
+    author::field<&WordValues::alarms>("alarms", "error and warning", word_flags));
 
 /// What the position counts.
 struct Scale {
@@ -246,26 +245,22 @@ constexpr bool encode_word(const WordFormat& format, const Word& word, BitBuffer
 
 /// Every field of the word, in the order of the wire.
 constexpr void put_word(FieldSink& sink, const WordFormat& format, const Word& word, const Scale& scale) {
-  const auto put = [&sink](WordFieldIndex index, std::int64_t number, double real = 0) {
-    sink.put({&word_fields[index], number, real});
-  };
   for (std::size_t i = 0; i < format.fields().size(); ++i) {
     const WordField& field = format.fields()[i];
-    const auto position = static_cast<std::int64_t>(word.position);
     if (field.meaning == Meaning::position && scale.linear) {
       const double um = micrometres(word.position, scale.unit_um);
-      put(word_field_position, position);
-      if (scale.unit_um > 0) put(word_field_position_um, 0, um);
-      if (scale.unit_um > 0) put(word_field_position_mm, 0, um / 1000);
+      word_fields.put<&WordValues::position>(sink, word.position);
+      if (scale.unit_um > 0) word_fields.put<&WordValues::position_um>(sink, um);
+      if (scale.unit_um > 0) word_fields.put<&WordValues::position_mm>(sink, um / 1000);
     } else if (field.meaning == Meaning::position) {
-      put(word_field_singleturn, position);
-      put(word_field_angle, 0, degrees(word.position, field.bits));
+      word_fields.put<&WordValues::singleturn>(sink, word.position);
+      word_fields.put<&WordValues::angle>(sink, degrees(word.position, field.bits));
     } else if (field.meaning == Meaning::multiturn) {
-      put(word_field_multiturn, static_cast<std::int64_t>(word.multiturn));
+      word_fields.put<&WordValues::multiturn>(sink, word.multiturn);
     } else if (field.meaning == Meaning::error) {
-      put(word_field_error, word.error ? 1 : 0);
+      word_fields.put<&WordValues::error>(sink, word.error);
     } else if (field.meaning == Meaning::warning) {
-      put(word_field_warning, word.warning ? 1 : 0);
+      word_fields.put<&WordValues::warning>(sink, word.warning);
     } else if (field.meaning == Meaning::value) {
       const FieldInfo info{field.name, FieldInfo::Kind::counts, "", "a field of the word format"};
       sink.put({&info, static_cast<std::int64_t>(word.values[i])});

@@ -93,17 +93,18 @@ struct WordSettings : Format {
 /// Where a field of a word that begins at bit `first` stands. What is Gray-coded stands in no bits of its own.
 [[nodiscard]] constexpr BitRanges place_in_word(const WordFormat& format, const FieldInfo& field, std::size_t first) {
   // By name: who keeps a decoded frame keeps copies of the fields that are no unit's own.
-  const auto is = [&field](WordFieldIndex index) { return field.name == word_fields[index].name; };
+  const auto is = [&field](const FieldInfo* shown) { return field.name == shown->name; };
   const auto shows = [&](const WordField& one) {
     switch (one.meaning) {
       case Meaning::position:
-        return !format.gray() && (is(word_field_singleturn) || is(word_field_position));
+        return !format.gray() &&
+               (is(word_fields.of<&WordValues::singleturn>()) || is(word_fields.of<&WordValues::position>()));
       case Meaning::multiturn:
-        return !format.gray() && is(word_field_multiturn);
+        return !format.gray() && is(word_fields.of<&WordValues::multiturn>());
       case Meaning::error:
-        return is(word_field_error);
+        return is(word_fields.of<&WordValues::error>());
       case Meaning::warning:
-        return is(word_field_warning);
+        return is(word_fields.of<&WordValues::warning>());
       case Meaning::value:
         return field.name == one.name;
       default:
@@ -116,16 +117,6 @@ struct WordSettings : Format {
     first += one.bits;
   }
   return ranges;
-}
-
-/// Returns two tables of fields as one.
-template <std::size_t a, std::size_t b>
-[[nodiscard]] constexpr std::array<FieldInfo, a + b> joined_fields(const std::array<FieldInfo, a>& first,
-                                                                   const std::array<FieldInfo, b>& second) {
-  std::array<FieldInfo, a + b> fields{};
-  for (std::size_t i = 0; i < a; ++i) fields[i] = first[i];
-  for (std::size_t i = 0; i < b; ++i) fields[a + i] = second[i];
-  return fields;
 }
 
 /// The encoders of the four examples in RLS "E201-9S Decoding the BiSS information". No speed is given for them.

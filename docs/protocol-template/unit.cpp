@@ -53,8 +53,8 @@ struct Values {
 
 constexpr auto options = OptionsOf{option<&Format::address>("address", "of the encoder on its line", 0, 255)};
 constexpr auto models = std::array{ModelText{"unnamed", "one sentence", 6000, ""}};
-constexpr auto fields = fields_of<Values>(field<&Values::singleturn>(
-    {"singleturn", FieldInfo::Kind::number, "counts", "position within the turn", {}, Role::position}));
+constexpr auto fields =
+    fields_of<Values>(field<&Values::singleturn>("singleturn", "counts", "position within the turn", Role::position));
 
 constexpr Values values_of_request(const Format&, const Request&) { return {}; }
 constexpr Values values_of_reply(const Format&, const Request&, const Reply& reply) { return {reply.singleturn}; }

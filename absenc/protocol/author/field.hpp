@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// A field is declared with the member that holds it: what is put, and in which order, follows.
+// The one manner to declare fields: each with the member of a struct that has its value. The kind of a field follows
+// from the type of the member, the order in which fields are put from that of their declarations.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -21,6 +23,11 @@ struct FieldOf {
   FieldInfo info;  ///< Description of the field.
 };
 
+/// A value that is text: ASCII in bytes, which outlive the call of `put`.
+struct AsciiText {
+  Bytes bytes;  ///< The characters.
+};
+
 namespace detail {
 template <class Values, class T>
 T shown_by(T Values::*);
@@ -31,29 +38,27 @@ T held_by(const T&);
 template <class T>
 T held_by(const std::optional<T>&);
 
+template <auto member>
+using Held = decltype(held_by(shown_by(member)));
+
 /// How a value of this type is shown.
 template <class T>
 constexpr FieldInfo::Kind kind_of() {
   if (std::is_same_v<T, bool>) return FieldInfo::Kind::boolean;
   if (std::is_same_v<T, double>) return FieldInfo::Kind::real;
-  if (std::is_same_v<T, std::string_view>) return FieldInfo::Kind::text;
+  if (std::is_same_v<T, std::string_view> || std::is_same_v<T, AsciiText>) return FieldInfo::Kind::text;
   if (std::is_same_v<T, Bytes>) return FieldInfo::Kind::bytes;
   if (std::is_same_v<T, std::uint64_t>) return FieldInfo::Kind::counts;
   return FieldInfo::Kind::number;
 }
 }  // namespace detail
 
-/// What is shown may be an optional: what it does not hold is not put.
-template <auto member>
-[[nodiscard]] constexpr FieldOf<member> field(const FieldInfo& info) {
-  return {info};
-}
-/// The type of the member says how it is shown.
+/// The type of the member, which may be an optional, says how it is shown. An optional without a value is not put.
 template <auto member>
 [[nodiscard]] constexpr FieldOf<member> field(std::string_view name, std::string_view unit, std::string_view meaning,
                                               Role role = Role::other) {
-  using Held = decltype(detail::held_by(detail::shown_by(member)));
-  return {{.name = name, .kind = detail::kind_of<Held>(), .unit = unit, .meaning = meaning, .role = role}};
+  return {
+      {.name = name, .kind = detail::kind_of<detail::Held<member>>(), .unit = unit, .meaning = meaning, .role = role}};
 }
 /// Bit n is flags[n].
 template <auto member>
@@ -79,6 +84,12 @@ struct FieldsOf {
   constexpr void put(FieldSink& sink, const Values& values) const {
     std::size_t index = 0;
     (put_one(sink, infos[index++], shown<members>(values)), ...);
+  }
+
+  /// Puts one field with this value.
+  template <auto member>
+  constexpr void put(FieldSink& sink, const detail::Held<member>& value) const {
+    put_one(sink, *of<member>(), value);
   }
 
   /// The field that shows this member.
@@ -107,6 +118,8 @@ struct FieldsOf {
       sink.put({.info = &info, .real = value});
     } else if constexpr (std::is_same_v<T, Bytes>) {
       sink.put({.info = &info, .bytes = value});
+    } else if constexpr (std::is_same_v<T, AsciiText>) {
+      sink.put({.info = &info, .bytes = value.bytes});
     } else if constexpr (std::is_same_v<T, std::string_view>) {
       ByteBuffer<96> text;
       for (const char c : value) text.push_back(static_cast<std::uint8_t>(c));
@@ -125,6 +138,15 @@ struct FieldsOf {
 template <class Values, auto... members>
 [[nodiscard]] constexpr FieldsOf<Values, members...> fields_of(const FieldOf<members>&... all) {
   return FieldsOf<Values, members...>(all...);
+}
+
+/// Returns the fields of several arrays as one, for Declaration::fields.
+template <std::size_t... sizes>
+[[nodiscard]] constexpr auto joined(const std::array<FieldInfo, sizes>&... infos) {
+  std::array<FieldInfo, (sizes + ...)> all{};
+  FieldInfo* next = all.data();
+  ((next = std::copy(infos.begin(), infos.end(), next)), ...);
+  return all;
 }
 
 }  // namespace absenc::author

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <array>
+#include <optional>
 #include <tuple>
 #include <utility>
 
@@ -114,43 +115,42 @@ constexpr auto chain_options = std::apply(
 
 // ---- Fields of each channel; the shown slave also has the fields of a single word
 
-enum ChannelField : std::size_t { in_multiturn, in_singleturn, in_error, in_warning, in_life_counter, in_crc, in_all };
+struct ChannelValues {
+  std::optional<std::uint64_t> multiturn{};
+  std::uint64_t singleturn = 0;
+  bool error = false;
+  bool warning = false;
+  std::optional<unsigned> life_counter{};
+  std::optional<unsigned> crc{};
+};
 
-template <unsigned i>
-constexpr std::array<FieldInfo, in_all> channel_fields_of{{
-    {name_of<i, "multiturn">, FieldInfo::Kind::counts, "revolutions", "its turns", {}, Role::of_position},
-    {name_of<i, "singleturn">, FieldInfo::Kind::counts, "counts", "its position", {}, Role::of_position},
-    {name_of<i, "error">, FieldInfo::Kind::boolean, "", "it says that its position is wrong"},
-    {name_of<i, "warning">, FieldInfo::Kind::boolean, "", "it works near its limits"},
-    {name_of<i, "life_counter">, FieldInfo::Kind::number, "", "counts up with every frame", {}, Role::life_counter},
-    {name_of<i, "crc">, FieldInfo::Kind::number, "", "as sent"},
-}};
-template <std::size_t... channel>
-constexpr auto fields_of_channels(std::index_sequence<channel...>) {
-  std::array<FieldInfo, most * in_all> fields{};
-  const auto put = [&fields](std::size_t at, const std::array<FieldInfo, in_all>& of_channel) {
-    for (std::size_t i = 0; i < in_all; ++i) fields[at * in_all + i] = of_channel[i];
-  };
-  (put(channel, channel_fields_of<channel>), ...);
-  return fields;
+template <std::size_t i>
+constexpr auto fields_of_channel = fields_of<ChannelValues>(
+    field<&ChannelValues::multiturn>(name_of<i, "multiturn">, "revolutions", "its turns", Role::of_position),
+    field<&ChannelValues::singleturn>(name_of<i, "singleturn">, "counts", "its position", Role::of_position),
+    field<&ChannelValues::error>(name_of<i, "error">, "", "it says that its position is wrong"),
+    field<&ChannelValues::warning>(name_of<i, "warning">, "", "it works near its limits"),
+    field<&ChannelValues::life_counter>(name_of<i, "life_counter">, "", "counts up with every frame",
+                                        Role::life_counter),
+    field<&ChannelValues::crc>(name_of<i, "crc">, "", "as sent"));
+constexpr auto channel_fields = []<std::size_t... channel>(std::index_sequence<channel...>) {
+  return std::array{fields_of_channel<channel>...};
 }
-constexpr auto channel_fields = fields_of_channels(EveryChannel{});
+(EveryChannel{});
 
-constexpr void put_channel(FieldSink& sink, const Channel& channel, const ChannelData& data, unsigned index) {
-  const auto put = [&](ChannelField field, std::uint64_t value) {
-    sink.put({&channel_fields[index * in_all + field], static_cast<std::int64_t>(value)});
-  };
-  if (channel.word.find(Meaning::multiturn) != nullptr) put(in_multiturn, data.word.multiturn);
-  put(in_singleturn, data.word.position);
-  put(in_error, data.word.error ? 1 : 0);
-  put(in_warning, data.word.warning ? 1 : 0);
-  if (channel.check.life_counter) put(in_life_counter, data.life_counter);
-  if (channel.check.width != 0) put(in_crc, data.crc);
+constexpr ChannelValues values_of_channel(const Channel& channel, const ChannelData& data) {
+  ChannelValues values{.singleturn = data.word.position, .error = data.word.error, .warning = data.word.warning};
+  if (channel.word.find(Meaning::multiturn) != nullptr) values.multiturn = data.word.multiturn;
+  if (channel.check.life_counter) values.life_counter = data.life_counter;
+  if (channel.check.width != 0) values.crc = data.crc;
+  return values;
 }
 
 constexpr auto chain_models = std::array{ModelText{"two-19", "two encoders of 19 bits", 0, "slaves=2"}};
-constexpr auto all_chain_fields =
-    joined_fields(joined_fields(word_fields, channel_fields), joined_fields(own_fields, register_fields.infos));
+constexpr auto all_chain_fields = []<std::size_t... channel>(std::index_sequence<channel...>) {
+  return joined(word_fields.infos, fields_of_channel<channel>.infos..., frame_fields.infos, register_fields.infos);
+}
+(EveryChannel{});
 
 constexpr ChainFormat chain_format(const Options& values) {
   ChainSettings given = chain_options.format(values);
@@ -170,8 +170,10 @@ constexpr bool is_chain_possible(const ChainFormat& format) { return biss::is_us
 
 constexpr void put_chain_reply(FieldSink& sink, const ChainFormat& format, const NoRequest&, const ChainReply& reply) {
   put_line_delay(sink, format, reply);
-  sink.put({&own_fields[field_ack_bits], reply.ack_bits});
-  for (unsigned i = 0; i < format.count; ++i) put_channel(sink, format.channels[i], reply.channels[i], i);
+  frame_fields.put<&FrameValues::ack_bits>(sink, reply.ack_bits);
+  for (unsigned i = 0; i < format.count; ++i) {
+    channel_fields[i].put(sink, values_of_channel(format.channels[i], reply.channels[i]));
+  }
   const unsigned shown = format.shown();
   put_word(sink, format.channels[shown].word, reply.channels[shown].word, format.scale);
 }
@@ -208,7 +210,7 @@ constexpr Declaration<ProtocolOf<ChainFormat>, VirtualEncoderOf<ChainFormat>> ch
     .encode = encode_control<ChainFormat>,
     .is_checked = is_chain_checked,
     .control_bit = control_bit,
-    .alarms = &all_chain_fields[word_field_alarms],
+    .alarms = word_fields.of<&WordValues::alarms>(),
     .memory = registers::areas,
 };
 

@@ -2,31 +2,38 @@
 // Names and meanings of the fields of a BiSS frame outside its word.
 #pragma once
 
-#include <array>
-
+#include "absenc/protocol/author/field.hpp"
 #include "absenc/protocol/biss/frame.hpp"
 
 namespace absenc::biss {
 
-/// Index of a field.
-enum FieldIndex : std::size_t { field_ack_bits, field_crc, field_life_counter, field_line_delay, field_line_delay_us };
+/// Values of a BiSS frame outside its word.
+struct FrameValues {
+  unsigned ack_bits;           ///< Clocks until the encoder was ready.
+  unsigned crc;                ///< CRC as sent, inverted.
+  unsigned life_counter;       ///< Life counter (BiSS Safety).
+  unsigned line_delay_clocks;  ///< Delay of the line there and back, in whole clocks.
+  double line_delay_us;        ///< Delay of the line there and back, in microseconds.
+};
 
-/// Fields of every BiSS unit.
-inline constexpr std::array<FieldInfo, 5> own_fields{{
-    {"ack_bits", FieldInfo::Kind::number, "", "clocks until the encoder was ready"},
-    {"crc", FieldInfo::Kind::number, "", "as sent: inverted"},
-    {"life_counter", FieldInfo::Kind::number, "", "counts up with every frame (BiSS Safety)", {}, Role::life_counter},
-    {"line_delay_clocks", FieldInfo::Kind::number, "", "whole clocks by which the line is late, there and back"},
-    {"line_delay_us", FieldInfo::Kind::real, "us", "the same at the clock of ma_khz: 100 m of cable make 1 us"},
-}};
+/// Fields of these values.
+inline constexpr auto frame_fields = author::fields_of<FrameValues>(
+    author::field<&FrameValues::ack_bits>("ack_bits", "", "clocks until the encoder was ready"),
+    author::field<&FrameValues::crc>("crc", "", "as sent: inverted"),
+    author::field<&FrameValues::life_counter>("life_counter", "", "counts up with every frame (BiSS Safety)",
+                                              Role::life_counter),
+    author::field<&FrameValues::line_delay_clocks>("line_delay_clocks", "",
+                                                   "whole clocks by which the line is late, there and back"),
+    author::field<&FrameValues::line_delay_us>("line_delay_us", "us",
+                                               "the same at the clock of ma_khz: 100 m of cable make 1 us"));
 
 /// Reports the delay of the line. It is known only if the samples begin with the clock; others may begin anywhere in
 /// the idle line.
 template <class F, class ReplyType>
 constexpr void put_line_delay(FieldSink& sink, const F& format, const ReplyType& reply) {
   if (reply.delay_bits == 0) return;
-  sink.put({&own_fields[field_line_delay], reply.delay_bits});
-  sink.put({&own_fields[field_line_delay_us], 0, reply.delay_bits * 1000.0 / format.ma_khz});
+  frame_fields.put<&FrameValues::line_delay_clocks>(sink, reply.delay_bits);
+  frame_fields.put<&FrameValues::line_delay_us>(sink, reply.delay_bits * 1000.0 / format.ma_khz);
 }
 
 }  // namespace absenc::biss

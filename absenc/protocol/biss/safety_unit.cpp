@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <array>
+#include <optional>
 
 #include "absenc/protocol/biss/commands.hpp"
 #include "absenc/protocol/biss/device.hpp"
@@ -31,55 +32,47 @@ struct SafetySettings : SafetyFormat, TimeoutSettings {
   bool spw_life_counter = true;
 };
 
-enum SafetyField : std::size_t {
-  field_cpw_multiturn,
-  field_cpw_singleturn,
-  field_angle,
-  field_cpw_error,
-  field_cpw_warning,
-  field_cpw_life_counter,
-  field_cpw_crc,
-  field_spw_multiturn,
-  field_spw_singleturn,
-  field_spw_error,
-  field_spw_warning,
-  field_spw_life_counter,
-  field_spw_crc,
-  field_alarms,
+struct SafetyWordValues {
+  std::optional<std::uint64_t> multiturn{};
+  std::uint64_t singleturn = 0;
+  double angle = 0;
+  bool error = false;
+  bool warning = false;
+  std::optional<unsigned> life_counter{};
+  std::optional<unsigned> crc{};
+};
+struct SafetyAlarms {
+  std::uint32_t alarms;  // of the reading: declared for its flags, and never put
 };
 
-using Kind = FieldInfo::Kind;
-constexpr std::array<FieldInfo, 14> safety_fields{{
-    {"cpw_multiturn", Kind::counts, "revolutions", "turns", {}, Role::turns},
-    {"cpw_singleturn", Kind::counts, "counts", "position within the turn", {}, Role::position},
-    {"angle_deg", Kind::real, "deg", "position within the turn", {}, Role::of_position},
-    {"cpw_error", Kind::boolean, "", "the encoder says that its position is wrong"},
-    {"cpw_warning", Kind::boolean, "", "the encoder works near its limits"},
-    {"cpw_life_counter", Kind::number, "", "counts up with every frame", {}, Role::life_counter},
-    {"cpw_crc", Kind::number, "", "as sent: inverted"},
-    {"spw_multiturn", Kind::counts, "revolutions", "turns of the safety word", {}, Role::of_position},
-    {"spw_singleturn", Kind::counts, "counts", "position of the safety word", {}, Role::of_position},
-    {"spw_error", Kind::boolean, "", "the safety word says that its position is wrong"},
-    {"spw_warning", Kind::boolean, "", "the safety word warns"},
-    {"spw_life_counter", Kind::number, "", "counts up with every frame, 63 and then 0", {}, Role::life_counter},
-    {"spw_crc", Kind::number, "", "as sent: inverted"},
-    {"alarms", Kind::flags, "", "error and warning of either word", word_flags},
-}};
+constexpr auto cpw_fields = fields_of<SafetyWordValues>(
+    field<&SafetyWordValues::multiturn>("cpw_multiturn", "revolutions", "turns", Role::turns),
+    field<&SafetyWordValues::singleturn>("cpw_singleturn", "counts", "position within the turn", Role::position),
+    field<&SafetyWordValues::angle>("angle_deg", "deg", "position within the turn", Role::of_position),
+    field<&SafetyWordValues::error>("cpw_error", "", "the encoder says that its position is wrong"),
+    field<&SafetyWordValues::warning>("cpw_warning", "", "the encoder works near its limits"),
+    field<&SafetyWordValues::life_counter>("cpw_life_counter", "", "counts up with every frame", Role::life_counter),
+    field<&SafetyWordValues::crc>("cpw_crc", "", "as sent: inverted"));
+constexpr auto spw_fields = fields_of<SafetyWordValues>(
+    field<&SafetyWordValues::multiturn>("spw_multiturn", "revolutions", "turns of the safety word", Role::of_position),
+    field<&SafetyWordValues::singleturn>("spw_singleturn", "counts", "position of the safety word", Role::of_position),
+    field<&SafetyWordValues::error>("spw_error", "", "the safety word says that its position is wrong"),
+    field<&SafetyWordValues::warning>("spw_warning", "", "the safety word warns"),
+    field<&SafetyWordValues::life_counter>("spw_life_counter", "", "counts up with every frame, 63 and then 0",
+                                           Role::life_counter),
+    field<&SafetyWordValues::crc>("spw_crc", "", "as sent: inverted"));
+constexpr auto alarm_fields =
+    fields_of<SafetyAlarms>(field<&SafetyAlarms::alarms>("alarms", "error and warning of either word", word_flags));
 
-constexpr void put_word_of(FieldSink& sink, const Channel& channel, const ChannelData& data, bool safety) {
-  const auto put = [&sink, safety](SafetyField cpw, SafetyField spw, std::uint64_t value) {
-    sink.put({&safety_fields[safety ? spw : cpw], static_cast<std::int64_t>(value)});
-  };
-  const unsigned bits = channel.word.bits_of(Meaning::position);
-  if (channel.word.find(Meaning::multiturn) != nullptr) {
-    put(field_cpw_multiturn, field_spw_multiturn, data.word.multiturn);
-  }
-  put(field_cpw_singleturn, field_spw_singleturn, data.word.position);
-  if (!safety) sink.put({&safety_fields[field_angle], 0, degrees(data.word.position, bits)});
-  put(field_cpw_error, field_spw_error, data.word.error ? 1 : 0);
-  put(field_cpw_warning, field_spw_warning, data.word.warning ? 1 : 0);
-  if (channel.check.life_counter) put(field_cpw_life_counter, field_spw_life_counter, data.life_counter);
-  if (channel.check.width != 0) put(field_cpw_crc, field_spw_crc, data.crc);
+constexpr SafetyWordValues values_of_word(const Channel& channel, const ChannelData& data) {
+  SafetyWordValues values{.singleturn = data.word.position,
+                          .angle = degrees(data.word.position, channel.word.bits_of(Meaning::position)),
+                          .error = data.word.error,
+                          .warning = data.word.warning};
+  if (channel.word.find(Meaning::multiturn) != nullptr) values.multiturn = data.word.multiturn;
+  if (channel.check.life_counter) values.life_counter = data.life_counter;
+  if (channel.check.width != 0) values.crc = data.crc;
+  return values;
 }
 
 constexpr auto safety_options = OptionsOf{
@@ -145,7 +138,8 @@ constexpr auto safety_models = std::array{
         "RLH", "24 bits and 24 bits of turns, safety word 16 and turns", 0,
         "cpw_singleturn_bits=24 cpw_multiturn_bits=24 spw_singleturn_bits=16 spw_multiturn_bits=24 compare_bits=13"},
 };
-constexpr auto all_safety_fields = joined_fields(joined_fields(safety_fields, own_fields), register_fields.infos);
+constexpr auto all_safety_fields =
+    joined(cpw_fields.infos, spw_fields.infos, alarm_fields.infos, frame_fields.infos, register_fields.infos);
 
 constexpr SafetyFormat safety_format(const Options& values) {
   SafetySettings given = safety_options.format(values);
@@ -166,9 +160,9 @@ constexpr bool is_safety_possible(const SafetyFormat& format) {
 constexpr void put_safety_reply(FieldSink& sink, const SafetyFormat& format, const NoRequest&,
                                 const SafetyReply& reply) {
   put_line_delay(sink, format, reply);
-  sink.put({&own_fields[field_ack_bits], reply.ack_bits});
-  put_word_of(sink, format.cpw, reply.cpw, false);
-  put_word_of(sink, format.spw, reply.spw, true);
+  frame_fields.put<&FrameValues::ack_bits>(sink, reply.ack_bits);
+  cpw_fields.put(sink, values_of_word(format.cpw, reply.cpw));
+  spw_fields.put(sink, values_of_word(format.spw, reply.spw));
 }
 Explanation explain_safety(const SafetyFormat& format, Error error, Bytes request, Bytes reply) {
   if (error == Error::sequence_mismatch) {
@@ -209,7 +203,7 @@ constexpr Declaration<ProtocolOf<SafetyFormat>, VirtualEncoderOf<SafetyFormat>> 
     .encode = encode_control<SafetyFormat>,
     .is_checked = is_safety_checked,
     .control_bit = control_bit,
-    .alarms = &safety_fields[field_alarms],
+    .alarms = alarm_fields.of<&SafetyAlarms::alarms>(),
     .memory = registers::areas,
 };
 

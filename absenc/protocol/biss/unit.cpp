@@ -56,7 +56,7 @@ constexpr auto options = OptionsOf{
     adaptive_timeout_option,
     stop_bit_option<&Settings::stop_bit>,
 };
-constexpr auto all_fields = joined_fields(joined_fields(word_fields, own_fields), register_fields.infos);
+constexpr auto all_fields = joined(word_fields.infos, frame_fields.infos, register_fields.infos);
 
 constexpr Format format_by(const Options& values) {
   Settings given = options.format(values);
@@ -73,10 +73,10 @@ constexpr bool is_readable(const Format& format) { return is_possible(format) &&
 // Reports the fields in the order of the line.
 constexpr void put_reply(FieldSink& sink, const Format& format, const NoRequest&, const Reply& reply) {
   put_line_delay(sink, format, reply);
-  sink.put({&own_fields[field_ack_bits], reply.ack_bits});
+  frame_fields.put<&FrameValues::ack_bits>(sink, reply.ack_bits);
   put_word(sink, format.word, reply.word, format.scale);
-  if (format.check.life_counter) sink.put({&own_fields[field_life_counter], reply.life_counter});
-  if (format.check.width != 0) sink.put({&own_fields[field_crc], reply.crc});
+  if (format.check.life_counter) frame_fields.put<&FrameValues::life_counter>(sink, reply.life_counter);
+  if (format.check.width != 0) frame_fields.put<&FrameValues::crc>(sink, reply.crc);
 }
 
 constexpr Report<Protocol> report{.put_reply = put_reply, .explain = explain_frame<Format>};
@@ -119,7 +119,7 @@ constexpr Declaration<Protocol, VirtualEncoderOf<Format>> declaration{
     .bits = bits_in,
     .control_bit = control_bit,
     .reportable = reportable_by,
-    .alarms = &all_fields[word_field_alarms],
+    .alarms = word_fields.of<&WordValues::alarms>(),
     .memory = registers::areas,
 };
 

@@ -98,8 +98,8 @@ constexpr auto models = [] {
 // ---- Fields
 
 template <auto member>
-constexpr std::optional<Bytes> words(const InterfaceResults& found) {
-  return found.*member ? std::optional<Bytes>(*(found.*member)) : std::nullopt;
+constexpr std::optional<AsciiText> text_of(const InterfaceResults& found) {
+  return found.*member ? std::optional(AsciiText{*(found.*member)}) : std::nullopt;
 }
 template <std::uint8_t symbol>
 constexpr std::optional<unsigned> milli(const InterfaceResults& found) {
@@ -115,8 +115,8 @@ constexpr std::optional<unsigned> valid(const InterfaceResults& found) {
 constexpr std::optional<std::int64_t> restored(const InterfaceResults& found) {
   return found.restored ? std::optional<std::int64_t>(found.previous) : std::nullopt;
 }
-constexpr std::optional<std::int64_t> aborted(const InterfaceResults& found) {
-  return found.restored ? std::optional<std::int64_t>(found.aborted) : std::nullopt;
+constexpr std::optional<bool> aborted(const InterfaceResults& found) {
+  return found.restored ? std::optional(found.aborted) : std::nullopt;
 }
 std::optional<std::int64_t> recommended(const InterfaceResults& found) {
   const unsigned clock = found.restored && !found.aborted ? found.recommended() : 0;
@@ -131,48 +131,46 @@ constexpr std::optional<unsigned> khz(const InterfaceResults& found) {
   return clocks_khz[static_cast<std::size_t>(*one) - 1];
 }
 
-using enum FieldInfo::Kind;
 constexpr auto own_fields = fields_of<InterfaceResults>(
-    field<words<&InterfaceResults::command>>({"command", text, "", "the request", {}, Role::exchange}),
-    field<words<&InterfaceResults::version>>({"version", text, "", "firmware of the interface", {}, Role::identity}),
-    field<words<&InterfaceResults::serial>>({"serial", text, "", "serial number of the interface", {}, Role::identity}),
-    field<words<&InterfaceResults::supply>>({"supply", text, "", "supply of the encoder, as the interface says it"}),
-    field<milli<'V'>>({"supply_mv", number, "mV", "voltage in that text"}),
-    field<milli<'A'>>({"supply_ma", number, "mA", "current in that text"}),
-    field<&InterfaceResults::clock>({"clock", number, "", "setting of the MA clock, 1 to 8"}),
-    field<khz<set_clock_of>>({"clock_khz", number, "kHz", "MA clock"}),
+    field<text_of<&InterfaceResults::command>>("command", "", "the request", Role::exchange),
+    field<text_of<&InterfaceResults::version>>("version", "", "firmware of the interface", Role::identity),
+    field<text_of<&InterfaceResults::serial>>("serial", "", "serial number of the interface", Role::identity),
+    field<text_of<&InterfaceResults::supply>>("supply", "", "supply of the encoder, as the interface says it"),
+    field<milli<'V'>>("supply_mv", "mV", "voltage in that text"),
+    field<milli<'A'>>("supply_ma", "mA", "current in that text"),
+    field<&InterfaceResults::clock>("clock", "", "setting of the MA clock, 1 to 8"),
+    field<khz<set_clock_of>>("clock_khz", "kHz", "MA clock"),
     field<&InterfaceResults::advice>("advice", "",
                                      "the clocks that are recommended for this encoder, where another is set"),
-    field<&InterfaceResults::width>({"width", number, "bits", "width of the position that ? gives"}),
-    field<&InterfaceResults::counts>({"counts", number, "counts", "position, the interface's zero taken off"}),
-    field<frames>({"frames", number, "", "frames read at each clock"}),
-    field<valid<0>>({"valid_35_khz", number, "", "good frames at 35 kHz"}),
-    field<valid<1>>({"valid_70_khz", number, "", "good frames at 70 kHz"}),
-    field<valid<2>>({"valid_140_khz", number, "", "good frames at 140 kHz"}),
-    field<valid<3>>({"valid_280_khz", number, "", "good frames at 280 kHz"}),
-    field<valid<4>>({"valid_560_khz", number, "", "good frames at 560 kHz"}),
-    field<valid<5>>({"valid_1100_khz", number, "", "good frames at 1100 kHz"}),
-    field<valid<6>>({"valid_2200_khz", number, "", "good frames at 2200 kHz"}),
-    field<valid<7>>({"valid_4400_khz", number, "", "good frames at 4400 kHz"}),
-    field<recommended>({"recommended_clock", number, "", "to be set with `absenc config set ... clock`"}),
-    field<khz<recommended>>({"recommended_khz", number, "kHz", "that clock"}),
-    field<restored>({"restored_clock", number, "", "clock before the sweep, which is restored"}),
-    field<aborted>({"aborted", boolean, "", "the sweep was ended early: not all clocks were tried"}));
+    field<&InterfaceResults::width>("width", "bits", "width of the position that ? gives"),
+    field<&InterfaceResults::counts>("counts", "counts", "position, the interface's zero taken off"),
+    field<frames>("frames", "", "frames read at each clock"),
+    field<valid<0>>("valid_35_khz", "", "good frames at 35 kHz"),
+    field<valid<1>>("valid_70_khz", "", "good frames at 70 kHz"),
+    field<valid<2>>("valid_140_khz", "", "good frames at 140 kHz"),
+    field<valid<3>>("valid_280_khz", "", "good frames at 280 kHz"),
+    field<valid<4>>("valid_560_khz", "", "good frames at 560 kHz"),
+    field<valid<5>>("valid_1100_khz", "", "good frames at 1100 kHz"),
+    field<valid<6>>("valid_2200_khz", "", "good frames at 2200 kHz"),
+    field<valid<7>>("valid_4400_khz", "", "good frames at 4400 kHz"),
+    field<recommended>("recommended_clock", "", "to be set with `absenc config set ... clock`"),
+    field<khz<recommended>>("recommended_khz", "kHz", "that clock"),
+    field<restored>("restored_clock", "", "clock before the sweep, which is restored"),
+    field<aborted>("aborted", "", "the sweep was ended early: not all clocks were tried"));
 // Fields of a sweep that was interrupted.
 constexpr auto left_fields = fields_of<InterfaceResults>(
-    field<left>({"left_clock", number, "", "the clock that the sweep set last"}),
-    field<khz<left>>({"left_khz", number, "kHz", "that clock"}),
-    field<&InterfaceResults::previous>(
-        {"previous_clock", number, "", "clock before the sweep: restore it with `absenc config set ... clock`"}));
-constexpr auto all_fields =
-    joined_fields(joined_fields(word_fields, biss::own_fields), joined_fields(own_fields.infos, left_fields.infos));
+    field<left>("left_clock", "", "the clock that the sweep set last"),
+    field<khz<left>>("left_khz", "kHz", "that clock"),
+    field<&InterfaceResults::previous>("previous_clock", "",
+                                       "clock before the sweep: restore it with `absenc config set ... clock`"));
+constexpr auto all_fields = joined(word_fields.infos, biss::frame_fields.infos, own_fields.infos, left_fields.infos);
 
 constexpr void put_samples(FieldSink& sink, const Format& format, std::uint64_t samples) {
   const Position position = decode_position(format, samples).value();
   const bool is_biss = format.carries == Carries::biss;
-  if (is_biss) sink.put({&biss::own_fields[biss::field_ack_bits], position.ack_bits});
+  if (is_biss) biss::frame_fields.put<&biss::FrameValues::ack_bits>(sink, position.ack_bits);
   put_word(sink, format.word, position.word, format.scale);
-  if (is_biss) sink.put({&biss::own_fields[biss::field_crc], position.crc});
+  if (is_biss) biss::frame_fields.put<&biss::FrameValues::crc>(sink, position.crc);
 }
 
 // ---- Reported fields
@@ -306,7 +304,7 @@ constexpr Declaration<Protocol, VirtualInterface> declaration{
     .reply_size = size_of_reply,
     .is_checked = is_checked,
     .reportable = reportable_by,
-    .alarms = &all_fields[word_field_alarms],
+    .alarms = word_fields.of<&WordValues::alarms>(),
     .timing = {.turnaround_limit = answer_limit},
 };
 

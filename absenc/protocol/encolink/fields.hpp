@@ -75,25 +75,22 @@ struct Values {
   /// A value that may be missing.
   template <class T>
   using Maybe = std::optional<T>;
-  Maybe<Position> position{};        ///< Value of the field `position`, if there is one.
-  Maybe<std::uint16_t> multiturn{};  ///< Value of the field `multiturn`, if there is one.
-  Maybe<std::uint8_t> channel2{};    ///< Value of the field `channel2`, if there is one.
-  Maybe<std::uint16_t> status{};     ///< Value of the field `status`, if there is one.
-  Maybe<std::uint8_t> channel3{};    ///< Value of the field `channel3`, if there is one.
-  Maybe<Identity> identity{};        ///< Value of the field `identity`, if there is one.
-  Maybe<std::uint8_t> config{};      ///< Value of the field `config`, if there is one.
-  Maybe<std::uint8_t> ra{};          ///< Value of the field `ra`, if there is one.
-  Maybe<std::string_view> op{};      ///< Value of the field `op`, if there is one.
-  Maybe<std::string_view> name{};    ///< Value of the field `name`, if there is one.
-  Maybe<std::uint32_t> address{};    ///< Value of the field `address`, if there is one.
-  Maybe<std::size_t> length{};       ///< Value of the field `length`, if there is one.
-  Maybe<Bytes> data{};               ///< Value of the field `data`, if there is one.
-  Maybe<std::uint64_t> value{};      ///< Value of the field `value`, if there is one.
+  Maybe<std::uint8_t> general_status{};  ///< Declared for its flags, which a reading has; never put.
+  Maybe<Position> position{};            ///< Value of the field `position`, if there is one.
+  Maybe<std::uint16_t> multiturn{};      ///< Value of the field `multiturn`, if there is one.
+  Maybe<std::uint8_t> channel2{};        ///< Value of the field `channel2`, if there is one.
+  Maybe<std::uint16_t> status{};         ///< Value of the field `status`, if there is one.
+  Maybe<std::uint8_t> channel3{};        ///< Value of the field `channel3`, if there is one.
+  Maybe<Identity> identity{};            ///< Value of the field `identity`, if there is one.
+  Maybe<std::uint8_t> config{};          ///< Value of the field `config`, if there is one.
+  Maybe<std::uint8_t> ra{};              ///< Value of the field `ra`, if there is one.
+  Maybe<std::string_view> op{};          ///< Value of the field `op`, if there is one.
+  Maybe<std::string_view> name{};        ///< Value of the field `name`, if there is one.
+  Maybe<std::uint32_t> address{};        ///< Value of the field `address`, if there is one.
+  Maybe<std::size_t> length{};           ///< Value of the field `length`, if there is one.
+  Maybe<Bytes> data{};                   ///< Value of the field `data`, if there is one.
+  Maybe<std::int64_t> value{};           ///< Value of the field `value`, if there is one.
 };
-
-/// Field: general status.
-inline constexpr FieldInfo general_status_field{"general_status", FieldInfo::Kind::flags, "",
-                                                "the two low bits of a position frame, active low", general_flags};
 
 namespace detail {
 // Returns a member of an optional part.
@@ -102,17 +99,18 @@ constexpr auto of(const Values& values) {
   return values.*part ? std::optional((*(values.*part)).*member) : std::nullopt;
 }
 constexpr std::optional<std::uint16_t> alarms_of(const Values& values) { return values.status; }
-constexpr std::optional<Bytes> part_number_of(const Values& values) {
-  return values.identity ? std::optional(values.identity->part_number()) : std::nullopt;
+constexpr std::optional<author::AsciiText> part_number_of(const Values& values) {
+  return values.identity ? std::optional(author::AsciiText{values.identity->part_number()}) : std::nullopt;
 }
 }  // namespace detail
 
 /// Fields of position frames.
 inline constexpr auto frame_fields = [] {
-  using enum FieldInfo::Kind;
   using author::field;
   using detail::of;
   return author::fields_of<Values>(
+      field<&Values::general_status>("general_status", "the two low bits of a position frame, active low",
+                                     general_flags),
       field<of<&Values::position, &Position::singleturn>>("singleturn", "counts", "position within the turn",
                                                           Role::position),
       field<&Values::multiturn>("multiturn", "revolutions", "turn counter", Role::turns),
@@ -126,7 +124,7 @@ inline constexpr auto frame_fields = [] {
       field<of<&Values::identity, &Identity::protocol_version>>("protocol_version", "", "of EncoLink: 2 or 4"),
       field<of<&Values::identity, &Identity::frame_bytes>>("frame_bytes", "", "5 without turns, 7 with"),
       field<of<&Values::identity, &Identity::resolution>>("resolution", "bits", "of a turn"),
-      field<detail::part_number_of>({"part_number", text, "", "from the identity", {}, Role::identity}),
+      field<detail::part_number_of>("part_number", "", "from the identity", Role::identity),
       field<&Values::config>("config", "",
                              "first byte of a request: 00 position, AA reset of the channels, BB identify"),
       field<&Values::ra>("ra", "", "second byte of a request: one byte of a register access"),
@@ -135,47 +133,50 @@ inline constexpr auto frame_fields = [] {
       field<&Values::address>("address", "", "of the register", Role::exchange),
       field<&Values::length>("length", "bytes", "of the register", Role::exchange),
       field<&Values::data>("data", "", "the register's bytes, most significant first", Role::data),
-      field<&Values::value>({"value", number, "", "the same as a number", {}, Role::value}));
+      field<&Values::value>("value", "", "the same as a number", Role::value));
 }();
 
-/// Field: number of calibrations.
-inline constexpr FieldInfo calibrations_field{"calibrations", FieldInfo::Kind::number, "",
-                                              "self-calibrations that ended, modulo 4"};
-/// Field: whether a calibration runs.
-inline constexpr FieldInfo running_field{"running", FieldInfo::Kind::boolean, "",
-                                         "whether the self-calibration is running"};
-/// Field: why no register is shown.
-inline constexpr FieldInfo not_described_field{"registers", FieldInfo::Kind::text, "", "why no register is shown"};
+/// The value of a register, by its content.
+struct RegisterValue {
+  std::int64_t number;     ///< A plain number.
+  double celsius;          ///< Temperature of the readhead, in degC.
+  double rpm;              ///< Speed of the ring, in rpm.
+  std::uint8_t flags;      ///< Flags of the last self-calibration.
+  author::AsciiText text;  ///< A number of the encoder.
+};
 
 /// Fields of the registers, in the order of the table `registers`.
 inline constexpr auto register_fields = [] {
-  using enum FieldInfo::Kind;
-  constexpr std::array<FieldInfo, 5> of_content{{
-      {"", number, "", "register"},
-      {"", real, "degC", "register: temperature of the readhead"},
-      {"", real, "rpm", "register: speed of the ring"},
-      {"", flags, "", "how the last self-calibration ended", calibration_flags},
-      {"", text, "", "register", {}, Role::identity},  // all registers with text are numbers that identify the encoder
-  }};
+  using author::field;
+  constexpr auto by_content = author::fields_of<RegisterValue>(
+      field<&RegisterValue::number>("", "", "register"),
+      field<&RegisterValue::celsius>("", "degC", "register: temperature of the readhead"),
+      field<&RegisterValue::rpm>("", "rpm", "register: speed of the ring"),
+      field<&RegisterValue::flags>("", "how the last self-calibration ended", calibration_flags),
+      field<&RegisterValue::text>("", "", "register",
+                                  Role::identity));  // all texts are numbers that identify the encoder
   std::array<FieldInfo, registers.size()> made{};
   for (std::size_t i = 0; i < made.size(); ++i) {
-    made[i] = of_content[static_cast<std::size_t>(registers[i].content)];
+    made[i] = by_content.infos[static_cast<std::size_t>(registers[i].content)];
     made[i].name = registers[i].name;
   }
   return made;
 }();
 
+/// Values that a procedure reports besides registers and frames.
+struct ProcedureValues {
+  std::uint8_t calibrations;        ///< Self-calibrations that ended, modulo 4.
+  bool running;                     ///< Whether the self-calibration is running.
+  author::AsciiText not_described;  ///< Why no register is shown.
+};
+/// Fields of these values.
+inline constexpr auto procedure_fields = author::fields_of<ProcedureValues>(
+    author::field<&ProcedureValues::calibrations>("calibrations", "", "self-calibrations that ended, modulo 4"),
+    author::field<&ProcedureValues::running>("running", "", "whether the self-calibration is running"),
+    author::field<&ProcedureValues::not_described>("registers", "", "why no register is shown"));
+
 /// Fields of frames, registers and procedures.
-inline constexpr auto fields = [] {
-  std::array<FieldInfo, 1 + frame_fields.infos.size() + register_fields.size() + 3> made{};
-  made[0] = general_status_field;
-  FieldInfo* next = std::copy(frame_fields.infos.begin(), frame_fields.infos.end(), made.data() + 1);
-  next = std::copy(register_fields.begin(), register_fields.end(), next);
-  *next++ = calibrations_field;
-  *next++ = running_field;
-  *next = not_described_field;
-  return made;
-}();
+inline constexpr auto fields = author::joined(frame_fields.infos, register_fields, procedure_fields.infos);
 
 /// Reports a position frame with its detailed status if known; with `channel3`, a cycle of channel 2.
 constexpr void put_position(FieldSink& sink, const Format& format, const Position& position,
@@ -210,7 +211,9 @@ constexpr void put_value(FieldSink& sink, std::size_t index, Bytes bytes) {
       break;
   }
   sink.put(shown);
-  if (index == calibration_status) sink.put({&calibrations_field, bytes[0] & calibration::count});
+  if (index == calibration_status) {
+    procedure_fields.put<&ProcedureValues::calibrations>(sink, bytes[0] & calibration::count);
+  }
 }
 
 /// Reports a register that was read or written.
@@ -220,7 +223,7 @@ constexpr void put_register(FieldSink& sink, std::uint32_t address, Bytes data,
   const bool in_table = known != nullptr && known->size == data.size();
   Values values{.op = op, .address = address, .length = data.size(), .data = data};
   if (known != nullptr) values.name = known->name;
-  if (!in_table && data.size() < 8) values.value = load_big_endian(data);
+  if (!in_table && data.size() < 8) values.value = static_cast<std::int64_t>(load_big_endian(data));
   frame_fields.put(sink, values);
   if (in_table) put_value(sink, static_cast<std::size_t>(known - registers.data()), data);
 }
@@ -290,7 +293,7 @@ constexpr Error decode_request(Bytes request, FieldSink& sink) {
   const bool reads = access->operation == RegisterRequest::Operation::read;
   Values values{.op = reads ? "read" : "write", .address = access->address, .length = access->length};
   if (!reads) values.data = access->data;
-  if (!reads && access->length < 8) values.value = load_big_endian(access->data);
+  if (!reads && access->length < 8) values.value = static_cast<std::int64_t>(load_big_endian(access->data));
   frame_fields.put(sink, values);
   return Error::none;
 }

@@ -163,7 +163,7 @@ void put_found(FieldSink& sink, const Host& host, const ProcedureState& found) {
     frame_fields.put(sink, {.identity = found.identity});
     if (found.identity->protocol_version == version::aksim4) {
       const Bytes why(reinterpret_cast<const std::uint8_t*>(not_described.data()), not_described.size());
-      sink.put({.info = &not_described_field, .bytes = why});
+      procedure_fields.put<&ProcedureValues::not_described>(sink, {why});
     }
   } else if (found.address) {
     put_register(sink, *found.address, found.data);
@@ -171,7 +171,7 @@ void put_found(FieldSink& sink, const Host& host, const ProcedureState& found) {
     put_position(sink, host.format(), host.last(), found.reports_status ? found.status : std::nullopt);
   }
   for (const ProcedureState::Value& one : found.values.view()) put_value(sink, one.index, one.bytes);
-  if (found.running) sink.put({&running_field, *found.running ? 1 : 0});
+  if (found.running) procedure_fields.put<&ProcedureValues::running>(sink, *found.running);
 }
 Explanation explain_host(const Host& host) {
   const Ask ask = host.request().ask;
@@ -445,7 +445,7 @@ constexpr author::Declaration<Protocol, VirtualEncoder, Host> declaration{
     .remembered = remembered,
     .follower = make_follower<interface>,
     .follower_storage = sizeof(ChannelFollower),
-    .status = &general_status_field,
+    .status = frame_fields.of<&Values::general_status>(),
     .alarms = frame_fields.of<detail::alarms_of>(),
     .registers = register_infos,
     .conditions = conditions,

@@ -80,7 +80,7 @@ struct Shown {
   std::optional<std::string_view> trouble{};       ///< Value of the field `trouble`, if there is one.
   std::optional<std::uint8_t> page{};              ///< Value of the field `page`, if there is one.
   std::optional<std::uint8_t> memory_address{};    ///< Value of the field `memory_address`, if there is one.
-  std::optional<bool> busy{};                      ///< Value of the field `busy`, if there is one.
+  std::optional<std::uint8_t> busy{};              ///< Value of the field `busy`, if there is one.
   std::optional<std::uint8_t> value{};             ///< Value of the field `value`, if there is one.
   std::optional<Bytes> data{};                     ///< Value of the field `data`, if there is one.
   std::optional<bool> written{};                   ///< Value of the field `written`, if there is one.
@@ -151,8 +151,7 @@ inline constexpr auto fields = [] {
           "ch2_sequence", "", "counts the replies, 0 to 127 (SC2)", Role::sequence),
       field<&Shown::page>("page", "", "memory page"),
       field<&Shown::memory_address>("memory_address", "", "ADF: 0 to 126; 127 selects the page"),
-      field<&Shown::busy>(
-          {"busy", FieldInfo::Kind::number, "", "1 while the memory is read or written: the request was not executed"}),
+      field<&Shown::busy>("busy", "", "1 while the memory is read or written: the request was not executed"),
       field<&Shown::value>("value", "", "EDF: the byte in memory", Role::value),
       field<&Shown::data>("data", "", "the bytes in memory from `memory_address` on", Role::data),
       field<&Shown::written>("written", "", "false when the value was there already", Role::written),

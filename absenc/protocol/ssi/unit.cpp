@@ -92,7 +92,7 @@ constexpr bool is_possible(const Format& format) {
 
 constexpr void put_reply(FieldSink& sink, const Format& format, const NoRequest&, const Word& word) {
   put_word(sink, format.word, word, format.scale);
-  if (format.error_parity) sink.put({&word_fields[word_field_error], word.error ? 1 : 0});
+  if (format.error_parity) word_fields.put<&WordValues::error>(sink, word.error);
 }
 Explanation explain(const Format& format, Error error, Bytes, Bytes) {
   if (error == Error::bad_checksum) return {"the parity of the word is wrong"};
@@ -138,7 +138,7 @@ constexpr Declaration<Protocol, VirtualEncoder> declaration{
     .options = options.infos,
     .format = format_by,
     .models = models,
-    .fields = word_fields,
+    .fields = word_fields.infos,
     .commands = commands,
     .vectors = vectors,
     .report = report,
@@ -148,7 +148,7 @@ constexpr Declaration<Protocol, VirtualEncoder> declaration{
     .is_checked = is_checked,
     .bits = bits_in,
     .reportable = reportable_by,
-    .alarms = &word_fields[word_field_alarms],
+    .alarms = word_fields.of<&WordValues::alarms>(),
 };
 
 }  // namespace

@@ -55,7 +55,7 @@ struct Values {
   std::optional<std::uint8_t> alarms{};              ///< Value of the field `alarms`, if there is one.
   std::optional<std::uint8_t> page{};                ///< Value of the field `page`, if there is one.
   std::optional<std::uint8_t> address{};             ///< Address.
-  std::optional<bool> busy{};                        ///< Value of the field `busy`, if there is one.
+  std::optional<std::uint8_t> busy{};                ///< Value of the field `busy`, if there is one.
   std::optional<std::uint8_t> value{};               ///< Value of the field `value`, if there is one.
   std::optional<Bytes> data{};                       ///< Value of the field `data`, if there is one.
   std::optional<std::int8_t> temperature{};          ///< Value of the field `temperature`, if there is one.
@@ -80,8 +80,7 @@ inline constexpr auto fields = [] {
       field<&Values::multiturn>("multiturn", "revolutions", "turns (ABM)", Role::turns),
       field<&Values::alarms>("alarms", "alarms (ALMC)", alarm_flags), field<&Values::page>("page", "", "memory page"),
       field<&Values::address>("address", "", "ADF: memory address; 127 selects the page"),
-      field<&Values::busy>(
-          {"busy", FieldInfo::Kind::number, "", "1 while the encoder writes: the request was not executed"}),
+      field<&Values::busy>("busy", "", "1 while the encoder writes: the request was not executed"),
       field<&Values::value>("value", "", "EDF: the byte in memory", Role::value),
       field<&Values::data>("data", "", "the bytes in memory from `address` on", Role::data),
       field<&Values::temperature>("temperature_c", "degC", "of the encoder's board, within 3 degC"),

@@ -123,13 +123,13 @@ struct Values {
   Number bit_rate{};                           ///< Value of the field `bit_rate`, if there is one.
   std::optional<bool> clash{};                 ///< Value of the field `clash`, if there is one.
   Number readings_per_s{};                     ///< Value of the field `readings_per_s`, if there is one.
-  Number singleturn{};                         ///< Value of the field `singleturn`, if there is one.
+  std::optional<std::uint64_t> singleturn{};   ///< Value of the field `singleturn`, if there is one.
   std::optional<double> angle{};               ///< Value of the field `angle`, if there is one.
   std::optional<bool> written{};               ///< Value of the field `written`, if there is one.
   std::optional<bool> answered{};              ///< Value of the field `answered`, if there is one.
   std::optional<bool> mirrored{};              ///< Value of the field `mirrored`, if there is one.
-  Number before{};                             ///< Value of the field `before`, if there is one.
-  Number after{};                              ///< Value of the field `after`, if there is one.
+  std::optional<std::uint64_t> before{};       ///< Value of the field `before`, if there is one.
+  std::optional<std::uint64_t> after{};        ///< Value of the field `after`, if there is one.
 };
 
 // ---- Orders to a node

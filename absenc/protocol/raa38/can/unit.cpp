@@ -56,7 +56,6 @@ constexpr Result<CanFrame> to(const Format& format, Arguments arguments) {
 
 // ---- Reported fields
 
-using enum FieldInfo::Kind;
 constexpr auto fields = author::fields_of<Values>(
     field<&Values::node>("node", "", "number of the node", Role::encoder),
     field<&Values::function>("function", "", "meaning of the identifier in CANopen; this encoder does not use it",
@@ -68,14 +67,14 @@ constexpr auto fields = author::fields_of<Values>(
     field<&Values::bit_rate>("bit_rate", "bit/s", "bit rate that the node is given"),
     field<&Values::clash>("clash", "", "two nodes share this number, or the line is bad", Role::clash),
     field<&Values::readings_per_s>("readings_per_s", "1/s", "positions that the node sends by itself"),
-    field<&Values::singleturn>({"singleturn", counts, "counts", "position within one revolution", {}, Role::position}),
+    field<&Values::singleturn>("singleturn", "counts", "position within one revolution", Role::position),
     field<&Values::angle>("angle_deg", "deg", "the same as an angle", Role::of_position),
     field<&Values::written>("written", "", "whether a value was written; it is not if it is set already",
                             Role::written),
     field<&Values::answered>("answered", "", "whether the command was answered"),
     field<&Values::mirrored>("mirrored", "", "whether the position is counted the other way since"),
-    field<&Values::before>({"before", counts, "counts", "position before the command"}),
-    field<&Values::after>({"after", counts, "counts", "position after it"}));
+    field<&Values::before>("before", "counts", "position before the command"),
+    field<&Values::after>("after", "counts", "position after it"));
 
 // Reports the fields, and the position as a reading.
 constexpr void put_found(FieldSink& sink, const Format& format, const Values& found) {
