@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// How long two readings can have been apart at most, also where only their times of arrival are known.
+// Upper limit of the time between two readings, also where only their arrival times are known.
 #pragma once
 
 #include <cstdint>
@@ -8,10 +8,11 @@
 
 namespace absenc::host {
 
-/// When a reading was latched: known, or only that it came then. Those that had to wait come together.
+/// What the time of a reading means: when the encoder latched it, or only when it arrived. Readings that waited in a
+/// buffer arrive together.
 enum class Times : std::uint8_t { latched, arrived };
 
-/// An encoder that transmits by itself has no time but that of its arrival.
+/// Returns whether readings of this encoder have arrival times only, because it transmits unsolicited.
 [[nodiscard]] constexpr bool sends_unsolicited(const Unit& unit, const Options& options) {
   return unit.link == LinkKind::can || (unit.streams != nullptr && unit.streams(options));
 }
@@ -22,8 +23,8 @@ class Apart {
   /// Counts the times that `times` selects.
   explicit constexpr Apart(Times times) : times_(times) {}
 
-  /// Readings that came together after a wait were taken during that wait, or while it was handed over, which takes
-  /// less long.
+  /// Returns the longest time that can lie between this reading and the last one. Readings that arrive together were
+  /// latched during the wait before, or during their delivery, which takes less time.
   [[nodiscard]] constexpr Time since_last(Time latched) const { return has_waited(latched) ? latched - last_ : wait_; }
 
   /// Adds a reading that was latched at this time.

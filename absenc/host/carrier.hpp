@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Carries a machine from interrupts: what host::drive is where a program can wait, in pieces where it cannot. It owns
-// no port and no clock; docs/firmware.md has it behind a UART, a DMA channel and a timer.
+// Runs a machine from interrupts, where a program cannot wait as host::drive does. The carrier owns no port and no
+// clock; docs/firmware.md connects it to a UART, a DMA channel and a timer.
 #pragma once
 
 #include <algorithm>
@@ -13,49 +13,51 @@
 
 namespace absenc::host {
 
-/// All members are called in one context: from interrupts of one priority, or with these held off.
+/// Call all members in one context: from interrupts of one priority, or with these disabled.
 ///
-/// Line has `void begin(const Step<Item>&)`, which begins a transfer, a pulse or a change of the rate and does not wait
-/// for it, and `void result(bool over)`, called for every `emit`, and at `done` with `over`, when `is_busy()` is false
-/// again.
+/// Line has `void begin(const Step<Item>&)`, which starts a transfer, a pulse or a change of the rate and does not wait
+/// for its end, and `void result(bool over)`. The carrier calls `result(false)` for every `emit`, and `result(true)` at
+/// `done`, when `is_busy()` is false again.
 template <class Item, class Line>
 class Carrier {
  public:
-  /// `latency` is what the way to the encoder adds to its answer time: of a UART beside it one character at the most.
+  /// `latency`: delay that the path to the encoder adds to its answer time; for a UART on the chip at most one
+  /// character.
   explicit Carrier(Line& line, Time latency = {}) : line_(&line), latency_(latency) {}
 
-  /// Begins a conversation, which must live until it is over. The one before is given up.
+  /// Starts a conversation, which must live until it is over. A running conversation is abandoned.
   void start(Machine<Item>& machine, Time now) {
     machine_ = &machine;
     expected_ = gathered_ = 0;
     sending_ = held_ = heard_ = false;
-    quiet_told_ = true;  // until something was sent
+    quiet_told_ = true;  // until a transfer is sent
     go_on(now);
   }
   /// Returns whether a conversation runs.
   [[nodiscard]] bool is_busy() const { return machine_ != nullptr; }
 
-  /// The last bit of the transfer, or of the pulse, is out.
+  /// Reports that the last bit of the transfer, or of the pulse, was sent.
   void sent(Time now) {
     if (!is_busy() || !sending_) return;
     sending_ = heard_ = quiet_told_ = false;
     quiet_since_ = now;
     tell({.kind = Event<Item>::Kind::sent, .at = now});
   }
-  /// What comes while no conversation runs is nobody's. Single characters are kept until as many are there as the
-  /// machine waits for, or the line is quiet, as a DMA channel does: one that others follow takes little time.
+  /// Reports received items; they are dropped while no conversation runs. Single characters are gathered until the
+  /// machine's expected number has arrived or the line is silent, as a DMA channel does: gathering one takes little
+  /// time.
   void received(std::span<const Item> items, Time now) {
     if (items.size() == 1 && gathered_ + 1u < expected_) return gather(items.front(), now);
     come(items, now);
   }
-  /// A character with a wrong stop or parity bit came.
+  /// Reports a character with a wrong stop or parity bit.
   void line_error(Time now) {
     tell_gathered();
     came({.kind = Event<Item>::Kind::line_error, .at = now});
   }
 
-  /// To be called when `due()` has come; oftener does no harm. A tick slower than the encoder's limits makes silences
-  /// longer, never wrong.
+  /// Does what is due. Call it at `due()`; more calls do no harm. A tick slower than the encoder's limits makes
+  /// silences longer, but never wrong.
   void tick(Time now) {
     if (now < due()) return;
     tell_gathered();
@@ -73,12 +75,12 @@ class Carrier {
     at_ = never;
     tell({.kind = Event<Item>::Kind::timer, .at = now});
   }
-  /// When `tick` has something to do; `never`: not before something is sent or comes.
+  /// Returns when `tick` has work to do; `never`: only after something is sent or received.
   [[nodiscard]] Time due() const {
     if (!is_busy()) return never;
     return held_ ? step_.at : std::min(at_, quiet_end());
   }
-  /// How often a reply did not come, or not to its end, or was followed by silence because it was not good.
+  /// Returns how many replies were missing, incomplete, or followed by silence because they were invalid.
   [[nodiscard]] std::uint32_t silences() const { return silences_; }
 
  private:
@@ -120,7 +122,8 @@ class Carrier {
     return quiet_told_ || limit == Time{} ? never : quiet_since_ + limit + latency_;
   }
 
-  // A transfer is remembered until its time has come; what it waits for afterwards stands in the step behind it.
+  // Takes the machine's steps until it waits. A transfer is stored until its time; its limits of silence are in the
+  // wait step after it.
   void go_on(Time now) {
     for (;;) {
       const Step<Item> step = machine_->next(now);
@@ -151,32 +154,32 @@ class Carrier {
           answer_ = step.answer;
           gap_ = step.gap;
           at_ = step.at > now ? step.at : never;
-          // Where no pause ends what has begun, characters that are kept would never be told.
+          // Without a gap limit no silence would deliver the gathered characters.
           expected_ = gap_ == Time{} ? 0 : static_cast<std::uint8_t>(std::min(step.expect, room));
           return;
       }
     }
   }
 
-  // As many as most replies have; longer ones are told in pieces. Of frames each.
+  // Characters of most replies; longer ones are delivered in pieces. CAN: one frame.
   static constexpr std::size_t room = sizeof(Item) == 1 ? 16 : 1;
 
-  // First what every character needs.
-  std::uint8_t expected_ = 0;  // characters that may be kept, or one more; 0: none
+  // Members that every received character needs come first, for short instructions.
+  std::uint8_t expected_ = 0;  // characters to gather, or one more; 0: none
   std::uint8_t gathered_ = 0;
   bool held_ = false;
   bool sending_ = false;
-  bool heard_ = false;  // since the last transfer
+  bool heard_ = false;  // an item arrived since the last transfer
   bool quiet_told_ = true;
   Time quiet_since_{};
-  std::array<Item, room> items_;  // gathered
+  std::array<Item, room> items_;  // gathered characters
   Line* line_;
   Machine<Item>* machine_ = nullptr;
   Time latency_;
   Time answer_{};
   Time gap_{};
   Time at_ = never;
-  Step<Item> step_{};  // held until its time
+  Step<Item> step_{};  // transfer that waits for its time
   std::uint32_t silences_ = 0;
 };
 

@@ -34,7 +34,7 @@ struct CarrierTest : testing::Test {
 TEST_F(CarrierTest, CarriesAConversationByteByByte) {
   carrier.start(read, 5us);
   EXPECT_EQ(line.sent, std::vector<std::uint8_t>{0x1A});
-  EXPECT_EQ(carrier.due(), never);  // until it is sent
+  EXPECT_EQ(carrier.due(), never);  // nothing is due until the transfer is sent
   carrier.sent(10us);
   EXPECT_EQ(carrier.due(), 10us + tformat::answer_limit + 1ms);
   Time now = 20us;
@@ -47,7 +47,7 @@ TEST_F(CarrierTest, CarriesAConversationByteByByte) {
   EXPECT_EQ(carrier.silences(), 0u);
 }
 
-// What a machine was fed, in words.
+// A machine that lists the events that it was fed, as text.
 struct Fed final : Machine<std::uint8_t> {
   void feed(const ByteEvent& event) override {
     if (event.kind == ByteEvent::Kind::sent) receiving = true;
@@ -90,13 +90,13 @@ TEST_F(CarrierTest, CharactersAreToldWhenAllAreThere) {
               one.sent(10ns);
               characters(one, 4, 11ns);
               EXPECT_EQ(one.due(), 14ns + 1us);
-              characters(one, 2, 15ns);  // the sixth is nobody's
+              characters(one, 2, 15ns);  // the sixth character arrives after the conversation and is dropped
             }),
             "5 at 15; ");
   EXPECT_EQ(fed_by([&](auto& one) {
               one.sent(10ns);
               characters(one, 3, 11ns);
-              one.tick(20ns);  // not due
+              one.tick(20ns);  // nothing is due
               one.tick(2us);
             }),
             "3 at 13; silence; ");
@@ -108,7 +108,7 @@ TEST_F(CarrierTest, CharactersAreToldWhenAllAreThere) {
             }),
             "2 at 12; error; 2 at 15; ");
   EXPECT_EQ(fed_by([&](auto& one) {
-              characters(one, 1, 5ns);  // before the request is out
+              characters(one, 1, 5ns);  // arrives before the request is sent
               one.sent(10ns);
               characters(one, 2, 11ns);
               one.received(std::span(reply).first(3), 15ns);
@@ -120,7 +120,7 @@ TEST_F(CarrierTest, CharactersAreToldWhenAllAreThere) {
                   characters(one, 2, 11ns);
                 },
                 0us),
-            "1 at 11; 1 at 12; ");  // nothing would end what is kept
+            "1 at 11; 1 at 12; ");  // without a gap limit no silence would deliver gathered characters
   EXPECT_EQ(fed_by(
                 [&](auto& one) {
                   one.sent(10ns);
@@ -130,7 +130,7 @@ TEST_F(CarrierTest, CharactersAreToldWhenAllAreThere) {
             "16 at 26; 4 at 30; ");
 }
 
-// The next conversation has nothing of what is given up.
+// The next conversation gets none of the gathered characters of an abandoned one.
 TEST_F(CarrierTest, WhatWasKeptIsForgottenWithItsConversation) {
   Fed fed;
   carrier.start(fed, 0us);
@@ -172,7 +172,7 @@ TEST_F(CarrierTest, WhatComesUnaskedIsNobodys) {
   EXPECT_EQ(line.results, 0u);
 }
 
-// A machine that sends later.
+// A machine whose transfer has a time in the future.
 struct Later final : Machine<std::uint8_t> {
   void feed(const ByteEvent& event) override { over = event.kind == ByteEvent::Kind::sent; }
   ByteStep next(Time) override {

@@ -1,16 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
-// Runs a machine on a port until it is done: the loop that every carrier of a real line has.
+// Runs a machine on a port until it is done: the loop of every program that may wait.
 #pragma once
 
 #include "absenc/link/port.hpp"
 
 namespace absenc::host {
 
-/// `on_emit()` is called for every `emit` step and returns whether to go on. Returns true when the machine is done,
-/// false when `on_emit` stopped it. What a port throws passes through.
+/// Runs the machine. `on_emit()` is called for every `emit` step and returns whether to continue. Returns true when the
+/// machine is done, false when `on_emit` stopped it. Exceptions of the port pass through.
 template <class Item, class OnEmit>
 bool drive(Machine<Item>& machine, Port<Item>& port, OnEmit&& on_emit) {
-  // Between events the machine's time stands still: looking at the clock more often only costs.
+  // The machine's time stands still between events: reading the clock more often costs time and gains nothing.
   for (Time now = port.now();;) {
     const Step<Item> step = machine.next(now);
     switch (step.kind) {
@@ -34,15 +34,15 @@ bool drive(Machine<Item>& machine, Port<Item>& port, OnEmit&& on_emit) {
   }
 }
 
-/// Feeds a machine that streams all that is waiting for it, and drops what it emits: what comes next is new.
+/// Feeds all waiting items to a machine that streams, and drops its results, so that the next result is new.
 template <class Item>
 void catch_up(Machine<Item>& machine, Port<Item>& port) {
   for (Time now = port.now();;) {
     Step<Item> step = machine.next(now);
     if (step.kind == Step<Item>::Kind::emit) continue;
-    if (step.kind != Step<Item>::Kind::wait) return;  // for `drive` to carry out
+    if (step.kind != Step<Item>::Kind::wait) return;  // `drive` executes this step
     const Time due = step.at;
-    step.at = port.now() + Time{1};  // bytes that are there go before it
+    step.at = port.now() + Time{1};  // items that have already arrived are delivered first
     const Event<Item> event = port.wait(step);
     now = event.at;
     if (event.kind != Event<Item>::Kind::timer) {

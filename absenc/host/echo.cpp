@@ -24,7 +24,7 @@ ByteStep EchoFilter::next(Time now) {
     sent_.clear();
     held_.clear();
     echoed_ = 0;
-    // A request longer than any protocol's is passed on unfiltered.
+    // Longer than any request of a supported protocol: passed on unfiltered.
     if (!sent_.append(step.out)) return step;
     reply_due_ = step.expect;
     echo_due_ = working_mode() == EchoMode::on ? sent_.size() : 0;
@@ -35,7 +35,7 @@ ByteStep EchoFilter::next(Time now) {
   if (step.expect != 0) {
     step.expect += working_mode() == EchoMode::on ? echo_due_ : sent_.size() - std::min(sent_.size(), held_.size());
   }
-  // The echo is no answer: the time for that still runs.
+  // The echo is no answer, so the answer limit still applies.
   if (!passed_) step.gap = std::max(step.gap, step.answer);
   return step;
 }
@@ -92,8 +92,8 @@ bool EchoFilter::is_reply(Bytes bytes) const {
   return unit_ != nullptr && unit_->check(*options_, {.bytes = sent_}, {.bytes = bytes}) == Error::none;
 }
 
-// What is held begins like the request: an echo, or a reply that begins like it. Their number tells, or which of both
-// is a good reply.
+// The held bytes begin like the request: they are an echo, or a reply that begins like it. Their number decides, or
+// which of the two is a valid reply.
 void EchoFilter::decide(Time at) {
   const std::size_t echo = sent_.size();
   const bool echo_and_reply = held_.size() >= reply_due_ + echo;
@@ -111,7 +111,7 @@ void EchoFilter::decide(Time at) {
   }
   found_ = EchoMode::off;
   if (!has_no_echo) return pass(at, bytes);
-  pass(at, bytes.first(reply));  // and what is behind it is not part of it
+  pass(at, bytes.first(reply));  // the bytes after the reply are not part of it
   pass(at, bytes.subspan(reply));
 }
 

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// Takes the local echo of an RS-485 adapter out of what a conversation hears: by count, never by comparing, because a
-// good reply may equal its request byte for byte. The removed bytes are compared to find a disturbed line. Whether
-// there is an echo is decided here alone: by the number of bytes, and where that leaves both by which is a good reply.
+// Removes the local echo of an RS-485 adapter from the received bytes: by count, not by comparison, because a valid
+// reply may equal its request byte for byte. The removed bytes are compared with the request to detect a disturbed
+// line. The filter alone decides whether the adapter echoes: by the number of bytes, and where that is ambiguous by
+// which bytes are a valid reply.
 #pragma once
 
 #include <cstdint>
@@ -14,30 +15,31 @@ namespace absenc::host {
 
 /// Whether the adapter receives what it sends.
 enum class EchoMode : std::uint8_t {
-  automatic,  ///< found out from the first good exchange
+  automatic,  ///< determined from the first good exchange
   on,
   off,
 };
 
-/// Stands between a conversation and its port.
+/// A filter between a conversation and its port.
 class EchoFilter final : public Machine<std::uint8_t> {
  public:
   /// Handles the echo of the adapter as `mode` says.
   explicit EchoFilter(EchoMode mode) : mode_(mode) {}
 
-  /// By whose rules replies are judged from now on; both must outlive that. Without, by their number of bytes alone.
+  /// Sets the unit that decides whether a reply is valid; both arguments must outlive the filter's use. Without a unit
+  /// the number of bytes alone decides.
   void judge_by(const Unit& unit, const Options& options) {
     unit_ = &unit;
     options_ = &options;
   }
-  /// The conversation to serve from now on.
+  /// Sets the conversation whose echo is removed from now on.
   void attach(Machine<std::uint8_t>& inner) {
     inner_ = &inner;
     sent_.clear();
     held_.clear();
   }
-  /// How the conversation ended. In automatic mode only a good one makes what was found final: a reply that is one byte
-  /// too long looks like an echo at first.
+  /// Ends the exchange. In automatic mode only a good conversation makes the detected mode final: a reply that is one
+  /// byte too long looks like an echo at first.
   void conclude(bool good);
 
   /// Takes an event of the port.
@@ -45,11 +47,11 @@ class EchoFilter final : public Machine<std::uint8_t> {
   /// Returns the next step of the port.
   Step<std::uint8_t> next(Time now) override;
 
-  /// What is known: `automatic` while nothing is.
+  /// Returns the mode; `automatic` while it is not known whether the adapter echoes.
   [[nodiscard]] EchoMode mode() const { return mode_; }
-  /// So many bytes of what came behind the last request were its echo.
+  /// Returns how many of the bytes after the last request were its echo.
   [[nodiscard]] std::size_t echoed() const { return echoed_; }
-  /// Whether the echo of the last request came back and nothing else.
+  /// Returns whether only the echo of the last request was received.
   [[nodiscard]] bool only_echo() const { return only_echo_; }
 
  private:
@@ -66,14 +68,14 @@ class EchoFilter final : public Machine<std::uint8_t> {
   EchoMode mode_;
   const Unit* unit_ = nullptr;
   const Options* options_ = nullptr;
-  EchoMode found_ = EchoMode::automatic;  // in this conversation
+  EchoMode found_ = EchoMode::automatic;  // mode detected in this conversation
   Machine<std::uint8_t>* inner_ = nullptr;
   ByteBuffer<capacity> sent_;
-  ByteBuffer<capacity> held_;  // automatic: heard before it is known what is echo
-  std::size_t echo_due_ = 0;   // on: echo bytes still to come
-  std::size_t echoed_ = 0;     // of the last request
-  std::size_t reply_due_ = 0;  // items the conversation expects
-  bool passed_ = false;        // something of the reply went to the conversation
+  ByteBuffer<capacity> held_;  // automatic: received bytes that may be echo
+  std::size_t echo_due_ = 0;   // on: echo bytes still to be received
+  std::size_t echoed_ = 0;     // echo bytes of the last request
+  std::size_t reply_due_ = 0;  // bytes that the conversation expects
+  bool passed_ = false;        // bytes of the reply were passed to the conversation
   bool only_echo_ = false;
 };
 

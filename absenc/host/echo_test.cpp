@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The echo of adapters, removed in a session.
+// Echo of adapters, removed in a session.
 #include "absenc/host/echo.hpp"
 
 #include <gtest/gtest.h>
@@ -25,7 +25,7 @@ TEST_P(Echo, IsRemovedByCount) {
   for (int i = 0; i < 3; ++i) {
     EXPECT_EQ(bench.read().error() == Error::none, GetParam().good);
   }
-  // Read, page select (its reply equals its request), memory read.
+  // Exchanges: read, page select (whose reply equals its request), memory read.
   const auto* temperature = bench.session->run(*find_command(bench.unit, Verb::temperature));
   EXPECT_EQ(temperature->error() == Error::none, GetParam().good);
 }
@@ -55,7 +55,7 @@ TEST(EchoFilter, NamesALineOnWhichOnlyTheEchoComesBack) {
 }
 
 TEST(EchoFilter, OneByteTooManyIsNotTakenForAnEcho) {
-  // The first reply has a byte behind it that makes it as long as echo and reply.
+  // The first reply has one extra byte, so that it is as long as echo and reply together.
   struct TooLong final : Machine<std::uint8_t> {
     explicit TooLong(Machine<std::uint8_t>& encoder) : device(encoder) {}
     void feed(const Event<std::uint8_t>& event) override { device.feed(event); }
@@ -99,9 +99,9 @@ TEST(EchoFilter, ADisturbedEchoIsNoticed) {
   }
 }
 
-// The echo ends long before the encoder answers: that is no gap.
+// The echo ends long before the encoder answers. That silence is no gap.
 TEST(EchoFilter, TheAnswerTimeRunsOnAfterTheEcho) {
-  Bench port_like(EchoMode::on);  // on a real port the echo comes after `sent`
+  Bench port_like(EchoMode::on);  // on a real port the echo is received after the `sent` event
   std::vector<std::byte> storage(port_like.unit.host_storage);
   auto* read = port_like.unit.host(port_like.options, *find_command(port_like.unit, Verb::read), {}, storage).bytes;
   EchoFilter filter(EchoMode::on);
@@ -121,7 +121,7 @@ TEST(EchoFilter, TheAnswerTimeRunsOnAfterTheEcho) {
   }
 }
 
-// The reply to a page select has as many bytes as its request and equals it.
+// The reply to a page select equals its request, so it has as many bytes.
 TEST(EchoFilter, AReplyLikeItsRequestIsNotTakenForAnEchoAlone) {
   Bench bench(EchoMode::automatic);
   EXPECT_EQ(bench.session->run(*find_command(bench.unit, Verb::temperature))->error(), Error::none);

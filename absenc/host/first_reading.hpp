@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Encoders send well-formed nonsense while they start, and no check sees all damage: the position to trust is the
-// second of two that agree.
+// Decides whether a position can be trusted. Encoders send well-formed wrong positions while they start, and no
+// checksum detects all damage: a position is trusted when a second one agrees with it.
 #pragma once
 
 #include <cstdint>
@@ -11,13 +11,13 @@
 
 namespace absenc::host {
 
-/// Compares each position with the one before: no shaft gets farther than its fastest in the time between. Where the
-/// fastest gets farther than half of what the encoder counts, less a sixteenth, only a position that is farther away
-/// than that is refused. A shaft that is faster, by `most_excess` at the most, is seen by its third position, which is
-/// as far from the second as that from the first.
+/// Compares each position with the one before: the distance must be possible at the highest speed in the time between
+/// them. If that speed covers more than 15/32 of the counted range, only positions farther away than 15/32 are refused.
+/// A shaft that is faster, by a factor of `most_excess` at most, is accepted at its third position, if it is as far
+/// from the second as the second from the first.
 class FirstReading {
  public:
-  /// 0: nobody says it, which counts as the usual limit of `SpeedLimit`.
+  /// `maximum_rpm` 0: unknown; the default limit of `SpeedLimit` applies.
   explicit constexpr FirstReading(std::uint32_t maximum_rpm)
       : FirstReading(Reach::of_shaft(maximum_rpm != 0 ? maximum_rpm : SpeedLimit{}.rpm)) {}
   /// Accepts readings that the shaft can reach.
@@ -29,22 +29,23 @@ class FirstReading {
     has_step_ = false;
   }
 
-  /// Whether `reading` is ready, valid and as near to the one before as the fastest shaft allows. The next is compared
-  /// with this one.
+  /// Returns whether `reading` is ready, valid and as near to the one before as the highest speed allows. Stores it for
+  /// the next comparison.
   constexpr bool confirms(const Reading& reading) {
     const bool agrees = is_near(reading);
     keep(reading);
     return agrees;
   }
 
-  /// Whether it has a position that can be compared: ready and valid.
+  /// Returns whether `reading` has a position that can be compared: ready and valid.
   [[nodiscard]] static constexpr bool has_position(const Reading& reading) {
     return reading.ready && reading.singleturn_valid();
   }
-  /// Whether there is one before.
+  /// Returns whether a position is stored that the next one is compared with.
   [[nodiscard]] constexpr bool has_last() const { return last_.bits != 0; }
 
-  /// `between` is how long they can have been apart.
+  /// Returns whether the stored position and this one can be `between` apart. `between`: longest possible time between
+  /// the two readings.
   [[nodiscard]] constexpr bool is_near(const Reading& reading, Time between) const {
     const Place place = place_of(reading);
     if (!is_like_last(place)) return false;
@@ -61,14 +62,13 @@ class FirstReading {
     return is_near(reading, reading.latched - latched_);
   }
 
-  /// Whether the limit tells anything of readings that are so far apart: whether it excludes any position that is not
-  /// half the range away.
+  /// Returns whether the speed limit excludes any position nearer than half the range after this time.
   [[nodiscard]] constexpr bool tells(const Reading& reading, Time between) const {
     const Place place = place_of(reading);
     return place.bits != 0 && reach(place, between) < most_told(place.bits);
   }
 
-  /// The next is compared with this one. One without a position starts it again.
+  /// Stores `reading` for the next comparison. One without a position clears the stored position.
   constexpr void keep(const Reading& reading) {
     const Place place = place_of(reading);
     has_step_ = is_like_last(place);
@@ -78,10 +78,10 @@ class FirstReading {
   }
 
  private:
-  // With the turns, where they hold.
+  // A position in counts, with the turns if they are valid.
   struct Place {
     std::uint64_t counts = 0;
-    std::uint8_t bits = 0;  // 0: none
+    std::uint8_t bits = 0;  // 0: no position
     std::uint8_t singleturn_bits = 0;
   };
 
@@ -103,7 +103,7 @@ class FirstReading {
   [[nodiscard]] static constexpr std::uint64_t least(std::uint64_t one, std::uint64_t other) {
     return one < other ? one : other;
   }
-  // The shorter way round.
+  // Returns the shorter of the two distances around the range.
   [[nodiscard]] static constexpr std::uint64_t distance(std::uint64_t step, unsigned bits) {
     return least(step & low_mask(bits), (0 - step) & low_mask(bits));
   }
@@ -113,7 +113,7 @@ class FirstReading {
     const std::uint64_t counts = reach_.counts(between, place.singleturn_bits);
     return counts < ~noise ? counts + noise : counts;
   }
-  // 15/32 of the range, as in longest_gap.
+  // Largest distance that can be judged: 15/32 of the range, as in longest_gap.
   [[nodiscard]] static constexpr std::uint64_t most_told(unsigned bits) {
     constexpr std::uint64_t share = 15;
     return bits >= 5 ? share << (bits - 5) : (share << bits) >> 5;
@@ -122,7 +122,7 @@ class FirstReading {
   Reach reach_;
   Place last_{};
   bool has_step_ = false;
-  std::uint64_t step_ = 0;  // to it from the one before
+  std::uint64_t step_ = 0;  // counts from the position before the last one to the last one
   Time latched_{};
 };
 

@@ -33,7 +33,7 @@ TEST(FirstReading, AllowsNoMoreThanTheFastestShaft) {
   };
   EXPECT_TRUE(confirmed(13'107, 0));
   EXPECT_FALSE(confirmed(13'120, 0));
-  EXPECT_TRUE(confirmed(131'072 - 13'107, 65'535));  // backwards over both wraps
+  EXPECT_TRUE(confirmed(131'072 - 13'107, 65'535));  // backwards across the ends of turn and turn counter
   EXPECT_FALSE(confirmed(0, 1));
   EXPECT_FALSE(confirmed(0, 32'768));
 }
@@ -67,7 +67,7 @@ TEST(FirstReading, AShaftThatIsFasterIsSeenByItsThirdPosition) {
 }
 
 TEST(FirstReading, AShaftThatIsMuchFasterIsNotBelieved) {
-  for (const std::uint64_t step : {1638u, 3276u, 3500u}) {  // of 819 in a millisecond
+  for (const std::uint64_t step : {1638u, 3276u, 3500u}) {  // 819 counts in 1 ms are allowed
     FirstReading first(6000);
     EXPECT_FALSE(first.confirms(of_bits(15, 0, 0ms)));
     EXPECT_FALSE(first.confirms(of_bits(15, 4 * step, 1ms)));

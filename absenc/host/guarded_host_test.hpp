@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Conversations on a simulated line behind the ReplyGuard, as a session runs them: for the campaigns of the units.
+// Runs conversations on a simulated line behind the ReplyGuard, as a session does: for the test campaigns of the units.
 #pragma once
 
 #include <cstdint>
@@ -19,8 +19,8 @@ class GuardedHost {
     valid_ = resolve_options(unit, {}, options, options_).kind == OptionError::Kind::none;
   }
 
-  /// Whether it came to its end within this time, one that asks without end to its first result. `may_repeat`: whether
-  /// it only reads.
+  /// Returns whether the conversation ended within this time, or gave its first result if it streams. `may_repeat`:
+  /// whether its requests may be repeated because they only read.
   [[nodiscard]] bool run(Conversation<Item>& conversation, Time limit, bool may_repeat = true) {
     asks_ = conversation.asks();
     emitted_ = false;
@@ -50,8 +50,8 @@ class GuardedHost {
   bool emitted_ = false;
 };
 
-/// Faults after which wrong bytes may be a good frame: all others leave frames as they were, and nothing wrong may come
-/// of them.
+/// Returns the number of faults that can turn wrong bytes into a valid frame. All other faults leave frames intact, so
+/// no wrong reading may follow from them.
 [[nodiscard]] inline std::uint64_t changed_bytes(const sim::FaultyDevice& faulty) {
   using sim::FaultKind;
   std::uint64_t sum = 0;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Unwrapping and velocity over random motions, on both sides of the speed at which they hold.
+// Unwrapping and velocity over random motions, below and above the speed at which they are valid.
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
 
@@ -11,7 +11,7 @@
 namespace absenc::host {
 namespace {
 
-/// What an encoder that counts `bits` in all shows at this position.
+/// Returns the reading of an encoder with these bits at this position.
 Reading shown(std::int64_t position, unsigned singleturn_bits, unsigned multiturn_bits, Time at) {
   const auto counts = static_cast<std::uint64_t>(position);
   Reading reading{.singleturn = counts & low_mask(singleturn_bits),
@@ -43,7 +43,7 @@ RC_GTEST_PROP(UnwrapProperty, FollowsEveryMotionBelowHalfTheRangeAStep, (std::in
   unwrapper.add(shown(position, singleturn_bits, multiturn_bits, Time{}));
   const std::int64_t offset = unwrapper.position() - position;
   for (int i = 1; i <= 200; ++i) {
-    // Up to one count below the limit one way, and up to it the other way.
+    // Steps up to one count below half the range in one direction, and up to half the range in the other.
     position += *rc::gen::weightedOneOf<std::int64_t>(
         {{8, rc::gen::inRange<std::int64_t>(-half, half)}, {1, rc::gen::just(-half)}, {1, rc::gen::just(half - 1)}});
     RC_ASSERT(unwrapper.add(shown(position, singleturn_bits, multiturn_bits, Time(i))) == Unwrapper::Joined::continued);
@@ -66,13 +66,13 @@ RC_GTEST_PROP(UnwrapProperty, TheLongestGapKeepsWithinThatLimit, ()) {
   const auto [singleturn_bits, multiturn_bits] = any_resolution();
   const auto rpm = *rc::gen::inRange<std::uint32_t>(1, 100'000);
   const Time gap = longest_gap({singleturn_bits, multiturn_bits}, {.rpm = rpm});
-  const double counts = std::ldexp(1.0, static_cast<int>(singleturn_bits)) * rpm / 60e9;  // a nanosecond
+  const double counts = std::ldexp(1.0, static_cast<int>(singleturn_bits)) * rpm / 60e9;  // counts in a nanosecond
   const auto half = static_cast<double>(Counter{singleturn_bits, multiturn_bits}.half());
   RC_ASSERT(counts * static_cast<double>(gap.count()) < half);
   RC_ASSERT(counts * static_cast<double>(gap.count() + 2) >= half * 0.9);
 }
 
-// By integers the same as by floating point, but for what is rounded up: 0.016 %.
+// Integer arithmetic gives the floating-point result, except for rounding up by at most 0.016 %.
 RC_GTEST_PROP(ReachProperty, IsWhatTheFastestGetsInThatTime, ()) {
   const auto bits = *rc::gen::inRange(1u, 65u);
   const auto speed = *rc::gen::inRange<std::uint32_t>(1, 1'000'001);
@@ -88,7 +88,7 @@ RC_GTEST_PROP(ReachProperty, IsWhatTheFastestGetsInThatTime, ()) {
 }
 
 RC_GTEST_PROP(VelocityProperty, IsThatOfTheMiddleOfItsWindow, ()) {
-  // Counts a second, and a second squared; readings every 0.1 to 20 ms, with up to half of that as jitter.
+  // Speed in counts/s, acceleration in counts/s^2; readings every 0.1 to 20 ms, with a jitter of up to half of that.
   const double speed = *rc::gen::inRange(-100'000'000, 100'000'000);
   const double acceleration = *rc::gen::inRange(-100'000'000, 100'000'000);
   const auto period = *rc::gen::inRange<std::int64_t>(100'000, 20'000'000);
@@ -112,7 +112,7 @@ RC_GTEST_PROP(VelocityProperty, OfAnUnwrappedTurnHoldsToHalfATurnAStep, ()) {
   constexpr unsigned bits = 17;
   constexpr double revolution = 1 << bits;
   const auto period = *rc::gen::inRange<std::int64_t>(100'000, 20'000'000);
-  const double limit = revolution / 2 * 1e9 / static_cast<double>(period);  // counts a second
+  const double limit = revolution / 2 * 1e9 / static_cast<double>(period);  // counts/s
   const auto measured = [&](double speed) {
     Unwrapper unwrapper(SpeedLimit{.rpm = 0});
     Velocity velocity;
@@ -126,7 +126,7 @@ RC_GTEST_PROP(VelocityProperty, OfAnUnwrappedTurnHoldsToHalfATurnAStep, ()) {
   const double share = *rc::gen::inRange(-999, 1000) / 1000.0;
   const double count = 1e9 / static_cast<double>(period);
   RC_ASSERT(std::abs(measured(share * limit) - share * limit) <= count);
-  // Above the limit it looks as if the shaft turned the other way.
+  // Above the limit the shaft seems to turn in the opposite direction.
   const double above = *rc::gen::inRange(1001, 2000) / 1000.0;
   RC_ASSERT(std::abs(measured(above * limit) - (above - 2) * limit) <= count);
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// When a position was latched, as far as host and line can tell.
+// Interval in which a position was latched, as far as host and line can know it.
 #pragma once
 
 #include "absenc/core/angle.hpp"
@@ -7,7 +7,7 @@
 
 namespace absenc::host {
 
-/// The interval in which a position was latched. Between request and reply nobody knows it better.
+/// The interval in which a position was latched. Within it, between request and reply, the time is unknown.
 struct LatchTime {
   Time earliest{};  ///< Earliest time at which the position can have been latched.
   Time latest{};    ///< Latest time at which the position can have been latched.
@@ -18,7 +18,7 @@ struct LatchTime {
   [[nodiscard]] constexpr Time width() const { return latest - earliest; }
 };
 
-/// From the times of the reading alone: the reply came behind the latching.
+/// Returns the interval from the times of the reading alone: the position was latched before its reply was received.
 [[nodiscard]] constexpr LatchTime latch_time(const Reading& reading) {
   return {reading.latched, reading.received > reading.latched ? reading.received : reading.latched};
 }

@@ -42,18 +42,18 @@ class OutstandingRequests {
     [[nodiscard]] std::size_t count() const { return lost + sent_at.size(); }
   };
 
-  /// Sets the unit whose rules decide which reply belongs to which request. Both arguments must outlive their use.
+  /// Sets the unit that decides which reply belongs to which request. Both arguments must outlive this object's use.
   void use(const Unit& unit, const Options& options) {
     unit_ = &unit;
     options_ = &options;
   }
   /// Returns whether an encoder answers this request.
   [[nodiscard]] bool is_answered(Items request) const;
-  /// Returns the time after the last received item before which this request must not be sent again.
+  /// Returns how long after the last received item this request must not be sent again.
   [[nodiscard]] Time pause_after(Items request) const;
   /// Returns whether `reply` is a valid reply to `request`.
   [[nodiscard]] bool is_reply(Items request, Items reply) const;
-  /// Returns whether `reply`, good or bad, may belong to `request`. On a CAN bus other nodes send, too.
+  /// Returns whether `reply`, valid or not, may belong to `request`. On a CAN bus other nodes send, too.
   [[nodiscard]] bool may_answer(Items request, Items reply) const;
 
   /// Returns whether no reply is outstanding.
@@ -69,16 +69,16 @@ class OutstandingRequests {
   /// Returns the first entry that this reply could answer, or null.
   [[nodiscard]] Entry* find_by_reply(Items reply);
 
-  /// Adds a request that was sent at this time. Ignored when full, unless the same request has an entry already.
+  /// Adds a request that was sent at this time. A full list ignores it, unless the same request has an entry already.
   void add(Items request, std::size_t expect, Time sent_at);
-  /// Marks all earlier requests of these bytes as lost, because the line was silent before the request is sent again.
-  /// The oldest of them counts as sent at most `longest` before the newest.
+  /// Marks all earlier requests with these bytes as lost, because the line was silent before this one is sent. The
+  /// oldest counts as sent at most `longest` before the newest.
   void mark_lost(Items request, Time longest);
-  /// Removes the oldest request of this entry: its reply arrived.
+  /// Removes the oldest request of this entry, because its reply was received.
   void remove_oldest(Entry& entry);
   /// Removes all entries.
   void clear() { entries_.clear(); }
-  /// Returns the longest time between two outstanding requests in a row, whatever their bytes, or from the last of them
+  /// Returns the longest time between two consecutive outstanding requests, whatever their bytes, or from the last one
   /// until `now`.
   [[nodiscard]] Time longest_interval(Time now) const { return std::max(longest_interval_, now - newest_); }
   /// Removes the entries whose newest request was sent before this time.
@@ -93,10 +93,10 @@ class OutstandingRequests {
   const Options* options_ = nullptr;
   Buffer<Entry, most> entries_{};
   Time newest_{};            // when the newest outstanding request was sent
-  Time longest_interval_{};  // between two requests that were added one after the other
+  Time longest_interval_{};  // longest time between two consecutively added requests
 };
 
-/// Removes the first `count` items; the buffer must have as many.
+/// Removes the first `count` items, which must exist.
 template <class Buffer>
 void drop_first(Buffer& buffer, std::size_t count = 1) {
   const Buffer all = buffer;

@@ -10,11 +10,12 @@ namespace {
 
 using namespace std::chrono_literals;
 
-constexpr int silent_timeouts = 4;        // a request is repeated after a silence of this many timeouts
-constexpr Time longest_silence = 2500ms;  // later replies were only seen on a line that delays every reply
-constexpr Time stall_silence = 500ms;     // after this silence, replies that a stalled line held back are lost
-constexpr Time longest_lateness = 10s;    // a reply later than this counts as lost
-constexpr Time noise_limit = 100ms;       // longer than any reply lasts
+constexpr int silent_timeouts = 4;  // timeouts of silence before a request is repeated
+// Longest usual lateness; replies were only later on a line that delays every reply.
+constexpr Time longest_silence = 2500ms;
+constexpr Time stall_silence = 500ms;   // silence after which the replies that a stalled line held back are lost
+constexpr Time longest_lateness = 10s;  // a reply later than this counts as lost
+constexpr Time noise_limit = 100ms;     // longer than any reply lasts
 constexpr Time tick{1};
 
 }  // namespace
@@ -47,9 +48,9 @@ Time ReplyGuard<Item>::longest_wait() const {
   return std::clamp(expected_lateness_ * 3 / 2, longest_silence, longest_lateness);
 }
 
-// ---- Phases: where they are entered
+// ---- Transitions between phases
 
-// The last request becomes outstanding if no valid reply arrived.
+// The last request becomes outstanding if no valid reply to it was received.
 template <class Item>
 void ReplyGuard<Item>::end_exchange() {
   const bool unmatched = phase_ == Phase::matching || phase_ == Phase::listening;
@@ -72,12 +73,13 @@ void ReplyGuard<Item>::enter_delaying(const Step<Item>& request, Time now) {
   received_.clear();
   outstanding_.remove_older(now - longest_lateness);
   pending_ = {.step = request, .deadline = std::max(now, request.at) + 4 * longest_wait()};
-  // A pause before the request is listened to as well; a short one the port keeps more exactly than its timer.
+  // Late replies are also awaited during a pause that the request demands. A short pause is left to the port, which is
+  // more exact than its timer.
   delaying_ = {.until = request.at > now + 1ms ? request.at : now + tick, .received_at = now - request.gap};
-  if (outstanding_.full()) {  // a silence makes all of them lost, so that new ones can be stored
+  if (outstanding_.full()) {  // the silence makes all of them lost, so that new ones can be stored
     delaying_.until = std::max(delaying_.until, last_.sent_at + required_silence());
   } else if (const Entry* entry = outstanding_.find(request.out)) {
-    // An encoder that did not answer twice, on a line where no reply was late, is absent.
+    // An encoder that did not answer twice is absent, if no reply was ever late on this line.
     const bool absent = expected_lateness_ == Time{} && entry->count() > 1;
     const Time silence = expected_lateness_ == Time{} ? required_silence() / 2 : required_silence();
     if (!absent) delaying_.until = std::max(delaying_.until, entry->newest() + silence);
@@ -103,7 +105,7 @@ Step<Item> ReplyGuard<Item>::send(Time now) {
   return pending_.step;
 }
 
-// The reply that is stored may be one to `entry`.
+// Enters listening, because the stored reply may answer `entry`.
 template <class Item>
 void ReplyGuard<Item>::enter_listening(const Entry& entry) {
   const Time suspected = matching_.first_at - entry.oldest();
@@ -114,9 +116,9 @@ void ReplyGuard<Item>::enter_listening(const Entry& entry) {
   listening_ = {.until = until, .suspected = suspected};
 }
 
-// A reply that was late by `suspected` is followed by the next at the interval of their requests, if the line delays
-// every reply by as much. Where that interval passes in silence, and no earlier reply was nearly as late, the line had
-// stalled, and the replies that it held back are lost. A CAN bus holds nothing back.
+// If the line delays every reply, the reply after one that was late by `suspected` follows at the interval of their
+// requests. If that interval passes in silence, and no earlier reply was nearly as late, the line had stalled, and the
+// replies that it held back are lost. A CAN bus holds nothing back.
 template <class Item>
 Time ReplyGuard<Item>::listening_time(Time suspected) const {
   const Time always_late = std::clamp(suspected * 5 / 4, required_silence(), longest_wait());
@@ -135,7 +137,7 @@ Step<Item> ReplyGuard<Item>::next(Time now) {
         return forward(now);
       case Phase::delaying:
         if (now < delaying_.until) return {.at = delaying_.until, .gap = pending_.step.gap};
-        // The request must not collide with items that still arrive. If they never end, the conversation reports that.
+        // The request must not collide with items that still arrive. If they never end, the conversation reports noise.
         if (delaying_.noise_end == never) delaying_.noise_end = now + noise_limit;
         if (!is_can && delaying_.received_at + pending_.step.gap > now && now < delaying_.noise_end) {
           delaying_.until = delaying_.received_at + pending_.step.gap;
@@ -148,7 +150,7 @@ Step<Item> ReplyGuard<Item>::next(Time now) {
           const std::size_t due = expected - std::min(expected, received_.size());
           return {.expect = due, .at = matching_.until, .answer = pending_.step.answer, .gap = pending_.step.gap};
         }
-        // Items arrive without end that are no reply; on CAN other nodes send them.
+        // Items that are no reply arrive without end; on CAN other nodes send them.
         received_.clear();
         matching_.damaged = !is_can;
         conclude_matching(true);
@@ -173,7 +175,7 @@ Step<Item> ReplyGuard<Item>::forward(Time now) {
   return step;
 }
 
-// The conversation gives a step after each event that is reported.
+// The conversation is asked for a step after each reported event.
 template <class Item>
 Step<Item> ReplyGuard<Item>::next_of_conversation(Time now) {
   while (report_event()) {
@@ -291,7 +293,7 @@ void ReplyGuard<Item>::store(Items items, Time at) {
   if (received_.empty()) return;
   matching_.received_at = at;
   if (!is_can && at - matching_.first_at >= noise_limit) return conclude_noise();
-  // A reply of unknown length ends with silence: its begin may look like a complete reply.
+  // A reply of unknown length ends with silence, because its first items may look like a complete reply.
   const std::size_t expected = is_can ? 1 : pending_.step.expect;
   if (expected == 0 || received_.size() < expected) return;
   const bool complete =
@@ -309,7 +311,7 @@ void ReplyGuard<Item>::keep_foreign(const Item& item) {
   }
 }
 
-// Removes replies that answer an outstanding request and not this one; the items behind them may be its reply.
+// Removes replies that answer an outstanding request and not the present one; the items after them may be its reply.
 template <class Item>
 void ReplyGuard<Item>::strip_late(Time at) {
   for (std::size_t i = 0; i < outstanding_.size();) {
@@ -334,7 +336,7 @@ void ReplyGuard<Item>::conclude_matching(bool timed_out) {
     if (const Entry* entry = outstanding_.find_by_reply(received_)) return enter_listening(*entry);
   }
   const bool valid = received && !matching_.damaged && outstanding_.is_reply(last_.items, received_);
-  if (valid) outstanding_.clear();  // the line keeps the order: earlier replies have arrived or are lost
+  if (valid) outstanding_.clear();  // the line keeps the order: replies to earlier requests have arrived or are lost
   if (!received) received_.append(matching_.foreign_frame);
   enter_forwarding({.answerable = true,
                     .received = received,
@@ -346,7 +348,7 @@ void ReplyGuard<Item>::conclude_matching(bool timed_out) {
                                .received_at = matching_.received_at}});
 }
 
-// On a line that is never silent no reply can be matched. The conversation gets none of these items and ends by its own
+// No reply can be matched on a line that is never silent. The conversation gets none of the items and ends by its own
 // time limit.
 template <class Item>
 void ReplyGuard<Item>::conclude_noise() {
@@ -359,7 +361,7 @@ void ReplyGuard<Item>::conclude_noise() {
 
 // ---- Delaying and listening
 
-// Where the length of a reply is known, the last received items may be one: noise may precede it.
+// If the length of the reply is known, only the last items are checked, because noise may precede the reply.
 template <class Item>
 void ReplyGuard<Item>::drop_items(Items items, Time at) {
   if (phase_ == Phase::delaying) delaying_.received_at = at;
@@ -395,7 +397,7 @@ bool ReplyGuard<Item>::ends_with_reply(Items request, std::size_t expect) const 
   return size != 0 && received_.size() >= size && outstanding_.is_reply(request, received_.view().last(size));
 }
 
-// `entry`: the outstanding request that it answers; null: it answers the last request, which had a reply.
+// `entry`: the outstanding request that the reply answers; null: a second reply to the last request.
 template <class Item>
 void ReplyGuard<Item>::drop_late_reply(Entry* entry, Time at) {
   received_.clear();
@@ -405,7 +407,7 @@ void ReplyGuard<Item>::drop_late_reply(Entry* entry, Time at) {
   Time& until = delaying ? delaying_.until : listening_.until;
   if (delaying && outstanding_.empty()) {
     until = std::max(at + pending_.step.gap, pending_.step.at);
-  } else if (!is_can) {  // on CAN it may also have been unsolicited
+  } else if (!is_can) {  // on CAN the reply may also have been unsolicited
     until = std::min(std::max(until, at + required_silence()), pending_.deadline);
   }
 }
@@ -415,15 +417,15 @@ void ReplyGuard<Item>::count_late(Entry* entry, Time at) {
   Time sent_at = last_.sent_at;
   if (entry != nullptr) {
     sent_at = entry->sent_at.empty() ? entry->lost_last : entry->sent_at[0];
-    // The first late reply may answer any of several outstanding requests; the next late reply shows which. On CAN it
-    // may also have been unsolicited.
+    // The first late reply may answer any of several outstanding requests; the next late reply shows which. On CAN the
+    // reply may also have been unsolicited.
     if (!is_can && expected_lateness_ == Time{}) sent_at = entry->newest();
   }
   expected_lateness_ = std::max(expected_lateness_, std::min(at - sent_at, longest_lateness));
-  // Where no reply was late before, a second reply to the last request is more likely a duplicate.
+  // If no reply was late before, a second reply to the last request is more likely a duplicate.
   if (entry == nullptr && late_replies_ == 0) return;
   ++late_replies_;
-  // Another reply arrives, so the stored one was late.
+  // Another reply was received while listening, so the stored reply was late.
   if (phase_ == Phase::listening) expected_lateness_ = std::max(expected_lateness_, listening_.suspected);
   greatest_lateness_ = std::max(greatest_lateness_, expected_lateness_);
   if (entry != nullptr) outstanding_.remove_oldest(*entry);

@@ -62,7 +62,7 @@ class ReplyGuard final : public Machine<Item> {
 
   /// Returns the number of replies that arrived after their timeout and were dropped.
   [[nodiscard]] std::uint64_t late() const { return late_replies_; }
-  /// Returns the time from a request to its reply, of the latest reply that was dropped; 0: none was.
+  /// Returns the time from a request to its reply, for the latest of all dropped replies; 0: none was dropped.
   [[nodiscard]] Time lateness() const { return greatest_lateness_; }
 
  private:
@@ -73,46 +73,46 @@ class ReplyGuard final : public Machine<Item> {
 
   enum class Phase : std::uint8_t { forwarding, delaying, matching, listening };
 
-  // Events that the conversation gets before its next step, in this order.
+  // Events that the conversation is fed before its next step, in this order.
   struct Report {
     bool sent = false;
     bool line_error = false;
-    bool reply = false;  // with the items of `received_`
+    bool reply = false;  // a `received` event with the items of `received_`
     bool timeout = false;
     Time received_at{};
   };
   struct Forwarding {
     bool answerable = false;  // the reply of the last request may still arrive
-    bool received = false;    // items arrived that may belong to its reply
-    bool doubtful = false;    // these items are no valid reply, and older requests are outstanding
+    bool received = false;    // items were received that may belong to the reply
+    bool doubtful = false;    // the received items are no valid reply, and older requests are outstanding
     Report report{};
   };
   struct Delaying {
-    Time until{};            // when the request is sent
-    Time received_at{};      // when the last item arrived
+    Time until{};            // when the delayed request is sent
+    Time received_at{};      // when the last item was received, before the request
     Time noise_end = never;  // when the request is sent even if items still arrive
   };
   struct Matching {
-    Time until = never;               // time limit, from the end of the request on
-    Time first_at{};                  // when the first of `received_` arrived
-    Time received_at{};               // when the last of `received_` arrived
-    bool damaged = false;             // a line error was among them
-    Buffer<Item, 1> foreign_frame{};  // CAN: a reply but for its identifier of 29 bits; explains a timeout
+    Time until = never;               // time limit of the reply, from the end of the request
+    Time first_at{};                  // when the first of the stored items was received
+    Time received_at{};               // when the last of the stored items was received
+    bool damaged = false;             // a line error was received with the stored items
+    Buffer<Item, 1> foreign_frame{};  // CAN: a reply except for its identifier of 29 bits, which explains a timeout
   };
   struct Listening {
-    Time until{};      // when the request is sent again, or a timeout reported
+    Time until{};      // when the request is repeated, or a timeout reported
     Time suspected{};  // lateness of the stored reply, if it is late
   };
-  // The request that the conversation wants to be sent, from delaying until forwarding.
+  // The request that the conversation wants to send; valid in all phases but forwarding.
   struct Pending {
     Step<Item> step{};
-    Time deadline{};  // no late reply prolongs delaying or listening beyond
+    Time deadline{};  // time limit of delaying and listening: late replies prolong them no further
   };
   struct LastRequest {
     bool exists = false;
-    Request items{};  // of a pulse empty
+    Request items{};  // the request; empty for a pulse
     std::size_t expect = 0;
-    Time sent_at{};  // end of the last transfer, also of one that is no request
+    Time sent_at{};  // end of the last transfer, even if that was no request
   };
 
   [[nodiscard]] bool is_request(const Step<Item>& step) const;
@@ -148,21 +148,21 @@ class ReplyGuard final : public Machine<Item> {
   Machine<Item>* inner_ = nullptr;
   bool may_repeat_ = false;
 
-  // The data of each phase, reset when it is entered.
+  // The data of each phase is reset when the phase is entered.
   Phase phase_ = Phase::forwarding;
   Forwarding forwarding_{};
   Delaying delaying_{};
   Matching matching_{};
   Listening listening_{};
   // One buffer for all phases, because a microcontroller has little RAM. Forwarding: the reply to report. Matching: the
-  // items since the request. Delaying, listening: the last items, at whose end a late reply is looked for.
+  // items received since the request. Delaying and listening: the last received items, whose end may be a late reply.
   Buffer<Item, is_can ? 1 : 64> received_{};
 
   Pending pending_{};
   LastRequest last_{};
   OutstandingRequests<Item> outstanding_;
-  Time longest_timeout_{};    // longest time in which no reply arrived
-  Time expected_lateness_{};  // how late a reply may be; fades with each that is not late
+  Time longest_timeout_{};    // longest time without a reply after a request
+  Time expected_lateness_{};  // time by which a reply may be late; each reply in time reduces it
   Time greatest_lateness_{};
   std::uint64_t late_replies_ = 0;
 };

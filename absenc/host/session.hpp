@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Runs a unit's commands on a port: repeats what may be repeated, removes echo, validates the first position, counts.
+// Runs a unit's commands on a port: repeats requests that may be repeated, removes echo, validates the first position,
+// counts errors.
 #pragma once
 
 #include <array>
@@ -24,9 +25,9 @@ namespace absenc::host {
 struct Counters {
   std::uint64_t good = 0;       ///< conversations that ended well
   std::uint64_t repeated = 0;   ///< attempts after an error
-  std::uint64_t late = 0;       ///< replies that came after their time and were dropped
+  std::uint64_t late = 0;       ///< replies that arrived after their timeout and were dropped
   std::uint64_t discarded = 0;  ///< damaged frames of streams, whether an error reported them or not
-  std::array<std::uint64_t, error_texts.size()> errors{};  ///< of each kind, repeated ones included
+  std::array<std::uint64_t, error_texts.size()> errors{};  ///< errors of each kind, also of attempts that were repeated
 
   /// Returns the number of conversations that failed.
   [[nodiscard]] constexpr std::uint64_t bad() const {
@@ -36,29 +37,29 @@ struct Counters {
   }
 };
 
-/// Stands between a conversation and what removes its echo: sees what is sent for it and all that comes, late replies
-/// too, and may change it.
+/// A filter between a conversation and the echo filter: it sees each transfer and all received items, late replies
+/// included, and may change them.
 template <class Item>
 struct Filter : Machine<Item> {
-  /// What it serves from now on.
+  /// Sets the machine to which the filter passes events from now on.
   virtual void attach(Machine<Item>& inner) = 0;
 
  protected:
   ~Filter() = default;
 };
 
-/// Of an encoder that transmits by itself. Whoever reads at a rate of his own wants the newest: what waits in the port
-/// would be shown as of now.
+/// Which reading of an encoder that transmits unsolicited is taken. A caller with a rate of its own wants the newest,
+/// because a reading that waited in the port would count as current.
 enum class Take : std::uint8_t {
-  newest,  ///< the first that comes from now on
-  every,   ///< the one after the last, however long ago it came
+  newest,  ///< the first one that is received from now on
+  every,   ///< the one after the last, however long ago it was received
 };
 
 /// Runs the commands of one encoder over a port and counts what happened.
 template <class Item>
 class Session {
  public:
-  /// `storage` takes one conversation at a time: unit.host_storage bytes, aligned for any type.
+  /// `storage` holds one conversation at a time: unit.host_storage bytes, aligned for any type.
   Session(const Unit& unit, const Options& options, Port<Item>& port, std::span<std::byte> storage,
           EchoMode echo = EchoMode::off, unsigned attempts = 3)
       : unit_(&unit),
@@ -71,14 +72,14 @@ class Session {
         first_(reach()),
         apart_(times()) {}
 
-  /// One command to its end, repeatable ones up to `attempts` times. `on_emit(conversation)` is called for each
-  /// result but the last and returns whether to go on. The conversation returned tells how it ended; it is null when
-  /// the unit cannot run the command, and valid until the next call.
+  /// Runs one command to its end, a repeatable one up to `attempts` times. `on_emit(conversation)` is called for each
+  /// result but the last and returns whether to continue. The returned conversation has the result or the error and is
+  /// valid until the next call; null: the unit cannot run the command.
   template <class OnEmit>
   const Conversation<Item>* run(const Command& command, Arguments arguments, OnEmit&& on_emit) {
     streaming_ = false;
     const Conversation<Item>* conversation = attempt(command, arguments, on_emit);
-    streaming_ = false;  // only readings go on
+    streaming_ = false;  // only readings continue a stream
     return conversation;
   }
   /// Runs a command once; returns the conversation, or null if the command does not exist for these options.
@@ -86,19 +87,19 @@ class Session {
     return run(command, arguments, [](const Conversation<Item>&) { return true; });
   }
 
-  /// As `run`, but a conversation that streams goes on where it stopped.
+  /// As `run`, but a conversation that streams continues where it stopped.
   const Conversation<Item>* next(const Command& command, Arguments arguments = {}) {
     if (command_ != &command) streaming_ = false;
     return attempt(command, arguments, [](const Conversation<Item>&) { return true; });
   }
 
-  /// The position, and whether it is confirmed: compared with the one before, and as near as the limit of the speed
-  /// allows. Where there is none before (after opening and after silence), where it is too far away, or where the time
-  /// between was too long to tell, it is read again until two in a row agree; when none of ten does, the last one is
-  /// returned and `confirmed` is false. If those two are near the position before, the first one was damaged and counts
-  /// as an error, cross_check_failed, because no check sees all damage; if not, the position did jump.
-  /// A conversation that streams goes on where it stopped, because to find the frames anew costs two of them; `take`
-  /// says whether with what came meanwhile. `on_reading` is called with each reading.
+  /// Reads the position. It is confirmed if it is as near to the one before as the speed limit allows. Without a
+  /// position before (after opening and after silence), if it is too far away, or if the time between was too long to
+  /// judge, it is read again until two consecutive positions agree; if none of ten agrees, the last one is returned and
+  /// `confirmed` is false. If those two are near the position before, the first one was damaged and counts as an error,
+  /// cross_check_failed, because no checksum detects all damage; if not, the position jumped.
+  /// A conversation that streams continues where it stopped, because finding its frames again costs two of them; `take`
+  /// decides whether frames that were received meanwhile are used. `on_reading` is called with each reading.
   template <class OnReading>
   const Conversation<Item>* read(const Command& command, Take take, OnReading&& on_reading) {
     if (streaming_ && take == Take::newest && !current_->asks()) catch_up(machine(), *port_);
@@ -119,7 +120,7 @@ class Session {
         known_ = true;
         return conversation;
       }
-      // What says itself that it does not hold is not asked again, unless the encoder may be starting.
+      // A position that the encoder itself reports as invalid is not read again, unless the encoder may be starting.
       if (number == most || (known_ && !FirstReading::has_position(*reading))) return conversation;
     }
   }
@@ -128,43 +129,43 @@ class Session {
     return read(command, take, [](const Reading&) {});
   }
 
-  /// Asks the conversation that is running to end early; see Conversation::abort.
+  /// Asks the running conversation to end early; see Conversation::abort.
   bool abort() { return current_ != nullptr && current_->abort(); }
-  /// What the last conversation leaves changed when its port threw; see Conversation::report_left.
+  /// Reports what the last conversation left changed when its port threw; see Conversation::report_left.
   void report_left(FieldSink& sink) const {
     if (current_ != nullptr) current_->report_left(sink);
   }
 
-  /// Tells whether the last conversation sent a request that changes the encoder, also when its port threw.
+  /// Returns whether the last conversation sent a request that changes the encoder, also when its port threw.
   [[nodiscard]] ChangeSent change_sent() const {
     return current_ != nullptr ? current_->change_sent() : ChangeSent::no;
   }
 
-  /// What is known of late replies belongs to the line: sessions of encoders on one line share it. It must outlive
-  /// them.
+  /// Shares one guard between the sessions of all encoders on a line, because late replies belong to the line. The
+  /// guard must outlive the sessions.
   void share(ReplyGuard<Item>& guard) { guard_ = &guard; }
-  /// Late replies are not kept away: for who does not know whose replies they are.
+  /// Lets late replies pass, for a caller that does not know which requests were sent.
   void leave_unguarded() { guard_ = nullptr; }
-  /// From the next command on; null: none. It must outlive this.
+  /// Sets a filter from the next command on; null: none. The filter must outlive the session.
   void set_filter(Filter<Item>* filter) { filter_ = filter; }
-  /// How late a reply came on this line at the most, until the last command ended; 0: none did.
+  /// Returns the greatest lateness of a reply on this line until the last command ended; 0: none was late.
   [[nodiscard]] Time lateness() const { return lateness_; }
 
-  /// From the next command on.
+  /// Sets the options from the next command on.
   void set_options(const Options& options) {
     options_ = options;
     follow_options();
   }
-  /// How fast the encoder may move, from the next reading on; before that it is the model's, or else the usual limit.
+  /// Sets the encoder's speed limit from the next reading on. The default is the model's limit, else the usual one.
   void set_speed_limit(const SpeedLimit& limit) {
     limit_ = limit;
     follow_options();
   }
 
-  /// To be fed from now on; null: none. 5 kB, which firmware may not have.
+  /// Sets statistics that are fed from now on; null: none. They need 5 kB, which firmware may not have.
   void observe(Statistics<Item>* statistics) { statistics_ = statistics; }
 
-  /// The encoder may be another one now: what it says next has to be confirmed.
+  /// Requires the next position to be confirmed, because the encoder may be another one now.
   void doubt() {
     confirmed_ = false;
     known_ = false;
@@ -172,12 +173,12 @@ class Session {
     pair_ = never;
     first_.start_again();
   }
-  /// The last command ended well, and what it read is wrong all the same, as only its caller can know.
+  /// Counts the last command as failed although it ended well: its caller knows that the reading is wrong.
   void refuse_last(Error error) {
     --counters_.good;
     ++counters_.errors[static_cast<std::size_t>(error)];
   }
-  /// Whether the last reading was compared with another, and agreed.
+  /// Returns whether the last reading was compared with another and agreed.
   [[nodiscard]] bool confirmed() const { return confirmed_; }
   /// Returns the counts so far.
   [[nodiscard]] const Counters& counters() const { return counters_; }
@@ -185,7 +186,7 @@ class Session {
   [[nodiscard]] const EchoFilter& echo() const { return echo_; }
 
  private:
-  // Another resolution, or other units: nothing before can be compared.
+  // With another resolution or other units no earlier position can be compared.
   void follow_options() {
     first_ = FirstReading(reach());
     apart_ = Apart(times());
@@ -193,14 +194,14 @@ class Session {
   [[nodiscard]] Reach reach() const { return Reach::of(limit_, unit_->resolution(options_)); }
   [[nodiscard]] Times times() const { return sends_unsolicited(*unit_, options_) ? Times::arrived : Times::latched; }
 
-  // Whether this and the one before cannot both be right.
+  // Returns whether this position and the one before contradict each other.
   [[nodiscard]] bool refutes(const Reading& reading) const {
     const Time between = apart_.since_last(reading.latched);
     return first_.has_last() && first_.tells(reading, between) && !first_.is_near(reading, between);
   }
 
-  // After a pause that is too long to tell anything, one of its own that `follows` at once does, unless that takes too
-  // long as well: then what the limit still excludes is all that can be known.
+  // After a pause that is too long to judge, a second reading of its own (`follows`) confirms the position. If that
+  // reading takes too long as well, the speed limit alone decides what can be excluded.
   bool confirms(const Reading& reading, bool follows) {
     const Time between = apart_.since_last(reading.latched);
     bool near = first_.is_near(reading, between);
@@ -218,8 +219,8 @@ class Session {
     if (statistics_ != nullptr) statistics_->add(damaged);
   }
 
-  // Whole commands are repeated here. Within a procedure that is not repeatable (a reset, a write) its engine repeats
-  // the single requests that only read.
+  // Repeats whole commands. In a procedure that is not repeatable (a reset, a write) the engine repeats the single
+  // requests that only read.
   template <class OnEmit>
   const Conversation<Item>* attempt(const Command& command, Arguments arguments, OnEmit&& on_emit) {
     const unsigned attempts = command.repeatable ? attempts_ : 1;
@@ -229,7 +230,7 @@ class Session {
       Conversation<Item>* conversation = streaming_ ? current_ : make(command, arguments);
       if (conversation == nullptr) return nullptr;
       const bool again = streaming_;
-      streaming_ = false;  // unless it comes to its next result
+      streaming_ = false;  // until the conversation gives its next result
       streaming_ = !drive_one(command, *conversation, on_emit, again) && conversation->streams();
       const Error error = conversation->error();
       echo_.conclude(error == Error::none);
@@ -240,16 +241,16 @@ class Session {
         return conversation;
       }
       ++counters_.errors[static_cast<std::size_t>(error)];
-      if (error == Error::timeout) doubt();  // it may have been switched off
+      if (error == Error::timeout) doubt();  // the encoder may have been switched off
       if (number >= attempts || error == Error::invalid_argument || error == Error::not_still) return conversation;
-      if (error == Error::timeout && late() != late_before) return conversation;  // it would be late again
+      if (error == Error::timeout && late() != late_before) return conversation;  // another attempt would be late again
       ++counters_.repeated;
     }
   }
 
   [[nodiscard]] std::uint64_t late() const { return guard_ != nullptr ? guard_->late() : 0; }
 
-  // `catch_up` drops frames, not their damage.
+  // `catch_up` drops frames, but their damage is counted.
   void count_discarded(const Conversation<Item>& conversation) {
     const StreamCounts* stream = conversation.stream();
     if (stream == nullptr) return;
@@ -262,15 +263,15 @@ class Session {
     return current_ = unit_->host(options_, command, arguments, storage_).template of<Item>();
   }
 
-  // On a link whose clock is the host's nothing comes late. On a CAN bus others send too: what listens to all of them
-  // hears everything.
+  // On a link whose clock the host drives no reply is late. On a CAN bus other nodes send too, and a listener receives
+  // all frames.
   [[nodiscard]] bool guarded(const Command& command) const {
     if (guard_ == nullptr) return false;
     if (unit_->link == LinkKind::can) return command.verb == Verb::read || command.verb == Verb::read_part;
     return unit_->link != LinkKind::spi && unit_->link != LinkKind::clocked;
   }
 
-  // What the port carries: the conversation, behind what keeps replies with their requests and what removes echo.
+  // Returns the machine that runs on the port: the conversation, its reply guard, and the echo filter around them.
   Machine<Item>& machine() {
     if constexpr (std::is_same_v<Item, std::uint8_t>) {
       if (echo_.mode() != EchoMode::off) return echo_;
@@ -286,11 +287,11 @@ class Session {
     return *current_;
   }
 
-  // Whether it came to its end; a conversation that streams stops at its next result.
+  // Returns whether the conversation came to its end; one that streams stops at its next result.
   template <class OnEmit>
   bool drive_one(const Command& command, Conversation<Item>& conversation, OnEmit&& on_emit, bool again) {
     if (!again) guarded_ = guarded(command);
-    // Others on the same line may have had the guard meanwhile.
+    // The guard may have served other encoders on the line meanwhile.
     if (guarded_ && !(again && guard_->serves(conversation))) {
       guard_->attach(conversation, *unit_, options_, !command.changes_encoder);
     }
@@ -304,7 +305,7 @@ class Session {
       }
     }
     const bool ended = drive(machine(), *port_, [&] { return !conversation.streams() && on_emit(conversation); });
-    // Copied: the guard may be others' by the time anybody asks.
+    // The values are copied, because the guard may serve another encoder when they are read.
     if (guard_ != nullptr) {
       counters_.late = guard_->late();
       lateness_ = guard_->lateness();
@@ -316,11 +317,11 @@ class Session {
   Options options_;
   Port<Item>* port_;
   std::span<std::byte> storage_;
-  Conversation<Item>* current_ = nullptr;  // in `storage_`
-  const Command* command_ = nullptr;       // of `current_`
+  Conversation<Item>* current_ = nullptr;  // conversation in `storage_`
+  const Command* command_ = nullptr;       // command of `current_`
   ReplyGuard<Item> own_guard_;
   ReplyGuard<Item>* guard_ = &own_guard_;
-  bool guarded_ = false;  // the present conversation
+  bool guarded_ = false;  // the guard serves the present conversation
   Filter<Item>* filter_ = nullptr;
   Time lateness_{};
   EchoFilter echo_;
@@ -328,11 +329,11 @@ class Session {
   SpeedLimit limit_;
   FirstReading first_;
   Apart apart_;
-  Time pair_ = never;       // how near to each other two readings have been at least, the second read at once
-  bool confirmed_ = false;  // the last reading
-  bool known_ = false;      // any reading since there was doubt
-  bool streaming_ = false;  // `current_` has stopped at a result and can go on
-  std::uint64_t discarded_before_ = 0;  // of the present stream, when it stopped last
+  Time pair_ = never;                   // shortest time between two readings, the second read at once
+  bool confirmed_ = false;              // the last reading was confirmed
+  bool known_ = false;                  // a reading was confirmed since the last doubt
+  bool streaming_ = false;              // `current_` has stopped at a result and can continue
+  std::uint64_t discarded_before_ = 0;  // discarded frames of the present stream when it stopped last
   Counters counters_;
   Statistics<Item>* statistics_ = nullptr;
 };

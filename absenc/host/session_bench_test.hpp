@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A session with a virtual T-format encoder, in virtual time.
+// Session with a virtual T-format encoder, in virtual time.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -23,7 +23,7 @@ struct Still final : Shaft {
   }
   std::int64_t position = 0;
   const Device<std::uint8_t>* device = nullptr;
-  std::uint64_t wrong_answer = UINT64_MAX;  // the number of one that says `wrong_position`
+  std::uint64_t wrong_answer = UINT64_MAX;  // number of the answer that contains `wrong_position`
   std::int64_t wrong_position = 0;
 };
 
@@ -42,13 +42,13 @@ struct Bench {
     session = std::make_unique<Session<std::uint8_t>>(unit, options, *port, host_storage, mode, attempts);
   }
   const Conversation<std::uint8_t>& read() { return *session->read(*find_command(unit, Verb::read)); }
-  /// Counts the answers that a reading took.
+  /// Returns the number of answers that one reading took.
   std::uint64_t answers_of_a_reading() {
     const std::uint64_t before = device->answer_count();
     EXPECT_EQ(read().error(), Error::none);
     return device->answer_count() - before;
   }
-  /// Once, turned by so much.
+  /// Makes one answer wrong, turned by this many counts.
   void answer_wrong(std::int64_t turned) {
     shaft.wrong_answer = device->answer_count();
     shaft.wrong_position = shaft.position + turned;

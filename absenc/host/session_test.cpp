@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Sessions with a T-format encoder in virtual time.
+// Sessions with a T-format encoder, in virtual time.
 #include "absenc/host/session.hpp"
 
 #include <gtest/gtest.h>
@@ -20,7 +20,7 @@ TEST(Session, WithoutAConversationThereIsNoResult) {
   EXPECT_EQ(session.run(*find_command(bench.unit, Verb::read)), nullptr) << "its storage is too small";
 }
 
-// ---- What waits behind ReplyGuard
+// ---- ReplyGuard
 
 TEST(ReplyGuard, ARequestWaitsAndWhatIsNoneDoesNot) {
   struct Asks final : Machine<std::uint8_t> {
@@ -46,7 +46,7 @@ TEST(ReplyGuard, ARequestWaitsAndWhatIsNoneDoesNot) {
   EXPECT_EQ(first(1, 1s + 5ms).at, 1s + 5ms);
 }
 
-/// Asks once, and hears what it is told.
+/// A machine that sends one request and stores the items that it is fed.
 struct Asking final : Machine<std::uint8_t> {
   using Kind = Step<std::uint8_t>::Kind;
   void feed(const Event<std::uint8_t>& event) override {
@@ -63,7 +63,7 @@ struct Asking final : Machine<std::uint8_t> {
   Wire heard;
 };
 
-// One that is owed may be what comes first; ten seconds later it is lost.
+// The reply of an outstanding request may arrive first; ten seconds later it counts as lost.
 TEST(ReplyGuard, NothingIsOwedForMoreThanTenSeconds) {
   using Kind = Step<std::uint8_t>::Kind;
   const Bench bench(EchoMode::off);
@@ -118,10 +118,10 @@ TEST(Session, RepeatsWhatMayBeRepeated) {
   EXPECT_EQ(bench.session->counters().repeated, 2u);
   EXPECT_EQ(bench.session->counters().errors[static_cast<std::size_t>(Error::wrong_length)], 3u);
   bench.session->run(*find_command(bench.unit, Verb::zero));
-  EXPECT_EQ(bench.device->answer_count(), 6u);  // one look at the position, tried three times; the reset itself never
+  EXPECT_EQ(bench.device->answer_count(), 6u);  // one position, tried three times; the reset is never sent
 }
 
-// Request, 3 us, 11 characters: 51 us a reading are what the document allows.
+// The document permits 51 us for a reading: request, 3 us, 11 characters.
 TEST(Session, TellsItsStatisticsOfEveryAttempt) {
   Bench bad(EchoMode::off, always(sim::FaultKind::corrupt));
   Statistics<std::uint8_t> statistics;
@@ -134,9 +134,9 @@ TEST(Session, TellsItsStatisticsOfEveryAttempt) {
 
   Bench good(EchoMode::off);
   good.session->observe(&statistics);
-  good.read();  // twice, because it is the first
+  good.read();  // reads twice, because it is the first
   EXPECT_EQ(statistics.latencies().count(), 2u);
-  // The encoder's 3 us and 11 characters of 4 us.
+  // 3 us of the encoder and 11 characters of 4 us each.
   EXPECT_EQ(statistics.latencies().longest(), std::chrono::microseconds(47));
 }
 
@@ -163,10 +163,10 @@ TEST(Session, ShowsTheSecondOfTwoReadingsThatAgree) {
   bench.faulty->set_rates({});
   const auto before = bench.device->answer_count();
   EXPECT_EQ(bench.read().error(), Error::none);
-  EXPECT_EQ(bench.device->answer_count(), before + 3);  // the first could have been the late reply to one of before
+  EXPECT_EQ(bench.device->answer_count(), before + 3);  // the first could be the late reply to an earlier request
 }
 
-// What explains the silence is told after each attempt, also when a late reply may still come.
+// Each attempt reports the frame that explains the timeout, also while a late reply may arrive.
 TEST(Session, AReplyWithTheWrongKindOfIdentifierExplainsASilence) {
   struct Extended final : Machine<CanFrame> {
     void feed(const Event<CanFrame>& event) override {
@@ -199,7 +199,7 @@ TEST(Session, AnInvalidPositionIsNeverConfirmed) {
   EXPECT_FALSE(bench.session->confirmed());
 }
 
-// ---- What is confirmed
+// ---- Confirmation
 
 constexpr std::int64_t turn = std::int64_t{1} << 32;
 constexpr OptionText no_turns{"multiturn_bits", "0"};
@@ -210,7 +210,7 @@ TEST(SessionGuard, APositionThatNoShaftReachesIsReadAgain) {
   bench.session->observe(&statistics);
   EXPECT_EQ(bench.answers_of_a_reading(), 2u) << "the first needs a second";
   EXPECT_EQ(bench.answers_of_a_reading(), 1u);
-  bench.answer_wrong(turn / 32);  // farther than 10 000 rpm get meanwhile, and nearer than what counts as a jump
+  bench.answer_wrong(turn / 32);  // farther than 10 000 rpm allow, and nearer than a jump
   EXPECT_EQ(bench.answers_of_a_reading(), 3u);
   EXPECT_TRUE(bench.session->confirmed());
   EXPECT_EQ(bench.refused(), 1u);
@@ -241,7 +241,7 @@ TEST(SessionGuard, TheLimitIsTheOneThatIsSet) {
   EXPECT_EQ(bench.refused(), 1u);
 }
 
-// Half a turn takes 3 ms at 10 000 rpm: after 20 ms a position may be anywhere.
+// Half a turn takes 3 ms at 10 000 rpm, so after 20 ms any position is possible.
 TEST(SessionGuard, AfterAPauseThatTellsNothingASecondReadingDoes) {
   Bench bench(EchoMode::off, {}, 3, {no_turns});
   bench.read();
@@ -270,7 +270,7 @@ TEST(SessionGuard, TurnsTellAfterALongPause) {
   EXPECT_EQ(bench.answers_of_a_reading(), 3u);
 }
 
-// A reading takes 55 us, in which such a shaft turns nearly once: a second one tells no more than the first.
+// A reading takes 55 us, in which the shaft turns nearly once, so a second reading tells no more than the first.
 TEST(SessionGuard, WhereNoSecondReadingTellsHalfATurnIsStillRefused) {
   Bench bench(EchoMode::off, {}, 3, {no_turns});
   bench.session->set_speed_limit({.rpm = 1'000'000});
@@ -308,7 +308,7 @@ TEST(SessionGuard, NothingIsConfirmedThatAgreesWithNothing) {
   EXPECT_EQ(device->answer_count(), 3u * 11);
 }
 
-// It was read once; what says itself that it does not hold needs no second, and is not confirmed.
+// An encoder that was read once needs no second reading for a position that it reports as invalid; it is not confirmed.
 TEST(SessionGuard, AnInvalidPositionOfAKnownEncoderIsShownAtOnce) {
   Bench bench(EchoMode::off);
   bench.read();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// How an encoder's line behaves: how long readings take, how many a second, and what the last bad frames were.
+// Statistics of an encoder's line: latencies, readings per second, and the last bad exchanges.
 #pragma once
 
 #include <algorithm>
@@ -34,8 +34,8 @@ class Latencies {
   /// Returns the sum of all latencies.
   [[nodiscard]] constexpr Time sum() const { return sum_; }
 
-  /// For each of the rising limits, how many latencies surely do not exceed it: those of the last 1/32 below it may be
-  /// missing, and stand with the next limit.
+  /// Returns, for each of the ascending limits, how many latencies surely do not exceed it. Latencies in the last 1/32
+  /// below a limit may be counted with the next limit only.
   template <std::size_t Size>
   [[nodiscard]] constexpr std::array<std::uint64_t, Size> within(const std::array<Time, Size>& limits) const {
     std::array<std::uint64_t, Size> counts{};
@@ -46,7 +46,7 @@ class Latencies {
     return counts;
   }
 
-  /// What `share` (0 to 1) of the latencies do not exceed; 0 when there are none.
+  /// Returns the latency that `share` (0 to 1) of all latencies do not exceed; 0 without latencies.
   [[nodiscard]] constexpr Time percentile(double share) const {
     const auto rank = static_cast<std::uint64_t>(share * static_cast<double>(count_));
     std::uint64_t below = 0;
@@ -62,7 +62,7 @@ class Latencies {
   static constexpr unsigned most_bits = 36;
   static constexpr std::int64_t most = (std::int64_t{1} << most_bits) - 1;
 
-  // Below 2^fine_bits each value has a bucket of its own.
+  // Each value below 2^fine_bits has a bucket of its own.
   [[nodiscard]] static constexpr std::size_t bucket(std::uint64_t value) {
     const auto width = static_cast<unsigned>(std::bit_width(value));
     if (width <= fine_bits) return static_cast<std::size_t>(value);
@@ -82,7 +82,7 @@ class Latencies {
   Time longest_{};
 };
 
-/// Events a second: a mean that forgets with a time constant of one second.
+/// Events per second: a mean that forgets with a time constant of one second.
 class Rate {
  public:
   /// Adds a reading at this time.
@@ -95,7 +95,7 @@ class Rate {
     seen_ = true;
   }
 
-  /// Falls when the next event is overdue. 0 before the second event.
+  /// Returns the rate, which falls when the next event is overdue. 0 before the second event.
   [[nodiscard]] constexpr double per_second(Time now) const {
     if (events_ == 0) return 0;
     Rate faded = *this;
@@ -114,10 +114,10 @@ class Rate {
   bool seen_ = false;
   Time last_{};
   double events_ = 0;
-  double nanoseconds_ = 0;  // in which they came
+  double nanoseconds_ = 0;  // time in which the counted events arrived
 };
 
-/// An exchange that failed, as it was. What is longer than the buffers is cut.
+/// A failed exchange with its bytes, which are cut at the size of the buffers.
 template <class Item>
 struct BadExchange {
   BadExchange() = default;
@@ -135,7 +135,7 @@ struct BadExchange {
   Buffer<Item, 64 / sizeof(Item)> received{};
 };
 
-/// Fed by a `Session` with every conversation, repeated ones included.
+/// A session feeds it with every conversation, repeated ones included.
 template <class Item>
 class Statistics {
  public:
@@ -153,11 +153,11 @@ class Statistics {
   /// Adds a failed exchange; it replaces the oldest.
   void add(const BadExchange<Item>& bad) { bad_[bad_count_++ % most_kept] = bad; }
 
-  /// From the end of the request to the end of the reply, of what ended well.
+  /// Returns the times from the end of the request to the end of the reply, of good exchanges.
   [[nodiscard]] const Latencies& latencies() const { return latencies_; }
-  /// How many of the last bad exchanges are kept.
+  /// Returns how many of the last bad exchanges are stored.
   [[nodiscard]] std::size_t kept() const { return std::min<std::size_t>(bad_count_, most_kept); }
-  /// The last one is number 0, the one before it number 1.
+  /// Returns a bad exchange; 0 is the last one, 1 the one before it.
   [[nodiscard]] const BadExchange<Item>& bad(std::size_t number) const {
     return bad_[(bad_count_ - 1 - number) % most_kept];
   }

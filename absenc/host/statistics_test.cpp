@@ -25,7 +25,7 @@ TEST(Latencies, AreAtMostA32ndTooLong) {
   for (std::int64_t value = 1; value < 68'000'000'000; value += value / 7 + 1) {
     Latencies latencies;
     latencies.add(Time(value));
-    latencies.add(70s);  // the longest would be told exactly
+    latencies.add(70s);  // the longest latency would be exact
     const std::int64_t told = latencies.percentile(0).count();
     ASSERT_GE(told, value);
     ASSERT_LE(told, value + value / 32);
@@ -49,7 +49,8 @@ TEST(Latencies, AreCountedWithinLimits) {
   for (const Time latency : {Time(9us), Time(10'400ns), Time(15us), Time(999'900ns), Time(1001us), Time(2s)}) {
     latencies.add(latency);
   }
-  EXPECT_EQ(latencies.within(limits), (std::array<std::uint64_t, 4>{1, 3, 3, 5}));  // 999.9 us: in the last 32nd
+  // 999.9 us is in the last 1/32 below its limit.
+  EXPECT_EQ(latencies.within(limits), (std::array<std::uint64_t, 4>{1, 3, 3, 5}));
   EXPECT_EQ(latencies.sum(), 2s + 2'035'300ns);
 }
 
@@ -83,7 +84,7 @@ TEST(Rate, FallsWhenNothingComes) {
   EXPECT_LT(rate.per_second(1000s), 0.01);
 }
 
-/// A conversation that ended as the test wants.
+/// A conversation with a given result.
 struct Ended final : Conversation<std::uint8_t> {
   void feed(const Event<std::uint8_t>&) override {}
   Step<std::uint8_t> next(Time) override { return {.kind = Step<std::uint8_t>::Kind::done}; }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A position that goes on where the encoder's counter begins again: 64 bits from readings that follow each other.
+// Continuous position: a counter of 64 bits from consecutive readings, where the encoder's own counter wraps.
 #pragma once
 
 #include <cstdint>
@@ -11,17 +11,17 @@
 
 namespace absenc::host {
 
-/// Takes the shorter way round between two readings, so it is right as long as the shaft turns less than half of what
-/// the encoder counts between them: half a revolution with a single-turn encoder. What the encoder counts is what its
-/// readings say, whatever was expected of it. Where the fastest shaft could have turned further it starts again.
+/// Adds the shorter of the two distances between two readings. That is right while the position changes by less than
+/// half of the counted range: half a revolution for a single-turn encoder. The counted range follows from the readings,
+/// not from the options. If the speed limit allows more than half the range, the position starts again.
 class Unwrapper {
  public:
   /// How a reading joins the positions before it.
   enum class Joined : std::uint8_t {
     ignored,    ///< the reading has no valid position
-    started,    ///< the first one: the position is the encoder's own
-    continued,  ///< the way since the reading before was added
-    restarted,  ///< too late after the one before to know how often it turned: the position is the encoder's own again
+    started,    ///< the first position, which is the encoder's own
+    continued,  ///< the distance since the reading before was added
+    restarted,  ///< the pause was too long to know the distance: the position is the encoder's own again
   };
 
   /// Joins readings of a shaft that moves within `limit`.
@@ -30,7 +30,8 @@ class Unwrapper {
 
   /// Adds a reading at the time at which it was latched.
   constexpr Joined add(const Reading& reading) { return add(reading, latch_time(reading)); }
-  /// A reply may be late because the encoder was: what counts is how far apart the two positions can have been latched.
+  /// Adds a reading. Its reply may be late because the encoder was, so the whole interval in which the position may
+  /// have been latched counts.
   constexpr Joined add(const Reading& reading, const LatchTime& at) {
     if (!has_position(reading)) return Joined::ignored;
     const bool first = !started_;
@@ -44,22 +45,23 @@ class Unwrapper {
     return first ? Joined::started : joins ? Joined::continued : Joined::restarted;
   }
 
-  /// Whether it is farther from the one before than any shaft turns in that time: by `most_excess` times the limit, for
-  /// one that is too fast is no jump. It was damaged in a way that its check does not see, or somebody moved the zero.
+  /// Returns whether the position is farther from the one before than `most_excess` times the speed limit allows: a
+  /// speed a little over the limit is no jump. A jump is damage that the checksum does not detect, or a moved zero.
   [[nodiscard]] constexpr bool jumps(const Reading& reading) const {
     if (!started_ || !has_position(reading) || !is_near(reading)) return false;
-    constexpr Time vague{1'000'000};  // when it was latched: not known better where others make us wait
-    constexpr double noise = 4;       // counts
+    constexpr Time vague{1'000'000};  // uncertainty of the latch time
+    constexpr double noise = 4;       // in counts
     const double seconds = static_cast<double>((apart(reading) + vague).count()) / 1e9;
     const auto moved = static_cast<double>(way(reading));
     return (moved < 0 ? -moved : moved) >
            most_excess * counts_per_second(resolution_of(reading), limit_) * seconds + noise;
   }
 
-  /// Counts of the single-turn resolution; at the start the encoder's own turns and counts.
+  /// Returns the position in counts of the single-turn resolution. It starts with the encoder's own turns and counts.
   [[nodiscard]] constexpr std::int64_t position() const { return static_cast<std::int64_t>(position_); }
 
-  /// Whether `position` began with turns that the encoder counts. If not, it began within a turn that nobody knows.
+  /// Returns whether the position started with turns that the encoder counts. If not, it started within an unknown
+  /// turn.
   [[nodiscard]] constexpr bool counts_turns() const { return counts_turns_; }
 
  private:
@@ -81,7 +83,7 @@ class Unwrapper {
     return turn_bits(reading) != 0 && turn_bits(last_) != 0;
   }
 
-  // With the turns that both have.
+  // Returns the resolution with the turns that both readings have.
   [[nodiscard]] constexpr Resolution resolution_of(const Reading& reading) const {
     return {reading.singleturn_bits, have_turns(reading) ? reading.multiturn_bits : 0, reading.unit_um};
   }
@@ -89,7 +91,8 @@ class Unwrapper {
     return apart(reading) < longest_gap(resolution_of(reading), limit_);
   }
 
-  // `longest_gap` leaves a sixteenth for times that are not known to the microsecond: this is all of it.
+  // Returns whether the readings are nearer than half the range allows, with latch times at their limits. The 1/16 that
+  // `longest_gap` reserves for unknown times is included here.
   [[nodiscard]] constexpr bool are_surely_near(const Reading& reading, const LatchTime& at) const {
     const Time gap = longest_gap(resolution_of(reading), limit_);
     return times_ == Times::arrived || gap == never || at.latest - last_at_.earliest < gap / 15 * 16;
@@ -110,7 +113,7 @@ class Unwrapper {
   Apart apart_;
   bool started_ = false;
   bool counts_turns_ = false;
-  std::uint64_t position_ = 0;  // unsigned: what overflows after 2^63 counts goes round
+  std::uint64_t position_ = 0;  // unsigned, because it wraps after 2^63 counts
   Reading last_{};
   LatchTime last_at_{};
 };

@@ -57,7 +57,7 @@ TEST(Unwrapper, GoesOnThroughZeroOfTurnsWithASign) {
   EXPECT_EQ(unwrapper.position(), 1 * 1024 + 8);
   unwrapper.add(signed_turns(-1, 1023, 2ms));
   EXPECT_EQ(unwrapper.position(), -1);
-  // And past its last turn.
+  // Beyond the end of the turn counter.
   unwrapper.add(signed_turns(-7, 0, 3ms));
   unwrapper.add(signed_turns(7, 0, 4ms));
   EXPECT_EQ(unwrapper.position(), -9 * 1024);
@@ -70,7 +70,7 @@ TEST(Unwrapper, TakesTheTurnOnlyWhereTheTurnsDoNotHold) {
   lost.multiturn_valid = false;
   EXPECT_EQ(unwrapper.add(lost), Joined::continued);
   EXPECT_EQ(unwrapper.position(), 6 * 1024 + 8);
-  // Valid again, but to other turns: there is no way that would join them.
+  // The position is valid again, but with other turns, which no motion explains.
   EXPECT_EQ(unwrapper.add(multiturn(0, 20, 2ms)), Joined::continued);
   EXPECT_EQ(unwrapper.position(), 6 * 1024 + 20);
 }
@@ -106,7 +106,7 @@ TEST(Unwrapper, HasALimitEvenWhereNobodySaysOne) {
 }
 
 TEST(Unwrapper, JoinsAsFarAsTheTurnsGoThatTheReadingsHave) {
-  Unwrapper unwrapper(SpeedLimit{.rpm = 600});  // 8 turns in 800 ms, half of one in 50
+  Unwrapper unwrapper(SpeedLimit{.rpm = 600});  // 8 turns in 800 ms, half a turn in 50 ms
   unwrapper.add(multiturn(3, 0, 0ms));
   EXPECT_EQ(unwrapper.add(multiturn(9, 0, 700ms)), Joined::continued);
   EXPECT_EQ(unwrapper.add(multiturn(1, 0, 1500ms)), Joined::restarted);
@@ -119,7 +119,7 @@ TEST(Unwrapper, JoinsAsFarAsTheTurnsGoThatTheReadingsHave) {
 TEST(Unwrapper, OfALinearEncoderByItsOwnSpeed) {
   Unwrapper unwrapper;
   Reading reading = singleturn(1000, 0ms);
-  reading.unit_um = 1000;  // 1.024 m in all
+  reading.unit_um = 1000;  // range 1.024 m
   unwrapper.add(reading);
   reading.singleturn = 10;
   reading.latched = 20ms;
@@ -130,7 +130,7 @@ TEST(Unwrapper, OfALinearEncoderByItsOwnSpeed) {
 }
 
 TEST(Unwrapper, ReadingsThatCameTogetherMayHaveBeenApart) {
-  // Half a turn in 50 ms. A host that was held up for 100 ms finds four frames at once.
+  // Half a turn takes 50 ms. A host that was delayed for 100 ms receives four frames at once.
   Unwrapper unwrapper(SpeedLimit{.rpm = 600}, Times::arrived);
   unwrapper.add(singleturn(0, 0ms));
   EXPECT_EQ(unwrapper.add(singleturn(10, 25ms)), Joined::continued);
@@ -143,7 +143,7 @@ TEST(Unwrapper, ReadingsThatCameTogetherMayHaveBeenApart) {
 }
 
 TEST(Unwrapper, KnowsWhatNoShaftTurns) {
-  // A tenth of a turn in 1 ms, and 1 ms more because times are vague.
+  // A tenth of a turn in 1 ms, plus 1 ms because the latch times are uncertain.
   Unwrapper unwrapper(SpeedLimit{.rpm = 6000});
   EXPECT_FALSE(unwrapper.jumps(multiturn(9, 0, 0ms))) << "nothing is known yet";
   unwrapper.add(multiturn(5, 0, 0ms));
@@ -186,8 +186,8 @@ TEST(LongestGap, IsNearlyHalfOfTheRangeAtFullSpeed) {
 }
 
 TEST(Unwrapper, DoesNotJoinPositionsThatMayHaveBeenLatchedTooFarApart) {
-  // At 10000 rpm half a turn takes 3 ms. The requests were 1 ms apart, but the second reply came late: the encoder may
-  // have latched late, too.
+  // At 10 000 rpm half a turn takes 3 ms. The requests were 1 ms apart, but the second reply was late, so the encoder
+  // may have latched late, too.
   Unwrapper unwrapper;
   unwrapper.add(singleturn(0, 0ms), {0ms, 1ms});
   EXPECT_EQ(unwrapper.add(singleturn(300, 1ms), {1ms, 2ms}), Joined::continued);

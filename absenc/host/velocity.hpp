@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Speed from positions, with its uncertainty and with a delay that is known.
+// Speed from positions, with its uncertainty and its delay.
 #pragma once
 
 #include <array>
@@ -11,25 +11,24 @@
 
 namespace absenc::host {
 
-/// The mean speed between two positions: the newest one and an older one. At constant acceleration this is the speed in
-/// the middle of that time, so the delay is half of it.
+/// Mean speed between two positions: the newest one and an older one. At constant acceleration this is the speed in the
+/// middle of that time, so the delay is half of it.
 ///
-/// The true mean speed between the two instants of latching is never farther from `counts_per_second` than
-/// `uncertainty`: as far as the latch times and one count of each position leave it open. The noise and the errors of
-/// the encoder itself are not in it.
+/// The true mean speed between the two latch times differs from `counts_per_second` by at most `uncertainty`, which
+/// covers unknown latch times and one count of each position, but not the noise and errors of the encoder.
 ///
-/// The time between the two positions is `window` where that is enough. It is longer, up to `longest_windows` of it,
-/// until the latch times leave a twentieth of the speed open to either side and the way is twenty counts. With the
-/// longest time any number of counts will do, and a fourth of the speed may be open. Otherwise no speed is valid.
+/// The time between the two positions is `window` if that is enough. It is extended, up to `longest_windows` times,
+/// until the latch times leave at most 1/20 of the speed uncertain and the distance is 20 counts. With the longest time
+/// any number of counts is accepted, and 1/4 of the speed may be uncertain. Otherwise no speed is valid.
 class Velocity {
  public:
   static constexpr std::size_t most_positions = 48;  ///< Greatest number of positions that are kept.
   static constexpr int longest_windows = 20;         ///< Longest window, in shortest windows.
 
-  /// Where readings are farther apart than `window`, the time is one step from reading to reading.
+  /// If the readings are farther apart than `window`, the window is the time between two readings.
   explicit constexpr Velocity(Time window = std::chrono::milliseconds(50)) : window_(window) {}
 
-  /// `position` as of `Unwrapper`. A position whose latch time does not lie behind the one before is not taken.
+  /// Adds a position of `Unwrapper`. A position that was not latched after the one before is ignored.
   constexpr void add(std::int64_t position, const LatchTime& at) {
     start_ = none;
     if (size_ != 0 && at.middle() <= newest().at.middle()) return;
@@ -38,28 +37,30 @@ class Velocity {
     forget_old();
     choose_start();
   }
-  /// The time is known exactly.
+  /// Adds a position whose latch time is known exactly.
   constexpr void add(std::int64_t position, Time at) { add(position, {at, at}); }
 
-  /// After a jump of the position, or a pause.
+  /// Forgets all positions, after a jump or a pause.
   constexpr void restart() {
     size_ = 0;
     start_ = none;
   }
 
-  /// Whether the last position has a speed.
+  /// Returns whether the last position has a speed.
   [[nodiscard]] constexpr bool valid() const { return start_ != none; }
-  /// 0 while not valid.
+  /// Returns the speed; 0 while not valid.
   [[nodiscard]] constexpr double counts_per_second() const {
     if (!valid()) return 0;
     const double middle = (fastest() + slowest()) / 2;
     return moved() < 0 ? -middle : middle;
   }
-  /// How far the true mean speed is from `counts_per_second` at most, in counts a second. 0 while not valid.
+  /// Returns the greatest difference between the true mean speed and `counts_per_second`, in counts/s. 0 while not
+  /// valid.
   [[nodiscard]] constexpr double uncertainty() const { return valid() ? (fastest() - slowest()) / 2 : 0; }
-  /// When the older position was latched, from which on this is the mean. Only while valid.
+  /// Returns when the older position was latched, which begins the window. Call only while valid.
   [[nodiscard]] constexpr const LatchTime& since() const { return positions_[start_].at; }
-  /// How long before the newest position (the middle of its latch time) the shaft had this speed. 0 while not valid.
+  /// Returns how long before the newest position (the middle of its latch interval) the shaft had this speed. 0 while
+  /// not valid.
   [[nodiscard]] constexpr Time delay() const { return valid() ? span(start_) / 2 : Time{}; }
 
  private:
@@ -68,8 +69,8 @@ class Velocity {
     LatchTime at;
   };
   static constexpr std::size_t none = ~std::size_t{0};
-  static constexpr int enough = 20;  // times an uncertainty, to report a speed at once
-  static constexpr int least = 4;    // the same with the longest window
+  static constexpr int enough = 20;  // speed / uncertainty, to report a speed at once
+  static constexpr int least = 4;    // speed / uncertainty, with the longest window
 
   [[nodiscard]] constexpr const Sample& newest() const { return positions_[size_ - 1]; }
   [[nodiscard]] constexpr Time span(std::size_t start) const {
@@ -85,7 +86,7 @@ class Velocity {
   [[nodiscard]] static constexpr double per_second(double counts, Time time) {
     return counts * 1e9 / static_cast<double>(time.count());
   }
-  // Bounds of the absolute speed: a position is known to one count, and a distance to one count more or less.
+  // Bounds of the absolute speed: a position is known to one count, so a distance may be one count longer or shorter.
   [[nodiscard]] constexpr double fastest() const {
     return per_second(static_cast<double>(moved_from(start_)) + 1, newest().at.earliest - positions_[start_].at.latest);
   }
@@ -95,14 +96,14 @@ class Velocity {
     return per_second(static_cast<double>(way) - 1, newest().at.latest - positions_[start_].at.earliest);
   }
 
-  // Keeps one position that is as old as the longest window, or older.
+  // Drops old positions, but keeps one that is as old as the longest window or older.
   constexpr void forget_old() {
     std::size_t old = 0;
     while (old + 2 < size_ && span(old + 1) >= longest_windows * window_) ++old;
     if (old != 0) remove(0, old);
   }
 
-  // At high rates old positions may be farther apart than new ones.
+  // At high rates old positions may be stored at longer intervals than new ones.
   constexpr void thin_out() {
     std::size_t closest = 1;
     for (std::size_t i = 2; i + 1 < size_; ++i) {
@@ -111,7 +112,7 @@ class Velocity {
     const bool drops_first = positions_[closest].at.width() > positions_[closest + 1].at.width();
     remove(drops_first || closest + 2 == size_ ? closest : closest + 1, 1);
   }
-  // In units of about a microsecond, so that a product fits.
+  // Returns the interval in units of about 1 us, so that a product fits into 64 bits.
   [[nodiscard]] constexpr std::int64_t gap(std::size_t i) const {
     return (positions_[i + 1].at.middle() - positions_[i].at.middle()).count() >> 10;
   }
@@ -122,14 +123,15 @@ class Velocity {
     size_ -= count;
   }
 
-  // The shortest window that is good enough.
+  // Selects the shortest window whose uncertainty is low enough.
   constexpr void choose_start() {
     for (std::size_t i = size_ - 1; i-- > 0;) {
       const bool fills_window = span(i) >= window_ || (i > 0 && span(i - 1) > window_);
       if (!fills_window && i > 0) continue;
       const std::uint64_t way = moved_from(i);
       const bool is_resolved = way == 0 ? fills_window : way >= enough;
-      const Time open = (newest().at.width() + positions_[i].at.width()) / 2;  // to either side
+      // Uncertainty of the window, to either side.
+      const Time open = (newest().at.width() + positions_[i].at.width()) / 2;
       const bool is_longest = span(i) >= longest_windows * window_;
       if ((is_resolved && enough * open <= span(i)) || (is_longest && least * open <= span(i))) {
         start_ = i;
@@ -141,7 +143,7 @@ class Velocity {
   Time window_;
   std::array<Sample, most_positions> positions_{};  // the oldest first
   std::size_t size_ = 0;
-  std::size_t start_ = none;  // of the window that was chosen
+  std::size_t start_ = none;  // first position of the selected window
 };
 
 }  // namespace absenc::host

@@ -88,7 +88,7 @@ TEST(Velocity, IsToldAtOnceOfAShaftThatStands) {
 TEST(Velocity, WaitsForTwentyCountsUpToTwentyWindows) {
   Velocity velocity(10ms);
   for (int i = 0; i < 200; ++i) {
-    velocity.add(i / 50, i * 1ms);  // 20 counts a second
+    velocity.add(i / 50, i * 1ms);  // 20 counts per second
     if (velocity.valid()) {
       ASSERT_EQ(velocity.counts_per_second(), 0) << i;
     }
@@ -127,17 +127,17 @@ TEST(Velocity, HasNoneWhenEvenTheLongestWindowDoesNotOutweighThem) {
   EXPECT_LE(good.uncertainty(), 0.26e6);
 }
 
-// Motions in counts by seconds.
+// Position in counts as a function of seconds.
 using Motion = std::function<double(double)>;
 
-// `since` gives the window: the true latch times are known here.
+// `since` returns the window; the test knows the true latch times.
 void expect_bounds(const Motion& motion, Time period, Time longest_jitter, unsigned seed, std::size_t least_valid) {
   std::mt19937_64 random(seed);
   const auto within = [&](Time most) {
     return Time(std::uniform_int_distribution<Time::rep>(0, most.count())(random));
   };
   Velocity velocity;
-  std::map<Time, Time> truths;  // by the earliest time of a position
+  std::map<Time, Time> truths;  // true latch time by the earliest latch time of a position
   const auto place = [&](Time at) { return motion(std::chrono::duration<double>(at).count()); };
   std::size_t valid = 0;
   for (int i = 0; i < 3000; ++i) {

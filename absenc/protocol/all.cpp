@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The only file that includes every unit: adding a protocol is its folder and one line here.
+// The only file that includes every unit. A new protocol needs its folder and one line here.
 #include "absenc/protocol/all.hpp"
 
 #include <array>
@@ -25,7 +25,7 @@ namespace absenc {
 
 namespace {
 
-// The clauses are not in the descriptor: firmware, which keeps that, tests nobody.
+// A unit and its clauses, which are not in the descriptor, because firmware uses the descriptor and tests nothing.
 struct Listed {
   const Unit* unit;
   std::span<const Clause> clauses{};

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The one list of protocol units. The command, the capture decoder and the generic tests walk it.
+// The one list of protocol units, over which the command, the capture decoder and the generic tests iterate.
 #pragma once
 
 #include <span>
@@ -12,7 +12,7 @@ namespace absenc {
 /// Returns all units, in the order of `protocol/all.cpp`.
 [[nodiscard]] std::span<const Unit* const> all_units();
 
-/// Null when there is no unit of that id.
+/// Returns the unit of this id, or null.
 [[nodiscard]] const Unit* find_unit(std::string_view id);
 
 }  // namespace absenc

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// How many frames of a stream were discarded, by the bytes in which no good one was found.
+// Number of discarded frames of a stream, from the bytes in which no valid frame was found.
 #pragma once
 
 #include <cstddef>
@@ -7,8 +7,8 @@
 
 namespace absenc {
 
-/// Counts as many frames as would fit between two good ones. Less than one before the first good frame is none: it may
-/// have been under way before anybody listened.
+/// Counts as many frames as fit between two valid ones. Less than one frame before the first valid one does not count:
+/// it may have begun before the host listened.
 class DiscardedFrames {
  public:
   /// Counts frames of this length.
@@ -19,7 +19,7 @@ class DiscardedFrames {
     skipped_ += bytes;
     gap_ += bytes;
   }
-  /// A good frame begins here.
+  /// A valid frame begins here.
   constexpr void found() {
     before_ = count();
     begun_ = true;
@@ -29,15 +29,15 @@ class DiscardedFrames {
   [[nodiscard]] constexpr std::uint64_t count() const {
     return before_ + (gap_ + (begun_ ? frame_bytes_ - 1 : 0)) / frame_bytes_;
   }
-  /// Bytes.
+  /// Returns the number of skipped bytes.
   [[nodiscard]] constexpr std::uint64_t skipped() const { return skipped_; }
 
  private:
   std::size_t frame_bytes_;
   bool begun_ = false;
   std::uint64_t skipped_ = 0;
-  std::uint64_t before_ = 0;  // up to the last good frame
-  std::uint64_t gap_ = 0;     // bytes skipped since then
+  std::uint64_t before_ = 0;  // discarded frames up to the last valid frame
+  std::uint64_t gap_ = 0;     // bytes skipped after the last valid frame
 };
 
 }  // namespace absenc

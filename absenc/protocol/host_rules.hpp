@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The rules of the document that the host of a virtual encoder has to keep: which it broke, and for whoever asks, how
-// often each was looked at.
+// Rules of the document that the host of a virtual encoder must keep: the violations, and a watch that is notified of
+// each check.
 #pragma once
 
 #include <cstdint>
@@ -15,10 +15,10 @@ namespace absenc {
 /// Rules that a virtual encoder watches, with those that the host broke.
 class HostRules {
  public:
-  /// The host did what the rule is about. Returns `kept`.
+  /// Records that the host did what the rule is about. Returns `kept`.
   bool expect(bool kept, std::string_view rule, Time at);
 
-  /// The same of what only who watches is told when it is broken: a host may do so, or have had to give up.
+  /// Notifies only the watch: breaking the rule is no violation, because a host may do so or may have given up.
   void note(bool kept, std::string_view rule) const;
 
   /// Returns the first rules that the host broke.

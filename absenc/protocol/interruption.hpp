@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Requests that come while a virtual encoder sends: each is one broken rule, not each of its bytes.
+// Requests received while a virtual encoder sends: each request counts once, not each of its bytes.
 #pragma once
 
 #include <cstddef>
@@ -17,8 +17,9 @@ class Interruption {
     heard_at_.reset();
     due_ = 0;
   }
-  /// Whether the byte that came at `at` begins a request. `length`: of the request that such a byte begins, 0: of none
-  /// (on a line that both use, what collides is garbled). What follows a pause of two characters begins one.
+  /// Returns whether the byte received at `at` begins a request. `length`: length of a request that begins with this
+  /// byte, 0 if none does (a collision on a half-duplex line garbles bytes). A byte after a pause of two characters
+  /// always begins one.
   bool begins_request(std::size_t length, Time at, Time character) {
     const bool begins_run = !heard_at_ || at - *heard_at_ > 2 * character;
     heard_at_ = at;

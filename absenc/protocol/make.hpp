@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// How a unit makes its machines in the storage that the caller gives.
+// Constructs a unit's machines in storage of the caller.
 #pragma once
 
 #include <cstddef>
@@ -17,7 +17,7 @@ Machine* make_in(std::span<std::byte> storage, const Parameters&... parameters) 
   return storage.size() < sizeof(Machine) ? nullptr : new (storage.data()) Machine(parameters...);
 }
 
-// Of whichever item the machine is.
+// Returns the machine as Any, by its item.
 template <template <class> class Role, class Made>
 Any<Role> any_of(Made* machine) {
   if constexpr (std::is_base_of_v<Machine<CanFrame>, Made>) {
@@ -28,13 +28,13 @@ Any<Role> any_of(Made* machine) {
 }
 }  // namespace detail
 
-/// A host machine; none when the storage is too small.
+/// Constructs a host machine; returns none if the storage is too small.
 template <class Machine, class... Parameters>
 [[nodiscard]] Any<Conversation> make_host(std::span<std::byte> storage, const Parameters&... parameters) {
   return detail::any_of<Conversation>(detail::make_in<Machine>(storage, parameters...));
 }
 
-/// A virtual encoder; none when the storage is too small.
+/// Constructs a virtual encoder; returns none if the storage is too small.
 template <class Machine, class... Parameters>
 [[nodiscard]] Any<Device> make_device(std::span<std::byte> storage, const Parameters&... parameters) {
   return detail::any_of<Device>(detail::make_in<Machine>(storage, parameters...));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A line that is never silent, which is another fault than one on which something came.
+// A line that is never silent, which is another fault than received noise.
 #pragma once
 
 #include "absenc/core/time.hpp"
@@ -9,11 +9,11 @@ namespace absenc {
 
 using namespace std::chrono_literals;
 
-/// How long something may go on before the line counts as one that is never silent: long enough for a reply that a
-/// carrier breaks into pieces. Slow characters want more.
+/// Traffic of this duration makes a line count as never silent: long enough for a reply that a carrier delivers in
+/// pieces. Slow characters need more.
 inline constexpr Time noise_limit = 100ms;
 
-/// What to say about such a line.
+/// Explanation of such a line.
 inline constexpr Explanation endless_noise{"something sends without a pause", "find the node that does not stop"};
 
 }  // namespace absenc

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What can be set about a unit, as data: bits, checks, profiles. A model is a named set of option values.
+// Settings of a unit as data: bits, checks, profiles. A model is a named set of option values.
 #pragma once
 
 #include <array>
@@ -18,14 +18,14 @@ namespace absenc {
 /// Words of options that are yes or no.
 inline constexpr std::array<std::string_view, 2> boolean_choices{"false", "true"};
 
-/// Of an option that says whether other encoders are on the line. `auto`: they are where somebody knows it
-/// (`tell_shared`): absenc.toml, an open link with several users, a virtual line with several encoders.
+/// Choices of an option that states whether other encoders share the line. `auto` becomes true if the caller knows it
+/// (`tell_shared`): from absenc.toml, an open link with several users, or a virtual line with several encoders.
 inline constexpr std::array<std::string_view, 3> sharing_choices{"auto", "true", "false"};
 /// Whether several encoders share the line.
 enum Sharing : std::int64_t { sharing_automatic, sharing_yes, sharing_no };
 
-/// A number in a range, or one of `choices` (then the value is the index into it). With `decimals`, the user writes up
-/// to so many digits behind a point, and all values are in the unit of the last one.
+/// A number in a range, or one of `choices` (the value is the index into it). With `decimals`, the user writes up to
+/// that many decimal digits, and all values are in units of the last digit.
 struct Option {
   std::string_view name;                        ///< Name of the option.
   std::string_view meaning;                     ///< Meaning of the option, with its unit.
@@ -33,13 +33,13 @@ struct Option {
   std::int64_t minimum = 0;                     ///< Lowest value.
   std::int64_t maximum = 0;                     ///< Highest value.
   std::span<const std::string_view> choices{};  ///< Words for the values from 0; none: it is a number.
-  bool probeable = false;                       ///< whether captured frames can tell which value is right
+  bool probeable = false;                       ///< captured frames can show its value
   unsigned decimals = 0;                        ///< Number of digits behind the point that the value has.
-  bool describes_word = false;                  ///< a word format says it instead: the two cannot be given together
-  std::uint32_t step = 1;                       ///< the values are `minimum` and what is multiples of this above it
-  Role role = Role::other;                      ///< Role by which generic programs find it.
-  bool in_hex = false;                          ///< texts show it in hexadecimal, as FieldInfo::in_hex
-  bool or_zero = false;                         ///< 0 is a value too, below the range
+  bool describes_word = false;  ///< a word format replaces this option: the two cannot be given together
+  std::uint32_t step = 1;       ///< values are `minimum` and multiples of this step above it
+  Role role = Role::other;      ///< Role by which generic programs find it.
+  bool in_hex = false;          ///< texts show it in hexadecimal, as FieldInfo::in_hex
+  bool or_zero = false;         ///< 0 is a value too, below the range
 };
 
 /// An option with its value.
@@ -52,20 +52,20 @@ struct OptionValue {
 struct Model {
   std::string_view name;                ///< Name of the model.
   std::string_view meaning;             ///< What the model is, as a phrase.
-  std::uint32_t maximum_rpm;            ///< fastest shaft for which a position is specified
+  std::uint32_t maximum_rpm;            ///< fastest shaft for which a position is specified, in rpm
   std::span<const OptionValue> values;  ///< Options that it sets.
 };
 
-inline constexpr std::size_t maximum_options = 68;  ///< twelve of biss-chain, and seven of each of its eight words
+inline constexpr std::size_t maximum_options = 68;  ///< twelve of biss-chain, and seven for each of its eight words
 
-/// What a word format is given as, beside the options of units that take one.
+/// Name of the option that gives a word format, for units that take one.
 inline constexpr std::string_view word_option_name = "word";
 
-/// The value of every option of one unit, by the index of the option.
+/// The values of all options of a unit, by the index of the option.
 struct Options {
   std::array<std::int64_t, maximum_options> values{};  ///< Values in the order of the unit's options.
-  const Model* model = nullptr;                        ///< null: no known model has these values
-  WordFormat word{};                                   ///< in place of the options that describe one; empty: they do
+  const Model* model = nullptr;                        ///< model with these values; null: none
+  WordFormat word{};                                   ///< replaces the options that describe a word; empty: they apply
 
   /// Returns whether the user described the position word.
   [[nodiscard]] constexpr bool has_word() const { return word.bits() != 0; }
@@ -79,7 +79,7 @@ struct OptionText {
   std::string_view value;  ///< Its value, as written.
 };
 
-/// Why options could not be resolved: `text` is the name or value at fault, `option` the one it was meant for.
+/// Why options were refused. `text`: the wrong name or value; `option`: the option that it was meant for.
 struct OptionError {
   /// What is wrong with a text of options.
   enum class Kind : std::uint8_t {
@@ -87,7 +87,7 @@ struct OptionError {
     unknown_model,
     unknown_option,
     bad_value,
-    bad_word,                      ///< `word` says why and where
+    bad_word,                      ///< `word` has the reason and the place
     beside_word,                   ///< the option or model `text` cannot be given together with a word
   } kind = Kind::none;             ///< What is wrong.
   std::string_view text{};         ///< The part of the text that is wrong.
@@ -97,17 +97,16 @@ struct OptionError {
 
 struct Unit;
 
-/// Option values from a model and single settings, which override it. Without a model name (empty), the first model
-/// that agrees with all the settings is taken, so that the length of a position also brings the id that belongs to it;
-/// when none does, the unit's defaults, which know no particular model.
-/// With a word no model is taken.
+/// Resolves options from a model and single settings, which override it. Without a model name the first model that
+/// agrees with all settings is used, so that the length of a position also selects its id; if none agrees, the unit's
+/// defaults apply. With a word no model is used.
 [[nodiscard]] OptionError resolve_options(const Unit& unit, std::string_view model,
                                           std::span<const OptionText> settings, Options& resolved);
 
-/// There are other encoders on the line: options that leave that open learn it.
+/// States that other encoders share the line, for options that leave it open.
 void tell_shared(const Unit& unit, Options& options);
 
-/// A whole number, decimal or 0x hexadecimal, with an optional minus sign. Error: invalid_argument.
+/// Parses an integer, decimal or 0x hexadecimal, with an optional minus sign. Error: invalid_argument.
 [[nodiscard]] constexpr Result<std::int64_t> parse_number(std::string_view text) {
   const bool negative = text.starts_with('-');
   if (negative) text.remove_prefix(1);
@@ -130,7 +129,7 @@ void tell_shared(const Unit& unit, Options& options);
   return negative ? -value : value;
 }
 
-/// A decimal number of 0 or more with at most `decimals` digits behind a point, in units of the last one: "0.05" with
+/// Parses a decimal number of 0 or more with at most `decimals` decimal digits, in units of the last digit: "0.05" with
 /// three decimals is 50. Error: invalid_argument.
 [[nodiscard]] constexpr Result<std::int64_t> parse_decimal(std::string_view text, unsigned decimals) {
   const std::size_t point = index_of(text, '.');
@@ -152,7 +151,7 @@ void tell_shared(const Unit& unit, Options& options);
   return value;
 }
 
-/// The value of an option: a number, or one of its choices. Error: invalid_argument.
+/// Parses the value of an option: a number, or one of its choices. Error: invalid_argument.
 [[nodiscard]] constexpr Result<std::int64_t> parse_value(const Option& option, std::string_view text) {
   for (std::size_t i = 0; i < option.choices.size(); ++i) {
     if (option.choices[i] == text) return static_cast<std::int64_t>(i);

@@ -87,14 +87,14 @@ TEST(Options, WhoeverKnowsTheLineTells) {
   };
   bus({});
   bus({{"bus", "true"}});
-  bus({{"bus", "false"}});  // who says so knows better
+  bus({{"bus", "false"}});  // an explicit value has priority
 }
 
 TEST(Options, WhatIsNoWordIsToldWithItsPlace) {
   const Resolved wrong = resolve(ssi::unit, {}, {{"word", "position:12 eror:1"}});
   EXPECT_EQ(wrong.error.kind, OptionError::Kind::bad_word);
   EXPECT_EQ(wrong.error.word.at, 12u);
-  // A value must not hide a field of the protocol.
+  // A value of the word must not have the name of a field of the protocol.
   const Resolved hiding = resolve(biss::unit, {}, {{"word", "position:12 crc=value:3"}});
   EXPECT_EQ(hiding.error.kind, OptionError::Kind::bad_word);
   EXPECT_EQ(hiding.error.word.at, 12u);

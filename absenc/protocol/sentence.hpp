@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A sentence put together from fixed texts, where there is no heap.
+// A sentence made from fixed texts, without a heap.
 #pragma once
 
 #include <algorithm>
@@ -13,7 +13,7 @@ namespace absenc {
 /// A sentence that is put together without heap.
 class Sentence {
  public:
-  /// What does not fit is left out.
+  /// Adds a text; what does not fit is left out.
   Sentence& add(std::string_view text) {
     if (text.size() <= text_.size() - size_) {
       std::copy(text.begin(), text.end(), text_.begin() + size_);
@@ -31,7 +31,7 @@ class Sentence {
     } while (number != 0);
     return add({digits.data() + first, digits.size() - first});
   }
-  /// Behind what is there already, parted from it by "; ".
+  /// Adds a part after the present text, separated by "; ".
   Sentence& add_part(std::string_view part) {
     if (!part.empty() && !empty()) add("; ");
     return add(part);
@@ -44,7 +44,7 @@ class Sentence {
   [[nodiscard]] std::string_view view() const { return {text_.data(), size_}; }
 
  private:
-  std::array<char, 400> text_;  // not cleared: each conversation has one, and few have anything to say
+  std::array<char, 400> text_;  // not cleared: each conversation has one, and few use it
   std::size_t size_ = 0;
 };
 

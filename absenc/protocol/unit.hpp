@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The descriptor of one protocol: everything the neutral layers and the command know about it, as data and functions.
+// The descriptor of one protocol: all its properties for the neutral layers and the command, as data and functions.
 #pragma once
 
 #include <cstddef>
@@ -18,9 +18,9 @@
 
 namespace absenc {
 
-/// What a command is for. The command-line verbs look a unit's commands up by this.
+/// The purpose of a command. The verbs of the command line find a unit's commands by it.
 enum class Verb : std::uint8_t {
-  read,  ///< the position, with all the alarms the unit can tell; the first such command is the one `read` uses
+  read,  ///< the position, with all alarms that the unit can report; `read` uses the first such command
   read_part,
   info,
   temperature,
@@ -31,8 +31,8 @@ enum class Verb : std::uint8_t {
   memory_write,
   config_get,
   config_set,
-  scan,  ///< who answers on a line: for each, a record that begins with its address
-  run,   ///< a procedure only this unit has
+  scan,  ///< finds the encoders on the line: for each, a record that begins with its address
+  run,   ///< a procedure that only this unit has
 };
 
 /// Description of an argument of a command.
@@ -46,40 +46,44 @@ struct Argument {
   Role role = Role::other;         ///< Role by which generic programs find it.
 };
 
-using Arguments = std::span<const std::int64_t>;  ///< one value for each Argument of the command, defaults filled in
+/// One value for each Argument of the command, with defaults filled in.
+using Arguments = std::span<const std::int64_t>;
 
 /// Description of a command of a unit.
 struct Command {
   std::string_view name;                  ///< Name of the command.
   Verb verb;                              ///< The verb of the command line that runs it.
-  std::uint8_t id;                        ///< the unit's own number for it
+  std::uint8_t id;                        ///< the unit's own number of the command
   std::string_view meaning;               ///< What it does, as a phrase.
   std::span<const Argument> arguments{};  ///< Arguments in their order.
   bool changes_encoder = false;           ///< Whether it changes anything in the encoder.
-  bool repeatable = true;                 ///< whether the same request may be sent again after an error
-  std::string_view reads_back{};  ///< config_set: the name of the config_get command that reads this setting; "": none
-                                  ///< can, the setting has the name of this command, which looks at the effect itself
-  std::string_view changes_option{};  ///< config_set: the option that must follow its first argument; who goes on does
-                                      ///< so with the new value, on the same open port
-  std::string_view disturbs{};        ///< what its requests may do to other devices on the line, a sentence without its
-                                      ///< end; "": nothing. People are asked before it is sent
-  bool reads_alarms = false;  ///< read_part: its reading has all the alarms by name, where that of Verb::read may not
+  bool repeatable = true;                 ///< the same request may be sent again after an error
+  /// Config_set: name of the config_get command that reads the setting; "": no command reads it, the setting has the
+  /// name of this command, which checks the effect itself.
+  std::string_view reads_back{};
+  /// Config_set: option that gets the value of the first argument; later commands use the new value on the same open
+  /// port.
+  std::string_view changes_option{};
+  /// Possible effect of its requests on other devices on the line, a sentence without its end; "": none. People are
+  /// asked before it is sent.
+  std::string_view disturbs{};
+  bool reads_alarms = false;  ///< read_part: its reading has all alarms by name, although that of Verb::read may not
 };
 
-/// A run of bytes in the encoder's memory. The commands memory_read and memory_write reach it by their arguments with
-/// the roles address, page, count, value and force; memory_read reports a field with the role data, or value for a
+/// A range of bytes in the encoder's memory. The commands memory_read and memory_write access it by their arguments
+/// with the roles address, page, count, value and force; memory_read reports a field with the role data, or value for a
 /// single byte.
 struct MemoryArea {
-  std::uint32_t page;             ///< 0 where there are no pages
+  std::uint32_t page;             ///< first page; 0 without pages
   std::uint32_t first;            ///< First address.
   std::uint32_t count;            ///< Number of bytes.
   std::string_view meaning;       ///< What the area holds, as a phrase.
   bool writable = true;           ///< Whether hosts may write it.
-  bool in_dump = true;            ///< whether it belongs to a copy of the memory
-  std::uint32_t write_life = 0;   ///< writes that the document permits; 0: not known
-  std::string_view protection{};  ///< why only memory_write's argument of the role force writes it; "": it needs none
-  bool life_in_total = false;     ///< write_life is of all bytes together; false: the document does not say of what
-  std::uint32_t pages = 1;        ///< this one and those behind it, which are alike and which an encoder may lack
+  bool in_dump = true;            ///< a copy of the memory includes it
+  std::uint32_t write_life = 0;   ///< writes that the document permits; 0: unknown
+  std::string_view protection{};  ///< why memory_write needs its argument of the role force here; "": it needs none
+  bool life_in_total = false;     ///< write_life is for all bytes together; false: the document does not say
+  std::uint32_t pages = 1;        ///< number of pages from `page` on that are alike; an encoder may have fewer
 
   /// Returns whether the area has this byte.
   [[nodiscard]] constexpr bool has(std::uint32_t on_page, std::uint32_t address) const {
@@ -87,46 +91,47 @@ struct MemoryArea {
   }
 };
 
-/// A register of the encoder: accessed as a whole, at its address. The commands memory_read and memory_write reach it
+/// A register of the encoder, accessed as a whole at its address. The commands memory_read and memory_write access it
 /// by their arguments with the roles address and value.
 struct RegisterInfo {
   std::string_view name;  ///< Name of the register.
   std::uint32_t address;  ///< Address of the register.
-  std::uint32_t size;     ///< bytes
+  std::uint32_t size;     ///< size in bytes
   bool readable = true;   ///< Whether hosts may read it.
   bool writable = false;  ///< Whether hosts may write it.
 };
 
-/// Something around a virtual encoder that its document speaks of: a temperature, a battery, a fault of one channel.
+/// A property of a virtual encoder's environment that its document mentions: a temperature, a battery, a fault of one
+/// channel.
 struct Condition {
   std::string_view name;     ///< Name of the condition.
-  std::string_view unit;     ///< as of a field; "" for yes (1) or no (0) and plain numbers
+  std::string_view unit;     ///< unit as of a field; "" for yes (1) or no (0) and plain numbers
   std::string_view meaning;  ///< Meaning of the value, with its unit.
   std::int64_t minimum;      ///< Lowest value.
   std::int64_t maximum;      ///< Highest value.
-  std::int64_t normal;       ///< of a healthy installation: what it begins with
+  std::int64_t normal;       ///< initial value, that of a healthy installation
 };
 
-/// A frame in the form its link carries.
+/// A frame in the form that its link carries.
 struct Frame {
   Bytes bytes{};                  ///< The bytes, or of a bit stream the bytes that hold it.
-  std::size_t bits = 0;           ///< clocked links: how many bits of `bytes` count
-  const CanFrame* can = nullptr;  ///< CAN links
+  std::size_t bits = 0;           ///< clocked links: number of valid bits in `bytes`
+  const CanFrame* can = nullptr;  ///< the frame of CAN links
 
   /// Returns whether there is neither a byte nor a CAN frame.
   [[nodiscard]] constexpr bool empty() const { return bytes.empty() && can == nullptr; }
 };
 
-/// One expected value of a vector.
+/// The expected value of a field in a vector.
 struct Expected {
   std::string_view field;   ///< Name of the field.
   std::int64_t number = 0;  ///< Wanted value of an integer field.
   double real = 0;          ///< Wanted value of a field with a fraction.
-  std::string_view text{};  ///< of text and bytes fields: the bytes themselves
+  std::string_view text{};  ///< text and bytes fields: the bytes themselves
 };
 
-/// A frame with what it must decode to. `options` is "name=value name=value". Clocked links: request and reply are
-/// texts of 0 and 1; CAN links: texts as "1ff:022b000000000000".
+/// A frame and its decoded fields. `options` is "name=value name=value". Clocked links: request and reply are texts of
+/// 0 and 1; CAN links: texts such as "1ff:022b000000000000".
 struct Vector {
   std::string_view id;                 ///< Identifier of the vector, unique within the unit.
   std::string_view meaning;            ///< What the vector shows, as a phrase.
@@ -138,20 +143,20 @@ struct Vector {
   Error error = Error::none;           ///< Wanted error; `Error::none`: the reply is valid.
 };
 
-/// A reply as it was captured on a link that carries bytes, and what had been asked. Without the request the reply
-/// itself must tell; an empty reply: none came.
+/// A captured request and reply on a link that carries bytes. Without a request the reply alone must show it; an empty
+/// reply: none was received.
 struct Capture {
   Bytes request{};  ///< Bytes of the request; empty: none was captured.
   Bytes reply{};    ///< Bytes of the reply; empty: none was captured.
 };
 
-/// What captures say about one value of one option.
+/// Evidence of captures about one value of one option.
 struct OptionEvidence {
   std::size_t option;    ///< index into the unit's options
   std::int64_t value;    ///< Value of the option.
   bool possible;         ///< Whether the captured frames can come from an encoder with this value.
-  std::size_t capture;   ///< not possible: the first that contradicts
-  std::string_view why;  ///< a sentence
+  std::size_t capture;   ///< if not possible: the first capture that contradicts the value
+  std::string_view why;  ///< the reason, a sentence
 };
 
 /// Receives the values of an option with their evidence.
@@ -163,8 +168,8 @@ struct EvidenceSink {
   ~EvidenceSink() = default;
 };
 
-/// Where a value, or a part of it, stands in a frame. Bits count as those of `Unit::is_checked`: on lines of characters
-/// the last of a range is the most significant, on clocked links the first.
+/// The bits of a value, or of a part of it, in a frame. Bits are numbered as for `Unit::is_checked`; the last bit of a
+/// range is the most significant on lines of characters, the first on clocked links.
 struct BitRange {
   std::size_t first = 0;  ///< Index of the first bit.
   std::size_t count = 0;  ///< Number of bits.
@@ -174,21 +179,22 @@ struct BitRange {
 /// The parts of one value, the least significant first.
 using BitRanges = Buffer<BitRange, 8>;
 
-/// Frames of which several exchanges carry a byte each. They are decoded as others are.
+/// A frame that several exchanges carried, one byte each. It is decoded as other frames are.
 struct Composed {
   Bytes request{};            ///< Bytes of the request.
   Bytes reply{};              ///< Bytes of the reply; empty: none.
   std::uint64_t first = 0;    ///< number of the exchange with which it began
-  Error error = Error::none;  ///< what its bytes alone do not tell: it contradicts the frames that carried it
+  Error error = Error::none;  ///< an error that its bytes alone do not show: it contradicts the frames that carried it
 };
 
-/// Finds them among the good exchanges of one encoder, as a capture has them.
+/// Finds composed frames in the valid exchanges of one encoder, in the order of a capture.
 struct Follower {
-  /// A good exchange, or a reply that came without a request. `number` counts them.
+  /// Takes a valid exchange, or a reply without a request. `number` counts them.
   virtual void follow(std::uint64_t number, Bytes request, Bytes reply) = 0;
-  /// Frames were lost or damaged here.
+  /// Notes that frames were lost or damaged here.
   virtual void lose() = 0;
-  /// Takes one that ended with the last exchange; false: there is no other. It is valid until the next exchange.
+  /// Returns in `one` a composed frame that ended with the last exchange; false: there is no other. Valid until the
+  /// next exchange.
   virtual bool take(Composed& one) = 0;
 
  protected:
@@ -198,18 +204,18 @@ struct Follower {
 /// Direction of a frame.
 enum class Direction : std::uint8_t { request, reply };
 
-/// Where a frame ends in a run of bytes.
+/// Where a frame ends in a sequence of bytes.
 struct FrameEnd {
   /// Whether the end of a frame is known.
   enum class Kind : std::uint8_t {
     complete,            ///< the first `size` bytes are one frame
     incomplete,          ///< a frame may have begun; at least `size` bytes in all are needed
-    no_frame,            ///< the first byte begins no frame
+    no_frame,            ///< no frame begins with the first byte
   } kind;                ///< Whether the end of the frame is known.
   std::size_t size = 0;  ///< Length of the frame in bytes, if known.
 };
 
-/// A machine of whichever item its link carries; exactly one pointer is set, or none when it could not be made.
+/// A machine with the item that its link carries. Exactly one pointer is set; none if the machine could not be made.
 template <template <class> class Role>
 struct Any {
   Role<std::uint8_t>* bytes = nullptr;  ///< The machine, if its items are bytes; else null.
@@ -226,65 +232,66 @@ struct Any {
   }
 };
 
-inline constexpr std::size_t longest_encoded = 1024;  ///< bytes of a request that `encode` writes
+inline constexpr std::size_t longest_encoded = 1024;  ///< bytes of a request that `encode` writes, at most
 
 /// Bits of a position; 0: it has no such part.
 struct Resolution {
   unsigned singleturn_bits = 0;   ///< Bits of the single-turn position; 0: none.
   unsigned multiturn_bits = 0;    ///< Bits of the turns; 0: none.
-  double unit_um = 0;             ///< linear encoders: micrometres a count; 0: a rotation
-  bool multiturn_signed = false;  ///< turns are counted below zero
+  double unit_um = 0;             ///< linear encoders: micrometres per count; 0: a rotary encoder
+  bool multiturn_signed = false;  ///< turns below zero are counted
 };
 
-/// Wires beside the data on which a host's pulses ask for something.
+/// Wires beside the data on which a host sends requests as pulses.
 struct ExtraWires {
-  bool trigger = false;  ///< each frame
-  bool clear = false;    ///< the zero
+  bool trigger = false;  ///< each frame needs a trigger pulse
+  bool clear = false;    ///< a pulse sets the zero
 };
 
-/// The times of an asynchronous line by which its captures are read.
+/// Times of an asynchronous line, which decoding its captures needs.
 struct LineTiming {
-  unsigned pause_bits = 15;  ///< a line silent for so many bits has ended the frame; shorter, the frame goes on
-  Time turnaround{};  ///< from the end of a request to the begin of its reply, as the document has it; 0: not told
-  Time turnaround_limit = std::chrono::milliseconds(100);  ///< no host waits longer for the reply to begin
+  unsigned pause_bits = 15;  ///< silence in bits that ends a frame; a shorter pause does not
+  Time turnaround{};  ///< time from the end of a request to the begin of its reply, as the document has it; 0: unknown
+  Time turnaround_limit = std::chrono::milliseconds(100);  ///< longest time that hosts wait for a reply to begin
 };
 
 /// Description of a protocol. All layers above know a protocol only by this.
 struct Unit {
   std::string_view id;        ///< Identifier: the part of an address before the colon.
   std::string_view name;      ///< maker and protocol, for people
-  std::string_view document;  ///< the source
-  /// Makers and families by which people look for it: "Tamagawa", "Smart-Abs". Its models stand in `models`.
+  std::string_view document;  ///< title of the document
+  /// Makers and families to find the unit by: "Tamagawa", "Smart-Abs". Its models are in `models`.
   std::span<const std::string_view> known_as{};
-  LinkKind link;                              ///< Kind of link between host and encoder.
-  LineSettings line;                          ///< rate 0: the document states none, the user must
-  std::span<const Option> options;            ///< Options that an address may set.
-  std::span<const Model> models;              ///< Models, which set several options by one name.
-  std::span<const FieldInfo> fields;          ///< Fields that replies can have.
-  std::span<const Command> commands;          ///< Commands of the encoder.
-  std::span<const MemoryArea> memory{};       ///< what the commands memory_read and memory_write reach, in order
-  std::span<const RegisterInfo> registers{};  ///< the same of an encoder that has registers instead of bytes
-  std::span<const Vector> vectors;            ///< Frames with their meaning, from documents.
-  const FieldInfo* status;                    ///< the flags of Reading::status; null when the unit has none
-  const FieldInfo* alarms;                    ///< the flags of Reading::alarms
-  /// The alarms that an encoder with these options can report; null: all.
+  LinkKind link;                         ///< Kind of link between host and encoder.
+  LineSettings line;                     ///< rate 0: the document states none, so the user must
+  std::span<const Option> options;       ///< Options that an address may set.
+  std::span<const Model> models;         ///< Models, which set several options by one name.
+  std::span<const FieldInfo> fields;     ///< Fields that replies can have.
+  std::span<const Command> commands;     ///< Commands of the encoder.
+  std::span<const MemoryArea> memory{};  ///< areas that the commands memory_read and memory_write access, in order
+  /// Registers that these commands access, of an encoder without bytes of memory.
+  std::span<const RegisterInfo> registers{};
+  std::span<const Vector> vectors;  ///< Frames with their meaning, from documents.
+  const FieldInfo* status;          ///< flags of Reading::status; null: the unit has none
+  const FieldInfo* alarms;          ///< flags of Reading::alarms
+  /// Returns the alarms that an encoder with these options can report. Null: all.
   std::uint32_t (*reportable)(const Options& options) = nullptr;
-  /// Of an encoder that reports in two channels, the flags of the second. Their bits follow those of the first in one
-  /// number: whoever compares alarms sees both, whoever shows them names each.
+  /// Flags of the second channel of an encoder with two. Their bits follow those of the first in one number, so
+  /// comparing alarms compares both channels; people see the names of each.
   const FieldInfo* second_status = nullptr;
   const FieldInfo* second_alarms = nullptr;  ///< Field of the second alarms; null: none.
-  std::size_t host_storage;                  ///< bytes that `host` needs, suitably aligned for any type
+  std::size_t host_storage;                  ///< bytes that `host` needs, aligned for any type
   std::size_t device_storage;                ///< bytes that `device` needs
 
   /// Checks a reply against its request and puts its fields; with an empty reply, the fields of the request.
   Error (*decode)(const Options& options, Frame request, Frame reply, FieldSink& sink);
-  /// Returns the error of `decode`; none: the reply is good, or with an empty reply the request.
+  /// Returns the error of `decode`; none: the reply, or with an empty reply the request, is valid.
   [[nodiscard]] Error check(const Options& values, const Frame& request, const Frame& reply) const {
     NoFields nowhere;
     return decode(values, request, reply, nowhere);
   }
-  /// The request of a command, at most `longest_encoded` bytes; on CAN and clocked links its text, as in vectors. Empty
-  /// where a host only clocks. Errors: invalid_argument, buffer_too_small, unsupported.
+  /// Writes the request of a command, at most `longest_encoded` bytes; on CAN and clocked links its text, as in
+  /// vectors. Empty if a host only clocks. Errors: invalid_argument, buffer_too_small, unsupported.
   Result<std::size_t> (*encode)(const Options& options, const Command& command, Arguments arguments,
                                 MutableBytes request);
   /// Returns where the frame that begins with `bytes` ends.
@@ -295,51 +302,53 @@ struct Unit {
                             std::span<std::byte> storage);
   /// Makes a virtual encoder in `storage`, which has `device_storage` bytes; none if the options contradict each other.
   Any<Device> (*device)(const Options& options, const Shaft& shaft, std::span<std::byte> storage);
-  /// What the options make of a position.
+  /// Returns the bits of a position with these options.
   Resolution (*resolution)(const Options& options);
-  /// Whether a flip of this bit of this good reply must be noticed; null: every bit. Bits count from the least
-  /// significant of the first byte on; on clocked links in the order of the wire.
+  /// Returns whether a flip of this bit in this valid reply must be detected. Null: every bit must. Bits count from the
+  /// least significant of the first byte on; on clocked links in the order of the wire.
   bool (*is_checked)(const Options& options, Frame request, Frame reply, std::size_t bit) = nullptr;
-  /// Where this good reply has a field that it carries: no ranges where it has it in no fixed place, or makes it of
-  /// something else (Gray code, decimal text). Null: not told of any. It may depend on options and request, so it is
-  /// asked frame by frame; the kit cuts the bits out of good frames and compares them with the field.
+  /// Returns the bits of a field in this valid reply that carries it; none if the field has no fixed place, or is
+  /// computed (Gray code, decimal text). Null: unknown for all fields. The place may depend on options and request, so
+  /// it is asked for each frame; the kit cuts the bits out of valid frames and compares them with the field.
   BitRanges (*bits)(const Options& options, Frame request, Frame reply, const FieldInfo& field) = nullptr;
-  /// About a reply that `decode` refuses with `error`, what the document says; null: nothing.
+  /// Returns the document's explanation of a reply that `decode` refuses with `error`. Null: it has none.
   Explanation (*explain)(const Options& options, Error error, Frame request, Frame reply) = nullptr;
-  /// The line as the options describe it; null: always `line`. Silences measured in characters follow its rate, and a
+  /// Returns the line with these options. Null: always `line`. Silences measured in characters follow its rate, and a
   /// conversation that changes the rate must know the old one.
   LineSettings (*settings)(const Options& options) = nullptr;
-  /// The unit of the same encoder behind an SPI controller, where that is another one.
+  /// The unit of the same encoder behind an SPI controller, if that is another one.
   const Unit* over_spi = nullptr;
-  /// Puts every value of the probeable options; null: frames do not tell. Captures are in the order of time. Whether
-  /// any values explain them all: then `options`, which give what is not probed, become such values, defaults where the
-  /// captures do not tell.
+  /// Puts every value of the probeable options; null: frames do not show them. Captures are in the order of time.
+  /// Returns whether some values explain all captures; then `options`, which have the values of all other options, get
+  /// these values, and defaults where captures leave them open.
   bool (*probe)(Options& options, std::span<const Capture> captures, EvidenceSink& sink) = nullptr;
-  /// What these options need beside the data, known before a port is opened: the user must say which wire it is, and a
-  /// pseudo-terminal has none. Null: nothing.
+  /// Returns the wires that these options need beside the data, before a port is opened: the user must name the wire,
+  /// and a pseudo-terminal has none. Null: none.
   ExtraWires (*extra_wires)(const Options& options) = nullptr;
   LineTiming timing{};  ///< Times of the line, for captures.
-  /// Whether the encoder sends replies that nobody asks for; null: never. On clocked and CAN links it always may.
+  /// Returns whether the encoder sends unsolicited replies. Null: never. On clocked and CAN links it may always do so.
   bool (*streams)(const Options& options) = nullptr;
-  /// Whether this request, a good one, is answered; null: every one is.
+  /// Returns whether this valid request is answered. Null: every one is.
   bool (*is_answered)(const Options& options, Frame request) = nullptr;
-  /// How long after what was last heard this good request may be sent again; null: at once.
+  /// Returns how long after the last received item this valid request must not be repeated. Null: it may be repeated at
+  /// once.
   Time (*pause)(const Options& options, Frame request) = nullptr;
-  std::span<const Condition> conditions{};  ///< that can be set of the virtual encoder, also while it runs
-  /// Clocked links whose host says a bit by the level of its clock line in each pause, 1 when it is held low: the index
-  /// of the bit in this reply with which the encoder says one too. Both together are decoded as request and reply, one
-  /// bit for each frame. Nothing: this reply has none. Null: no reply of the unit has.
+  std::span<const Condition> conditions{};  ///< conditions of the virtual encoder, which can also be set while it runs
+  /// Clocked links whose host sends a bit by the level of its clock line in each pause, 1 when it is low: returns the
+  /// index of the bit in this reply with which the encoder sends one, too. Both together are decoded as request and
+  /// reply, one bit per frame. Nothing: this reply has none. Null: no reply of the unit has one.
   std::optional<std::size_t> (*control_bit)(const Options& options, Frame reply) = nullptr;
-  /// Returns `now`, the reading of one reply, completed by what earlier replies of the same encoder reported since it
-  /// was switched on and this one does not carry. `before` is the reading before it, completed in the same way. Null:
-  /// each reply says all that there is to say.
+  /// Returns `now`, the reading of one reply, completed by values that it does not carry and that earlier replies of
+  /// the same encoder have reported since power on. `before`: the completed reading before it. Null: each reply has all
+  /// values.
   Reading (*remembered)(const Reading& before, Reading now) = nullptr;
-  /// In storage of `follower_storage` bytes, aligned for any type. Null: each exchange says all that it says by itself.
+  /// Constructs a follower in storage of `follower_storage` bytes, aligned for any type. Null: no frame is carried by
+  /// several exchanges.
   Follower* (*follower)(const Options& options, std::span<std::byte> storage) = nullptr;
   std::size_t follower_storage = 0;  ///< Bytes that a channel follower needs.
 };
 
-/// Whether a word format may stand in for some of its options.
+/// Returns whether a word format may replace some of the unit's options.
 [[nodiscard]] constexpr bool takes_word(const Unit& unit) {
   for (const Option& option : unit.options) {
     if (option.describes_word) return true;
@@ -347,12 +356,12 @@ struct Unit {
   return false;
 }
 
-/// The line as these options describe it.
+/// Returns the line with these options.
 [[nodiscard]] inline LineSettings line_settings(const Unit& unit, const Options& options) {
   return unit.settings != nullptr ? unit.settings(options) : unit.line;
 }
 
-/// The first command with this verb, or null.
+/// Returns the first command with this verb, or null.
 [[nodiscard]] constexpr const Command* find_command(const Unit& unit, Verb verb) {
   for (const Command& command : unit.commands) {
     if (command.verb == verb) return &command;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Compares what a frame decodes to with what its vector expects, at compile time too.
+// Compares the decoded fields of a frame with those that its vector expects, also at compile time.
 #pragma once
 
 #include <span>
@@ -10,7 +10,7 @@
 
 namespace absenc {
 
-/// Every field that is put must be expected, in any order; real numbers to 1e-9.
+/// A sink that expects every put field, in any order; real numbers to 1e-9.
 struct VectorCheck final : FieldSink {
   /// Compares with these values.
   constexpr explicit VectorCheck(std::span<const Expected> wanted) : expected(wanted) {}
@@ -39,15 +39,15 @@ struct VectorCheck final : FieldSink {
   std::size_t count = 0;               ///< Number of expected fields that came.
 };
 
-/// The frame behind the text of a vector on a clocked link; at most 256 bits, everything but 1 is 0.
+/// Returns the frame of a vector's text on a clocked link: at most 256 bits, every character but 1 is 0.
 [[nodiscard]] constexpr BitBuffer<256> bits_of_text(Bytes text) {
   BitBuffer<256> bits;
   for (const std::uint8_t c : text) bits.append(c == '1' ? 1 : 0, 1);
   return bits;
 }
 
-/// The frame behind the text of a vector on a CAN link: "1ff:022b", an identifier of more than three digits is one of
-/// 29 bits. A text that is none gives an empty frame.
+/// Returns the frame of a vector's text on a CAN link: "1ff:022b"; an identifier of more than three digits has 29 bits.
+/// Any other text gives an empty frame.
 [[nodiscard]] constexpr CanFrame can_frame_of_text(Bytes text) {
   CanFrame frame;
   std::size_t at = 0;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The position word of clocked encoders, decoded and encoded by its WordFormat, and what it means as a reading.
+// The position word of clocked encoders: decoded and encoded by its WordFormat, and turned into a reading.
 #pragma once
 
 #include <array>
@@ -17,7 +17,7 @@
 
 namespace absenc {
 
-/// Fields that the word does not carry are 0.
+/// The values of a word; those that it does not carry are 0.
 template <std::size_t size>
 struct WordWith {
   static constexpr std::size_t capacity = size;  ///< Number of values that have room.
@@ -25,7 +25,7 @@ struct WordWith {
   std::uint64_t multiturn = 0;                   ///< Turns.
   bool error = false;                            ///< Whether the error bit reports an error.
   bool warning = false;                          ///< Whether the warning bit reports a warning.
-  std::array<std::uint64_t, size> values{};      ///< those of Meaning::value, by the field's index
+  std::array<std::uint64_t, size> values{};      ///< values of Meaning::value, by the field's index
 
   /// Compares all values.
   friend constexpr bool operator==(const WordWith&, const WordWith&) = default;
@@ -43,7 +43,7 @@ inline constexpr std::array<FlagInfo, 2> word_flags{{
     {"warning", "the encoder works near its limits", "check distance, dirt, temperature and supply", true},
 }};
 
-/// The fields of a word; those of Meaning::value have names of their own.
+/// The fields of a word, except those of Meaning::value, which have names of their own.
 struct WordValues {
   std::uint64_t multiturn;   ///< Turns.
   std::uint64_t singleturn;  ///< Position within the turn, in counts.
@@ -68,13 +68,13 @@ inline constexpr auto word_fields = author::fields_of<WordValues>(
     author::field<&WordValues::warning>("warning", "", "the encoder works near its limits"),
     author::field<&WordValues::alarms>("alarms", "error and warning", word_flags));
 
-/// What the position counts.
+/// The unit of a position.
 struct Scale {
   bool linear = false;  ///< Whether the encoder is linear.
-  double unit_um = 0;   ///< linear: micrometres a count; 0: not known
+  double unit_um = 0;   ///< linear: micrometres per count; 0: unknown
 };
 
-/// A field and its place in the word.
+/// A field with its place in the word.
 struct PlacedField {
   std::size_t index;  ///< Index of the field in the format.
   unsigned first;     ///< Index of its first bit in the word.
@@ -83,8 +83,8 @@ struct PlacedField {
   bool active_low;    ///< Whether 0 means that a flag is set.
 };
 
-/// What the functions of a position word are written with: its format, that of the protocol around it, and a way over
-/// its fields, which calls `use` with each until it returns false.
+/// Word format for the functions of a position word, known at run time: the format, that of the protocol around it, and
+/// `each`, which calls `use` with each field until it returns false.
 template <class Format>
 struct Given {
   static constexpr bool is_known = false;  ///< Whether the format is known at compile time.
@@ -106,7 +106,7 @@ struct Given {
   }
 };
 
-/// The same of a format that is known when the program is written: nothing of it is left to run time.
+/// The same for a format that is known when the program is written, so that nothing is computed at run time.
 template <const auto& known>
 struct Known {
   static constexpr bool is_known = true;                     ///< Whether the format is known at compile time.
@@ -148,7 +148,7 @@ constexpr bool parity_of(const Bits& bits, std::size_t first, std::size_t end) {
   return odd ^ odd_parity(bits.load(first, static_cast<unsigned>(end - first)));
 }
 
-// Of a Gray-coded number that goes on from field to field: each needs the last bit of the one before.
+// Decodes a Gray-coded number that continues from field to field: each field needs the last bit of the one before.
 class GrayFields {
  public:
   constexpr std::uint64_t decode(std::uint64_t gray, unsigned bits) {
@@ -166,8 +166,8 @@ class GrayFields {
   bool odd_ = false;
 };
 
-// The bits from `first` on for a format that is known at run time only: in one number where they fit, which is faster,
-// and one piece of code for both. All of them must be there.
+// The bits from `first` on, for a format known at run time only. At most 64 bits are loaded as one number, which is
+// faster, and one piece of code serves all formats. All bits must exist.
 class SomeBits {
  public:
   constexpr SomeBits(BitView bits, std::size_t first, unsigned count)
@@ -214,14 +214,14 @@ constexpr Error take_word(const Source& source, const Bits& bits, std::size_t fi
 
 }  // namespace detail
 
-/// The word that begins at bit `first`. Errors: wrong_length (fewer bits are there), bad_checksum (parity).
+/// Decodes the word that begins at bit `first`. Errors: wrong_length (too few bits), bad_checksum (parity).
 [[nodiscard]] constexpr Result<Word> decode_word(const WordFormat& format, BitView bits, std::size_t first = 0) {
   Word word;
   const Error error = detail::take_word(Given<WordFormat>{format, format}, bits, first, word);
   return error == Error::none ? Result(word) : error;
 }
 
-/// Appends the word; what does not fit into a field is cut off. False when `out` is too small.
+/// Appends the word; values are cut to the bits of their field. Returns false if `out` is too small.
 template <std::size_t Capacity>
 constexpr bool encode_word(const WordFormat& format, const Word& word, BitBuffer<Capacity>& out) {
   if (out.capacity() - out.size() < format.bits()) return false;
@@ -243,7 +243,7 @@ constexpr bool encode_word(const WordFormat& format, const Word& word, BitBuffer
   return true;
 }
 
-/// Every field of the word, in the order of the wire.
+/// Puts every field of the word, in the order of the wire.
 constexpr void put_word(FieldSink& sink, const WordFormat& format, const Word& word, const Scale& scale) {
   for (std::size_t i = 0; i < format.fields().size(); ++i) {
     const WordField& field = format.fields()[i];
@@ -268,17 +268,17 @@ constexpr void put_word(FieldSink& sink, const WordFormat& format, const Word& w
   }
 }
 
-/// How many bits of a word are position and turns, and which come first.
+/// Bits of position and turns in a word, and their order.
 struct PositionBits {
   unsigned position;            ///< Bits of the position.
   unsigned multiturn = 0;       ///< Bits of the turns; 0: none.
   bool multiturn_first = true;  ///< Whether the turns stand before the position.
 };
 
-/// What a reading needs to know of its word.
+/// Properties of a word that its reading needs.
 struct WordContents {
   PositionBits bits{};         ///< Widths of position and turns.
-  std::uint32_t reported = 0;  ///< the alarms for which the word has a bit
+  std::uint32_t reported = 0;  ///< alarms for which the word has a bit
 };
 /// Returns the widths and flags of a word.
 [[nodiscard]] constexpr WordContents contents_of(const WordFormat& format) {
@@ -292,7 +292,7 @@ struct WordContents {
   return contents;
 }
 
-/// An error bit makes position and turns invalid. Of a word without one nothing does.
+/// Makes the reading of a word. An error bit makes position and turns invalid; a word without one is always valid.
 template <std::size_t size>
 [[nodiscard]] constexpr Reading to_reading(const WordContents& contents, const WordWith<size>& word,
                                            const Scale& scale) {
@@ -311,13 +311,14 @@ template <std::size_t size>
   return to_reading(contents_of(format), word, scale);
 }
 
-/// Every field of the word and its reading.
+/// Puts every field of the word, and its reading.
 constexpr void put_position(FieldSink& sink, const WordFormat& format, const Word& word, const Scale& scale) {
   put_word(sink, format, word, scale);
   sink.put_reading(to_reading(format, word, scale));
 }
 
-/// What a virtual encoder shows of a shaft. A linear one goes along its whole scale in one revolution.
+/// Returns the word of a virtual encoder at this state of the shaft. A linear one moves over its whole range in one
+/// revolution.
 [[nodiscard]] constexpr Word word_of(const WordFormat& format, const ShaftState& state, std::uint32_t alarms) {
   const unsigned bits = format.bits_of(Meaning::position);
   const auto fraction = static_cast<std::uint64_t>(state.position);
@@ -329,12 +330,12 @@ constexpr void put_position(FieldSink& sink, const WordFormat& format, const Wor
   return word;
 }
 
-/// The usual words: turns before or behind the position, then nError and nWarning, if wanted.
+/// Returns the usual word: turns before or after the position, then nError and nWarning if wanted.
 [[nodiscard]] constexpr WordFormat word_format(const PositionBits& bits) {
   WordFormat format;
   const auto bits_of = [](unsigned count) { return static_cast<std::uint8_t>(count <= 64 ? count : 0); };
   const WordField turns{"multiturn", Meaning::multiturn, bits_of(bits.multiturn)};
-  if (bits.multiturn_first) format.add(turns);  // a field of 0 bits is refused, and so is one of too many
+  if (bits.multiturn_first) format.add(turns);  // fields of 0 or of too many bits are refused
   format.add({"position", Meaning::position, bits_of(bits.position)});
   if (!bits.multiturn_first) format.add(turns);
   return format;

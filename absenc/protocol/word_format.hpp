@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A position word described as text, for encoders that nobody has a driver for: the fields from its MSB on.
+// A position word described as text, for encoders without a driver: its fields from the MSB on.
 //
 //   word    = item { " " item }
 //   item    = [ name "=" ] meaning ":" bits [ "!" ]  |  "gray"
@@ -28,13 +28,13 @@ enum class Meaning : std::uint8_t { position, multiturn, error, warning, parity,
 inline constexpr std::array<std::string_view, 7> meaning_names{"position", "multiturn", "error", "warning",
                                                                "parity",   "value",     "skip"};
 
-/// A short text that is copied with what it names.
+/// A short text that is stored in the object.
 class WordFieldName {
  public:
   static constexpr std::size_t capacity = 15;  ///< Greatest length of a name.
 
   constexpr WordFieldName() = default;
-  /// What is longer than `capacity` is cut.
+  /// Stores a text, cut to `capacity` characters.
   constexpr WordFieldName(std::string_view text)
       : text_(copied(text)), size_(static_cast<std::uint8_t>(first_of(text, capacity).size())) {}
   /// Takes a name of at most `capacity` characters.
@@ -60,20 +60,19 @@ class WordFieldName {
 
 /// One field of a word.
 struct WordField {
-  WordFieldName name{};             ///< that of the meaning unless another was given
+  WordFieldName name{};             ///< name of the meaning, unless another was given
   Meaning meaning = Meaning::skip;  ///< What the field means.
   std::uint8_t bits = 0;            ///< 1 to 64; error, warning and parity have 1
   bool active_low = false;          ///< Whether 0 means that a flag is set.
 };
 
-/// Where a text is no word: `reason` is empty when it is one.
+/// Error in the text of a word format; `reason` is empty if there is none.
 struct WordFormatError {
   std::string_view reason{};  ///< Why the text is no format; empty: it is one.
   std::size_t at = 0;         ///< index into the text
 };
 
-/// A position word is data: options that describe one make it, and so does a text for an encoder nobody has a driver
-/// for. All that decodes and sends words takes this.
+/// A position word as data, made from options or from a text. Everything that decodes and sends words uses it.
 class WordFormat {
  public:
   static constexpr std::size_t maximum_fields = 12;  ///< Greatest number of fields.
@@ -81,7 +80,7 @@ class WordFormat {
 
   constexpr WordFormat() = default;
 
-  /// Why the field cannot follow those before it, or empty.
+  /// Adds a field. Returns why it cannot follow the fields before it, or "".
   constexpr std::string_view add(const WordField& field) {
     const bool flag = field.meaning >= Meaning::error && field.meaning <= Meaning::parity;
     if (field.bits < 1 || field.bits > 64) return "a field has 1 to 64 bits";
@@ -104,21 +103,21 @@ class WordFormat {
   [[nodiscard]] constexpr unsigned bits() const { return bits_; }
   /// Returns whether the position is Gray code.
   [[nodiscard]] constexpr bool gray() const { return gray_; }
-  /// Where the field at `index` begins.
+  /// Returns the first bit of the field at `index`.
   [[nodiscard]] constexpr unsigned first_of(std::size_t index) const {
     unsigned first = 0;
     for (std::size_t i = 0; i < index; ++i) first += fields_[i].bits;
     return first;
   }
 
-  /// Null when the word has none.
+  /// Returns the first field with this meaning, or null.
   [[nodiscard]] constexpr const WordField* find(Meaning meaning) const {
     for (const WordField& field : fields()) {
       if (field.meaning == meaning) return &field;
     }
     return nullptr;
   }
-  /// 0 when the word has none.
+  /// Returns the bits of the field with this meaning; 0: the word has none.
   [[nodiscard]] constexpr unsigned bits_of(Meaning meaning) const {
     const WordField* field = find(meaning);
     return field == nullptr ? 0 : field->bits;
@@ -132,7 +131,7 @@ class WordFormat {
     return false;
   }
 
-  // No padding stands between them: clang 14 leaves a constant with some half unset.
+  // No padding between the members: clang 14 leaves constants with padding partly unset.
   std::array<WordField, maximum_fields> fields_{};
   std::uint32_t size_ = 0;
   unsigned bits_ = 0;
@@ -153,7 +152,7 @@ constexpr WordFormatError check_name(std::string_view name) {
   return {};
 }
 
-// [name=]meaning:bits[!], without spaces. `at` of the error is relative to the item.
+// Parses "[name=]meaning:bits[!]", without spaces. `at` of the error is relative to the item.
 constexpr WordFormatError parse_word_field(std::string_view item, WordField& field) {
   const std::size_t equals = index_of(item, '=');
   const bool named = equals < item.size();
@@ -197,7 +196,7 @@ constexpr bool is_taken(std::string_view name, std::span<const FieldInfo> taken)
 
 }  // namespace detail
 
-/// `format` is only changed when there is no error. No value may have a name of `taken`.
+/// Parses a word format. `format` changes only without an error. No value may have a name of `taken`.
 [[nodiscard]] constexpr WordFormatError parse_word_format(std::string_view text, WordFormat& format,
                                                           std::span<const FieldInfo> taken = {}) {
   WordFormat parsed;
@@ -233,7 +232,7 @@ constexpr bool is_taken(std::string_view name, std::span<const FieldInfo> taken)
 }
 
 namespace detail {
-void this_is_no_word_format();  // not constexpr: a call of it does not compile
+void this_is_no_word_format();  // not constexpr: a call does not compile
 
 consteval WordFormat word_format_or_stop(std::string_view text) {
   WordFormat format;
@@ -242,7 +241,7 @@ consteval WordFormat word_format_or_stop(std::string_view text) {
 }
 }  // namespace detail
 
-/// One that is known when the program is written: a mistake does not compile.
+/// A word format known when the program is written: a mistake does not compile.
 consteval WordFormat operator""_word(const char* text, std::size_t size) {
   return detail::word_format_or_stop({text, size});
 }

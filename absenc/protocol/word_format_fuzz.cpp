@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Any text as a word format: an error points into the text, and what parses can be decoded and encoded.
+// Parses any text as a word format: an error points into the text, and a parsed format can decode and encode.
 #include <cstddef>
 #include <cstdint>
 #include <cstdlib>
@@ -14,7 +14,7 @@ void require(bool condition) {
   if (!condition) std::abort();
 }
 
-// Whatever the bits are, encoding what was decoded gives them again, apart from what is skipped and the parity.
+// Checks that encoding a decoded word gives the same bits, apart from skipped bits and the parity.
 void decode_and_encode(const WordFormat& format, Bytes bits) {
   const BitView view{bits, bits.size() * 8};
   const Result<Word> word = decode_word(format, view);

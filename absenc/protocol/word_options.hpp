@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the units of position words have in common in their descriptors: options, models, fields.
+// Options, models and fields that the units of position words share.
 #pragma once
 
 #include <array>
@@ -53,7 +53,7 @@ inline constexpr Option after_word_option{.name = "after_word",
                                           .default_value = 0,
                                           .choices = after_word_choices};
 
-/// A format, and what options say of its word, as they are given.
+/// A format and the options that describe its word.
 template <class Format>
 struct WordSettings : Format {
   std::uint8_t singleturn_bits = 0;  ///< Bits of the single-turn position; 0: as the word says.
@@ -67,8 +67,8 @@ struct WordSettings : Format {
     if (position_bits != 0) return {.position = position_bits};
     return {singleturn_bits, multiturn_bits, multiturn_first};
   }
-  /// The format with its word: that of `values`, or else the one that its options describe. `linear`: whether they
-  /// describe a linear encoder; a word is one of a linear encoder when there is a unit.
+  /// Returns the format with its word: that of `values`, else the one that its options describe. `linear`: whether the
+  /// options describe a linear encoder; a word format is linear if it has a unit.
   [[nodiscard]] constexpr Format with_word(const Options& values, const WordFormat& described, bool linear) const {
     Format format = *this;
     format.word = values.has_word() ? values.word : described;
@@ -77,12 +77,12 @@ struct WordSettings : Format {
   }
 };
 
-/// Whether there is a position, and position and turns have at most 64 bits together.
+/// Returns whether the word has a position, and position and turns have at most 64 bits together.
 [[nodiscard]] constexpr bool is_usable(const WordFormat& word) {
   const unsigned position = word.bits_of(Meaning::position);
   return position > 0 && position + word.bits_of(Meaning::multiturn) <= 64;
 }
-/// Whether readings can be told from angles: a linear encoder needs its unit.
+/// Returns whether a reading can be shown as an angle or a distance: a linear encoder needs its unit.
 [[nodiscard]] constexpr bool is_usable(const Scale& scale) { return !scale.linear || scale.unit_um > 0; }
 
 /// Returns the bits of position and turns of a word.
@@ -90,9 +90,9 @@ struct WordSettings : Format {
   return {word.bits_of(Meaning::position), word.bits_of(Meaning::multiturn), scale.linear ? scale.unit_um : 0};
 }
 
-/// Where a field of a word that begins at bit `first` stands. What is Gray-coded stands in no bits of its own.
+/// Returns the bits of a field, of a word that begins at bit `first`. Gray-coded values have none of their own.
 [[nodiscard]] constexpr BitRanges place_in_word(const WordFormat& format, const FieldInfo& field, std::size_t first) {
-  // By name: who keeps a decoded frame keeps copies of the fields that are no unit's own.
+  // Compared by name, because stored frames have copies of fields that do not belong to a unit.
   const auto is = [&field](const FieldInfo* shown) { return field.name == shown->name; };
   const auto shows = [&](const WordField& one) {
     switch (one.meaning) {
@@ -119,7 +119,7 @@ struct WordSettings : Format {
   return ranges;
 }
 
-/// The encoders of the four examples in RLS "E201-9S Decoding the BiSS information". No speed is given for them.
+/// The encoders of the four examples in RLS "E201-9S Decoding the BiSS information", which gives no speeds.
 inline constexpr std::array position_models{
     author::ModelText{"rotary-19", "single-turn, 19 bits (example 4)", 0,
                       "singleturn_bits=19 multiturn_bits=0 position_bits=0"},

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The engine and its coroutines, with a protocol of one byte: what is asked comes back with its high bit set.
+// The engine and its coroutines, with a protocol of one byte: the reply is the request with its high bit set.
 #include <gtest/gtest.h>
 
 #include <array>
@@ -57,9 +57,9 @@ struct Found {
 };
 using Wire = std::vector<std::uint8_t>;
 
-constexpr std::uint8_t damaged = 0x55;  // what comes back as a character that cannot be used
+constexpr std::uint8_t damaged = 0x55;  // a byte that is received as a damaged character
 
-/// Runs a conversation in virtual time; `encoder` gives what comes back for the nth request, nothing at all: silence.
+/// Runs a conversation in virtual time; `encoder` returns the reply to the n-th request, no bytes for silence.
 struct Bench {
   using Encoder = std::function<Wire(std::uint8_t, unsigned)>;
   explicit Bench(Encoder answers) : encoder(std::move(answers)) {}
@@ -138,7 +138,7 @@ TEST(Procedures, GoOnWithEachReply) {
   Case<two_questions> good(echo);
   EXPECT_EQ(good.host.error(), Error::none);
   EXPECT_EQ(good.host.found().sum, 0x81u + 0x82u);
-  EXPECT_EQ(good.bench.sent[1] - good.bench.sent[0], 10ms + 10us);  // after what came last
+  EXPECT_EQ(good.bench.sent[1] - good.bench.sent[0], 10ms + 10us);  // after the last received character
 }
 
 TEST(Procedures, EndWhereNoGoodReplyComes) {
@@ -147,7 +147,7 @@ TEST(Procedures, EndWhereNoGoodReplyComes) {
   EXPECT_EQ(bad.host.detail(), "the second");
   ASSERT_EQ(bad.bench.sent.size(), 4u);                               // three attempts, each after its pause
   EXPECT_EQ(bad.bench.sent[3] - bad.bench.sent[2], 1ms + 2ms - 1ms);  // the silence is part of the pause
-  EXPECT_EQ(bad.bench.now, bad.bench.sent[3] + 5ms);                  // held
+  EXPECT_EQ(bad.bench.now, bad.bench.sent[3] + 5ms);                  // after the hold time
 }
 
 TEST(Procedures, DamagedCharactersAreNoSilence) {
@@ -167,12 +167,12 @@ TEST(Procedures, RepeatWhatWasDamagedWhenTheLineIsSilent) {
 TEST(Procedures, ARefusalIsWholeAtOnce) {
   Case<two_questions> refused([](std::uint8_t, unsigned) { return Wire{0xFF}; });
   EXPECT_EQ(refused.host.error(), Error::busy);
-  EXPECT_EQ(refused.bench.sent[1] - refused.bench.sent[0], 10us + 2ms);  // not after the silence
+  EXPECT_EQ(refused.bench.sent[1] - refused.bench.sent[0], 10us + 2ms);  // a refusal is followed by no silence
 }
 
 TEST(Engine, AWeakCheckIsTrustedOnlyBeforeSilence) {
   const auto longer = [](std::uint8_t request, unsigned) { return Wire{static_cast<std::uint8_t>(request | 0x80), 0}; };
-  EXPECT_EQ(Case<two_questions>(longer).host.error(), Error::none);  // what follows belongs to nobody
+  EXPECT_EQ(Case<two_questions>(longer).host.error(), Error::none);  // bytes after a complete reply are dropped
   EXPECT_EQ(Case<two_questions>(longer, {.ends_by_silence = true}).host.error(), Error::wrong_length);
   EXPECT_EQ(Case<two_questions>(echo, {.ends_by_silence = true}).host.error(), Error::none);
 }
@@ -180,7 +180,7 @@ TEST(Engine, AWeakCheckIsTrustedOnlyBeforeSilence) {
 TEST(Engine, TheLineIsSilentBeforeEachRequest) {
   Case<two_questions> good(echo, {.silence = 20ms});
   EXPECT_EQ(good.bench.sent[0], 20ms);
-  EXPECT_EQ(good.bench.sent[1] - good.bench.sent[0], 20ms + 10us);  // the longer of the two
+  EXPECT_EQ(good.bench.sent[1] - good.bench.sent[0], 20ms + 10us);  // the longer of the two times
 }
 
 Procedure attempts(ToyDialog& dialog, Found& found) {
@@ -215,7 +215,7 @@ Part<unsigned> deeper(ToyDialog& dialog, unsigned depth) {
 }
 
 Procedure many_parts(ToyDialog& dialog, Found& found, Arguments arguments) {
-  for (int i = 0; i < 500; ++i) {  // more than would fit together
+  for (int i = 0; i < 500; ++i) {  // more parts than the storage could hold at once
     const unsigned sum = co_await deeper(dialog, static_cast<unsigned>(arguments[0]));
     found.sum = sum;
   }
@@ -242,9 +242,12 @@ TEST(Procedures, StopFromAnyDepth) {
 TEST(Procedures, SayWhenTheStorageIsTooSmall) {
   const std::array<std::int64_t, 1> depth{12};
   const std::size_t needed = Case<many_parts>(echo, {}, depth).host.frames_size();
-  EXPECT_EQ(Case<many_parts>(echo, {}, depth, needed).host.error(), Error::out_of_range);          // too deep
-  EXPECT_EQ(Case<many_parts>(echo, {}, depth, needed - 1).host.error(), Error::buffer_too_small);  // for a part
-  EXPECT_EQ(Case<many_parts>(echo, {}, depth, 16).host.error(), Error::buffer_too_small);          // for the procedure
+  // Too many parts in each other.
+  EXPECT_EQ(Case<many_parts>(echo, {}, depth, needed).host.error(), Error::out_of_range);
+  // Too small for a part.
+  EXPECT_EQ(Case<many_parts>(echo, {}, depth, needed - 1).host.error(), Error::buffer_too_small);
+  // Too small for the procedure.
+  EXPECT_EQ(Case<many_parts>(echo, {}, depth, 16).host.error(), Error::buffer_too_small);
 }
 
 Procedure endless(ToyDialog& dialog, Found& found) {
@@ -385,7 +388,7 @@ TEST(Text, RealNumbersHaveAPoint) {
   for (const std::string_view none : {"", "12", "1.2.3", "1.5x"}) EXPECT_FALSE(to_real(none, number)) << none;
 }
 
-// 0.02 degrees in the time between two looks are 0.33 rpm.
+// 0.02 degrees in the time between two readings are 0.33 rpm.
 TEST(Standstill, ShowsAThirdOfARevolutionAMinute) { EXPECT_EQ(standstill_millidegrees * (1s / between_looks), 2000); }
 
 static_assert(is_near(0, 1, 14) && is_near(16383, 0, 14) && !is_near(0, 2, 14));

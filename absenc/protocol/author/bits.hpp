@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Where a value stands in a frame of characters, for `Unit::bits`.
+// Builds the bit ranges of a value in a frame of characters, for `Unit::bits`.
 #pragma once
 
 #include <algorithm>
@@ -9,14 +9,15 @@
 
 namespace absenc::author {
 
-/// `count` bits from bit `first` of byte `byte` on, the bytes behind it more significant; of 0 bits there is no place.
+/// Returns `count` bits from bit `first` of byte `byte` on; later bytes are more significant. No range for 0 bits.
 [[nodiscard]] constexpr BitRanges bits_of(std::size_t byte, std::size_t first, std::size_t count) {
   BitRanges ranges;
   if (count != 0) ranges.push_back({8 * byte + first, count});
   return ranges;
 }
 
-/// `count` bits from bit `first` on of a number in `size` bytes from `byte` on, the most significant first.
+/// Returns `count` bits from bit `first` on, of a number in `size` bytes from `byte` on, the most significant byte
+/// first.
 [[nodiscard]] constexpr BitRanges big_endian_bits(std::size_t byte, std::size_t size, std::size_t count,
                                                   std::size_t first = 0) {
   BitRanges ranges;

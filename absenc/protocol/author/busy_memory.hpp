@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Host side of a memory that is busy for a while: a request is sent again until the encoder executes it.
+// Host side of a memory that is busy for a while: repeats a request until the encoder executes it.
 #pragma once
 
 #include <algorithm>
@@ -16,8 +16,8 @@ struct BusyWait {
   bool after_busy = false;  ///< Whether a reply counts only when it follows a busy one.
 };
 
-/// Returns the first reply that is not busy, whose member `busy` is false. Because a busy encoder has not executed the
-/// request, even a write may be sent again. Errors: busy, or that of the last attempt.
+/// Returns the first valid reply whose member `busy` is false. A busy encoder has not executed the request, so even a
+/// write may be repeated. Errors: busy, or that of the last attempt.
 template <class P>
 Part<Result<typename P::Reply>> until_ready(DialogOf<P>& dialog, typename P::Request request, BusyWait wait) {
   Time last_attempt = never;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a procedure on a CAN bus speaks through: it sends a frame, or listens, and then awaits one frame after the
+// Host side of a procedure on a CAN bus: it sends a frame, or listens, and then awaits one received frame after the
 // other.
 //
 //   struct Protocol {
@@ -31,15 +31,15 @@ class DialogOf<P> : public CanEngine, public Routine {
   /// Returns the format of the encoder.
   [[nodiscard]] const Format& format() const { return format_; }
 
-  /// What is heard begins with one of these.
+  /// Sends a frame, or only listens. One of these calls must come before the first received frame is awaited.
   void ask(const CanFrame& frame, Time pause = {}) { CanEngine::ask(frame, P::host_times(format_), pause); }
   using CanEngine::ask_for;
   using CanEngine::configure;
   using CanEngine::listen;
   using CanEngine::overhear;
 
-  /// The next frame, anybody's; none when the time is over: `const std::optional<CanFrame> frame = co_await
-  /// dialog.heard()`.
+  /// Awaits the next frame on the bus, from any node; nothing when the time is over: `const std::optional<CanFrame>
+  /// frame = co_await dialog.heard()`.
   [[nodiscard]] auto heard() {
     struct Hear {
       DialogOf& dialog;
@@ -49,12 +49,12 @@ class DialogOf<P> : public CanEngine, public Routine {
     };
     return Hear{*this};
   }
-  /// When that frame was complete.
+  /// Returns when the awaited frame was complete.
   [[nodiscard]] Time heard_at() const { return heard_at_; }
-  /// Whether it came before what was asked had left: see `overhear`.
+  /// Returns whether the frame was received before the request was sent: see `overhear`.
   using CanEngine::came_early;
   [[nodiscard]] ChangeSent change_sent() const final { return change(); }
-  /// That frame is the answer.
+  /// Stores the awaited frame as the answer.
   void keep() { CanEngine::keep(*frame_, heard_at_); }
 
  protected:

@@ -6,7 +6,7 @@ namespace absenc::author {
 using FrameStep = Step<CanFrame>;
 using FrameEvent = Event<CanFrame>;
 
-// ---- For the subclass
+// ---- Calls of the subclass
 
 void CanEngine::ask(const CanFrame& frame, const CanHostTimes& times, Time pause) {
   ask_for(frame, times.busy_limit);
@@ -48,7 +48,7 @@ void CanEngine::keep(const CanFrame& frame, Time at) {
 }
 
 void CanEngine::end() {
-  state_ = State::over;  // unless the subclass goes on
+  state_ = State::over;  // unless the subclass continues
   over();
 }
 
@@ -66,7 +66,8 @@ void CanEngine::feed(const FrameEvent& event) {
       break;
     case Kind::received:
       for (const CanFrame& frame : event.items) {
-        // A frame that was complete before the request cannot answer it: it may have waited in a queue for long.
+        // A frame that was complete before the request was sent cannot answer it, although it may be delivered late
+        // from a queue.
         early_ = state_ < State::hearing || event.at < since_;
         if (state_ <= State::hearing && (overhears_ || !early_)) heard(frame, event.at);
       }

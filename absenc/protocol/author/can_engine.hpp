@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Host side of a CAN bus: sends a frame, hears what comes for a time, among the traffic of others. It knows no
-// protocol, and is compiled once.
+// Host side of a CAN bus: sends a frame and receives all frames for a time, among the traffic of other nodes. It knows
+// no protocol, and is compiled once.
 #pragma once
 
 #include <cstdint>
@@ -11,21 +11,21 @@
 
 namespace absenc::author {
 
-/// How long a host hears for an answer.
+/// How long a host waits for an answer.
 struct CanHostTimes {
-  Time answer_limit{};  ///< without any frame on the bus
-  Time busy_limit{};    ///< on a bus that others keep busy
+  Time answer_limit{};  ///< time without any frame on the bus
+  Time busy_limit{};    ///< time on a bus that other nodes keep busy
 };
 
-/// One frame and what comes behind it at a time; a subclass decides what comes next. What was under way before is not
-/// told to it.
+/// Sends one frame at a time and receives the frames after it; a subclass decides which frame is sent next. Frames that
+/// were complete before the request are not delivered to the subclass.
 class CanEngine : public Conversation<CanFrame> {
  public:
   /// Takes an event of the port.
   void feed(const Event<CanFrame>& event) final;
   /// Returns the next step of the port.
   Step<CanFrame> next(Time now) final;
-  /// Nothing: see Engine.
+  /// Puts nothing: see Engine.
   void report(FieldSink&) const override {}
   [[nodiscard]] Error error() const final { return outcome_.error; }
   [[nodiscard]] std::string_view detail() const override { return outcome_.detail; }
@@ -35,41 +35,42 @@ class CanEngine : public Conversation<CanFrame> {
     return {{&request_, has_request_ ? 1u : 0u}, {&relevant_, has_relevant_ ? 1u : 0u}, sent_at_, relevant_at_};
   }
 
-  /// When the last frame had left.
+  /// Returns when the last frame was sent.
   [[nodiscard]] Time sent_at() const { return sent_at_; }
-  /// Whether frames were destroyed on the bus since what was asked last.
+  /// Returns whether frames were destroyed on the bus since the last request.
   [[nodiscard]] bool is_disturbed() const { return disturbed_; }
-  /// Why no answer came: timeout, or bad_framing on a bus with errors.
+  /// Returns why no answer was received: timeout, or bad_framing on a bus with errors.
   [[nodiscard]] Error missing() const { return disturbed_ ? Error::bad_framing : Error::timeout; }
-  /// Never: whoever sends without a pause leaves the bus to others all the same.
+  /// Returns false: a node that sends without a pause still leaves the bus to others.
   [[nodiscard]] bool is_noisy() const { return false; }
 
  protected:
   CanEngine() = default;
   ~CanEngine() = default;
 
-  /// Sends `frame`, `pause` after the last answer or request, and hears until nothing has come for the answer limit.
+  /// Sends `frame`, `pause` after the last answer or request, and receives until the bus was silent for the answer
+  /// limit.
   void ask(const CanFrame& frame, const CanHostTimes& times, Time pause = {});
-  /// Sends `frame` and hears for exactly so long.
+  /// Sends `frame` and receives for exactly `duration`.
   void ask_for(const CanFrame& frame, Time duration);
-  /// From here on what comes before a frame that is asked has left is told too: answers to those before it.
+  /// Delivers frames, from now on, that were received before the request was sent: they may answer earlier requests.
   void overhear(bool yes = true) { overhears_ = yes; }
-  /// Whether the frame that is being told is such a one.
+  /// Returns whether the delivered frame was received before the request was sent.
   [[nodiscard]] bool came_early() const { return early_; }
-  /// Hears what is sent unsolicited.
+  /// Receives unsolicited frames for `duration`.
   void listen(Time duration);
-  /// Switches this end of the line, then hears for `duration`.
+  /// Switches the rate of this end of the line, then receives for `duration`.
   void configure(std::uint32_t rate, Time duration);
   /// Ends the conversation with this outcome.
   void finish(const Outcome& outcome);
-  /// Keeps the frame as the answer, for `exchange`.
+  /// Stores the frame as the answer, for `exchange`.
   void keep(const CanFrame& frame, Time at);
   /// Returns whether a good reply needs no second one to be presented as good.
   [[nodiscard]] bool is_alone() const { return outcome_.alone; }
 
-  /// A frame came, after what was asked. Calls one of those, or goes on hearing.
+  /// Handles a frame that was received after the request. Calls one of the functions above, or returns to receive more.
   virtual void heard(const CanFrame& frame, Time at) = 0;
-  /// The time is over. Calls one of those.
+  /// Handles the end of the time limit. Calls one of the functions above.
   virtual void over() = 0;
 
  private:
@@ -85,10 +86,10 @@ class CanEngine : public Conversation<CanFrame> {
   std::uint32_t rate_ = 0;
   CanFrame request_{};
   CanFrame relevant_{};
-  Time silence_{};   // without any frame, that ends hearing; 0: it is heard for exactly `duration_`
-  Time duration_{};  // of hearing, at the most
-  Time since_{};     // what was complete before is not told
-  Time until_{};     // of hearing its end; before that when to send
+  Time silence_{};   // time without any frame that ends receiving; 0: it lasts exactly `duration_`
+  Time duration_{};  // longest time of receiving
+  Time since_{};     // frames that were complete before this time are not delivered
+  Time until_{};     // end of receiving; before that the time of sending
   Time sent_at_{};
   Time relevant_at_{};
   Outcome outcome_{};

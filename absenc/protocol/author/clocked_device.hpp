@@ -10,7 +10,7 @@
 
 namespace absenc::author {
 
-/// What is driven on the line, a bit for each clock. The line idles behind them.
+/// Bits that the encoder drives on the line, one for each clock. After them the line idles.
 using DrivenBits = BitBuffer<512>;
 
 /// A virtual encoder on a clocked link.
@@ -29,21 +29,22 @@ class ClockedDevice : public EncoderOn<std::uint8_t> {
   explicit ClockedDevice(Time start_time = {}) : EncoderOn(start_time) {}
   ~ClockedDevice() = default;
 
-  /// The clock begins, with this period; 0: it is not known. Whether its line was held low before, and not idle, means
-  /// something to few. `bits`, empty now, is what the encoder drives.
+  /// The clock starts with this period; 0: unknown. `held_low`: the clock line was held low before, not idle, which few
+  /// protocols use. The encoder puts the bits that it drives into `bits`, which is empty.
   virtual void selected(Time at, Time period, bool held_low, DrivenBits& bits) = 0;
-  /// The host has stopped after so many clocks, one at least.
+  /// The host has stopped after `clocks` clocks, at least one.
   virtual void clocked(Time at, std::size_t clocks) = 0;
-  /// For `selected`: from the last edge of the clock the line is driven low for so long.
+  /// Drives the line low for `time` after the last edge of the clock. Call it from `selected`.
   void hold_low(Time time) { low_after_ = time; }
-  /// For `selected`: of the bits that are driven hosts take so many, and a fault of the line strikes those.
+  /// Sets how many of the driven bits hosts read, which are those that a fault of the line damages. Call it from
+  /// `selected`.
   void hosts_take(std::size_t bits) { taken_ = bits; }
 
  private:
   DrivenBits bits_;
   Time low_after_{};
-  std::size_t taken_ = 0;  // 0: all
-  bool pending_ = false;   // to be driven
+  std::size_t taken_ = 0;  // 0: all bits
+  bool pending_ = false;   // bits are to be driven
   bool driving_ = false;
 };
 

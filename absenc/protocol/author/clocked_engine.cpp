@@ -5,7 +5,7 @@
 
 namespace absenc::author {
 
-// ---- For the subclass
+// ---- Calls of the subclass
 
 void ClockedEngine::clock(unsigned count, bool hold_low) {
   if (count > 8 * storage_.size()) return finish(Error::invalid_argument);
@@ -22,12 +22,12 @@ void ClockedEngine::finish(Error error) {
 // ---- Steps
 
 ByteStep ClockedEngine::next(Time now) {
-  // Made by a function, as that of Engine.
+  // A function makes the step, as in Engine::next.
   ByteStep step = [this]() -> ByteStep { return {.expect = (count_ + 7) / 8, .bits = count_, .at = never}; }();
   const bool begins = state_ != State::over && !begun_;
   if (begins) {
     begun_ = true;
-    rested_at_ = now + times_.rest;  // somebody may have clocked just before
+    rested_at_ = now + times_.rest;  // another host may have clocked just before
   }
   if (state_ == State::over) {
     step.kind = ByteStep::Kind::done;
@@ -50,7 +50,7 @@ void ClockedEngine::feed(const ByteEvent& event) {
   if (state_ != State::clocking) return;
   if (event.kind == ByteEvent::Kind::sent) {
     sent_at_ = event.at;
-    // 32 bits: a processor without division spends long on 64.
+    // 32 bits, because a processor without division is slow with 64.
     if (times_.rate != 0) begun_at_ = event.at - Time(count_ * (1'000'000'000u / times_.rate));
   }
   if (event.kind != ByteEvent::Kind::received) return;
@@ -64,13 +64,13 @@ void ClockedEngine::received(const ByteEvent& event) {
   size_ = std::min(event.items.size(), whole);
   std::copy_n(event.items.begin(), size_, storage_.begin());
   if (size_ < whole) return finish(Error::wrong_length);
-  // Zeros alone behind an idle line that was high are a position; a line that was low all the time is shorted.
+  // Zeros alone on a line that was idle high are a position; a line that was low all the time is shorted.
   if (event.idle_low) {
     std::uint8_t any = 0;
     for (const std::uint8_t byte : storage_.first(size_)) any |= byte;
     if (any == 0) return finish(Error::line_stuck);
   }
-  state_ = State::over;  // unless the subclass goes on
+  state_ = State::over;  // unless the subclass continues
   clocked({Bytes(storage_).first(size_), count_});
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Host side of a clocked line: lets the clock rest, clocks bits out of the encoder and hands them on. It knows no
+// Host side of a clocked line: lets the clock rest, clocks bits out of the encoder and delivers them. It knows no
 // protocol, and is compiled once.
 #pragma once
 
@@ -11,15 +11,15 @@
 
 namespace absenc::author {
 
-/// How an encoder is clocked, as its document has it.
+/// Times of the clock, as the encoder's document has them.
 struct ClockedHostTimes {
-  std::uint32_t rate = 0;  ///< of the clock, Hz, which is set first; 0: it stays as the line has it
-  Time rest{};             ///< of the clock before each transfer, after which the encoder takes a new position
+  std::uint32_t rate = 0;  ///< rate of the clock in Hz, set first; 0: the line keeps its rate
+  Time rest{};             ///< rest of the clock before each transfer, after which the encoder latches a new position
 };
 
-/// One transfer after the other; a subclass says how many clocks each has, and what becomes of its bits. Whoever is the
-/// clock never waits for a reply: there is no timeout, and nothing is repeated. It rests before the first transfer too,
-/// because somebody may have clocked just before.
+/// Clocks one transfer after the other; a subclass decides the number of clocks and handles the bits. The host drives
+/// the clock, so there is no timeout and nothing is repeated. It rests before the first transfer too, because another
+/// host may have clocked just before.
 class ClockedEngine : public Conversation<std::uint8_t> {
  public:
   /// Takes an event of the port.
@@ -27,18 +27,19 @@ class ClockedEngine : public Conversation<std::uint8_t> {
   /// Returns the next step of the port.
   Step<std::uint8_t> next(Time now) override;
   [[nodiscard]] Error error() const final { return error_; }
-  /// Nothing: see Engine.
+  /// Puts nothing: see Engine.
   void report(FieldSink&) const override {}
   /// Returns the items of the last exchange.
   [[nodiscard]] Exchange<std::uint8_t> exchange() const final {
     return {{}, Bytes(storage_).first(size_), sent_at_, received_at_};
   }
 
-  /// The first edge of the clock in the last transfer: when it was due, or, where the rate is known, by its end.
+  /// Returns the first edge of the clock in the last transfer: when it was due, or computed from the end if the rate is
+  /// known.
   [[nodiscard]] Time begun_at() const { return begun_at_; }
   /// Returns when the last item was received.
   [[nodiscard]] Time received_at() const { return received_at_; }
-  /// Never: nothing comes but what is clocked out.
+  /// Returns false: an encoder sends nothing but clocked bits.
   [[nodiscard]] bool is_noisy() const { return false; }
 
  protected:
@@ -46,13 +47,13 @@ class ClockedEngine : public Conversation<std::uint8_t> {
   ClockedEngine(const ClockedHostTimes& times, MutableBytes storage) : times_(times), storage_(storage) {}
   ~ClockedEngine() = default;
 
-  /// Gives so many clocks, when the clock has rested: at its idle level, or held low. More than there is storage for
-  /// end the conversation: invalid_argument.
+  /// Gives `count` clocks after a rest of the clock line, at its idle level or held low. If `storage` is too small, the
+  /// conversation ends with invalid_argument.
   void clock(unsigned count, bool hold_low = false);
-  /// The conversation is over.
+  /// Ends the conversation.
   void finish(Error error);
 
-  /// All bits of the transfer are there. Calls `clock` or `finish`.
+  /// Handles the bits of a complete transfer. Calls `clock` or `finish`.
   virtual void clocked(BitView bits) = 0;
 
  private:
@@ -62,7 +63,7 @@ class ClockedEngine : public Conversation<std::uint8_t> {
   ClockedHostTimes times_;
   MutableBytes storage_;
   std::size_t size_ = 0;
-  unsigned count_ = 0;  // clocks of this transfer
+  unsigned count_ = 0;  // clocks of the present transfer
   State state_ = State::over;
   bool begun_ = false;
   bool hold_low_ = false;

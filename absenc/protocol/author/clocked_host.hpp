@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The engine of a clocked line with a protocol.
+// Combines the engine of a clocked line with a protocol.
 #pragma once
 
 #include <array>
@@ -12,7 +12,7 @@
 
 namespace absenc::author {
 
-/// What the document says of frames of clocked bits:
+/// The functions that a protocol of clocked bits must have:
 ///
 ///   struct Protocol {
 ///     using Format, Reply;
@@ -31,7 +31,7 @@ concept Clocked = requires {
 struct Later {};
 inline constexpr Later later{};  ///< Makes a host that begins its transfer later.
 
-/// A position with typed replies; a subclass says what becomes of the bits.
+/// A conversation with typed replies; a subclass handles the bits.
 template <Clocked P>
 class ClockedHostOf : public ClockedEngine {
  public:
@@ -42,7 +42,7 @@ class ClockedHostOf : public ClockedEngine {
 
   /// Returns the format of the encoder.
   [[nodiscard]] const Format& format() const { return format_; }
-  /// The last good reply.
+  /// Returns the last valid reply.
   [[nodiscard]] const Reply& last() const { return last_; }
   /// Returns the empty request of clocked links.
   [[nodiscard]] static constexpr NoRequest request() { return {}; }
@@ -50,15 +50,15 @@ class ClockedHostOf : public ClockedEngine {
   [[nodiscard]] const Reading* reading() const override {
     return error() == Error::none && reading_.singleturn_bits != 0 ? &reading_ : nullptr;
   }
-  /// The last that was good, whatever came after it.
+  /// Returns the position of the last valid reply, even if invalid ones followed.
   [[nodiscard]] const Reading& position() const { return reading_; }
-  /// See HostOf.
+  /// Returns false, as HostOf does.
   [[nodiscard]] static constexpr bool is_alone() { return false; }
 
  protected:
   /// Begins with a transfer at once.
   explicit ClockedHostOf(const Format& format) : ClockedHostOf(format, later) { ask(); }
-  /// Nothing is clocked before the subclass does.
+  /// Clocks nothing until the subclass does.
   ClockedHostOf(const Format& format, Later) : ClockedEngine(P::host_times(format), storage_), format_(format) {}
   ~ClockedHostOf() = default;
 
@@ -70,12 +70,12 @@ class ClockedHostOf : public ClockedEngine {
     if (reply) last_ = *reply;
     return reply.error();
   }
-  /// This is the last good reply, whose position was taken at the first edge of the clock.
+  /// Stores a valid reply, whose position was latched at the first edge of the clock.
   void keep(const Reply& reply) {
     last_ = reply;
     keep();
   }
-  /// Ends it, with no error by the last good reply.
+  /// Ends the conversation. Without an error the last valid reply is its result.
   void conclude(Error error) {
     if (error == Error::none) keep();
     finish(error);
@@ -83,7 +83,7 @@ class ClockedHostOf : public ClockedEngine {
 
  private:
   void keep() {
-    new (&reading_) Reading(P::reading(format_, last_));  // made there, not copied
+    new (&reading_) Reading(P::reading(format_, last_));  // constructed in place, not copied
     reading_.latched = begun_at();
     reading_.received = received_at();
   }
@@ -94,7 +94,7 @@ class ClockedHostOf : public ClockedEngine {
   std::array<std::uint8_t, (P::most_clocks + 7) / 8> storage_;
 };
 
-/// A position, clocked out once.
+/// Reads one position with one transfer.
 template <Clocked P>
 class ReadClocked : public ClockedHostOf<P> {
  public:
@@ -105,7 +105,7 @@ class ReadClocked : public ClockedHostOf<P> {
   void clocked(BitView bits) final { this->conclude(this->take(bits)); }
 };
 
-/// What Reader, made of the format, reads.
+/// Declares a command that Reader carries out, constructed from the format.
 template <const auto& unit_report, class Reader = ReadClocked<ReportedProtocol<unit_report>>>
 [[nodiscard]] constexpr CommandOf<ReportedProtocol<unit_report>> clocked_reading(const Command& info) {
   using Format = typename ReportedProtocol<unit_report>::Format;
@@ -117,7 +117,7 @@ template <const auto& unit_report, class Reader = ReadClocked<ReportedProtocol<u
           .size = sizeof(Made)};
 }
 
-/// The bits of a clocked frame; all of its bytes when it does not say how many count.
+/// Returns the bits of a clocked frame; all bits of its bytes if `bits` is 0.
 [[nodiscard]] constexpr BitView to_bits(const Frame& frame) {
   return {frame.bytes, frame.bits != 0 ? frame.bits : frame.bytes.size() * 8};
 }

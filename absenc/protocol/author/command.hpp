@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A command is declared with its request and with the conversation that carries it out: how much storage that needs
-// and what it reports follow.
+// Declares a command by its request and the conversation that executes it. Its storage and its report follow from them.
 #pragma once
 
 #include <algorithm>
@@ -16,7 +15,7 @@
 
 namespace absenc::author {
 
-/// A conversation that is over before it began.
+/// A conversation that has already ended with an error.
 template <class Item>
 class Refusal final : public Conversation<Item> {
  public:
@@ -49,11 +48,11 @@ struct ItemOf<P> {
 };
 }  // namespace detail
 
-/// What the lines of a protocol carry: characters where it does not say otherwise.
+/// The item that the lines of a protocol carry: `P::Item`, or characters without one.
 template <class P>
 using ItemOf = typename detail::ItemOf<P>::Item;
 
-/// The fields of a unit's requests and replies, and its words for people; firmware does not link them. All
+/// The fields of a unit's requests and replies, and its texts for people, which firmware does not link. All
 /// conversations of the unit derive from `Host`.
 template <class P, class Host = Conversation<ItemOf<P>>>
 struct Report {
@@ -70,21 +69,20 @@ struct Report {
 
   /// Puts the fields of a request. `put_values<fields, values>` makes such a function.
   void (*put_request)(FieldSink&, const Format&, const Request&) = nullptr;
-  /// Puts the fields of a good reply to it.
+  /// Puts the fields of a valid reply to the request.
   void (*put_reply)(FieldSink&, const Format&, const Request&, const Reply&) = nullptr;
-  /// Explains a bad reply, or none, as the document does. Not asked where a procedure gives an advice of its own.
+  /// Explains an invalid or missing reply by the document. Not called if a procedure has an advice of its own.
   Explanation (*explain)(const Format&, Error, Items request, Items reply) = nullptr;
-  /// Used in place of `explain` for conversations, where only they know enough.
+  /// Used instead of `explain` for conversations, if only they know the reason.
   Explanation (*explain_host)(const Host&) = nullptr;
-  /// Used in place of `explain` for conversations, where words must be put together. The last exchange of `host` went
-  /// wrong.
+  /// Used instead of `explain` for conversations, to put an explanation together. The last exchange of `host` failed.
   void (*tell)(Sentence&, const Host& host) = nullptr;
   /// Advice about a line that is never silent.
   std::string_view noise_advice = endless_noise.advice;
 };
 
-/// The fields of a procedure's `Found`. `Subject` is the format; or a class that the conversation derives from, where
-/// the format alone is not enough.
+/// The fields of the result of a procedure, `Found`. `Subject` is the format, or a class that the conversation derives
+/// from if the format alone is not enough.
 template <class Subject, class T>
 struct Finding {
   /// The format, or the class that the conversation derives from.
@@ -94,20 +92,20 @@ struct Finding {
 
   /// Puts the values of a finding into fields.
   void (*put)(FieldSink&, const Subject&, const T&) = nullptr;
-  /// Puts the fields of what a procedure leaves behind that is broken off.
+  /// Puts the fields of the changes that an interrupted procedure leaves behind.
   void (*put_left)(FieldSink&, const Subject&, const T&) = nullptr;
-  /// Returns the same in words.
+  /// Returns the same changes in words.
   std::string_view (*left)(const T&) = nullptr;
 };
 
-/// Puts the `fields` of what `values(format, ...)` returns.
+/// Puts the fields of the values that `values(format, ...)` returns.
 template <const auto& fields, auto values, class... What>
 constexpr void put_values(FieldSink& sink, const What&... what) {
   fields.put(sink, values(what...));
 }
 
-/// A conversation as a unit hands it out: with the fields and the words of `unit_report`. A procedure has a `finding`;
-/// without one the last reply is shown.
+/// A conversation of a unit, which reports fields and texts of `unit_report`. A procedure has a `finding`; without one
+/// the last reply is reported.
 template <const auto& unit_report, class Base, const auto&... finding>
 class Reported final : public Base {
  public:
@@ -184,13 +182,13 @@ class Reported final : public Base {
   mutable Sentence words_;
 };
 
-/// Whether a pulse on a wire of its own is the request.
+/// Returns whether the request is a pulse on a wire of its own.
 template <class P>
 constexpr bool asks_by_pulse(const typename P::Format& format, const typename P::Request& request) {
   return P::manner(format, request).pulse != Time{};
 }
 
-/// The host sends nothing but clocks.
+/// Request of a protocol whose host sends nothing but clocks.
 struct NoRequest {};
 
 /// A command with the request or procedure that executes it.
@@ -202,19 +200,19 @@ struct CommandOf {
   using Request = typename P::Request;
 
   Command info;  ///< Description of the command.
-  /// The one request that does its work; procedures send more. Or why there is none with these arguments: an error, or
-  /// one that P::encode makes nothing of. Null: what it sends is not known beforehand.
+  /// Returns the request that does the work of the command; procedures send more. It returns an error, or a request
+  /// that P::encode refuses, if the arguments allow none. Null: the requests are not known beforehand.
   Result<Request> (*request)(const Format&, Arguments);
   /// Makes its conversation in storage of `size` bytes.
   Any<Conversation> (*make)(const Format&, Arguments, std::span<std::byte>);
-  std::size_t size;  ///< bytes of storage, without those of frames
-  /// Why an encoder of this format does not have it; empty: it has. Null: every one has.
+  std::size_t size;  ///< bytes of storage, without the frames of coroutines
+  /// Returns why an encoder of this format lacks the command, "" if it has it. Null: every encoder has it.
   std::string_view (*missing)(const Format&) = nullptr;
-  /// Of formats of which `is_other` is true, in place of `make`. Null: of none.
+  /// Used instead of `make` for formats for which `is_other` is true. Null: for none.
   Any<Conversation> (*make_other)(const Format&, Arguments, std::span<std::byte>) = nullptr;
   /// Returns whether `make_other` makes the conversation for this format; null: never.
   bool (*is_other)(const Format&) = nullptr;
-  /// Of formats of which this is false no conversation is made: the options contradict it. Null: of all one is.
+  /// Returns whether the options of this format are consistent; no conversation is made otherwise. Null: always.
   bool (*possible)(const Format&) = nullptr;
 
   /// Returns this command, refused for formats of which `why` returns a reason.
@@ -229,7 +227,7 @@ struct CommandOf {
     one.possible = is_possible;
     return one;
   }
-  /// Of these formats `other` carries it out.
+  /// Lets `other` execute the command for formats for which `is` is true.
   [[nodiscard]] constexpr CommandOf or_when(bool (*is)(const Format&), const CommandOf& other) const {
     CommandOf one = *this;
     one.is_other = is;
@@ -237,7 +235,7 @@ struct CommandOf {
     one.size = std::max(size, other.size);
     return one;
   }
-  /// Whether a request is made of these arguments, or the conversation says why there is none.
+  /// Returns whether these arguments make a request, or the conversation explains why not.
   [[nodiscard]] bool can_ask(const Format& format, Arguments arguments) const {
     if constexpr (std::is_same_v<Request, NoRequest>) {
       return true;
@@ -260,7 +258,7 @@ struct CommandOf {
 };
 
 namespace detail {
-// Made of the format, and of arguments, of which there are none.
+// Makes a request from the format, for commands without arguments.
 template <auto request, class Format>
 constexpr auto request_of(const Format& format) {
   if constexpr (std::is_invocable_v<decltype(request), const Format&>) {
@@ -283,11 +281,12 @@ Any<Conversation> make_run(const typename Machine::Format& format, Arguments arg
 }
 }  // namespace detail
 
-/// The protocol that a report is of.
+/// The protocol of a report.
 template <const auto& unit_report>
 using ReportedProtocol = typename std::remove_cvref_t<decltype(unit_report)>::Protocol;
 
-/// A position, or another value, that one request asks for: `request` makes it of the format, and Reader reads it.
+/// Declares a command that reads a position, or another value, with one request, which `request` makes from the format.
+/// Reader reads it.
 template <const auto& unit_report, auto request, class Reader = ReadPosition<ReportedProtocol<unit_report>>>
 [[nodiscard]] constexpr CommandOf<ReportedProtocol<unit_report>> reading(const Command& info) {
   using P = ReportedProtocol<unit_report>;
@@ -303,7 +302,8 @@ template <const auto& unit_report, auto request, class Reader = ReadPosition<Rep
           .size = sizeof(Made)};
 }
 
-/// What a procedure does. `request(format, arguments)`: see CommandOf; a Request, or a Result.
+/// Declares a command that a procedure executes. `request(format, arguments)` returns a Request or a Result; see
+/// CommandOf.
 template <const auto& unit_report, const auto& finding, auto procedure, auto request, auto... bound>
 [[nodiscard]] constexpr CommandOf<ReportedProtocol<unit_report>> command(const Command& info) {
   using P = ReportedProtocol<unit_report>;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A position that one reply alone does not always prove.
+// Reads a position that one reply alone does not always prove.
 #pragma once
 
 #include <optional>
@@ -8,10 +8,10 @@
 
 namespace absenc::author {
 
-/// As ReadPosition. Of the protocol it needs besides:
+/// As ReadPosition, with these functions of the protocol besides:
 ///
 ///   static bool needs_another(const Format&, const Reply&);
-///   static Error agree(const Format&, const Reply& first, const Reply& second, Time between);   // or what is wrong
+///   static Error agree(const Format&, const Reply& first, const Reply& second, Time between);   // or the error
 template <class P>
 class ReadConfirmed : public HostOf<P> {
  public:
@@ -20,7 +20,7 @@ class ReadConfirmed : public HostOf<P> {
     this->ask(request);
   }
   [[nodiscard]] const Reading* reading() const final {
-    return reading_.singleturn_bits != 0 ? &reading_ : nullptr;  // of a good end only
+    return reading_.singleturn_bits != 0 ? &reading_ : nullptr;  // only after a good end
   }
 
  private:

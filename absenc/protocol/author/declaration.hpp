@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// All that an author declares of a unit, in one aggregate with designated initializers: a misspelt member does not
-// compile. docs/protocol-template shows a whole one.
+// The declaration of a unit by its author: one aggregate with designated initializers, so that a misspelt member does
+// not compile. docs/protocol-template is a complete example.
 #pragma once
 
 #include <cstddef>
@@ -16,8 +16,8 @@
 
 namespace absenc::author {
 
-/// Declares a unit of the protocol `P` (dialog.hpp, device.hpp; clocked_host.hpp). `VirtualEncoder` is made of (format,
-/// shaft): BusDevice, ClockedDevice. `Host` is that of its Report.
+/// Declares a unit of the protocol `P` (dialog.hpp, device.hpp; clocked_host.hpp). `VirtualEncoder` is constructed from
+/// (format, shaft): BusDevice, ClockedDevice. `Host` is the Host of the Report.
 template <class P, class VirtualEncoder, class Host = Conversation<ItemOf<P>>>
 struct Declaration {
   /// The protocol.
@@ -31,18 +31,18 @@ struct Declaration {
 
   std::string_view id{};                         ///< Identifier: the part of an address before the colon.
   std::string_view name{};                       ///< maker and protocol, for people
-  std::string_view document{};                   ///< the source
-  std::span<const std::string_view> known_as{};  ///< makers and families: "Tamagawa", "Smart-Abs"
+  std::string_view document{};                   ///< title of the document
+  std::span<const std::string_view> known_as{};  ///< makers and families to find it by: "Tamagawa", "Smart-Abs"
   LinkKind link{};                               ///< Kind of link between host and encoder.
   std::span<const Option> options{};             ///< OptionsOf::infos (option.hpp)
-  Format (*format)(const Options&) = nullptr;    ///< `format_of<options>` where the options are members of the format
+  Format (*format)(const Options&) = nullptr;    ///< `format_of<options>` if the options are members of the format
   std::span<const ModelText> models{};           ///< option.hpp
   std::span<const FieldInfo> fields{};           ///< FieldsOf::infos (field.hpp)
   std::span<const CommandOf<P>> commands{};      ///< command.hpp
-  std::span<const VectorText> vectors{};         ///< text.hpp; they hold, or it does not compile
-  bool frames_are_texts = false;                 ///< frames of vectors are no hexadecimal; clocked ones are 0 and 1
-  std::size_t frames_size = 0;                   ///< bytes of storage that the procedures' frames need at the most
-  Report<P, Host> report{};                      ///< How requests, replies and findings are shown.
+  std::span<const VectorText> vectors{};         ///< text.hpp; a vector that does not decode as stated does not compile
+  bool frames_are_texts = false;  ///< frames of vectors are not hexadecimal; those of clocked links are 0 and 1
+  std::size_t frames_size = 0;    ///< most bytes of storage that the coroutine frames of the procedures need
+  Report<P, Host> report{};       ///< How requests, replies and findings are shown.
 
   // ---- What depends on the format
 
@@ -50,19 +50,19 @@ struct Declaration {
   LineSettings (*line)(const Format&) = nullptr;
   /// Null: `format.resolution()`.
   Resolution (*resolution)(const Format&) = nullptr;
-  /// Returns whether a virtual encoder is made, and clocked frames are decoded. Null: always.
+  /// Returns whether a virtual encoder can be made, and clocked frames decoded. Null: always.
   bool (*is_usable)(const Format&) = nullptr;
-  /// Returns the request that a reply belongs to, by the reply alone; or an error. Needed where `decode` is null,
-  /// except on clocked lines.
+  /// Returns the request that a reply answers, from the reply alone, or an error. Required if `decode` is null, except
+  /// on clocked lines.
   Result<Request> (*guess_request)(const Format&, Bytes reply) = nullptr;
-  /// Returns the length of any reply that begins so; 0: none does. Null: the longest.
+  /// Returns the length of a reply that begins with these bytes; 0: no reply does. Null: the longest.
   std::size_t (*reply_size)(const Format&, Bytes begin) = nullptr;
-  /// Returns the error of a bad request, by the reply to it. Null: the error of the request.
+  /// Returns the error of an invalid request, from the reply to it. Null: the error of the request.
   Error (*answer_to_bad)(const Format&, Bytes request, Error error, Bytes reply) = nullptr;
-  /// Checks a frame and puts its fields. Null: by the protocol and the report.
+  /// Checks a frame and puts its fields. Null: the protocol and the report do.
   Error (*decode)(const Format&, Frame request, Frame reply, FieldSink&) = nullptr;
 
-  /// Clocked links: writes the bits that the host says for a command, as text of 0 and 1. Null: it only clocks.
+  /// Clocked links: writes the bits that the host sends for a command, as text of 0 and 1. Null: the host only clocks.
   Result<std::size_t> (*encode)(const Format&, const Command&, Arguments, MutableBytes out) = nullptr;
 
   // ---- As in Unit (protocol/unit.hpp)
@@ -99,7 +99,7 @@ struct Declaration {
   const Unit* over_spi = nullptr;             ///< The same encoder on SPI; null: none.
 };
 
-/// The format whose members the options set.
+/// Returns the format whose members the options set.
 template <const auto& options>
 constexpr auto format_of(const Options& values) {
   return options.format(values);

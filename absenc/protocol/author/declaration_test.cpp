@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Each member of a Declaration reaches the Unit. tests/unit_declaration_test.py shows that no other compiles.
+// Each member of a Declaration reaches the Unit. tests/unit_declaration_test.py shows that a misspelt member does not
+// compile.
 #include "absenc/protocol/author/declaration.hpp"
 
 #include <gtest/gtest.h>
@@ -13,7 +14,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-// A request is answered by the next byte.
+// A protocol whose reply is the request plus one.
 struct Toy {
   struct Format {
     unsigned bits = 8;
@@ -286,7 +287,7 @@ TEST(Declaration, SizesReplies) {
   EXPECT_EQ(end.size, 9u);
 }
 
-// Then nothing is known of its requests.
+// A declaration with a `decode` of its own says nothing about its requests.
 TEST(Declaration, DecodesByItself) {
   NoFields sink;
   constexpr Unit made = Descriptor<decoding>::make();

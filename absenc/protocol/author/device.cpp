@@ -8,9 +8,9 @@ namespace absenc::author {
 
 namespace {
 constexpr std::string_view turn_rule = "request during the encoder's transmission";
-// No host of a virtual encoder gives a request up, and asks again, sooner: what carries its bytes takes so long.
+// No host of a virtual encoder waits less before it repeats a request: a pseudo-terminal delays the bytes by this time.
 constexpr Time least_patience = std::chrono::milliseconds(1);
-// One that has to give up time and again is told from one that never waits.
+// More replies in a row during which the host sent cannot be excused by a delay of this program.
 constexpr unsigned most_excuses = 2;
 }  // namespace
 
@@ -29,7 +29,7 @@ ByteStep Responder::next(Time) {
     return {.kind = ByteStep::Kind::transfer, .out = reply_, .at = reply_at_};
   }
   ByteStep step{.expect = 1, .at = never};
-  // Another encoder may be absent: behind its request any pause is enough.
+  // The other encoder may be absent, so any pause ends its reply.
   if (damaged_ || skipping_ != 0) step.expect = 0;
   if (!damaged_ && !request_.empty()) step.expect = request_size(request_) - request_.size();
   if (damaged_ || !request_.empty() || skipping_ != 0 || refusing_) {
@@ -68,7 +68,7 @@ void Responder::forget() {
   skip_begins_ = damaged_ = false;
 }
 
-// The rest of what was begun is none either, until the line is silent.
+// The rest of a damaged request is ignored until the line is silent.
 void Responder::damage(Time at) {
   if (!is_on(at) || transmitting_) return forget();
   heard_at_ = at;
@@ -76,7 +76,7 @@ void Responder::damage(Time at) {
   refusing_ = is_refused(Flaw::damaged, request_) || refusing_;
 }
 
-// Silence: what was begun is no request.
+// Silence ends an incomplete request.
 void Responder::end_run(Time at) {
   reply_.clear();
   if (is_on(at) && !transmitting_) {
@@ -114,7 +114,7 @@ void Responder::hear(std::uint8_t byte, Time at) {
   request_.clear();
 }
 
-// No request begins with the first byte: perhaps one begins behind it.
+// No request begins with the first byte, but one may begin at a later byte.
 void Responder::search_on(Time at) {
   refusing_ = is_refused(Flaw::unknown, request_);
   const ByteBuffer<32> heard = request_;
@@ -123,8 +123,8 @@ void Responder::search_on(Time at) {
   for (const std::uint8_t byte : heard.view().subspan(1)) hear(byte, at);
 }
 
-// Had this program been let run, the replies might have been out before: but only if the host had given each request up
-// first.
+// If this program was delayed, the host may have sent the request after its timeout, before the reply was sent. That
+// explains it only if the delay is longer than the host waits for each request.
 void Responder::hear_while_transmitting(std::uint8_t byte, Time at) {
   if (!interruption_.begins_request(request_size({&byte, 1}), at, times_.character)) return;
   ++interrupted_;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Device side of a line of characters: finds requests, leaves those of others alone, answers in time, lists the rules
-// that its host breaks, and keeps its memory. It knows no protocol, and is compiled once.
+// Device side of a line of characters: recognizes requests, ignores those of other encoders, answers in time, checks
+// the rules that hosts must follow, and has a memory. It knows no protocol, and is compiled once.
 #pragma once
 
 #include <array>
@@ -17,17 +17,17 @@
 
 namespace absenc::author {
 
-/// The times of a virtual encoder, as its document has them.
+/// Times of a virtual encoder, as its document has them.
 struct DeviceTimes {
-  Time character{};    ///< of its line: a pause of two ends a request that is not whole
+  Time character{};    ///< time of a character; a pause of two ends an incomplete request
   Time answer_time{};  ///< from the end of a request to its reply
   Time start_time{};   ///< from power on to the first request that is answered
-  Time gap{};          ///< the pause that ends a request, where it is not two characters
-  /// Full duplex with a memory for what comes while it sends: that is answered afterwards.
+  Time gap{};          ///< pause that ends an incomplete request; 0: two characters
+  /// Full duplex: requests received during a transmission are stored and answered afterwards.
   bool keeps_requests = false;
 };
 
-/// A subclass says what a request is, and what is answered. BusDevice makes one from a protocol.
+/// A virtual encoder whose subclass recognizes requests and answers them. BusDevice makes one from a protocol.
 class Responder : public EncoderOn<std::uint8_t> {
  public:
   /// Takes an event of the port.
@@ -43,20 +43,21 @@ class Responder : public EncoderOn<std::uint8_t> {
   explicit Responder(const DeviceTimes& times) : EncoderOn(times.start_time), times_(times) {}
   ~Responder() = default;
 
-  /// Sends what no request on a line of characters asks for: what a chip select does, or nobody.
+  /// Transmits without a request on the line: after chip select, or unsolicited.
   void transmit(Bytes bytes, Time at);
   /// Returns whether the encoder is sending.
   [[nodiscard]] bool is_transmitting() const { return transmitting_; }
-  /// When what was heard at `at` may have come: earlier than that, where the carrier was kept from looking. What a host
-  /// must wait for counts from here.
+  /// Returns the earliest time at which bytes delivered at `at` may have arrived, because the carrier may have been
+  /// delayed. Times that a host must wait count from here.
   [[nodiscard]] Time earliest(Time at) const { return at - late_; }
 
-  /// How many bytes the request has that begins so, one at least, or how many tell more; 0: none begins so, and the
-  /// search goes on behind the first byte.
+  /// Returns the length of the request that begins with these bytes, or how many bytes are needed to know it, at least
+  /// one; 0: no request begins with them, and the search continues at the next byte.
   [[nodiscard]] virtual std::size_t request_size(Bytes begin) const = 0;
-  /// How many bytes follow this request, which is another encoder's.
+  /// Returns the length of the reply to this request, which is for another encoder.
   [[nodiscard]] virtual std::size_t others_reply_size(Bytes request) const = 0;
-  /// Whether the reply to the last request of others may begin so; if not, nobody answers it, and a request follows.
+  /// Returns whether the other encoder's reply may begin with this byte; if not, the other encoder did not answer and a
+  /// request follows.
   [[nodiscard]] virtual bool begins_others_reply(std::uint8_t) const { return true; }
   /// Whether and how a request is answered.
   enum class Answer : std::uint8_t {
@@ -65,20 +66,20 @@ class Responder : public EncoderOn<std::uint8_t> {
     for_others,
     refused,  ///< when the line is silent: see `refuse`
   };
-  /// For `respond`: this reply takes so much longer.
+  /// Delays the present reply by `time`. Call it from `respond`.
   void take_longer(Time time) { longer_ = time; }
-  /// A whole request. Its reply goes to `reply`.
+  /// Answers a complete request. The reply goes to `reply`.
   virtual Answer respond(Bytes request, Time at, ByteBuffer<64>& reply) = 0;
   /// What is wrong with a request.
   enum class Flaw : std::uint8_t {
-    damaged,    ///< a character
-    unknown,    ///< no request begins so
-    cut_short,  ///< by silence
+    damaged,    ///< damaged character
+    unknown,    ///< no request begins with these bytes
+    cut_short,  ///< ended by silence
   };
-  /// Whether what is no request is refused. What is not is as if it had not come. Of a damaged one `heard` is what came
-  /// before the damage, perhaps nothing.
+  /// Returns whether an invalid request is refused; otherwise it is ignored. For a damaged one, `heard` has the bytes
+  /// before the damage, possibly none.
   virtual bool is_refused(Flaw, Bytes /*heard*/) { return false; }
-  /// The line is silent after something that is refused: the reply to it.
+  /// Makes the reply to a refused request, when the line is silent.
   virtual void refuse(Time, ByteBuffer<64>& /*reply*/) {}
 
  private:
@@ -93,34 +94,34 @@ class Responder : public EncoderOn<std::uint8_t> {
 
   DeviceTimes times_;
   ByteBuffer<32> request_;
-  bool damaged_ = false;  // a character of it: the rest is none until the line is silent
+  bool damaged_ = false;  // a character of the request was damaged: the rest is ignored until the line is silent
   Time heard_at_{};
-  Time late_{};               // what was heard last may have come so much earlier
-  std::size_t skipping_ = 0;  // characters of another encoder's reply
-  bool skip_begins_ = false;  // none of them has come yet
-  bool refusing_ = false;     // what was heard is answered when the line is silent
+  Time late_{};               // longest delay with which the last bytes were delivered
+  std::size_t skipping_ = 0;  // characters left of another encoder's reply
+  bool skip_begins_ = false;  // the first of these characters is still to be received
+  bool refusing_ = false;     // the refused request is answered when the line is silent
   ByteBuffer<64> reply_;
   Time reply_at_{};
   Time longer_{};
-  ByteBuffer<64> kept_;                  // what came while it sends
-  unsigned interrupted_ = 0;             // requests that came while it sends
-  unsigned interruptions_in_a_row_ = 0;  // replies during which some came
+  ByteBuffer<64> kept_;                  // bytes received during the transmission
+  unsigned interrupted_ = 0;             // requests received during the transmission
+  unsigned interruptions_in_a_row_ = 0;  // consecutive transmissions during which requests were received
   bool reply_pending_ = false;
   bool transmitting_ = false;
   Interruption interruption_;
 };
 
 /// A virtual encoder of a protocol with requests and replies (dialog.hpp), with `memory_size` bytes that survive power
-/// off. Of the protocol it needs besides:
+/// off. The protocol needs these functions besides:
 ///
 ///   static DeviceTimes device_times(const Format&);
-///   static std::size_t request_size(const Format&, Bytes begin);       // 0: no request begins so
+///   static std::size_t request_size(const Format&, Bytes begin);       // 0: no request begins with these bytes
 ///   static std::size_t reply_size(const Format&, const Request&);      // 0: it is not answered
 ///   static Result<Request> decode_request(const Format&, Bytes);
 ///   static ByteBuffer<N> encode_reply(const Format&, const Request&, const Reply&);
 ///
-/// `Derived` answers: `bool is_mine(const Request&)`, and `std::optional<Reply> answer(const Request&, Time at)`, where
-/// none is no reply.
+/// `Derived` has `bool is_mine(const Request&)`, and `std::optional<Reply> answer(const Request&, Time at)`, which
+/// returns nothing for no reply.
 template <class P, class Derived, std::size_t memory_size>
 class BusDevice : public Responder {
  public:
@@ -131,7 +132,7 @@ class BusDevice : public Responder {
   /// A reply of the protocol.
   using Reply = typename P::Reply;
 
-  /// Switched off until `power_on`. `shaft` must outlive the encoder.
+  /// Constructs an encoder that is off until `power_on`. `shaft` must outlive it.
   BusDevice(const Format& format, const Shaft& shaft)
       : Responder(P::device_times(format)), format_(format), shaft_(&shaft) {}
   /// Returns the memory of the encoder, which outlasts power-off.
@@ -144,13 +145,13 @@ class BusDevice : public Responder {
   [[nodiscard]] const Format& format() const { return format_; }
   /// Returns position and motion of the shaft.
   [[nodiscard]] ShaftState shaft(Time at) const { return shaft_->at(at); }
-  /// Counts of 2^-bits revolution since the zero that `store_zero` keeps in four bytes from this address on; they go on
-  /// from turn to turn, and are negative below zero.
+  /// Returns counts of 2^-bits revolution since the zero that `store_zero` stored in four bytes at this address;
+  /// continuous from turn to turn, negative below zero.
   [[nodiscard]] std::int64_t counts(Time at, unsigned bits, std::size_t zero_address) const {
     const auto zero = static_cast<std::int64_t>(load_little_endian(Bytes(memory_).subspan(zero_address, 4)));
     return (shaft(at).position - zero) >> (32 - bits);
   }
-  /// The zero is here.
+  /// Stores the present position as the zero.
   void store_zero(Time at, std::size_t zero_address) {
     const auto here = static_cast<std::uint64_t>(shaft(at).position) & low_mask(32);
     store_little_endian(MutableBytes(memory_).subspan(zero_address, 4), here);

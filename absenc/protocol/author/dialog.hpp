@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The engine with a protocol: conversations that ask for one thing and procedures that ask for several.
+// Combines the engine with a protocol: conversations with one request, and procedures with several.
 #pragma once
 
 #include <array>
@@ -16,23 +16,22 @@
 
 namespace absenc::author {
 
-/// What the document says of frames. Nothing of it is optional: a name that is misspelt does not compile.
+/// The functions that a protocol must have. None is optional, so a misspelt name does not compile.
 ///
 ///   struct Protocol {
-///     using Format, Request, Reply;                                  // Format: what the options make of them
+///     using Format, Request, Reply;                                  // Format: made from the options
 ///     static constexpr std::size_t longest_reply;                    // bytes
 ///     static HostTimes host_times(const Format&);
 ///     static Manner manner(const Format&, const Request&);
 ///     static ByteBuffer<N> encode(const Format&, const Request&);
 ///     static std::size_t expected(const Format&, const Request&, Bytes reply);   // see Engine
-///     static Result<Reply> decode(const Format&, const Request&, Bytes reply);   // of one byte at least
+///     static Result<Reply> decode(const Format&, const Request&, Bytes reply);   // of at least one byte
 ///     static bool is_whole(const Format&, Error);                    // see Engine
 ///     static Reading reading(const Format&, const Request&, const Reply&);
-///     static Time latched(const Format&, Time sent_at);              // when the encoder takes the position; where the
-///   };                                                               // document does not say it: at `sent_at`, the
-///   latest
+///     static Time latched(const Format&, Time sent_at);              // when the encoder latches the position; if the
+///   };                                                               // document does not say: `sent_at`, the latest
 ///
-/// Typed requests and replies; a subclass says what becomes of them.
+/// A conversation with typed requests and replies, which a subclass handles.
 template <class P>
 class HostOf : public Engine {
  public:
@@ -47,16 +46,16 @@ class HostOf : public Engine {
   [[nodiscard]] const Format& format() const { return format_; }
   /// Returns the request.
   [[nodiscard]] const Request& request() const { return request_; }
-  /// The last good one.
+  /// Returns the last valid reply.
   [[nodiscard]] const Reply& last() const { return last_; }
-  /// The position in the last good reply, with the times of its exchange.
+  /// Returns the position in the last valid reply, with the times of its exchange.
   [[nodiscard]] Reading last_reading() const {
     Reading reading = P::reading(format_, request_, last_);
     reading.latched = P::latched(format_, sent_at());
     reading.received = received_at();
     return reading;
   }
-  /// Whether the texts of a procedure say all: it has none.
+  /// Returns whether the texts of a procedure replace all others; only a procedure has such texts.
   [[nodiscard]] static constexpr bool is_alone() { return false; }
 
  protected:
@@ -64,7 +63,7 @@ class HostOf : public Engine {
   explicit HostOf(const Format& format) : Engine(P::host_times(format), storage_), format_(format) {}
   ~HostOf() = default;
 
-  /// What was not known of the encoder it has told.
+  /// Sets the format when the encoder has reported what the options left open.
   void set_format(const Format& format) { format_ = format; }
   /// Sends a request, not before `earliest`.
   void ask(const Request& request, Time earliest = {}) { ask(request, P::manner(format_, request), earliest); }
@@ -88,11 +87,11 @@ class HostOf : public Engine {
   Request request_{};
   decltype(P::encode(Format{}, Request{})) request_bytes_{};
   Reply last_{};
-  // More than the longest reply tells "too long".
+  // Longer than the longest reply, so that a reply that is too long is detected.
   std::array<std::uint8_t, 3 * P::longest_reply> storage_;
 };
 
-/// A position, asked for once: what a drive repeats ten thousand times a second.
+/// Reads a position with one request: a drive does this ten thousand times a second.
 template <class P>
 class ReadPosition : public HostOf<P> {
  public:
@@ -102,19 +101,19 @@ class ReadPosition : public HostOf<P> {
   }
   /// Returns the position, or null if there is none.
   [[nodiscard]] const Reading* reading() const final {
-    return reading_.singleturn_bits + reading_.multiturn_bits != 0 ? &reading_ : nullptr;  // of a good end only
+    return reading_.singleturn_bits + reading_.multiturn_bits != 0 ? &reading_ : nullptr;  // only after a good end
   }
 
  private:
   void concluded(Error error) final {
-    if (error == Error::none) new (&reading_) Reading(this->last_reading());  // made there, not copied
+    if (error == Error::none) new (&reading_) Reading(this->last_reading());  // constructed in place, not copied
     this->finish(error, error == Error::none ? Time{} : this->manner().hold);
   }
 
   Reading reading_{};
 };
 
-/// What a procedure speaks through.
+/// The engine and coroutine storage through which a procedure sends requests.
 template <class P>
 class DialogOf : public HostOf<P>, public Routine {
  public:
@@ -123,39 +122,39 @@ class DialogOf : public HostOf<P>, public Routine {
   /// A reply of the protocol.
   using Reply = typename P::Reply;
 
-  /// `co_await`ed. With `must` the procedure ends when there is no good reply, and what is awaited is the reply;
-  /// without, it is a Result.
+  /// An awaitable request. With `must` the procedure ends without a valid reply, and the result is the reply; otherwise
+  /// the result is a Result.
   template <bool must>
   class [[nodiscard]] Question {
    public:
     /// Belongs to this dialog.
     explicit Question(DialogOf& dialog) : dialog_(dialog) {}
-    /// Not before `pause` has passed since the encoder was last heard, or asked.
+    /// Sends the request only after `pause` since the last received or sent character.
     Question& after(Time pause) {
       dialog_.earliest_ = dialog_.received_at() + pause;
       return *this;
     }
-    /// It is never sent again.
+    /// Never repeats the request.
     Question& once() {
       dialog_.asking_.repeats = 0;
       return *this;
     }
-    /// It is sent up to `attempts` times, 1 at least.
+    /// Sends the request up to `attempts` times, at least once.
     Question& repeated(unsigned attempts) {
       dialog_.asking_.repeats = attempts - 1;
       return *this;
     }
-    /// It changes the encoder, if it is obeyed.
+    /// Marks the request as one that changes the encoder if it is executed.
     Question& changes() {
       dialog_.changing_ = true;
       return *this;
     }
-    /// Its reply is taken only when silence follows, as Manner::ends_by_silence.
+    /// Accepts the reply only when silence follows, as Manner::ends_by_silence.
     Question& until_silence() {
       dialog_.asking_.ends_by_silence = true;
       return *this;
     }
-    /// What the procedure's error says when it ends here: which step failed.
+    /// Sets the detail of the procedure's error if it ends here: the step that failed.
     Question& or_say(std::string_view words) {
       dialog_.words_ = words;
       return *this;
@@ -188,7 +187,7 @@ class DialogOf : public HostOf<P>, public Routine {
     prepare(request);
     return Question<false>(*this);
   }
-  /// Nothing is sent for so long after the encoder was last heard, or asked: `co_await dialog.rest(10ms)`.
+  /// Sends nothing for `pause` after the last received or sent character: `co_await dialog.rest(10ms)`.
   [[nodiscard]] auto rest(Time pause) {
     struct Rest {
       DialogOf& dialog;
@@ -199,22 +198,23 @@ class DialogOf : public HostOf<P>, public Routine {
     };
     return Rest{*this, pause};
   }
-  /// Hands out an intermediate result before what is asked next.
+  /// Emits an intermediate result before the next request.
   void emit() { HostOf<P>::emit(); }
   using HostOf<P>::set_format;
-  /// This end of the line speaks at `rate` from here on, with these times.
+  /// Switches this end of the line to `rate` from now on, with these times.
   void set_rate(std::uint32_t rate, const HostTimes& times) {
     HostOf<P>::set_rate(rate);
     this->set_times(times);
   }
-  /// Nothing is sent for so long, which what is awaited next begins: `heard` tells what comes, until it is over.
+  /// Listens for `duration` from the next await on, without sending. `heard` returns the received bytes until it is
+  /// over.
   void listen(Time duration) {
     heard_ = {};
     HostOf<P>::listen(duration);
   }
   /// Reply of an encoder that sends without requests.
   struct Heard {
-    Bytes bytes{};      ///< none, and it is not over: a damaged character. They are there until something is awaited
+    Bytes bytes{};      ///< none, while not over: a damaged character. Valid until the next await
     bool over = false;  ///< Whether no more replies come.
   };
   /// Waits for the next reply of an encoder that sends without requests.
@@ -232,7 +232,8 @@ class DialogOf : public HostOf<P>, public Routine {
   /// Returns whether a good reply needs no second one to be presented as good.
   [[nodiscard]] bool is_alone() const { return outcome_.alone; }
   [[nodiscard]] ChangeSent change_sent() const final { return change(); }
-  /// From here on it leaves the encoder as it was when it is asked to end early; `is_aborted` tells.
+  /// Promises that from now on the procedure restores the encoder when it is asked to end early; `is_aborted` returns
+  /// whether it was.
   void restores(bool yes = true) { restores_ = yes; }
   /// Returns whether the procedure was aborted from outside.
   [[nodiscard]] bool is_aborted() const { return aborted_; }
@@ -286,7 +287,7 @@ class DialogOf : public HostOf<P>, public Routine {
   Error failure_ = Error::none;
   Heard heard_{};
   bool must_ = false;
-  bool changing_ = false;  // what is asked
+  bool changing_ = false;  // the present request changes the encoder
   bool restores_ = false;
   bool aborted_ = false;
 };
@@ -303,14 +304,15 @@ struct ProcedureDialog<P> {
 };
 }  // namespace detail
 
-/// What the procedures of a protocol speak through: `P::Dialog`, an Engine and Routine made of (format, arena), where
-/// one request is not answered by one reply.
+/// The dialog of the procedures of a protocol: `P::Dialog`, an Engine and Routine constructed from (format, arena), if
+/// the protocol does not answer each request with one reply.
 template <class P>
 using ProcedureDialog = typename detail::ProcedureDialog<P>::Type;
 
-/// A procedure that runs: `procedure(dialog, found, bound..., arguments)`, the last where it takes them. What it finds
-/// is `Found`, whose member `reading`, if there is one, is the position; else that of the dialog. With `Found::streams`
-/// each `emit` is a result, and the procedure ends only with an error. Frames lie in the storage behind this object.
+/// A running procedure: `procedure(dialog, found, bound..., arguments)`, the last only if it takes them. Its result is
+/// `Found`, whose member `reading`, if it has one, is the position; otherwise the dialog has the position. With
+/// `Found::streams` each `emit` is a result, and the procedure ends only with an error. Coroutine frames are in the
+/// storage after this object.
 template <class P, class Found, auto procedure, auto... bound>
 class Run : public ProcedureDialog<P> {
  public:
@@ -343,7 +345,7 @@ class Run : public ProcedureDialog<P> {
  private:
   static constexpr bool goes_on = requires { Found::streams; };
 
-  static constexpr StreamCounts counts_{};  // what it asks for is no stream of which frames could be discarded
+  static constexpr StreamCounts counts_{};  // a polled procedure discards no frames
 
   Found found_{};
   Buffer<std::int64_t, 6> arguments_;

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What every virtual encoder has, whatever its line: power, alarms that somebody raised, the rules that its host broke,
-// how often it answered.
+// Base of every virtual encoder, on any line: power, alarms raised by tests and users, broken rules, number of answers.
 #pragma once
 
 #include <cstdint>
@@ -46,11 +45,11 @@ class EncoderOn : public Device<Item> {
   explicit EncoderOn(Time start_time) : start_time_(start_time) {}
   ~EncoderOn() = default;
 
-  /// The host did what a rule of the document is about: whether it kept it, which is returned.
+  /// Records whether the host kept a rule of the document, and returns `kept`. A broken rule is a violation.
   bool expect(bool kept, std::string_view rule, Time at) { return rules_.expect(kept, rule, at); }
-  /// The same of what is no violation: a host may do so, or have had to give up.
+  /// Records the same for a rule whose breach is no violation: a host may break it, or may have given up.
   void note(bool kept, std::string_view rule) { rules_.note(kept, rule); }
-  /// Does not hear anything until `time`, as after a reset.
+  /// Ignores everything until `until`, as after a reset.
   void restart(Time until) {
     power_ = Power::starting;
     ready_at_ = until;
@@ -70,7 +69,7 @@ class EncoderOn : public Device<Item> {
   /// Counts a reply.
   void count_answer() { ++answer_count_; }
 
-  /// Power has come, and the start-up is over, at the time at which it was.
+  /// Called when power is on and the start-up over; the time is the end of the start-up.
   virtual void started(Time) {}
   /// Is called when the encoder is switched off.
   virtual void stopped(Time) {}

@@ -6,7 +6,7 @@
 
 namespace absenc::author {
 
-// ---- For the subclass
+// ---- Calls of the subclass
 
 void Engine::send(Bytes request, const Manner& manner, Time earliest) {
   out_ = request;
@@ -43,13 +43,13 @@ void Engine::finish(Error error, Time hold) {
 // ---- Steps
 
 ByteStep Engine::next(Time now) {
-  // Made by a function: a variable is zeroed first, by a call.
+  // A function makes the step, because a variable would first be zeroed by a call.
   ByteStep step = [this]() -> ByteStep {
     return {.expect = due_, .at = never, .answer = manner_.answer_limit, .gap = times_.gap_limit};
   }();
   if (state_ == State::receiving) return step;  // at once: between two characters there is little time
   step.expect = 0;
-  // What was on the line before this conversation is not known.
+  // Traffic before this conversation is unknown, so pauses count from now.
   if (!begun_) received_at_ = now;
   begun_ = true;
   wake(now);
@@ -67,18 +67,18 @@ ByteStep Engine::next(Time now) {
   return step;
 }
 
-// The subclass may rest again. What it has told before comes first.
+// The subclass may sleep again. Its emits and rate changes come first.
 void Engine::wake(Time now) {
   while ((state_ == State::sleeping || state_ == State::listening) && rate_ == 0 && !emitting_) {
     if (state_ == State::listening && earliest_ == never) earliest_ = now + listening_;
     if (now < earliest_) return;
     if (state_ == State::listening) received_at_ = earliest_;
-    state_ = State::over;  // unless the subclass goes on
+    state_ = State::over;  // unless the subclass continues
     woken();
   }
 }
 
-// Before it nothing is done.
+// Returns the time before which nothing is sent or ended.
 Time Engine::rest_end() const {
   if (state_ == State::ready && times_.silence != Time{}) return std::max(received_at_ + times_.silence, earliest_);
   return state_ >= State::sleeping && state_ != State::over ? earliest_ : Time::min();
@@ -130,14 +130,15 @@ void Engine::feed(const ByteEvent& event) {
   if (noisy_) end_noise(before);
 }
 
-// Whether that is all to be done.
+// Handles items that arrive while no reply is awaited. Returns whether they need no further handling.
 bool Engine::came_unasked(const ByteEvent& event) {
   const bool damaged = event.kind == ByteEvent::Kind::line_error;
   if (state_ == State::listening) {
     heard(damaged ? Bytes{} : event.items);
     return true;
   }
-  const bool pulsing = state_ == State::sending && manner_.pulse != Time{};  // its edge is past already
+  // The reply may already follow the pulse's edge.
+  const bool pulsing = state_ == State::sending && manner_.pulse != Time{};
   if (!pulsing) disturbed_ = true;
   return false;
 }
@@ -146,7 +147,7 @@ void Engine::end_noise(State before) {
   if (is_awaited() || (before == State::ready && state_ == State::ready)) {
     conclude();
   } else if (state_ != State::sending) {
-    heard_ = noisy_ = false;  // the reply was taken
+    heard_ = noisy_ = false;  // the reply was accepted
   }
 }
 
@@ -156,10 +157,10 @@ void Engine::sent(Time at) {
   if (state_ != State::sending) return;
   if (!manner_.expects_reply) return conclude_with(Error::none);
   state_ = disturbed_ ? State::settling : State::receiving;
-  look();  // at what came during a pulse
+  look();  // checks items received during a pulse
 }
 
-// Whether the reply is there.
+// Ends the exchange if the reply is complete.
 void Engine::look() {
   if (state_ != State::receiving) return;
   const std::size_t whole = expected();
@@ -175,7 +176,7 @@ void Engine::conclude() {
     if (disturbed_) return conclude_with(Error::bad_framing);
     return conclude_with(manner_.any_reply ? Error::none : Error::timeout);
   }
-  // Bytes that are not this reply's.
+  // Some of the bytes do not belong to this reply.
   if (disturbed_ || noisy_) return conclude_with(Error::wrong_length);
   conclude_with(manner_.any_reply ? Error::none : check());
 }
@@ -185,7 +186,7 @@ void Engine::conclude_with(Error error) {
     --manner_.repeats;
     return start(received_at_ + manner_.pause);
   }
-  state_ = State::over;  // unless the subclass goes on
+  state_ = State::over;  // unless the subclass continues
   concluded(error);
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The one manner to declare fields: each with the member of a struct that has its value. The kind of a field follows
-// from the type of the member, the order in which fields are put from that of their declarations.
+// Declares a field by the member of a struct that has its value. All units do so: the kind of a field follows from the
+// type of its member, and the order of put fields from the order of their declarations.
 #pragma once
 
 #include <algorithm>
@@ -17,13 +17,13 @@
 
 namespace absenc::author {
 
-/// `member` shows a member, or what a function makes of all: `T (*)(const Values&)`.
+/// A field and its source: a member, or a function of all values, `T (*)(const Values&)`.
 template <auto member>
 struct FieldOf {
   FieldInfo info;  ///< Description of the field.
 };
 
-/// A value that is text: ASCII in bytes, which outlive the call of `put`.
+/// A text as ASCII bytes, which must outlive the call of `put`.
 struct AsciiText {
   Bytes bytes;  ///< The characters.
 };
@@ -41,7 +41,7 @@ T held_by(const std::optional<T>&);
 template <auto member>
 using Held = decltype(held_by(shown_by(member)));
 
-/// How a value of this type is shown.
+/// Returns the kind of field for a value of this type.
 template <class T>
 constexpr FieldInfo::Kind kind_of() {
   if (std::is_same_v<T, bool>) return FieldInfo::Kind::boolean;
@@ -53,28 +53,29 @@ constexpr FieldInfo::Kind kind_of() {
 }
 }  // namespace detail
 
-/// The type of the member, which may be an optional, says how it is shown. An optional without a value is not put.
+/// Declares a field. The type of the member, which may be an optional, gives its kind. An optional without a value is
+/// not put.
 template <auto member>
 [[nodiscard]] constexpr FieldOf<member> field(std::string_view name, std::string_view unit, std::string_view meaning,
                                               Role role = Role::other) {
   return {
       {.name = name, .kind = detail::kind_of<detail::Held<member>>(), .unit = unit, .meaning = meaning, .role = role}};
 }
-/// Bit n is flags[n].
+/// Declares a field of flags; bit n is flags[n].
 template <auto member>
 [[nodiscard]] constexpr FieldOf<member> field(std::string_view name, std::string_view meaning,
                                               std::span<const FlagInfo> flags) {
   return {{name, FieldInfo::Kind::flags, {}, meaning, flags}};
 }
 
-/// The same field, which texts show in hexadecimal.
+/// Returns the field, which texts show in hexadecimal.
 template <auto member>
 [[nodiscard]] constexpr FieldOf<member> in_hex(FieldOf<member> one) {
   one.info.in_hex = true;
   return one;
 }
 
-/// The fields of `Values`, a struct whose members they show.
+/// The fields of `Values`, a struct with their members.
 template <class Values, auto... members>
 struct FieldsOf {
   /// Takes the fields in their order.
@@ -92,7 +93,7 @@ struct FieldsOf {
     put_one(sink, *of<member>(), value);
   }
 
-  /// The field that shows this member.
+  /// Returns the field of this member.
   template <auto member>
   [[nodiscard]] constexpr const FieldInfo* of() const {
     std::size_t index = 0;
@@ -140,7 +141,7 @@ template <class Values, auto... members>
   return FieldsOf<Values, members...>(all...);
 }
 
-/// Returns the fields of several arrays as one, for Declaration::fields.
+/// Joins the fields of several arrays, for Declaration::fields.
 template <std::size_t... sizes>
 [[nodiscard]] constexpr auto joined(const std::array<FieldInfo, sizes>&... infos) {
   std::array<FieldInfo, (sizes + ...)> all{};

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A position of an encoder whose format, and what it is asked, are known when the program is written, as a drive knows
-// them: what follows from them is not computed, and what they exclude is not linked.
+// Reads a position of an encoder whose format and request are known when the program is written, as a drive knows them:
+// values that follow from them are not computed, and cases that they exclude are not linked.
 #pragma once
 
 #include <cstddef>
@@ -9,7 +9,7 @@
 
 namespace absenc::author {
 
-/// P with one format and one request.
+/// The protocol P with one format and one request.
 template <class P, const typename P::Format& format, const typename P::Request& request>
 struct Known {
   struct Format {};
@@ -42,8 +42,8 @@ struct Known {
   static constexpr Time latched(const Format&, Time sent_at) { return P::latched(format, sent_at); }
 };
 
-/// `static constexpr Format format{...}; static constexpr Request request{...};`. Of a protocol whose ReadPosition is
-/// author's: not where one reply is not enough.
+/// Use: `static constexpr Format format{...}; static constexpr Request request{...};`. For protocols that use
+/// ReadPosition of author, but not where one reply is not enough.
 template <class P, const typename P::Format& format, const typename P::Request& request>
 requires(!requires { P::needs_another; }) class ReadKnownPosition final
     : public ReadPosition<Known<P, format, request>> {

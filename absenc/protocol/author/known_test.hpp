@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// For the tests of units: what is known when the program is written is read as anything is.
+// For the tests of units: a reader of a format known when the program is written reads as any other reader.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -11,8 +11,8 @@
 
 namespace absenc::author::testing {
 
-/// What a conversation sends, when it is over, and its events: those of `reply`, told in one piece or byte by byte, and
-/// silence behind it.
+/// Returns what a conversation sends, when it ends, and its result, for a `reply` that is delivered in one piece or
+/// byte by byte and followed by silence.
 template <class Reader>
 std::vector<std::vector<std::uint8_t>> talk(Reader& reader, const std::vector<std::uint8_t>& reply, bool whole) {
   using Kind = Event<std::uint8_t>::Kind;
@@ -37,7 +37,7 @@ std::vector<std::vector<std::uint8_t>> talk(Reader& reader, const std::vector<st
   return sent;
 }
 
-/// A good reply, each of its bits wrong, and each of its beginnings.
+/// Checks a valid reply, the reply with each of its bits wrong, and each incomplete reply.
 template <class P, const typename P::Format& format, const typename P::Request& request>
 void expect_known_as_any(const std::vector<std::uint8_t>& good) {
   std::vector<std::vector<std::uint8_t>> replies{good};

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Parts that procedures share: a look at the position, and whether a zero may be set.
+// Parts that procedures share: reading the position, and checking whether a zero may be set.
 #pragma once
 
 #include <cstdint>
@@ -9,7 +9,7 @@
 
 namespace absenc::author {
 
-/// A good reply that carries the position, or the turns, all of it valid.
+/// Returns a reading whose position, or turns, are valid completely.
 [[nodiscard]] constexpr Reading position_reading(std::uint64_t counts, unsigned bits) {
   Reading reading;
   reading.singleturn = counts & low_mask(bits);
@@ -26,7 +26,7 @@ namespace absenc::author {
   return reading;
 }
 
-/// What a look found: `Found` of procedures that show a position derive from it, or are it.
+/// Result of `look`: `Found` of procedures that report a position derives from it, or is it.
 template <class P>
 struct Looked {
   typename P::Request request{};  ///< The request.
@@ -34,7 +34,7 @@ struct Looked {
   Reading reading{};              ///< The position.
 };
 
-/// Asks once; `found` is what came, with its times. The result is the position in counts.
+/// Requests the position once. `found` gets the reply with its times; the result is the position in counts.
 template <class P>
 Part<std::uint64_t> look(DialogOf<P>& dialog, Looked<P>& found, typename P::Request request) {
   found.reply = co_await dialog.ask(request);
@@ -43,7 +43,7 @@ Part<std::uint64_t> look(DialogOf<P>& dialog, Looked<P>& found, typename P::Requ
   co_return found.reading.singleturn;
 }
 
-/// Looks twice. Ends the procedure where a zero must not be set, before anything is sent.
+/// Reads the position twice. Ends the procedure if the zero must not be set, before anything is changed.
 template <class P>
 Part<bool> may_set_zero(DialogOf<P>& dialog, Looked<P>& found, typename P::Request request) {
   co_await look(dialog, found, request);

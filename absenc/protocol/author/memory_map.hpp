@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Where a byte of an encoder's memory is: in which of its areas, and at which offset of their bytes in a row.
+// Finds the area of an encoder's memory that has a byte, and the offset of the byte in the stored areas.
 #pragma once
 
 #include <algorithm>
@@ -10,7 +10,7 @@
 
 namespace absenc::author {
 
-/// Returns the area of this byte, or null.
+/// Returns the area that has this byte, or null.
 [[nodiscard]] constexpr const MemoryArea* find_area(std::span<const MemoryArea> areas, unsigned page,
                                                     unsigned address) {
   const auto area =
@@ -31,8 +31,8 @@ template <class Counts>
   return bytes;
 }
 
-/// Returns the offset of a byte, where the areas of one page each for which `counts` is true are stored in a row. One
-/// of them must have the byte.
+/// Returns the offset of a byte if the areas for which `counts` is true are stored one after the other. Each has one
+/// page, and one of them must have the byte.
 template <class Counts>
 [[nodiscard]] constexpr std::size_t offset_of(std::span<const MemoryArea> areas, unsigned page, unsigned address,
                                               Counts counts) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// An option is declared with the member of the format that it sets: the table of the unit, the format, and what models
-// and vectors say of it follow.
+// Declares an option by the member of the format that it sets. The unit's table, the format, and the values of models
+// and vectors follow from it.
 #pragma once
 
 #include <array>
@@ -19,7 +19,7 @@ template <class Format, class Member>
 Format format_of(Member Format::*);
 template <class Format, class Member>
 Member member_of(Member Format::*);
-// Of a time nanoseconds.
+// Value of an option for a member; times are in nanoseconds.
 template <class Value>
 constexpr std::int64_t number_of(const Value& value) {
   if constexpr (requires { value.count(); }) {
@@ -28,7 +28,7 @@ constexpr std::int64_t number_of(const Value& value) {
     return static_cast<std::int64_t>(value);
   }
 }
-// The one that derives from all others.
+// The type that derives from all others.
 template <class One, class... Others>
 struct MostDerived {
   using Type = One;
@@ -55,7 +55,7 @@ struct OptionOf {
   }
 };
 
-/// A number from `minimum` to `maximum` in steps; its default is that of the member.
+/// Declares a number from `minimum` to `maximum` in steps; the member has the default.
 template <auto member>
 [[nodiscard]] constexpr OptionOf<member> option(std::string_view name, std::string_view meaning, std::int64_t minimum,
                                                 std::int64_t maximum, std::uint32_t step = 1) {
@@ -68,7 +68,7 @@ template <auto member>
            .step = step}};
 }
 
-/// One of `choices`: of an enumeration, in its order.
+/// Declares a choice; the choices of an enumeration are in its order.
 template <auto member>
 [[nodiscard]] constexpr OptionOf<member> option(std::string_view name, std::string_view meaning,
                                                 std::span<const std::string_view> choices) {
@@ -76,55 +76,55 @@ template <auto member>
   return {{.name = name, .meaning = meaning, .default_value = static_cast<std::int64_t>(value), .choices = choices}};
 }
 
-/// Yes or no.
+/// Declares a choice of yes and no.
 template <auto member>
 [[nodiscard]] constexpr OptionOf<member> option(std::string_view name, std::string_view meaning) {
   return option<member>(name, meaning, std::span<const std::string_view>(boolean_choices));
 }
 
-/// The same option, which captured frames can tell.
+/// Returns the option, marked as one whose value captured frames can show.
 template <auto member>
 [[nodiscard]] constexpr OptionOf<member> probeable(OptionOf<member> one) {
   one.info.probeable = true;
   return one;
 }
 
-/// The same option, which a word format says instead.
+/// Returns the option, marked as one that a word format replaces.
 template <auto member>
 [[nodiscard]] constexpr OptionOf<member> describing_word(OptionOf<member> one) {
   one.info.describes_word = true;
   return one;
 }
 
-/// The same option, of which the user writes so many digits behind a point: its values are in units of the last one.
+/// Returns the option with this many decimal digits: its values are in units of the last digit.
 template <unsigned decimals, auto member>
 [[nodiscard]] constexpr OptionOf<member> decimal(OptionOf<member> one) {
   one.info.decimals = decimals;
   return one;
 }
 
-/// The same option, which may also be 0, below its range.
+/// Returns the option, which may also be 0, below its range.
 template <auto member>
 [[nodiscard]] constexpr OptionOf<member> or_zero(OptionOf<member> one) {
   one.info.or_zero = true;
   return one;
 }
 
-/// The same option, which others than its unit know by this role.
+/// Returns the option with this role, by which code that does not know the unit finds it.
 template <Role role, auto member>
 [[nodiscard]] constexpr OptionOf<member> with_role(OptionOf<member> one) {
   one.info.role = role;
   return one;
 }
 
-/// The same option, which texts show in hexadecimal; it may be written so or in decimal.
+/// Returns the option, which texts show in hexadecimal; users may write it so or in decimal.
 template <auto member>
 [[nodiscard]] constexpr OptionOf<member> in_hex(OptionOf<member> one) {
   one.info.in_hex = true;
   return one;
 }
 
-/// Members of one struct, and of what it derives from.
+/// Options of a unit: members of one struct and of its bases.
 template <auto... members>
 struct OptionsOf {
   /// Format of the encoder: the values of its options.
@@ -133,14 +133,14 @@ struct OptionsOf {
   /// Takes the options in their order.
   constexpr explicit OptionsOf(const OptionOf<members>&... all) : infos{all.info...} {}
 
-  /// What these values make of the format's own.
+  /// Returns the format with these values.
   [[nodiscard]] constexpr Format format(const Options& values) const {
     Format made{};
     std::size_t index = 0;
     (OptionOf<members>::put(made, values[index++]), ...);
     return made;
   }
-  /// The option of this index alone.
+  /// Sets the option of this index in `format`.
   static constexpr void put(Format& format, std::size_t option, std::int64_t value) {
     std::size_t index = 0;
     ((index++ == option ? OptionOf<members>::put(format, value) : void()), ...);
@@ -152,7 +152,7 @@ struct OptionsOf {
     ((index++ == option ? void(value = OptionOf<members>::get(format)) : void()), ...);
     return value;
   }
-  /// Index of the option with this name; the number of options when there is none.
+  /// Returns the index of the option with this name; the number of options if there is none.
   [[nodiscard]] constexpr std::size_t find(std::string_view name) const {
     std::size_t i = 0;
     while (i < infos.size() && infos[i].name != name) ++i;
@@ -163,11 +163,11 @@ struct OptionsOf {
   std::array<Option, sizeof...(members)> infos;
 };
 
-/// A model as text: "bits=12 turns=false".
+/// A model, whose values are text: "bits=12 turns=false".
 struct ModelText {
   std::string_view name;      ///< Name of the model.
   std::string_view meaning;   ///< What the model is, as a phrase.
-  std::uint32_t maximum_rpm;  ///< 0: the document states none
+  std::uint32_t maximum_rpm;  ///< highest speed in rpm; 0: the document states none
   std::string_view values;    ///< Options that it sets, as `name=value` separated by blanks.
 };
 

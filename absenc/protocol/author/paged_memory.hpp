@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Device side of a memory with pages, which is busy for a while after each change: an EEPROM whose bytes have addresses
+// Device side of a memory with pages that is busy for a while after each change: an EEPROM whose bytes have addresses
 // of 7 or 8 bits. It knows no protocol, and is compiled once.
 #pragma once
 
@@ -76,10 +76,10 @@ class PagedMemoryDevice : public Responder {
 
   const PagedMemory* memory_;
   std::uint8_t page_ = 0;
-  bool page_changed_ = false;  // and no access since that waited for it
+  bool page_changed_ = false;  // no access has waited for the page change yet
   Time page_ready_at_{};
   Time written_at_{};                              // end of the last write; 0: none
-  std::optional<std::uint8_t> refused_address_{};  // of the last request, a read during a write
+  std::optional<std::uint8_t> refused_address_{};  // address of the last request, if it was a read during a write
   bool fetching_ = false;
   std::uint8_t fetch_address_ = 0;
   Time fetch_begin_{};

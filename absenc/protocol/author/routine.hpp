@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Procedures as coroutines without a heap: each reads like its paragraph of the document. Their frames lie in storage
-// that the caller gives, one above the other.
+// Procedures as coroutines without a heap: each reads like its paragraph of the document. Coroutine frames are in
+// storage of the caller, one after the other.
 #pragma once
 
 #include <coroutine>
@@ -16,35 +16,36 @@
 #include "absenc/core/time.hpp"
 #include "absenc/protocol/conversation.hpp"
 
-// Without optimisation g++ 12 takes the frame's own operators for a pair that does not match, in every coroutine.
+// Without optimisation g++ 12 warns in every coroutine that the frame's own operators do not match.
 #pragma GCC diagnostic ignored "-Wmismatched-new-delete"
 
 namespace absenc::author {
 
-/// How a procedure ends.
+/// Result of a procedure.
 struct Outcome {
   Error error = Error::none;  ///< Why it ended; `Error::none`: well.
-  std::string_view detail{};  ///< which step failed, what was found
-  std::string_view advice{};  ///< what to do, in place of the error's own advice
-  Time hold{};                ///< so long after what was last sent or heard the encoder must not be disturbed
-  bool alone = false;         ///< these texts say all: what the document says of the last reply is not added
+  std::string_view detail{};  ///< which step failed, and the evidence
+  std::string_view advice{};  ///< what to try, instead of the error's own advice
+  Time hold{};                ///< how long the encoder must not be disturbed after the last sent or received character
+  bool alone = false;         ///< these texts replace all others: the explanation of the last reply is not added
 };
 
-/// `co_return done;`
+/// `co_return done;` ends a procedure without an error.
 inline constexpr Outcome done{};
 
-/// `co_return only(Error::timeout, "...")`: these words and no others.
+/// `co_return only(Error::timeout, "...")` ends a procedure with these texts and no others.
 [[nodiscard]] constexpr Outcome only(Error error, std::string_view detail, std::string_view advice = {}) {
   return {.error = error, .detail = detail, .advice = advice, .alone = true};
 }
 
-/// Runs one procedure and its parts; whoever carries it says what is awaited. Not to be copied: frames point to it.
+/// Runs one procedure and its parts; the subclass resumes it when an awaited result is there. Not copyable, because
+/// coroutine frames point to it.
 class Routine {
  public:
   Routine(const Routine&) = delete;
   Routine& operator=(const Routine&) = delete;
 
-  /// For the coroutines themselves: storage of a frame, null when it does not fit.
+  /// For coroutines: returns storage of a frame, null if it does not fit.
   [[nodiscard]] void* take(std::size_t size) {
     const std::size_t needed = (size + alignment - 1) / alignment * alignment;
     if (needed > arena_.size() - used_) return nullptr;
@@ -55,7 +56,7 @@ class Routine {
   }
   /// Releases the frame of the coroutine that ended last.
   void give_back(void* frame) { used_ = static_cast<std::size_t>(static_cast<std::byte*>(frame) - arena_.data()); }
-  /// For the coroutines themselves: `next` goes on when the present one suspends.
+  /// For coroutines: resumes `next` when the present one suspends.
   void go_on_with(std::coroutine_handle<> next) { next_ = next; }
   /// Ends the procedure with this outcome.
   void end_with(const Outcome& outcome) {
@@ -63,12 +64,12 @@ class Routine {
     current_ = nullptr;
     ended(outcome);
   }
-  /// Bytes of storage that its frames took at the most.
+  /// Returns the most bytes of storage that coroutine frames have taken.
   [[nodiscard]] std::size_t frames_size() const { return most_used_; }
 
-  /// Marks that requests from here on may change the encoder.
+  /// Marks that requests from now on may change the encoder.
   void changes() { change_ = ChangeSent::yes; }
-  /// The encoder is as it was before `changes`: it said so, or reading back shows it.
+  /// Marks that the encoder is as it was before `changes`: it refused the request, or reading back shows it.
   void refused() { change_ = ChangeSent::refused; }
   /// Returns whether a request that changes the encoder was sent.
   [[nodiscard]] ChangeSent change() const { return change_; }
@@ -90,10 +91,11 @@ class Routine {
   explicit Routine(std::span<std::byte> arena) : arena_(arena) {}
   ~Routine() = default;
 
-  /// The procedure, or the part of it that is running, has ended as a whole.
+  /// Handles the end of the whole procedure, also if a part of it ended it.
   virtual void ended(const Outcome& outcome) = 0;
 
-  /// What was awaited is there. Parts are resumed one after the other, not from within each other.
+  /// Resumes the coroutine whose awaited result is there. Parts are resumed one after the other, not from within each
+  /// other.
   void resume() {
     next_ = current_;
     while (next_) {
@@ -119,14 +121,14 @@ class Routine {
   std::coroutine_handle<> next_{};
 };
 
-/// What frames of procedures and parts have in common. The first parameter of the coroutine is what carries it.
+/// Base of the coroutine frames of procedures and parts. The first parameter of the coroutine is the Routine.
 struct FrameInRoutine {
   /// Allocates the frame in the arena of the routine; null: there is no room.
   template <class... Parameters>
   static void* operator new(std::size_t size, Routine& routine, const Parameters&...) noexcept {
     return routine.take(size);
   }
-  /// The storage is the caller's: a part gives its own back, that of the procedure goes with its owner.
+  /// The caller owns the storage: a part returns its own, and that of the procedure ends with its owner.
   static void operator delete(void*, std::size_t) {}
 
   /// Belongs to this routine.
@@ -141,7 +143,7 @@ struct FrameInRoutine {
   Routine& routine;  ///< The routine that runs this coroutine.
 };
 
-/// The result of a coroutine that is a whole command: `Procedure name(Dialog& dialog, Found& found, ...)`. Ends by
+/// Return type of a coroutine that is a whole command: `Procedure name(Dialog& dialog, Found& found, ...)`. It ends by
 /// `co_return done;` or `co_return {Error::..., "..."};`.
 struct Procedure {
   /// The interface that the compiler requires of a coroutine.
@@ -159,7 +161,8 @@ struct Procedure {
   std::coroutine_handle<> handle{};  ///< The coroutine; null: there was no room.
 };
 
-/// A part of a procedure, with a result: `const Reply reply = co_await look(dialog);`. At most one of a procedure runs.
+/// Return type of a part of a procedure, with a result: `const Reply reply = co_await look(dialog);`. At most one part
+/// of a procedure runs.
 template <class T>
 struct [[nodiscard]] Part {
   /// The interface that the compiler requires of a coroutine.
@@ -200,7 +203,7 @@ struct [[nodiscard]] Part {
     handle.promise().caller = caller;
     routine.go_on_with(handle);
   }
-  /// By value: a reference would point into the frame, which is given back here.
+  /// Returned by value: a reference would point into the frame, which is released here.
   T await_resume() {
     const T result = *handle.promise().result;
     Routine& routine = handle.promise().routine;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Who answers on a line: every address is asked.
+// Finds the encoders on a line by a request to every address.
 #pragma once
 
 #include <array>
@@ -13,11 +13,12 @@ namespace absenc::author {
 template <std::size_t addresses>
 struct Nodes {
   std::array<bool, addresses> there{};  ///< Whether an encoder answered, for each address.
-  std::array<bool, addresses> clash{};  ///< every answer was damaged: two encoders of one address, or a bad line
+  /// Every answer was damaged: two encoders share the address, or the line is bad.
+  std::array<bool, addresses> clash{};
 };
 
-/// `request_to(i)` asks the address of this index. Each that is not silent is asked twice: one answer may be noise.
-/// What answers at every address is no encoder.
+/// Requests every address; `request_to(i)` makes the request to address i. An address that is not silent is requested
+/// twice, because one answer may be noise. A device that answers at every address is no encoder.
 template <class P, std::size_t addresses, auto request_to>
 Procedure scan(DialogOf<P>& dialog, Nodes<addresses>& nodes) {
   constexpr unsigned most_in_a_row = 8;
@@ -33,7 +34,7 @@ Procedure scan(DialogOf<P>& dialog, Nodes<addresses>& nodes) {
     const Result<typename P::Reply> second = co_await dialog.attempt(request_to(i)).once();
     if (!first && !second && second.error() == Error::timeout) continue;
     nodes.there[i] = any = true;
-    // Two whole answers that are not good are those of one encoder.
+    // Two complete but invalid answers come from one encoder.
     nodes.clash[i] = !first && !second && (is_damage(first.error()) || is_damage(second.error()));
     if (++noise == most_in_a_row) {
       co_return {Error::wrong_length, "something comes back whatever address is asked: noise, or another device"};

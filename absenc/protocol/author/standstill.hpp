@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What counts as standing still, as an angle, and when a zero must not be set: each stated once.
+// Limits for standing still, as angles, and for setting a zero: each is stated once, here.
 #pragma once
 
 #include <algorithm>
@@ -11,14 +11,14 @@
 
 namespace absenc::author {
 
-/// Two looks at a shaft so far apart show whether it turns: at 0.33 rpm and more.
+/// Time between two positions that show whether the shaft turns: at 0.33 rpm and more.
 inline constexpr Time between_looks = std::chrono::milliseconds(10);
-/// What noise may make of it.
+/// Angle that noise may add to a standing position, in 1/1000 degree.
 inline constexpr std::uint32_t standstill_millidegrees = 20;
-/// How far from 0 a zero may be that was set, where the document does not say how exact it is.
+/// Largest distance from 0 after a zero was set, in 1/1000 degree, if the document states none.
 inline constexpr std::uint32_t zero_millidegrees = 350;
 
-/// This angle on a circle of 2^bits counts (1 to 64), one count at least.
+/// Returns this angle in counts of a circle with 2^bits counts (1 to 64), at least one count.
 [[nodiscard]] constexpr std::int64_t counts_of_angle(unsigned bits,
                                                      std::uint32_t millidegrees = standstill_millidegrees) {
   const unsigned more = bits > 40 ? bits - 40 : 0;
@@ -26,7 +26,7 @@ inline constexpr std::uint32_t zero_millidegrees = 350;
   return std::max<std::int64_t>(static_cast<std::int64_t>(counts), 1);
 }
 
-/// Whether two places on a circle of 2^bits counts (1 to 63) are no further apart than this angle, or one count.
+/// Returns whether two positions on a circle of 2^bits counts (1 to 63) differ by at most this angle, or one count.
 [[nodiscard]] constexpr bool is_near(std::uint64_t counts, std::uint64_t other, unsigned bits,
                                      std::uint32_t millidegrees = standstill_millidegrees) {
   const std::int64_t apart = wrapped_difference(counts, other, bits);
@@ -34,14 +34,14 @@ inline constexpr std::uint32_t zero_millidegrees = 350;
   return apart <= limit && -apart <= limit;
 }
 
-/// Why a command that needs the shaft to stand still must not be sent after these two looks, `between_looks` apart:
-/// not_still; no error: it may.
+/// Returns why a command that needs a standing shaft must not be sent after these two readings, taken `between_looks`
+/// apart: not_still; no error: it may be sent.
 [[nodiscard]] constexpr Outcome objection_to_moving(const Reading& first, const Reading& second) {
   if (is_near(second.singleturn, first.singleturn, second.singleturn_bits)) return {};
   return {Error::not_still, "nothing was changed"};
 }
 
-/// The same of a zero, which is wrong for ever where the position that it is made of does not hold: invalid_argument.
+/// Returns the same for setting a zero. If the position is invalid the zero would be wrong for ever: invalid_argument.
 [[nodiscard]] constexpr Outcome objection_to_zero(const Reading& first, const Reading& second) {
   for (const Reading& look : {first, second}) {
     if (!look.ready) {

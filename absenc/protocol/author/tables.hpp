@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the author of a unit declares, as the tables that its descriptor points to. Texts are read when it compiles.
+// Turns the declaration of a unit into the tables that its descriptor points to. Texts are parsed when the unit is
+// compiled.
 #pragma once
 
 #include <algorithm>
@@ -39,14 +40,14 @@ struct Tables {
     return most + declared.frames_size;
   }();
 
-  /// Index of the option with this name; the number of options when there is none.
+  /// Returns the index of the option with this name; the number of options if there is none.
   static constexpr std::size_t find_option(std::string_view name) {
     std::size_t i = 0;
     while (i < declared.options.size() && declared.options[i].name != name) ++i;
     return i;
   }
 
-  /// What texts say lies one behind the other, and no larger than if it were written by hand.
+  /// The parsed values are stored one after the other, in no more space than values written by hand.
   static constexpr Buffer<OptionValue, maximum_options> values_of(const ModelText& model) {
     Buffer<OptionValue, maximum_options> made;
     const bool good = for_each_value(model.values, [&](std::string_view name, std::string_view text) {
@@ -77,7 +78,8 @@ struct Tables {
       const ModelText& text = declared.models[i];
       const std::size_t size = values_of(text).size();
       made[i] = {text.name, text.meaning, text.maximum_rpm, {}};
-      if (size != 0) made[i].values = model_values.view().subspan(first, size);  // g++ 12 cannot view an empty one
+      // G++ 12 cannot make a view of an empty one.
+      if (size != 0) made[i].values = model_values.view().subspan(first, size);
       first += size;
     }
     return made;

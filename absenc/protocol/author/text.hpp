@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Vectors and models as an author writes them: as text, read when the unit is compiled.
+// Vectors and models as text, which is parsed when the unit is compiled.
 #pragma once
 
 #include <cstddef>
@@ -13,9 +13,8 @@
 
 namespace absenc::author {
 
-/// A frame with what it must decode to: `fields` is "name=value name=value", or the name of an error. A value is a
-/// whole number, a real one where it has a point, or a text. Frames are hexadecimal, or themselves where they are
-/// texts.
+/// A frame and its decoded fields: `fields` is "name=value name=value", or the name of an error. A value is an integer,
+/// a real number if it has a point, or a text. Frames are hexadecimal, or plain text if the unit's frames are texts.
 struct VectorText {
   std::string_view id;       ///< Identifier of the vector, unique within the unit.
   std::string_view meaning;  ///< What the vector shows, as a phrase.
@@ -26,19 +25,19 @@ struct VectorText {
   std::string_view fields;   ///< Wanted values as `name=value` separated by blanks, or the wanted error.
 };
 
-/// Not constexpr, and not defined: who calls one when compiling reads its name in the compiler's message.
+/// Neither constexpr nor defined: a call while compiling is an error whose message contains the function's name.
 void fields_of_a_vector_are_name_equals_value_or_the_name_of_an_error();
 /// Is never defined: its name is the error of the compiler.
 void a_frame_of_a_vector_is_hexadecimal_and_has_at_most_128_bytes();
 /// Is never defined: its name is the error of the compiler.
 void this_model_has_an_option_or_a_value_that_the_unit_does_not_have();
 
-/// Calls `take(name, value)` for each "name=value" of a text until it returns false; whether all were taken. A value
-/// may have spaces inside, but no equals sign.
+/// Calls `take(name, value)` for each "name=value" of a text until it returns false. Returns whether all were taken. A
+/// value may have spaces inside, but no equals sign.
 template <class Take>
 constexpr bool for_each_value(std::string_view text, Take&& take) {
   while (!text.empty()) {
-    const std::size_t equals = text.find('=');  // or behind every end
+    const std::size_t equals = text.find('=');  // npos for the last value
     const std::size_t next = text.find('=', equals + 1);
     const std::size_t end = next == std::string_view::npos ? text.size() : text.rfind(' ', next);
     if (end < equals || end > text.size()) return false;
@@ -48,7 +47,7 @@ constexpr bool for_each_value(std::string_view text, Take&& take) {
   return true;
 }
 
-/// A decimal number with a point.
+/// Parses a decimal number with a point.
 constexpr bool to_real(std::string_view text, double& number) {
   const bool negative = text.starts_with('-');
   if (negative) text.remove_prefix(1);
@@ -69,7 +68,7 @@ constexpr bool to_real(std::string_view text, double& number) {
   return true;
 }
 
-/// What a VectorText says, where a Vector can point to. When it says nothing that can be understood, it does not
+/// The parsed content of a VectorText, in storage that a Vector can point to. A text that cannot be parsed does not
 /// compile.
 struct VectorParts {
   constexpr VectorParts() = default;
@@ -112,7 +111,7 @@ struct VectorParts {
   }
 };
 
-/// The parts of all vectors of a unit, one behind the other.
+/// The parts of all vectors of a unit, one after the other.
 template <std::size_t byte_count, std::size_t field_count>
 struct AllParts {
   ByteBuffer<byte_count> bytes{};          ///< Bytes of all frames.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Makes the descriptor of a unit from what its author declares (declaration.hpp).
+// Makes the descriptor of a unit from its author's declaration (declaration.hpp).
 #pragma once
 
 #include <algorithm>
@@ -45,10 +45,10 @@ struct Descriptor {
   static_assert(Clocked<P> || declared.decode != nullptr || declared.report.put_request != nullptr,
                 "a report needs put_request");
 
-  /// Requests and replies of the protocol as it is; else the unit says itself what its frames are.
+  /// Requests and replies are those of the protocol; otherwise the declaration decodes frames itself.
   static constexpr bool has_requests = !Clocked<P> && declared.decode == nullptr;
 
-  // ---- The functions of the descriptor
+  // ---- Functions of the descriptor
 
   /// Returns the reply with all checks done, or the first error.
   static constexpr Error decode(const Options& values, Frame asked, Frame frame, FieldSink& sink) {
@@ -110,7 +110,7 @@ struct Descriptor {
   /// Returns the declared command.
   static constexpr const CommandOf<P>& find(const Command& command) { return declared.commands[command.id]; }
 
-  /// One for each that the command has, in its range.
+  /// Returns whether there is one argument for each of the command's, within its range.
   static constexpr bool are_good(const Command& command, Arguments arguments) {
     return std::equal(
         arguments.begin(), arguments.end(), command.arguments.begin(), command.arguments.end(),
@@ -162,7 +162,7 @@ struct Descriptor {
     if constexpr (declared.frame_end != nullptr) {
       return declared.frame_end(values, direction, bytes);
     } else if constexpr (Clocked<P>) {
-      return {FrameEnd::Kind::complete, bytes.size()};  // the pause of the clock ends a frame
+      return {FrameEnd::Kind::complete, bytes.size()};  // a pause of the clock ends a frame
     } else {
       if (bytes.empty()) return {FrameEnd::Kind::incomplete, 1};
       const std::size_t size =
@@ -208,7 +208,7 @@ struct Descriptor {
   /// Returns the settings of the line for options.
   static constexpr LineSettings settings(const Options& values) { return line_of(declared.format(values)); }
 
-  /// By the manner of its request.
+  /// The manner of the request decides.
   static bool is_answered(const Options& values, Frame asked) {
     const Format f = declared.format(values);
     const Result<Request> request = P::decode_request(f, asked.bytes);
@@ -223,7 +223,7 @@ struct Descriptor {
     return request ? P::manner(f, *request).pause : Time{};
   }
 
-  /// As the links of the protocol carry it.
+  /// Returns the items of a frame, as the protocol's link carries them.
   static constexpr std::span<const ItemOf<P>> items(const Frame& frame) {
     if constexpr (std::is_same_v<ItemOf<P>, CanFrame>) {
       return {frame.can, frame.can != nullptr ? 1u : 0u};
@@ -254,7 +254,7 @@ struct Descriptor {
     }
   }
 
-  /// Whether the text is understood, which comes over a model, which comes over the defaults.
+  /// Applies defaults, then the model, then the text. Returns whether the text was understood.
   static constexpr bool resolve(std::string_view text, std::span<const OptionValue> model, Options& values) {
     for (std::size_t i = 0; i < declared.options.size(); ++i) {
       values.values[i] = declared.options[i].default_value;
@@ -278,7 +278,7 @@ struct Descriptor {
   static constexpr bool holds(const Vector& vector) {
     Options values;
     bool known = resolve(vector.options, {}, values);
-    // The first model that agrees with what is said, as resolve_options has it.
+    // The first model that agrees with the text is used, as by resolve_options.
     for (const Model& model : Made::models) {
       Options of_model;
       known = known && resolve(vector.options, model.values, of_model);

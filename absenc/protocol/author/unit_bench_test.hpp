@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// For the tests of units of characters: the virtual encoder and the unit's commands on one line in virtual time.
+// For the tests of units on lines of characters: the virtual encoder and the unit's commands on one line in virtual
+// time.
 #pragma once
 
 #include <functional>
@@ -25,7 +26,7 @@ using Numbers = std::map<std::string, std::int64_t>;
 
 inline Wire wire(Bytes bytes) { return {bytes.begin(), bytes.end()}; }
 
-/// How a command ended, and what it told: real numbers rounded among the numbers.
+/// Result and fields of a command. Real numbers are rounded and stored with the numbers.
 struct Told : FieldSink {
   void put(const FieldValue& value) override {
     const std::string name(value.info->name);
@@ -50,15 +51,15 @@ struct Told : FieldSink {
   std::optional<Reading> reading;
   Numbers numbers;
   std::map<std::string, std::string> texts;
-  Wire sent;  // in the last exchange
+  Wire sent;  // request of the last exchange
   Time received_at{};
   bool finished = false;
   unsigned emits = 0;
-  std::uint64_t frames = 0;  // that the encoder answered
+  std::uint64_t frames = 0;  // number of frames that the encoder answered
   Time took{};
 };
 
-/// "name=value name=value".
+/// Returns the options of a text "name=value name=value".
 inline Options options_of(const Unit& unit, std::string_view text) {
   std::vector<OptionText> settings;
   for_each_value(text, [&settings](std::string_view name, std::string_view value) {
@@ -71,7 +72,7 @@ inline Options options_of(const Unit& unit, std::string_view text) {
   return options;
 }
 
-/// The same of a format whose members are the options.
+/// Returns the options of a format whose members they are.
 template <class Declared, class Format>
 requires requires(const Declared& declared) { declared.infos; }
 Options options_of(const Declared& declared, const Format& format) {
@@ -80,7 +81,7 @@ Options options_of(const Declared& declared, const Format& format) {
   return options;
 }
 
-/// Rules that a virtual encoder saw broken, one after the other.
+/// Rules that a virtual encoder reports as broken, in order.
 struct BrokenRules final : RuleWatch {
   void looked(std::string_view rule, bool kept) override {
     if (!kept) rules.emplace_back(rule);
@@ -88,7 +89,7 @@ struct BrokenRules final : RuleWatch {
   std::vector<std::string> rules;
 };
 
-/// A command of a unit; the last arguments may be left out.
+/// A conversation for a command of a unit; trailing arguments may be left out.
 template <class Item>
 class Talk {
  public:
@@ -108,10 +109,10 @@ class Talk {
   Conversation<Item>* made_ = nullptr;
 };
 
-/// Changes what the n-th time (from 0) comes or goes; of what is sent nothing left: it is lost.
+/// Changes the n-th frame (from 0) that is received or sent. A sent frame without bytes is lost.
 using Tamper = std::function<void(unsigned nth, Wire& bytes)>;
 
-/// Changes what the encoder hears and what it sends; by default nothing.
+/// Changes the frames that the encoder receives and sends; by default none.
 class Tampered final : public Machine<std::uint8_t> {
  public:
   explicit Tampered(Machine<std::uint8_t>& encoder) : encoder_(encoder) {}
@@ -134,7 +135,7 @@ class Tampered final : public Machine<std::uint8_t> {
       replies_.tamper(replies_.count++, out_);
       step.out = out_;
       if (!out_.empty()) return step;
-      encoder_.feed({.kind = Event<std::uint8_t>::Kind::sent, .at = now});  // nothing comes out
+      encoder_.feed({.kind = Event<std::uint8_t>::Kind::sent, .at = now});  // the frame is lost
     }
   }
 
@@ -149,7 +150,7 @@ class Tampered final : public Machine<std::uint8_t> {
   Wire out_;
 };
 
-/// A line with one host at a time, and nobody in its place in between.
+/// A line with one host at a time, and silence without one.
 struct HostedLine : sim::Line<std::uint8_t> {
   HostedLine(LinkKind kind, const LineSettings& settings) : Line(kind, settings) {}
 
@@ -157,11 +158,11 @@ struct HostedLine : sim::Line<std::uint8_t> {
     if (node) return replace(*node, host);
     node = attach(sim::Role::host, host, [this] { return !on_emit || on_emit(); });
   }
-  /// Whether it came to its end.
+  /// Runs a host and returns whether it came to its end.
   bool converse(Machine<std::uint8_t>& host) {
     put_on(host);
     const bool ended = run(*node, now() + 60s);
-    run_until(now());  // the device's own `sent` is at the same time
+    run_until(now());  // the device's own `sent` event has the same time
     replace(*node, idle);
     return ended;
   }
@@ -186,8 +187,8 @@ struct UnitBench {
     line.attach(sim::Role::device, tampered);
   }
 
-  /// A command of the unit to its end, told what `options` say; one that asks without end to its first result.
-  /// `on_emit` is called at every emit.
+  /// Runs a command of the unit to its end with these `options`, one that streams to its first result. `on_emit` is
+  /// called at every emit.
   Told run(std::string_view name, const std::vector<std::int64_t>& arguments = {}, const OnEmit& on_emit = {}) {
     const Talk<std::uint8_t> talk(unit, options, name, arguments);
     return run(*talk, on_emit);
@@ -208,13 +209,13 @@ struct UnitBench {
     told.took = line.now() - begin;
     return told;
   }
-  /// One that streams: `go_on()` is called for each of its results.
+  /// Runs a conversation that streams; `go_on()` is called for each result and returns whether to continue.
   void listen(Conversation<std::uint8_t>& conversation, const std::function<bool()>& go_on) {
     line.on_emit = go_on;
     line.converse(conversation);
     line.on_emit = {};
   }
-  /// These bytes, at once; and what comes back until the line is silent.
+  /// Sends these bytes at once. Returns the host, which has all bytes received until the line is silent.
   sim::testing::RawHost raw(Wire request, Time answer = 50ms, Time gap = 5ms) {
     sim::testing::RawHost host(std::move(request), answer, gap, line.now());
     line.converse(host);

@@ -72,12 +72,12 @@ TEST(EslBus, AScanFindsWhoAnswersAndWhatIsDamaged) {
         EXPECT_EQ(encoder->violation_count(), 0u);
       }
       EXPECT_EQ(encoder->answer_count(),
-                clashes.empty() || encoder == bus.encoders[0] ? 1u : 3u);  // ID 5 and never ID 8
+                clashes.empty() || encoder == bus.encoders[0] ? 1u : 3u);  // ID 5 is sent, never ID 8
     }
   }
 }
 
-// "disconnect one" is bad advice where there is only one: its answer is whole.
+// A complete answer comes from one encoder, so "disconnect one" would be bad advice.
 TEST(EslBus, ARefusalIsNoClash) {
   struct Scan final : FieldSink {
     void put(const FieldValue& value) override {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the document demands of the encoder, with the place that says so.
+// Demands of the document on encoder and host, with their paragraphs.
 #pragma once
 
 #include <array>
@@ -12,7 +12,7 @@ namespace absenc::esl {
 // ---- Requests that no host sends
 
 namespace request {
-// A command frame of this address, and its CRC where requests have one.
+// Writes a command frame with this control field, and its CRC if requests have one.
 inline Result<std::size_t> seal(const Profile& profile, std::uint8_t field, MutableBytes request) {
   const std::size_t size = request_length(profile, DataId::position);
   if (request.size() < size) return Error::buffer_too_small;
@@ -20,20 +20,20 @@ inline Result<std::size_t> seal(const Profile& profile, std::uint8_t field, Muta
   if (size > 1) request[1] = checksum8(profile.crc_bit_order, Bytes(request).first(1));
   return size;
 }
-// Only the parity is wrong.
+// A request whose parity bit alone is wrong.
 inline Result<std::size_t> wrong_parity(const Options& values, MutableBytes request) {
   const Profile profile = options.format(values);
   const std::uint8_t good = control_field(profile, profile.address, DataId::position);
   return seal(profile, static_cast<std::uint8_t>(good ^ 0x80U), request);
 }
-// Table 3 has no ID 3; its parity is right.
+// A request with ID 3, which Table 3 does not list; its parity is right.
 inline Result<std::size_t> unknown_id(const Options& values, MutableBytes request) {
   const Profile profile = options.format(values);
   return seal(profile, control_field(profile, profile.address, DataId{3}), request);
 }
 }  // namespace request
 
-/// Table 8: the others need more than command C. Of both channels.
+/// Alarms that command C clears, in both channels. Table 8: the others need more.
 inline constexpr std::int64_t cleared_by_c = alarms::xc_error | alarms::xc_error << 8;
 
 /// Clauses of the document for the encoder.
@@ -107,7 +107,7 @@ inline constexpr auto clauses = std::array{
            .verb = Verb::reset_multiturn},
 };
 
-// ---- What hosts do that break a clause, or are about one
+// ---- Steps of hosts that break a clause, or show its case
 
 namespace script {
 using std::chrono::microseconds;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A virtual QS35: answers as the ESL document says, computes both channels independently, and lists the rules its host
-// breaks. Several of them share a line.
+// A virtual QS35: answers as the ESL document states, computes both channels independently, and lists the rules that
+// its host breaks. Several of them share a line.
 #pragma once
 
 #include <array>
@@ -12,8 +12,8 @@
 
 namespace absenc::esl {
 
-/// What can be set around the virtual encoder, and what can be wrong inside one channel, whose CRC is right all the
-/// same. Indexes of `conditions`.
+/// Conditions of the virtual encoder: its environment, and faults inside one channel, whose CRC is still right. Indexes
+/// of `conditions`.
 namespace condition {
 /// Index of a condition.
 enum Index : std::size_t {
@@ -23,7 +23,7 @@ enum Index : std::size_t {
   lissajous,
   id_d_clears_singleturn,
   redundant_offset,
-  ch1_stuck,  ///< of channel 2 what follows each
+  ch1_stuck,  ///< channel 2's condition follows channel 1's
   ch2_stuck,
   ch1_sequence,
   ch2_sequence,
@@ -77,7 +77,7 @@ inline constexpr author::PagedMemory paged_memory{
 /// A virtual encoder.
 class VirtualEncoder final : public author::PagedMemoryDevice {
  public:
-  /// Switched off until `power_on`. `shaft` must outlive the encoder.
+  /// Constructs an encoder that is off until `power_on`. `shaft` must outlive it.
   VirtualEncoder(const Profile& profile, const Shaft& shaft)
       : PagedMemoryDevice({.character = line_settings.character(), .answer_time = answer_time}, paged_memory),
         profile_(profile),
@@ -106,7 +106,7 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
     latches_ &= static_cast<std::uint8_t>(~bits);
     forced_ &= static_cast<std::uint8_t>(~bits);
   }
-  /// What a reply to `id` would say now.
+  /// Returns the reply to `id` at this time.
   [[nodiscard]] Reply reply_to(DataId id, Time now) const {
     Reply reply{.id = id, .encoder_address = profile_.address};
     reply.one = channel_now(Channel::one, now);
@@ -120,7 +120,7 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
     reply.temperature = static_cast<std::int8_t>(value_of(condition::temperature));
     return reply;
   }
-  /// It answers from the first moment on: SF tells when it is ready.
+  /// It answers from power on; SF reports when it is ready.
   void power_on(Time now, PowerOn kind) override {
     ready_at_ = kind == PowerOn::real ? now + start_up : now;
     Responder::power_on(now, kind);
@@ -130,29 +130,30 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
   static constexpr std::int32_t overspeed_above = 10'000'000;  // 1/1000 rpm (Table 8)
   static constexpr std::int32_t under_voltage_below = 2900;    // mV, typical
   static constexpr std::int32_t over_voltage_above = 3700;
-  static constexpr std::int32_t standing_still = 1'000;  // 1/1000 rpm: what a servo at rest may tremble
-  static constexpr std::int32_t warning_above = 105;     // degC: the document gives no limit
-  static constexpr Time start_up = 100ms;                // until ready; the document gives none
-  static constexpr Time reset_interval_least = 35us;     // "typical 40 us": what is surely too fast
+  static constexpr std::int32_t standing_still = 1'000;  // 1/1000 rpm: trembling of a servo at rest
+  static constexpr std::int32_t warning_above = 105;     // degC; assumed, because the document states no limit
+  static constexpr Time start_up = 100ms;                // from power on to `ready`; the document states none
+  // The document: "typical 40 us"; less than this is surely too fast.
+  static constexpr Time reset_interval_least = 35us;
 
   static constexpr std::string_view eight_rule = "reset not sent eight times in a row";
 
   static constexpr std::int32_t magnitude(std::int32_t value) { return value < 0 ? -value : value; }
   static constexpr std::uint32_t counts_of(std::int64_t position) { return static_cast<std::uint32_t>(position) >> 8; }
 
-  // Behind the EEPROM and the MTP: the zeros of the channels, 4 bytes each, little endian, and what is taken off the
-  // turns of the shaft, 8 bytes.
+  // After the EEPROM and the MTP: the zeros of the channels, 4 bytes each, little endian, and the turns subtracted from
+  // those of the shaft, 8 bytes.
   static constexpr std::size_t zero_at = stored_bytes;
   static constexpr std::size_t turns_at = zero_at + 8;
 
   // ---- Requests
 
   [[nodiscard]] bool is_own(Bytes begin) const { return address_of(begin[0]) == profile_.address; }
-  // A request without a CRC has none that could be wrong.
+  // A request without a CRC cannot have a wrong one.
   [[nodiscard]] bool has_wrong_checksum(Bytes request) const {
     return request.size() > 1 && !has_checksum8(profile_, request);
   }
-  // Whether one of its own ends here.
+  // Returns whether a request for this encoder ends here.
   [[nodiscard]] bool holds_own_request(Bytes heard) const {
     for (std::size_t begin = 1; begin < heard.size(); ++begin) {
       const Bytes rest = heard.subspan(begin);
@@ -161,8 +162,9 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
     }
     return false;
   }
-  // Whatever its parity bit: a wrong one is reported. "Else, it will continue to search for the next available logic of
-  // low state": behind what begins a request of another address, and behind a wrong CRC.
+  // The parity bit is ignored here: a wrong one is reported. "Else, it will continue to search for the next available
+  // logic of low state": the search continues after the first bytes of a request for another address, and after a wrong
+  // CRC.
   [[nodiscard]] std::size_t request_size(Bytes begin) const override {
     const std::optional<DataId> id = data_id(begin[0]);
     if (!id) return 0;
@@ -202,11 +204,12 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
   void refuse(Time at, ByteBuffer<64>& reply) override {
     report_bad_request(refused_field_, status::stop_error, at, reply);
   }
-  // Table 5 reports it in SF, the overview wants no answer; a memory reply has no SF.
+  // Returns whether a wrong request is reported: Table 5 reports it in SF, the overview demands silence. A memory reply
+  // has no SF.
   [[nodiscard]] bool is_reported(std::uint8_t field) const {
     return profile_.bad_request == BadRequest::report && !is_memory_access(*data_id(field));
   }
-  // CF is echoed as it came.
+  // CF is echoed as received.
   Answer report_bad_request(std::uint8_t field, std::uint8_t status_bit, Time at, ByteBuffer<64>& reply) {
     if (!is_reported(field)) return Answer::for_others;
     const DataId id = *data_id(field);
@@ -216,7 +219,7 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
     reply.append(encode_reply(profile_, report, field));
     return Answer::sent;
   }
-  // What is sent too fast does not count, but was sent.
+  // A request that was sent too fast does not count for the reset, but it was sent.
   void end_resets() {
     if (resets_sent_ > 0 && resets_sent_ < reset_requests) note(false, eight_rule);
     resets_sent_ = 0;
@@ -239,7 +242,7 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
       for (std::uint8_t& counter : counters_) ++counter;
     }
   }
-  // That there is no such address is not acknowledged: the document does not say it.
+  // An address that does not exist gets no answer, because the document defines none.
   std::optional<Reply> access_memory(const Request& request, Time at) {
     if (!expect(profile_.bus != sharing_yes, "memory access with several encoders on the line", at))
       return std::nullopt;
@@ -275,7 +278,7 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
     }
     const std::uint16_t turns_before = turns(at);
     if (id == DataId::zero || value_of(condition::id_d_clears_singleturn) != 0) {
-      // Each channel takes its own measurement as its zero.
+      // Each channel stores its own measurement as its zero.
       for (const std::size_t to : {zero_at, zero_at + 4}) {
         store_little_endian(MutableBytes(memory_).subspan(to, 4), counts_of(shaft_->at(at).position));
       }
@@ -291,13 +294,13 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
     const std::size_t at = channel == Channel::one ? zero_at : zero_at + 4;
     return static_cast<std::uint32_t>(load_little_endian(Bytes(memory_).subspan(at, 4)));
   }
-  // Each channel from its own sight of the shaft and its own zero.
+  // Each channel measures the shaft itself and has its own zero.
   [[nodiscard]] std::uint32_t singleturn(Channel channel, Time now) const {
     const std::int32_t stuck = value_of(condition::ch1_stuck, channel);
     const std::uint32_t seen = counts_of(shaft_->at(now).position) - zero(channel);
     return (stuck >= 0 ? static_cast<std::uint32_t>(stuck) : seen) & 0xFFFFFF;
   }
-  // Turns change where the zeroed position wraps.
+  // The turns change where the position, counted from the zero, wraps.
   [[nodiscard]] std::uint64_t shaft_turns(Time now) const {
     return static_cast<std::uint64_t>((shaft_->at(now).position - (std::int64_t{zero(Channel::one)} << 8)) >> 32);
   }
@@ -348,11 +351,11 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
     counters_.fill(0);
   }
   void stopped(Time) override {
-    latches_ &= alarms::turns_wrong;  // the others need a power cycle; these an ID C
+    latches_ &= alarms::turns_wrong;  // other alarms end with the power, these with an ID C
     turns_cleared_ = false;
     in_a_row_ = resets_sent_ = 0;
   }
-  // Of channel 2 the one behind that of channel 1.
+  // Channel 2's condition follows channel 1's.
   [[nodiscard]] std::int32_t value_of(std::size_t index, Channel channel = Channel::one) const {
     return condition_[index + (channel == Channel::two ? 1 : 0)];
   }
@@ -365,15 +368,15 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
 
   Time ready_at_{};
   std::uint8_t latches_ = 0;
-  std::uint8_t forced_ = 0;     // voltage alarms raised from outside
-  bool turns_cleared_ = false;  // ID D was done: ID C may clear multiturn_error
+  std::uint8_t forced_ = 0;     // voltage alarms that tests and users raised
+  bool turns_cleared_ = false;  // an ID D was executed: an ID C may clear multiturn_error
   std::array<std::uint8_t, 2> counters_{};
 
   DataId last_id_{};
-  unsigned in_a_row_ = 0;           // requests of `last_id_`
-  unsigned resets_sent_ = 0;        // of `last_id_`
+  unsigned in_a_row_ = 0;           // consecutive requests with `last_id_`
+  unsigned resets_sent_ = 0;        // resets sent with `last_id_`
   std::uint8_t refused_field_ = 0;  // CF of a damaged request
-  std::uint8_t others_field_ = 0;   // CF of the last request: the reply to it begins alike
+  std::uint8_t others_field_ = 0;   // CF of the last request: the reply to it begins with the same byte
   Time last_reset_{};
 };
 

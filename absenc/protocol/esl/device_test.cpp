@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The virtual QS35 against its document, asked by hand-made bytes.
+// The virtual QS35 against its document, with requests written as bytes.
 #include "absenc/protocol/esl/device.hpp"
 
 #include <gtest/gtest.h>
@@ -38,7 +38,7 @@ TEST(EslDevice, AnswersTwoMicrosecondsAfterTheRequest) {
   EXPECT_EQ(host.reply.size(), 18u);
 }
 
-// Only IDs 1, 2, 8 and B count, unless the profile says that every request does.
+// Only IDs 1, 2, 8 and B count, unless the profile says that every request counts.
 TEST(EslDevice, SequenceCounters) {
   Bench bench;
   EXPECT_EQ(bench.read(DataId::position).one.sequence, 1);
@@ -51,17 +51,17 @@ TEST(EslDevice, SequenceCounters) {
   each.raw(Request{DataId::temperature});
   EXPECT_EQ(each.read(DataId::position).one.sequence, 2);
   for (unsigned i = 2; i < 256; ++i) bench.read(DataId::position);
-  EXPECT_EQ(bench.read(DataId::position).one.sequence, 1);  // 8 bits and 7 bits
+  EXPECT_EQ(bench.read(DataId::position).one.sequence, 1);  // SC1 has 8 bits, SC2 7 bits
   EXPECT_EQ(bench.read(DataId::position).two.sequence, 2);
 }
 
 TEST(EslDevice, WhatIsNotForItIsNotAnswered) {
   Bench bench;
-  EXPECT_TRUE(bench.raw(wire(hex<"0874">)).empty());               // CRC
+  EXPECT_TRUE(bench.raw(wire(hex<"0874">)).empty());               // wrong CRC
   EXPECT_TRUE(bench.raw(wire_of({DataId::position, 3})).empty());  // another address
-  EXPECT_TRUE(bench.raw(wire(hex<"18">)).empty());                 // no such id
-  EXPECT_TRUE(bench.raw(wire(hex<"08">)).empty());                 // cut short
-  EXPECT_EQ(bench.raw(wire(hex<"0875">)).size(), 18u);             // and it is ready for the next
+  EXPECT_TRUE(bench.raw(wire(hex<"18">)).empty());                 // unknown id
+  EXPECT_TRUE(bench.raw(wire(hex<"08">)).empty());                 // incomplete
+  EXPECT_EQ(bench.raw(wire(hex<"0875">)).size(), 18u);             // the next request is answered
   EXPECT_TRUE(bench.raw(memory_write(page_select_address, 7)).empty());
   EXPECT_TRUE(bench.raw(memory_read(0x30)).empty());  // page 8 ends at 2F
   EXPECT_EQ(bench.encoder.answer_count(), 1u);
@@ -80,7 +80,7 @@ TEST(EslDevice, FindsARequestBehindBytesThatBeginNoneOfItsOwn) {
   }
 }
 
-// It looks like a request, but stands in the reply of another encoder.
+// The bytes look like a request, but are part of another encoder's reply.
 TEST(EslDevice, FindsNoRequestInAReplyToAnotherEncoder) {
   Bench bench;
   const Wire reply = wire({.id = DataId::position_short,
@@ -113,7 +113,7 @@ TEST(EslDevice, AWrongParityBitIsReportedOrNotAtEveryAddress) {
   }
 }
 
-// An encoder without a line: what happens to it by hand.
+// A virtual encoder without a line: the test feeds its events.
 struct Alone {
   using LinkEvent = Event<std::uint8_t>::Kind;
   Alone() { encoder.power_on(Time{}, PowerOn::skip); }
@@ -126,7 +126,7 @@ struct Alone {
 };
 constexpr auto waits = Step<std::uint8_t>::Kind::wait;
 
-// A request of three characters, the second of them damaged: the answer waits for the end of the frame set.
+// The second of three characters of a request is damaged: the answer follows the end of the frame set.
 TEST(EslDevice, AWrongStopBitIsReportedWhenTheHostHasEnded) {
   Alone alone;
   alone.feed(Alone::LinkEvent::received, 1us, {control_field({}, 0, DataId::position)});
@@ -151,7 +151,7 @@ TEST(EslDevice, AnyPauseEndsWhatAnAbsentEncoderWasAskedAndNothingIsSentWhenOff) 
   EXPECT_EQ(alone.encoder.next(10us).kind, waits);
 }
 
-// So that the eighth reset after it is the first of eight.
+// The eighth reset after a bad request counts as the first of eight.
 TEST(EslDevice, ABadRequestStartsTheCountAgain) {
   for (const auto kind : {Alone::LinkEvent::received, Alone::LinkEvent::line_error}) {
     Alone alone;
@@ -201,7 +201,7 @@ TEST(EslDevice, ReadyOnlyAfterStartUp) {
 // ---- Memory
 
 TEST(EslDevice, RegistersAtOnceTheEepromInTwoSteps) {
-  Bench bench;  // page 8 after power on
+  Bench bench;  // page 8 is selected after power on
   bench.raw(memory_write(0x05, 0x11));
   EXPECT_EQ(bench.raw(memory_read(0x05)), memory_reply(memory_read(0x05), false, 0x11));
   bench.raw(memory_write(page_select_address, 0));
@@ -215,7 +215,7 @@ TEST(EslDevice, RegistersAtOnceTheEepromInTwoSteps) {
   EXPECT_EQ(bench.raw(memory_read(5)), memory_reply(memory_read(5), true, 0));
   bench.pass(200us);
   EXPECT_EQ(bench.raw(memory_read(5)), memory_reply(memory_read(5), false, 0x77));
-  EXPECT_EQ(*bench.encoder.stored(0, 6), 0);  // was not executed
+  EXPECT_EQ(*bench.encoder.stored(0, 6), 0);  // the write was not executed
   EXPECT_EQ(bench.encoder.memory_version(), 1u);
   EXPECT_EQ(bench.violations(), 0u);
   bench.raw(memory_read(7));
@@ -224,7 +224,7 @@ TEST(EslDevice, RegistersAtOnceTheEepromInTwoSteps) {
   ASSERT_EQ(bench.violations(), 1u);
   EXPECT_EQ(bench.encoder.violations()[0].rule, "memory read again less than 200 us after the request before");
   bench.pass(eeprom_read_time);
-  EXPECT_EQ(bench.raw(memory_read(5)), memory_reply(memory_read(5), true, 0));  // what was fetched is another byte
+  EXPECT_EQ(bench.raw(memory_read(5)), memory_reply(memory_read(5), true, 0));  // another byte was fetched
 }
 
 TEST(EslDevice, APageChangeTakes18Milliseconds) {
@@ -238,7 +238,7 @@ TEST(EslDevice, APageChangeTakes18Milliseconds) {
   EXPECT_EQ(bench.raw(memory_read(page_select_address)), memory_reply(memory_read(page_select_address), false, 4));
 }
 
-// What is no violation, but told to who watches.
+// Breaches that are no violations, but are reported to the watch.
 TEST(EslDevice, TellsWhatAHostLeavesUndone) {
   using Rules = std::vector<std::string>;
   const std::string once = "an EEPROM byte asked for only once";
@@ -267,7 +267,7 @@ TEST(EslDevice, TellsWhatAHostLeavesUndone) {
   EXPECT_EQ(broken.rules, Rules{"reset not sent eight times in a row"});
 }
 
-// Heard so late, a request may have come so much earlier: its host need not wait again.
+// A request that is delivered late may have arrived earlier, so its host need not wait longer.
 TEST(EslDevice, ItsTimesBeginWhenARequestMayHaveCome) {
   const auto rules = [](const Request& first, const Request& second, Time apart, Time late) {
     Alone alone;
@@ -298,7 +298,7 @@ TEST(EslDevice, MemorySurvivesPowerOffAndRegistersDoNot) {
   EXPECT_EQ(*bench.encoder.stored(6, 0x0B), 0x33);
 }
 
-// Every byte of Table 11 is a byte of its own.
+// Every byte of Table 11 has storage of its own.
 TEST(EslDevice, NoTwoAddressesShareAByte) {
   Bench bench;
   std::map<std::uint8_t*, int> seen;
@@ -346,7 +346,7 @@ TEST(EslDevice, WhatClearsWhichAlarm) {
   }
 }
 
-// Table 8: "perform MT counter reset and all error clear", of this error, not of one long ago.
+// Table 8: "perform MT counter reset and all error clear": a reset before the error does not count.
 TEST(EslDevice, CClearsAMultiturnErrorOnlyIfTheTurnsWereClearedSince) {
   Bench bench;
   reset(bench, DataId::reset_multiturn);
@@ -356,7 +356,7 @@ TEST(EslDevice, CClearsAMultiturnErrorOnlyIfTheTurnsWereClearedSince) {
   EXPECT_EQ(bench.read().one.alarms, alarms::multiturn_error);
   reset(bench, DataId::reset_multiturn);
   bench.pass(10ms);
-  bench.encoder.raise_alarms(alarms::multiturn_error);  // it is there already
+  bench.encoder.raise_alarms(alarms::multiturn_error);  // the alarm is raised already
   reset(bench, DataId::clear_alarms);
   EXPECT_EQ(bench.read().one.alarms, 0);
 }
@@ -437,7 +437,7 @@ TEST(EslDevice, FaultsStayInTheirChannel) {
   EXPECT_EQ(reply.redundant, 0u);
 }
 
-// Of a request with a damaged character it answers its own alone, and one of which nothing was understood not at all.
+// A damaged request is answered only if it is for this encoder; one without any valid character never is.
 TEST(EslDevice, ADamagedRequestOfAnotherIsNone) {
   using Kind = Event<std::uint8_t>::Kind;
   for (const auto& [begun, is_answered] :

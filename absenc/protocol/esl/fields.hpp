@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Names, units and meanings of everything in an ESL frame, in words for the person in front of the machine.
+// Names, units and meanings of all values in an ESL frame, in words for the operator.
 #pragma once
 
 #include <array>
@@ -11,7 +11,7 @@
 
 namespace absenc::esl {
 
-/// Table 5
+/// Flags of SF (Table 5).
 inline constexpr std::array<FlagInfo, 8> status_flags{{
     {"parity_error", "the encoder received the request with a wrong parity bit and did not execute it",
      "send the same request again; if it stays, set parity_scope"},
@@ -28,7 +28,7 @@ inline constexpr std::array<FlagInfo, 8> status_flags{{
     {"forced_test_passed", "the forced test has passed", ""},
 }};
 
-/// Tables 7 and 8
+/// Flags of ALM (Tables 7 and 8).
 inline constexpr std::array<FlagInfo, 8> alarm_flags{{
     {"xc_error", "the turn counter missed five times in a row: turns may be wrong",
      "return to the origin, then `absenc clear-alarms`, and check the turns"},
@@ -47,7 +47,7 @@ inline constexpr std::array<FlagInfo, 8> alarm_flags{{
      "check that no more than 5 V are at the connector; it clears with the voltage, or the encoder is damaged"},
 }};
 
-/// What is shown of a frame, or of what a procedure found: each where it is there, of a reply what its id carries.
+/// Values of a frame, or of a procedure's result. An optional has a value if the frame carries it.
 struct Shown {
   constexpr Shown() = default;
   /// Shows a request.
@@ -88,11 +88,11 @@ struct Shown {
   std::optional<bool> lissajous_error{};           ///< Value of the field `lissajous_error`, if there is one.
   std::optional<std::uint32_t> safe_singleturn{};  ///< Value of the field `safe_singleturn`, if there is one.
   std::optional<std::uint8_t> page_left{};         ///< Value of the field `page_left`, if there is one.
-  bool has_turns = true;                           ///< false: what stands in ABM is no part of the position
+  bool has_turns = true;                           ///< false: ABM is no part of the position
 };
 
 namespace detail {
-// What stands in this part of a reply, where its id carries it in that channel.
+// Returns a member of the reply, if its id carries this part in this channel.
 template <Channel channel, unsigned part, auto member>
 constexpr auto in(const Shown& all) {
   const Reply reply = all.reply.value_or(Reply{});
@@ -107,7 +107,7 @@ constexpr auto in(const Shown& all) {
 constexpr std::optional<std::uint16_t> turns_in(const Shown& all) {
   return all.has_turns ? in<Channel::one, part::multiturn, &Reply::multiturn>(all) : std::nullopt;
 }
-// Bits of ENID, which is the same in both channels.
+// Returns bits of ENID, which is the same in both channels.
 template <unsigned shift, unsigned mask>
 constexpr std::optional<unsigned> of_encoder_id(const Shown& all) {
   const auto id = in<Channel::one, part::encoder_id, &ChannelReply::encoder_id>(all);
@@ -165,12 +165,12 @@ inline constexpr auto fields = [] {
 }();
 
 namespace detail {
-// Where this part, whose first byte is `here`, has the field.
+// Returns the bits of the field in this part, whose first byte is `here`.
 template <Channel channel, unsigned id>
 constexpr BitRanges place_in_part(const Profile& profile, std::size_t here, const FieldInfo& field) {
   using author::bits_of;
   const auto is = [&field](const FieldInfo* one) { return one == &field; };
-  // RS: its low bit in the second byte, the others in the first.
+  // RS: its lowest bit is in the second byte, the others are in the first.
   const auto redundant = [here](RedundantBit low) {
     BitRanges ranges = bits_of(here + 1, low == RedundantBit::b7 ? 7 : 0, 1);
     ranges.push_back({8 * here, 8});
@@ -242,7 +242,7 @@ constexpr BitRanges place_in(const Profile& profile, unsigned parts, std::size_t
 }
 }  // namespace detail
 
-/// Where a good reply has a field that it carries.
+/// Returns the bits of a field in a valid reply that carries it.
 [[nodiscard]] constexpr BitRanges place_of(const Profile& profile, Bytes reply, const FieldInfo& field) {
   if (&field == fields.of<&Shown::encoder_address>()) return author::bits_of(0, 0, 3);
   if (&field == fields.of<&Shown::data_id>()) return author::bits_of(0, 3, 4);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// QS35 ESL frames (RS-485, 10 Mbps, 8N1, LSB first): what they are made of, and how they are encoded. reply.hpp
-// decodes. Table numbers are those of the ESL Protocol Specification, rev 1.5; README.md draws the frames.
+// QS35 ESL frames (RS-485, 10 Mbps, 8N1, LSB first): their parts, and encoding them. reply.hpp decodes them. Table
+// numbers are those of the ESL Protocol Specification, rev 1.5; README.md draws the frames.
 #pragma once
 
 #include <array>
@@ -17,7 +17,7 @@
 
 namespace absenc::esl {
 
-/// Bits of SF in the order of the document (Table 5); `status_order` tells how the wire has them.
+/// Bits of SF in the order of the document (Table 5); `status_order` gives their order on the wire.
 namespace status {
 inline constexpr std::uint8_t parity_error = 0x01;                   ///< Status: parity error.
 inline constexpr std::uint8_t stop_error = 0x02;                     ///< Status: stop error.
@@ -42,7 +42,7 @@ inline constexpr std::uint8_t under_voltage = 0x40;                      ///< Al
 inline constexpr std::uint8_t over_voltage = 0x80;                       ///< Alarm: over voltage.
 inline constexpr std::uint8_t voltage = under_voltage | over_voltage;    ///< Alarm: voltage.
 inline constexpr std::uint8_t turns_wrong = xc_error | multiturn_error;  ///< Alarm: turns wrong.
-/// Those that take a position its safety; the position within the turn is not used with them.
+/// Alarms with which the position within the turn is not used, because it is not safe.
 inline constexpr std::uint8_t unsafe = led_or_lissajous_error | memory_error | singleturn_error | voltage;
 }  // namespace alarms
 
@@ -70,7 +70,8 @@ inline constexpr CrcParameters crc8_msb{8, 0x2F, 0, false, false, 0};      ///< 
 [[nodiscard]] constexpr std::uint16_t initial_value(Channel channel) { return channel == Channel::two ? 0xFFFF : 0; }
 
 namespace detail {
-// One 00 byte is appended where the number of bytes is odd. `swapped`: the second byte of each two comes first.
+// Computes the CRC of 16-bit words. One 00 byte is appended to an odd number of bytes. `swapped`: the second byte of
+// each pair enters the CRC first.
 template <CrcParameters parameters>
 constexpr std::uint16_t crc_of_pairs(Channel channel, Bytes bytes, bool swapped) {
   Crc<parameters, CrcTable::nibble> crc(initial_value(channel));
@@ -95,27 +96,27 @@ constexpr std::uint16_t crc_of_pairs(Channel channel, Bytes bytes, bool swapped)
                                    : Crc<crc8_msb, CrcTable::nibble>::of(bytes);
 }
 
-/// Whether the first of the two CRC bytes of this channel is the low one.
+/// Returns whether the first of the two CRC bytes of this channel is the low one.
 [[nodiscard]] constexpr bool low_byte_first(CrcByteOrder order, Channel channel) {
   if (order == CrcByteOrder::table12) return channel == Channel::one;
   return order == CrcByteOrder::low;
 }
 
-// ---- Tables 3 and 12 as data: the command ids, and which parts each channel of their replies is made of
+// ---- Tables 3 and 12 as data: the command ids, and the parts of each channel of their replies
 
-/// Data ID codes of Table 3, and 6 of Tables 6 and 12.
+/// Data ID codes of Table 3; 6 is in Tables 6 and 12.
 enum class DataId : std::uint8_t {
   position = 1,          ///< safety
   singleturn = 2,        ///< safety
   position_short = 4,    ///< non-safety
   singleturn_short = 5,  ///< non-safety
   calibration = 6,       ///< non-safety
-  encoder_id = 8,        ///< never eight times in a row: "dynamic addressing", which nothing describes
+  encoder_id = 8,  ///< never eight times in a row: that is "dynamic addressing", which the document does not describe
   temperature = 9,
   alarms = 0xA,
-  zero = 0xB,             ///< eight times
-  clear_alarms = 0xC,     ///< eight times
-  reset_multiturn = 0xD,  ///< eight times
+  zero = 0xB,             ///< sent eight times
+  clear_alarms = 0xC,     ///< sent eight times
+  reset_multiturn = 0xD,  ///< sent eight times
   read_memory = 0xE,
   write_memory = 0xF,
 };
@@ -194,7 +195,7 @@ struct Layout {
   std::uint16_t one = 0;        ///< Parts of channel 1.
   std::uint16_t two = 0;        ///< Parts of channel 2; 0: none.
   std::uint8_t crc_bytes = 1;   ///< Length of the checksum in bytes.
-  std::uint8_t length_one = 0;  ///< with CF and CRC
+  std::uint8_t length_one = 0;  ///< length in bytes with CF and CRC
   std::uint8_t length_two = 0;  ///< Length of the part of channel 2 in bytes.
 
  private:
@@ -204,7 +205,7 @@ struct Layout {
 };
 
 namespace detail {
-// Indexed by the id; empty for an id that does not exist.
+// Layouts by id; empty for an id that does not exist.
 inline constexpr std::array<Layout, 16> layouts = [] {
   using part::status, part::alarms, part::singleturn, part::multiturn, part::encoder_id, part::temperature;
   using part::sequence, part::zero_sequence, part::redundant_sequence, part::redundant_alone;
@@ -229,7 +230,7 @@ inline constexpr std::array<Layout, 16> layouts = [] {
 /// Returns the layout of replies to a request.
 [[nodiscard]] constexpr const Layout& layout_of(DataId id) { return detail::layouts[static_cast<std::size_t>(id)]; }
 
-/// The id of a control field, whatever its parity; nothing for one that the tables do not list.
+/// Returns the id of a control field, whatever its parity; nothing for one that the tables do not list.
 [[nodiscard]] constexpr std::optional<DataId> data_id(std::uint8_t field) {
   const std::uint8_t id = (field >> 3) & 0xF;
   if (detail::layouts[id].length_one == 0) return std::nullopt;
@@ -248,11 +249,11 @@ inline constexpr std::array<Layout, 16> layouts = [] {
 [[nodiscard]] constexpr bool is_safety_position(DataId id) {
   return id == DataId::position || id == DataId::singleturn;
 }
-/// Of the positions that carry all that the encoder measures.
+/// Returns the id of the position with all that the encoder measures.
 [[nodiscard]] constexpr DataId position_id(const Profile& profile) {
   return profile.turns ? DataId::position : DataId::singleturn;
 }
-/// Ids whose replies carry the sequence counter (and count it, with sequence_step=safety).
+/// Returns whether replies to this id carry the sequence counter (and count it, with sequence_step=safety).
 [[nodiscard]] constexpr bool has_sequence(DataId id) { return layout_of(id).crc_bytes == 2; }
 
 /// Returns the length of a reply in bytes.
@@ -266,13 +267,13 @@ inline constexpr std::array<Layout, 16> layouts = [] {
   return profile.request_crc ? 2 : 1;
 }
 
-/// EAD, the id, its parity bit, which makes the number of ones odd.
+/// Returns CF: EAD, the id, and a parity bit that makes the number of ones odd.
 [[nodiscard]] constexpr std::uint8_t control_field(const Profile& profile, unsigned address, DataId data) {
   const auto id = static_cast<unsigned>(data);
   const unsigned covered = profile.parity_scope == ParityScope::all ? address << 4 | id : id;
   return static_cast<std::uint8_t>((address & 7) | id << 3 | (odd_parity(covered) ? 0 : 0x80));
 }
-/// ENID: b7 a safety encoder, b6..5 bytes of turns, b4..0 bits of the turn.
+/// Returns ENID: b7 a safety encoder, b6..5 bytes of the turns, b4..0 bits of the turn.
 [[nodiscard]] constexpr std::uint8_t encoder_id(const Profile& profile) {
   constexpr unsigned safety = 0x80;
   const unsigned turn_bytes = profile.turns ? multiturn_bits / 8 : 0;
@@ -284,9 +285,9 @@ inline constexpr std::array<Layout, 16> layouts = [] {
 /// A request of the protocol.
 struct Request {
   DataId id = DataId::position;      ///< Data ID of the request.
-  std::uint8_t encoder_address = 0;  ///< 0 to 7
-  std::uint8_t memory_address = 0;   ///< memory access: 0 to 7F
-  std::uint8_t value = 0;            ///< write_memory
+  std::uint8_t encoder_address = 0;  ///< address 0 to 7
+  std::uint8_t memory_address = 0;   ///< memory access: address 0 to 7F
+  std::uint8_t value = 0;            ///< write_memory: byte to be written
 };
 
 /// What a reply says of one channel.
@@ -297,7 +298,7 @@ struct ChannelReply {
   std::uint8_t encoder_id = 0;  ///< Encoder identifier.
 };
 
-/// Fields that the id does not carry are 0.
+/// The fields of a reply; those that its id does not carry are 0.
 struct Reply {
   DataId id = DataId::position;                   ///< Data ID of the reply.
   std::uint8_t encoder_address = 0;               ///< Address of the encoder on its line.
@@ -305,19 +306,19 @@ struct Reply {
   ChannelReply two{.status = status::channel_2};  ///< Channel 2.
   std::uint32_t singleturn = 0;                   ///< Position in counts.
   std::uint16_t multiturn = 0;                    ///< Turns.
-  std::uint16_t redundant = 0;                    ///< 9 bits; 16 of ID 6 where the profile says so
-  std::int8_t temperature = 0;                    ///< its sign is assumed
+  std::uint16_t redundant = 0;                    ///< 9 bits; with ID 6 16 bits if the profile says so
+  std::int8_t temperature = 0;                    ///< signed, which is assumed
   std::uint8_t memory_address = 0;                ///< Address of the memory byte.
   bool busy = false;                              ///< Whether the memory is busy.
   std::uint8_t value = 0;                         ///< Value of the memory byte.
-  bool unused_bits = false;                       ///< decoded: a bit that is always 0 was set
+  bool unused_bits = false;                       ///< decoded: a bit that must be 0 was set
 };
 
 // ---- Bits whose place the document leaves open
 
 namespace detail {
 
-// T-format has DD in b0..3, EA in b4..5, CA in b6..7.
+// In T-format DD is in b0..3, EA in b4..5, CA in b6..7.
 [[nodiscard]] constexpr std::uint8_t status_to_wire(const Profile& profile, std::uint8_t value) {
   if (profile.status_order == FieldOrder::document) return value;
   return static_cast<std::uint8_t>(value >> 4 | (value & 0x0C) << 2 | (value & 0x03) << 6);
@@ -327,7 +328,7 @@ namespace detail {
   return static_cast<std::uint8_t>(value << 4 | (value >> 2 & 0x0C) | value >> 6);
 }
 
-// A byte whose b7 stands at b0 where `at_b0`: {busy, ADF}, {RS1, SC2}, {0, SC2}, or RS1 alone.
+// Moves b7 of a byte to b0 if `at_b0`: {busy, ADF}, {RS1, SC2}, {0, SC2}, or RS1 alone.
 [[nodiscard]] constexpr std::uint8_t to_wire(bool at_b0, unsigned byte) {
   return std::rotl(static_cast<std::uint8_t>(byte), at_b0 ? 1 : 0);
 }
@@ -351,11 +352,11 @@ namespace detail {
 
 namespace detail {
 
-// The bytes of one part, the first on the wire lowest.
+// Returns the bytes of one part, the first on the wire lowest.
 template <unsigned id>
 constexpr std::uint32_t part_to_wire(const Profile& profile, const Reply& reply, const ChannelReply& channel) {
   const unsigned counter = channel.sequence & 0x7Fu;
-  // In two bytes: its upper bits, and {RS1, SC2}.
+  // RS in two bytes: its upper bits, then {RS1, SC2}.
   const auto redundant = [&reply](RedundantBit order, unsigned sequence) {
     const unsigned second = to_wire(order == RedundantBit::b0, (reply.redundant & 1u) << 7 | sequence);
     return reply.redundant >> 1 | second << 8;
@@ -409,7 +410,7 @@ constexpr void encode_channel(const Profile& profile, const Reply& reply, std::u
 
 }  // namespace detail
 
-/// With this control field: CF is that of the request, also where its parity is wrong.
+/// Encodes a reply with this control field, which is that of the request, even with a wrong parity bit.
 [[nodiscard]] constexpr ReplyBytes encode_reply(const Profile& profile, const Reply& reply, std::uint8_t field) {
   ReplyBytes bytes;
   detail::encode_channel(profile, reply, field, Channel::one, bytes);

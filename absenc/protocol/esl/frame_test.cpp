@@ -24,7 +24,7 @@ constexpr std::array all_ids{DataId::position,         DataId::singleturn,      
 
 constexpr std::array<std::uint8_t, 9> check_input{'1', '2', '3', '4', '5', '6', '7', '8', '9'};
 
-// Every profile that changes frames.
+// Returns all profiles that change frames.
 std::vector<Profile> all_profiles() {
   std::vector<Profile> profiles{Profile{}};
   for (std::size_t option = 0; option < open_options; ++option) {
@@ -41,7 +41,7 @@ std::vector<Profile> all_profiles() {
   return profiles;
 }
 
-// Everything that an id may carry.
+// Returns a reply with all parts that the id can carry.
 Reply sample(DataId id, const Profile& profile = {}) {
   Reply reply{.id = id,
               .encoder_address = 3,
@@ -97,7 +97,7 @@ TEST(EslFrame, EveryFieldWithEitherParityScope) {
   }
 }
 
-// Table 5 in either order: DD, EA and CA from b0 up in T-format.
+// Table 5 in both orders; in T-format DD, EA and CA follow from b0 up.
 TEST(EslFrame, StatusBitsInBothOrders) {
   const Profile tformat{.status_order = FieldOrder::tformat};
   const std::array<std::pair<std::uint8_t, std::uint8_t>, 8> places{{{status::temperature_warning, 0x01},
@@ -179,7 +179,7 @@ TEST(EslFrame, EveryCheckHasItsSentence) {
   }
 }
 
-// Which status and alarm bits take what of a reading away.
+// Which status and alarm bits make which part of a reading invalid.
 TEST(EslFrame, ValidityOfEachPart) {
   Reply reply = sample(DataId::position);
   reply.one = {.status = status::ready};
@@ -204,11 +204,12 @@ TEST(EslFrame, ValidityOfEachPart) {
   EXPECT_TRUE(to_reading(short_reply).multiturn_valid);
   short_reply.one.status = status::ready | status::non_safety_error;
   EXPECT_TRUE(to_reading(short_reply).singleturn_valid());
-  EXPECT_EQ(to_reading(short_reply).multiturn_validity(), Validity::unknown);  // or Lissajous, or overspeed
+  // The cause may also be Lissajous or overspeed.
+  EXPECT_EQ(to_reading(short_reply).multiturn_validity(), Validity::unknown);
   EXPECT_EQ(to_reading({.id = DataId::temperature}).singleturn_bits, 0u);
 }
 
-// SF comes with every reading, ALM only with some, of each channel its own.
+// Every reply has SF, only some have ALM, in each of their channels.
 TEST(EslFrame, RepliesReportTheFlagsThatTheyCarry) {
   struct Row {
     DataId id;
@@ -226,7 +227,7 @@ TEST(EslFrame, RepliesReportTheFlagsThatTheyCarry) {
   }
 }
 
-// A Lissajous error is a non-safety error (Table 5): the position holds, whichever ID asks for it.
+// A Lissajous error is a non-safety error (Table 5): the position stays valid for every id.
 TEST(EslFrame, LedAndLissajousErrorsCountAlikeInEveryId) {
   for (const auto& [error, validity] :
        {std::pair{status::safety_error, Validity::invalid}, std::pair{status::non_safety_error, Validity::valid}}) {
@@ -240,7 +241,7 @@ TEST(EslFrame, LedAndLissajousErrorsCountAlikeInEveryId) {
       EXPECT_NE(to_reading(reply).multiturn_validity(), Validity::invalid) << static_cast<int>(id);
     }
   }
-  // Of another channel, or of both alarms at once.
+  // The alarm is in the other channel, or both alarms are raised at once.
   Reply reply = sample(DataId::position);
   reply.one = {.status = status::ready | status::non_safety_error};
   reply.two = {.status = status::channel_2 | status::ready, .alarms = alarms::led_or_lissajous_error};
@@ -251,7 +252,7 @@ TEST(EslFrame, LedAndLissajousErrorsCountAlikeInEveryId) {
   EXPECT_EQ(to_reading(reply).singleturn_validity(), Validity::invalid);
 }
 
-// The check of the request is right, and the encoder says what it does not like.
+// The request's checksum is right, and the encoder reports its parity bit.
 TEST(EslUnit, AnswerToAWrongParityBitIsARefusal) {
   const Options values = author::testing::options_of(unit, "");
   const auto field = static_cast<std::uint8_t>(control_field({}, 0, DataId::position) ^ 0x80);
@@ -266,7 +267,7 @@ TEST(EslUnit, AnswerToAWrongParityBitIsARefusal) {
     const Explanation why = unit.explain(values, Error::request_rejected, {.bytes = asked}, {.bytes = refused});
     EXPECT_NE(why.detail.find("wrong parity bit"), std::string_view::npos) << why.detail;
   }
-  // What is not refused is not explained by the parity bit.
+  // A reply that is no refusal is not explained by the parity bit.
   reply.one.status = status::ready;
   reply.two.status = status::ready | status::channel_2;
   const ReplyBytes taken = encode_reply({}, reply, field);

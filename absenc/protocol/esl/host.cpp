@@ -12,18 +12,18 @@ using author::Procedure;
 
 namespace {
 
-constexpr unsigned attempts = 3;  // of what only reads, or selects a page: resets, writes and ID 8 are never repeated
+constexpr unsigned attempts = 3;  // attempts of reads and page selects: resets, writes and ID 8 are never repeated
 constexpr unsigned safe_attempts = 6;
 
 Request request_of(const Dialog& dialog, DataId id) { return {id, dialog.format().address}; }
 
-// What the last exchange brought, with its times.
+// Stores the reply of the last exchange, with its times.
 void show_last(const Dialog& dialog, Found& found) {
   found.show(dialog.last());
   found.reading = dialog.last_reading();
 }
 
-// "24 bits and turns", "20 bits and no turns, not a safety encoder"
+// Writes "24 bits and turns", or "20 bits and no turns, not a safety encoder".
 void describe(Sentence& words, std::uint8_t id) {
   const std::array<char, 2> bits{static_cast<char>('0' + (id & 0x1F) / 10), static_cast<char>('0' + (id & 0x1F) % 10)};
   words.add({bits.data(), bits.size()}).add(" bits and ").add((id >> 5 & 3) != 0 ? "turns" : "no turns");
@@ -73,13 +73,13 @@ Procedure read_safely(Dialog& dialog, FoundSafe& found) {
 
 namespace {
 
-// The eight of them are 40 us apart, from start to start; a slow line takes longer.
+// Returns the pause between two of the eight resets: 40 us from start to start; a slow line takes longer.
 Time pause_between_resets(const Dialog& dialog, DataId id) {
   const Time duration = line_settings.character() * static_cast<std::int64_t>(request_length(dialog.format(), id));
   return dialog.sent_at() - duration + reset_interval - dialog.received_at();
 }
 
-// The alarms that an ID C left, and what clears them (Table 8).
+// Names the alarms that remain after an ID C, and what clears them (Table 8).
 std::string_view what_remains(Sentence& words, unsigned remaining) {
   constexpr unsigned until_power_off =
       alarms::led_or_lissajous_error | alarms::overspeed | alarms::memory_error | alarms::singleturn_error;
@@ -93,7 +93,7 @@ std::string_view what_remains(Sentence& words, unsigned remaining) {
   return words.view();
 }
 
-// What the encoder did not do; no detail: it did all.
+// Returns which part of the reset failed; no detail: none did.
 Explanation missed(Sentence& words, DataId id, const Reply& before, const Reply& now) {
   const unsigned remaining = now.one.alarms | now.two.alarms;
   if (id == DataId::clear_alarms) {
@@ -128,13 +128,13 @@ Procedure reset(Dialog& dialog, Found& found, DataId id) {
   for (unsigned i = 0; i < reset_requests; ++i) {
     const Time pause = i == 0 ? Time{} : pause_between_resets(dialog, id);
     const Result<Reply> reply = co_await dialog.attempt(request_of(dialog, id)).changes().after(pause);
-    // When the last reply is lost, the reset may have been done all the same: reading tells.
+    // If the last reply is lost, the reset may have been executed: reading shows it.
     if (reply || i + 1 == reset_requests) continue;
     co_return {reply.error(),
                "one of the eight requests was not answered well, so the encoder has most likely done nothing: read the "
                "position before you try again"};
   }
-  // B saves the zero in the EEPROM; D may do the same.
+  // B writes the zero to the EEPROM; D may do so, too.
   const Time pause = id == DataId::clear_alarms ? reset_interval : eeprom_write_pause;
   const Reply now = co_await dialog.ask(look).repeated(attempts).after(pause).or_say(
       "all eight requests were sent, but whether the encoder obeyed could not be read");
@@ -148,11 +148,12 @@ Procedure reset(Dialog& dialog, Found& found, DataId id) {
 
 namespace {
 
-constexpr Time busy_limit = 2 * page_time;  // the document gives no maximum
+constexpr Time busy_limit = 2 * page_time;  // the document states no maximum
 
 constexpr std::string_view unknown_area = "Table 11 lists no such page and address; nothing was sent";
 
-// `after_busy`: the temporary register may hold a byte that somebody else asked for, which only a busy reply excludes.
+// Repeats a request until the memory is ready. `after_busy`: the temporary register may hold a byte that another host
+// requested, which only a busy reply excludes.
 author::Part<Result<Reply>> settled(Dialog& dialog, const Request& request, bool after_busy = false) {
   const bool writes = request.id == DataId::write_memory && !selects_page(request);
   return author::until_ready<Protocol>(dialog, request,
@@ -168,7 +169,7 @@ author::Outcome failure(Error error, std::string_view words, Time hold) {
   return {error, words, {}, hold};
 }
 
-// When the page is ready. `words`: what the error says where the procedure ends here.
+// Selects a page and waits until it is ready. `words`: detail of the error if the procedure ends here.
 author::Part<std::uint8_t> turn_to(Dialog& dialog, std::uint8_t page, std::string_view words) {
   const Request request{DataId::write_memory, dialog.format().address, page_select_address, page};
   const Result<Reply> reply = co_await settled(dialog, request);
@@ -224,7 +225,7 @@ Procedure write_memory(Dialog& dialog, Found& found, Arguments arguments) {
   const std::uint8_t before = co_await read_byte(dialog, page, address, nothing_written);
   found.written = before != value;
   if (before == value) co_return done;
-  // A lost reply does not tell whether the write was done: reading back does.
+  // A lost reply does not show whether the byte was written, but reading it back does.
   const Request write{DataId::write_memory, dialog.format().address, address, value};
   dialog.changes();
   const Result<Reply> written = co_await settled(dialog, write);
@@ -251,7 +252,7 @@ Procedure select_page(Dialog& dialog, Found& found, Arguments arguments) {
 
 namespace {
 
-// A bit of SF that an alarm beside it raises as well does not tell, unless the other bit is clear.
+// Finds the cause in SF. A bit that another raised alarm sets as well is ambiguous, unless the other bit is clear.
 bool tell_by_status(Found& found, const Reply& reply) {
   constexpr unsigned other_safety = alarms::unsafe & ~unsigned{alarms::led_or_lissajous_error};
   constexpr unsigned other_non_safety = alarms::turns_wrong | alarms::overspeed;
@@ -289,7 +290,7 @@ Procedure read_error_info(Dialog& dialog, Found& found) {
   if (known && before->value == register_page) co_return done;
   found.page_left = register_page;
   if (!known) co_return done;
-  // What was asked for is known, whatever becomes of this: reading it back tells what the next user finds.
+  // The result is known by now. Reading the page back shows what the next user of the encoder finds.
   const Request restore{DataId::write_memory, dialog.format().address, page_select_address, before->value};
   const Result<Reply> restored = co_await settled(dialog, restore);
   if (restored.error() == Error::busy) co_return failure(Error::busy, {}, page_time);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The unit's commands against the virtual QS35 in virtual time.
+// The unit's commands with the virtual QS35 in virtual time.
 #include "absenc/protocol/esl/host.hpp"
 
 #include <gtest/gtest.h>
@@ -27,7 +27,7 @@ TEST(EslHost, ReadsTheSafetyPositionInTheTimeOfTheWire) {
   EXPECT_EQ(read.reading->singleturn, 0xABCDEFu);
   EXPECT_EQ(read.reading->multiturn, 4660u);
   EXPECT_TRUE(read.reading->singleturn_valid() && read.reading->multiturn_valid && read.reading->ready);
-  EXPECT_EQ(read.reading->latched, request_pause + 1us + 4300ns);  // the end bit of CF is over after one character
+  EXPECT_EQ(read.reading->latched, request_pause + 1us + 4300ns);  // CF ends after one character
   EXPECT_EQ(read.reading->received, request_pause + 22us);
   EXPECT_EQ(read.numbers.at("redundant_singleturn"), 0xABCDEF >> 15);
 }
@@ -37,10 +37,10 @@ TEST(EslHost, Id8IsNeverSentEightTimesInARow) {
   for (unsigned i = 0; i < 20; ++i) EXPECT_EQ(bench.run("encoder-id").error, Error::none);
   EXPECT_EQ(bench.violations(), 0u);
   for (unsigned i = 0; i < 8; ++i) bench.raw(Request{DataId::encoder_id});
-  ASSERT_EQ(bench.violations(), 1u);  // the rule is watched
+  ASSERT_EQ(bench.violations(), 1u);  // the virtual encoder checks the rule
 }
 
-// "If there is no Start Bit after the End Bit of the last frame": one bit between two frame sets is the least.
+// "If there is no Start Bit after the End Bit of the last frame": at least one bit is between two frame sets.
 TEST(EslHost, EachRequestBeginsTwoBitsAfterTheReplyBeforeInEveryConversation) {
   const std::vector<std::pair<const char*, std::vector<std::int64_t>>> commands{{"position", {}},
                                                                                 {"position", {}},
@@ -72,7 +72,7 @@ TEST(EslHost, EachRequestBeginsTwoBitsAfterTheReplyBeforeInEveryConversation) {
   EXPECT_EQ(bench.violations(), 0u);
 }
 
-// ---- Which encoder it is
+// ---- Encoder id
 
 TEST(EslHost, AnEncoderIdThatIsNotThatOfTheOptionsIsReported) {
   for (const auto& [id, turns, words] :
@@ -124,7 +124,7 @@ TEST(EslHost, TurnsFromAnEncoderOfOneTurnAreAnError) {
 
 // ---- Safe positions
 
-// One exchange each, as soon as two have shown that the counter moves.
+// One exchange each, after two have shown that the counter moves.
 TEST(EslHost, SafePositionsFollowEachOther) {
   Bench bench;
   const testing::Talk made(unit, testing::options_of({}), "safe-position");
@@ -146,7 +146,7 @@ TEST(EslHost, ACounterThatStopsBetweenSafePositionsIsFound) {
   unsigned safe = 0;
   bench.line.on_emit = [&] {
     if (++safe == 10) {
-      bench.condition(condition::ch1_sequence, 11);  // that of the last reply
+      bench.condition(condition::ch1_sequence, 11);  // counter of the last reply
       bench.condition(condition::ch2_sequence, 11);
     }
     return safe < 20;
@@ -158,7 +158,7 @@ TEST(EslHost, ACounterThatStopsBetweenSafePositionsIsFound) {
   EXPECT_EQ((*made).reading(), nullptr);
 }
 
-// Every profile on both sides; another address too.
+// Host and encoder use each profile, also with another address.
 TEST(EslHost, EveryProfileIsSpokenOnBothSides) {
   for (std::size_t option = 0; option < open_options; ++option) {
     for (std::size_t value = 0; value < options.infos[option].choices.size(); ++value) {
@@ -191,7 +191,7 @@ TEST(EslHost, SilenceIsATimeout) {
   EXPECT_TRUE(bench.run("memory-read", {0}).says("(Figure 18)"));
 }
 
-// Each with its own name and sentence.
+// Each error has its own name and sentence.
 TEST(EslHost, WhatIsWrongWithAReplyIsSaid) {
   struct Row {
     const char* sentence;
@@ -222,7 +222,7 @@ TEST(EslHost, WhatIsWrongWithAReplyIsSaid) {
   }
 }
 
-// Of characters that were damaged nobody knows what they would have been.
+// The content of damaged characters is unknown.
 TEST(EslHost, OfADamagedReplyNoSentenceIsMade) {
   using LinkEvent = Event<std::uint8_t>;
   const testing::Talk made(unit, testing::options_of({}), "position");
@@ -240,8 +240,8 @@ TEST(EslHost, OfADamagedReplyNoSentenceIsMade) {
 TEST(EslHost, AProfileThatDoesNotFitIsNamed) {
   const Profile plain;
   struct Row {
-    Profile host;     // what the host believes
-    Profile encoder;  // what the encoder is
+    Profile host;     // profile of the host
+    Profile encoder;  // profile of the encoder
     const char* command;
     const char* sentence;
   };

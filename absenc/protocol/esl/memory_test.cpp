@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The memory commands against the virtual QS35 in virtual time.
+// The memory commands with the virtual QS35 in virtual time.
 #include <gtest/gtest.h>
 
 #include "absenc/protocol/esl/bench_test.hpp"
@@ -21,7 +21,7 @@ TEST(EslMemory, MemoryIsWrittenReadBackAndSparedWear) {
   const Told first = bench.run(write, {0x7E, 0x5A, 0});
   EXPECT_EQ(first.error, Error::none) << first.detail;
   EXPECT_EQ(first.numbers.at("written"), 1);
-  EXPECT_EQ(bench.encoder.answer_count(), 6u);  // page, two reads, the write, and two reads when its time is over
+  EXPECT_EQ(bench.encoder.answer_count(), 6u);  // page select, two reads, the write, and two reads after it
   EXPECT_EQ(*bench.encoder.stored(0, 0x7E), 0x5A);
   const Told same = bench.run(write, {0x7E, 0x5A, 0});
   EXPECT_EQ(same.error, Error::none);
@@ -70,7 +70,8 @@ TEST(EslMemory, ThePageThatADriveHadSelectedIsRestored) {
     EXPECT_EQ(bench.raw(Request{DataId::read_memory, 0, page_select_address})[2], before);
     EXPECT_EQ(bench.violations(), 0u);
   }
-  // It does not say which page is selected (asked three times); or, at the end, that the one before is again.
+  // The encoder does not report the selected page (requested three times), or does not report at the end that the page
+  // before is selected again.
   for (const auto& [first, last] : {std::pair{1u, 3u}, std::pair{5u, 5u}}) {
     Bench bench({}, [first = first, last = last](unsigned index, Wire& reply) {
       if (index < first || index > last) return;
@@ -118,7 +119,7 @@ TEST(EslMemory, AMemoryThatStaysBusyIsGivenUp) {
   EXPECT_LT(bench.line.now(), 100ms);
 }
 
-// The temporary register may hold what somebody else once asked for.
+// The temporary register may hold a byte that another host requested.
 TEST(EslMemory, AnEepromByteIsNotBelievedWithoutABusyAnswerBefore) {
   Bench bench({}, [](unsigned index, Wire& reply) {
     if (index == 1) reply = wire({.id = DataId::read_memory, .memory_address = 5, .value = 0x77});
@@ -181,7 +182,7 @@ TEST(EslMemory, LedAndLissajousAreToldApart) {
   }
 }
 
-// By SF, as far as no other alarm raises the same bit.
+// SF shows the cause if no other alarm raises the same bit.
 TEST(EslMemory, LedAndLissajousAreToldApartOnABusWithoutMemory) {
   constexpr int open = -1;
   struct Row {

@@ -23,7 +23,7 @@ constexpr std::size_t combinations = [] {
   return product;
 }();
 
-// The n-th profile; number 0 has every default.
+// Returns the n-th profile; number 0 has all defaults.
 Profile nth_profile(const Profile& base, std::size_t number) {
   Profile profile = base;
   for (std::size_t i = 0; i < open_options; ++i) {
@@ -41,7 +41,7 @@ Profile with_other_parity(Profile profile) {
   return profile;
 }
 
-// What was asked, as far as the bytes of the request tell under this profile.
+// The request of a capture, as far as its bytes show it under this profile.
 struct Asked {
   Request request{};
   bool parity_wrong = false;
@@ -62,7 +62,8 @@ Asked asked_in(const Profile& profile, const Capture& capture) {
           .accepted = good || capture.request.empty()};
 }
 
-// An encoder answers only what it accepts, and reports a wrong parity bit only where there is one.
+// Returns the check that fails under this profile. An encoder answers only requests that it accepts, and reports a
+// wrong parity bit only if there is one.
 Check explain(const Profile& profile, const Capture& capture) {
   if (capture.reply.empty()) return Check::passed;
   const Asked asked = asked_in(profile, capture);
@@ -72,7 +73,7 @@ Check explain(const Profile& profile, const Capture& capture) {
   const Check check = check_reply(as_sent, asked.request, capture.reply, reply);
   if (!asked.parity_wrong) return check;
   if (check == Check::parity_reported) {
-    // All else must be right.
+    // All other parts of the reply must be right.
     reply.one.status &= static_cast<std::uint8_t>(~status::rejected);
     reply.two.status &= static_cast<std::uint8_t>(~status::rejected);
     return detail::check_content(as_sent, layout_of(reply.id), reply);
@@ -80,12 +81,12 @@ Check explain(const Profile& profile, const Capture& capture) {
   return check == Check::passed && !is_memory_access(asked.request.id) ? Check::request_not_accepted : check;
 }
 
-// How far a profile comes: a later capture, then a later check.
+// How far a profile explains the captures: the first capture that it does not explain, then the check.
 struct Progress {
   std::size_t capture = 0;
   Check failed = Check::passed;
 
-  // An encoder that would not even have answered explains least.
+  // A profile under which the encoder would not have answered at all explains least.
   [[nodiscard]] int rank() const { return failed == Check::request_not_accepted ? 0 : static_cast<int>(failed); }
   [[nodiscard]] bool fits() const { return failed == Check::passed; }
   [[nodiscard]] bool better_than(const Progress& other) const {
@@ -103,20 +104,20 @@ Progress progress_of(const Profile& profile, std::span<const Capture> captures) 
   return {};
 }
 
-// By the index of the option and of its value: how far the best profile with this value comes.
+// By the index of the option and of its value: how far the best profile with this value explains the captures.
 using ReachedByValue = std::array<Progress, most_choices>;
 using Reached = std::array<ReachedByValue, open_options>;
 
-// Each step of the counter against what `best` makes of the replies.
+// Compares each step of the counter with the replies as `best` decodes them.
 void judge_sequence(Profile& best, std::span<const Capture> captures, ReachedByValue& values) {
   values.fill({});
   bool known = false;
   std::uint8_t last = 0;
-  std::uint8_t safety = 0;   // replies with a counter since the last one seen
-  std::uint8_t request = 0;  // requests
+  std::uint8_t safety = 0;   // replies with a counter since the last counter
+  std::uint8_t request = 0;  // requests since the last counter
   for (std::size_t i = 0; i < captures.size(); ++i) {
     ++request;
-    if (captures[i].reply.empty()) {  // whether it was counted is not known
+    if (captures[i].reply.empty()) {  // unknown whether the encoder counted the request
       known = false;
       continue;
     }
@@ -174,7 +175,7 @@ bool probe(Options& values, std::span<const Capture> captures, EvidenceSink& sin
       if (progress.better_than(so_far)) so_far = progress;
     }
   }
-  // Of one frame it changes nothing.
+  // sequence_step does not change single frames.
   auto& sequence = reached[option_sequence_step];
   sequence.fill(sequence[static_cast<std::size_t>(best.sequence_step)]);
   if (any) judge_sequence(best, captures, sequence);
@@ -185,7 +186,7 @@ bool probe(Options& values, std::span<const Capture> captures, EvidenceSink& sin
 
 namespace {
 
-// The request's parity bit was wrong only if the other scope makes another one.
+// Returns whether the request's parity bit alone is wrong: the other scope must give another one.
 bool parity_is_it(const Profile& profile, const Capture& capture) {
   const Asked asked = asked_in(profile, capture);
   Reply reply;
@@ -193,7 +194,7 @@ bool parity_is_it(const Profile& profile, const Capture& capture) {
          asked_in(with_other_parity(profile), capture).parity_wrong;
 }
 
-// Each value of each option that changes replies.
+// The values of all options that change replies.
 constexpr auto changes = [] {
   Buffer<OptionValue, most_choices * open_options> all;
   for (std::size_t option = 0; option < open_options; ++option) {
@@ -213,7 +214,7 @@ Profile changed(Profile profile, const OptionValue& change) {
 
 }  // namespace
 
-// The request went out under the profile in use: the reply alone tells.
+// The host sent the request under the profile in use, so only the reply is evidence.
 Buffer<OptionValue, 2> find_change(const Profile& profile, Bytes reply) {
   const Capture capture{.reply = reply};
   Buffer<OptionValue, 2> found;
@@ -222,7 +223,7 @@ Buffer<OptionValue, 2> find_change(const Profile& profile, Bytes reply) {
     found.push_back({option_parity_scope, profile.parity_scope == ParityScope::all ? 0 : 1});
     return found;
   }
-  if (explain(profile, capture) == Check::passed) return found;  // something else is wrong with it
+  if (explain(profile, capture) == Check::passed) return found;  // the reply has another error
   for (const OptionValue& one : changes.view()) {
     if (explain(changed(profile, one), capture) != Check::passed) continue;
     found.push_back(one);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Which profiles fit frames captured from a real encoder: what the document leaves open, the hardware tells.
+// Finds the profiles that fit frames captured from a real encoder: the hardware shows what the document leaves open.
 #pragma once
 
 #include <span>
@@ -9,13 +9,13 @@
 
 namespace absenc::esl {
 
-/// As Unit::probe. Without a request, the reply's own control field says what was asked; an empty reply proves nothing.
-/// Captures must follow each other without a gap for sequence_step to be judged: nothing else may have been sent to the
-/// encoder between them.
+/// As Unit::probe. Without a request, the reply's own control field gives the request; an empty reply proves nothing.
+/// To judge sequence_step the captures must be consecutive: nothing else may have been sent to the encoder between
+/// them.
 bool probe(Options& values, std::span<const Capture> captures, EvidenceSink& sink);
 
-/// What to change in `profile`, in one option or two, so that a reply that it does not explain is good; nothing where
-/// nothing was found.
+/// Returns changes of one or two options of `profile` that make an invalid reply valid; none if there are no such
+/// changes.
 [[nodiscard]] Buffer<OptionValue, 2> find_change(const Profile& profile, Bytes reply);
 
 }  // namespace absenc::esl

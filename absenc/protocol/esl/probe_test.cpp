@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What captured replies tell about the profile of the encoder that sent them.
+// Evidence of captured replies about the profile of their encoder.
 #include "absenc/protocol/esl/probe.hpp"
 
 #include <gtest/gtest.h>
@@ -17,7 +17,7 @@ struct Taken {
   Wire reply;
 };
 
-// What a sniffer sees when an encoder of this profile is asked for each id.
+// Returns a capture of these requests to an encoder of this profile.
 std::vector<Taken> captured(const Profile& profile, const std::vector<Request>& requests) {
   testing::Bench bench(profile);
   bench.shaft.put(77, 0xABCDEF);
@@ -34,7 +34,7 @@ struct Evidence {
   std::size_t capture = 0;
   std::string why;
 };
-// What is said of each value of each option, and the profile that remains.
+// The evidence about each value of each option, and the remaining profile.
 struct Probed final : EvidenceSink {
   explicit Probed(const std::vector<Taken>& taken, bool with_requests = true) {
     std::vector<Capture> captures;
@@ -60,19 +60,19 @@ const std::vector<Request> everything{{DataId::position},    {DataId::temperatur
                                       {DataId::position},    {DataId::clear_alarms},
                                       {DataId::calibration}, {DataId::write_memory, 0, page_select_address, 8}};
 
-// Each value of each option is found, and is the only one left, when the frames carry it.
+// Each value of each option is found, and is the only one left, if the frames carry it.
 TEST(EslProbe, EveryValueIsFound) {
   for (std::size_t option = 0; option < open_options; ++option) {
     const std::string_view name = options.infos[option].name;
     for (std::size_t value = 0; value < options.infos[option].choices.size(); ++value) {
-      if (name == "sequence_step" && value == 0) continue;  // change: the others are special cases of it
+      if (name == "sequence_step" && value == 0) continue;  // change: the other values are special cases of it
       Profile profile{.address = 1};
       options.put(profile, option, static_cast<std::int64_t>(value));
       Probed result(captured(profile, everything));
       SCOPED_TRACE(std::string(name) + "=" + std::string(options.infos[option].choices[value]));
       ASSERT_TRUE(result.any);
       EXPECT_TRUE(result.of[name][value].possible);
-      // Nine bits of RS may always be the top of sixteen.
+      // The nine bits of RS may always be the top of sixteen.
       const bool sure = name != "sequence_step" && !(name == "id6_rs" && value == 1);
       if (sure) {
         EXPECT_EQ(options.get(result.best, option), static_cast<std::int64_t>(value));
@@ -122,7 +122,7 @@ TEST(EslProbe, AReportedParityErrorTellsTheScope) {
 }
 
 TEST(EslProbe, OpenOptionsStandFirst) {
-  EXPECT_EQ(open_options, 10u);  // README.md names each
+  EXPECT_EQ(open_options, 10u);  // README.md names each option
   for (const Option& option : std::span(options.infos).subspan(open_options))
     EXPECT_FALSE(option.probeable) << option.name;
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the QS35 document leaves open, and how one encoder is addressed and judged: every assumption in one place, each
-// an option. README.md says how hardware tells each alternative; probe.hpp finds them in captured frames.
+// Options for everything that the QS35 document leaves open, and for address and checks of one encoder. README.md
+// states how hardware shows each alternative; probe.hpp finds them in captured frames.
 #pragma once
 
 #include <algorithm>
@@ -14,31 +14,31 @@ namespace absenc::esl {
 
 /// Order of the bits in which a CRC is computed.
 enum class CrcBitOrder : std::uint8_t {
-  lsb,   ///< every byte LSB first, as the wire has it
-  msb,   ///< every byte MSB first
+  lsb,   ///< each byte LSB first, as on the wire
+  msb,   ///< each byte MSB first
   word,  ///< 16-bit words of two bytes, low byte first on the wire, MSB first into the CRC; the 8-bit CRC: as msb
 };
 /// Order of the bytes of a CRC.
 enum class CrcByteOrder : std::uint8_t {
   low,      ///< low byte first
   high,     ///< high byte first
-  table12,  ///< as Table 12 prints it: channel 1 low byte first, channel 2 high byte first
+  table12,  ///< as in Table 12: channel 1 low byte first, channel 2 high byte first
 };
-/// Which end of a byte the lowest bit of the redundant position stands at.
+/// The bit of the byte {RS1, ...} that holds the lowest bit of the redundant position.
 enum class RedundantBit : std::uint8_t { b7, b0 };
 /// When the sequence bit of a safety reply changes.
 enum class SequenceStep : std::uint8_t {
-  change,   ///< differs from the last one seen
-  safety,   ///< plus one for each reply to IDs 1, 2, 8, B
-  request,  ///< plus one for each request
+  change,   ///< it differs from the last one
+  safety,   ///< it counts the replies to IDs 1, 2, 8 and B
+  request,  ///< it counts all requests
 };
-/// What the parity bit of CF covers.
+/// The bits that the parity bit of CF covers.
 enum class ParityScope : std::uint8_t { command, all };
-/// Order of bits in SF, or in ADF: as the QS35 document lists them, or as Tamagawa's T-format has them.
+/// Order of the bits in SF, or in ADF: that of the QS35 document, or that of Tamagawa's T-format.
 enum class FieldOrder : std::uint8_t { document, tformat };
-/// How many bits the redundant position of ID 6 has.
+/// Bits of the redundant position of ID 6.
 enum class Id6Redundant : std::uint8_t { bits_16, bits_9 };
-/// What the virtual encoder does when parity or stop bit of a request is wrong.
+/// Reaction of the virtual encoder to a request with a wrong parity or stop bit.
 enum class BadRequest : std::uint8_t { report, silent };
 
 /// Choices that the document leaves open.
@@ -54,11 +54,12 @@ struct Profile {
   RedundantBit idc_rs1 = RedundantBit::b7;                 ///< Bit with redundant data of ID C.
   Id6Redundant id6_rs = Id6Redundant::bits_16;             ///< Redundant data of ID 6.
 
-  std::uint8_t address = 0;                     ///< EAD, 0 to 7
-  bool turns = true;                            ///< false: an encoder of one turn
-  Sharing bus = sharing_automatic;              ///< yes: others share the line, memory cannot be reached (Figure 18)
-  bool require_forced_test = false;             ///< of a safe position
-  std::uint8_t redundant_tolerance = 1;         ///< RS against the top 9 bits of ABS, 1/512 turn, 0 to 255
+  std::uint8_t address = 0;          ///< EAD, 0 to 7
+  bool turns = true;                 ///< false: a single-turn encoder
+  Sharing bus = sharing_automatic;   ///< yes: other encoders share the line, so memory cannot be accessed (Figure 18)
+  bool require_forced_test = false;  ///< a safe position needs it
+  /// Largest difference between RS and the top 9 bits of ABS, in 1/512 turn, 0 to 255.
+  std::uint8_t redundant_tolerance = 1;
   BadRequest bad_request = BadRequest::report;  ///< Reaction to a bad request.
 };
 
@@ -76,14 +77,14 @@ inline constexpr Names<2> bad_request{"report", "silent"};
 }  // namespace choices
 
 namespace detail {
-// What the document leaves open and captured frames can tell.
+// An option that the document leaves open and that captured frames can show.
 template <auto member, class... Choices>
 constexpr auto open_option(std::string_view name, std::string_view meaning, const Choices&... choices) {
   return author::probeable(author::option<member>(name, meaning, choices...));
 }
 }  // namespace detail
 
-/// The options that the document leaves open come first (EslProbe.OpenOptionsStandFirst).
+/// Options of ESL. Those that the document leaves open come first (EslProbe.OpenOptionsStandFirst).
 inline constexpr auto options = author::OptionsOf{
     detail::open_option<&Profile::crc_bit_order>(
         "crc_bit_order", "which bit of a byte enters the CRC first; word: 16-bit words, MSB first",
@@ -127,13 +128,13 @@ inline constexpr auto options = author::OptionsOf{
         "bad_request", "what the virtual encoder does with a request whose parity or stop bit is wrong",
         choices::bad_request),
 };
-/// How many the document leaves open.
+/// Number of options that the document leaves open.
 inline constexpr std::size_t open_options = [] {
   std::size_t count = 0;
   while (options.infos[count].probeable) ++count;
   return count;
 }();
-/// The most values that one of these has.
+/// Most choices that one of these options has.
 inline constexpr std::size_t most_choices = [] {
   std::size_t most = 0;
   for (std::size_t i = 0; i < open_options; ++i) most = std::max(most, options.infos[i].choices.size());

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Decoding ESL: everything that can be wrong with a reply, in the order in which it is looked at, and what to say about
-// it; the reading that a good one makes; and all of it as the author's layer takes it.
+// Decodes ESL replies: all checks in their order, with their texts; the reading of a valid reply; and the Protocol for
+// author's engine.
 #pragma once
 
 #include <array>
@@ -18,7 +18,7 @@ namespace absenc::esl {
 /// The first check that failed. `passed` comes first, then the checks of a frame, then those of a safe position.
 enum class Check : std::uint8_t {
   passed,
-  // of every frame
+  // checks of every frame
   length,
   channel_2_missing,
   ch1_checksum,
@@ -40,7 +40,7 @@ enum class Check : std::uint8_t {
   sequences_differ,
   redundant_position,
   encoder_ids_differ,
-  // of a safe position
+  // checks of a safe position
   not_a_safety_reply,
   ch1_not_ready,
   ch2_not_ready,
@@ -50,7 +50,7 @@ enum class Check : std::uint8_t {
   sequence_unknown,
   sequence_still,
   sequence_jumped,
-  // of a probe
+  // checks of a probe
   request_not_accepted,
 };
 
@@ -58,10 +58,10 @@ enum class Check : std::uint8_t {
 struct CheckText {
   Error error;                ///< Error of the reply.
   std::string_view sentence;  ///< The check, as a sentence.
-  std::string_view advice{};  ///< in place of the error's own
+  std::string_view advice{};  ///< advice instead of the error's own
 };
 
-/// Indexed by the enumerator.
+/// Texts of the checks, indexed by the enumerator.
 inline constexpr std::array<CheckText, 32> check_texts{{
     {Error::none, ""},
     {Error::wrong_length, "the number of bytes is not that of this reply"},
@@ -99,7 +99,7 @@ inline constexpr std::array<CheckText, 32> check_texts{{
 }};
 static_assert(check_texts.size() == static_cast<std::size_t>(Check::request_not_accepted) + 1);
 
-/// The errors alone, so that firmware does not link the sentences.
+/// Errors of the checks without their texts, so that firmware does not link the texts.
 inline constexpr std::array<Error, check_texts.size()> check_errors = [] {
   std::array<Error, check_texts.size()> errors{};
   for (std::size_t i = 0; i < errors.size(); ++i) errors[i] = check_texts[i].error;
@@ -112,7 +112,8 @@ inline constexpr std::array<Error, check_texts.size()> check_errors = [] {
 [[nodiscard]] constexpr Error error_of(Check check) { return check_errors[static_cast<std::size_t>(check)]; }
 
 namespace detail {
-// What a request of this id says, or what the reply to it says of it: unchecked, and of memory only as far as it goes.
+// Returns the content of a request of this id, or of a reply to it that echoes the request: unchecked, and for memory
+// only as far as its bytes go.
 constexpr Request split_request(const Profile& profile, DataId id, Bytes bytes, bool& busy) {
   Request request{id, address_of(bytes[0])};
   if (!is_memory_access(id) || bytes.size() < 3) return request;
@@ -124,13 +125,13 @@ constexpr Request split_request(const Profile& profile, DataId id, Bytes bytes, 
 }
 }  // namespace detail
 
-/// Whether the last byte is the 8-bit CRC of those before it.
+/// Returns whether the last byte is the 8-bit CRC of those before it.
 [[nodiscard]] constexpr bool has_checksum8(const Profile& profile, Bytes bytes) {
   return checksum8(profile.crc_bit_order, bytes.first(bytes.size() - 1)) == bytes.back();
 }
 
-/// Errors: wrong_length; unsupported (an id that Table 3 does not list); bad_checksum (parity or CRC); out_of_range
-/// (the busy bit is 0 in requests).
+/// Decodes a request. Errors: wrong_length; unsupported (an id that Table 3 does not list); bad_checksum (parity or
+/// CRC); out_of_range (the busy bit is 0 in requests).
 [[nodiscard]] constexpr Result<Request> decode_request(const Profile& profile, Bytes bytes) {
   if (bytes.empty()) return Error::wrong_length;
   const std::optional<DataId> id = data_id(bytes[0]);
@@ -145,7 +146,7 @@ constexpr Request split_request(const Profile& profile, DataId id, Bytes bytes, 
 
 namespace detail {
 
-// RS in two bytes, the lowest bit in the second; the other bits of that.
+// Decodes RS from two bytes; its lowest bit is in the second byte, whose other bits are returned.
 constexpr std::uint8_t split_redundant(RedundantBit order, Bytes bytes, Reply& reply) {
   const std::uint8_t second = from_wire(order == RedundantBit::b0, bytes[1]);
   reply.redundant = static_cast<std::uint16_t>(bytes[0] << 1 | second >> 7);
@@ -207,7 +208,7 @@ constexpr Check check_checksums(const Profile& profile, const Layout& layout, By
   if (two.empty()) return Check::both_checksums;
   if (one_holds) return Check::ch2_checksum;
   if (two_holds) return Check::ch1_checksum;
-  // Channel 2 in front of channel 1?
+  // If both CRCs fail, channel 2 may come before channel 1.
   const Bytes all(one.data(), one.size() + two.size());
   const bool swapped = checksum_holds(profile, layout.crc_bytes, Channel::two, all.first(two.size())) &&
                        checksum_holds(profile, layout.crc_bytes, Channel::one, all.subspan(two.size()));
@@ -222,7 +223,7 @@ constexpr Check check_echo(std::uint8_t asked, std::uint8_t one, std::uint8_t tw
 
 constexpr Check check_memory(const Request& request, const Reply& reply) {
   if (reply.memory_address != request.memory_address) return Check::other_memory_address;
-  // Table 10: a busy encoder answers 00, an accepted write echoes its value.
+  // Table 10: a busy encoder answers 00; an accepted write echoes its value.
   if (reply.busy) return reply.value == 0 ? Check::passed : Check::busy_with_data;
   return reply.id == DataId::write_memory && reply.value != request.value ? Check::other_value : Check::passed;
 }
@@ -248,7 +249,7 @@ constexpr Check check_content(const Profile& profile, const Layout& layout, cons
 }  // namespace detail
 
 namespace detail {
-// `asked`: the control field that was sent, also one with a wrong parity bit.
+// `asked`: the control field of the request, even with a wrong parity bit.
 constexpr Check check_reply_to(const Profile& profile, const Request& request, std::uint8_t asked, Bytes bytes,
                                Reply& reply) {
   const Layout& layout = layout_of(request.id);
@@ -271,15 +272,15 @@ constexpr Check check_reply_to(const Profile& profile, const Request& request, s
 }
 }  // namespace detail
 
-/// Checks in this order: length, checksums, echo, refusal, fixed bits, range, cross checks. `reply` is filled as soon
-/// as the checksums hold, and to be used only when the result is `passed`. A busy memory reply passes.
+/// Checks a reply in this order: length, checksums, echo, refusal, fixed bits, range, cross checks. `reply` is filled
+/// once the checksums are right; use it only if the result is `passed`. A busy memory reply passes.
 [[nodiscard]] constexpr Check check_reply(const Profile& profile, const Request& request, Bytes bytes, Reply& reply) {
   const std::uint8_t asked = control_field(profile, request.encoder_address, request.id);
   return detail::check_reply_to(profile, request, asked, bytes, reply);
 }
 
-/// A good request is a whole one with the right parity bit. Of one in which that bit alone is wrong, and of its reply:
-/// what the encoder reports, `passed` where it is something else. Without the request the reply echoes it.
+/// Returns the refusal in a reply to a request whose parity bit alone is wrong; `passed` if the request or the reply is
+/// something else. Without the request its bytes are taken from the reply, which echoes them.
 [[nodiscard]] constexpr Check check_refusal(const Profile& profile, Bytes request, Bytes bytes) {
   if (bytes.empty()) return Check::passed;
   const Bytes sent = request.empty() ? bytes : request;
@@ -303,8 +304,8 @@ constexpr Check check_reply_to(const Profile& profile, const Request& request, s
 }
 
 namespace detail {
-// The alarms of a channel with which the position within the turn is not used. SF tells LED from Lissajous: a Lissajous
-// error is a non-safety error (Table 5), and the position holds.
+// Returns the alarms of a channel with which the position within the turn is not used. SF distinguishes LED and
+// Lissajous: a Lissajous error is a non-safety error (Table 5), and the position stays valid.
 constexpr unsigned unsafe_alarms(const ChannelReply& channel) {
   constexpr std::uint8_t errors = status::safety_error | status::non_safety_error;
   const bool lissajous = (channel.status & errors) == status::non_safety_error;
@@ -312,9 +313,9 @@ constexpr unsigned unsafe_alarms(const ChannelReply& channel) {
 }
 }  // namespace detail
 
-/// The position in a good reply and what of it holds, the flags of channel 2 above those of channel 1. IDs 4, 5 and 6
-/// carry no alarms: SF alone tells then. Whether a non-safety error is one of the turns it does not say. This is not a
-/// safe position (safety.hpp).
+/// Returns the position in a valid reply with its validity; the flags of channel 2 are above those of channel 1. IDs 4,
+/// 5 and 6 carry no alarms, so SF alone decides, which does not show whether a non-safety error concerns the turns.
+/// This is not a safe position (safety.hpp).
 [[nodiscard]] constexpr Reading to_reading(DataId id, const Reply& reply) {
   const Layout& layout = layout_of(id);
   const std::uint8_t second = layout.has_two() ? reply.two.status : reply.one.status;
@@ -346,7 +347,7 @@ constexpr unsigned unsafe_alarms(const ChannelReply& channel) {
 /// Returns the reading of a reply.
 [[nodiscard]] constexpr Reading to_reading(const Reply& reply) { return to_reading(reply.id, reply); }
 
-// ---- As the author's layer takes it
+// ---- Protocol, for author's engine
 
 /// Returns whether a request selects a page of the memory.
 [[nodiscard]] constexpr bool selects_page(const Request& request) {
@@ -367,8 +368,8 @@ struct Protocol {
   static constexpr author::HostTimes host_times(const Profile&) {
     return {.answer_limit = answer_limit, .gap_limit = gap_limit, .pause = request_pause};
   }
-  /// A page change that was not answered well may be going on all the same, and so may the reading of an EEPROM byte:
-  /// neither a repetition nor whoever comes next may meet it.
+  /// After a page change without a valid reply, or while an EEPROM byte is being fetched, the encoder is busy: neither
+  /// a repetition nor the next request may be sent.
   static constexpr author::Manner manner(const Profile&, const Request& request) {
     const Time busy = selects_page(request) ? page_time : is_memory_access(request.id) ? eeprom_read_pause : Time{};
     return {.pause = busy, .hold = busy};
@@ -386,7 +387,8 @@ struct Protocol {
   static constexpr auto decode = decode_reply;  ///< Returns the reply with all checks done, or the first error.
   /// Returns the position of a reply.
   static constexpr Reading reading(const Profile& profile, const Request& request, const Reply& reply) {
-    Reading reading = to_reading(request.id, reply);  // by the request, which may be known when the program is written
+    // By the request's id, which may be known when the program is written.
+    Reading reading = to_reading(request.id, reply);
     if (!profile.turns) reading.multiturn_bits = 0;
     if (!profile.turns) reading.multiturn_valid = false;
     return reading;
@@ -400,7 +402,7 @@ struct Protocol {
   static constexpr auto latched = latch_time;  ///< Returns when the encoder latched the position.
 };
 
-/// Of a profile that is known when the program is written, by a request that is: `static constexpr Profile
+/// Reads a position with profile and request known when the program is written: `static constexpr Profile
 /// profile{...};` and `static constexpr Request request{...};`.
 template <const Profile& profile, const Request& request>
 using ReadKnownPosition = author::ReadKnownPosition<Protocol, profile, request>;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Resets of alarms, turns and zero, against the virtual QS35 in virtual time.
+// Resets of alarms, turns and zero, with the virtual QS35 in virtual time.
 #include <gtest/gtest.h>
 
 #include <tuple>
@@ -39,7 +39,7 @@ TEST(EslReset, Resets) {
   EXPECT_EQ(bench.read().multiturn, 0u);
 }
 
-// Between the looks 10 ms, between the eight requests 40 us from start to start, then the time of the EEPROM.
+// 10 ms between the positions, 40 us between the eight requests from start to start, then the EEPROM's write time.
 TEST(EslReset, TheTimesOfAReset) {
   for (const auto& [command, id, last] :
        {std::tuple{"zero", DataId::zero, Time(7ms)}, std::tuple{"reset-multiturn", DataId::reset_multiturn, Time(7ms)},
@@ -111,7 +111,7 @@ TEST(EslReset, AResetOnATurningShaftOrAStartingEncoderIsNotSent) {
     const Told zero = bench.run("zero");
     EXPECT_EQ(zero.error, Error::not_still);
     EXPECT_TRUE(zero.says("nothing was changed"));
-    EXPECT_EQ(bench.encoder.answer_count(), 2u);  // it only looked
+    EXPECT_EQ(bench.encoder.answer_count(), 2u);  // only two positions were read
   }
   Bench starting;
   starting.restart(testing::PowerOn::real);
@@ -120,7 +120,7 @@ TEST(EslReset, AResetOnATurningShaftOrAStartingEncoderIsNotSent) {
   EXPECT_TRUE(zero.says("not ready"));
 }
 
-// The zero would be wrong for ever: it is in the EEPROM.
+// The zero would be wrong for ever, because it is in the EEPROM.
 TEST(EslReset, AZeroOfAPositionThatDoesNotHoldIsNotSent) {
   Bench bench;
   bench.shaft.put(7, 1'000'000);
@@ -132,7 +132,7 @@ TEST(EslReset, AZeroOfAPositionThatDoesNotHoldIsNotSent) {
   EXPECT_EQ(bench.encoder.memory_version(), 0u);
 }
 
-// Replies 0 and 1 are looks, 2 to 9 answer the requests, 10 and, when they fail, 11 and 12 are the verification.
+// Replies 0 and 1 are positions, 2 to 9 answer the reset, 10 is the verification, and 11 and 12 are its repetitions.
 TEST(EslReset, ALostReplyStopsAResetUnlessItIsTheLast) {
   struct Row {
     unsigned first;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Positions that passed every check a reader of IDs 1 and 2 can make. This is not a certified safety function:
-// README.md lists what the checks cannot see.
+// Positions that passed every check that a reader of IDs 1 and 2 can make. This is not a certified safety function:
+// README.md lists what the checks cannot detect.
 #pragma once
 
 #include <optional>
@@ -11,14 +11,14 @@ namespace absenc::esl {
 
 class SafetyMonitor;
 
-/// Only a SafetyMonitor makes one. The turns are not part of it: they exist in channel 1 alone.
+/// A safe position, which only a SafetyMonitor constructs. It has no turns, because only channel 1 has them.
 class SafePosition {
  public:
-  /// Counts, 0 to 2^24 - 1. Its top 9 bits are confirmed by channel 2, within the profile's tolerance.
+  /// Returns counts, 0 to 2^24 - 1. Channel 2 confirms the top 9 bits, within the profile's tolerance.
   [[nodiscard]] constexpr std::uint32_t singleturn() const { return singleturn_; }
   /// Returns the address of the encoder.
   [[nodiscard]] constexpr std::uint8_t encoder_address() const { return encoder_address_; }
-  /// When the encoder took the position.
+  /// Returns when the encoder latched the position.
   [[nodiscard]] constexpr Time latched() const { return latched_; }
 
  private:
@@ -37,23 +37,23 @@ struct SafetyVerdict {
   Check failed = Check::passed;            ///< The check that failed.
 };
 
-/// Judges the replies of one encoder, one after the other, from the bytes as they came.
+/// Judges the consecutive replies of one encoder from their bytes.
 ///
-/// The sequence counter proves something only against an earlier reply. After the start, and after anything that went
-/// wrong, the first good reply therefore makes no safe position, and the one after it must answer the other of the two
-/// IDs (`next_id`): a line that hands out each reply one cycle late shows by the wrong echo.
+/// The sequence counter proves something only against an earlier reply. After the start, and after any error, the first
+/// valid reply therefore gives no safe position, and the next one must answer the other of the two IDs (`next_id`): a
+/// line that delivers each reply one cycle late is detected by the wrong echo.
 class SafetyMonitor {
  public:
   /// Judges replies of this profile.
   constexpr explicit SafetyMonitor(const Profile& profile) : profile_(profile) {}
 
-  /// Which ID to ask; `wanted` once the monitor trusts the line.
+  /// Returns the id of the next request; `wanted` once the monitor trusts the line.
   [[nodiscard]] constexpr DataId next_id(DataId wanted = DataId::position) const {
     if (trust_ == Trust::full) return wanted;
     return last_id_ == DataId::position ? DataId::singleturn : DataId::position;
   }
 
-  /// `sent_at`, the end of the request, dates the position.
+  /// Judges a reply. `sent_at`, the end of the request, gives the time of the position.
   constexpr SafetyVerdict judge(const Request& request, Bytes bytes, Time sent_at) {
     Reply reply;
     Check check = check_reply(profile_, request, bytes, reply);
@@ -68,13 +68,13 @@ class SafetyMonitor {
     return {.position = SafePosition(reply, latch_time(profile_, sent_at))};
   }
 
-  /// A request was sent and no reply came.
+  /// Notes that a request was sent without a reply.
   constexpr void missed(const Request& request) {
     trust_ = Trust::none;
     last_id_ = request.id;
   }
 
-  /// Another request than IDs 1 and 2 was answered by this encoder.
+  /// Notes that this encoder answered another request than IDs 1 and 2.
   constexpr void other_exchange(DataId id) {
     if (profile_.sequence_step == SequenceStep::request || has_sequence(id)) ++step_;
   }
@@ -114,7 +114,7 @@ class SafetyMonitor {
   DataId last_id_ = DataId::position;
   DataId baseline_id_ = DataId::position;
   std::uint8_t last_sequence_ = 0;
-  std::uint8_t step_ = 1;  // how far the counter has to move until the next reply
+  std::uint8_t step_ = 1;  // how far the counter must move until the next reply
 };
 
 }  // namespace absenc::esl

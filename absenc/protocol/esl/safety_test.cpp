@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// What can become a safe position: every single fault of one channel, every small error of the wire, replays and
-// delays. For each kind the number that was accepted although it was wrong is printed; README.md says which the checks
-// cannot see, and why.
+// Campaign of faults against safe positions: each single fault of one channel, each small error of the wire, replays
+// and delays. The number of wrong but accepted positions is printed for each kind; README.md states which the checks
+// cannot detect, and why.
 #include "absenc/protocol/esl/safety.hpp"
 
 #include <gtest/gtest.h>
@@ -21,7 +21,7 @@ namespace {
 
 using testing::Wire;
 
-/// What is wrong inside the encoder: conditions with their values.
+/// Faults inside the encoder: conditions with their values.
 using Faults = std::vector<std::pair<condition::Index, std::int64_t>>;
 
 static_assert(!std::is_default_constructible_v<SafePosition>);
@@ -32,7 +32,7 @@ void print(const char* kind, unsigned tried, unsigned accepted) {
   std::printf("%-58s %7u tried %6u accepted\n", kind, tried, accepted);
 }
 
-/// An encoder with its monitor and no line: its replies as bytes, some position apart each time.
+/// An encoder with its monitor and without a line: it gives its replies as bytes, at another position each time.
 class Monitored {
  public:
   explicit Monitored(const Profile& profile = {}) : profile_(profile), encoder(profile, shaft), monitor(profile) {
@@ -113,7 +113,7 @@ TEST(EslSafety, EveryCheckIsNamed) {
     const SafetyVerdict verdict = pair.next();
     EXPECT_EQ(verdict.failed, row.failed) << text_of(verdict.failed).sentence << " / " << text_of(row.failed).sentence;
     EXPECT_FALSE(verdict.position.has_value());
-    // One good reply is not enough afterwards.
+    // After an error one valid reply is not enough.
     pair.heal();
     EXPECT_EQ(pair.next().failed, Check::sequence_unknown);
     EXPECT_EQ(pair.next().failed, Check::passed);
@@ -137,7 +137,7 @@ TEST(EslSafety, OtherRepliesAreCountedAsTheProfileSays) {
       pair.monitor.other_exchange(other);
       EXPECT_EQ(pair.next().failed, Check::passed) << static_cast<int>(step) << " " << static_cast<int>(other);
     }
-    pair.reply_to(DataId::position);  // lost
+    pair.reply_to(DataId::position);  // this reply is lost
     EXPECT_EQ(pair.next().failed, step == SequenceStep::change ? Check::passed : Check::sequence_jumped);
   }
   EXPECT_EQ(Monitored().judge(DataId::singleturn_short, {}).failed, Check::length);
@@ -145,7 +145,7 @@ TEST(EslSafety, OtherRepliesAreCountedAsTheProfileSays) {
 
 // ---- The campaign
 
-// One channel wrong from some moment on: how many are accepted, and how far off they are.
+// Counts the accepted replies while one channel is wrong, and their largest error.
 unsigned accepted_with(condition::Index index, std::int64_t value, unsigned exchanges, std::int64_t& off) {
   Monitored pair;
   pair.trust();
@@ -161,7 +161,7 @@ unsigned accepted_with(condition::Index index, std::int64_t value, unsigned exch
 }
 
 TEST(EslSafetyCampaign, StuckCountersAndPositionsOfOneChannel) {
-  constexpr unsigned each = 600;  // more than the counters take to come round
+  constexpr unsigned each = 600;  // more exchanges than the counters take to wrap
   for (const bool second : {false, true}) {
     const auto of_it = [second](condition::Index first) {
       return static_cast<condition::Index>(first + (second ? 1 : 0));
@@ -171,7 +171,8 @@ TEST(EslSafetyCampaign, StuckCountersAndPositionsOfOneChannel) {
     unsigned accepted = 0;
     for (unsigned value = 0; value < 256; value += 17)
       accepted += accepted_with(of_it(condition::ch1_sequence), value, each, off);
-    // The other channel comes by the stuck value once in 128 replies: that one reply is a good one, but trust is gone.
+    // The other channel's counter equals the stuck one once in 128 replies: that reply is valid, but the monitor's
+    // trust is lost.
     print("stuck sequence counter", 16 * each, accepted);
     EXPECT_EQ(accepted, 0u);
     unsigned tried = 0;
@@ -196,7 +197,8 @@ TEST(EslSafetyCampaign, StuckCountersAndPositionsOfOneChannel) {
   EXPECT_EQ(accepted, 0u);
 }
 
-// A reply of ID 1: which byte is what, and which of its bits the checks see when it is stuck before the CRC is taken.
+// The bytes of a reply to ID 1, and the bits of each that the checks detect when they are stuck before the CRC is
+// computed.
 struct StuckField {
   const char* name;
   std::size_t byte;
@@ -209,7 +211,7 @@ constexpr std::array<StuckField, 14> stuck_fields{{
     {"SF1", 1, seen_status},
     {"ALM1", 2, alarms::unsafe},
     {"ABS0", 3, 0},  // below the resolution of channel 2
-    {"ABS1", 4, 0},  // its top bit is the lowest of RS: within the tolerance
+    {"ABS1", 4, 0},  // its top bit is the lowest of RS, which is within the tolerance
     {"ABS2", 5, 0xFF},
     {"ABM0", 6, 0},  // no part of a safe position
     {"ABM1", 7, 0},
@@ -218,10 +220,10 @@ constexpr std::array<StuckField, 14> stuck_fields{{
     {"SF2", 12, seen_status},
     {"ALM2", 13, alarms::unsafe},
     {"RS0", 14, 0xFF},
-    {"RS1, SC2", 15, 0x7F},  // RS1: within the tolerance
+    {"RS1, SC2", 15, 0x7F},  // RS1 is within the tolerance
 }};
 
-// The reply with one bit stuck, the CRC of its channel right.
+// Returns the reply with one bit stuck and the CRC of its channel right.
 Wire stuck(Wire reply, std::size_t byte, unsigned bit, bool value) {
   const auto mask = static_cast<std::uint8_t>(1u << bit);
   reply[byte] = static_cast<std::uint8_t>(value ? reply[byte] | mask : reply[byte] & ~mask);
@@ -235,7 +237,7 @@ Wire stuck(Wire reply, std::size_t byte, unsigned bit, bool value) {
   return reply;
 }
 
-// Counted is what was accepted although a byte of the reply was not what it should have been.
+// Counts accepted replies with a wrong byte.
 TEST(EslSafetyCampaign, EveryBitOfEveryFieldStuckAt0AndAt1) {
   sim::Random random(7);
   for (const StuckField& field : stuck_fields) {
@@ -320,7 +322,7 @@ TEST(EslSafetyCampaign, SmallErrorsAndSwapsOfAnId1Reply) {
   EXPECT_EQ(cut, 0u);
 }
 
-// Replies of the past: the last one again and again, one of `age` replies ago, and a line that is late.
+// Replies of the past: the last one repeated, one of `age` replies ago, and a line that delays replies.
 TEST(EslSafetyCampaign, ReplaysAndDelays) {
   for (const SequenceStep step : {SequenceStep::change, SequenceStep::safety}) {
     std::printf("sequence_step=%s:\n", step == SequenceStep::change ? "change" : "safety");
@@ -351,7 +353,7 @@ TEST(EslSafetyCampaign, ReplaysAndDelays) {
     print(step == SequenceStep::change ? "an older reply once (cannot be seen)" : "an older reply once", 990, older);
     EXPECT_EQ(older, step == SequenceStep::change ? 990u : 0u);
 
-    // From some moment on every reply comes one cycle late: the first cycle has none.
+    // From a certain moment on every reply is one cycle late; the first cycle has none.
     unsigned late = 0;
     pair.trust();
     Wire held = pair.reply_to(pair.monitor.next_id());
@@ -367,7 +369,7 @@ TEST(EslSafetyCampaign, ReplaysAndDelays) {
   }
 }
 
-// What is left when random bytes come instead of a reply of the right length: 2^-32 for the CRCs alone.
+// Random bytes of the right length that are accepted: 2^-32 by the CRCs alone.
 TEST(EslSafetyCampaign, NoiseOfTheRightLength) {
   sim::Random random(1);
   Monitored pair;
@@ -384,7 +386,8 @@ TEST(EslSafetyCampaign, NoiseOfTheRightLength) {
   EXPECT_EQ(accepted, 0u);
 }
 
-// Over a line with every kind of fault: what the command calls safe is where the shaft stands, and not unsafe.
+// A line with every kind of fault: each position that the command reports as safe is the shaft's, and no unsafe one is
+// reported.
 TEST(EslSafetyCampaign, SafePositionsOverABadLine) {
   const sim::FaultRates rates = sim::testing::damaged_replies(0.1);
   sim::Random random(1);

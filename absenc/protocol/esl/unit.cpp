@@ -28,7 +28,7 @@ constexpr std::array<Argument, 1> page_arguments{{{"page", "0 to 6, 8 or 14", 0,
 
 constexpr std::uint8_t byte_of(std::int64_t argument) { return static_cast<std::uint8_t>(argument); }
 
-// ---- Commands: the one request that does the work of each; procedures send more (page select, repetitions)
+// ---- Commands: the one request that does the work; procedures send more (page select, repetitions)
 
 template <DataId data>
 constexpr Request ask(const Profile& profile, Arguments) {
@@ -58,10 +58,9 @@ constexpr std::string_view no_turns(const Profile& profile) {
   return profile.turns ? "" : "an encoder of one turn counts none (turns=false); nothing was sent";
 }
 
-// ---- What is said of errors
+// ---- Errors
 
-// Without the request the reply's own control field says what was asked; the address of a memory access is taken as it
-// comes.
+// Without the request the reply's own control field gives it; the address of a memory access is that of the reply.
 constexpr Result<Request> asked_by(const Profile& profile, Bytes request, Bytes reply) {
   if (!request.empty()) return decode_request(profile, request);
   const auto id = data_id(reply[0]);
@@ -70,7 +69,7 @@ constexpr Result<Request> asked_by(const Profile& profile, Bytes request, Bytes 
   return detail::split_request(profile, *id, reply, busy);
 }
 
-// The check behind `error`; `passed` where the error is none of the frame's.
+// Returns the check behind `error`; `passed` if the error is not one of the frame.
 Check check_behind(const Profile& profile, Error error, Bytes request, Bytes reply) {
   if (reply.empty()) return Check::passed;
   if (const Check refusal = check_refusal(profile, request, reply); refusal != Check::passed) return refusal;
@@ -81,7 +80,7 @@ Check check_behind(const Profile& profile, Error error, Bytes request, Bytes rep
   return error_of(check) == error ? check : Check::passed;
 }
 
-// ---- What is shown, of frames and of what procedures find
+// ---- Reports of frames and of procedures' results
 
 constexpr Shown values_of_request(const Profile& profile, const Request& request) { return {profile, request}; }
 constexpr Shown values_of_reply(const Profile& profile, const Request&, const Reply& reply) {
@@ -109,7 +108,7 @@ void put_nodes(FieldSink& sink, const Profile&, const Nodes& nodes) {
     if (reply) sink.put_reading(to_reading(*reply));
   }
 }
-// Of the last exchange, and which profile would make its reply good.
+// Explains the last exchange, and names a profile under which its reply would be valid.
 void tell(Sentence& words, const HostOf<Protocol>& host) {
   const Profile& profile = host.format();
   const Bytes request = host.exchange().sent;
@@ -135,7 +134,7 @@ void tell(Sentence& words, const HostOf<Protocol>& host) {
 }
 Explanation explain_reply(const Profile& profile, Error error, Bytes request, Bytes reply) {
   const Check check = check_behind(profile, error, request, reply);
-  if (check == Check::length) return {};  // the error says all of it
+  if (check == Check::length) return {};  // the error's own text is enough
   return {.detail = text_of(check).sentence};
 }
 
@@ -195,7 +194,7 @@ constexpr auto commands = std::array{
         .unless(no_memory),
 };
 
-// ---- What is declared
+// ---- Declaration
 
 template <Channel channel>
 constexpr const FieldInfo* status_of = fields.of<detail::in<channel, part::status, &ChannelReply::status>>();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// ESL as the neutral layers see it.
+// The unit of ESL, for the neutral layers.
 #pragma once
 
 #include "absenc/protocol/unit.hpp"

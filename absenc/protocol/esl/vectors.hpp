@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// ESL frames with their source. Each is decoded at compile time: a broken frame does not build.
+// ESL frames with their sources. Each is decoded at compile time, so a wrong frame does not build.
 #pragma once
 
 #include <array>

@@ -29,7 +29,7 @@ struct RawHost final : sim::testing::RawHost {
   explicit RawHost(Wire request, Time at = {}) : sim::testing::RawHost(std::move(request), 100us, 12us, at) {}
 };
 
-/// Refusals in place of these replies.
+/// Replaces the replies `from` to `to` by refusals.
 inline Tamper refuse(unsigned from, unsigned to, std::uint8_t alarm) {
   return [=](unsigned index, Wire& reply) {
     if (index >= from && index < to) reply = wire(Reply{.status = alarm, .encoder_id = 0x11});

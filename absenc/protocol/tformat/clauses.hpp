@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the document demands of the encoder, with the place that says so.
+// Demands of the document on encoder and host, with their paragraphs.
 #pragma once
 
 #include <array>
@@ -9,7 +9,7 @@
 
 namespace absenc::tformat {
 
-/// What a reset clears. Over-heat is raised again as long as it is hot.
+/// Alarms that a reset clears, except over-heat, which returns as long as the encoder is hot.
 inline constexpr std::int64_t latched_alarms = alarms::latched & ~alarms::over_heat;
 
 /// Clauses of the document for the encoder.
@@ -107,7 +107,7 @@ inline constexpr auto clauses = std::array{
            .verb = Verb::reset_multiturn},
 };
 
-// ---- What hosts do that break a clause, or are about one
+// ---- Steps of hosts that break a clause, or show its case
 
 namespace script {
 using std::chrono::microseconds;

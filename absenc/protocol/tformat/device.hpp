@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A virtual Smart-Abs: answers like paragraphs 6 to 10 of the specification say, and lists the rules its host breaks.
+// A virtual Smart-Abs: answers as paragraphs 6 to 10 of the specification state, and lists the rules that its host
+// breaks.
 #pragma once
 
 #include <array>
@@ -35,7 +36,7 @@ inline constexpr author::PagedMemory paged_memory{
 /// A virtual encoder.
 class VirtualEncoder final : public author::PagedMemoryDevice {
  public:
-  /// Switched off until `power_on`. `shaft` must outlive the encoder.
+  /// Constructs an encoder that is off until `power_on`. `shaft` must outlive it.
   VirtualEncoder(const Format& format, const Shaft& shaft)
       : PagedMemoryDevice(Protocol::device_times(format), paged_memory), format_(format), shaft_(&shaft) {
     if (format_.encoder_id < 0) format_.encoder_id = 0x11;
@@ -45,7 +46,7 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
   }
   [[nodiscard]] MutableBytes memory() override { return memory_; }
 
-  /// EEPROM writes since it was made: of 100 000 in total (6.1.1).
+  /// Returns the EEPROM writes so far, of 100 000 permitted in total (6.1.1).
   [[nodiscard]] std::uint32_t writes() const { return writes_; }
   void raise_alarms(std::uint32_t bits) override {
     latches_ |= static_cast<std::uint8_t>(bits & (alarms::latched | alarms::counting_error));
@@ -62,7 +63,7 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
     if (is_on(now)) update(now);
     if (off_) watch_battery();
   }
-  /// What an ID 3 reply would say now.
+  /// Returns the reply to ID 3 at this time.
   [[nodiscard]] Reply everything(Time now) const {
     const std::uint64_t mask = low_mask(format_.singleturn_bits);
     const std::uint8_t almc = alarms_now();
@@ -85,8 +86,8 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
     } else {
       counter_lap_ = lap(now);
     }
-    // Without battery nothing counted the turns, also where it has come back since. Over_speed and counter_overflow are
-    // indefinite then: here, clear. Over_heat does not need the battery (6.5).
+    // Without a battery nothing counted the turns, even if a battery is connected again. Over_speed and
+    // counter_overflow are indefinite then; this encoder clears them. Over_heat does not need the battery (6.5).
     if (battery_lost_) {
       latches_ = static_cast<std::uint8_t>((latches_ & alarms::over_heat) | alarms::battery_error);
       set_turns(0, now);
@@ -111,10 +112,10 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
   }
 
  private:
-  static constexpr std::int32_t battery_error_voltage = 2750;  // mV, typical: this or less (5.4, 6.5)
+  static constexpr std::int32_t battery_error_voltage = 2750;  // mV, typical: this voltage or less (5.4, 6.5)
   static constexpr std::int32_t battery_alarm_voltage = 3100;
   static constexpr std::int32_t full_absolute_speed = 100'000;   // 1/1000 rpm (5.4.1)
-  static constexpr std::int32_t standing_still = 1'000;          // 1/1000 rpm: what a servo at rest may tremble
+  static constexpr std::int32_t standing_still = 1'000;          // 1/1000 rpm: trembling of a servo at rest
   static constexpr std::int32_t power_off_speed = 6'000'000;     // 1/1000 rpm (5.4.2)
   static constexpr std::int32_t power_off_acceleration = 4'000;  // rad/s^2
   static constexpr std::int32_t power_off_timer_acceleration = 80'000;
@@ -140,8 +141,8 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
     reply.append(encode_reply(*made).view());
     return Answer::sent;
   }
-  // It looks for the next start where there is none (8.1); where the frame ends is not known otherwise: a missing start
-  // bit tells (8.2, 9.2).
+  // The encoder searches for the next start bit if there is none (8.1). The end of such a frame is unknown, so a
+  // missing start bit ends it (8.2, 9.2).
   bool is_refused(Flaw flaw, Bytes heard) override {
     if (flaw == Flaw::unknown && !has_sync_code(heard[0])) return false;
     if (flaw == Flaw::unknown && heard[0] != control_field(heard[0] >> 3)) refused_status_ |= status::parity_error;
@@ -160,8 +161,8 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
     if (!is_reset(request.id)) end_resets();
     if (is_memory_access(request.id)) return access_memory(request, at);
     Reply reply = everything(at);
-    reply.id = request.id;                                  // encoding takes what this id carries
-    if (is_reset(request.id)) count_reset(request.id, at);  // the tenth still shows the old errors
+    reply.id = request.id;                                  // encoding uses the fields that this id carries
+    if (is_reset(request.id)) count_reset(request.id, at);  // the tenth reply still shows the old alarms
     return reply;
   }
 
@@ -191,7 +192,7 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
 
   // ---- Resets
 
-  // What is sent too fast does not count, but was sent.
+  // A request that was sent too fast does not count for the reset, but it was sent.
   void end_resets() {
     if (resets_sent_ > 0 && resets_sent_ < reset_requests) note(false, ten_rule);
     reset_count_ = resets_sent_ = 0;
@@ -225,15 +226,15 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
   [[nodiscard]] std::uint32_t zero() const {
     return static_cast<std::uint32_t>(load_little_endian(Bytes(memory_).subspan(zero_at, 4)));
   }
-  // Counts since the shaft's own zero, the programmed zero taken off.
+  // Returns counts since the zero of the shaft, minus the programmed zero.
   [[nodiscard]] std::int64_t counts(Time now) const {
     return (shaft_->at(now).position >> (32 - format_.singleturn_bits)) - zero();
   }
-  // As if the turn counter had no end.
+  // Returns the turns as if the counter had no end.
   [[nodiscard]] std::int64_t turns(Time now) const { return (counts(now) >> format_.singleturn_bits) - turn_offset_; }
-  // A single-turn encoder has no counter that could run over, or miss a turn.
+  // Returns whether there is a turn counter, which can overflow or miss a turn; single-turn encoders have none.
   [[nodiscard]] bool counts_turns() const { return format_.multiturn_bits != 0; }
-  // How often the turn counter has gone round.
+  // Returns how often the turn counter has overflowed.
   [[nodiscard]] std::int64_t lap(Time now) const { return turns(now) >> format_.multiturn_bits; }
   void set_turns(std::int64_t turns, Time now) {
     turn_offset_ = (counts(now) >> format_.singleturn_bits) - turns;
@@ -245,12 +246,12 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
     if (battery_now() <= battery_alarm_voltage) bits |= alarms::battery_alarm;
     return static_cast<std::uint8_t>(bits);
   }
-  // Brings everything that changes with time up to now.
+  // Updates everything that changes with time.
   void update(Time now) {
     if (zero_pending_ && now >= written_at()) write_zero();
     if (magnitude(shaft_->at(now).speed_millirpm) < full_absolute_speed) full_absolute_ = false;
 
-    // A whole lap between two requests goes unnoticed when it is undone before the next.
+    // A whole lap of the counter between two requests is not detected if it is undone before the next request.
     const std::int64_t lap_now = lap(now);
     if (lap_now != counter_lap_ && counts_turns()) latches_ |= alarms::counter_overflow;
     counter_lap_ = lap_now;
@@ -258,7 +259,7 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
     const std::uint8_t threshold = memory_[threshold_at];
     if ((threshold & 0x80) != 0 && conditions_[temperature] > (threshold & 0x7F)) latches_ |= alarms::over_heat;
   }
-  // The turns stay.
+  // Sets the zero and leaves the turns unchanged.
   void write_zero() {
     zero_pending_ = false;
     const std::uint64_t zeroed = static_cast<std::uint64_t>(zero_request_) & low_mask(format_.singleturn_bits);
@@ -271,12 +272,12 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
 
   [[nodiscard]] std::int64_t battery_now() const { return format_.battery ? conditions_[battery_voltage] : 0; }
   [[nodiscard]] bool has_battery() const { return battery_now() > battery_error_voltage; }
-  // While the power is off: however short the battery was away, it is told afterwards (6.5).
+  // Notes, while the power is off, that the battery failed: even a short failure is reported afterwards (6.5).
   void watch_battery() { battery_lost_ = battery_lost_ || !has_battery(); }
 
   void started(Time at) override { full_absolute_ = magnitude(shaft_->at(at).speed_millirpm) >= full_absolute_speed; }
-  // What happened to the turns while only the battery counted them (5.4.2): looked at every 10 ms, but at no more than
-  // 10 000 points of a long pause.
+  // Counts the turns while only the battery supplies the counter (5.4.2): checks the motion every 10 ms, but at no more
+  // than 10 000 points of a long pause.
   void count_on_battery(Time from, Time now) {
     if (!counts_turns()) return;
     const Time step = std::max(Time(10ms), (now - from) / 10'000);
@@ -285,7 +286,7 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
       const std::int32_t limit = at - from < power_off_timer ? power_off_timer_acceleration : power_off_acceleration;
       if (magnitude(state.speed_millirpm) <= power_off_speed && magnitude(state.acceleration) <= limit) continue;
       latches_ |= alarms::over_speed;
-      ++turn_offset_;  // a turn was missed: the flag means that the count is wrong
+      ++turn_offset_;  // one turn is missed: the flag means that the count is wrong
       return;
     }
   }
@@ -299,19 +300,19 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
   std::array<std::uint8_t, memory_size> memory_{};
   std::uint32_t writes_ = 0;
 
-  std::optional<Time> off_since_{};  // none: it was never on before, or is
+  std::optional<Time> off_since_{};  // none: it was never on, or it is on
   bool off_ = true;
-  bool battery_lost_ = false;  // since it was switched off
+  bool battery_lost_ = false;  // since the last power off
 
   std::int64_t turn_offset_ = 0;  // subtracted from the turns of the shaft
-  std::int64_t counter_lap_ = 0;  // which lap of the turn counter was seen last
+  std::int64_t counter_lap_ = 0;  // lap of the turn counter at the last update
   std::uint8_t latches_ = 0;
-  std::uint8_t forced_ = 0;  // unlatched alarms raised from outside
+  std::uint8_t forced_ = 0;  // unlatched alarms that tests and users raised
   bool full_absolute_ = false;
 
   bool zero_pending_ = false;
-  std::int64_t zero_request_ = 0;  // counts to become zero when the EEPROM is written
-  std::int64_t zero_turns_ = 0;    // to be kept then
+  std::int64_t zero_request_ = 0;  // counts that become zero when the EEPROM is written
+  std::int64_t zero_turns_ = 0;    // turns that stay unchanged then
 
   DataId reset_id_{};
   unsigned reset_count_ = 0;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The alarms of the virtual Smart-Abs (6.5), its battery and its power.
+// Alarms of the virtual Smart-Abs (6.5), its battery and its power.
 #include <gtest/gtest.h>
 
 #include "absenc/protocol/tformat/bench_test.hpp"
@@ -36,7 +36,7 @@ TEST(TformatDevice, CounterOverflowGoesOnModulo65536) {
   bench.shaft.put(65536, 5);
   EXPECT_EQ(bench.everything().alarms, alarms::counter_overflow);
   EXPECT_EQ(bench.everything().multiturn, 0u);
-  EXPECT_EQ(bench.everything().status, 0);  // SF does not show it
+  EXPECT_EQ(bench.everything().status, 0);  // SF does not show full_absolute_status
   bench.restart();
   EXPECT_EQ(bench.everything().alarms, alarms::counter_overflow);
 }
@@ -49,11 +49,11 @@ TEST(TformatDevice, FullAbsoluteStatusClearsBelow100Rpm) {
   bench.encoder.power_on(bench.line.now(), PowerOn::skip);
   const Reply fast = bench.everything();
   EXPECT_EQ(fast.alarms, alarms::full_absolute_status);
-  EXPECT_EQ(fast.singleturn & 0xFFF, 0u);  // only the top 5 bits hold
+  EXPECT_EQ(fast.singleturn & 0xFFF, 0u);  // only the top 5 bits are valid
   bench.shaft.spin(99, bench.line.now());
   EXPECT_EQ(bench.everything().alarms, 0);
   bench.shaft.spin(3000, bench.line.now());
-  EXPECT_EQ(bench.everything().alarms, 0);  // it arises at power on only
+  EXPECT_EQ(bench.everything().alarms, 0);  // full_absolute_status arises at power on only
 }
 
 TEST(TformatDevice, BatteryFlags) {
@@ -62,15 +62,15 @@ TEST(TformatDevice, BatteryFlags) {
   bench.condition(battery_voltage, 3050);
   EXPECT_EQ(bench.everything().alarms, alarms::battery_alarm);
   bench.condition(battery_voltage, 3600);
-  EXPECT_EQ(bench.everything().alarms, 0);  // not latched
+  EXPECT_EQ(bench.everything().alarms, 0);  // battery_alarm is not latched
   bench.condition(battery_voltage, 2600);
-  bench.encoder.power_on(bench.line.now(), PowerOn::skip);      // it is on
-  EXPECT_EQ(bench.everything().alarms, alarms::battery_alarm);  // battery_error arises with the power off only
+  bench.encoder.power_on(bench.line.now(), PowerOn::skip);      // the encoder is on already
+  EXPECT_EQ(bench.everything().alarms, alarms::battery_alarm);  // battery_error arises only while the power is off
   bench.restart();
   const Reply lost = bench.everything();
   EXPECT_EQ(lost.alarms, alarms::battery_alarm | alarms::battery_error);
   EXPECT_FALSE(to_reading({}, lost).multiturn_valid);
-  EXPECT_EQ(lost.multiturn, 0u);  // nothing counted them
+  EXPECT_EQ(lost.multiturn, 0u);  // no battery counted the turns
   bench.condition(battery_voltage, 3600);
   reset(bench, DataId::reset_multiturn);
   EXPECT_EQ(bench.everything().alarms, 0);
@@ -104,15 +104,15 @@ TEST(TformatDevice, ABatteryThatWasAwayWhileThePowerWasOffIsTold) {
   EXPECT_EQ(bench.everything().multiturn, 0u);
   reset(bench, DataId::reset_multiturn);
   bench.restart();
-  EXPECT_EQ(bench.everything().alarms, 0);  // it has been there since
-  // Changed while the power was on: nothing was lost.
+  EXPECT_EQ(bench.everything().alarms, 0);  // the battery has been connected since power on
+  // The battery fails while the power is on, so no turns are lost.
   bench.condition(battery_voltage, 0);
   bench.condition(battery_voltage, 3600);
   bench.restart();
   EXPECT_EQ(bench.everything().alarms, 0);
 }
 
-// Of over_heat 6.5 says the same with a battery and without; over_speed and counter_overflow are "indefinite".
+// For over_heat 6.5 states the same with and without a battery; over_speed and counter_overflow are "indefinite".
 TEST(TformatDevice, OverHeatIsLatchedWithoutABattery) {
   Bench bench;
   bench.condition(battery_voltage, 0);
@@ -160,7 +160,7 @@ TEST(TformatDevice, OverSpeedArisesWhileTheBatteryCounts) {
   bench.encoder.power_on(bench.line.now(), PowerOn::skip);
   const Reply reply = bench.encoder.everything(bench.line.now());
   EXPECT_EQ(reply.alarms & alarms::over_speed, alarms::over_speed);
-  EXPECT_EQ(reply.multiturn, (bench.shaft.at(bench.line.now()).position >> 32) - 1);  // the count is wrong
+  EXPECT_EQ(reply.multiturn, (bench.shaft.at(bench.line.now()).position >> 32) - 1);  // one turn is missing
 }
 
 // 5.4.2: for the first five seconds without power the counter follows a faster jolt.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The virtual Smart-Abs against the paragraphs of its specification, asked by hand-made bytes.
+// The virtual Smart-Abs against the paragraphs of its specification, with requests written as bytes.
 #include "absenc/protocol/tformat/device.hpp"
 
 #include <gtest/gtest.h>
@@ -35,14 +35,14 @@ TEST(TformatDevice, CountsRoundTheTurnAndBelowZero) {
   const Reply reply = bench.everything();
   EXPECT_EQ(reply.singleturn, 0x1FFFFu);
   EXPECT_EQ(reply.multiturn, 0xFFFFu);
-  EXPECT_EQ(reply.alarms, alarms::counter_overflow);  // it came from 0
+  EXPECT_EQ(reply.alarms, alarms::counter_overflow);  // the counter started at 0
 
   testing::TestShaft below_zero;
   below_zero.put(-1, 0);
   VirtualEncoder encoder({}, below_zero);
   encoder.power_on(Time{}, PowerOn::skip);
   EXPECT_EQ(encoder.everything(Time{}).multiturn, 0xFFFFu);
-  EXPECT_EQ(encoder.everything(Time{}).alarms, 0);  // it always was there
+  EXPECT_EQ(encoder.everything(Time{}).alarms, 0);  // the counter started at this value
 }
 
 // ---- Abnormal requests (8.4, 9.4)
@@ -51,23 +51,23 @@ TEST(TformatDevice, AbnormalRequestsAreAnsweredLikeId3) {
   Bench bench;
   const Wire plain = wire(Reply{.encoder_id = 0x11});
   const Wire parity = wire(Reply{.status = status::parity_error, .encoder_id = 0x11});
-  EXPECT_EQ(bench.raw({0x9A}), parity);                          // parity of ID 3
+  EXPECT_EQ(bench.raw({0x9A}), parity);                          // wrong parity of ID 3
   EXPECT_EQ(bench.raw({control_field(0x4)}), plain);             // unknown id
-  EXPECT_EQ(bench.raw({0xEA, 0x01, 0xEC}), plain);               // CRC
-  EXPECT_EQ(bench.raw({0xEA, 0x01}), plain);                     // cut short
+  EXPECT_EQ(bench.raw({0xEA, 0x01, 0xEC}), plain);               // wrong CRC
+  EXPECT_EQ(bench.raw({0xEA, 0x01}), plain);                     // incomplete
   EXPECT_EQ(bench.raw({0x32, 0x81, 0x00, 0x32 ^ 0x81}), plain);  // busy bit in a request
-  EXPECT_EQ(bench.raw({0x00}), Wire{});                          // sync code: no answer
-  EXPECT_EQ(bench.raw({0x00, 0x1A}), plain);                     // ... but the next start is found
+  EXPECT_EQ(bench.raw({0x00}), Wire{});                          // wrong sync code: no answer
+  EXPECT_EQ(bench.raw({0x00, 0x1A}), plain);                     // the next start is found
   EXPECT_EQ(memory_write(bench, 127, 6), plain);                 // closed page
   EXPECT_EQ(memory_write(bench, 127, 7), wire(hex<"327F074A">));
   bench.pass(memory_time);
-  EXPECT_EQ(memory_read(bench, 3), plain);  // page 7 is closed but for 4 and 5
+  EXPECT_EQ(memory_read(bench, 3), plain);  // page 7 is closed except for addresses 4 and 5
   EXPECT_EQ(memory_write(bench, 5, 1), plain);
   EXPECT_EQ(memory_read(bench, 4), wire(hex<"EA04DA34">));
   EXPECT_EQ(memory_read(bench, 5), wire(Reply{.id = DataId::read_memory, .address = 5, .value = 35}));
 }
 
-// ID D with a wrong parity bit: one refusal, when the frame has ended.
+// ID D with a wrong parity bit is refused once, when its frame has ended.
 TEST(TformatDevice, ARefusedFrameEndsBeforeItIsAnswered) {
   Bench bench;
   testing::RawHost host({0x6A, 0x05, 0xEF});
@@ -77,7 +77,7 @@ TEST(TformatDevice, ARefusedFrameEndsBeforeItIsAnswered) {
   EXPECT_EQ(bench.encoder.answer_count(), 1u);
   EXPECT_EQ(bench.violations(), 0u);
   for (const Wire& request : {Wire{0xA2, 0x05, 0xEF, 0x01}, Wire{0x32, 0x81, 0x00, 0xB3, 0x00}}) {
-    EXPECT_EQ(bench.raw(request), wire(Reply{.encoder_id = 0x11}));  // an unknown id; a busy bit, and one byte too many
+    EXPECT_EQ(bench.raw(request), wire(Reply{.encoder_id = 0x11}));  // an unknown id; a busy bit with one byte too many
   }
   EXPECT_EQ(bench.violations(), 0u);
 }
@@ -118,9 +118,10 @@ TEST(TformatDevice, IsBusyFor18MillisecondsAfterAWrite) {
   EXPECT_EQ(memory_write(bench, 6, 1), wire(hex<"328600B4">));
   bench.line.run_until(written + memory_time);
   EXPECT_EQ(memory_read(bench, 5), wire(Reply{.id = DataId::read_memory, .address = 5, .value = 0x77}));
-  EXPECT_EQ(memory_read(bench, 6), wire(Reply{.id = DataId::read_memory, .address = 6}));  // was not executed
+  // The write during the busy time was not executed.
+  EXPECT_EQ(memory_read(bench, 6), wire(Reply{.id = DataId::read_memory, .address = 6}));
   EXPECT_EQ(bench.encoder.writes(), 1u);
-  EXPECT_EQ(bench.violations(), 0u);  // asking a writing encoder whether it is ready is allowed
+  EXPECT_EQ(bench.violations(), 0u);  // asking a writing encoder whether it is ready is permitted
 }
 
 TEST(TformatDevice, PagesAreSeparateAndChangingThemTakesTime) {
@@ -131,14 +132,14 @@ TEST(TformatDevice, PagesAreSeparateAndChangingThemTakesTime) {
     memory_write(bench, 126, static_cast<std::uint8_t>(0xA0 + page));
     bench.pass(memory_time);
   }
-  EXPECT_EQ(bench.encoder.writes(), 6u);  // page changes do not wear
+  EXPECT_EQ(bench.encoder.writes(), 6u);  // page changes do not write the EEPROM
   memory_write(bench, 127, 2);
   memory_read(bench, 126);
   ASSERT_EQ(bench.violations(), 1u);
   EXPECT_EQ(bench.encoder.violations()[0].rule, "memory access before the page is ready");
   bench.pass(memory_time);
   EXPECT_EQ(memory_read(bench, 126)[2], 0xA2);
-  // Page 0 after power on, at once.
+  // After power on page 0 is selected, without a delay.
   memory_write(bench, 126, 1);
   bench.restart();
   EXPECT_EQ(memory_read(bench, 126)[2], 0xA0);
@@ -151,9 +152,9 @@ TEST(TformatDevice, TenRequestsMakeAReset) {
   bench.shaft.put(7, 1000);
   bench.encoder.raise_alarms(alarms::over_heat | alarms::counter_overflow);
   reset(bench, DataId::clear_alarms, 9);
-  EXPECT_NE(bench.everything().alarms, 0);  // and this read starts the count again
+  EXPECT_NE(bench.everything().alarms, 0);  // this read restarts the count
   reset(bench, DataId::clear_alarms, 9);
-  EXPECT_NE(bench.raw({0xBA})[1] & status::alarm, 0);  // the tenth still shows the old errors
+  EXPECT_NE(bench.raw({0xBA})[1] & status::alarm, 0);  // the tenth reply still shows the old alarms
   bench.pass(40us);
   EXPECT_EQ(bench.everything().alarms, 0);
   EXPECT_EQ(bench.everything().multiturn, 7u);
@@ -167,7 +168,7 @@ TEST(TformatDevice, AnyOtherRequestStartsTheCountAgain) {
   Bench bench;
   bench.shaft.put(7, 0);
   reset(bench, DataId::reset_multiturn, 9);
-  bench.raw({0xEA, 0x01, 0xEC});  // an abnormal one
+  bench.raw({0xEA, 0x01, 0xEC});  // an abnormal request
   reset(bench, DataId::reset_multiturn, 9);
   EXPECT_EQ(bench.everything().multiturn, 7u);
   reset(bench, DataId::clear_alarms, 9);
@@ -216,7 +217,7 @@ TEST(TformatDevice, ZeroTakes18MillisecondsAndSurvivesPowerOff) {
 TEST(TformatDevice, ResetsSentTooFastOrOnATurningShaftDoNothing) {
   Bench bench;
   bench.shaft.put(3, 0);
-  for (unsigned i = 0; i < 20; ++i) {  // the next request right behind each reply: 31 us apart
+  for (unsigned i = 0; i < 20; ++i) {  // each request follows the reply at once: 31 us apart
     testing::RawHost host({0x62}, bench.line.now());
     bench.line.put_on(host);
     while (host.reply.size() < 6) bench.line.step();
@@ -253,15 +254,15 @@ TEST(TformatDevice, ARequestDuringItsTransmissionIsAViolation) {
   Bench longer;
   longer.raw({0x1A, 0xEA, 0x05, 0xEF});
   EXPECT_EQ(longer.violations(), 1u);
-  // Where they come at once, as on a pseudo-terminal: two requests, not four bytes.
+  // Bytes that arrive together, as on a pseudo-terminal, count as two requests, not as four bytes.
   testing::TestShaft shaft;
   VirtualEncoder encoder({}, shaft);
   encoder.power_on(Time{}, PowerOn::skip);
   const Wire all{0x1A, 0xEA, 0x05, 0xEF, 0x1A};
   encoder.feed({.kind = Event<std::uint8_t>::Kind::received, .at = 1us, .items = all});
   EXPECT_EQ(encoder.violation_count(), 2u);
-  // Unless the emulator was late itself: the reply to the first, of 29 us, might have been out before the others came.
-  // A host that asks again has given up first, which takes a millisecond at the least, each time.
+  // If the emulator was delayed, the reply to the first request, which takes 29 us, might have been sent before the
+  // others arrived. A host repeats a request only after its timeout, at least a millisecond each time.
   for (const auto& [late, rules] : {std::pair(20us, 2u), {900us, 2u}, {1500us, 1u}, {3ms, 0u}}) {
     VirtualEncoder delayed({}, shaft);
     delayed.power_on(Time{}, PowerOn::skip);
@@ -270,7 +271,7 @@ TEST(TformatDevice, ARequestDuringItsTransmissionIsAViolation) {
   }
 }
 
-// In two writes: the second may come while the first is answered, or behind that.
+// Bytes in two writes: the second may arrive while the first is answered, or afterwards.
 TEST(TformatDevice, RequestsWithoutAPauseAreToldHoweverTheyAreCut) {
   testing::TestShaft shaft;
   const Wire one{0x1A};
@@ -288,7 +289,7 @@ TEST(TformatDevice, RequestsWithoutAPauseAreToldHoweverTheyAreCut) {
   }
 }
 
-// However busy the machine is: a host that never waits is told from one that had to give up.
+// However long the machine is delayed, a host that never waits differs from one that had to give up.
 TEST(TformatDevice, AHostThatNeverWaitsIsNotExcusedForEver) {
   testing::TestShaft shaft;
   VirtualEncoder encoder({}, shaft);
@@ -307,12 +308,12 @@ TEST(TformatDevice, AHostThatNeverWaitsIsNotExcusedForEver) {
   EXPECT_EQ(ask(thrice), 0u);
   EXPECT_EQ(ask(thrice), 2u);
   EXPECT_EQ(ask(thrice), 4u);
-  // One that waited in between is excused again.
+  // A host that waited in between is excused again.
   EXPECT_EQ(ask(once), 4u);
   EXPECT_EQ(ask(thrice), 4u);
 }
 
-// What is no violation, but told to who watches (9.1, 10).
+// Breaches that are no violations, but are reported to the watch (9.1, 10).
 TEST(TformatDevice, TellsWhatAHostLeavesUndone) {
   using Rules = std::vector<std::string>;
   const std::string again = "what was refused as busy was not asked for again";
@@ -320,7 +321,7 @@ TEST(TformatDevice, TellsWhatAHostLeavesUndone) {
   author::testing::BrokenRules broken;
   bench.encoder.watch_rules(&broken);
   memory_write(bench, 5, 1);
-  memory_read(bench, 5);  // busy
+  memory_read(bench, 5);  // answered as busy
   memory_read(bench, 5);
   EXPECT_EQ(broken.rules, Rules{});
   memory_read(bench, 6);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Names, units and meanings of everything in a T-format frame, in words for the person in front of the machine.
+// Names, units and meanings of all values in a T-format frame, in words for the operator.
 #pragma once
 
 #include <array>
@@ -11,7 +11,7 @@
 
 namespace absenc::tformat {
 
-/// 6.3.2
+/// Flags of SF (6.3.2).
 inline constexpr std::array<FlagInfo, 8> status_flags{{
     {"", "", ""},
     {"", "", ""},
@@ -24,7 +24,7 @@ inline constexpr std::array<FlagInfo, 8> status_flags{{
     {"delimiter_error", "the encoder received the request with a wrong stop bit", "send the same request again"},
 }};
 
-/// 6.5. One that is declared to have no battery reports nothing of it.
+/// Flags of ALMC (6.5). An encoder declared to have no battery reports no battery alarms.
 inline constexpr std::array<FlagInfo, 8> alarm_flags{{
     {"over_speed", "the shaft turned faster than the counter follows while the power was off: turns may be wrong",
      "return to the origin, then `absenc reset-multiturn` or `absenc clear-alarms`"},
@@ -44,7 +44,7 @@ inline constexpr std::array<FlagInfo, 8> alarm_flags{{
      "replace the battery with the encoder switched on; without a battery set battery=false", true},
 }};
 
-/// What a frame or a procedure shows; in the order of the wire.
+/// Values of a frame or a procedure, in the order of the wire.
 struct Values {
   std::optional<DataId> data_id{};                   ///< Value of the field `data_id`, if there is one.
   std::optional<std::uint8_t> control_field{};       ///< Value of the field `control_field`, if there is one.
@@ -100,8 +100,8 @@ inline constexpr auto fields = [] {
   return all;
 }
 
-/// Without a battery the turns mean nothing, and are not shown; the battery's alarms, which are always set then,
-/// neither.
+/// Returns the values of a reply. Without a battery the turns are invalid and not shown; neither are the battery's
+/// alarms, which are always set then.
 [[nodiscard]] constexpr Values values_of(const Format& format, const Reply& reply) {
   if (is_memory_access(reply.id)) {
     return {.data_id = reply.id, .address = reply.address, .busy = reply.busy, .value = reply.value};
@@ -115,7 +115,7 @@ inline constexpr auto fields = [] {
   return all;
 }
 
-/// Where a good reply has a field that it carries (Figures of 6.3).
+/// Returns the bits of a field in a valid reply that carries it (Figures of 6.3).
 [[nodiscard]] constexpr BitRanges place_of(const Format& format, Bytes reply, const FieldInfo& field) {
   const DataId id = data_id(reply[0]).value_or(DataId::everything);
   const bool everything = id == DataId::everything;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Frames of the T-format: encode, decode, every check that they allow, and the reading that a good reply makes.
-// Paragraph numbers are those of the TS5700N8500 specification; README.md draws the frames.
+// Frames of the T-format: encoding, decoding, all checks, and the reading of a valid reply. Paragraph numbers are those
+// of the TS5700N8500 specification; README.md draws the frames.
 #pragma once
 
 #include <algorithm>
@@ -21,8 +21,8 @@
 
 namespace absenc::tformat {
 
-inline constexpr std::uint8_t busy_bit = 0x80;      ///< of ADF, in replies
-inline constexpr unsigned full_absolute_bits = 5;   ///< of the position hold with full_absolute_status (5.4.1)
+inline constexpr std::uint8_t busy_bit = 0x80;      ///< busy flag in the ADF of replies
+inline constexpr unsigned full_absolute_bits = 5;   ///< valid bits of the position with full_absolute_status (5.4.1)
 inline constexpr std::size_t request_capacity = 4;  ///< Length of the longest request in bytes.
 inline constexpr std::size_t reply_capacity = 11;   ///< Length of the longest reply in bytes.
 /// Bytes of a request.
@@ -30,8 +30,8 @@ using RequestBytes = ByteBuffer<request_capacity>;
 /// Bytes of a reply.
 using ReplyBytes = ByteBuffer<reply_capacity>;
 
-/// G(X) = X^8 + 1 (6.3.4): the same as the exclusive OR of all bytes, which is how `checksum` computes it: by `reduce`,
-/// whose order is free, because a loop waits for each byte in turn.
+/// G(X) = X^8 + 1 (6.3.4) equals the exclusive OR of all bytes. `checksum` computes it by `reduce`, whose order is
+/// free, because a loop would wait for each byte in turn.
 inline constexpr CrcParameters crc_parameters{8, 0x01, 0, true, true, 0};
 
 /// Returns the checksum.
@@ -40,9 +40,9 @@ inline constexpr CrcParameters crc_parameters{8, 0x01, 0, true, true, 0};
                      [](std::uint8_t one, std::uint8_t other) -> std::uint8_t { return one ^ other; });
 }
 
-/// Sync code 010, the id, its even parity (6.3.1).
+/// Returns CF: sync code 010, the id, and its even parity (6.3.1).
 [[nodiscard]] constexpr std::uint8_t control_field(std::uint8_t id) {
-  constexpr unsigned odd_parities = 0x6996;  // a bit for each id: a small core computes them in many steps
+  constexpr unsigned odd_parities = 0x6996;  // one bit per id: a small core needs many steps to compute a parity
   return static_cast<std::uint8_t>(0x02u | (id & 0xFu) << 3 | (odd_parities >> (id & 0xF) & 1) << 7);
 }
 /// Returns the control field of a request.
@@ -61,7 +61,7 @@ inline constexpr CrcParameters crc_parameters{8, 0x01, 0, true, true, 0};
 }
 
 namespace detail {
-// Of requests and replies, by the id; 0: Table 1 does not list it.
+// Lengths of requests and replies, by the id; 0: Table 1 does not list the id.
 struct Lengths {
   std::uint8_t request = 0;
   std::uint8_t reply = 0;
@@ -86,7 +86,7 @@ inline constexpr std::array<Lengths, 16> lengths = [] {
   return detail::lengths[static_cast<std::size_t>(id)].reply;
 }
 
-/// The id of a control field, whatever its parity; nothing for an id that Table 1 does not list.
+/// Returns the id of a control field, whatever its parity; nothing for an id that Table 1 does not list.
 [[nodiscard]] constexpr std::optional<DataId> data_id(std::uint8_t field) {
   const auto id = static_cast<DataId>((field >> 3) & 0xF);
   return request_length(id) != 0 ? std::optional(id) : std::nullopt;
@@ -95,8 +95,8 @@ inline constexpr std::array<Lengths, 16> lengths = [] {
 /// A request of the protocol.
 struct Request {
   DataId id = DataId::everything;  ///< Data ID of the request.
-  std::uint8_t address = 0;        ///< memory access: 0 to 127
-  std::uint8_t value = 0;          ///< write_memory
+  std::uint8_t address = 0;        ///< memory access: address 0 to 127
+  std::uint8_t value = 0;          ///< write_memory: byte to be written
 };
 
 /// Returns whether a request selects a page of the memory.
@@ -104,7 +104,7 @@ struct Request {
   return request.id == DataId::write_memory && request.address == page_select_address;
 }
 
-/// Fields that the id does not carry are 0. In an order that makes it four words.
+/// The fields of a reply; those that its id does not carry are 0. The order makes it four words.
 struct Reply {
   DataId id = DataId::everything;  ///< Data ID of the reply.
   std::uint8_t status = 0;         ///< Status field.
@@ -128,12 +128,13 @@ struct Reply {
   return bytes;
 }
 
-/// Errors: wrong_length; bad_framing (sync code); bad_checksum (parity of the id, or CRC); unsupported (an id that
-/// Table 1 does not list); out_of_range (the busy bit is 0 in requests).
+/// Decodes a request. Errors: wrong_length; bad_framing (sync code); bad_checksum (parity of the id, or CRC);
+/// unsupported (an id that Table 1 does not list); out_of_range (the busy bit is 0 in requests).
 [[nodiscard]] constexpr Result<Request> decode_request(Bytes bytes) {
   if (bytes.empty()) return Error::wrong_length;
   if (!has_sync_code(bytes[0])) return Error::bad_framing;
-  if (bytes[0] != control_field(bytes[0] >> 3)) return Error::bad_checksum;  // the length depends on the id
+  // Checked first, because the length depends on the id.
+  if (bytes[0] != control_field(bytes[0] >> 3)) return Error::bad_checksum;
   const std::optional<DataId> id = data_id(bytes[0]);
   if (!id) return Error::unsupported;
   if (bytes.size() != request_length(*id)) return Error::wrong_length;
@@ -169,7 +170,8 @@ struct Reply {
   return bytes;
 }
 
-/// SF as the alarms demand it (6.3.2): over_speed, full_absolute_status and counter_overflow do not show in it.
+/// Returns the bits of SF that these alarms demand (6.3.2): over_speed, full_absolute_status and counter_overflow do
+/// not show in SF.
 [[nodiscard]] constexpr std::uint8_t status_for(std::uint8_t almc) {
   return static_cast<std::uint8_t>(((almc & alarms::counting_error) != 0 ? status::counting_error : 0) |
                                    ((almc & alarms::shown_in_status) != 0 ? status::alarm : 0));
@@ -177,7 +179,7 @@ struct Reply {
 
 namespace detail {
 
-// The fields of a reply of the right length and checksum, unchecked.
+// Returns the fields of a reply with the right length and checksum, unchecked.
 [[nodiscard]] constexpr Reply split_reply(DataId id, Bytes bytes) {
   if (is_memory_access(id)) {
     return {.id = id,
@@ -201,7 +203,7 @@ namespace detail {
 
 [[nodiscard]] constexpr Error check_memory_reply(const Format& format, const Request& request, const Reply& reply) {
   if (reply.address != request.address) return Error::unexpected_reply;
-  // Table 5: a busy encoder answers 00, an accepted write echoes its value.
+  // Table 5: a busy encoder answers 00; an accepted write echoes its value.
   if (reply.busy) return format.strict && reply.value != 0 ? Error::unexpected_reply : Error::none;
   if (request.id == DataId::write_memory && reply.value != request.value) return Error::unexpected_reply;
   return Error::none;
@@ -223,8 +225,8 @@ namespace detail {
 
 }  // namespace detail
 
-/// Whether the bytes so far begin an ID-3 reply to a request of another id: how the encoder answers whatever it
-/// cannot accept (8.4, 9.4).
+/// Returns whether the first bytes are those of a reply to ID 3, although another id was requested: the encoder answers
+/// every request that it cannot accept so (8.4, 9.4).
 [[nodiscard]] constexpr bool begins_rejection(DataId asked, Bytes reply) {
   return asked != DataId::everything && !reply.empty() && reply[0] == control_field(DataId::everything);
 }
@@ -245,8 +247,8 @@ constexpr Error check_reply(const Format& format, const Request& request, const 
 
 }  // namespace detail
 
-/// Checks in this order: length, checksum, echo, refusal, fixed bits, range, cross checks; the first that fails
-/// names the error. A busy memory reply is no error: `busy` is set.
+/// Decodes and checks a reply, in this order: length, checksum, echo, refusal, fixed bits, range, cross checks; the
+/// first check that fails gives the error. A busy memory reply is no error: `busy` is set.
 [[nodiscard]] constexpr Result<Reply> decode_reply(const Format& format, const Request& request, Bytes bytes) {
   Error error = detail::check_frame(request, bytes);
   if (error != Error::none) return error;
@@ -256,31 +258,31 @@ constexpr Error check_reply(const Format& format, const Request& request, const 
   return reply;
 }
 
-/// Bits of ALMC that are no alarms of this encoder, because the format says so.
+/// Returns the bits of ALMC that are no alarms of this encoder, because it has no battery.
 [[nodiscard]] constexpr unsigned expected_alarms(const Format& format) {
   return format.battery ? 0u : alarms::without_battery;
 }
 
-/// What replies have reported of the alarms since the encoder was switched on: bits of ALMC.
+/// Alarms known from the replies since power on: bits of ALMC.
 struct KnownAlarms {
   std::uint8_t reported = 0;  ///< Alarms that were reported.
   std::uint8_t raised = 0;    ///< Alarms that are raised.
 
-  /// As an ID 3 reply reports them: all.
+  /// Returns the alarms of a reply to ID 3, which reports all.
   [[nodiscard]] static constexpr KnownAlarms all(std::uint8_t almc) { return {0xFF, almc}; }
 };
 
-/// Returns what is known after a reply that carries SF and no ALMC. SF has counting_error, and one bit for over_heat,
-/// multiturn_error, battery_error and battery_alarm together: 0 reports all four clear. 1 says nothing new where one of
-/// them is known to be raised; otherwise one is raised, and nobody knows which. `sf_reported` are the bits of SF that
-/// this encoder reports: without a battery that one bit is always 1, and what is known of the four stays.
+/// Returns the known alarms after a reply that carries SF and no ALMC. SF has counting_error, and one bit for
+/// over_heat, multiturn_error, battery_error and battery_alarm together: 0 reports all four clear. 1 adds nothing if
+/// one of them is known to be raised; otherwise one of them is raised, but it is unknown which. `sf_reported`: bits of
+/// SF that this encoder reports. Without a battery that one bit is always 1, and the known state of the four stays.
 [[nodiscard]] constexpr KnownAlarms known_after(KnownAlarms before, std::uint8_t sf, unsigned sf_reported) {
   constexpr unsigned together = alarms::shown_in_status;
   unsigned reported = before.reported | alarms::counting_error;
   unsigned raised = before.raised & ~unsigned{alarms::counting_error};
   if ((sf & status::counting_error) != 0) raised |= alarms::counting_error;
   if ((sf_reported & status::alarm) == 0) {
-    // `together` stays as it was.
+    // the state of the four alarms stays
   } else if ((sf & status::alarm) == 0) {
     reported |= together;
     raised &= ~together;
@@ -292,7 +294,7 @@ struct KnownAlarms {
 
 namespace detail {
 
-// Which parts of a position hold. Without full_absolute_status the top bits hold all the same.
+// Sets which parts of a position are valid. Its top bits are valid unless full_absolute_status is known to be set.
 constexpr void judge(Reading& reading, const KnownAlarms& known) {
   reading.alarms = known.raised;
   reading.alarms_reported = known.reported;
@@ -310,8 +312,7 @@ constexpr void judge(Reading& reading, const KnownAlarms& known) {
   reading.multiturn_known = reading.multiturn_bits == 0 || all_reported || lost;
 }
 
-// SF as a reading shows it: its `alarm` is set for ever by a battery that there is not. Without ALMC it tells nothing
-// then.
+// Returns SF as a reading shows it. A missing battery sets `alarm` for ever, so the bit tells nothing without ALMC.
 [[nodiscard]] constexpr std::uint8_t status_of(const Format& format, bool has_alarms, const Reply& reply) {
   if (format.battery) return reply.status;
   const bool other = has_alarms && (reply.alarms & alarms::shown_in_status & ~expected_alarms(format)) != 0;
@@ -323,9 +324,9 @@ constexpr unsigned reported_status(const Format& format, bool has_alarms) {
 
 }  // namespace detail
 
-/// The position in a good reply and what of it holds. ALMC tells; an ID 3 reply carries it. SF of the other replies
-/// hides over_speed and full_absolute_status: they need what ID 3 said since the encoder was switched on
-/// (`known_alarms`), or it is unknown whether the position holds.
+/// Returns the position in a valid reply with its validity, which ALMC decides; only a reply to ID 3 carries it. SF of
+/// other replies hides over_speed and full_absolute_status: without an ALMC since power on (`known_alarms`) it is
+/// unknown whether the position is valid.
 [[nodiscard]] constexpr Reading to_reading(const Format& format, DataId id, const Reply& reply,
                                            std::optional<std::uint8_t> known_alarms = std::nullopt) {
   const bool has_all = id == DataId::everything;
@@ -352,15 +353,15 @@ constexpr unsigned reported_status(const Format& format, bool has_alarms) {
   return to_reading(format, reply.id, reply, known_alarms);
 }
 
-/// See Unit.
+/// Completes a reading; see Unit.
 [[nodiscard]] constexpr Reading remembered(const Reading& before, Reading now) {
-  if ((now.alarms_reported & alarms::full_absolute_status) != 0) return now;  // an ID 3 reply
+  if ((now.alarms_reported & alarms::full_absolute_status) != 0) return now;  // a reply to ID 3
   const KnownAlarms known{static_cast<std::uint8_t>(before.alarms_reported), static_cast<std::uint8_t>(before.alarms)};
   detail::judge(now, known_after(known, static_cast<std::uint8_t>(now.status), now.status_reported));
   return now;
 }
 
-// ---- As the engine and the virtual encoder use it
+// ---- Protocol, for the engine and the virtual encoder
 
 /// The protocol, as author layers use it: frames, lengths and times.
 struct Protocol {
@@ -376,8 +377,8 @@ struct Protocol {
   static constexpr author::HostTimes host_times(const Format&) {
     return {.answer_limit = answer_limit, .gap_limit = gap_limit};
   }
-  /// What reads or selects a page is repeated, resets and writes never. A page change that was not answered well may be
-  /// going on all the same, and must not be disturbed.
+  /// Reads and page selects are repeated, resets and writes never. A page change without a valid reply may still be
+  /// going on, and must not be disturbed.
   static constexpr author::Manner manner(const Format&, const Request& request) {
     if (selects_page(request)) return {.repeats = 2, .pause = memory_time, .hold = memory_time};
     return {.repeats = request.id == DataId::write_memory || is_reset(request.id) ? 0u : 2u};
@@ -389,12 +390,13 @@ struct Protocol {
     return reply_length(begins_rejection(request.id, so_far) ? DataId::everything : request.id);
   }
   static constexpr auto decode = decode_reply;  ///< Returns the reply with all checks done, or the first error.
-  /// A refusal may be followed by the same request at once. After anything else that is wrong more may be coming, and
-  /// sending while the encoder sends can destroy its driver (11).
+  /// A refusal may be followed by the same request at once. After any other error more bytes may follow, and sending
+  /// while the encoder sends can destroy its driver (11).
   static constexpr bool is_whole(const Format&, Error error) { return error == Error::request_rejected; }
   /// Returns the position of a reply.
   static constexpr Reading reading(const Format& format, const Request& request, const Reply& reply) {
-    return to_reading(format, request.id, reply);  // by the request, which may be known when the program is written
+    // By the request's id, which may be known when the program is written.
+    return to_reading(format, request.id, reply);
   }
   /// Returns when the encoder latched the position of a reply to a request that was sent at `sent_at`.
   static constexpr Time latched(const Format&, Time sent_at) { return sent_at; }

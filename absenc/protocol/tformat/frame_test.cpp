@@ -46,8 +46,8 @@ TEST(TformatFrame, EveryControlFieldIsJudged) {
   }
 }
 
-// How many of the two-bit errors of an 11-byte reply pass: all that X^8 + 1 lets through, then with the fixed bits
-// checked, then with SF and ALMC compared.
+// Counts the two-bit errors of an 11-byte reply that pass: those that X^8 + 1 does not detect, then those that also
+// pass the fixed bits, then those that also pass the comparison of SF and ALMC.
 TEST(TformatFrame, TwoBitErrorsThatPassEachLevelOfChecks) {
   const Format format{.encoder_id = 0x11};
   const ReplyBytes good = encode_reply({.singleturn = 0x12345, .multiturn = 0x1234, .encoder_id = 0x11});
@@ -64,7 +64,7 @@ TEST(TformatFrame, TwoBitErrorsThatPassEachLevelOfChecks) {
       const Error error = decode_reply(format, {DataId::everything}, bad).error();
       if (error != Error::bad_checksum) ++crc_passes;
       if (error == Error::none) ++strict_passes;
-      // The level between: bits 4 to 7 of SF may be anything.
+      // The second level allows any value in bits 4 to 7 of SF.
       bad[1] &= 0x0F;
       bad[10] = checksum(bad.view().first(10));
       const Error fixed_bits = decode_reply(format, {DataId::everything}, bad).error();
@@ -105,11 +105,11 @@ TEST(TformatFrame, AMemoryReplyIsThatOfItsRequest) {
 
 TEST(TformatFrame, WhatIsNoRequest) {
   EXPECT_EQ(decode_request({}).error(), Error::wrong_length);
-  EXPECT_EQ(decode_request(hex<"328100B3">).error(), Error::out_of_range);  // the busy bit
+  EXPECT_EQ(decode_request(hex<"328100B3">).error(), Error::out_of_range);  // the busy bit is set
   EXPECT_TRUE(decode_request(hex<"32010033">));
 }
 
-// Paragraph 6.5: which alarm takes what of a reading away.
+// Paragraph 6.5: which alarm makes which part of a reading invalid.
 TEST(TformatFrame, ValidityOfEachPart) {
   struct Row {
     std::uint8_t almc;
@@ -147,7 +147,7 @@ TEST(TformatFrame, PartialRepliesPromiseNoMoreThanIsKnown) {
   EXPECT_EQ(to_reading({}, alarmed, 0).multiturn_validity(), Validity::unknown);
 }
 
-// SF says only that one of four alarms is raised: one that an ID 3 reply has told explains it.
+// SF reports only that one of four alarms is raised; one that a reply to ID 3 has reported explains it.
 TEST(TformatFrame, KnownAlarmExplainsStatus) {
   const Reply turns{.id = DataId::multiturn, .status = status::alarm, .multiturn = 5};
   for (const std::uint8_t harmless : {alarms::over_heat, alarms::battery_alarm}) {
@@ -158,7 +158,7 @@ TEST(TformatFrame, KnownAlarmExplainsStatus) {
   EXPECT_EQ(to_reading({}, turns, alarms::battery_error).multiturn_validity(), Validity::invalid);
 }
 
-// 6.3.2: SF has counting_error, and four others together.
+// 6.3.2: SF has counting_error, and one bit for four other alarms.
 TEST(TformatFrame, StatusReportsPartOfTheAlarms) {
   constexpr std::uint8_t in_status = alarms::counting_error | alarms::shown_in_status;
   struct Row {
@@ -182,7 +182,7 @@ TEST(TformatFrame, StatusReportsPartOfTheAlarms) {
   EXPECT_EQ(to_reading({}, {.id = DataId::read_memory}).status_reported, 0u);
 }
 
-// 2 (1): there `alarm` of SF is set for ever, by a battery that there is not.
+// 2 (1): a missing battery sets `alarm` of SF for ever.
 TEST(TformatFrame, WithoutABatteryStatusTellsNothingOfFourAlarms) {
   constexpr Format format{.battery = false};
   const auto whole = [&](std::uint8_t more) {
@@ -202,7 +202,7 @@ TEST(TformatFrame, WithoutABatteryStatusTellsNothingOfFourAlarms) {
   EXPECT_EQ(remembered(part, whole(0)).alarms_reported, whole(0).alarms_reported);
 }
 
-// What one reply after the other leaves known, as in a capture.
+// Alarms known after each of several replies, as in a capture.
 TEST(TformatFrame, LaterRepliesCompleteWhatEarlierOnesReported) {
   const auto part = [](std::uint8_t sf) { return to_reading({}, {.id = DataId::singleturn, .status = sf}); };
   const auto whole = [](std::uint8_t almc) {

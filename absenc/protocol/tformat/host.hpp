@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Reads positions of T-format encoders: a plain machine without port, clock, heap or texts, for drives that do it ten
-// thousand times a second. link/step.hpp says how to run it; unit.cpp has what takes several steps.
+// Reads positions of T-format encoders: a machine without port, clock, heap or texts, for drives that read ten thousand
+// times a second. link/step.hpp shows how to run it; procedures with several steps are in unit.cpp.
 #pragma once
 
 #include <optional>
@@ -10,9 +10,9 @@
 
 namespace absenc::tformat {
 
-/// Data IDs 0 to 3. ID 3 carries everything. SF hides over_speed, full_absolute_status and counter_overflow, so
-/// unless `known_alarms` (the ALMC of an ID 3 reply since power on) is given, IDs 0 and 1 are preceded by an ID 3,
-/// and an alarm that newly appears in their SF is followed by one, whose reply is the result then. Nothing is repeated.
+/// Reads data IDs 0 to 3. ID 3 carries everything. SF hides over_speed, full_absolute_status and counter_overflow, so
+/// without `known_alarms` (the ALMC of a reply to ID 3 since power on) IDs 0 and 1 are preceded by an ID 3; and an
+/// alarm that newly appears in their SF is followed by an ID 3, whose reply is the result. Nothing is repeated.
 class ReadPosition : public author::HostOf<Protocol> {
  public:
   /// Reads from an encoder of this format.
@@ -26,9 +26,10 @@ class ReadPosition : public author::HostOf<Protocol> {
   ReadPosition(const Format& format, const Request& request) : ReadPosition(format, request.id) {}
 
   [[nodiscard]] const Reading* reading() const final {
-    return reading_.singleturn_bits != 0 || reading_.multiturn_bits != 0 ? &reading_ : nullptr;  // of a good end only
+    // Only after a good end.
+    return reading_.singleturn_bits != 0 || reading_.multiturn_bits != 0 ? &reading_ : nullptr;
   }
-  /// Of the last good exchange.
+  /// Returns the reply of the last good exchange.
   [[nodiscard]] const Reply& reply() const { return last(); }
 
  private:
@@ -42,8 +43,8 @@ class ReadPosition : public author::HostOf<Protocol> {
       const int unknown = reply().status & ~status_for(known_alarms_.value_or(0));
       if (unknown != 0) return ask_for(DataId::everything);
     }
-    new (&reading_) Reading(to_reading(format(), reply(), known_alarms_));  // made there, not copied
-    // The document does not say when the position is taken; the end of the request is the latest it can be.
+    new (&reading_) Reading(to_reading(format(), reply(), known_alarms_));  // constructed in place, not copied
+    // The document does not state when the position is latched; the end of the request is the latest possible time.
     reading_.latched = sent_at();
     reading_.received = received_at();
     finish(Error::none);
@@ -51,13 +52,13 @@ class ReadPosition : public author::HostOf<Protocol> {
   void ask_for(DataId id) { ask({id}, author::Manner{}); }
 
   DataId id_;
-  bool part_read_ = false;  // ID 0 or 1 has been answered
+  bool part_read_ = false;  // ID 0 or 1 was answered
   std::optional<std::uint8_t> known_alarms_;
   Reading reading_{};
 };
 
 inline constexpr Request everything{DataId::everything};  ///< Request for position, turns, identifier and alarms.
-/// Data ID 3 of a format that is known when the program is written: `static constexpr Format format{...};`.
+/// Reads data ID 3 with a format known when the program is written: `static constexpr Format format{...};`.
 template <const Format& format>
 using ReadKnownPosition = author::ReadKnownPosition<Protocol, format, everything>;
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Positions, and refusals in words, against the virtual Smart-Abs in virtual time.
+// Positions and explained refusals, with the virtual Smart-Abs in virtual time.
 #include "absenc/protocol/tformat/host.hpp"
 
 #include <gtest/gtest.h>
@@ -63,7 +63,7 @@ TEST(TformatHost, PartsAreReadWithWhatAlarmsSay) {
   ReadPosition first({}, DataId::singleturn);
   EXPECT_EQ(bench.run(first).reading()->singleturn, 0x12345u);
   EXPECT_TRUE(first.reading()->singleturn_valid());
-  EXPECT_EQ(bench.encoder.answer_count(), 2u);  // ID 3 before it
+  EXPECT_EQ(bench.encoder.answer_count(), 2u);  // preceded by an ID 3
   ReadPosition turns({}, DataId::multiturn, 0);
   EXPECT_EQ(bench.run(turns).reading()->multiturn, 4660u);
   EXPECT_EQ(bench.encoder.answer_count(), 3u);
@@ -101,7 +101,7 @@ TEST(TformatHost, SilenceIsATimeoutAndNothingIsRepeated) {
 
 // ---- Refusals (6.3.2)
 
-// ca0 and ca1 by name, what else is answered so, and what to do.
+// The explanation names ca0 and ca1, other reasons for such an answer, and what to try.
 TEST(TformatHost, ARefusalIsExplained) {
   struct Row {
     std::uint8_t alarm;
@@ -128,7 +128,7 @@ TEST(TformatHost, ARefusalIsExplained) {
   EXPECT_TRUE(reset.says("; one of the ten requests")) << reset.detail;
 }
 
-// What captures show: a reply alone, and what came of a request that is none (8.4, 9.4).
+// Captures have replies without a request, and replies to invalid requests (8.4, 9.4).
 TEST(TformatHost, ARequestIsGuessedOrWasNone) {
   const Bench bench;
   const auto error = [&bench](const Wire& request, const Wire& reply) {
@@ -143,7 +143,7 @@ TEST(TformatHost, ARequestIsGuessedOrWasNone) {
 }
 
 TEST(TformatHost, ARefusedRequestIsSentAgainInsideProcedures) {
-  Bench bench(refuse(2, 3, status::parity_error));  // the read behind the page select
+  Bench bench(refuse(2, 3, status::parity_error));  // the read after the page select
   const auto read = bench.run("temperature");
   EXPECT_EQ(read.error, Error::none);
   EXPECT_EQ(read.numbers, (Numbers{{"temperature_c", 35}}));

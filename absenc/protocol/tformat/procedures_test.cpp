@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The commands of the unit that take several steps against the virtual Smart-Abs in virtual time.
+// Commands with several steps, with the virtual Smart-Abs in virtual time.
 #include <gtest/gtest.h>
 
 #include "absenc/protocol/tformat/bench_test.hpp"
@@ -35,22 +35,22 @@ TEST(TformatProcedures, ThePageThatADriveHadSelectedIsRestored) {
 }
 
 TEST(TformatProcedures, APageThatStaysSelectedIsTold) {
-  // An encoder that refuses to say which page is selected, as it does with a closed address (9.4).
+  // An encoder that refuses to report the selected page, as it does for a closed address (9.4).
   Bench refusing(refuse(0, 3, 0));
   EXPECT_EQ(refusing.run("temperature").numbers, (Numbers{{"temperature_c", 35}, {"page_left", 7}}));
-  // One that says a page that there is not.
+  // An encoder that reports a page that does not exist.
   Bench odd([](unsigned index, Wire& reply) {
     if (index == 0) reply = wire(Reply{.id = DataId::read_memory, .address = page_select_address, .value = 9});
   });
   EXPECT_EQ(odd.run("temperature").numbers, (Numbers{{"temperature_c", 35}, {"page_left", 7}}));
   EXPECT_EQ(odd.encoder.answer_count(), 3u);
-  // One that says another page in the end than was selected again.
+  // An encoder that reports another page in the end than the one that was selected again.
   Bench other([](unsigned index, Wire& reply) {
     if (index == 4) reply = wire(Reply{.id = DataId::read_memory, .address = page_select_address, .value = 3});
   });
   EXPECT_EQ(other.run("temperature").numbers, (Numbers{{"temperature_c", 35}, {"page_left", 7}}));
   struct Row {
-    unsigned lost;  // from this reply on: page, page select, temperature, page select, page
+    unsigned lost;  // replies are lost from this one on: page, page select, temperature, page select, page
     Error error;
     bool left;
   };
@@ -63,7 +63,7 @@ TEST(TformatProcedures, APageThatStaysSelectedIsTold) {
     EXPECT_EQ(lost.error, row.error) << row.lost;
     EXPECT_EQ(lost.says("page 7 may be left selected"), row.error != Error::none) << lost.detail;
     EXPECT_EQ(lost.numbers.contains("page_left"), row.left && row.error == Error::none) << row.lost;
-    // A page change that may be going on is over when the next one asks.
+    // A page change that may still be going on is over when the next request is sent.
     const Wire answer = bench.raw({0xEA, 0x7F, 0x95});
     EXPECT_EQ(bench.violations(), 0u) << row.lost;
   }
@@ -110,7 +110,7 @@ TEST(TformatProcedures, MemoryIsWrittenReadBackAndSparedWear) {
   EXPECT_EQ(bench.violations(), 0u);
 }
 
-// 7.2.4 and 7.4: bit 7 switches it on, from 1 degC on; everything else with bit 7 clear is "off".
+// 7.2.4 and 7.4: bit 7 enables the threshold, from 1 degC on; every byte with bit 7 clear is "off".
 TEST(TformatProcedures, AnOverHeatThresholdOfZeroDegreesIsNotWritten) {
   Bench bench;
   const auto zero = bench.run("memory-write", {overheat_address, 0x80, service_page});
@@ -120,7 +120,7 @@ TEST(TformatProcedures, AnOverHeatThresholdOfZeroDegreesIsNotWritten) {
   for (const std::int64_t value : {0x81, 0xFF, 0x00, 0x7F}) {
     EXPECT_EQ(bench.run("memory-write", {overheat_address, value, service_page}).error, Error::none) << value;
   }
-  EXPECT_EQ(bench.run("memory-write", {overheat_address, 0x80, 0}).error, Error::none);  // the user's own byte
+  EXPECT_EQ(bench.run("memory-write", {overheat_address, 0x80, 0}).error, Error::none);  // a byte of the user's pages
 }
 
 TEST(TformatProcedures, ClosedMemoryIsRefusedBeforeAnythingIsSent) {
@@ -183,7 +183,7 @@ TEST(TformatProcedures, AWriteIsJudgedByReadingBackAndNeverRepeated) {
   }
 }
 
-// Of a busy encoder, up to 36 ms: a read or write is asked again each millisecond, a page select after 18.
+// A busy encoder is waited for up to 36 ms: a read or write is repeated each millisecond, a page select after 18 ms.
 TEST(TformatProcedures, ABusyEncoderIsWaitedFor) {
   const auto busy = [](unsigned from, unsigned to) {
     return [=](unsigned index, Wire& reply) {
@@ -256,13 +256,13 @@ TEST(TformatProcedures, AResetThatMustNotBeSentIsNot) {
     const auto reset = bench.run(row.name);
     EXPECT_EQ(reset.error, row.rpm != 0 ? Error::not_still : Error::invalid_argument) << row.detail;
     EXPECT_TRUE(reset.says(row.detail)) << reset.detail;
-    EXPECT_EQ(reset.advice.empty(), row.rpm != 0) << row.detail;  // that of not_still
-    EXPECT_EQ(bench.encoder.answer_count(), 2u);                  // it only looked
+    EXPECT_EQ(reset.advice.empty(), row.rpm != 0) << row.detail;  // not_still has an advice of its own
+    EXPECT_EQ(bench.encoder.answer_count(), 2u);                  // only two positions were read
     EXPECT_EQ(bench.violations(), 0u);
   }
 }
 
-// Nothing is lost of an encoder without a battery by clearing what it always shows.
+// An encoder without a battery always shows battery alarms, so clearing them loses nothing.
 TEST(TformatProcedures, AnEncoderWithoutBatteryIsDeclared) {
   Bench bench;
   bench.shaft.put(7, 1000);
@@ -288,7 +288,7 @@ TEST(TformatProcedures, AnEncoderWithoutBatteryIsDeclared) {
   EXPECT_EQ(bench.everything().alarms, alarms::battery_alarm);
 }
 
-// Replies 0 and 1 are looks, 2 to 11 answer the requests, 12 is the verification.
+// Replies 0 and 1 are positions, 2 to 11 answer the reset, 12 is the verification.
 TEST(TformatProcedures, AResetThatDidNotHappenIsFound) {
   struct Row {
     std::string_view name;

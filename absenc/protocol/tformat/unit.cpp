@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What of a T-format encoder takes several steps, and what is declared of it.
+// Procedures of T-format encoders with several steps, and the declaration of the unit.
 #include "absenc/protocol/tformat/unit.hpp"
 
 #include <array>
@@ -21,20 +21,20 @@ using namespace author;
 
 using Dialog = DialogOf<Protocol>;
 
-// What a procedure found.
+// Result of a procedure.
 struct Found : Values {
   Reading reading{};
-  ByteBuffer<page_addresses> bytes{};  // of `data`
+  ByteBuffer<page_addresses> bytes{};  // bytes of `data`
   std::optional<std::uint8_t> selected{};
 };
 
 // ---- Resets (10)
 
-// Why this reset must not be sent; empty: it may.
+// Returns why this reset must not be sent; no error: it may be sent.
 Outcome objection(const Format& format, DataId id, const Reply& first, const Reply& second) {
   const Reading before = to_reading(format, first);
   const Reading now = to_reading(format, second);
-  // The position is too coarse then to show a movement.
+  // The position is too coarse to show a movement.
   if ((second.alarms & alarms::full_absolute_status) != 0) {
     return {Error::invalid_argument,
             "full_absolute_status: the encoder was switched on while the shaft turned, and has not seen it stand still "
@@ -52,7 +52,7 @@ Outcome objection(const Format& format, DataId id, const Reply& first, const Rep
   return {};
 }
 
-// What the encoder did not do; no detail: it did all.
+// Returns which part of the reset failed; no detail: none did.
 Explanation missed(DataId id, const Reply& now, unsigned bits) {
   if (id == DataId::zero) {
     if (is_near(now.singleturn, 0, bits, zero_tolerance_millidegrees)) return {};
@@ -70,25 +70,25 @@ Explanation missed(DataId id, const Reply& now, unsigned bits) {
   return {};
 }
 
-// Data IDs 7 (latched alarms), 8 (single-turn zero here) and C (turns and latched alarms): makes sure that the shaft
-// stands still, sends ten requests, reads back what became of it.
+// Sends data ID 7 (latched alarms), 8 (single-turn zero here) or C (turns and latched alarms): makes sure that the
+// shaft stands still, sends ten requests, and verifies the result.
 Procedure reset(Dialog& dialog, Found& found, DataId id) {
   const Reply first = co_await dialog.ask({DataId::everything});
   const Reply second = co_await dialog.ask({DataId::everything}).after(between_looks);
   const Outcome why_not = objection(dialog.format(), id, first, second);
   if (why_not.error != Error::none) co_return why_not;
 
-  // Intervals are counted from the end of the reply: that is 40 us or more however the document means it.
+  // Intervals count from the end of the reply, which makes 40 us or more, however the document measures them.
   for (unsigned sent = 1; sent <= reset_requests; ++sent) {
     const Result<Reply> reply = co_await dialog.attempt({id}).changes().after(reset_interval);
-    // When the tenth reply is lost, the reset may have been done all the same: reading tells.
+    // If the tenth reply is lost, the reset may have been executed: reading shows it.
     if (!reply && sent < reset_requests) {
       co_return {reply.error(),
                  "one of the ten requests was not answered well, so the encoder has most likely done nothing: see that "
                  "with `absenc read` before you try again"};
     }
   }
-  // Only ID 8 writes the EEPROM; the tenth reply still shows the old errors.
+  // Only ID 8 writes the EEPROM. The tenth reply still shows the old alarms.
   const Reply now = co_await dialog.ask({DataId::everything})
                         .after(id == DataId::zero ? memory_time : reset_interval)
                         .or_say("all ten requests were sent, but whether the encoder obeyed could not be read");
@@ -101,12 +101,12 @@ Procedure reset(Dialog& dialog, Found& found, DataId id) {
 
 // ---- Memory (6.3.5, 9.1)
 
-constexpr Time busy_limit = 2 * memory_time;  // the document's maximum is memory_time
-constexpr Time busy_pause = 1ms;              // between two looks at a busy encoder
+constexpr Time busy_limit = 2 * memory_time;  // twice the document's maximum
+constexpr Time busy_pause = 1ms;              // between two requests to a busy encoder
 
 constexpr std::uint8_t byte(std::int64_t argument) { return static_cast<std::uint8_t>(argument); }
 
-// A page change must not be disturbed by asking whether it is over.
+// Repeats a request until the encoder is ready. A page change must not be disturbed by asking whether it is over.
 Part<Result<Reply>> persist(Dialog& dialog, const Request& request) {
   return until_ready<Protocol>(dialog, request,
                                {.limit = busy_limit,
@@ -121,7 +121,7 @@ Outcome failure(const Dialog& dialog, Error error, std::string_view step) {
           Protocol::manner(dialog.format(), dialog.request()).hold};
 }
 
-// The procedure ends, at this step, where the encoder does not do it.
+// Executes a memory request; ends the procedure at this step if the encoder does not execute it.
 Part<std::uint8_t> insist(Dialog& dialog, Request request, std::string_view step) {
   const Result<Reply> reply = co_await persist(dialog, request);
   if (!reply) co_await dialog.stop(failure(dialog, reply.error(), step));
@@ -156,8 +156,8 @@ Procedure read_memory(Dialog& dialog, Found& found, Arguments arguments) {
   co_return done;
 }
 
-// On the selected page: reads, writes what differs (100 000 writes are permitted in total), waits, selects the page
-// again so that the EEPROM itself is read, and compares.
+// Writes a byte on the selected page: reads it, writes it if it differs (100 000 writes are permitted in total), waits,
+// selects the page again so that the EEPROM itself is read, and compares.
 Part<bool> write_byte(Dialog& dialog, Found& found, std::uint8_t address, std::uint8_t value) {
   const Request look{DataId::read_memory, address};
   const std::uint8_t before = co_await insist(dialog, look, "nothing was written");
@@ -169,7 +169,7 @@ Part<bool> write_byte(Dialog& dialog, Found& found, std::uint8_t address, std::u
     dialog.refused();
     co_await dialog.stop(failure(dialog, Error::busy, ""));
   }
-  // A lost reply does not tell whether the write was done: reading back does, of the EEPROM itself.
+  // A lost reply does not show whether the byte was written, but reading it back does.
   co_await dialog.rest(memory_time);
   constexpr std::string_view lost = "the byte was written, but could not be read back";
   co_await select_page(dialog, found, *found.selected, lost);
@@ -205,10 +205,10 @@ Procedure write_memory(Dialog& dialog, Found& found, Arguments arguments) {
   co_return done;
 }
 
-// ---- The service page (7.2, 7.3), after which the page before is selected again where it is known
+// ---- The service page (7.2, 7.3); the page before it is selected again if it is known
 
-// The document shows the page as the content of address 127, but does not say that it can be read: an encoder that
-// refuses is one of those whose page is not known.
+// The document shows the page as the content of address 127, but does not state that it can be read. If the encoder
+// refuses, the page before is unknown.
 Part<std::optional<std::uint8_t>> open_service_page(Dialog& dialog, Found& found, std::string_view step) {
   const Result<Reply> before = co_await persist(dialog, {DataId::read_memory, page_select_address});
   found.page_left = service_page;
@@ -216,12 +216,13 @@ Part<std::optional<std::uint8_t>> open_service_page(Dialog& dialog, Found& found
   co_return before&& is_page(before->value) ? std::optional(before->value) : std::nullopt;
 }
 
-// When that fails, what was asked for is known all the same. Reading it back is what the encoder's next user finds.
+// Selects the page before again. If that fails, the result of the procedure is still valid. Reading the page back shows
+// what the next user of the encoder finds.
 Part<bool> restore(Dialog& dialog, Found& found, std::optional<std::uint8_t> before) {
   if (!before) co_return false;
   if (*before != service_page) {
     const Result<Reply> selected = co_await persist(dialog, {DataId::write_memory, page_select_address, *before});
-    co_await dialog.rest(memory_time);  // without a good reply it may be going on all the same
+    co_await dialog.rest(memory_time);  // without a valid reply the page change may still be going on
     if (!selected) co_return false;
     const Result<Reply> now = co_await persist(dialog, {DataId::read_memory, page_select_address});
     if (!now || now->value != *before) co_return false;
@@ -238,7 +239,7 @@ Procedure read_temperature(Dialog& dialog, Found& found) {
   co_return done;
 }
 
-// The byte in memory.
+// Returns the byte that stores this threshold.
 constexpr std::uint8_t threshold_of(std::int64_t degrees) { return degrees == 0 ? 0 : byte(0x80 | degrees); }
 
 void show_threshold(Found& found, std::uint8_t value) {
@@ -262,11 +263,11 @@ Procedure write_threshold(Dialog& dialog, Found& found, Arguments arguments) {
   co_return done;
 }
 
-// ---- Refusals: the communication alarms of SF (6.3.2), or what else is answered like data ID 3 (8.4, 9.4)
+// ---- Refusals: the communication alarms of SF (6.3.2), or other requests that are answered like data ID 3 (8.4, 9.4)
 
 constexpr Explanation explain_refusal(Bytes reply) {
   constexpr std::array<std::string_view, 4> found{
-      // by ca1 and ca0
+      // indexed by ca1 and ca0
       "it answered as to data ID 3, without a communication alarm: a data ID that it does not have, a CRC that is "
       "wrong, or an address that is closed",
       "ca0: it received the request with a parity error of the data ID",
@@ -281,7 +282,7 @@ constexpr Explanation explain_refusal(Bytes reply) {
                 "termination and shielding"};
 }
 
-// ---- What is shown
+// ---- Reports
 
 constexpr Values values_of_request(const Format&, const Request& request) { return values_of(request); }
 constexpr Values values_of_reply(const Format& format, const Request&, const Reply& reply) {
@@ -365,7 +366,7 @@ constexpr auto commands = std::array{
                                          threshold_arguments, true, false, "overheat-threshold"}),
 };
 
-// ---- What is declared
+// ---- Declaration
 
 constexpr auto options = OptionsOf{
     option<&Format::singleturn_bits>("singleturn_bits", "bits of ABS", 1, 24),
@@ -392,7 +393,7 @@ constexpr std::size_t size_of_reply(const Format&, Bytes begin) {
   const std::optional<DataId> of = data_id(begin[0]);
   return of && begin[0] == control_field(*of) ? reply_length(*of) : 0;
 }
-/// The reply's own control field says what was asked; the address of a memory access is taken as it comes.
+/// Guesses the request of a reply: its control field has the id; the address of a memory access is that of the reply.
 constexpr Result<Request> guess_request(const Format&, Bytes reply) {
   const std::optional<DataId> asked = data_id(reply[0]);
   if (!asked) return Error::unexpected_reply;
@@ -403,7 +404,7 @@ constexpr Result<Request> guess_request(const Format&, Bytes reply) {
   }
   return request;
 }
-/// What the encoder cannot accept is answered like ID 3 (8.4, 9.4).
+/// Returns the error of a request that the encoder did not accept, which it answers like ID 3 (8.4, 9.4).
 constexpr Error answer_to_bad(const Format&, Bytes, Error error, Bytes reply) {
   const bool refused = reply.size() == reply_length(DataId::everything) && checksum(reply) == 0 &&
                        reply[0] == control_field(DataId::everything);
@@ -435,7 +436,7 @@ constexpr Declaration<Protocol, VirtualEncoder> declaration{
     .alarms = fields.of<&Values::alarms>(),
     .memory = memory_areas,
     .conditions = conditions,
-    // Any pause ends a frame; some encoders may forgive one that is shorter than their own answer time.
+    // Any pause ends a frame; some encoders tolerate one that is shorter than their own answer time.
     .timing = {.pause_bits = 5, .turnaround = answer_time, .turnaround_limit = answer_limit},
 };
 
