@@ -8,8 +8,8 @@
 
 namespace absenc::host {
 
-/// What the time of a reading means: when the encoder latched it, or only when it arrived. Readings that waited in a
-/// buffer arrive together.
+/// Meaning of a reading's time: when the encoder latched it, or only when it arrived. Readings that waited in a buffer
+/// arrive together.
 enum class Times : std::uint8_t { latched, arrived };
 
 /// Returns whether readings of this encoder have arrival times only, because it transmits unsolicited.

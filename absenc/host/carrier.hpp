@@ -56,7 +56,7 @@ class Carrier {
     came({.kind = Event<Item>::Kind::line_error, .at = now});
   }
 
-  /// Does what is due. Call it at `due()`; more calls do no harm. A tick slower than the encoder's limits makes
+  /// Executes what is due. Call it at `due()`; more calls do no harm. A tick slower than the encoder's limits makes
   /// silences longer, but never wrong.
   void tick(Time now) {
     if (now < due()) return;

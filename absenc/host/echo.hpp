@@ -23,7 +23,7 @@ enum class EchoMode : std::uint8_t {
 /// A filter between a conversation and its port.
 class EchoFilter final : public Machine<std::uint8_t> {
  public:
-  /// Handles the echo of the adapter as `mode` says.
+  /// Handles the echo of the adapter by `mode`.
   explicit EchoFilter(EchoMode mode) : mode_(mode) {}
 
   /// Sets the unit that decides whether a reply is valid; both arguments must outlive the filter's use. Without a unit

@@ -13,7 +13,7 @@ using namespace std::chrono_literals;
 constexpr int silent_timeouts = 4;  // timeouts of silence before a request is repeated
 // Longest usual lateness; replies were only later on a line that delays every reply.
 constexpr Time longest_silence = 2500ms;
-constexpr Time stall_silence = 500ms;   // silence after which the replies that a stalled line held back are lost
+constexpr Time stall_silence = 500ms;   // silence after which the replies that a stalled line delayed are lost
 constexpr Time longest_lateness = 10s;  // a reply later than this counts as lost
 constexpr Time noise_limit = 100ms;     // longer than any reply lasts
 constexpr Time tick{1};
@@ -117,8 +117,8 @@ void ReplyGuard<Item>::enter_listening(const Entry& entry) {
 }
 
 // If the line delays every reply, the reply after one that was late by `suspected` follows at the interval of their
-// requests. If that interval passes in silence, and no earlier reply was nearly as late, the line had stalled, and the
-// replies that it held back are lost. A CAN bus holds nothing back.
+// requests. If that interval passes in silence, and no earlier reply was nearly as late, the line had stalled, and its
+// delayed replies are lost. A CAN bus delays no frames.
 template <class Item>
 Time ReplyGuard<Item>::listening_time(Time suspected) const {
   const Time always_late = std::clamp(suspected * 5 / 4, required_silence(), longest_wait());
@@ -175,7 +175,7 @@ Step<Item> ReplyGuard<Item>::forward(Time now) {
   return step;
 }
 
-// The conversation is asked for a step after each reported event.
+// The conversation makes a step after each reported event.
 template <class Item>
 Step<Item> ReplyGuard<Item>::next_of_conversation(Time now) {
   while (report_event()) {

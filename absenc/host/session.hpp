@@ -55,7 +55,7 @@ enum class Take : std::uint8_t {
   every,   ///< the one after the last, however long ago it was received
 };
 
-/// Runs the commands of one encoder over a port and counts what happened.
+/// Runs the commands of one encoder over a port and counts their results.
 template <class Item>
 class Session {
  public:

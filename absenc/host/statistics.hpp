@@ -121,7 +121,7 @@ class Rate {
 template <class Item>
 struct BadExchange {
   BadExchange() = default;
-  /// Keeps the beginning of what was sent and received.
+  /// Stores the first bytes of request and reply.
   BadExchange(Error why, const Exchange<Item>& exchange) : error(why), at(exchange.received_at) {
     sent.append(exchange.sent.first(std::min(exchange.sent.size(), sent.capacity())));
     received.append(exchange.received.first(std::min(exchange.received.size(), received.capacity())));
@@ -129,9 +129,9 @@ struct BadExchange {
 
   Error error = Error::none;  ///< Why it failed.
   Time at{};                  ///< when the last item was received, or sent
-  /// Beginning of what was sent.
+  /// First bytes of the request.
   Buffer<Item, 64 / sizeof(Item)> sent{};
-  /// Beginning of what was received.
+  /// First bytes of the reply.
   Buffer<Item, 64 / sizeof(Item)> received{};
 };
 
@@ -139,7 +139,7 @@ struct BadExchange {
 template <class Item>
 class Statistics {
  public:
-  static constexpr std::size_t most_kept = 8;  ///< Number of failed exchanges that are kept, the last ones.
+  static constexpr std::size_t most_kept = 8;  ///< Number of failed exchanges that are stored, the last ones.
 
   /// Adds a conversation that ended.
   void add(const Conversation<Item>& conversation) {

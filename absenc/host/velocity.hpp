@@ -22,7 +22,7 @@ namespace absenc::host {
 /// any number of counts is accepted, and 1/4 of the speed may be uncertain. Otherwise no speed is valid.
 class Velocity {
  public:
-  static constexpr std::size_t most_positions = 48;  ///< Greatest number of positions that are kept.
+  static constexpr std::size_t most_positions = 48;  ///< Greatest number of positions that are stored.
   static constexpr int longest_windows = 20;         ///< Longest window, in shortest windows.
 
   /// If the readings are farther apart than `window`, the window is the time between two readings.

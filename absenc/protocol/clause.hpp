@@ -83,12 +83,12 @@ enum class Reaction : std::uint8_t {
 struct Clause {
   std::string_view id;                   ///< unique in its unit: "crc"
   std::string_view paragraph;            ///< paragraph of the unit's document
-  std::string_view words;                ///< What the document demands, in words.
+  std::string_view words;                ///< Demand of the document, in words.
   Demand demand;                         ///< Kind of the demand.
   std::string_view needs{};              ///< options for which the document demands it: "carries=biss", "crc_width!=0"
   Errors errors = 0;                     ///< as_drawn: errors that break the clause; 0: form_errors
   Ask ask{};                             ///< Request that it is about.
-  Reaction reaction = Reaction::silent;  ///< What the encoder must do.
+  Reaction reaction = Reaction::silent;  ///< Required reaction of the encoder.
   std::string_view as{};                 ///< command whose reply is demanded; "": a reply to the sent request
   std::string_view option{};             ///< option that reading uses for this clause; "": the user's options
   std::int64_t value = 0;                ///< value of this option, or as the demand states
@@ -96,10 +96,10 @@ struct Clause {
   std::uint32_t address = 0;             ///< Address of the byte that it is about.
   std::string_view setting{};            ///< name of the setting that `config set` writes and reads
   std::string_view field{};              ///< field of the setting: the number that is its argument
-  std::int64_t other = 0;                ///< A second value.
+  std::int64_t other = 0;                ///< Second value, for demands that need two.
   Verb verb = Verb::run;                 ///< Verb of the command that it is about.
   std::string_view command{};            ///< Command that it is about.
-  std::string_view stop{};               ///< Command that ends what `command` begins; empty: none.
+  std::string_view stop{};               ///< Command that ends the stream of `command`; empty: none.
   std::string_view shown_with{};         ///< options of a virtual encoder that shows the case, if its defaults do not
 };
 
@@ -124,11 +124,11 @@ struct HostStep {
 /// Requests of a host, with pauses.
 using HostScript = std::span<const HostStep>;
 
-/// What a document demands of the host.
+/// A demand of a document on the host.
 struct HostClause {
   std::string_view id;         ///< Identifier, unique within the unit.
   std::string_view paragraph;  ///< Paragraph of the document.
-  std::string_view words;      ///< What the document demands, in words.
+  std::string_view words;      ///< Demand of the document, in words.
   HostDemand demand;           ///< Kind of the demand.
   std::string_view rule{};     ///< name of the rule in the virtual encoder; untested until the encoder has checked it
   // Hosts that break the clause, if the steps of every test do not (two commands in a row, pauses left out, a

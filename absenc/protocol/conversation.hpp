@@ -86,7 +86,7 @@ struct Violation {
 
 /// Is notified each time a virtual encoder checks a rule, because the host did what the rule is about.
 struct RuleWatch {
-  /// Is called for each look at a rule, with whether the host kept it.
+  /// Called for each check of a rule, with whether the host kept it.
   virtual void looked(std::string_view rule, bool kept) = 0;
 
  protected:

@@ -25,7 +25,7 @@ class HostRules {
   [[nodiscard]] std::span<const Violation> violations() const { return violations_; }
   /// Returns how often the host broke a rule.
   [[nodiscard]] std::uint32_t violation_count() const { return count_; }
-  /// Reports each look at a rule to `watch`; null: to nobody.
+  /// Sets the watch of rule checks; null: none.
   void watch(RuleWatch* watch) { watch_ = watch; }
 
  private:

@@ -34,7 +34,7 @@ struct Option {
   std::int64_t maximum = 0;                     ///< Highest value.
   std::span<const std::string_view> choices{};  ///< Words for the values from 0; none: it is a number.
   bool probeable = false;                       ///< captured frames can show its value
-  unsigned decimals = 0;                        ///< Number of digits behind the point that the value has.
+  unsigned decimals = 0;                        ///< Number of decimal digits of the value.
   bool describes_word = false;  ///< a word format replaces this option: the two cannot be given together
   std::uint32_t step = 1;       ///< values are `minimum` and multiples of this step above it
   Role role = Role::other;      ///< Role by which generic programs find it.
@@ -51,7 +51,7 @@ struct OptionValue {
 /// A model of encoder: a name for values of options.
 struct Model {
   std::string_view name;                ///< Name of the model.
-  std::string_view meaning;             ///< What the model is, as a phrase.
+  std::string_view meaning;             ///< The model, as a phrase.
   std::uint32_t maximum_rpm;            ///< fastest shaft for which a position is specified, in rpm
   std::span<const OptionValue> values;  ///< Options that it sets.
 };
@@ -81,7 +81,7 @@ struct OptionText {
 
 /// Why options were refused. `text`: the wrong name or value; `option`: the option that it was meant for.
 struct OptionError {
-  /// What is wrong with a text of options.
+  /// Error in a text of options.
   enum class Kind : std::uint8_t {
     none,
     unknown_model,
@@ -89,10 +89,10 @@ struct OptionError {
     bad_value,
     bad_word,                      ///< `word` has the reason and the place
     beside_word,                   ///< the option or model `text` cannot be given together with a word
-  } kind = Kind::none;             ///< What is wrong.
+  } kind = Kind::none;             ///< Kind of the error.
   std::string_view text{};         ///< The part of the text that is wrong.
   const Option* option = nullptr;  ///< The option; null: it is unknown.
-  WordFormatError word{};          ///< What is wrong with the position word.
+  WordFormatError word{};          ///< Error of the position word.
 };
 
 struct Unit;

@@ -38,7 +38,7 @@ class Sentence {
   }
   /// Removes all text.
   void clear() { size_ = 0; }
-  /// Returns whether there is nothing.
+  /// Returns whether the sentence is empty.
   [[nodiscard]] bool empty() const { return size_ == 0; }
   /// Returns the text.
   [[nodiscard]] std::string_view view() const { return {text_.data(), size_}; }

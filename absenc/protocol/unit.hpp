@@ -54,7 +54,7 @@ struct Command {
   std::string_view name;                  ///< Name of the command.
   Verb verb;                              ///< The verb of the command line that runs it.
   std::uint8_t id;                        ///< the unit's own number of the command
-  std::string_view meaning;               ///< What it does, as a phrase.
+  std::string_view meaning;               ///< Purpose of the command, as a phrase.
   std::span<const Argument> arguments{};  ///< Arguments in their order.
   bool changes_encoder = false;           ///< Whether it changes anything in the encoder.
   bool repeatable = true;                 ///< the same request may be sent again after an error
@@ -77,7 +77,7 @@ struct MemoryArea {
   std::uint32_t page;             ///< first page; 0 without pages
   std::uint32_t first;            ///< First address.
   std::uint32_t count;            ///< Number of bytes.
-  std::string_view meaning;       ///< What the area holds, as a phrase.
+  std::string_view meaning;       ///< Content of the area, as a phrase.
   bool writable = true;           ///< Whether hosts may write it.
   bool in_dump = true;            ///< a copy of the memory includes it
   std::uint32_t write_life = 0;   ///< writes that the document permits; 0: unknown
@@ -114,11 +114,11 @@ struct Condition {
 
 /// A frame in the form that its link carries.
 struct Frame {
-  Bytes bytes{};                  ///< The bytes, or of a bit stream the bytes that hold it.
+  Bytes bytes{};                  ///< The bytes; for a bit stream the bytes that contain it.
   std::size_t bits = 0;           ///< clocked links: number of valid bits in `bytes`
   const CanFrame* can = nullptr;  ///< the frame of CAN links
 
-  /// Returns whether there is neither a byte nor a CAN frame.
+  /// Returns whether the frame has neither bytes nor a CAN frame.
   [[nodiscard]] constexpr bool empty() const { return bytes.empty() && can == nullptr; }
 };
 
@@ -134,7 +134,7 @@ struct Expected {
 /// 0 and 1; CAN links: texts such as "1ff:022b000000000000".
 struct Vector {
   std::string_view id;                 ///< Identifier of the vector, unique within the unit.
-  std::string_view meaning;            ///< What the vector shows, as a phrase.
+  std::string_view meaning;            ///< The case that the vector shows, as a phrase.
   std::string_view source;             ///< Document and paragraph of the frame.
   std::string_view options;            ///< Options of the encoder, as `name=value` separated by blanks.
   Bytes request;                       ///< Bytes of the request; empty: none.
@@ -154,7 +154,7 @@ struct Capture {
 struct OptionEvidence {
   std::size_t option;    ///< index into the unit's options
   std::int64_t value;    ///< Value of the option.
-  bool possible;         ///< Whether the captured frames can come from an encoder with this value.
+  bool possible;         ///< Whether an encoder with this value may have sent the captured frames.
   std::size_t capture;   ///< if not possible: the first capture that contradicts the value
   std::string_view why;  ///< the reason, a sentence
 };

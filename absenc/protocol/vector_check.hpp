@@ -31,12 +31,12 @@ struct VectorCheck final : FieldSink {
     }
     return true;
   }
-  /// Returns whether each expected field came once, with its value.
+  /// Returns whether each expected field was put once, with its value.
   [[nodiscard]] constexpr bool all() const { return matches == expected.size() && count == expected.size(); }
 
   std::span<const Expected> expected;  ///< The wanted values.
   std::size_t matches = 0;             ///< Number of fields with the wanted value.
-  std::size_t count = 0;               ///< Number of expected fields that came.
+  std::size_t count = 0;               ///< Number of expected fields that were put.
 };
 
 /// Returns the frame of a vector's text on a clocked link: at most 256 bits, every character but 1 is 0.

@@ -78,7 +78,7 @@ struct Scale {
 struct PlacedField {
   std::size_t index;  ///< Index of the field in the format.
   unsigned first;     ///< Index of its first bit in the word.
-  Meaning meaning;    ///< What the field means.
+  Meaning meaning;    ///< Meaning of the field.
   unsigned bits;      ///< Number of bits, 1 to 64.
   bool active_low;    ///< Whether 0 means that a flag is set.
 };
@@ -121,7 +121,7 @@ struct Known {
   struct Field {
     static constexpr std::size_t index = i;                          ///< Index of the field in the format.
     static constexpr unsigned first = word.first_of(i);              ///< Index of its first bit in the word.
-    static constexpr Meaning meaning = word.fields()[i].meaning;     ///< What the field means.
+    static constexpr Meaning meaning = word.fields()[i].meaning;     ///< Meaning of the field.
     static constexpr unsigned bits = word.fields()[i].bits;          ///< Number of bits, 1 to 64.
     static constexpr bool active_low = word.fields()[i].active_low;  ///< Whether 0 means that a flag is set.
   };
@@ -272,7 +272,7 @@ constexpr void put_word(FieldSink& sink, const WordFormat& format, const Word& w
 struct PositionBits {
   unsigned position;            ///< Bits of the position.
   unsigned multiturn = 0;       ///< Bits of the turns; 0: none.
-  bool multiturn_first = true;  ///< Whether the turns stand before the position.
+  bool multiturn_first = true;  ///< Whether the turns precede the position.
 };
 
 /// Properties of a word that its reading needs.

@@ -61,7 +61,7 @@ class WordFieldName {
 /// One field of a word.
 struct WordField {
   WordFieldName name{};             ///< name of the meaning, unless another was given
-  Meaning meaning = Meaning::skip;  ///< What the field means.
+  Meaning meaning = Meaning::skip;  ///< Meaning of the field.
   std::uint8_t bits = 0;            ///< 1 to 64; error, warning and parity have 1
   bool active_low = false;          ///< Whether 0 means that a flag is set.
 };

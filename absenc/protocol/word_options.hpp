@@ -56,9 +56,9 @@ inline constexpr Option after_word_option{.name = "after_word",
 /// A format and the options that describe its word.
 template <class Format>
 struct WordSettings : Format {
-  std::uint8_t singleturn_bits = 0;  ///< Bits of the single-turn position; 0: as the word says.
+  std::uint8_t singleturn_bits = 0;  ///< Bits of the single-turn position; 0: that of the word.
   std::uint8_t multiturn_bits = 0;   ///< Bits of the turns; 0: none.
-  bool multiturn_first = true;       ///< Whether the turns stand before the position.
+  bool multiturn_first = true;       ///< Whether the turns precede the position.
   std::uint8_t position_bits = 0;    ///< Bits of a linear position; 0: rotary encoder.
   std::int64_t unit_pm = 0;          ///< Picometres per count; 0: rotary encoder.
 

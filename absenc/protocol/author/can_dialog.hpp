@@ -31,7 +31,7 @@ class DialogOf<P> : public CanEngine, public Routine {
   /// Returns the format of the encoder.
   [[nodiscard]] const Format& format() const { return format_; }
 
-  /// Sends a frame, or only listens. One of these calls must come before the first received frame is awaited.
+  /// Sends a frame, or only listens. One of these calls must precede the first await of a received frame.
   void ask(const CanFrame& frame, Time pause = {}) { CanEngine::ask(frame, P::host_times(format_), pause); }
   using CanEngine::ask_for;
   using CanEngine::configure;

@@ -87,7 +87,7 @@ template <class Subject, class T>
 struct Finding {
   /// The format, or the class that the conversation derives from.
   using Of = Subject;
-  /// Type of what is found.
+  /// Type of the result.
   using Found = T;
 
   /// Puts the values of a finding into fields.
@@ -140,7 +140,7 @@ class Reported final : public Base {
     (words_.add_part(left<finding>()), ...);
     return words_.view();
   }
-  /// Returns what the user can try; empty: nothing.
+  /// Returns what the user can try, "" for nothing.
   [[nodiscard]] std::string_view advice() const override {
     const std::string_view own = Base::advice();
     if (!own.empty()) return own;

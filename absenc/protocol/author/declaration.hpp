@@ -44,7 +44,7 @@ struct Declaration {
   std::size_t frames_size = 0;    ///< most bytes of storage that the coroutine frames of the procedures need
   Report<P, Host> report{};       ///< How requests, replies and findings are shown.
 
-  // ---- What depends on the format
+  // ---- Functions of the format
 
   /// Null: `format.line()`.
   LineSettings (*line)(const Format&) = nullptr;
@@ -71,7 +71,7 @@ struct Declaration {
   bool (*is_answered)(const Options&, Frame request) = nullptr;       ///< null: by the manner of the request
   /// Returns whether a flip of this bit of a good reply must be noticed; null: of every bit.
   bool (*is_checked)(const Options&, Frame request, Frame reply, std::size_t bit) = nullptr;
-  /// Returns where a field stands in request and reply; null: not known.
+  /// Returns the bits of a field in request and reply; null: unknown.
   BitRanges (*bits)(const Options&, Frame request, Frame reply, const FieldInfo&) = nullptr;
   /// Finds options in captured frames; null: none can be found.
   bool (*probe)(Options&, std::span<const Capture>, EvidenceSink&) = nullptr;
@@ -83,7 +83,7 @@ struct Declaration {
   std::optional<std::size_t> (*control_bit)(const Options&, Frame reply) = nullptr;
   /// Returns the alarms that replies can report; null: all.
   std::uint32_t (*reportable)(const Options&) = nullptr;
-  /// Completes a reading with what readings before it reported; null: each is complete.
+  /// Completes a reading by values of earlier readings; null: each reading is complete.
   Reading (*remembered)(const Reading& before, Reading now) = nullptr;
   /// Makes a follower, which completes replies of a capture; null: none is needed.
   Follower* (*follower)(const Options&, std::span<std::byte>) = nullptr;

@@ -70,7 +70,7 @@ class Responder : public EncoderOn<std::uint8_t> {
   void take_longer(Time time) { longer_ = time; }
   /// Answers a complete request. The reply goes to `reply`.
   virtual Answer respond(Bytes request, Time at, ByteBuffer<64>& reply) = 0;
-  /// What is wrong with a request.
+  /// Error of a request.
   enum class Flaw : std::uint8_t {
     damaged,    ///< damaged character
     unknown,    ///< no request begins with these bytes

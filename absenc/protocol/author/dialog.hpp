@@ -177,7 +177,7 @@ class DialogOf : public HostOf<P>, public Routine {
     DialogOf& dialog_;
   };
 
-  /// Sends a request; the procedure ends here if no good reply comes.
+  /// Sends a request; without a valid reply the procedure ends here.
   [[nodiscard]] Question<true> ask(const Request& request) {
     prepare(request);
     return Question<true>(*this);
@@ -215,7 +215,7 @@ class DialogOf : public HostOf<P>, public Routine {
   /// Reply of an encoder that sends without requests.
   struct Heard {
     Bytes bytes{};      ///< none, while not over: a damaged character. Valid until the next await
-    bool over = false;  ///< Whether no more replies come.
+    bool over = false;  ///< Whether the time of listening is over.
   };
   /// Waits for the next reply of an encoder that sends without requests.
   [[nodiscard]] auto heard() {
@@ -327,7 +327,7 @@ class Run : public ProcedureDialog<P> {
       this->begin(procedure(*this, found_, bound...).handle);
     }
   }
-  /// Returns what was found so far.
+  /// Returns the results so far.
   [[nodiscard]] const Found& found() const { return found_; }
   /// Returns the counts of a stream; null: the command does not stream.
   [[nodiscard]] const StreamCounts* stream() const final { return goes_on ? &counts_ : ProcedureDialog<P>::stream(); }

@@ -10,7 +10,7 @@
 
 namespace absenc::author {
 
-/// What virtual encoders share: power, alarms and watched rules.
+/// Power, alarms and watched rules, which all virtual encoders share.
 template <class Item>
 class EncoderOn : public Device<Item> {
  public:
@@ -35,7 +35,7 @@ class EncoderOn : public Device<Item> {
   [[nodiscard]] std::span<const Violation> violations() const final { return rules_.violations(); }
   /// Returns how often the host broke a rule.
   [[nodiscard]] std::uint32_t violation_count() const final { return rules_.violation_count(); }
-  /// Reports each look at a rule to `watch`; null: to nobody.
+  /// Sets the watch of rule checks; null: none.
   void watch_rules(RuleWatch* watch) final { rules_.watch(watch); }
   /// Returns the number of replies sent.
   [[nodiscard]] std::uint64_t answer_count() const final { return answer_count_; }

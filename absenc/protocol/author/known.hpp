@@ -24,7 +24,7 @@ struct Known {
   static constexpr Manner manner(const Format&, const Request&) { return P::manner(format, request); }
   /// Returns the request as it is sent.
   static constexpr auto encode(const Format&, const Request&) { return P::encode(format, request); }
-  /// Returns the length of the reply, as far as its first bytes say, in bytes; 0 if it is not known.
+  /// Returns the length of the reply in bytes, as far as its first bytes show it; 0: unknown.
   static constexpr std::size_t expected(const Format&, const Request&, Bytes so_far) {
     return P::expected(format, request, so_far);
   }

@@ -166,7 +166,7 @@ struct OptionsOf {
 /// A model, whose values are text: "bits=12 turns=false".
 struct ModelText {
   std::string_view name;      ///< Name of the model.
-  std::string_view meaning;   ///< What the model is, as a phrase.
+  std::string_view meaning;   ///< The model, as a phrase.
   std::uint32_t maximum_rpm;  ///< highest speed in rpm; 0: the document states none
   std::string_view values;    ///< Options that it sets, as `name=value` separated by blanks.
 };

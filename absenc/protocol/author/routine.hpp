@@ -123,7 +123,7 @@ class Routine {
 
 /// Base of the coroutine frames of procedures and parts. The first parameter of the coroutine is the Routine.
 struct FrameInRoutine {
-  /// Allocates the frame in the arena of the routine; null: there is no room.
+  /// Allocates the frame in the arena of the routine; null: the arena is full.
   template <class... Parameters>
   static void* operator new(std::size_t size, Routine& routine, const Parameters&...) noexcept {
     return routine.take(size);
@@ -192,7 +192,7 @@ struct [[nodiscard]] Part {
 
   /// Returns false: the part always runs.
   [[nodiscard]] bool await_ready() const { return false; }
-  /// Begins the part; its caller goes on when it has ended.
+  /// Begins the part; its caller continues when the part has ended.
   template <class Caller>
   void await_suspend(std::coroutine_handle<Caller> caller) {
     Routine& routine = caller.promise().routine;

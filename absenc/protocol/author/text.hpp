@@ -17,7 +17,7 @@ namespace absenc::author {
 /// a real number if it has a point, or a text. Frames are hexadecimal, or plain text if the unit's frames are texts.
 struct VectorText {
   std::string_view id;       ///< Identifier of the vector, unique within the unit.
-  std::string_view meaning;  ///< What the vector shows, as a phrase.
+  std::string_view meaning;  ///< The case that the vector shows, as a phrase.
   std::string_view source;   ///< Document and paragraph of the frame.
   std::string_view options;  ///< Options of the encoder, as `name=value` separated by blanks.
   std::string_view request;  ///< Bytes of the request in hexadecimal.

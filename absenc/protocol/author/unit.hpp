@@ -232,7 +232,7 @@ struct Descriptor {
     }
   }
 
-  /// Returns what the document says about an error.
+  /// Returns the document's explanation of an error.
   static Explanation explain(const Options& values, Error error, Frame asked, Frame reply) {
     return declared.report.explain(declared.format(values), error, items(asked), items(reply));
   }
@@ -274,7 +274,7 @@ struct Descriptor {
                        [&](const OptionValue& one) { return values.values[one.option] == one.value; });
   }
 
-  /// Returns whether a vector decodes as it says.
+  /// Returns whether a vector decodes to its stated fields.
   static constexpr bool holds(const Vector& vector) {
     Options values;
     bool known = resolve(vector.options, {}, values);

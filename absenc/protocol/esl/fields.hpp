@@ -72,22 +72,22 @@ struct Shown {
     value = one.value;
   }
 
-  std::optional<DataId> data_id{};                 ///< Value of the field `data_id`, if there is one.
-  std::optional<std::uint8_t> control_field{};     ///< Value of the field `control_field`, if there is one.
-  std::optional<std::uint8_t> encoder_address{};   ///< Value of the field `encoder_address`, if there is one.
-  std::optional<Reply> reply{};                    ///< Value of the field `reply`, if there is one.
-  std::optional<bool> clash{};                     ///< Value of the field `clash`, if there is one.
-  std::optional<std::string_view> trouble{};       ///< Value of the field `trouble`, if there is one.
-  std::optional<std::uint8_t> page{};              ///< Value of the field `page`, if there is one.
-  std::optional<std::uint8_t> memory_address{};    ///< Value of the field `memory_address`, if there is one.
-  std::optional<std::uint8_t> busy{};              ///< Value of the field `busy`, if there is one.
-  std::optional<std::uint8_t> value{};             ///< Value of the field `value`, if there is one.
-  std::optional<Bytes> data{};                     ///< Value of the field `data`, if there is one.
-  std::optional<bool> written{};                   ///< Value of the field `written`, if there is one.
-  std::optional<bool> led_error{};                 ///< Value of the field `led_error`, if there is one.
-  std::optional<bool> lissajous_error{};           ///< Value of the field `lissajous_error`, if there is one.
-  std::optional<std::uint32_t> safe_singleturn{};  ///< Value of the field `safe_singleturn`, if there is one.
-  std::optional<std::uint8_t> page_left{};         ///< Value of the field `page_left`, if there is one.
+  std::optional<DataId> data_id{};                 ///< Data id of request or reply.
+  std::optional<std::uint8_t> control_field{};     ///< CF: encoder address, data id, parity.
+  std::optional<std::uint8_t> encoder_address{};   ///< Address of the encoder on the line (EAD).
+  std::optional<Reply> reply{};                    ///< The reply, whose id decides which parts it has.
+  std::optional<bool> clash{};                     ///< Whether every answer at this address is damaged.
+  std::optional<std::string_view> trouble{};       ///< Error of an answer that was complete.
+  std::optional<std::uint8_t> page{};              ///< Page of a memory access.
+  std::optional<std::uint8_t> memory_address{};    ///< Address of a memory access (ADF).
+  std::optional<std::uint8_t> busy{};              ///< 1: the memory is busy, and the request was not executed.
+  std::optional<std::uint8_t> value{};             ///< Byte in memory (EDF).
+  std::optional<Bytes> data{};                     ///< Bytes in memory from `memory_address` on.
+  std::optional<bool> written{};                   ///< Whether the byte was written; false: it had the value already.
+  std::optional<bool> led_error{};                 ///< Whether the LED current is out of range.
+  std::optional<bool> lissajous_error{};           ///< Whether the signals of the disc are out of range.
+  std::optional<std::uint32_t> safe_singleturn{};  ///< Safe position within the turn, in counts.
+  std::optional<std::uint8_t> page_left{};         ///< Page that is left selected although the page before is unknown.
   bool has_turns = true;                           ///< false: ABM is no part of the position
 };
 

@@ -143,8 +143,8 @@ inline constexpr unsigned redundant = redundant_sequence | redundant_alone | red
 /// A part with its length on the wire.
 template <unsigned part_id, std::size_t part_size>
 struct WirePart {
-  static constexpr unsigned id = part_id;         ///< One of `part`.
-  static constexpr std::size_t size = part_size;  ///< Bytes.
+  static constexpr unsigned id = part_id;         ///< The part, one of namespace `part`.
+  static constexpr std::size_t size = part_size;  ///< Length in bytes.
 };
 
 namespace detail {
@@ -290,7 +290,7 @@ struct Request {
   std::uint8_t value = 0;            ///< write_memory: byte to be written
 };
 
-/// What a reply says of one channel.
+/// The parts of a reply in one channel.
 struct ChannelReply {
   std::uint8_t status = 0;      ///< bits in the order of the document
   std::uint8_t alarms = 0;      ///< Alarms of the channel.

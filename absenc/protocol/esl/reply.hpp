@@ -54,7 +54,7 @@ enum class Check : std::uint8_t {
   request_not_accepted,
 };
 
-/// What a failed check says.
+/// Texts of a failed check.
 struct CheckText {
   Error error;                ///< Error of the reply.
   std::string_view sentence;  ///< The check, as a sentence.
@@ -393,7 +393,7 @@ struct Protocol {
     if (!profile.turns) reading.multiturn_valid = false;
     return reading;
   }
-  /// Returns the length of the reply, as far as its first bytes say, in bytes; 0 if it is not known.
+  /// Returns the length of the reply in bytes, as far as its first bytes show it; 0: unknown.
   static constexpr std::size_t expected(const Profile& profile, const Request& request, Bytes) {
     return reply_size(profile, request);
   }

@@ -141,8 +141,8 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
     reply.append(encode_reply(*made).view());
     return Answer::sent;
   }
-  // The encoder searches for the next start bit if there is none (8.1). The end of such a frame is unknown, so a
-  // missing start bit ends it (8.2, 9.2).
+  // The encoder searches for the next start bit if none follows (8.1). The end of such a frame is unknown, so a missing
+  // start bit ends it (8.2, 9.2).
   bool is_refused(Flaw flaw, Bytes heard) override {
     if (flaw == Flaw::unknown && !has_sync_code(heard[0])) return false;
     if (flaw == Flaw::unknown && heard[0] != control_field(heard[0] >> 3)) refused_status_ |= status::parity_error;

@@ -46,23 +46,23 @@ inline constexpr std::array<FlagInfo, 8> alarm_flags{{
 
 /// Values of a frame or a procedure, in the order of the wire.
 struct Values {
-  std::optional<DataId> data_id{};                   ///< Value of the field `data_id`, if there is one.
-  std::optional<std::uint8_t> control_field{};       ///< Value of the field `control_field`, if there is one.
-  std::optional<std::uint8_t> status{};              ///< Value of the field `status`, if there is one.
-  std::optional<std::uint32_t> singleturn{};         ///< Value of the field `singleturn`, if there is one.
-  std::optional<std::uint8_t> encoder_id{};          ///< Value of the field `encoder_id`, if there is one.
-  std::optional<std::uint32_t> multiturn{};          ///< Value of the field `multiturn`, if there is one.
-  std::optional<std::uint8_t> alarms{};              ///< Value of the field `alarms`, if there is one.
-  std::optional<std::uint8_t> page{};                ///< Value of the field `page`, if there is one.
-  std::optional<std::uint8_t> address{};             ///< Address.
-  std::optional<std::uint8_t> busy{};                ///< Value of the field `busy`, if there is one.
-  std::optional<std::uint8_t> value{};               ///< Value of the field `value`, if there is one.
-  std::optional<Bytes> data{};                       ///< Value of the field `data`, if there is one.
-  std::optional<std::int8_t> temperature{};          ///< Value of the field `temperature`, if there is one.
-  std::optional<bool> overheat_enabled{};            ///< Value of the field `overheat_enabled`, if there is one.
-  std::optional<std::uint8_t> overheat_threshold{};  ///< Value of the field `overheat_threshold`, if there is one.
-  std::optional<bool> written{};                     ///< Value of the field `written`, if there is one.
-  std::optional<std::uint8_t> page_left{};           ///< Value of the field `page_left`, if there is one.
+  std::optional<DataId> data_id{};                   ///< Data ID of request or reply.
+  std::optional<std::uint8_t> control_field{};       ///< CF of the request: sync code, data id, parity.
+  std::optional<std::uint8_t> status{};              ///< SF of the reply.
+  std::optional<std::uint32_t> singleturn{};         ///< Position within the turn, in counts (ABS).
+  std::optional<std::uint8_t> encoder_id{};          ///< ENID: the kind of encoder.
+  std::optional<std::uint32_t> multiturn{};          ///< Turns (ABM).
+  std::optional<std::uint8_t> alarms{};              ///< Alarms (ALMC).
+  std::optional<std::uint8_t> page{};                ///< Page of a memory access.
+  std::optional<std::uint8_t> address{};             ///< Address of a memory access (ADF).
+  std::optional<std::uint8_t> busy{};                ///< 1: the encoder is busy and did not execute the request.
+  std::optional<std::uint8_t> value{};               ///< Byte in memory (EDF).
+  std::optional<Bytes> data{};                       ///< Bytes in memory from `address` on.
+  std::optional<std::int8_t> temperature{};          ///< Temperature of the board, in degC.
+  std::optional<bool> overheat_enabled{};            ///< Whether over_heat is watched.
+  std::optional<std::uint8_t> overheat_threshold{};  ///< Threshold of over_heat, in degC.
+  std::optional<bool> written{};                     ///< Whether the byte was written; false: it had the value already.
+  std::optional<std::uint8_t> page_left{};  ///< Page that is left selected although the page before is unknown.
 };
 
 /// Fields of requests and replies.

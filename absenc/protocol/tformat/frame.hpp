@@ -385,7 +385,7 @@ struct Protocol {
   }
   /// Returns the request as it is sent.
   static constexpr RequestBytes encode(const Format&, const Request& request) { return encode_request(request); }
-  /// Returns the length of the reply, as far as its first bytes say, in bytes; 0 if it is not known.
+  /// Returns the length of the reply in bytes, as far as its first bytes show it; 0: unknown.
   static constexpr std::size_t expected(const Format&, const Request& request, Bytes so_far) {
     return reply_length(begins_rejection(request.id, so_far) ? DataId::everything : request.id);
   }
