@@ -25,7 +25,7 @@ inline constexpr Option multiturn_bits_option{.name = "multiturn_bits",  ///< Op
                                               .maximum = 63,
                                               .probeable = true,
                                               .describes_word = true};
-/// Option: whether the turns stand before the position.
+/// Option: whether the turns precede the position.
 inline constexpr Option multiturn_first_option{.name = "multiturn_first",
                                                .meaning = "whether the turns come before the position",
                                                .default_value = 1,
