@@ -205,7 +205,7 @@ class EveryUnit : public testing::TestWithParam<const Unit*> {
   }
 };
 
-TEST_P(EveryUnit, ChangeWithFaultsIsNamedAsTheEncoderHasIt) {
+TEST_P(EveryUnit, ReportedChangeMatchesMemoryUnderFaults) {
   Counts counts{};
   each_command([&](const Unit& unit, const Command& command, const Values& values) {
     const std::string address = fmt::format("sim:{}?singleturn=77", unit.id);
@@ -229,7 +229,7 @@ TEST_P(EveryUnit, ChangeWithFaultsIsNamedAsTheEncoderHasIt) {
   tell(counts);
 }
 
-TEST_P(EveryUnit, ChangeWhosePortIsLostIsNamedAsTheEncoderHasIt) {
+TEST_P(EveryUnit, ReportedChangeMatchesMemoryAfterPortLoss) {
   Counts counts{};
   each_command([&](const Unit& unit, const Command& command, const Values& values) {
     const std::string address = fmt::format("sim:{}?singleturn=77", unit.id);
@@ -257,7 +257,7 @@ INSTANTIATE_TEST_SUITE_P(Units, EveryUnit, testing::ValuesIn(all_units().begin()
                            return name;
                          });
 
-TEST(Change, NamesWhatToTryAfterItsResultWasLost) {
+TEST(Change, AdvisesAfterUnknownResult) {
   const EncoderAddress encoder = parse_address("sim:raa38-modbus?fault=silence=1");
   const Unit& unit = *encoder.unit;
   const Command& setter = *require_setting(unit, "baud").setter;
@@ -273,7 +273,7 @@ TEST(Change, NamesWhatToTryAfterItsResultWasLost) {
   EXPECT_NE(change->text().find("as before"), std::string::npos) << change->text();
 }
 
-TEST(Change, IsKeptWhenOnlyReadingItAgainFails) {
+TEST(Change, IsReportedIfOnlyReadBackFails) {
   Encoder encoder = make_encoder(parse_address("sim:tformat"), Time{},
                                  [](const EncoderAddress& one) { return breaking_link(virtual_link(one), 400); });
   encoder.connect();

@@ -15,7 +15,7 @@
 namespace absenc::client {
 namespace {
 
-TEST(Joint, IsCalculatedAsItsHeaderSays) {
+TEST(Joint, ComputesAnglesAsDocumented) {
   const Joint joint{.direction = -1, .offset = 30, .gear = 50.0 / 3, .pole_pairs = 7, .is_set = true};
   EXPECT_DOUBLE_EQ(joint_degrees(joint, 30), 0);
   EXPECT_DOUBLE_EQ(joint_degrees(joint, 30 + 360 * 50.0 / 3), -360);
@@ -86,7 +86,7 @@ TEST(Joint, FollowsTheShaftOverSeveralTurnsInBothDirections) {
   expect_angles("sim:tformat?multiturn=1&motion=rpm=-300" + more + "0.5", 1, -40.5, 0.5, 5);
 }
 
-TEST(Joint, IsNotKnownWhereTheTurnsAreNot) {
+TEST(Joint, IsUnknownWithoutTurns) {
   const std::string single = "sim:esl?model=single-turn&singleturn=1000";
   EXPECT_FALSE(open(single + "&gear=2").samples({.count = 1}).begin()->angles.joint_deg.has_value());
   EXPECT_TRUE(open(single + "&gear=1").samples({.count = 1}).begin()->angles.joint_deg.has_value());
@@ -96,7 +96,7 @@ TEST(Joint, IsNotKnownWhereTheTurnsAreNot) {
   EXPECT_FALSE(open(lost).samples({.count = 1}).begin()->angles.joint_deg.has_value());
 }
 
-TEST(Joint, IsEmptyWhereThePositionDoesNotHold) {
+TEST(Joint, IsInvalidIfPositionIsInvalid) {
   Encoder encoder = open("sim:tformat?gear=2&pole_pairs=3&alarm=counting_error");
   SampleRows rows(encoder.unit(), encoder.options(), Time{}, SampleRows::With::motion, encoder.joint());
   for (const Sample& sample : encoder.samples({.count = 3})) {
@@ -110,7 +110,7 @@ TEST(Joint, IsEmptyWhereThePositionDoesNotHold) {
   }
 }
 
-TEST(Joint, StandsBesideTheEncodersOwnPosition) {
+TEST(Joint, AddsColumnsAndKeepsPosition) {
   Encoder encoder = open("sim:biss?model=linear-26-1um&singleturn=30000&direction=-1&offset_mm=10&pole_pair_mm=24");
   SampleRows rows(encoder.unit(), encoder.options(), Time{}, SampleRows::With::motion, encoder.joint());
   for (const Sample& sample : encoder.samples({.count = 1})) {
@@ -128,7 +128,7 @@ TEST(Joint, StandsBesideTheEncodersOwnPosition) {
   }
 }
 
-TEST(Joint, RefusesSettingsThatMakeNoSense) {
+TEST(Joint, RefusesInvalidSettings) {
   const auto refused = [](const std::string& address) -> std::string {
     try {
       static_cast<void>(parse_address(address));

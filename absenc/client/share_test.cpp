@@ -7,7 +7,7 @@ namespace absenc::client {
 namespace {
 
 // Computed by hand from Wilson's formula: 0 of 100 and 10 of 100.
-TEST(ShareTest, HasWilsonsInterval) {
+TEST(ShareTest, MatchesWilsonInterval) {
   EXPECT_NEAR((Share{0, 100}).low(), 0, 1e-12);
   EXPECT_NEAR((Share{0, 100}).high(), 0.037, 1e-3);
   EXPECT_NEAR((Share{10, 100}).low(), 0.0552, 1e-3);

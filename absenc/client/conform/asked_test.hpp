@@ -17,7 +17,7 @@ namespace absenc::client {
 
 /// Returns the encoder of this address. If it sends unsolicited frames, sets the first choice of an option with which
 /// it is polled.
-inline EncoderAddress asked_address(const std::string& text) {
+inline EncoderAddress polled_address(const std::string& text) {
   const EncoderAddress usual = parse_address(text);
   const Unit& unit = *usual.unit;
   if (unit.streams == nullptr || !unit.streams(usual.options)) return usual;

@@ -21,9 +21,9 @@ namespace {
 
 // Wait that is longer than any encoder is busy with a byte, including its reply.
 constexpr Time settling = std::chrono::milliseconds(50);
-constexpr unsigned tries = 3;        // attempts to restore one value
-constexpr std::uint32_t beside = 4;  // bytes before the written one that must stay unchanged
-constexpr unsigned nearness = 512;   // positions are equal within this fraction of a turn
+constexpr unsigned tries = 3;                 // attempts to restore one value
+constexpr std::uint32_t beside = 4;           // bytes before the written one that must stay unchanged
+constexpr unsigned position_tolerance = 512;  // positions are equal within this fraction of a turn
 
 /// Thrown when the encoder refuses a command or its reply is bad: the clause is broken.
 struct Refused {
@@ -50,7 +50,7 @@ struct BusySink final : FieldSink {
 bool is_near(const Reading& reading, std::uint64_t wanted) {
   const std::uint64_t turn = std::uint64_t{1} << reading.singleturn_bits;
   const std::uint64_t away = (reading.singleturn - wanted) & (turn - 1);
-  return std::min(away, turn - away) <= turn / nearness;
+  return std::min(away, turn - away) <= turn / position_tolerance;
 }
 
 void Changes::test(const Clause& clause, ClauseResult& result) {
@@ -140,16 +140,16 @@ void Changes::test_busy(const Clause& clause, ClauseResult& result) {
   const std::int64_t written = save_byte(clause.page, clause.address) ^ 0xFF;
   const Command& reader = *find_command(unit_, Verb::memory_read);
   const Command& writer = *find_command(unit_, Verb::memory_write);
-  const Sent wrote = send(
+  const SingleExchange wrote = send(
       writer,
       role_arguments(writer, {{Role::page, clause.page}, {Role::address, clause.address}, {Role::value, written}}));
   const auto where =
       role_arguments(reader, {{Role::page, clause.page}, {Role::address, clause.address}, {Role::count, 1}});
-  const Sent asked = send(reader, where);
-  line_.rest(settling);
+  const SingleExchange asked = send(reader, where);
+  line_.wait_for(settling);
   const std::int64_t now = saved_.back().look();
   std::string seen = fmt::format("{}; later 0x{:02X} is read, 0x{:02X} was written",
-                                 what_came(unit_.link, asked.request.frame(), asked.reply.frame()), now, written);
+                                 exchange_text(unit_.link, asked.request.frame(), asked.reply.frame()), now, written);
   const std::optional<BusyReply> accepted = busy_reply(wrote);
   const std::optional<BusyReply> reply = busy_reply(asked);
   result.evidence = "the byte could not be written: " + seen;
@@ -164,9 +164,9 @@ void Changes::test_busy(const Clause& clause, ClauseResult& result) {
 void Changes::test_closed(const Clause& clause, ClauseResult& result) {
   save({.look = [this] { return std::int64_t{read_byte(0, 0)}; }, .write = [](std::int64_t) {}});
   static_cast<void>(read_byte(clause.page, clause.address));
-  const Sent sent = line_.send(parse_wire_text(unit_.link, "a request", clause.ask.wire).bytes);
+  const SingleExchange sent = line_.send(parse_wire_text(unit_.link, "a request", clause.ask.wire).bytes);
   const bool as_demanded = reply_error(unit_, line_.options(), clause.as, {sent.request, sent.reply}) == Error::none;
-  const std::string seen = what_came(unit_.link, sent.request.frame(), sent.reply.frame());
+  const std::string seen = exchange_text(unit_.link, sent.request.frame(), sent.reply.frame());
   static_cast<void>(read_byte(clause.page, clause.address));  // proves that the encoder replies, and selects the page
   conclude(result, as_demanded, seen);
 }
@@ -220,8 +220,8 @@ void Changes::test_direction(const Clause& clause, ClauseResult& result) {
                 if (is_mirrored() == wanted) return;
               }
             },
-        .by_hand = fmt::format("absenc config set {} {} {}, or {}, until the position is {} again", name_,
-                               clause.setting, clause.other, clause.value, before.singleturn)});
+        .restore_command = fmt::format("absenc config set {} {} {}, or {}, until the position is {} again", name_,
+                                       clause.setting, clause.other, clause.value, before.singleturn)});
   set(clause.value);
   const std::int64_t first = is_mirrored();
   set(clause.other);
@@ -236,14 +236,14 @@ void Changes::test_pace(const Clause& clause, ClauseResult& result) {
   constexpr Time heard_for = std::chrono::milliseconds(2200);  // long enough for two frames at one frame per second
   const Command& start = *find_command(unit_, clause.command);
   const Command& stop = *find_command(unit_, clause.stop);
-  const auto look = [this] { return line_.hear(heard_for).per_second(); };
+  const auto look = [this] { return line_.count_unsolicited(heard_for).per_second(); };
   const auto write = [this, &start, &stop](std::int64_t value) {
     if (value == 0) static_cast<void>(run(stop, complete_arguments(stop, {})));
     if (value != 0) static_cast<void>(run(start, complete_arguments(start, std::array{value})));
   };
   const std::int64_t before = save({.look = look, .write = write});
-  saved_.back().by_hand = before == 0 ? fmt::format("absenc run {} {}", name_, clause.stop)
-                                      : fmt::format("absenc run {} {} {}", name_, clause.command, before);
+  saved_.back().restore_command = before == 0 ? fmt::format("absenc run {} {}", name_, clause.stop)
+                                              : fmt::format("absenc run {} {} {}", name_, clause.command, before);
   const std::int64_t wanted = before == clause.value ? clause.value / 2 : clause.value;
   write(wanted);
   const std::int64_t now = look();
@@ -258,7 +258,7 @@ void Changes::test_pace(const Clause& clause, ClauseResult& result) {
 
 // Returns whether the test may erase `what`. Without a value to lose the command is sent anyway: it may be refused, or
 // do harm.
-bool Changes::may_lose(std::string_view what, ClauseResult& result) const {
+bool Changes::may_erase(std::string_view what, ClauseResult& result) const {
   if (what.empty() || resets_) return true;
   result.evidence = fmt::format("there is {}, which nothing could bring back: --resets gives it up", what);
   return false;
@@ -268,7 +268,7 @@ void Changes::test_zero(ClauseResult& result) {
   const Command& zero = *find_command(unit_, Verb::zero);
   const Reading before = read();
   const bool differs = !is_near(before, 0);
-  if (!may_lose(before.singleturn != 0 ? fmt::format("a position of {}", before.singleturn) : "", result)) return;
+  if (!may_erase(before.singleturn != 0 ? fmt::format("a position of {}", before.singleturn) : "", result)) return;
   static_cast<void>(run(zero, complete_arguments(zero, {})));
   const Reading after = read();
   const std::string seen = fmt::format("the position is {} after {}", after.singleturn, before.singleturn);
@@ -284,9 +284,9 @@ void Changes::test_reset(const Clause& clause, ClauseResult& result) {
   std::string lost;
   if (before.alarms != 0) lost = "an alarm";
   if (turns && before.multiturn != 0) lost = fmt::format("a count of {} turns", before.turns());
-  if (!may_lose(lost, result)) return;
+  if (!may_erase(lost, result)) return;
   const Command& command = *find_command(unit_, clause.verb);
-  const Ran ran = line_.run(command, complete_arguments(command, {}));
+  const CommandResult ran = line_.run(command, complete_arguments(command, {}));
   const Reading after = read();
   std::string seen = fmt::format("position {}, turns {}, alarms {:x} before; {}, {}, {:x} after", before.singleturn,
                                  before.turns(), before.alarms, after.singleturn, after.turns(), after.alarms);
@@ -304,10 +304,10 @@ void Changes::test_reset(const Clause& clause, ClauseResult& result) {
 void Changes::test_restart(const Clause& clause, ClauseResult& result) {
   const Reading before = read();
   const bool turns = before.multiturn_bits != 0 && before.multiturn != 0;
-  if (!may_lose(turns ? fmt::format("a count of {} turns", before.turns()) : "", result)) return;
+  if (!may_erase(turns ? fmt::format("a count of {} turns", before.turns()) : "", result)) return;
   static_cast<void>(send(*find_command(unit_, clause.command), {}));
-  const Ran at_once = line_.run(*find_command(unit_, Verb::read), {});
-  line_.rest(std::chrono::milliseconds(clause.value) + settling);
+  const CommandResult at_once = line_.run(*find_command(unit_, Verb::read), {});
+  line_.wait_for(std::chrono::milliseconds(clause.value) + settling);
   const Reading after = read();
   const bool silent = !at_once.heard;
   conclude(result, silent && is_near(after, before.singleturn),
@@ -332,30 +332,30 @@ std::int64_t Changes::save_byte(std::uint32_t page, std::uint32_t address) {
   const std::int64_t value =
       save({.look = [this, page, address] { return std::int64_t{read_byte(page, address)}; }, .write = write});
   const bool paged = find_role(setter.arguments, Role::page) != nullptr;
-  saved_.back().by_hand = fmt::format("absenc memory write {} 0x{:02X} 0x{:02X}{}", name_, address, value,
-                                      paged ? fmt::format(" --page {}", page) : "");
+  saved_.back().restore_command = fmt::format("absenc memory write {} 0x{:02X} 0x{:02X}{}", name_, address, value,
+                                              paged ? fmt::format(" --page {}", page) : "");
   return value;
 }
 
 std::int64_t Changes::save_setting(const Clause& clause) {
   const Setting setting = require_setting(unit_, clause.setting);
   const auto look = [this, setting, field = clause.field] {
-    const Ran ran = run(*setting.getter, complete_arguments(*setting.getter, {}));
+    const CommandResult ran = run(*setting.getter, complete_arguments(*setting.getter, {}));
     const std::int64_t value = number_of(ran.answer, field);
-    line_.follow(*setting.setter, value);
+    line_.note_setting(*setting.setter, value);
     return value;
   };
   const auto write = [this, setting](std::int64_t value) {
     static_cast<void>(run(*setting.setter, complete_arguments(*setting.setter, std::array{value})));
-    line_.follow(*setting.setter, value);
+    line_.note_setting(*setting.setter, value);
   };
   const std::int64_t value = save({.look = look, .write = write});
-  std::string by_hand = fmt::format("absenc config set {} {} {}", name_, clause.setting, value);
+  std::string restore_command = fmt::format("absenc config set {} {} {}", name_, clause.setting, value);
   if (!setting.setter->changes_option.empty()) {
     const std::int64_t wanted = value == clause.value ? clause.other : clause.value;
-    by_hand += fmt::format(" --option {}={}", setting.setter->changes_option, wanted);
+    restore_command += fmt::format(" --option {}={}", setting.setter->changes_option, wanted);
   }
-  saved_.back().by_hand = std::move(by_hand);
+  saved_.back().restore_command = std::move(restore_command);
   return value;
 }
 
@@ -363,7 +363,7 @@ void Changes::put_back() {
   while (!saved_.empty()) {
     const Saved one = std::move(saved_.back());
     saved_.pop_back();
-    if (!put_back(one) && !one.by_hand.empty()) left_.push_back(one.by_hand);
+    if (!put_back(one) && !one.restore_command.empty()) restore_commands_.push_back(one.restore_command);
   }
 }
 
@@ -371,7 +371,7 @@ void Changes::put_back() {
 bool Changes::put_back(const Saved& one) {
   for (unsigned i = 0; i < tries; ++i) {
     try {
-      line_.rest(settling);
+      line_.wait_for(settling);
       if (one.look() == one.value) return true;
       one.write(one.value);
       if (one.look() == one.value) return true;
@@ -388,14 +388,14 @@ bool Changes::put_back(const Saved& one) {
 
 // ---- The line
 
-Ran Changes::run(const Command& command, Arguments arguments) const {
-  Ran ran = line_.run(command, arguments);
+CommandResult Changes::run(const Command& command, Arguments arguments) const {
+  CommandResult ran = line_.run(command, arguments);
   if (ran.error == Error::none) return ran;
   throw Refused{fmt::format("{}: {} {}", command.name, text_of(ran.error).name, ran.detail)};
 }
 
 // Returns the decoded reply; nothing if it is not a good one.
-std::optional<BusyReply> Changes::busy_reply(const Sent& sent) const {
+std::optional<BusyReply> Changes::busy_reply(const SingleExchange& sent) const {
   if (sent.reply.frame().empty()) return std::nullopt;
   BusySink sink;
   const Error error = unit_.decode(line_.options(), sent.request.frame(), sent.reply.frame(), sink);
@@ -403,7 +403,7 @@ std::optional<BusyReply> Changes::busy_reply(const Sent& sent) const {
   return error == Error::none || error == Error::busy ? std::optional(sink.reply) : std::nullopt;
 }
 
-Sent Changes::send(const Command& command, Arguments arguments) const {
+SingleExchange Changes::send(const Command& command, Arguments arguments) const {
   std::vector<std::uint8_t> request(longest_request);
   const auto size = unit_.encode(line_.options(), command, arguments, request);
   if (!size) throw Refused{fmt::format("{}: {}", command.name, text_of(size.error()).name)};
@@ -412,14 +412,15 @@ Sent Changes::send(const Command& command, Arguments arguments) const {
 }
 
 Reading Changes::read() const {
-  const Ran ran = run(*find_command(unit_, Verb::read), {});
+  const CommandResult ran = run(*find_command(unit_, Verb::read), {});
   if (!ran.reading) throw Refused{"no position was told"};
   return *ran.reading;
 }
 
 std::uint8_t Changes::read_byte(std::uint32_t page, std::uint32_t address) const {
   const Command& getter = *find_command(unit_, Verb::memory_read);
-  const Ran ran = run(getter, role_arguments(getter, {{Role::page, page}, {Role::address, address}, {Role::count, 1}}));
+  const CommandResult ran =
+      run(getter, role_arguments(getter, {{Role::page, page}, {Role::address, address}, {Role::count, 1}}));
   if (ran.data.empty()) throw Refused{"no byte was told"};
   return ran.data.front();
 }

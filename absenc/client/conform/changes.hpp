@@ -18,7 +18,7 @@
 namespace absenc::client {
 
 /// Result of a command.
-struct Ran {
+struct CommandResult {
   Error error = Error::none;
   std::string detail{};
   std::uint64_t requests = 0;  // number of requests that the command sent
@@ -29,7 +29,7 @@ struct Ran {
 };
 
 /// A single request and its reply. Both are empty if no request exists with these options.
-struct Sent {
+struct SingleExchange {
   capture::ObservedFrame request{};
   capture::ObservedFrame reply{};
 };
@@ -41,7 +41,7 @@ struct BusyReply {
 };
 
 /// Unsolicited frames of a period.
-struct Heard {
+struct UnsolicitedFrames {
   std::uint64_t frames = 0;
   Time first{};
   Time last{};
@@ -57,13 +57,13 @@ struct Heard {
 /// Access to the line, independent of its link. All functions throw the exceptions of the port, and os::Interrupted
 /// once for each request of the caller to end.
 struct ChangesLine {
-  std::function<Ran(const Command&, Arguments)> run;
+  std::function<CommandResult(const Command&, Arguments)> run;
   // sends a request, encoded by Unit::encode, and returns the exchange
-  std::function<Sent(const std::vector<std::uint8_t>& request)> send;
-  std::function<Heard(Time)> hear;
-  std::function<void(Time)> rest;
+  std::function<SingleExchange(const std::vector<std::uint8_t>& request)> send;
+  std::function<UnsolicitedFrames(Time)> count_unsolicited;
+  std::function<void(Time)> wait_for;
   // reports a new value of a setting, which may change how the encoder is reached
-  std::function<void(const Command& setter, std::int64_t value)> follow;
+  std::function<void(const Command& setter, std::int64_t value)> note_setting;
   std::function<const Options&()> options;  // returns the present options
 };
 
@@ -81,7 +81,7 @@ class Changes {
   void test(const Clause& clause, ClauseResult& result);
 
   /// Returns the commands with which the user restores values that the test could not restore.
-  [[nodiscard]] const std::vector<std::string>& left() const { return left_; }
+  [[nodiscard]] const std::vector<std::string>& left() const { return restore_commands_; }
 
  private:
   /// A saved value, with functions to read and write it and the user's command to restore it.
@@ -89,7 +89,7 @@ class Changes {
     std::function<std::int64_t()> look{};
     std::function<void(std::int64_t)> write{};
     std::int64_t value = 0;
-    std::string by_hand{};
+    std::string restore_command{};
   };
 
   void test_one(const Clause& clause, ClauseResult& result);
@@ -110,10 +110,10 @@ class Changes {
   std::int64_t save_setting(const Clause& clause);
   void put_back();
   [[nodiscard]] bool put_back(const Saved& one);
-  [[nodiscard]] bool may_lose(std::string_view what, ClauseResult& result) const;
-  [[nodiscard]] Ran run(const Command& command, Arguments arguments) const;
-  [[nodiscard]] Sent send(const Command& command, Arguments arguments) const;
-  [[nodiscard]] std::optional<BusyReply> busy_reply(const Sent& sent) const;
+  [[nodiscard]] bool may_erase(std::string_view what, ClauseResult& result) const;
+  [[nodiscard]] CommandResult run(const Command& command, Arguments arguments) const;
+  [[nodiscard]] SingleExchange send(const Command& command, Arguments arguments) const;
+  [[nodiscard]] std::optional<BusyReply> busy_reply(const SingleExchange& sent) const;
   [[nodiscard]] Reading read() const;
   [[nodiscard]] std::uint8_t read_byte(std::uint32_t page, std::uint32_t address) const;
 
@@ -122,7 +122,7 @@ class Changes {
   ChangesLine line_;
   bool resets_;
   std::vector<Saved> saved_{};
-  std::vector<std::string> left_{};
+  std::vector<std::string> restore_commands_{};
   bool interrupted_ = false;  // an interrupt came while values were restored
 };
 

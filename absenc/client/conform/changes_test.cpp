@@ -41,10 +41,11 @@ class Disobedient final : public Machine<Item> {
     // A clocked request has no bytes.
     if (event.kind == Kind::received || event.kind == Kind::selected) {
       ++requests;
-      const bool deaf = requests >= deaf_from && requests < deaf_until;
-      const bool meant =
-          !deaf_to.empty() && std::equal(event.items.begin(), event.items.end(), deaf_to.begin(), deaf_to.end());
-      if (deaf || (meant && heard_++ >= heard_before)) return;
+      const bool is_ignored_now = requests >= ignored_from && requests < ignored_until;
+      const bool is_ignored_request =
+          !ignored_request.empty() &&
+          std::equal(event.items.begin(), event.items.end(), ignored_request.begin(), ignored_request.end());
+      if (is_ignored_now || (is_ignored_request && obeyed_++ >= obeyed_times)) return;
     }
     const ByteList before = memory();
     line_.feed(event);
@@ -56,20 +57,20 @@ class Disobedient final : public Machine<Item> {
     look(before);
     const bool is_damaged = damaged_at != 0 && requests == damaged_at;
     if (step.kind != Step<Item>::Kind::transfer || !is_damaged || step.out.empty()) return step;
-    said_.assign(step.out.begin(), step.out.end());
+    reply_.assign(step.out.begin(), step.out.end());
     if constexpr (std::is_same_v<Item, CanFrame>) {
-      said_.back().data[0] ^= 1;
+      reply_.back().data[0] ^= 1;
     } else {
-      said_.back() ^= 1;
+      reply_.back() ^= 1;
     }
-    step.out = said_;
+    step.out = reply_;
     return step;
   }
 
-  std::vector<Item> deaf_to{};  // a request that the encoder ignores
-  unsigned heard_before = 0;    // number of times that the encoder still obeys the request `deaf_to`
-  unsigned deaf_from = 0;       // first ignored request, counted from 1
-  unsigned deaf_until = 0;      // first request after the ignored ones
+  std::vector<Item> ignored_request{};  // a request that the encoder ignores
+  unsigned obeyed_times = 0;            // number of times that the encoder still obeys the request `ignored_request`
+  unsigned ignored_from = 0;            // first ignored request, counted from 1
+  unsigned ignored_until = 0;           // first request after the ignored ones
   // number of the request whose reply has a wrong bit; 0: none
   unsigned damaged_at = 0;
   unsigned change = 0;  // number of the memory change that is corrupted, from 1
@@ -87,8 +88,8 @@ class Disobedient final : public Machine<Item> {
   Machine<Item>& line_;
   Device<Item>& device_;
   unsigned changes_ = 0;
-  unsigned heard_ = 0;
-  std::vector<Item> said_;
+  unsigned obeyed_ = 0;
+  std::vector<Item> reply_;
 };
 
 /// Interrupts the test or loses the line at step `at`.
@@ -134,7 +135,7 @@ struct Bench {
     while (line->now() < rest.at && line->wait(rest).kind != Event<Item>::Kind::timer) {
     }
     std::string text;
-    const auto tell = [&](const Command& command, std::string_view field) {
+    const auto add_value = [&](const Command& command, std::string_view field) {
       std::vector<std::byte> storage(address.unit->host_storage);
       host::Session<Item> session(*address.unit, address.options, *line, storage);
       const Conversation<Item>* ended = session.run(command);
@@ -145,21 +146,22 @@ struct Bench {
       text += fmt::format("{} {}\n", command.name, to_text(sink.answer[field]));
     };
     for (const Clause& clause : clauses_of(*address.unit)) {
-      if (!clause.field.empty()) tell(*find_command(*address.unit, clause.setting), clause.field);
+      if (!clause.field.empty()) add_value(*find_command(*address.unit, clause.setting), clause.field);
     }
     const auto position = std::ranges::find(address.unit->fields, Role::position, &FieldInfo::role);
-    if (position != address.unit->fields.end()) tell(*find_command(*address.unit, Verb::read), position->name);
+    if (position != address.unit->fields.end()) add_value(*find_command(*address.unit, Verb::read), position->name);
     return text;
   }
   // Runs the test on a link without the device, which stays available for inspection.
   [[nodiscard]] Conformance run(bool resets = false, const std::function<bool()>& over = {}) const {
-    Link way;
+    Link port_link;
     if constexpr (std::is_same_v<Item, CanFrame>) {
-      way.frames = port.get();
+      port_link.frames = port.get();
     } else {
-      way.bytes = port.get();
+      port_link.bytes = port.get();
     }
-    return conform(address, std::move(way), {.readings = 3, .changes = true, .resets = resets, .over = over}, "NAME");
+    return conform(address, std::move(port_link), {.readings = 3, .changes = true, .resets = resets, .over = over},
+                   "NAME");
   }
 
   EncoderAddress address;
@@ -228,28 +230,28 @@ std::vector<Spoil<Item>> spoils_of(const EncoderAddress& address, const Clause& 
     const std::vector<Item> request = request_of<Item>(address, *command);
     for (unsigned before = 0; before < 10 && !request.empty(); ++before) {
       all.push_back([=](Encoder& one) {
-        one.deaf_to = request;
-        one.heard_before = before;
+        one.ignored_request = request;
+        one.obeyed_times = before;
       });
     }
   }
-  const auto be_deaf_to = [&](const Command& command, Arguments given) {
+  const auto add_ignored = [&](const Command& command, Arguments given) {
     const std::vector<Item> request = request_of<Item>(address, command, given);
-    if (!request.empty()) all.push_back([=](Encoder& one) { one.deaf_to = request; });
+    if (!request.empty()) all.push_back([=](Encoder& one) { one.ignored_request = request; });
   };
   if (clause.demand == Demand::set || clause.demand == Demand::mirrored) {
     const Command& setter = *require_setting(*address.unit, clause.setting).setter;
-    for (const std::int64_t value : {clause.value, clause.other}) be_deaf_to(setter, std::array{value});
+    for (const std::int64_t value : {clause.value, clause.other}) add_ignored(setter, std::array{value});
   }
   if (clause.demand == Demand::paced) {
-    be_deaf_to(*find_command(*address.unit, clause.command), std::array{clause.value});
-    be_deaf_to(*find_command(*address.unit, clause.stop), {});
+    add_ignored(*find_command(*address.unit, clause.command), std::array{clause.value});
+    add_ignored(*find_command(*address.unit, clause.stop), {});
   }
   const bool by_itself = clause.demand == Demand::byte_busy || clause.demand == Demand::page_closed;
   for (unsigned at = 1; by_itself && at <= requests; ++at) {
     all.push_back([=](Encoder& one) {
-      one.deaf_from = at;
-      one.deaf_until = at + 1;
+      one.ignored_from = at;
+      one.ignored_until = at + 1;
     });
     all.push_back([=](Encoder& one) { one.damaged_at = at; });
   }
@@ -273,8 +275,8 @@ std::vector<Spoil<Item>> spoils_of(const EncoderAddress& address, const Clause& 
   for (const unsigned window : {30u, 1000u}) {
     for (unsigned from = 1; clause.demand >= Demand::set && from <= requests; from += step) {
       all.push_back([=](Encoder& one) {
-        one.deaf_from = from;
-        one.deaf_until = from + window;  // longer than any repetition
+        one.ignored_from = from;
+        one.ignored_until = from + window;  // longer than any repetition
       });
     }
   }
@@ -287,9 +289,9 @@ void check_mutants(const Unit& unit) {
   for (const Clause* const clause : changing(unit)) {
     const EncoderAddress address = address_showing_change(unit, *clause);
     const Bench<Item> good(address);
-    const Conformance held = good.run(true);
-    EXPECT_EQ(verdict_of(held, clause->id), Verdict::kept) << clause->id << "\n" << held.report();
-    EXPECT_EQ(with_verdict(held, Verdict::broken), std::vector<std::string>{}) << held.report();
+    const Conformance original = good.run(true);
+    EXPECT_EQ(verdict_of(original, clause->id), Verdict::kept) << clause->id << "\n" << original.report();
+    EXPECT_EQ(with_verdict(original, Verdict::broken), std::vector<std::string>{}) << original.report();
     unsigned alone = 0;
     unsigned broken = 0;
     std::string last;
@@ -314,8 +316,8 @@ template <class Item>
 void check_ends(const EncoderAddress& address) {
   const Bench<Item> whole(address);
   const ByteList before = whole.memory();
-  const Conformance held = whole.run();
-  ASSERT_EQ(held.verdict(), Verdict::kept) << held.report();
+  const Conformance original = whole.run();
+  ASSERT_EQ(original.verdict(), Verdict::kept) << original.report();
   const unsigned steps = whole.port->steps;
   const std::string settings = whole.settings();
   // The write counter of an encoder is not restored.
@@ -355,7 +357,7 @@ void check_ends(const EncoderAddress& address) {
 
 class ChangingClauses : public ::testing::TestWithParam<const Unit*> {};
 
-TEST_P(ChangingClauses, EachIsBrokenByTwoMutantsOneAlone) {
+TEST_P(ChangingClauses, EachClauseIsBrokenByTwoMutantsOneAlone) {
   if (GetParam()->link == LinkKind::can) {
     check_mutants<CanFrame>(*GetParam());
   } else {
@@ -363,7 +365,7 @@ TEST_P(ChangingClauses, EachIsBrokenByTwoMutantsOneAlone) {
   }
 }
 
-TEST_P(ChangingClauses, LeaveTheMemoryAsItWasWhateverStepIsTheLast) {
+TEST_P(ChangingClauses, RestoreSettingsAfterEndAtAnyStep) {
   const EncoderAddress address = address_of_unit(*GetParam());
   if (GetParam()->link == LinkKind::can) {
     check_ends<CanFrame>(address);
@@ -382,7 +384,7 @@ INSTANTIATE_TEST_SUITE_P(Units, ChangingClauses, ::testing::ValuesIn([] {
                          [](const auto& one) { return test_name(*one.param); });
 
 // If a value cannot be restored, the error contains the command that does.
-TEST(Conformance, SaysHowToPutBackWhatALostLineLeftChanged) {
+TEST(Conformance, NamesCommandThatRestoresAfterLostLine) {
   const EncoderAddress address = parse_address("sim:tformat");
   const Bench<std::uint8_t> whole(address);
   const ByteList before = whole.memory();
@@ -408,7 +410,7 @@ TEST(Conformance, SaysHowToPutBackWhatALostLineLeftChanged) {
 }
 
 // A test erases values that cannot be restored only with `resets`. A counter that is already 0 proves nothing.
-TEST(Conformance, ResetsOnlyWhatMayBeLost) {
+TEST(Conformance, ErasesZeroTurnsAndAlarmsOnlyWithResets) {
   const auto found = [](std::string_view text, bool resets) {
     const Bench<std::uint8_t> bench(parse_address(text));
     const Conformance conformance = bench.run(resets);

@@ -21,7 +21,7 @@ ClauseResult untested(const Unit& unit, const Clause& clause) {
           .verdict = Verdict::untested};
 }
 
-[[noreturn]] void tell_left(std::string_view why, const std::vector<std::string>& left) {
+[[noreturn]] void throw_left_changed(std::string_view why, const std::vector<std::string>& left) {
   throw Failure(fmt::format("{}\nthe encoder is left changed; to put it back:\n  {}", why, fmt::join(left, "\n  ")));
 }
 
@@ -42,11 +42,11 @@ void test_all(const EncoderAddress& address, Port<Item>& port, Time latency, con
       conformance.clauses.push_back(std::move(result));
     }
   } catch (const os::Interrupted&) {
-    if (!changes.left().empty()) tell_left("interrupted", changes.left());
+    if (!changes.left().empty()) throw_left_changed("interrupted", changes.left());
     if (tester.ended()) throw Cancelled{};
     throw;
   } catch (const std::exception& error) {
-    if (!changes.left().empty()) tell_left(error.what(), changes.left());
+    if (!changes.left().empty()) throw_left_changed(error.what(), changes.left());
     throw;
   }
   conformance.left = changes.left();

@@ -38,17 +38,18 @@ void flip_bit(FrameList& items, std::size_t bit) {
 template <class Item>
 void flip_and_repair(Mutant<Item>& mutant, const EncoderAddress& address, std::size_t bit) {
   if constexpr (std::is_same_v<Item, std::uint8_t>) {
-    mutant.say = [&mutant, &address, bit](ByteList& said, ByteStep&) {
-      if (said.size() < 4 || bit >= (said.size() - 2) * 8) return;
-      const ByteList before = said;
-      flip_bit(said, bit);
+    mutant.change_reply = [&mutant, &address, bit](ByteList& reply_items, ByteStep&) {
+      if (reply_items.size() < 4 || bit >= (reply_items.size() - 2) * 8) return;
+      const ByteList before = reply_items;
+      flip_bit(reply_items, bit);
       for (unsigned check = 0; check < 0x10000; ++check) {
-        said[said.size() - 1] = static_cast<std::uint8_t>(check);
-        said[said.size() - 2] = static_cast<std::uint8_t>(before[said.size() - 2] + (check >> 8));
-        const Error error = address.unit->check(address.options, {.bytes = mutant.heard()}, {.bytes = said});
+        reply_items[reply_items.size() - 1] = static_cast<std::uint8_t>(check);
+        reply_items[reply_items.size() - 2] = static_cast<std::uint8_t>(before[reply_items.size() - 2] + (check >> 8));
+        const Error error =
+            address.unit->check(address.options, {.bytes = mutant.last_request()}, {.bytes = reply_items});
         if (error != Error::bad_checksum) return;
       }
-      said = before;
+      reply_items = before;
     };
   }
 }
@@ -56,7 +57,7 @@ void flip_and_repair(Mutant<Item>& mutant, const EncoderAddress& address, std::s
 /// Adds mutants that change the reply to one request, to all from the third on (as a host may repeat its request), and
 /// to all from the eighth on (as some hosts use the first requests to detect the echo).
 template <class Item>
-void add_said(Changes<Item>& all, const std::function<void(Mutant<Item>&)>& change) {
+void add_reply_mutants(Changes<Item>& all, const std::function<void(Mutant<Item>&)>& change) {
   all.push_back({.change = change});
   for (const unsigned from : {3U, 8U}) {
     all.push_back({.change = [change, from](Mutant<Item>& m) {
@@ -67,24 +68,25 @@ void add_said(Changes<Item>& all, const std::function<void(Mutant<Item>&)>& chan
   }
 }
 template <class Item>
-void add_said(Changes<Item>& all, void (*say)(std::vector<Item>&, Step<Item>&)) {
-  add_said<Item>(all, [say](Mutant<Item>& m) { m.say = say; });
+void add_reply_mutants(Changes<Item>& all, void (*change_reply)(std::vector<Item>&, Step<Item>&)) {
+  add_reply_mutants<Item>(all, [change_reply](Mutant<Item>& m) { m.change_reply = change_reply; });
 }
 
 /// Adds mutants that repeat their first reply, as a whole or with its first bits before the rest of a later reply.
 template <class Item>
-void add_stale(Changes<Item>& all, const Clause& clause) {
+void add_stale_mutants(Changes<Item>& all, const Clause& clause) {
   if constexpr (std::is_same_v<Item, std::uint8_t>) {
     const auto add = [&](std::size_t kept_bits) {
-      add_said<Item>(all, [kept_bits](Mutant<Item>& m) {
+      add_reply_mutants<Item>(all, [kept_bits](Mutant<Item>& m) {
         const auto first = std::make_shared<ByteList>();
         m.mutated = 1;
         m.always = true;
-        m.say = [first, kept_bits](ByteList& said, ByteStep&) {
-          if (first->empty()) *first = said;
-          for (std::size_t bit = 0; bit < std::min(kept_bits, bits_of(said)); ++bit) {
+        m.change_reply = [first, kept_bits](ByteList& reply_items, ByteStep&) {
+          if (first->empty()) *first = reply_items;
+          for (std::size_t bit = 0; bit < std::min(kept_bits, bits_of(reply_items)); ++bit) {
             const auto mask = static_cast<std::uint8_t>(0x80U >> bit % 8);
-            said[bit / 8] = static_cast<std::uint8_t>((said[bit / 8] & ~mask) | ((*first)[bit / 8] & mask));
+            reply_items[bit / 8] =
+                static_cast<std::uint8_t>((reply_items[bit / 8] & ~mask) | ((*first)[bit / 8] & mask));
           }
         };
       });
@@ -96,27 +98,29 @@ void add_stale(Changes<Item>& all, const Clause& clause) {
 }
 
 template <class Item>
-Changes<Item> of_frames(const EncoderAddress& address, const Clause& clause) {
+Changes<Item> frame_mutants(const EncoderAddress& address, const Clause& clause) {
   using List = std::vector<Item>;
   Changes<Item> all;
-  add_stale(all, clause);
+  add_stale_mutants(all, clause);
   if constexpr (std::is_same_v<Item, CanFrame>) {
-    add_said<Item>(all, [](List& said, Step<Item>&) { said.front().extended = true; });
-    add_said<Item>(all, [](List& said, Step<Item>&) { said.front().size = 7; });
-    add_said<Item>(all, [](List& said, Step<Item>&) { said.front().size = 2; });
-    add_said<Item>(all, [](List& said, Step<Item>&) {
-      said.front().extended = true;
-      said.front().id |= 0x1000'0000;
+    add_reply_mutants<Item>(all, [](List& reply_items, Step<Item>&) { reply_items.front().extended = true; });
+    add_reply_mutants<Item>(all, [](List& reply_items, Step<Item>&) { reply_items.front().size = 7; });
+    add_reply_mutants<Item>(all, [](List& reply_items, Step<Item>&) { reply_items.front().size = 2; });
+    add_reply_mutants<Item>(all, [](List& reply_items, Step<Item>&) {
+      reply_items.front().extended = true;
+      reply_items.front().id |= 0x1000'0000;
     });
   } else {
-    add_said<Item>(all, [](List& said, Step<Item>&) { said.pop_back(); });
-    add_said<Item>(all, [](List& said, Step<Item>&) { said.push_back(0); });
-    add_said<Item>(all, [](List& said, Step<Item>&) { said.assign(said.size(), 0); });
-    add_said<Item>(all, [](List& said, Step<Item>&) { said.assign(said.size(), 0xFF); });
+    add_reply_mutants<Item>(all, [](List& reply_items, Step<Item>&) { reply_items.pop_back(); });
+    add_reply_mutants<Item>(all, [](List& reply_items, Step<Item>&) { reply_items.push_back(0); });
+    add_reply_mutants<Item>(all, [](List& reply_items, Step<Item>&) { reply_items.assign(reply_items.size(), 0); });
+    add_reply_mutants<Item>(all, [](List& reply_items, Step<Item>&) { reply_items.assign(reply_items.size(), 0xFF); });
   }
   if (clause.demand == Demand::whole) return all;
   for (std::size_t bit = 0; bit < 160; ++bit) {
-    add_said<Item>(all, [=](Mutant<Item>& m) { m.say = [bit](List& said, Step<Item>&) { flip_bit(said, bit); }; });
+    add_reply_mutants<Item>(all, [=](Mutant<Item>& m) {
+      m.change_reply = [bit](List& reply_items, Step<Item>&) { flip_bit(reply_items, bit); };
+    });
   }
   if (clause.demand == Demand::as_drawn) {
     for (std::size_t bit = 160; bit-- > 0;) {
@@ -125,10 +129,10 @@ Changes<Item> of_frames(const EncoderAddress& address, const Clause& clause) {
   }
   for (std::size_t bit = 0; bit < 88; ++bit) {
     for (std::size_t other = bit + 1; other < 88; ++other) {
-      add_said<Item>(all, [=](Mutant<Item>& m) {
-        m.say = [=](List& said, Step<Item>&) {
-          flip_bit(said, bit);
-          flip_bit(said, other);
+      add_reply_mutants<Item>(all, [=](Mutant<Item>& m) {
+        m.change_reply = [=](List& reply_items, Step<Item>&) {
+          flip_bit(reply_items, bit);
+          flip_bit(reply_items, other);
         };
       });
     }
@@ -139,7 +143,7 @@ Changes<Item> of_frames(const EncoderAddress& address, const Clause& clause) {
 /// Returns mutants with a defect inside the encoder, at both ends of its range, and mutants whose line always flips a
 /// bit.
 template <class Item>
-Changes<Item> of_commands(const EncoderAddress& address) {
+Changes<Item> command_mutants(const EncoderAddress& address) {
   Changes<Item> all;
   for (const Condition& one : address.unit->conditions) {
     for (const std::int64_t value : {one.maximum, one.minimum, one.normal + 5}) {
@@ -151,10 +155,11 @@ Changes<Item> of_commands(const EncoderAddress& address) {
     all.push_back({.change = [=](Mutant<Item>& m) {
       m.always = true;
       m.mutated = 1;
-      m.say = [bit](std::vector<Item>& said, Step<Item>&) { flip_bit(said, bit); };
+      m.change_reply = [bit](std::vector<Item>& reply_items, Step<Item>&) { flip_bit(reply_items, bit); };
     }});
-    all.push_back(
-        {.change = [=](Mutant<Item>& m) { m.hear = [bit](std::vector<Item>& heard) { flip_bit(heard, bit); }; }});
+    all.push_back({.change = [=](Mutant<Item>& m) {
+      m.change_request = [bit](std::vector<Item>& last_request) { flip_bit(last_request, bit); };
+    }});
   }
   return all;
 }
@@ -162,39 +167,39 @@ Changes<Item> of_commands(const EncoderAddress& address) {
 /// Returns mutants that treat requests other than the first one wrongly: like the first, not at all, or with another
 /// reply.
 template <class Item>
-Changes<Item> of_special(const Clause& clause) {
+Changes<Item> special_request_mutants(const Clause& clause) {
   using M = Mutant<Item>;
   using List = std::vector<Item>;
   Changes<Item> all;
   const auto hears_good = [](M& m) {
-    m.hear = [&m](List& heard) {
-      if (m.is_special) heard = m.good;
+    m.change_request = [&m](List& last_request) {
+      if (m.is_special) last_request = m.good;
     };
     m.on_damage = true;
   };
   all.push_back({.change = hears_good});
   all.push_back({.change = [](M& m) {
-    m.hear = [&m](List& heard) {
-      if (m.is_special) heard.clear();
+    m.change_request = [&m](List& last_request) {
+      if (m.is_special) last_request.clear();
     };
   }});
   if constexpr (std::is_same_v<Item, std::uint8_t>) {
     // This mutant's reply has the right length but wrong content.
     all.push_back({.change = [hears_good](M& m) {
       hears_good(m);
-      m.of_special = true;
-      m.say = [](List& said, Step<Item>&) {
-        for (std::size_t i = 0; i < said.size(); ++i) said[i] = static_cast<std::uint8_t>(0x30 + i);
+      m.changes_special = true;
+      m.change_reply = [](List& reply_items, Step<Item>&) {
+        for (std::size_t i = 0; i < reply_items.size(); ++i) reply_items[i] = static_cast<std::uint8_t>(0x30 + i);
       };
     }});
     if (clause.reaction == Reaction::silent) return all;
     for (std::size_t bit = 0; bit < 88; ++bit) {
       for (std::size_t other = bit + 8; other < 88; other += 8) {
         all.push_back({.change = [=](M& m) {
-          m.of_special = true;
-          m.say = [=](List& said, Step<Item>&) {
-            flip_bit(said, bit);
-            flip_bit(said, other);
+          m.changes_special = true;
+          m.change_reply = [=](List& reply_items, Step<Item>&) {
+            flip_bit(reply_items, bit);
+            flip_bit(reply_items, other);
           };
         }});
       }
@@ -202,23 +207,25 @@ Changes<Item> of_special(const Clause& clause) {
   } else {
     // This mutant replies with the node number of the request.
     all.push_back({.change = [hears_good](M& m) {
-      const auto asked = std::make_shared<std::uint32_t>(0);
-      m.hear = [&m, asked](List& heard) {
-        *asked = heard.front().id;
-        if (m.is_special) heard = m.good;
+      const auto requested = std::make_shared<std::uint32_t>(0);
+      m.change_request = [&m, requested](List& last_request) {
+        *requested = last_request.front().id;
+        if (m.is_special) last_request = m.good;
       };
-      m.of_special = true;
-      m.say = [asked](List& said, Step<Item>&) { said.front().id = (said.front().id & ~0xFFU) | (*asked & 0xFF); };
+      m.changes_special = true;
+      m.change_reply = [requested](List& reply_items, Step<Item>&) {
+        reply_items.front().id = (reply_items.front().id & ~0xFFU) | (*requested & 0xFF);
+      };
     }});
     all.push_back({.change = [hears_good](M& m) {
-      const auto asked = std::make_shared<std::uint32_t>(0);
-      m.hear = [&m, asked](List& heard) {
-        *asked = heard.front().id;
-        if (m.is_special) heard = m.good;
+      const auto requested = std::make_shared<std::uint32_t>(0);
+      m.change_request = [&m, requested](List& last_request) {
+        *requested = last_request.front().id;
+        if (m.is_special) last_request = m.good;
       };
-      m.of_special = true;
-      m.say = [asked](List& said, Step<Item>&) {
-        said.front() = {.id = 0x100 | (*asked & 0xFF), .size = 8, .data = {0x11}};
+      m.changes_special = true;
+      m.change_reply = [requested](List& reply_items, Step<Item>&) {
+        reply_items.front() = {.id = 0x100 | (*requested & 0xFF), .size = 8, .data = {0x11}};
       };
     }});
   }
@@ -232,37 +239,38 @@ Changes<Item> mutants_of(const EncoderAddress& address, const Clause& clause) {
   switch (clause.demand) {
     case Demand::answered:
     case Demand::streamed:
-      add_said<Item>(all, [](List& said, Step<Item>&) { said.clear(); });
+      add_reply_mutants<Item>(all, [](List& reply_items, Step<Item>&) { reply_items.clear(); });
       if constexpr (std::is_same_v<Item, std::uint8_t>) {
-        add_said<Item>(all, [](List& said, Step<Item>&) { said.assign(said.size(), 0xFF); });
+        add_reply_mutants<Item>(all,
+                                [](List& reply_items, Step<Item>&) { reply_items.assign(reply_items.size(), 0xFF); });
       } else {
-        add_said<Item>(all, [](List& said, Step<Item>&) { ++said.front().id; });
+        add_reply_mutants<Item>(all, [](List& reply_items, Step<Item>&) { ++reply_items.front().id; });
       }
       return all;
     case Demand::in_time:
-      add_said<Item>(all, [](List&, Step<Item>& step) { step.at += 15ms; });
-      add_said<Item>(all, [](List&, Step<Item>& step) { step.at += 60ms; });
+      add_reply_mutants<Item>(all, [](List&, Step<Item>& step) { step.at += 15ms; });
+      add_reply_mutants<Item>(all, [](List&, Step<Item>& step) { step.at += 60ms; });
       return all;
     case Demand::whole:
     case Demand::checked:
     case Demand::as_drawn:
-      return of_frames<Item>(address, clause);
+      return frame_mutants<Item>(address, clause);
     case Demand::does:
-      return of_commands<Item>(address);
+      return command_mutants<Item>(address);
     default:
       break;
   }
   // Valid requests that are not for this encoder.
   if (clause.demand == Demand::foreign_silent) {
-    for (const ReplyChange<Item>& change : of_special<Item>(clause)) {
+    for (const ReplyChange<Item>& change : special_request_mutants<Item>(clause)) {
       all.push_back({.change = [change = change.change, &address](Mutant<Item>& m) {
         change(m);
         m.is_meant = [&address, &m](const List& request) {
           if constexpr (std::is_same_v<Item, CanFrame>) {
             return true;
           } else {
-            const auto asks = [&](const List& asked) {
-              return encoder_of(*address.unit, address.options, {.bytes = asked});
+            const auto asks = [&](const List& requested) {
+              return encoder_of(*address.unit, address.options, {.bytes = requested});
             };
             const bool is_request = address.unit->check(address.options, {.bytes = request}, {}) == Error::none;
             return is_request && (!asks(request) || asks(request) != asks(m.good));
@@ -273,7 +281,7 @@ Changes<Item> mutants_of(const EncoderAddress& address, const Clause& clause) {
     return all;
   }
   constexpr int most_specials = 8;
-  for (const ReplyChange<Item>& change : of_special<Item>(clause)) {
+  for (const ReplyChange<Item>& change : special_request_mutants<Item>(clause)) {
     for (int special = 0; special < most_specials; ++special) {
       all.push_back({.change = [change = change.change, special](Mutant<Item>& m) {
         change(m);
@@ -286,7 +294,7 @@ Changes<Item> mutants_of(const EncoderAddress& address, const Clause& clause) {
 
 // Returns whether the mutant breaks only this clause. Clauses about commands may break together, because registers
 // depend on channel 2 and both on the identity.
-bool is_alone(const Unit& unit, const Clause& clause, const std::vector<std::string>& broken) {
+bool breaks_only(const Unit& unit, const Clause& clause, const std::vector<std::string>& broken) {
   return std::all_of(broken.begin(), broken.end(), [&](const std::string& id) {
     const auto other = std::ranges::find(clauses_of(unit), id, &Clause::id);
     return id == clause.id || (clause.demand == Demand::does && other->demand == Demand::does);
@@ -314,7 +322,7 @@ void check(const Unit& unit) {
       last = mutant.report();
       if (verdict_of(mutant, clause.id) != Verdict::broken) continue;
       ++broken;
-      alone += is_alone(unit, clause, ids) ? 1 : 0;
+      alone += breaks_only(unit, clause, ids) ? 1 : 0;
       if (alone >= 1 && broken >= 2) break;
     }
     EXPECT_GE(alone, 1U) << unit.id << " " << clause.id << "\n" << last;
@@ -325,7 +333,7 @@ void check(const Unit& unit) {
 
 class Clauses : public ::testing::TestWithParam<const Unit*> {};
 
-TEST_P(Clauses, EachIsBrokenByTwoMutantsOneAlone) {
+TEST_P(Clauses, EachClauseIsBrokenByTwoMutantsOneAlone) {
   const Unit& unit = *GetParam();
   if (clauses_of(unit).empty()) GTEST_SKIP() << "no clauses are known";
   if (unit.link == LinkKind::can) {
@@ -357,7 +365,7 @@ void check_kept(const EncoderAddress& address, std::set<std::string>& seen) {
   }
 }
 
-TEST_P(Clauses, WhatIsKeptWithAnyOptionCouldBeBroken) {
+TEST_P(Clauses, EachKeptClauseCanBeBroken) {
   const Unit& unit = *GetParam();
   std::set<std::string> seen;
   for (const EncoderAddress& address : variations_of(unit)) {
@@ -373,7 +381,7 @@ INSTANTIATE_TEST_SUITE_P(Units, Clauses, ::testing::ValuesIn(all_units().begin()
                          [](const auto& one) { return test_name(*one.param); });
 
 // The echo must not count as a reply or in its time.
-TEST(Conformance, HoldsBehindAnAdapterThatEchoes) {
+TEST(Conformance, EchoOfAdapterIsNoReply) {
   for (const char* const text : {"sim:tformat?echo=auto", "sim:tformat?echo=on", "sim:amt21?echo=auto"}) {
     const EncoderAddress address = parse_address(text);
     for (const bool silent : {false, true}) {
@@ -382,7 +390,7 @@ TEST(Conformance, HoldsBehindAnAdapterThatEchoes) {
       link.device->power_on(Time{});
       Mutant<std::uint8_t> mutant(*link.device->bytes(), address.unit->link);
       mutant.mutated = 7;
-      if (silent) mutant.say = [](std::vector<std::uint8_t>& said, ByteStep&) { said.clear(); };
+      if (silent) mutant.change_reply = [](std::vector<std::uint8_t>& reply_items, ByteStep&) { reply_items.clear(); };
       sim::SimPort<std::uint8_t> line(address.unit->link, address.line.with_some_rate(), mutant);
       line.set_echo(true);
       link.bytes = &line;
@@ -413,7 +421,7 @@ class FixedRatePort final : public Port<std::uint8_t> {
   Port<std::uint8_t>& port_;
 };
 
-TEST(Conformance, LeavesClauseUntestedThatNeedsARateWhichThePortDoesNotHave) {
+TEST(Conformance, ClauseIsUntestedIfPortCannotChangeRate) {
   const EncoderAddress address = parse_address("sim:tformat");
   Link link;
   link.device = std::make_unique<VirtualDevice>(*address.unit, address.options, address.device);
@@ -427,7 +435,7 @@ TEST(Conformance, LeavesClauseUntestedThatNeedsARateWhichThePortDoesNotHave) {
   EXPECT_NE(found.report().find("this port has one rate"), std::string::npos);
 }
 
-TEST(Conformance, TellsProgramsAndPeople) {
+TEST(Conformance, PrintsTapJunitAndReport) {
   const Conformance one{.protocol = "toy",
                         .clauses = {{"a", "doc", "1", "x < y", Verdict::kept, "seen"},
                                     {"b", "doc", "2", "z", Verdict::broken, "not \"seen\""},
@@ -443,7 +451,7 @@ TEST(Conformance, TellsProgramsAndPeople) {
 }
 
 // Programs that count tests regard skipped tests as passed.
-TEST(Conformance, SaysWhenNothingCouldBeJudged) {
+TEST(Conformance, TapBailsOutIfNoClauseWasJudged) {
   const Conformance nothing{.protocol = "toy", .clauses = {{"a", "doc", "1", "x", Verdict::untested, "nothing came"}}};
   EXPECT_EQ(nothing.verdict(), Verdict::untested);
   EXPECT_EQ(nothing.tap(),
@@ -461,7 +469,7 @@ TEST(Conformance, SaysWhenNothingCouldBeJudged) {
 }
 
 // A report prints the paragraph after the document.
-TEST(Clauses, TheDocumentDoesNotNameTheParagraphAgain) {
+TEST(Clauses, DocumentNameContainsNoParagraph) {
   for (const Unit* unit : all_units()) {
     const auto look = [&](std::string_view id, std::string_view paragraph) {
       const std::string_view number = paragraph.substr(0, paragraph.find(' '));

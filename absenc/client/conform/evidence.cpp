@@ -100,7 +100,7 @@ Error reply_error(const Unit& unit, const Options& options, std::string_view com
   return unit.check(options, request.frame(), exchange.reply.frame());
 }
 
-std::size_t changes_noticed(const Unit& unit, const Options& options, const ObservedExchange& good, Errors errors) {
+std::size_t detected_changes(const Unit& unit, const Options& options, const ObservedExchange& good, Errors errors) {
   std::size_t noticed = 0;
   const auto try_one = [&](const ObservedFrame& request, const ObservedFrame& reply) {
     noticed += (errors & any_of(unit.check(options, request.frame(), reply.frame()))) != 0 ? 1 : 0;
@@ -142,7 +142,7 @@ std::optional<std::int64_t> encoder_of(const Unit& unit, const Options& options,
   return unit.decode(options, request, {}, found) == Error::none ? found.encoder : std::nullopt;
 }
 
-std::string what_came(LinkKind link, const Frame& request, const Frame& reply) {
+std::string exchange_text(LinkKind link, const Frame& request, const Frame& reply) {
   return fmt::format("to {} came {}", request.empty() ? "a pulse" : to_wire_text(link, request),
                      reply.empty() ? "nothing" : to_wire_text(link, reply));
 }

@@ -28,8 +28,8 @@ inline void conclude(ClauseResult& result, bool kept, std::string evidence) {
 
 /// Returns how many changes of a good reply are detected as one of `errors`. Changes are a wrong bit, a missing or
 /// additional byte, and a request that it does not answer. 0: these options have no such check.
-[[nodiscard]] std::size_t changes_noticed(const Unit& unit, const Options& options,
-                                          const capture::ObservedExchange& good, Errors errors);
+[[nodiscard]] std::size_t detected_changes(const Unit& unit, const Options& options,
+                                           const capture::ObservedExchange& good, Errors errors);
 
 /// Returns the error of the reply, checked as the reply to a request of `command`; "": to its own request.
 [[nodiscard]] Error reply_error(const Unit& unit, const Options& options, std::string_view command,
@@ -39,6 +39,6 @@ inline void conclude(ClauseResult& result, bool kept, std::string evidence) {
 [[nodiscard]] std::optional<std::int64_t> encoder_of(const Unit& unit, const Options& options, const Frame& request);
 
 /// Returns "to 9a came 1a 40 ...".
-[[nodiscard]] std::string what_came(LinkKind link, const Frame& request, const Frame& reply);
+[[nodiscard]] std::string exchange_text(LinkKind link, const Frame& request, const Frame& reply);
 
 }  // namespace absenc::client

@@ -14,8 +14,8 @@ namespace absenc::client {
 std::uint64_t HostTrial::length() const {
   if (phase_ == Phase::good || phase_ == Phase::last) return answers_ / 2;
   const auto demands = [](const HostClause& clause) { return clause.demand == HostDemand::after_refusal; };
-  const bool is_asked = phase_ != Phase::refusal || std::ranges::any_of(host_clauses_of(unit_), demands);
-  return is_asked ? asked_again : 0;
+  const bool is_polled = phase_ != Phase::refusal || std::ranges::any_of(host_clauses_of(unit_), demands);
+  return is_polled ? requests_to_continue : 0;
 }
 
 // Returns how often the fault of this phase occurred; in phases without a fault, how many requests were answered.
@@ -29,7 +29,7 @@ std::uint64_t HostTrial::counted() const {
 // still show it.
 bool HostTrial::is_calm() const {
   return phase_ == Phase::good || phase_ == Phase::over ||
-         (phase_ == Phase::last && counted() - begun_at_ >= asked_again);
+         (phase_ == Phase::last && counted() - phase_begin_ >= requests_to_continue);
 }
 
 HostTrial::Fault HostTrial::look(Seen seen) {
@@ -42,10 +42,10 @@ HostTrial::Fault HostTrial::look(Seen seen) {
     }
   }
   seen_ = std::move(seen);
-  if (phase_ == Phase::refusal) refused_ = counted() - begun_at_;
-  while (phase_ != Phase::over && counted() - begun_at_ >= length()) {
+  if (phase_ == Phase::refusal) refused_ = counted() - phase_begin_;
+  while (phase_ != Phase::over && counted() - phase_begin_ >= length()) {
     phase_ = static_cast<Phase>(static_cast<unsigned>(phase_) + 1);
-    begun_at_ = counted();
+    phase_begin_ = counted();
   }
   if (phase_ == Phase::silence) return Fault::silence;
   if (phase_ == Phase::refusal) return Fault::damaged_request;
@@ -71,11 +71,11 @@ void HostTrial::judge_one(const HostClause& clause, ClauseResult& result) const 
     case HostDemand::asks:
       return judge_requests(result);
     case HostDemand::after_silence:
-      return judge_going_on(Phase::silence, "replies were missing", seen_.missing, result);
+      return judge_continuation(Phase::silence, "replies were missing", seen_.missing, result);
     case HostDemand::after_damage:
-      return judge_going_on(Phase::damage, "replies were damaged", seen_.damaged, result);
+      return judge_continuation(Phase::damage, "replies were damaged", seen_.damaged, result);
     case HostDemand::after_refusal:
-      return judge_going_on(Phase::refusal, "requests came damaged", refused_, result);
+      return judge_continuation(Phase::refusal, "requests came damaged", refused_, result);
     case HostDemand::rule:
     case HostDemand::row:
       return judge_rule(clause, result);
@@ -102,12 +102,14 @@ void HostTrial::conclude_if_all_are_requests(ClauseResult& result, bool kept, st
   result.evidence = fmt::format("{}, but the host also sent what is no request", evidence);
 }
 
-void HostTrial::judge_going_on(Phase phase, std::string_view what, std::uint64_t count, ClauseResult& result) const {
+void HostTrial::judge_continuation(Phase phase, std::string_view what, std::uint64_t count,
+                                   ClauseResult& result) const {
   result.evidence = fmt::format("the host asked for so little that no {}", what);
   if (count == 0) return;
-  const bool goes_on = phase_ > phase;
+  const bool continues = phase_ > phase;
   conclude_if_all_are_requests(
-      result, goes_on, fmt::format("{} {}, {}", count, what, goes_on ? "and it asked on" : "then it asked no more"));
+      result, continues,
+      fmt::format("{} {}, {}", count, what, continues ? "and it asked on" : "then it asked no more"));
 }
 
 void HostTrial::judge_rule(const HostClause& clause, ClauseResult& result) const {

@@ -38,7 +38,7 @@ class HostTrial {
 
  private:
   enum class Phase : std::uint8_t { good, silence, after_silence, damage, after_damage, refusal, last, over };
-  static constexpr std::uint64_t asked_again = 3;  // requests after a fault that prove that the host continues
+  static constexpr std::uint64_t requests_to_continue = 3;  // requests after a fault that prove that the host continues
 
   [[nodiscard]] std::uint64_t counted() const;
   [[nodiscard]] std::uint64_t length() const;
@@ -46,15 +46,15 @@ class HostTrial {
   void judge_one(const HostClause& clause, ClauseResult& result) const;
   void judge_requests(ClauseResult& result) const;
   /// Judges whether the host continued after `count` faults of `phase`.
-  void judge_going_on(Phase phase, std::string_view what, std::uint64_t count, ClauseResult& result) const;
+  void judge_continuation(Phase phase, std::string_view what, std::uint64_t count, ClauseResult& result) const;
   void judge_rule(const HostClause& clause, ClauseResult& result) const;
   void conclude_if_all_are_requests(ClauseResult& result, bool kept, std::string evidence) const;
 
   const Unit& unit_;
   std::size_t answers_;
   Phase phase_ = Phase::good;
-  std::uint64_t begun_at_ = 0;  // value of `counted` when the phase began
-  std::uint64_t refused_ = 0;   // requests received while the fault damages every request byte
+  std::uint64_t phase_begin_ = 0;  // value of `counted` when the phase began
+  std::uint64_t refused_ = 0;      // requests received while the fault damages every request byte
   Seen seen_{};
   // rule counts of the times with good replies, in which no earlier fault can have an effect
   std::vector<RuleCount> calm_{};

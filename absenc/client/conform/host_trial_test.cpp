@@ -18,7 +18,7 @@
 namespace absenc::client {
 namespace {
 
-Flaws doing(HostScript script) { return {.sends = {script.begin(), script.end()}}; }
+Flaws host_that_sends(HostScript script) { return {.sends = {script.begin(), script.end()}}; }
 
 /// Returns controllers with defects that break one of the rules about clock, length or mode.
 std::vector<Flaws> flaws_of_controllers() {
@@ -27,7 +27,8 @@ std::vector<Flaws> flaws_of_controllers() {
   std::vector<Flaws> all{{.other_mode = true}, {.without_lead = true}};
   for (const std::uint32_t rate : {200'000u, 500'000u}) all.push_back({.rate = rate, .other_mode = true});
   all.push_back({.bytes = 1, .without_lead = true});
-  for (const Time early : {Time(microseconds(100)), Time(milliseconds(1))}) all.push_back({.early = early});
+  for (const Time too_early_by : {Time(microseconds(100)), Time(milliseconds(1))})
+    all.push_back({.too_early_by = too_early_by});
   for (const int bytes : {-1, -2, -3, -4}) all.push_back({.bytes = bytes});
   for (const std::uint32_t rate : {5'000u, 20'000u, 300'000u, 500'000u, 5'000'000u, 6'000'000u}) {
     all.push_back({.rate = rate});
@@ -44,8 +45,8 @@ std::vector<Flaws> flaws_for(const EncoderAddress& address) {
     all.push_back({.stops_at_damage = asked});
     all.push_back({.stops_at_refusal = asked});
   }
-  for (const Time hasty : {Time(100'000), Time(1'000'000), Time(19'000'000), Time(100'000'000)}) {
-    all.push_back({.hasty = hasty});
+  for (const Time skipped_wait : {Time(100'000), Time(1'000'000), Time(19'000'000), Time(100'000'000)}) {
+    all.push_back({.skipped_wait = skipped_wait});
   }
   if (unit.link == LinkKind::spi || unit.link == LinkKind::clocked) {
     const std::vector<Flaws> controllers = flaws_of_controllers();
@@ -53,7 +54,7 @@ std::vector<Flaws> flaws_for(const EncoderAddress& address) {
   }
   for (const HostClause& clause : host_clauses_of(unit)) {
     for (const HostScript script : clause.breaks) {
-      if (!script.empty()) all.push_back(doing(script));
+      if (!script.empty()) all.push_back(host_that_sends(script));
     }
   }
   const Time character = address.line.with_some_rate().character();
@@ -70,7 +71,7 @@ std::vector<Flaws> flaws_for(const EncoderAddress& address) {
 }
 
 /// Returns a host that also sends permitted requests which our own host does not send.
-Flaws polite(const Unit& unit) {
+Flaws host_with_permitted_extras(const Unit& unit) {
   Flaws flaws;
   for (const HostClause& clause : host_clauses_of(unit)) {
     flaws.sends.insert(flaws.sends.end(), clause.keeps.begin(), clause.keeps.end());
@@ -96,7 +97,7 @@ EncoderAddress address_of_unit(const Unit& unit, std::string_view motion) {
   for (const HostClause& clause : host_clauses_of(unit)) {
     if (!clause.options.empty()) text += fmt::format("&{}", clause.options);
   }
-  return asked_address(text);
+  return polled_address(text);
 }
 
 bool is_mistake_of(std::span<const std::string> broken, std::string_view clause) {
@@ -167,7 +168,7 @@ std::vector<Conformance> judged_with_damaged_requests(const EncoderAddress& addr
 
 class HostClauses : public ::testing::TestWithParam<const Unit*> {};
 
-TEST_P(HostClauses, EachIsBrokenByTwoMutantsAlone) {
+TEST_P(HostClauses, EachClauseIsBrokenByTwoMutantsAlone) {
   const Unit& unit = *GetParam();
   std::size_t tried = 0;
   std::map<std::string_view, unsigned> found;
@@ -176,7 +177,7 @@ TEST_P(HostClauses, EachIsBrokenByTwoMutantsAlone) {
   };
   for (const char* const motion : {"rpm=60", "still"}) {
     const EncoderAddress address = address_of_unit(unit, motion);
-    const Conformance own = judged(address, polite(unit), true);
+    const Conformance own = judged(address, host_with_permitted_extras(unit), true);
     EXPECT_EQ(own.verdict(), Verdict::kept) << own.report();
     if (std::string_view(motion) == "still") {
       EXPECT_EQ(with_verdict(own, Verdict::untested), std::vector<std::string>{}) << own.report();
@@ -205,12 +206,12 @@ TEST_P(HostClauses, EachIsBrokenByTwoMutantsAlone) {
               tried);
 }
 
-TEST_P(HostClauses, ScriptsBreakTheirClause) {
+TEST_P(HostClauses, ScriptBreaksItsClause) {
   const EncoderAddress address = address_of_unit(*GetParam(), "still");
   for (const HostClause& clause : host_clauses_of(*GetParam())) {
     for (const HostScript script : clause.breaks) {
       if (script.empty()) continue;
-      const Conformance found = judged(address, doing(script));
+      const Conformance found = judged(address, host_that_sends(script));
       EXPECT_TRUE(is_mistake_of(with_verdict(found, Verdict::broken), clause.id)) << clause.id << "\n"
                                                                                   << found.report();
     }
@@ -218,7 +219,7 @@ TEST_P(HostClauses, ScriptsBreakTheirClause) {
 }
 
 // A rule that the host never put to the test is untested, not kept.
-TEST_P(HostClauses, WhatAHostNeverDidIsUntested) {
+TEST_P(HostClauses, UnobservedRuleIsUntested) {
   const EncoderAddress address = address_of_unit(*GetParam(), "still");
   const Conformance silent = judged(address, {.is_silent = true});
   EXPECT_EQ(silent.verdict(), Verdict::untested) << silent.report();
@@ -242,7 +243,7 @@ void expect_none_kept(const Conformance& found, std::string_view who) {
 
 /// Checks senders that send again and again and ignore replies.
 template <class Item>
-void let_strangers_come(const EncoderAddress& address) {
+void check_stranger_hosts(const EncoderAddress& address) {
   const auto judged_sending = [&](const auto& next) { return Host<Item>(address, {}).judged_sending(next); };
   sim::Random random(1);
   for (int i = 0; i < 3; ++i) {
@@ -261,27 +262,27 @@ void let_strangers_come(const EncoderAddress& address) {
   }
   for (const Unit* const other : all_units()) {
     if (other->link == LinkKind::clocked || (other->link == LinkKind::can) != std::is_same_v<Item, CanFrame>) continue;
-    const std::vector<Item> request = request_of<Item>(asked_address(fmt::format("sim:{}", other->id)));
+    const std::vector<Item> request = request_of<Item>(polled_address(fmt::format("sim:{}", other->id)));
     // Skips requests that this unit accepts too.
     if (request.empty() || error_of(address, request) == Error::none) continue;
     expect_none_kept(judged_sending([&] { return request; }), other->id);
   }
 }
 
-TEST_P(HostClauses, NoneIsKeptByWhatIsNoHost) {
+TEST_P(HostClauses, StrangerKeepsNoClause) {
   const EncoderAddress address = address_of_unit(*GetParam(), "still");
   switch (GetParam()->link) {
     case LinkKind::clocked:
       GTEST_SKIP() << "its requests have no bytes";
     case LinkKind::can:
-      return let_strangers_come<CanFrame>(address);
+      return check_stranger_hosts<CanFrame>(address);
     default:
-      return let_strangers_come<std::uint8_t>(address);
+      return check_stranger_hosts<std::uint8_t>(address);
   }
 }
 
 // Two requests in one write: the second does not wait for the first reply.
-TEST_P(HostClauses, TwoRequestsAtOnceBreakOne) {
+TEST_P(HostClauses, TwoRequestsInOneWriteBreakAClause) {
   const Unit& unit = *GetParam();
   if (unit.link != LinkKind::half_duplex) GTEST_SKIP() << "its host need not wait";
   const EncoderAddress address = address_of_unit(unit, "still");

@@ -74,11 +74,11 @@ class Stranger final : public Machine<Item> {
 
   void feed(const Event<Item>& event) override {
     if (event.kind == Kind::sent) sending_ = false;
-    const bool asked =
+    const bool is_request =
         event.kind == Kind::selected || event.kind == Kind::triggered || (event.kind == Kind::received && !driven_);
-    if (!asked || sending_) return;
-    said_ = next_();
-    if (said_.empty()) return;
+    if (!is_request || sending_) return;
+    reply_items_ = next_();
+    if (reply_items_.empty()) return;
     pending_ = true;
     at_ = driven_ ? event.at : event.at + answer_;
   }
@@ -86,14 +86,14 @@ class Stranger final : public Machine<Item> {
     constexpr Time period = std::chrono::milliseconds(10);
     if (streams_ && !sending_ && !pending_ && now >= due_) {
       due_ = now + period;
-      said_ = next_();
-      pending_ = !said_.empty();
+      reply_items_ = next_();
+      pending_ = !reply_items_.empty();
       at_ = now;
     }
     if (pending_ && !sending_) {
       pending_ = false;
       sending_ = !driven_;
-      return {.kind = Step<Item>::Kind::transfer, .out = said_, .at = at_};
+      return {.kind = Step<Item>::Kind::transfer, .out = reply_items_, .at = at_};
     }
     return {.at = streams_ ? due_ : never};
   }
@@ -104,7 +104,7 @@ class Stranger final : public Machine<Item> {
   bool streams_ = false;
   Time character_{};
   Time answer_{};
-  std::vector<Item> said_;
+  std::vector<Item> reply_items_;
   Time at_{};
   Time due_{};
   bool pending_ = false;
@@ -113,7 +113,7 @@ class Stranger final : public Machine<Item> {
 
 /// Returns a good reply of this encoder; empty if it cannot be read.
 template <class Item>
-std::vector<Item> said_by(const EncoderAddress& address) {
+std::vector<Item> reply_of(const EncoderAddress& address) {
   VirtualDevice device(*address.unit, address.options, address.device);
   device.power_on(Time{});
   sim::RoughLine<Item> line(address.unit->link, address.line.with_some_rate(), machine_of<Item>(device), 1);
@@ -121,19 +121,19 @@ std::vector<Item> said_by(const EncoderAddress& address) {
   host::Session<Item> session(*address.unit, address.options, line, storage);
   const Conversation<Item>* const ended = session.run(*find_command(*address.unit, Verb::read));
   if (ended == nullptr || ended->error() != Error::none) return {};
-  const std::span<const Item> said = line.reply().empty() ? ended->exchange().received : line.reply();
-  return {said.begin(), said.end()};
+  const std::span<const Item> reply_items = line.reply().empty() ? ended->exchange().received : line.reply();
+  return {reply_items.begin(), reply_items.end()};
 }
 
 /// Returns a good reply of an encoder with another number on the same line.
 template <class Item>
-std::vector<Item> said_by_neighbour(const EncoderAddress& address) {
+std::vector<Item> reply_of_neighbour(const EncoderAddress& address) {
   EncoderAddress other = address;
   for (std::size_t i = 0; i < address.unit->options.size(); ++i) {
     const Option& option = address.unit->options[i];
     if (option.role != Role::encoder) continue;
     other.options.values[i] += other.options.values[i] == option.maximum ? -option.step : option.step;
-    return said_by<Item>(other);
+    return reply_of<Item>(other);
   }
   return {};
 }
@@ -253,32 +253,32 @@ Conformance judge(const EncoderAddress& address, Machine<Item>& machine, const C
 }
 
 template <class Item>
-void let_strangers_answer(const EncoderAddress& address, const ConformChoices& choices) {
-  const auto answered_by = [&](std::string_view who, const typename Stranger<Item>::Next& next) {
+void check_strangers(const EncoderAddress& address, const ConformChoices& choices) {
+  const auto judged_with = [&](std::string_view who, const typename Stranger<Item>::Next& next) {
     Stranger<Item> stranger(address, next);
     return judge<Item>(address, stranger, choices, who);
   };
-  const std::vector<Item> own = said_by<Item>(address);
-  const Conformance silence = answered_by("silence", [] { return std::vector<Item>{}; });
+  const std::vector<Item> own = reply_of<Item>(address);
+  const Conformance silence = judged_with("silence", [] { return std::vector<Item>{}; });
   EXPECT_EQ(with_verdict(silence, Verdict::kept), std::vector<std::string>{}) << variation_name(address) << "\n"
                                                                               << silence.report();
   sim::Random random(1);
-  answered_by("noise", [&] { return noise<Item>(random, own.size() + 3); });
-  answered_by("zeros", [&] { return zeros(own); });
-  answered_by("one reply for ever", [&] { return own; });
-  if (const std::vector<Item> said = said_by_neighbour<Item>(address); !said.empty()) {
-    answered_by("a neighbour", [&] { return said; });
+  judged_with("noise", [&] { return noise<Item>(random, own.size() + 3); });
+  judged_with("zeros", [&] { return zeros(own); });
+  judged_with("one reply for ever", [&] { return own; });
+  if (const std::vector<Item> reply_items = reply_of_neighbour<Item>(address); !reply_items.empty()) {
+    judged_with("a neighbour", [&] { return reply_items; });
   }
   for (const Unit* const other : all_units()) {
     if (other == address.unit || !is_same_kind(*other, *address.unit)) continue;
-    const std::vector<Item> said = said_by<Item>(asked_address(fmt::format("sim:{}", other->id)));
-    if (!said.empty()) answered_by(other->id, [&] { return said; });
+    const std::vector<Item> reply_items = reply_of<Item>(polled_address(fmt::format("sim:{}", other->id)));
+    if (!reply_items.empty()) judged_with(other->id, [&] { return reply_items; });
   }
 }
 
 // A real encoder on a line that damages every reply, or every second one.
 template <class Item>
-void let_line_damage(const EncoderAddress& address, const ConformChoices& choices) {
+void check_damaged_line(const EncoderAddress& address, const ConformChoices& choices) {
   for (const unsigned every : {1u, 2u}) {
     VirtualDevice device(*address.unit, address.options, address.device);
     device.power_on(Time{});
@@ -287,12 +287,12 @@ void let_line_damage(const EncoderAddress& address, const ConformChoices& choice
     unsigned replies = 0;
     mutant.always = true;
     mutant.mutated = 0;
-    mutant.say = [&](std::vector<Item>& said, Step<Item>&) {
-      if (said.empty() || replies++ % every != 0) return;
+    mutant.change_reply = [&](std::vector<Item>& reply_items, Step<Item>&) {
+      if (reply_items.empty() || replies++ % every != 0) return;
       if constexpr (std::is_same_v<Item, CanFrame>) {
-        said.front().data[random.below(8)] ^= static_cast<std::uint8_t>(1 + random.below(255));
+        reply_items.front().data[random.below(8)] ^= static_cast<std::uint8_t>(1 + random.below(255));
       } else {
-        said[random.below(said.size())] ^= static_cast<std::uint8_t>(1 + random.below(255));
+        reply_items[random.below(reply_items.size())] ^= static_cast<std::uint8_t>(1 + random.below(255));
       }
     };
     judge<Item>(address, mutant, choices, every == 1 ? "all damaged" : "every second one damaged");
@@ -306,8 +306,8 @@ void check(const Unit& unit) {
     const bool usual = variations++ == 0;
     const ConformChoices choices{.readings = 5, .changes = usual, .resets = usual};
     try {
-      let_strangers_answer<Item>(address, choices);
-      let_line_damage<Item>(address, choices);
+      check_strangers<Item>(address, choices);
+      check_damaged_line<Item>(address, choices);
     } catch (const UsageError&) {
       EXPECT_FALSE(usual);  // no host reads with these options
     }
@@ -317,7 +317,7 @@ void check(const Unit& unit) {
 
 class HostileEncoders : public ::testing::TestWithParam<const Unit*> {};
 
-TEST_P(HostileEncoders, KeepNothingThatWasNotSeen) {
+TEST_P(HostileEncoders, KeepNoClauseWithoutEvidence) {
   if (GetParam()->link == LinkKind::can) {
     check<CanFrame>(*GetParam());
   } else {
@@ -328,13 +328,13 @@ TEST_P(HostileEncoders, KeepNothingThatWasNotSeen) {
 // Checks an encoder with each option with which it can be read.
 template <class Item>
 void check_good_one(const EncoderAddress& address) {
-  if (said_by<Item>(address).empty()) return;
+  if (reply_of<Item>(address).empty()) return;
   const Conformance found = conform(address, virtual_link(address, {.rough = sim::RoughRates{}}), {.readings = 5});
   EXPECT_EQ(with_verdict(found, Verdict::broken), std::vector<std::string>{}) << variation_name(address) << "\n"
                                                                               << found.report();
 }
 
-TEST_P(HostileEncoders, GoodOnesBreakNothingWithAnyOption) {
+TEST_P(HostileEncoders, VirtualEncoderBreaksNoClauseWithAnyOption) {
   for (const EncoderAddress& address : variations_of(*GetParam())) {
     if (GetParam()->link == LinkKind::can) {
       check_good_one<CanFrame>(address);

@@ -36,17 +36,17 @@ class Mutant final : public Machine<Item> {
     if (event.kind == Kind::line_error) {
       note_special({});
       if (is_special && on_damage) {
-        heard_ = good;
-        changed = {.kind = Kind::received, .at = event.at, .items = heard_};
+        last_request_ = good;
+        changed = {.kind = Kind::received, .at = event.at, .items = last_request_};
       }
     } else if (event.kind == Kind::received) {
       if (!driven) ++requests;
-      heard_.assign(event.items.begin(), event.items.end());
-      if (good.empty()) good = heard_;
-      note_special(heard_);
-      if (hear) hear(heard_);
-      changed.items = heard_;
-      if (heard_.empty()) return;
+      last_request_.assign(event.items.begin(), event.items.end());
+      if (good.empty()) good = last_request_;
+      note_special(last_request_);
+      if (change_request) change_request(last_request_);
+      changed.items = last_request_;
+      if (last_request_.empty()) return;
     }
     device_.feed(changed);
   }
@@ -55,34 +55,34 @@ class Mutant final : public Machine<Item> {
     for (;;) {
       Step<Item> step = device_.next(now);
       if (step.kind != Step<Item>::Kind::transfer) return step;
-      said.assign(step.out.begin(), step.out.end());
-      if (!driven && heard_.empty()) ++requests;  // the device sends an unsolicited frame
-      if (say && mutates()) {
-        say(said, step);
-        if (said.empty() && driven) continue;
+      reply_items.assign(step.out.begin(), step.out.end());
+      if (!driven && last_request_.empty()) ++requests;  // the device sends an unsolicited frame
+      if (change_reply && mutates()) {
+        change_reply(reply_items, step);
+        if (reply_items.empty() && driven) continue;
         // The device must see the suppressed reply as sent.
-        if (said.empty()) {
+        if (reply_items.empty()) {
           device_.feed({.kind = Kind::sent, .at = now});
           continue;
         }
       }
-      step.out = said;
+      step.out = reply_items;
       return step;
     }
   }
 
-  [[nodiscard]] std::span<const Item> heard() const { return heard_; }
+  [[nodiscard]] std::span<const Item> last_request() const { return last_request_; }
 
-  std::function<void(std::vector<Item>&)> hear{};
-  std::function<void(std::vector<Item>&, Step<Item>&)> say{};
-  bool on_damage = false;   // a damaged request is received as the good one
-  bool of_special = false;  // changes replies to requests that differ from the first
-  bool always = false;      // changes the replies to all requests from number `mutated` on
+  std::function<void(std::vector<Item>&)> change_request{};
+  std::function<void(std::vector<Item>&, Step<Item>&)> change_reply{};
+  bool on_damage = false;        // a damaged request is received as the good one
+  bool changes_special = false;  // changes replies to requests that differ from the first
+  bool always = false;           // changes the replies to all requests from number `mutated` on
   // number of the request whose reply is changed, from 1; the first request may only detect the echo
   unsigned mutated = 3;
   bool driven = false;
   unsigned requests = 0;
-  std::vector<Item> said;
+  std::vector<Item> reply_items;
   std::vector<Item> good;  // the first request, a good one
   int special = -1;        // index of the only special request, in order of arrival; -1: all
   std::function<bool(const std::vector<Item>&)> is_meant{};  // further condition of special requests; empty: none
@@ -99,12 +99,12 @@ class Mutant final : public Machine<Item> {
     is_special = (special < 0 || special == index) && (!is_meant || is_meant(request));
   }
   [[nodiscard]] bool mutates() const {
-    if (of_special) return is_special;
+    if (changes_special) return is_special;
     return requests == mutated || (always && requests > mutated);
   }
 
   Machine<Item>& device_;
-  std::vector<Item> heard_;
+  std::vector<Item> last_request_;
   std::vector<std::vector<Item>> specials_;
 };
 

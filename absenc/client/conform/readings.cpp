@@ -14,12 +14,12 @@ namespace absenc::client {
 
 namespace {
 
-std::string words_of(const Attempted& one) {
+std::string error_text(const Attempted& one) {
   const std::string_view name = error_texts[static_cast<std::size_t>(one.error)].name;
   return one.detail.empty() ? std::string(name) : fmt::format("{} {}", name, one.detail);
 }
 
-std::size_t counters_seen(const Readings& readings) {
+std::size_t distinct_counters(const Readings& readings) {
   std::set<std::int64_t> values;
   for (const Attempted& one : readings.all) {
     if (one.error == Error::none && one.counter) values.insert(*one.counter);
@@ -29,7 +29,7 @@ std::size_t counters_seen(const Readings& readings) {
 
 // Returns how many mixtures are detected as one of `errors`. A mixture has the first bits of one good reply and the
 // rest of another, so that each part alone is right.
-std::size_t mixtures_noticed(const Unit& unit, const Options& options, const Readings& readings, Errors errors) {
+std::size_t detected_mixtures(const Unit& unit, const Options& options, const Readings& readings, Errors errors) {
   const Attempted* const one = readings.first_good();
   std::size_t noticed = 0;
   for (const Attempted& other : readings.all) {
@@ -82,7 +82,7 @@ void judge_streamed(const Readings& readings, ClauseResult& result) {
                                     [](const Attempted& one) { return one.error == Error::timeout; });
   const bool comes = readings.good != 0 && stopped == readings.all.end();
   const Attempted& worst = stopped != readings.all.end() ? *stopped : readings.all.front();
-  if (!comes) seen += fmt::format("; {}", words_of(worst));
+  if (!comes) seen += fmt::format("; {}", error_text(worst));
   conclude(result, comes, std::move(seen));
 }
 
@@ -113,7 +113,7 @@ void judge_frames(const Unit& unit, const Options& options, const Readings& read
   std::string first;
   for (const Attempted& one : readings.all) {
     if (one.error == Error::none || (errors & any_of(one.error)) == 0) continue;
-    if (++bad == 1) first = fmt::format(": {}", words_of(one));
+    if (++bad == 1) first = fmt::format(": {}", error_text(one));
   }
   std::string seen = fmt::format("{} good replies, {} that break it{}", readings.good, bad, first);
   if (readings.discarded != 0) seen += fmt::format("; {} frames of the stream were discarded", readings.discarded);
@@ -125,17 +125,17 @@ void judge_frames(const Unit& unit, const Options& options, const Readings& read
   if (good == nullptr) return;
   // a single reply cannot show an error of the counter
   const bool about_counters = errors == any_of(Error::sequence_mismatch);
-  const std::size_t noticed = about_counters ? 0 : changes_noticed(unit, options, good->exchange, errors);
+  const std::size_t noticed = about_counters ? 0 : detected_changes(unit, options, good->exchange, errors);
   if (noticed != 0) {
     return conclude(result, true, fmt::format("{}; of one changed it would be seen in {} ways", seen, noticed));
   }
   if (about_counters) {
-    const std::size_t counters = counters_seen(readings);
+    const std::size_t counters = distinct_counters(readings);
     result.evidence = "no reply carried a counter that moved";
     if (counters < 2) return;
     return conclude(result, true, fmt::format("{}; their counters had {} values", seen, counters));
   }
-  const std::size_t mixed = mixtures_noticed(unit, options, readings, errors);
+  const std::size_t mixed = detected_mixtures(unit, options, readings, errors);
   result.evidence = "with these options nothing could be wrong with it while the shaft stands still: turn it a little";
   if (mixed == 0) return;
   conclude(result, true, fmt::format("{}; of two mixed together it would be seen in {} ways", seen, mixed));

@@ -57,10 +57,10 @@ class Tester {
   [[nodiscard]] ChangesLine line() {
     return {.run = [this](const Command& command, Arguments arguments) { return run(command, arguments, 3); },
             .send = [this](const std::vector<std::uint8_t>& request) { return send(request); },
-            .hear = [this](Time time) { return hear(time); },
-            .rest = [this](Time time) { runner_.listen(time); },
-            .follow = [this](const Command& setter,
-                             std::int64_t value) { options_ = options_behind(unit_, options_, setter, value); },
+            .count_unsolicited = [this](Time time) { return count_unsolicited(time); },
+            .wait_for = [this](Time time) { runner_.listen(time); },
+            .note_setting = [this](const Command& setter,
+                                   std::int64_t value) { options_ = options_behind(unit_, options_, setter, value); },
             .options = [this]() -> const Options& { return options_; }};
   }
 
@@ -97,17 +97,17 @@ class Tester {
   // ---- The line
 
   // Runs a command. On an interrupt the conversation first restores what it changed in the encoder for its own use.
-  Ran run(const Command& command, Arguments arguments, unsigned attempts) {
+  CommandResult run(const Command& command, Arguments arguments, unsigned attempts) {
     runner_.set_options(options_);
     runner_.start_again(attempts);
     const std::uint64_t before = runner_.port().requests;
     const Conversation<Item>* ended = runner_.run(command, arguments);
     if (runner_.port().take_aborted()) throw os::Interrupted{};
     if (ended == nullptr) throw UsageError(fmt::format("{} cannot run {} with these options", unit_.id, command.name));
-    Ran ran{.error = ended->error(),
-            .detail = std::string(ended->detail()),
-            .requests = runner_.port().requests - before,
-            .heard = !runner_.last().reply().empty()};
+    CommandResult ran{.error = ended->error(),
+                      .detail = std::string(ended->detail()),
+                      .requests = runner_.port().requests - before,
+                      .heard = !runner_.last().reply().empty()};
     if (ran.error != Error::none) return ran;
     if (const Reading* reading = ended->reading()) ran.reading = *reading;
     Told told(ran);
@@ -116,13 +116,13 @@ class Tester {
     return ran;
   }
   struct Told final : FieldSink {
-    explicit Told(Ran& into) : ran(into) {}
+    explicit Told(CommandResult& into) : ran(into) {}
     void put(const FieldValue& field) override {
       if (field.info->role == Role::data) ran.data.assign(field.bytes.begin(), field.bytes.end());
       if (field.info->role == Role::value && ran.data.empty()) ran.data = {static_cast<std::uint8_t>(field.number)};
       sink.put(field);
     }
-    Ran& ran;
+    CommandResult& ran;
     AnswerSink sink;
   };
 
@@ -135,7 +135,7 @@ class Tester {
       throw UsageError(fmt::format("{} cannot be read with these options{}{}", unit_.id, one.detail.empty() ? "" : ": ",
                                    one.detail));
     }
-    if (one.error == Error::none || !is_asked() || is_streamed(options)) return one;
+    if (one.error == Error::none || !is_polled() || is_streamed(options)) return one;
     // No reply is a timeout, whatever error the host reports.
     if (!one.answered) one.error = Error::timeout;
     runner_.listen(listen_for);
@@ -163,7 +163,7 @@ class Tester {
     return unit_.streams != nullptr && unit_.streams(options);
   }
   // Returns whether the encoder replies to requests. On clocked and SPI links the host clocks the bits instead.
-  [[nodiscard]] bool is_asked() const { return unit_.link != LinkKind::clocked && unit_.link != LinkKind::spi; }
+  [[nodiscard]] bool is_polled() const { return unit_.link != LinkKind::clocked && unit_.link != LinkKind::spi; }
   // Returns whether the encoder replies to a reading: a missing reply to another request is no evidence otherwise.
   [[nodiscard]] bool answers() {
     for (unsigned i = 0; i < times; ++i) {
@@ -198,8 +198,8 @@ class Tester {
   }
   void set_rate(std::uint32_t rate) { runner_.port().begin({.kind = Step<Item>::Kind::configure, .rate = rate}); }
   /// Sends a request, given as bytes or, for a CAN bus, as text.
-  Sent send(const std::vector<std::uint8_t>& request) {
-    Sent sent;
+  SingleExchange send(const std::vector<std::uint8_t>& request) {
+    SingleExchange sent;
     const auto attempted = send_instead([&](std::vector<Item>& edited) { edited = items_of(request); }, 0,
                                         2 * unit_.timing.turnaround + latency_);
     if (attempted) sent = {.request = attempted->exchange.request, .reply = attempted->exchange.reply};
@@ -214,8 +214,8 @@ class Tester {
     }
   }
   /// Counts unsolicited frames with the identifier of the readings' replies, for `time`.
-  Heard hear(Time time) {
-    Heard heard;
+  UnsolicitedFrames count_unsolicited(Time time) {
+    UnsolicitedFrames heard;
     const Attempted* const good = readings_.first_good();
     if constexpr (is_can) {
       if (good == nullptr || !good->exchange.reply.can) return heard;
@@ -248,7 +248,7 @@ class Tester {
     const std::vector<std::int64_t> arguments = complete_arguments(command, {});
     std::uint64_t requests = 0;
     for (unsigned i = 0; i < times; ++i) {
-      const Ran ran = run(command, arguments, 1);
+      const CommandResult ran = run(command, arguments, 1);
       requests += ran.requests;
       if (ran.error == Error::none) continue;
       const std::string_view name = error_texts[static_cast<std::size_t>(ran.error)].name;
@@ -289,7 +289,7 @@ class Tester {
       result.evidence = "with these options nothing is asked";
       if (runner_.port().requests == before) return;
       seen = fmt::format("address {}: {}", address,
-                         what_came(unit_.link, one.exchange.request.frame(), one.exchange.reply.frame()));
+                         exchange_text(unit_.link, one.exchange.request.frame(), one.exchange.reply.frame()));
       if (is_silent(one)) {
         result.evidence = seen + ", but the encoder does not answer its own address any more";
         if (answers()) conclude(result, true, seen + ", and to its own address a good reply");
@@ -297,7 +297,7 @@ class Tester {
       }
       const bool of_own = error_of(own_request(), one) == Error::none;
       if (one.error != Error::none && of_own) return conclude(result, false, seen + ", which is the reply of this one");
-      const Ran here = run(read_, {}, times);
+      const CommandResult here = run(read_, {}, times);
       const bool same = one.reading && here.reading && is_near(*here.reading, one.reading->singleturn);
       alike += one.error != Error::none || same ? 1 : 0;
     }
@@ -349,7 +349,7 @@ class Tester {
       }
       result.evidence = "with these options nothing is asked";
       if (!one) return;
-      last = what_came(unit_.link, one->exchange.request.frame(), one->exchange.reply.frame());
+      last = exchange_text(unit_.link, one->exchange.request.frame(), one->exchange.reply.frame());
       const Seen seen = reaction_of(clause, *one);
       // The port may return to the usual rate too late for the reply.
       const bool missed = slow && (is_silent(*one) || seen == Seen::unclear);

@@ -33,10 +33,10 @@ struct Flaws {
   unsigned stops_at_silence = 0;  // number of requests without reply after which it stops; 0: never
   unsigned stops_at_damage = 0;   // number of damaged replies after which it stops; 0: never
   unsigned stops_at_refusal = 0;  // number of damaged requests after which it stops; 0: never
-  Time hasty{};                   // waits up to this length are skipped
+  Time skipped_wait{};            // waits up to this length are skipped
   std::vector<HostStep> sends{};
   // Defects of an SPI controller:
-  Time early{};            // time by which transfers begin too early
+  Time too_early_by{};     // time by which transfers begin too early
   std::uint32_t rate = 0;  // clock rate in Hz; 0: that of the step
   int bytes = 0;           // bytes added to each transfer, negative: removed; at least one byte remains
   bool other_mode = false;
@@ -58,7 +58,7 @@ class HastyPort final : public Port<Item> {
   }
   Event<Item> wait(const Step<Item>& step) override {
     const Time left = step.at - port_.now();
-    if (!sending_ && step.at != never && left > Time{} && left <= hasty) {
+    if (!sending_ && step.at != never && left > Time{} && left <= skipped_wait) {
       return {.kind = Event<Item>::Kind::timer, .at = step.at};
     }
     const Event<Item> event = port_.wait(step);
@@ -66,7 +66,7 @@ class HastyPort final : public Port<Item> {
     return event;
   }
 
-  Time hasty{};
+  Time skipped_wait{};
   unsigned requests_left = UINT_MAX;
 
  private:
@@ -86,12 +86,12 @@ class ControllerPort final : public Port<std::uint8_t> {
   void begin(const ByteStep& step) override {
     if (step.kind == ByteStep::Kind::configure) rate_ = step.rate;
     if (step.kind != ByteStep::Kind::transfer) return;
-    now_ = std::max(now_, step.at - flaws_.early);
+    now_ = std::max(now_, step.at - flaws_.too_early_by);
     if (device_.timer() <= now_) device_.wake(now_);
     if (step.hold_low) device_.rest(line_.spi_mode & 1u);
-    const std::size_t told =
+    const std::size_t wanted_size =
         step.bits > 0 ? (step.bits + line_.idle_clocks + 7) / 8 : std::max(step.out.size(), step.expect);
-    const std::size_t size = static_cast<std::size_t>(std::max(static_cast<int>(told) + flaws_.bytes, 1));
+    const std::size_t size = static_cast<std::size_t>(std::max(static_cast<int>(wanted_size) + flaws_.bytes, 1));
     std::vector<std::uint8_t> out(step.out.begin(), step.out.end());
     out.resize(size);
     std::vector<std::uint8_t> in(size);
@@ -100,14 +100,14 @@ class ControllerPort final : public Port<std::uint8_t> {
         {{.mode = mode, .delay = flaws_.without_lead ? Time{} : line_.select_lead},
          {.size = size, .out = out, .in = in, .rate = flaws_.rate != 0 ? flaws_.rate : rate_, .mode = mode}}};
     now_ = device_.message(message, now_);
-    in.resize(told, 0xFF);
+    in.resize(wanted_size, 0xFF);
     const bool idle_low = line_.idle_clocks > 0 && (in[0] & 0x80) == 0;
-    for (std::size_t i = 0; i < told && line_.idle_clocks == 1; ++i) {
-      in[i] = static_cast<std::uint8_t>(in[i] << 1 | (i + 1 < told ? in[i + 1] >> 7 : 0));
+    for (std::size_t i = 0; i < wanted_size && line_.idle_clocks == 1; ++i) {
+      in[i] = static_cast<std::uint8_t>(in[i] << 1 | (i + 1 < wanted_size ? in[i + 1] >> 7 : 0));
     }
-    came_ = in;
+    received_ = in;
     events_.push_back({.kind = ByteEvent::Kind::sent, .at = now_});
-    events_.push_back({.kind = ByteEvent::Kind::received, .at = now_, .items = came_, .idle_low = idle_low});
+    events_.push_back({.kind = ByteEvent::Kind::received, .at = now_, .items = received_, .idle_low = idle_low});
   }
   ByteEvent wait(const ByteStep& step) override {
     if (!events_.empty()) {
@@ -127,7 +127,7 @@ class ControllerPort final : public Port<std::uint8_t> {
   std::uint32_t rate_;
   Time now_{};
   os::SpiDevice device_;
-  std::vector<std::uint8_t> came_;
+  std::vector<std::uint8_t> received_;
   std::deque<ByteEvent> events_;
 };
 
@@ -145,7 +145,7 @@ class Host {
         storage_(unit_.host_storage) {
     device_.watch_rules(&rules_);
     device_.power_on(Time{});
-    port_.hasty = flaws_.early;
+    port_.skipped_wait = flaws_.too_early_by;
   }
 
   /// Judges a host that sends `next()` again and again and ignores replies.
@@ -173,7 +173,7 @@ class Host {
     if (!flaws_.sends.empty()) send_all();
     for (const Command& command : unit_.commands) {
       const bool moves = !command.changes_option.empty();  // the host would have to change its options
-      if (all && !moves) run(command, complete_arguments(command, given(command)));
+      if (all && !moves) run(command, complete_arguments(command, required_arguments(command)));
     }
     trial.look(seen());
     return trial.judge();
@@ -222,12 +222,12 @@ class Host {
   void round(HostTrial& trial) {
     if (flaws_.is_silent) return;
     one(trial, *find_command(unit_, Verb::read), {});
-    port_.hasty = flaws_.hasty;
+    port_.skipped_wait = flaws_.skipped_wait;
     const Command* memory = find_command(unit_, Verb::memory_read);
     for (const std::int64_t page : {1, 0}) {
       if (memory != nullptr) one(trial, *memory, role_arguments(*memory, {{Role::page, page}, {Role::address, 3}}));
     }
-    port_.hasty = flaws_.early;
+    port_.skipped_wait = flaws_.too_early_by;
   }
 
   void run(const Command& command, Arguments arguments) {
@@ -271,7 +271,7 @@ class Host {
       wire = parse_wire_text(unit_.link, "sent", one.what);
     } else {
       const auto arguments =
-          complete_arguments(*command, one.arguments.empty() ? Arguments(given(*command)) : one.arguments);
+          complete_arguments(*command, one.arguments.empty() ? Arguments(required_arguments(*command)) : one.arguments);
       const auto size = unit_.encode(address_.options, *command, arguments, bytes);
       if (!size) return {};
       bytes.resize(*size);
@@ -285,7 +285,7 @@ class Host {
       return wire.bytes;
     }
   }
-  static std::vector<std::int64_t> given(const Command& command) {
+  static std::vector<std::int64_t> required_arguments(const Command& command) {
     std::vector<std::int64_t> values;
     for (const Argument& one : command.arguments) {
       if (one.required) values.push_back(std::max<std::int64_t>(one.minimum, 1));
