@@ -12,7 +12,7 @@
 namespace absenc {
 namespace {
 
-using sim::Role;
+using sim::NodeRole;
 using std::chrono::microseconds;
 using toy::Byte;
 using ByteToy = toy::Toy<Byte>;
@@ -36,11 +36,11 @@ struct RequestReply : testing::Test {
   }};
 
   void begin(bool with_device) {
-    if (with_device) line.attach(Role::device, device);
+    if (with_device) line.attach(NodeRole::device, device);
     host.idle.answer = microseconds(10);
     host.idle.gap = microseconds(6);
     host.send({0x1A});
-    EXPECT_TRUE(line.run(line.attach(Role::host, host)));
+    EXPECT_TRUE(line.run(line.attach(NodeRole::host, host)));
     line.run_until(line.now());  // runs the device's `sent` event, which has the same time
   }
 };
@@ -65,10 +65,10 @@ TEST_F(RequestReply, ReportsSilenceWhenReplyStops) {
 
 TEST_F(RequestReply, WaitsForCharacterThatHasBegun) {
   host.idle.at = microseconds(9);  // the timer fires while a character is being received
-  line.attach(Role::device, device);
+  line.attach(NodeRole::device, device);
   host.idle.answer = microseconds(4);
   host.send({0x1A});
-  EXPECT_TRUE(line.run(line.attach(Role::host, host)));
+  EXPECT_TRUE(line.run(line.attach(NodeRole::host, host)));
   EXPECT_EQ(host.log, "4000 sent, 9000 timer, 11000 received 1A, 15000 received 00, 19000 received 55");
 }
 
@@ -90,8 +90,8 @@ TEST(Stream, EmitsResultsWithoutRequest) {
   });
   host.idle.gap = microseconds(50);
   std::vector<Byte> results;
-  line.attach(Role::device, device);
-  const auto node = line.attach(Role::host, host, [&] {
+  line.attach(NodeRole::device, device);
+  const auto node = line.attach(NodeRole::host, host, [&] {
     results.push_back(frame[1]);
     frame.clear();
     return results.size() < 3;
@@ -181,8 +181,8 @@ TEST(Spi, ReadsRegisterWithinPositionFrames) {
   SpiDevice device;
   SpiHost host;
   std::string results;
-  line.attach(Role::device, device);
-  const auto node = line.attach(Role::host, host, [&] {
+  line.attach(NodeRole::device, device);
+  const auto node = line.attach(NodeRole::host, host, [&] {
     if (host.position == 50) host.read_register(0x4C);  // requests a register while the stream continues
     results += std::to_string(line.now().count()) + (host.good ? " good " : " bad ") + std::to_string(host.position) +
                ' ' + std::to_string(host.value) + '\n';
@@ -207,9 +207,9 @@ struct Clocked : testing::Test {
   }};
 
   void clock(std::size_t bits) {
-    line.attach(Role::device, device);
+    line.attach(NodeRole::device, device);
     host.send({}, microseconds(1), bits);
-    EXPECT_TRUE(line.run(line.attach(Role::host, host)));
+    EXPECT_TRUE(line.run(line.attach(NodeRole::host, host)));
   }
 };
 
@@ -255,9 +255,9 @@ TEST_F(Can, ArbitratesCyclicFramesByIdentifier) {
   CanToy low(cyclic(0x120, 0xA0));
   CanToy host;
   host.send({frame(0x200, 0x01)});
-  line.attach(Role::device, high);
-  line.attach(Role::device, low);
-  line.attach(Role::host, host);
+  line.attach(NodeRole::device, high);
+  line.attach(NodeRole::device, low);
+  line.attach(NodeRole::host, host);
   line.run_until(microseconds(2500));
   EXPECT_EQ(host.log, "240000 sent, 1472000 received 120:A0, 1696000 received 121:B0, 2472000 received 120:A0");
   EXPECT_EQ(low.log, "240000 received 200:01, 1472000 sent, 1696000 received 121:B0, 2472000 sent");
@@ -269,8 +269,8 @@ TEST_F(Can, ReportsErrorForSameIdentifierWithOtherData) {
   CanToy two(cyclic(0x120, 0xA1));
   CanToy host;
   host.send({frame(0x200, 0x01)});
-  for (CanToy* device : {&one, &two}) line.attach(Role::device, *device);
-  line.attach(Role::host, host);
+  for (CanToy* device : {&one, &two}) line.attach(NodeRole::device, *device);
+  line.attach(NodeRole::host, host);
   line.run_until(microseconds(2000));
   EXPECT_EQ(host.log, "240000 sent, 1472000 error");
   for (CanToy* device : {&one, &two}) EXPECT_EQ(device->log, "240000 received 200:01, 1472000 error, 1472000 sent");
@@ -281,8 +281,8 @@ TEST_F(Can, StandardFrameWinsOverExtendedFrameWithSamePrefix) {
   extended.send({CanFrame{.id = 0x120u << 18, .extended = true}}, microseconds(10));
   CanToy standard;
   standard.send({frame(0x120, 0xA0)}, microseconds(10));
-  line.attach(Role::device, extended);
-  line.attach(Role::device, standard);
+  line.attach(NodeRole::device, extended);
+  line.attach(NodeRole::device, standard);
   line.run_until(microseconds(1000));
   EXPECT_EQ(standard.log, "242000 sent, 534000 received 04800000:");
 }
@@ -304,8 +304,8 @@ TEST(Trigger, RequestsEachFrameWithLongEnoughPulse) {
   });
   host.idle.answer = microseconds(40);
   pulse(host, Time{}, microseconds(10));
-  line.attach(Role::device, device);
-  EXPECT_TRUE(line.run(line.attach(Role::host, host)));
+  line.attach(NodeRole::device, device);
+  EXPECT_TRUE(line.run(line.attach(NodeRole::host, host)));
   EXPECT_EQ(host.log, "10000 sent, 40000 received FF, 109000 sent, 149000 silence");
   EXPECT_EQ(device.log, "0 triggered 10000, 40000 sent, 100000 triggered 9000");
 }
@@ -330,8 +330,8 @@ struct BaudChange : testing::Test {
       self.send({0x01}, event.at + microseconds(5));
     });
     host.send({0x19});
-    line.attach(Role::device, device);
-    EXPECT_TRUE(line.run(line.attach(Role::host, host)));
+    line.attach(NodeRole::device, device);
+    EXPECT_TRUE(line.run(line.attach(NodeRole::host, host)));
     return host.log;
   }
 };
@@ -351,8 +351,8 @@ TEST_F(BaudChange, KeepsParityAndStopBits) {
   ByteToy listens([](ByteToy&, const Event<Byte>&) {});
   configure(listens);
   follows.send({0x19});
-  parity_line.attach(Role::device, listens);
-  parity_line.attach(Role::host, follows);
+  parity_line.attach(NodeRole::device, listens);
+  parity_line.attach(NodeRole::host, follows);
   parity_line.run_until(microseconds(100));
   EXPECT_EQ(listens.log, "12000 error, 18000 received 01");
 }
@@ -376,9 +376,9 @@ struct Collision : testing::Test {
     ByteToy second(two);
     ByteToy host;
     host.send({0x1A}, microseconds(1));
-    line.attach(Role::device, first);
-    line.attach(Role::device, second);
-    line.set_echo(line.attach(Role::host, host), echo);
+    line.attach(NodeRole::device, first);
+    line.attach(NodeRole::device, second);
+    line.set_echo(line.attach(NodeRole::host, host), echo);
     line.run_until(microseconds(100));
     return host.log;
   }
@@ -404,8 +404,8 @@ TEST_F(Collision, DeviceReceivesWhileSending) {
     if (event.kind == Kind::received && event.items[0] == 0x01) self.send({0x77}, event.at + microseconds(4));
   });
   host.send({0x1A});
-  line.attach(Role::device, device);
-  line.attach(Role::host, host);
+  line.attach(NodeRole::device, device);
+  line.attach(NodeRole::host, host);
   line.run_until(microseconds(60));
   EXPECT_EQ(device.log, "10000 received 1A, 37000 received 02, 43000 sent");
 }
@@ -414,7 +414,7 @@ TEST_F(Collision, RejectsTransferDuringTransfer) {
   ByteToy host;
   host.send({0x01});
   host.send({0x02});
-  EXPECT_THROW(line.attach(Role::host, host), std::logic_error);
+  EXPECT_THROW(line.attach(NodeRole::host, host), std::logic_error);
 }
 
 }  // namespace

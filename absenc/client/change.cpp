@@ -11,11 +11,11 @@ namespace absenc::client {
 
 namespace {
 
-struct Words {
+struct StateText {
   std::string_view word;
   std::string_view sentence;
 };
-constexpr std::array<Words, 5> words{{
+constexpr std::array<StateText, 5> words{{
     {"", ""},
     {"not_sent", "not sent: the encoder is as it was"},
     {"confirmed", "sent and confirmed"},
@@ -23,7 +23,7 @@ constexpr std::array<Words, 5> words{{
     {"unknown", "sent, result unknown"},
 }};
 
-const Words& words_of(ChangeState state) { return words[static_cast<std::size_t>(state)]; }
+const StateText& words_of(ChangeState state) { return words[static_cast<std::size_t>(state)]; }
 
 }  // namespace
 

@@ -73,9 +73,9 @@ class Decoded {
   [[nodiscard]] const std::vector<std::string>& notes() const;
 
  private:
-  struct Work;
+  struct Parts;
 
-  std::unique_ptr<Work> work_;
+  std::unique_ptr<Parts> parts_;
   const Row* row_ = nullptr;
 };
 

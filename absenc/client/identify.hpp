@@ -15,7 +15,7 @@
 namespace absenc::client {
 
 /// An encoder that explains the received frames.
-struct Found {
+struct FoundEncoder {
   const Unit* unit = nullptr;           ///< The unit that explains the replies.
   Options options{};                    ///< Options with which it does.
   std::vector<std::string> settings{};  ///< Shortest list of settings that yields these options, as "model=23-bit".
@@ -33,9 +33,9 @@ struct Found {
 
 /// Result of `identify`: the units that explain what the port received.
 struct Identified {
-  std::vector<Found> found{};        ///< Encoders, the most probable first.
-  std::vector<std::string> notes{};  ///< Sentences about attempts that were impossible and about damaged data.
-  bool is_complete = true;           ///< False if the time limit ended the search early.
+  std::vector<FoundEncoder> found{};  ///< Encoders, the most probable first.
+  std::vector<std::string> notes{};   ///< Sentences about attempts that were impossible and about damaged data.
+  bool is_complete = true;            ///< False if the time limit ended the search early.
 };
 
 /// What `identify` may send, and how long it listens.

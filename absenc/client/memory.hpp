@@ -52,19 +52,19 @@ struct MemoryRun {
 [[nodiscard]] std::string addresses_in_words(const Unit& unit, const MemoryImage& image);
 
 /// Whether bytes are read or written.
-enum class Access : std::uint8_t {
+enum class MemoryAccess : std::uint8_t {
   read,
   write,
   force,  ///< also write protected bytes
 };
 
 /// Returns the reason why this access to the address is impossible, or "".
-[[nodiscard]] std::string closed(const Unit& unit, MemoryAddress at, Access access);
+[[nodiscard]] std::string closed(const Unit& unit, MemoryAddress at, MemoryAccess access);
 
 /// Throws UsageError if the unit has no memory that can be read or written.
-void require_memory(const Unit& unit, Access access);
+void require_memory(const Unit& unit, MemoryAccess access);
 /// Throws UsageError if a byte of `image` is not open to this access.
-void require_open(const Unit& unit, const MemoryImage& image, Access access);
+void require_open(const Unit& unit, const MemoryImage& image, MemoryAccess access);
 
 class Encoder;
 
@@ -90,7 +90,7 @@ class Memory {
   [[nodiscard]] MemoryImage read(const MemoryImage& image, const MemoryProgress& progress = {});
 
   /// Writes a byte and reads it back. `before` is the stored value, if it is known.
-  void write(MemoryAddress at, std::uint8_t value, Access access, std::optional<std::uint8_t> before = {});
+  void write(MemoryAddress at, std::uint8_t value, MemoryAccess access, std::optional<std::uint8_t> before = {});
 
  private:
   [[nodiscard]] std::vector<std::uint8_t> read_run(MemoryAddress at, std::size_t count);
@@ -103,7 +103,7 @@ class Memory {
 class MemoryChange {
  public:
   /// Prepares the change. Throws UsageError for addresses that cannot be written.
-  MemoryChange(Memory memory, MemoryImage wanted, Access access);
+  MemoryChange(Memory memory, MemoryImage wanted, MemoryAccess access);
 
   /// Reads the stored bytes at the wanted addresses.
   void look(const MemoryProgress& progress = {});
@@ -132,7 +132,7 @@ class MemoryChange {
  private:
   Memory memory_;
   MemoryImage wanted_;
-  Access access_;
+  MemoryAccess access_;
   MemoryImage found_{};
   MemoryImage differing_{};
   MemoryImage written_{};

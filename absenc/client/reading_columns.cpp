@@ -17,27 +17,28 @@ constexpr std::string_view flag_words =
 ReadingColumns::ReadingColumns(const Unit& unit, const Options& options) : unit_(&unit) {
   const bool is_linear = unit.resolution(options).unit_um > 0;
   if (is_linear) {
-    columns_ = {{"position_mm", "mm", Type::real, "millimetres, empty when not valid"},
-                {"position_um", "um", Type::real, "micrometres, empty when not valid"}};
+    columns_ = {{"position_mm", "mm", ColumnType::real, "millimetres, empty when not valid"},
+                {"position_um", "um", ColumnType::real, "micrometres, empty when not valid"}};
   } else {
-    columns_ = {{"angle_deg", "deg", Type::real, "degrees within the turn, empty when not valid"}};
+    columns_ = {{"angle_deg", "deg", ColumnType::real, "degrees within the turn, empty when not valid"}};
   }
   const Column numbers[] = {
-      {"singleturn", "counts", Type::uint64, "counts"},
-      {"singleturn_bits", "", Type::uint64, "", {.is_detail = true}},
-      {"singleturn_valid", "", Type::boolean, ""},
-      {"singleturn_valid_bits", "", Type::uint64, "", {.is_detail = true}},
-      {"multiturn", "revolutions", Type::int64, "revolutions as the encoder counts them"},
-      {"multiturn_bits", "", Type::uint64, "", {.is_detail = true}},
-      {"multiturn_valid", "", Type::boolean, ""},
+      {"singleturn", "counts", ColumnType::uint64, "counts"},
+      {"singleturn_bits", "", ColumnType::uint64, "", {.is_detail = true}},
+      {"singleturn_valid", "", ColumnType::boolean, ""},
+      {"singleturn_valid_bits", "", ColumnType::uint64, "", {.is_detail = true}},
+      {"multiturn", "revolutions", ColumnType::int64, "revolutions as the encoder counts them"},
+      {"multiturn_bits", "", ColumnType::uint64, "", {.is_detail = true}},
+      {"multiturn_valid", "", ColumnType::boolean, ""},
   };
   columns_.insert(columns_.end(), std::begin(numbers), std::end(numbers));
   if (has_channels(unit)) {
-    for (const Flags& flags : flags_of(unit, {})) columns_.push_back({flags.field->name, "", Type::flags, flag_words});
-    columns_.push_back({"alarms", "", Type::flags, flag_words, {.is_detail = true}});
+    for (const Flags& flags : flags_of(unit, {}))
+      columns_.push_back({flags.field->name, "", ColumnType::flags, flag_words});
+    columns_.push_back({"alarms", "", ColumnType::flags, flag_words, {.is_detail = true}});
   } else {
-    columns_.push_back({"status", "", Type::flags, flag_words});
-    columns_.push_back({"alarms", "", Type::flags, flag_words});
+    columns_.push_back({"status", "", ColumnType::flags, flag_words});
+    columns_.push_back({"alarms", "", ColumnType::flags, flag_words});
   }
 }
 

@@ -15,12 +15,12 @@
 namespace absenc::client {
 
 /// Type of a value.
-enum class Type : std::uint8_t { int64, uint64, real, boolean, flags, text, bytes };
+enum class ColumnType : std::uint8_t { int64, uint64, real, boolean, flags, text, bytes };
 
 /// Description of a value in each row.
 struct Column {
   /// How the value is printed as text.
-  struct Look {
+  struct Presentation {
     std::string_view format{};  ///< Format of a real number, as for std::format, "{:.6f}"; "": the shortest exact text.
     bool is_detail = false;     ///< Left out where each row is a line of a table.
     bool in_hex = false;        ///< People read the number in hexadecimal; tables of values print it in decimal.
@@ -28,11 +28,11 @@ struct Column {
     bool is_exchange = false;
   };
 
-  std::string_view name;     ///< Name of the column, in `snake_case`.
-  std::string_view unit;     ///< Unit of the value; "" for a plain number.
-  Type type;                 ///< Type of the values.
-  std::string_view meaning;  ///< Meaning of the value, as a phrase.
-  Look look{};               ///< How a table for people shows it.
+  std::string_view name;        ///< Name of the column, in `snake_case`.
+  std::string_view unit;        ///< Unit of the value; "" for a plain number.
+  ColumnType type;              ///< Type of the values.
+  std::string_view meaning;     ///< Meaning of the value, as a phrase.
+  Presentation presentation{};  ///< How a table for people shows it.
 };
 
 /// Bytes as a value.
@@ -51,11 +51,12 @@ struct Unknown {
   friend bool operator==(const Unknown&, const Unknown&) = default;
 };
 
-/// A value. The alternatives are: nothing, if the row has no value; those of `Type` in its order; `Invalid`; `Unknown`.
+/// A value. The alternatives are: nothing, if the row has no value; those of `ColumnType` in its order; `Invalid`;
+/// `Unknown`.
 using Value = std::variant<std::monostate, std::int64_t, std::uint64_t, double, bool, Flags, std::string, ByteVector,
                            Invalid, Unknown>;
 
-/// Returns whether the value has one of the types of `Type`.
+/// Returns whether the value has one of the types of `ColumnType`.
 [[nodiscard]] inline bool has_value(const Value& value) {
   return value.index() != 0 && !std::holds_alternative<Invalid>(value) && !std::holds_alternative<Unknown>(value);
 }

@@ -9,7 +9,7 @@ namespace absenc::client {
 
 namespace {
 
-constexpr Column::Look detail{.is_detail = true};
+constexpr Column::Presentation detail{.is_detail = true};
 
 double seconds(Time time) { return std::chrono::duration<double>(time).count(); }
 
@@ -22,62 +22,63 @@ SampleRows::SampleRows(const Unit& unit, const Options& options, Time start, Wit
       with_(with),
       joint_(joint),
       reading_(unit, options) {
-  add({"time_s", "s", Type::real, "seconds after `started`", {.format = "{:.6f}"}});
-  protocol_ = add({"protocol", "", Type::text, "", detail});
+  add({"time_s", "s", ColumnType::real, "seconds after `started`", {.format = "{:.6f}"}});
+  protocol_ = add({"protocol", "", ColumnType::text, "", detail});
   reading_at_ = columns_.size();
   columns_.insert(columns_.end(), reading_.columns().begin(), reading_.columns().end());
-  confirmed_ = add({"confirmed", "", Type::boolean, "two readings in a row agreed", detail});
-  ok_ = add({"ok", "", Type::boolean, "whether it is a reading", detail});
+  confirmed_ = add({"confirmed", "", ColumnType::boolean, "two readings in a row agreed", detail});
+  ok_ = add({"ok", "", ColumnType::boolean, "whether it is a reading", detail});
   if (with == With::motion) add_motion();
   if (joint.is_set || joint.has_motor()) add_angles();
   event_ = add(
-      {"event", "", Type::text,
+      {"event", "", ColumnType::text,
        "empty for a reading; restarted: it jumped, or came so long after the one before that the way between them is "
        "not known: position starts again; lost or back: the port; gap; otherwise the error that came in its place"});
-  message_ = add({"message", "", Type::text, "the event in words", detail});
-  sent_ = add({"sent", "", Type::text, "of a reading that failed", detail});
-  received_ = add({"received", "", Type::text, "of a reading that failed", detail});
+  message_ = add({"message", "", ColumnType::text, "the event in words", detail});
+  sent_ = add({"sent", "", ColumnType::text, "of a reading that failed", detail});
+  received_ = add({"received", "", ColumnType::text, "of a reading that failed", detail});
   row_ = {columns_, std::vector<Value>(columns_.size())};
 }
 
 void SampleRows::add_motion() {
   const bool is_linear = unit_um_ > 0;
-  motion_ = add({"position", "counts", Type::int64, "counts, continued past the end of the encoder's own counter"});
-  if (is_linear) add({"unwrapped_mm", "mm", Type::real, "the same in millimetres"});
-  const Column::Look rounded{.format = "{:.6g}"};
+  motion_ =
+      add({"position", "counts", ColumnType::int64, "counts, continued past the end of the encoder's own counter"});
+  if (is_linear) add({"unwrapped_mm", "mm", ColumnType::real, "the same in millimetres"});
+  const Column::Presentation rounded{.format = "{:.6g}"};
   const std::string_view mean = "mean over twice speed_delay_s";
-  add(is_linear ? Column{"speed_mm_s", "mm/s", Type::real, mean, rounded}
-                : Column{"speed_rpm", "rpm", Type::real, mean, rounded});
+  add(is_linear ? Column{"speed_mm_s", "mm/s", ColumnType::real, mean, rounded}
+                : Column{"speed_rpm", "rpm", ColumnType::real, mean, rounded});
   const std::string_view most = "how far the true mean is from it at most: what times and counts leave open";
-  const Column::Look short_look{.format = "{:.3g}"};
-  add(is_linear ? Column{"speed_uncertainty_mm_s", "mm/s", Type::real, most, short_look}
-                : Column{"speed_uncertainty_rpm", "rpm", Type::real, most, short_look});
+  const Column::Presentation three_digits{.format = "{:.3g}"};
+  add(is_linear ? Column{"speed_uncertainty_mm_s", "mm/s", ColumnType::real, most, three_digits}
+                : Column{"speed_uncertainty_rpm", "rpm", ColumnType::real, most, three_digits});
   const std::string_view before =
       is_linear ? "how long before time_s it was so fast" : "how long before time_s the shaft had that speed";
-  add({"speed_delay_s", "s", Type::real, before, {.format = "{:.6f}"}});
-  missed_ = add({"missed", "", Type::uint64, "of a gap: how many readings were due and were not taken"});
+  add({"speed_delay_s", "s", ColumnType::real, before, {.format = "{:.6f}"}});
+  missed_ = add({"missed", "", ColumnType::uint64, "of a gap: how many readings were due and were not taken"});
 }
 
 void SampleRows::add_angles() {
   const bool is_linear = unit_um_ > 0;
   angles_ = columns_.size();
   if (joint_.is_set) {
-    add(is_linear ? Column{"joint_mm", "mm", Type::real, "direction * (unwrapped_mm - offset_mm)"}
-                  : Column{"joint_deg", "deg", Type::real,
+    add(is_linear ? Column{"joint_mm", "mm", ColumnType::real, "direction * (unwrapped_mm - offset_mm)"}
+                  : Column{"joint_deg", "deg", ColumnType::real,
                            "direction * (degrees past the end of a turn - offset_deg) / gear; empty where the turns "
                            "are not known"});
   }
   if (joint_.is_set && with_ == With::motion) {
-    const Column::Look rounded{.format = "{:.6g}"};
-    const Column::Look short_look{.format = "{:.3g}"};
+    const Column::Presentation rounded{.format = "{:.6g}"};
+    const Column::Presentation three_digits{.format = "{:.3g}"};
     const std::string_view speed = "the speed at the joint";
     const std::string_view most = "how far the true mean is from it at most";
-    add(is_linear ? Column{"joint_speed_mm_s", "mm/s", Type::real, speed, rounded}
-                  : Column{"joint_speed_rpm", "rpm", Type::real, speed, rounded});
-    add(is_linear ? Column{"joint_speed_uncertainty_mm_s", "mm/s", Type::real, most, short_look}
-                  : Column{"joint_speed_uncertainty_rpm", "rpm", Type::real, most, short_look});
+    add(is_linear ? Column{"joint_speed_mm_s", "mm/s", ColumnType::real, speed, rounded}
+                  : Column{"joint_speed_rpm", "rpm", ColumnType::real, speed, rounded});
+    add(is_linear ? Column{"joint_speed_uncertainty_mm_s", "mm/s", ColumnType::real, most, three_digits}
+                  : Column{"joint_speed_uncertainty_rpm", "rpm", ColumnType::real, most, three_digits});
   }
-  if (joint_.has_motor()) add({"electrical_deg", "deg", Type::real, "of the motor, 0 to below 360"});
+  if (joint_.has_motor()) add({"electrical_deg", "deg", ColumnType::real, "of the motor, 0 to below 360"});
 }
 
 std::size_t SampleRows::add(const Column& column) {

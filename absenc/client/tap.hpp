@@ -64,9 +64,9 @@ class Tap {
   [[nodiscard]] std::span<const Column> columns() const;
 
  private:
-  struct Work;
+  struct Parts;
 
-  std::unique_ptr<Work> work_;
+  std::unique_ptr<Parts> parts_;
   const Row* row_ = nullptr;
 };
 

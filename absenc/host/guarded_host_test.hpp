@@ -26,7 +26,7 @@ class GuardedHost {
     emitted_ = false;
     guard_.attach(conversation, *unit_, options_, may_repeat);
     if (node_ == none) {
-      node_ = line_->attach(sim::Role::host, guard_, [this] {
+      node_ = line_->attach(sim::NodeRole::host, guard_, [this] {
         emitted_ = asks_;
         return !asks_;
       });

@@ -132,7 +132,7 @@ OrderResult read_settings(Encoder& encoder, const Command* wanted, const Between
     (is_setting ? settings : identity).set(getter->name, to_json(answer->row()));
     for (std::size_t i = 0; i < answer->columns.size(); ++i) {
       const Column& column = answer->columns[i];
-      if (column.look.is_exchange) continue;
+      if (column.presentation.is_exchange) continue;
       Json row = row_for_people(column, answer->values[i]);
       rows.append(row.set("setting", getter->name).set("range", range_of(encoder.unit(), *getter)));
     }
@@ -197,7 +197,7 @@ std::string_view Order::name() const {
 Json shown_values(const Answer& answer) {
   Json rows = Json::array();
   for (std::size_t i = 0; i < answer.columns.size(); ++i) {
-    if (!answer.columns[i].look.is_exchange) rows.append(row_for_people(answer.columns[i], answer.values[i]));
+    if (!answer.columns[i].presentation.is_exchange) rows.append(row_for_people(answer.columns[i], answer.values[i]));
   }
   return rows;
 }
@@ -223,7 +223,7 @@ Order memory_order(const Unit& unit, std::int64_t page) {
   Order order;
   order.kind = Order::Kind::memory;
   if (!unit.registers.empty() && find_command(unit, Verb::memory_read) != nullptr) return order;
-  require_memory(unit, client::Access::read);
+  require_memory(unit, client::MemoryAccess::read);
   if (page < 0) order.addresses = dump_addresses(unit);
   for (const MemoryArea& area : unit.memory) {
     if (page < 0 || !area.has(static_cast<std::uint32_t>(page), area.first)) continue;

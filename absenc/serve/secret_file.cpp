@@ -21,7 +21,7 @@ std::vector<Secret> read_secrets(const std::string& title, const std::string& pa
     throw Failure(fmt::format("others may read or write the {}s in {}: chmod 600 {}", title, path, path));
   }
   std::vector<Secret> secrets;
-  for (LineReader lines(text); lines.next();) {
+  for (SignificantLines lines(text); lines.next();) {
     const std::size_t space = lines.line.find_first_of(" \t");
     const std::size_t secret = std::min(lines.line.find_first_not_of(" \t", space), lines.line.size());
     if (space == std::string_view::npos || lines.line.size() - secret < least) {

@@ -420,7 +420,7 @@ OrderResult Watch::examine(Encoder& live, const std::stop_token& stop) {
   set_state(State::examined, words);
   const EncoderAddress address = connection_of(live).uri();
   Surroundings surroundings;
-  if (address.place == client::Place::sim) {
+  if (address.port_kind == client::PortKind::sim) {
     if (!live.connected()) live.connect();
     surroundings.open = [&](const EncoderAddress&) { return connection_of(live).lend(); };
   } else {

@@ -88,9 +88,9 @@ struct Requester final : Machine<std::uint8_t> {
 
 std::vector<Wire> run_requests(const Wire& requests, const std::vector<Machine<std::uint8_t>*>& on_the_line) {
   Line<std::uint8_t> line(LinkKind::half_duplex, settings);
-  for (Machine<std::uint8_t>* device : on_the_line) line.attach(Role::device, *device);
+  for (Machine<std::uint8_t>* device : on_the_line) line.attach(NodeRole::device, *device);
   Requester requester(requests);
-  const auto host = line.attach(Role::host, requester);
+  const auto host = line.attach(NodeRole::host, requester);
   EXPECT_TRUE(line.run(host, 1s));
   return requester.replies;
 }
@@ -126,7 +126,7 @@ TEST(Bus, MergesOverlappingTransfersAndSendsTheRestLater) {
   Responder late(1, {0x77}, 50ms);
   Bus bus({&second, &first, &late}, settings.character());
   Line<std::uint8_t> line(LinkKind::half_duplex, settings);
-  line.attach(Role::device, bus);
+  line.attach(NodeRole::device, bus);
   struct Quiet final : Machine<std::uint8_t> {
     void feed(const ByteEvent& event) override {
       received_bytes.insert(received_bytes.end(), event.items.begin(), event.items.end());
@@ -140,7 +140,7 @@ TEST(Bus, MergesOverlappingTransfersAndSendsTheRestLater) {
     Wire received_bytes;
     bool requested = false;
   } host;
-  line.attach(Role::host, host);
+  line.attach(NodeRole::host, host);
   line.run_until(10ms);
   EXPECT_EQ(host.received_bytes, (Wire{0x81, 0x0E, 0x0F}));
   line.run_until(60ms);

@@ -87,8 +87,8 @@ struct Faults : testing::Test {
     FaultRates rates;
     rates[kind] = rate;
     faulty = std::make_unique<FaultyDevice>(device, rates, seed);
-    line.attach(Role::device, *faulty);
-    node = line.attach(Role::host, host);
+    line.attach(NodeRole::device, *faulty);
+    node = line.attach(NodeRole::host, host);
   }
   // Sends one request and returns the bytes received within 1 ms.
   ByteVector exchange() {

@@ -18,7 +18,7 @@ template <class Item>
 Line<Item>::~Line() = default;
 
 template <class Item>
-auto Line<Item>::attach(Role role, Machine<Item>& machine, const OnEmit& on_emit) -> Node {
+auto Line<Item>::attach(NodeRole role, Machine<Item>& machine, const OnEmit& on_emit) -> Node {
   auto state = std::make_unique<State>();
   state->role = role;
   state->machine = &machine;
@@ -69,7 +69,7 @@ void Line<Item>::observe_pulses(PulseObserver observer) {
 }
 
 template <class Item>
-Role Line<Item>::role(Node node) const {
+NodeRole Line<Item>::role(Node node) const {
   return nodes_[node]->role;
 }
 
@@ -212,7 +212,7 @@ template <class Item>
 void Line<Item>::accept_step(Node node, const Step<Item>& step) {
   State& state = *nodes_[node];
   // A device selected by chip select or clock answers into the transfer in progress.
-  const bool driven = state.role == Role::device && step.kind == Step<Item>::Kind::transfer &&
+  const bool driven = state.role == NodeRole::device && step.kind == Step<Item>::Kind::transfer &&
                       (kind_ == LinkKind::spi || kind_ == LinkKind::clocked);
   if (!driven && state.active_step != Step<Item>::Kind::wait) {
     throw std::logic_error("a machine began a transfer or pulse before its last one was sent");

@@ -14,7 +14,7 @@
 namespace absenc::sim {
 
 /// Whether a node is host or device.
-enum class Role : std::uint8_t { host, device };
+enum class NodeRole : std::uint8_t { host, device };
 
 /// One shared line. Hosts and devices are machines of the same kind; the role only decides who drives the clock (SPI,
 /// clocked) and the pulses, and which pair a full-duplex node drives.
@@ -57,7 +57,7 @@ class Line {
   Line& operator=(const Line&) = delete;
 
   /// Attaches a machine and takes its first step at once. `machine` must outlive the line or be replaced.
-  Node attach(Role role, Machine<Item>& machine, const OnEmit& on_emit = {});
+  Node attach(NodeRole role, Machine<Item>& machine, const OnEmit& on_emit = {});
   /// Gives the node another machine, from now on. A transfer of the old machine is cut off.
   void replace(Node node, Machine<Item>& machine);
   /// Takes the machine's next step, after something other than an event has changed it.
@@ -74,7 +74,7 @@ class Line {
   /// Returns the virtual time.
   [[nodiscard]] Time now() const { return now_; }
   /// Returns whether a node is host or device.
-  [[nodiscard]] Role role(Node node) const;
+  [[nodiscard]] NodeRole role(Node node) const;
   /// Returns whether the machine of a node has ended.
   [[nodiscard]] bool done(Node node) const;
   /// Returns the time before which all items that began were reported to the observers.

@@ -18,7 +18,7 @@ namespace absenc::sim {
 /// State of one node.
 template <class Item>
 struct Line<Item>::State {
-  Role role{};                       ///< Whether it is host or device.
+  NodeRole role{};                   ///< Whether it is host or device.
   Machine<Item>* machine = nullptr;  ///< The machine.
   OnEmit on_emit;                    ///< Called for what the machine emits.
   LineSettings settings{};           ///< Settings of its port.

@@ -41,8 +41,8 @@ struct LineTest : testing::Test {
   Line<Byte> line{LinkKind::half_duplex, {.rate = 1'000'000}};
   Puppet device;
   Puppet host;
-  Line<Byte>::Node device_node = line.attach(Role::device, device);
-  Line<Byte>::Node host_node = line.attach(Role::host, host);
+  Line<Byte>::Node device_node = line.attach(NodeRole::device, device);
+  Line<Byte>::Node host_node = line.attach(NodeRole::host, host);
 };
 
 TEST_F(LineTest, WakeTakesAStepWithoutAnEvent) {
@@ -116,9 +116,9 @@ TEST(FullDuplex, HasOneWirePerDirection) {
   line.observe([&](Line<Byte>::Node sender, Time, Time, const Byte& item) {
     items += std::to_string(sender) + ':' + std::to_string(item) + ' ';
   });
-  line.attach(Role::device, one);
-  line.attach(Role::device, another);
-  line.attach(Role::host, host);
+  line.attach(NodeRole::device, one);
+  line.attach(NodeRole::device, another);
+  line.attach(NodeRole::host, host);
   line.run_until(microseconds(100));
   EXPECT_EQ(items, "0:0 2:6 1:0 0:2 1:2 ");  // bytes of the two devices are ANDed, the byte of the host is intact
   EXPECT_EQ(host.log, "10000 received 10000 sent 20000 received ");
@@ -160,9 +160,9 @@ struct CanLine : testing::Test {
   }
   static std::size_t length(std::uint32_t id) { return can_bits({.id = id}).size() + can_intermission_bits; }
   std::string run(CanPuppet first, CanPuppet second) {
-    line.attach(Role::device, first);
-    line.attach(Role::device, second);
-    line.attach(Role::host, host);
+    line.attach(NodeRole::device, first);
+    line.attach(NodeRole::device, second);
+    line.attach(NodeRole::host, host);
     line.run_until(microseconds(1000));
     return host.log;
   }

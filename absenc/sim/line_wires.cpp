@@ -138,7 +138,7 @@ void Line<Item>::begin_transfer(Node node) {
   host.expect = kind_ == LinkKind::clocked ? (host.bits + 7) / 8 : std::max(host.out.size(), host.expect);
   if (kind_ == LinkKind::spi) host.bits = host.expect * 8;
   for (Node other = 0; other < nodes_.size(); ++other) {
-    if (nodes_[other]->role == Role::host) continue;
+    if (nodes_[other]->role == NodeRole::host) continue;
     nodes_[other]->active_step = Step<Item>::Kind::wait;
     nodes_[other]->out.clear();
     nodes_[other]->width = {};
@@ -157,7 +157,7 @@ void Line<Item>::end_transfer(Node node) {
     std::vector<Item> in(host.expect, 0xFF);  // a line that no device drives is pulled up
     Time low_after{};
     for (const auto& other : nodes_) {
-      if (other->role == Role::host) continue;
+      if (other->role == NodeRole::host) continue;
       low_after = std::max(low_after, other->width);
       const std::size_t driven = std::min(in.size(), other->out.size());
       for (std::size_t i = 0; i < in.size(); ++i) in[i] &= i < driven ? other->out[i] : other->behind_out;
@@ -172,7 +172,7 @@ void Line<Item>::end_transfer(Node node) {
           {host.start, now_, bits, out, in, host.lead, host.hold_low ? host.accepted_at : never, low_after});
     }
     for (Node other = 0; other < nodes_.size(); ++other) {
-      if (nodes_[other]->role == Role::host) continue;
+      if (nodes_[other]->role == NodeRole::host) continue;
       nodes_[other]->active_step = Step<Item>::Kind::wait;
       if (kind_ == LinkKind::spi) {
         feed(other, {.kind = Event<Item>::Kind::received, .at = now_, .items = out});

@@ -19,8 +19,8 @@ Step<Item> SimPort<Item>::HostEnd::next(Time) {
 
 template <class Item>
 SimPort<Item>::SimPort(LinkKind kind, LineSettings settings, Machine<Item>& device, RealTime real_time)
-    : real_time_(std::move(real_time)), line_(kind, settings), host_node_(line_.attach(Role::host, host_end_)) {
-  line_.attach(Role::device, device);
+    : real_time_(std::move(real_time)), line_(kind, settings), host_node_(line_.attach(NodeRole::host, host_end_)) {
+  line_.attach(NodeRole::device, device);
   if (!real_time_.now != !real_time_.sleep_until) {
     throw std::invalid_argument("a simulated port needs both now and sleep_until, or neither");
   }

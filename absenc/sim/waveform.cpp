@@ -20,7 +20,7 @@ constexpr std::size_t clock = 0, data = 1;
 constexpr std::size_t can = 0;
 
 // Divides `length` into equal parts; the call returns the boundary after `part`, to the nearest nanosecond.
-struct Scale {
+struct EvenDivision {
   Time start;
   Time length;
   std::int64_t parts;
@@ -97,11 +97,11 @@ void Waveform::comment(Time at, std::string words) {
   comments_.insert(behind, {at, std::move(words)});
 }
 
-void Waveform::character(Role sender, Time start, Time end, std::uint8_t byte) {
-  const bool by_host = sender == Role::host;
+void Waveform::character(NodeRole sender, Time start, Time end, std::uint8_t byte) {
+  const bool by_host = sender == NodeRole::host;
   const std::size_t wire = kind_ == LinkKind::half_duplex ? line : by_host ? host : device;
   const unsigned bits = settings_.character_bits();
-  const Scale edge{start, end - start, bits};
+  const EvenDivision edge{start, end - start, bits};
   drive(wire, edge(0), edge(1));
   for (unsigned i = 0; i < 8; ++i) {
     if ((byte >> i & 1) == 0) drive(wire, edge(i + 1), edge(i + 2));
@@ -127,7 +127,7 @@ void Waveform::transfer(const Line<std::uint8_t>::Transfer& seen) {
 void Waveform::draw_clocked(const Line<std::uint8_t>::Transfer& seen) {
   const auto bits = static_cast<std::int64_t>(seen.bits);
   const std::int64_t idle = settings_.idle_clocks;
-  const Scale half{seen.start, seen.end - seen.start, 2 * bits};
+  const EvenDivision half{seen.start, seen.end - seen.start, 2 * bits};
   // The clock line rises again half a period before the first edge.
   if (seen.held_low != never) drive(clock, seen.held_low + half(1) - half(0), half(-1));
   for (std::int64_t i = 0; i < bits + idle; ++i) drive(clock, half(2 * i), half(2 * i + 1));
@@ -144,7 +144,7 @@ void Waveform::draw_clocked(const Line<std::uint8_t>::Transfer& seen) {
 void Waveform::draw_spi(const Line<std::uint8_t>::Transfer& seen) {
   const std::int64_t phase = (settings_.spi_mode & 1) != 0 ? 0 : 1;
   const Time first = seen.start + seen.lead;
-  const Scale half{first, seen.end - first, static_cast<std::int64_t>(2 * seen.bits)};
+  const EvenDivision half{first, seen.end - first, static_cast<std::int64_t>(2 * seen.bits)};
   drive(cs, seen.start, seen.end);
   for (std::size_t i = 0; i < seen.bits; ++i) {
     const auto at = static_cast<std::int64_t>(2 * i);
@@ -157,7 +157,7 @@ void Waveform::draw_spi(const Line<std::uint8_t>::Transfer& seen) {
 void Waveform::frame(Time start, const CanFrame& frame) {
   const std::vector<bool> bits = can_bits(frame);
   const auto count = static_cast<std::int64_t>(bits.size());
-  const Scale edge{start, settings_.bits(bits.size()), count};
+  const EvenDivision edge{start, settings_.bits(bits.size()), count};
   for (std::int64_t i = 0; i < count; ++i) {
     if (!bits[static_cast<std::size_t>(i)]) drive(can, edge(i), edge(i + 1));
   }

@@ -54,7 +54,7 @@ class Waveform {
   void observe(Line<CanFrame>& line);
 
   /// Draws one asynchronous character.
-  void character(Role sender, Time start, Time end, std::uint8_t byte);
+  void character(NodeRole sender, Time start, Time end, std::uint8_t byte);
   /// Draws a transfer of an SPI or clocked link.
   void transfer(const Line<std::uint8_t>::Transfer& transfer);
   /// Draws a CAN frame.
@@ -74,11 +74,11 @@ class Waveform {
 
  private:
   // A drive of a wire away from its idle level (`by` 1) or its release (-1). A wire without any drive is idle.
-  struct Change {
+  struct LevelChange {
     Time at;
     std::size_t wire;
     int by;
-    bool operator>(const Change& other) const { return at > other.at; }
+    bool operator>(const LevelChange& other) const { return at > other.at; }
   };
   struct Comment {
     Time at;
@@ -97,7 +97,7 @@ class Waveform {
   std::vector<Wire> wires_;
   std::vector<int> drivers_;  // number of active drives of each wire
   // Changes and comments that the sink has not received yet.
-  std::priority_queue<Change, std::vector<Change>, std::greater<>> changes_;
+  std::priority_queue<LevelChange, std::vector<LevelChange>, std::greater<>> changes_;
   std::vector<Comment> comments_;  // in the order of time
   Time end_{};
 };

@@ -67,8 +67,8 @@ TEST(Waveform, NamesItsWires) {
 
 TEST(Waveform, CommentsListTheItems) {
   Picture waveform(LinkKind::full_duplex, slow);
-  waveform.character(Role::device, 7us, 17us, 0x00);
-  waveform.character(Role::host, 5us, 15us, 0x1A);
+  waveform.character(NodeRole::device, 7us, 17us, 0x00);
+  waveform.character(NodeRole::host, 5us, 15us, 0x1A);
   EXPECT_THAT(waveform.vcd(), HasSubstr("$timescale 1 ns $end\n$comment #5000 host 1A $end\n"
                                         "$comment #7000 device 00 $end\n$scope"));
   Picture spi(LinkKind::spi, slow);
@@ -83,7 +83,7 @@ TEST(Waveform, CommentsListTheItems) {
 
 TEST(Waveform, Character) {
   Picture waveform(LinkKind::half_duplex, slow);
-  waveform.character(Role::host, 5us, 15us, 0x1A);  // bits on the line: 0 01011000 1
+  waveform.character(NodeRole::host, 5us, 15us, 0x1A);  // bits on the line: 0 01011000 1
   EXPECT_EQ(body(waveform),
             "#0\n1!\n#5000\n0!\n#7000\n1!\n#8000\n0!\n#9000\n1!\n#11000\n0!\n#14000\n1!\n"
             "#25000\n");
@@ -92,21 +92,21 @@ TEST(Waveform, Character) {
 TEST(Waveform, ParityAndTwoStopBits) {
   for (const auto& [parity, high] : {std::pair{Parity::even, true}, std::pair{Parity::odd, false}}) {
     Picture waveform(LinkKind::full_duplex, {.rate = 1'000'000, .parity = parity, .stop_bits = 2});
-    waveform.character(Role::device, 0us, 12us, 0x80);  // bits on the line: 0 00000001 p 11
+    waveform.character(NodeRole::device, 0us, 12us, 0x80);  // bits on the line: 0 00000001 p 11
     EXPECT_THAT(body(waveform), HasSubstr(high ? "#8000\n1\"\n#22000\n" : "#8000\n1\"\n#9000\n0\"\n#10000\n1\"\n"));
   }
 }
 
 TEST(Waveform, CollisionIsTheAnd) {
   Picture waveform(LinkKind::half_duplex, slow);
-  waveform.character(Role::device, 0us, 10us, 0xFE);
-  waveform.character(Role::device, 1us, 11us, 0xFE);
+  waveform.character(NodeRole::device, 0us, 10us, 0xFE);
+  waveform.character(NodeRole::device, 1us, 11us, 0xFE);
   EXPECT_EQ(body(waveform), "#0\n0!\n#3000\n1!\n#21000\n");
 }
 
 TEST(Waveform, BitsThatAreNoWholeNanoseconds) {
   Picture waveform(LinkKind::half_duplex, {.rate = 3'000'000});
-  waveform.character(Role::host, 0ns, 3333ns, 0x55);  // level changes at every bit
+  waveform.character(NodeRole::host, 0ns, 3333ns, 0x55);  // level changes at every bit
   std::string edges;
   for (const int edge : {333, 667, 1000, 1333, 1667, 2000, 2333, 2666, 3000}) {
     edges += "#" + std::to_string(edge) + '\n';
@@ -223,8 +223,8 @@ TEST(Waveform, PassesSettledChangesToSink) {
   toy::Toy<std::uint8_t> device;
   host.send({0x00, 0x55, 0x00, 0x55}, 10us);
   device.send({0x55, 0x00, 0x55, 0x00}, 14us);
-  line.attach(Role::host, host);
-  line.attach(Role::device, device);
+  line.attach(NodeRole::host, host);
+  line.attach(NodeRole::device, device);
   line.run_until(45us);  // within the fourth character of both
   EXPECT_EQ(line.settled(), 40us);
   EXPECT_EQ(counter.last, 33us);
@@ -317,8 +317,8 @@ TEST_F(Sigrok, ReadsSpiInEveryMode) {
     });
     toy::Toy<std::uint8_t> host;
     host.send({0x11, 0x93}, 10us, 0, 3);
-    line.attach(Role::device, device);
-    line.attach(Role::host, host);
+    line.attach(NodeRole::device, device);
+    line.attach(NodeRole::host, host);
     line.run_until(100us);
     const std::string decoder =
         "spi:clk=sck:miso=miso:mosi=mosi:cs=cs:cpol=" + std::to_string(mode / 2) + ":cpha=" + std::to_string(mode % 2);

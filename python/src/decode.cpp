@@ -18,37 +18,37 @@ namespace absenc::python {
 namespace {
 
 using client::Column;
-using client::Type;
+using client::ColumnType;
 using client::Value;
 
 /// The values of one column. They are stored without the GIL and converted with it.
 struct Values {
-  explicit Values(Type of_type) : type(of_type) {}
+  explicit Values(ColumnType of_type) : type(of_type) {}
 
   void add(const Value& value) {
     const bool is_there = client::has_value(value);
     missing.push_back(is_there ? 0 : 1);
     switch (type) {
-      case Type::real:
+      case ColumnType::real:
         reals.push_back(is_there ? std::get<double>(value) : std::numeric_limits<double>::quiet_NaN());
         break;
-      case Type::int64:
+      case ColumnType::int64:
         integers.push_back(is_there ? static_cast<std::uint64_t>(std::get<std::int64_t>(value)) : 0);
         break;
-      case Type::uint64:
+      case ColumnType::uint64:
         integers.push_back(is_there ? std::get<std::uint64_t>(value) : 0);
         break;
-      case Type::boolean:
+      case ColumnType::boolean:
         integers.push_back(is_there && std::get<bool>(value) ? 1 : 0);
         break;
-      case Type::flags:
+      case ColumnType::flags:
         integers.push_back(is_there ? std::get<client::Flags>(value).bits : 0);
         break;
-      case Type::text:
+      case ColumnType::text:
         if (is_there) characters += std::get<std::string>(value);
         ends.push_back(characters.size());
         break;
-      case Type::bytes:
+      case ColumnType::bytes:
         if (is_there) {
           const client::ByteVector& bytes = std::get<client::ByteVector>(value);
           characters.append(bytes.begin(), bytes.end());
@@ -61,18 +61,18 @@ struct Values {
   [[nodiscard]] py::object array() const {
     const auto size = static_cast<py::ssize_t>(missing.size());
     switch (type) {
-      case Type::real:
+      case ColumnType::real:
         return py::array_t<double>(size, reals.data());
-      case Type::int64:
+      case ColumnType::int64:
         return py::array_t<std::uint64_t>(size, integers.data()).attr("view")("int64");
-      case Type::uint64:
+      case ColumnType::uint64:
         return py::array_t<std::uint64_t>(size, integers.data());
-      case Type::boolean:
+      case ColumnType::boolean:
         return py::array_t<std::uint64_t>(size, integers.data()).attr("astype")("bool");
-      case Type::flags:
+      case ColumnType::flags:
         return py::array_t<std::uint64_t>(size, integers.data()).attr("astype")("uint32");
-      case Type::text:
-      case Type::bytes:
+      case ColumnType::text:
+      case ColumnType::bytes:
         break;
     }
     return objects();
@@ -90,7 +90,7 @@ struct Values {
       if (const auto found = known.find(value); found != known.end()) {
         object = found->second;
       } else {
-        object = type == Type::text ? py::object(py::str(value.data(), value.size())) : to_bytes(bytes_of(value));
+        object = type == ColumnType::text ? py::object(py::str(value.data(), value.size())) : to_bytes(bytes_of(value));
         if (known.size() < most_known) known.emplace(value, object);
       }
       PyList_SET_ITEM(list.ptr(), static_cast<py::ssize_t>(i), object.release().ptr());
@@ -98,7 +98,7 @@ struct Values {
     return list;
   }
 
-  Type type;
+  ColumnType type;
   std::vector<std::uint8_t> missing;
   std::vector<double> reals;
   std::vector<std::uint64_t> integers;
@@ -106,20 +106,20 @@ struct Values {
   std::vector<std::size_t> ends;
 };
 
-std::string_view dtype_of(Type type) {
+std::string_view dtype_of(ColumnType type) {
   switch (type) {
-    case Type::real:
+    case ColumnType::real:
       return "f8";
-    case Type::int64:
+    case ColumnType::int64:
       return "i8";
-    case Type::uint64:
+    case ColumnType::uint64:
       return "u8";
-    case Type::boolean:
+    case ColumnType::boolean:
       return "?";
-    case Type::flags:
+    case ColumnType::flags:
       return "u4";
-    case Type::text:
-    case Type::bytes:
+    case ColumnType::text:
+    case ColumnType::bytes:
       break;
   }
   return "O";

@@ -214,12 +214,12 @@ client::MemoryImage image_of(std::uint32_t page, std::uint32_t address, std::str
 
 py::bytes memory_read(PyEncoder& encoder, std::uint32_t address, std::uint32_t count, std::uint32_t page) {
   const Unit& unit = encoder.unit();
-  client::require_memory(unit, client::Access::read);
+  client::require_memory(unit, client::MemoryAccess::read);
   client::MemoryImage wanted;
   for (std::uint32_t i = 0; i < count; ++i) {
     const client::MemoryAddress at{page, address + i};
-    client::require_open(unit, {{at, 0}}, client::Access::read);  // each address separately, because `count` may be
-                                                                  // very large
+    client::require_open(unit, {{at, 0}}, client::MemoryAccess::read);  // each address separately, because `count` may
+                                                                        // be very large
     wanted[at] = 0;
   }
   const client::MemoryImage image = encoder.use([&](client::Encoder& one) { return one.memory().read(wanted); });
@@ -230,7 +230,7 @@ py::bytes memory_read(PyEncoder& encoder, std::uint32_t address, std::uint32_t c
 
 MemoryBytes memory_dump(PyEncoder& encoder) {
   return to_list(encoder.use([](client::Encoder& one) {
-    client::require_memory(one.unit(), client::Access::read);
+    client::require_memory(one.unit(), client::MemoryAccess::read);
     client::Memory memory = one.memory();
     memory.check_model();
     return memory.read(client::dump_addresses(one.unit()));
@@ -241,7 +241,7 @@ std::size_t memory_write(PyEncoder& encoder, std::uint32_t address, const py::by
                          bool force) {
   const client::MemoryImage wanted = image_of(page, address, std::string_view(data));
   return encoder.use([&](client::Encoder& one) {
-    const client::Access access = force ? client::Access::force : client::Access::write;
+    const client::MemoryAccess access = force ? client::MemoryAccess::force : client::MemoryAccess::write;
     client::require_memory(one.unit(), access);
     client::MemoryChange change(one.memory(), wanted, access);
     change.look();

@@ -9,7 +9,7 @@ namespace absenc::python {
 
 namespace {
 
-py::dict to_dict(const client::Found& found) {
+py::dict to_dict(const client::FoundEncoder& found) {
   py::dict one;
   one["unit"] = std::string(found.unit->id);
   one["settings"] = found.settings;
@@ -26,7 +26,7 @@ py::dict to_dict(const client::Found& found) {
 
 py::tuple to_tuple(const client::Identified& identified) {
   py::list found;
-  for (const client::Found& one : identified.found) found.append(to_dict(one));
+  for (const client::FoundEncoder& one : identified.found) found.append(to_dict(one));
   return py::make_tuple(found, identified.notes, identified.is_complete);
 }
 

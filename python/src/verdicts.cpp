@@ -13,7 +13,7 @@ namespace absenc::python {
 
 namespace {
 
-using Settings = std::vector<std::string>;
+using SettingTexts = std::vector<std::string>;
 
 Time duration_of(double seconds) { return std::chrono::duration_cast<Time>(std::chrono::duration<double>(seconds)); }
 
@@ -35,7 +35,7 @@ std::string watched(const Work& work) {
   }
 }
 
-std::string doctor(const std::string& text, const Settings& settings, double seconds, std::size_t readings,
+std::string doctor(const std::string& text, const SettingTexts& settings, double seconds, std::size_t readings,
                    double turning_s) {
   return watched([&](const std::function<bool()>& over) {
     const client::DoctorChoices choices{
@@ -44,7 +44,7 @@ std::string doctor(const std::string& text, const Settings& settings, double sec
   });
 }
 
-std::string conform(const std::string& text, const Settings& settings, std::size_t readings, bool changes,
+std::string conform(const std::string& text, const SettingTexts& settings, std::size_t readings, bool changes,
                     bool resets) {
   return watched([&](const std::function<bool()>& over) {
     const client::ConformChoices choices{.readings = readings, .changes = changes, .resets = resets, .over = over};
@@ -52,13 +52,14 @@ std::string conform(const std::string& text, const Settings& settings, std::size
   });
 }
 
-std::string probe(const std::string& protocol, const std::string& model, const Settings& settings,
-                  const Settings& replies, const Settings& requests) {
+std::string probe(const std::string& protocol, const std::string& model, const SettingTexts& settings,
+                  const SettingTexts& replies, const SettingTexts& requests) {
   return client::to_json(client::probe(protocol, model, settings, replies, requests)).line();
 }
 
-py::tuple wave(const std::string& text, const Settings& settings, const std::string& file, const Settings& commands,
-               std::uint64_t count, double rate, std::uint64_t samples_per_second, bool replaces) {
+py::tuple wave(const std::string& text, const SettingTexts& settings, const std::string& file,
+               const SettingTexts& commands, std::uint64_t count, double rate, std::uint64_t samples_per_second,
+               bool replaces) {
   SignalWatch watch;
   try {
     client::Waved waved;
@@ -85,7 +86,7 @@ py::tuple wave(const std::string& text, const Settings& settings, const std::str
 
 std::vector<std::string> ports() {
   std::vector<std::string> all;
-  for (const client::Port& port : client::ports()) all.push_back(client::to_json(port).line());
+  for (const client::FoundPort& port : client::ports()) all.push_back(client::to_json(port).line());
   return all;
 }
 

@@ -363,7 +363,7 @@ std::vector<std::pair<OwnedFrame, OwnedFrame>> Campaign<Item>::frames_of(const Q
     if (!by_host) answering = true;
   };
   world.line().observe([&](std::size_t sender, Time, Time, const Item& item) {
-    const bool by_host = world.line().role(sender) == sim::Role::host;
+    const bool by_host = world.line().role(sender) == sim::NodeRole::host;
     next(by_host);
     OwnedFrame& frame = by_host ? frames.back().first : frames.back().second;
     if constexpr (World<Item>::is_can) {

@@ -59,7 +59,7 @@ class World {
     device_->power_on(Time{}, Device<Item>::PowerOn::skip);
     faulty_ = std::make_unique<Faulty>(*device_, sim::FaultRates{}, seed);
     line_ = std::make_unique<Line>(unit.link, settings());
-    line_->attach(sim::Role::device, *faulty_);
+    line_->attach(sim::NodeRole::device, *faulty_);
   }
 
   /// Returns whether the unit has a virtual encoder for these options.
@@ -187,7 +187,7 @@ class World {
   }
   void attach(Machine<Item>& machine) {
     if (node_ == none) {
-      node_ = line_->attach(sim::Role::host, idle_, [this] { return !on_emit_ || on_emit_(); });
+      node_ = line_->attach(sim::NodeRole::host, idle_, [this] { return !on_emit_ || on_emit_(); });
     }
     // The caller of a conversation controls how long the SPI chip stays deselected between conversations.
     if (unit_.link == LinkKind::spi) pass(std::chrono::microseconds(20));

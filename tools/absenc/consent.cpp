@@ -40,7 +40,7 @@ bool says_yes(const std::string& question) {
 
 // A sim: encoder is alone on its line and disappears afterwards, so its commands disturb nothing.
 bool disturbs(const EncoderAddress& uri, const Command& command) {
-  return !command.disturbs.empty() && uri.place != Place::sim;
+  return !command.disturbs.empty() && uri.port_kind != PortKind::sim;
 }
 
 }  // namespace
@@ -48,14 +48,14 @@ bool disturbs(const EncoderAddress& uri, const Command& command) {
 bool must_ask(const Invocation& invocation, const EncoderAddress& uri, std::string_view what,
               std::string_view meaning) {
   // A sim: encoder disappears afterwards, so there is nothing to confirm.
-  if (uri.place == Place::sim || invocation.has("--yes")) return false;
+  if (uri.port_kind == PortKind::sim || invocation.has("--yes")) return false;
   if (can_ask()) return true;
   throw UsageError(
       fmt::format("{} changes the encoder ({}) and nobody is there to be asked: give --yes to do it", what, meaning));
 }
 
 bool confirmed(const EncoderAddress& uri, std::string_view meaning) {
-  const std::string where = uri.place == Place::tcp ? fmt::format("{}:{}", uri.host, uri.port) : uri.path;
+  const std::string where = uri.port_kind == PortKind::tcp ? fmt::format("{}:{}", uri.host, uri.port) : uri.path;
   return says_yes(fmt::format("This changes the encoder at {}: {}. Go on? [y/N] ", where, meaning));
 }
 

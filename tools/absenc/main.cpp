@@ -32,9 +32,9 @@ namespace {
 bool asks_for_help(std::string_view word) { return word == "--help" || word == "-h"; }
 
 /// Parses the words after a verb. It reports a wrong name before a parameter that is missing because of it.
-class Parser {
+class ArgumentParser {
  public:
-  explicit Parser(const Subcommand& subcommand) : subcommand_(&subcommand) {
+  explicit ArgumentParser(const Subcommand& subcommand) : subcommand_(&subcommand) {
     for (const Parameter& parameter : subcommand.parameters) {
       if (!parameter.is_option()) arguments_.push_back(&parameter);
     }
@@ -112,7 +112,7 @@ class Parser {
     const std::size_t equals = std::min(setting.find('='), setting.size());
     const std::string_view name = setting.substr(0, equals);
     const client::LinkParameter* known = client::find_link_parameter(name);
-    const bool of_virtual_encoder = known != nullptr && known->places == "sim";
+    const bool of_virtual_encoder = known != nullptr && known->port_kinds == "sim";
     if (of_virtual_encoder || name == "model") {
       if (const Parameter* own = find_parameter(fmt::format("--{}", name))) {
         return invocation_.add(own->name, std::string(setting.substr(std::min(equals + 1, setting.size()))));
@@ -273,7 +273,7 @@ int run_command_line(std::span<char*> words, std::string& understood) {
   if (words.empty()) return welcome();
   const Subcommand* subcommand = find_verb(words, understood);
   if (subcommand == nullptr) return exit_good;
-  const std::optional<Invocation> invocation = Parser(*subcommand).parse(words.subspan(1));
+  const std::optional<Invocation> invocation = ArgumentParser(*subcommand).parse(words.subspan(1));
   if (invocation) return run(*subcommand, *invocation);
   print_line(help(*subcommand));
   return exit_good;

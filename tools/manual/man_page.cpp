@@ -60,7 +60,7 @@ std::string encoders(std::span<const Unit* const> units) {
       to_roff("`absenc list <protocol>`"));
   for (const LinkParameter& parameter : link_parameters) {
     text += tagged(fmt::format("{}={}", parameter.name, parameter.value),
-                   fmt::format("{} (for: {})", parameter.meaning, parameter.places));
+                   fmt::format("{} (for: {})", parameter.meaning, parameter.port_kinds));
   }
   return text;
 }

@@ -89,7 +89,7 @@ class Arrival : public ::testing::TestWithParam<const Unit*> {
     std::vector<Exchange> exchanges;
     for (std::size_t talks = 0; exchanges.size() < count && talks < exchanges.size() + 20; ++talks) {
       for (const Transmission& sent : talker.talk().transmissions) {
-        if (sent.by == sim::Role::host) {
+        if (sent.by == sim::NodeRole::host) {
           exchanges.push_back({sent.bytes, {}});
         } else if (!exchanges.empty()) {
           Wire& reply = exchanges.back().reply;

@@ -73,11 +73,11 @@ class Truth {
 
   void add(const std::vector<Transmission>& sent) {
     for (std::size_t i = 0; i < sent.size(); ++i) {
-      if (sent[i].by == sim::Role::device) {
+      if (sent[i].by == sim::NodeRole::device) {
         unsolicited(sent[i]);
         continue;
       }
-      if (i + 1 < sent.size() && sent[i + 1].by == sim::Role::device) {
+      if (i + 1 < sent.size() && sent[i + 1].by == sim::NodeRole::device) {
         answered(sent[i], sent[i + 1]);
         ++i;
       } else {

@@ -99,7 +99,7 @@ TEST_P(OfUnit, ALineThatNeverPauses) {
   for (const Transmission& transmission : talk(2000, 1)) {
     AnnotationCollector collector;
     Judge judge(unit, options);
-    const bool is_position = transmission.by == sim::Role::device &&
+    const bool is_position = transmission.by == sim::NodeRole::device &&
                              judge.decode({}, {.bytes = transmission.bytes}) == Error::none &&
                              judge.contents().reading != nullptr;
     if (!is_position) continue;

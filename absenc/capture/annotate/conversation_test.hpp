@@ -32,7 +32,7 @@ inline LineSettings line_of(const Unit& unit) { return unit.line.with_some_rate(
 
 /// Bytes that one side sent without a pause.
 struct Transmission {
-  sim::Role by;
+  sim::NodeRole by;
   std::vector<std::uint8_t> bytes;
   Tick begin;
   Tick end;
@@ -58,7 +58,7 @@ class Talker {
         faulty_(*device_, rates, seed),
         line_(unit.link, line_of(unit)) {
     device_->power_on(Time{}, Device<std::uint8_t>::PowerOn::skip);
-    line_.attach(sim::Role::device, faulty_);
+    line_.attach(sim::NodeRole::device, faulty_);
     line_.observe([this](std::size_t sender, Time start, Time end, std::uint8_t byte) {
       if (waveform_ != nullptr) waveform_->character(line_.role(sender), start, end, byte);
       record(line_.role(sender), static_cast<Tick>(start.count()), static_cast<Tick>(end.count()), byte);
@@ -90,7 +90,7 @@ class Talker {
         line_.replace(*host_, *conversation);
       } else {
         // A streaming host stops after its first result.
-        host_ = line_.attach(sim::Role::host, *conversation, [this] { return !streams_; });
+        host_ = line_.attach(sim::NodeRole::host, *conversation, [this] { return !streams_; });
       }
       line_.run(*host_, line_.now() + std::chrono::seconds(30));
     }
@@ -108,8 +108,8 @@ class Talker {
   [[nodiscard]] const sim::FaultyDevice& faulty() const { return faulty_; }
 
  private:
-  void record(sim::Role by, Tick begin, Tick end, std::uint8_t byte) {
-    const bool is_other_wire = unit_.link == LinkKind::full_duplex && by == sim::Role::device;
+  void record(sim::NodeRole by, Tick begin, Tick end, std::uint8_t byte) {
+    const bool is_other_wire = unit_.link == LinkKind::full_duplex && by == sim::NodeRole::device;
     record_.characters.push_back(
         {.begin = begin, .end = end, .value = byte, .channel = static_cast<std::uint8_t>(is_other_wire ? 1 : 0)});
     const auto last = std::find_if(record_.transmissions.rbegin(), record_.transmissions.rend(),

@@ -66,7 +66,7 @@ Rates rates_of(std::span<const std::string> written) {
 }
 
 /// A shaft at rest at a position that can be set.
-struct Hand final : Shaft {
+struct PlacedShaft final : Shaft {
   [[nodiscard]] ShaftState at(Time) const override { return {.position = position}; }
   std::int64_t position = 0;
 };
@@ -107,7 +107,7 @@ class Campaign {
   }
 
  private:
-  struct Place {
+  struct Placement {
     Time since;
     std::int64_t position;
   };
@@ -157,17 +157,17 @@ class Campaign {
     const std::span<const Time> old = line_.old_frames();
     return std::any_of(old.begin(), old.end(), [&](Time sent) {
       const auto after = std::upper_bound(places_.begin(), places_.end(), sent,
-                                          [](Time time, const Place& place) { return time < place.since; });
+                                          [](Time time, const Placement& place) { return time < place.since; });
       return after != places_.begin() && sim::is_at(reading, std::prev(after)->position);
     });
   }
 
   const Unit& unit_;
   const Options& options_;
-  Hand shaft_;
+  PlacedShaft shaft_;
   RoughBench<Item> bench_;
   sim::RoughLine<Item>& line_ = bench_.line;
-  std::deque<Place> places_;
+  std::deque<Placement> places_;
 };
 
 std::optional<CheckWorth> worth_of(const Unit& unit, const Options& options, double bit_errors) {

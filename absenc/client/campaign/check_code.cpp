@@ -14,7 +14,7 @@ namespace {
 
 constexpr unsigned most_check_bits = 16;  // limit, because the dual code has 2^bits words
 
-struct Position final : FieldSink {
+struct ReadingSink final : FieldSink {
   void put(const FieldValue&) override {}
   void put_reading(const Reading& one) override { reading = one; }
   std::optional<Reading> reading;
@@ -26,15 +26,15 @@ bool is_of_others(Error error) { return error != Error::none && error != Error::
 
 bool has_position(const Unit& unit, const Options& options, const GoodReply& reply) {
   if (reply.reply.empty()) return false;
-  Position seen;
+  ReadingSink seen;
   const Frame frame{.bytes = reply.reply, .bits = reply.bits};
   return unit.decode(options, {.bytes = reply.request}, frame, seen) == Error::none && seen.reading.has_value();
 }
 
 /// Applies errors to a reply and returns the decoder's judgement.
-class CheckCode::Asked {
+class CheckCode::AlteredReply {
  public:
-  Asked(const Unit& unit, const Options& options, const GoodReply& good)
+  AlteredReply(const Unit& unit, const Options& options, const GoodReply& good)
       : unit_(unit), options_(options), good_(good), frame_(good.reply) {}
 
   void flip(std::size_t bit) { frame_[bit / 8] = static_cast<std::uint8_t>(frame_[bit / 8] ^ (0x80u >> (bit % 8))); }
@@ -63,7 +63,7 @@ std::optional<CheckCode> CheckCode::learn(const Unit& unit, const Options& optio
   CheckCode code;
   code.syndromes_.resize(bits);
   code.is_fixed_.resize(bits);
-  Asked asked(unit, options, replies.front());
+  AlteredReply asked(unit, options, replies.front());
   for (std::size_t bit = 0; bit < bits; ++bit) {
     asked.flip(bit);
     code.is_fixed_[bit] = is_of_others(asked.error());
@@ -77,7 +77,7 @@ std::optional<CheckCode> CheckCode::learn(const Unit& unit, const Options& optio
 
 // Searches from the last bit, because most checks are at the end; otherwise any independent bits serve. Bits before the
 // covered ones belong to other frames, or mark the beginning of the frame.
-bool CheckCode::find_check(Asked& asked) {
+bool CheckCode::find_check(AlteredReply& asked) {
   bool complete = false;
   bool before = false;
   for (std::size_t bit = bits(); bit-- > 0;) {
@@ -101,7 +101,7 @@ bool CheckCode::find_check(Asked& asked) {
 }
 
 // Returns the check bits that compensate an error of this bit; nothing if none do.
-std::optional<std::uint32_t> CheckCode::syndrome_of(Asked& asked, std::size_t bit) const {
+std::optional<std::uint32_t> CheckCode::syndrome_of(AlteredReply& asked, std::size_t bit) const {
   asked.restore();
   asked.flip(bit);
   std::uint32_t pattern = 0;
@@ -120,7 +120,7 @@ std::optional<std::uint32_t> CheckCode::syndrome_of(Asked& asked, std::size_t bi
 bool CheckCode::is_linear(const Unit& unit, const Options& options, std::span<const GoodReply> replies) const {
   sim::Random random(1);
   for (unsigned i = 0; i < 1000; ++i) {
-    Asked asked(unit, options, replies[random.below(replies.size())]);
+    AlteredReply asked(unit, options, replies[random.below(replies.size())]);
     std::uint32_t syndrome = 0;
     for (std::size_t bit = 0; bit < bits(); ++bit) {
       if (is_fixed_[bit] || random.below(2) == 0) continue;
@@ -197,7 +197,7 @@ Estimated CheckCode::taken(const Unit& unit, const Options& options, std::span<c
   std::vector<double> of_frame(replies.size());
   for (unsigned i = 0; i < samples; ++i) {
     const GoodReply& reply = replies[i % replies.size()];
-    Asked asked(unit, options, reply);
+    AlteredReply asked(unit, options, reply);
     std::uint32_t syndrome = 0;
     bool damaged = false;
     bool by_chance = false;
@@ -212,8 +212,8 @@ Estimated CheckCode::taken(const Unit& unit, const Options& options, std::span<c
     for (unsigned one = 0; one < check_.size(); ++one) {
       if (by_chance ? random.chance(bit_errors) : (syndrome >> one & 1) != 0) asked.flip(check_[one]);
     }
-    Position right;
-    Position seen;
+    ReadingSink right;
+    ReadingSink seen;
     if (asked.decode(seen) != Error::none) continue;
     asked.restore();
     if (asked.decode(right) != Error::none || sim::same_place(seen.reading, right.reading)) continue;

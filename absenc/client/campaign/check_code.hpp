@@ -57,9 +57,9 @@ class CheckCode {
 
  private:
   CheckCode() = default;
-  class Asked;
-  bool find_check(Asked& asked);
-  [[nodiscard]] std::optional<std::uint32_t> syndrome_of(Asked& asked, std::size_t bit) const;
+  class AlteredReply;
+  bool find_check(AlteredReply& asked);
+  [[nodiscard]] std::optional<std::uint32_t> syndrome_of(AlteredReply& asked, std::size_t bit) const;
   [[nodiscard]] bool is_check(std::size_t bit) const;
   [[nodiscard]] bool is_linear(const Unit& unit, const Options& options, std::span<const GoodReply> replies) const;
   [[nodiscard]] std::vector<std::uint32_t> dual_weights() const;

@@ -40,7 +40,7 @@ class MeasuredShaft final : public Shaft {
   [[nodiscard]] bool was_at(const Reading& reading) const { return find(reading) != nullptr; }
   /// Returns that position; for a wrong reading, the last measured one.
   [[nodiscard]] std::int64_t place_of(const Reading& reading) const {
-    const Sample* found = find(reading);
+    const ShaftSample* found = find(reading);
     for (std::size_t i = 0; found == nullptr && i < count(); ++i) {
       if (last(i).at <= reading.received || i + 1 == count()) found = &last(i);
     }
@@ -48,17 +48,17 @@ class MeasuredShaft final : public Shaft {
   }
 
  private:
-  struct Sample {
+  struct ShaftSample {
     Time at{};
     std::int64_t position = 0;
   };
 
   // Index 0 is the last measurement.
-  [[nodiscard]] const Sample& last(std::size_t number) const {
+  [[nodiscard]] const ShaftSample& last(std::size_t number) const {
     return samples_[(count_ - 1 - number) % samples_.size()];
   }
   [[nodiscard]] std::size_t count() const { return std::min(count_, samples_.size()); }
-  [[nodiscard]] const Sample* find(const Reading& reading) const {
+  [[nodiscard]] const ShaftSample* find(const Reading& reading) const {
     constexpr Time vague =
         2ms;  // uncertainty of the time of measurement: an encoder may measure more often than it is polled
     for (std::size_t i = 0; i < count(); ++i) {
@@ -70,7 +70,7 @@ class MeasuredShaft final : public Shaft {
 
   std::int64_t start_;
   double speed_;
-  mutable std::array<Sample, 16> samples_{};
+  mutable std::array<ShaftSample, 16> samples_{};
   mutable std::size_t count_ = 0;
 };
 
@@ -100,7 +100,7 @@ class LetThrough {
     const auto drawn = [&](double often) {
       return random.chance(often) ? static_cast<std::uint64_t>(away_[random.below(away_.size())]) : 0;
     };
-    for (const Comparison& one : comparisons_) {
+    for (const ShaftMovement& one : comparisons_) {
       for (unsigned i = 0; i < draws; ++i) {
         const std::uint64_t first = drawn(share);
         const std::uint64_t second = drawn(share);
@@ -113,7 +113,7 @@ class LetThrough {
   }
 
  private:
-  struct Comparison {
+  struct ShaftMovement {
     Time between;
     std::int64_t moved;
     std::int64_t before;
@@ -136,7 +136,7 @@ class LetThrough {
   unsigned bits_;
   std::uint64_t positions_ = 0;
   std::vector<std::int64_t> away_;
-  std::vector<Comparison> comparisons_;
+  std::vector<ShaftMovement> comparisons_;
 };
 
 double turns_a_second(const Resolution& resolution, double rpm) {

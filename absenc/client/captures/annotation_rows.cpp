@@ -16,19 +16,21 @@ enum At : std::size_t { at_begin, at_end, at_kind, at_request, at_reply, at_turn
 
 std::vector<Column> columns_of(const Unit& unit, const Options& options, bool has_time) {
   const bool is_linear = unit.resolution(options).unit_um > 0;
-  const Type wire = unit.link == LinkKind::can || unit.link == LinkKind::clocked ? Type::text : Type::bytes;
-  const Type time = has_time ? Type::real : Type::uint64;
+  const ColumnType wire =
+      unit.link == LinkKind::can || unit.link == LinkKind::clocked ? ColumnType::text : ColumnType::bytes;
+  const ColumnType time = has_time ? ColumnType::real : ColumnType::uint64;
   std::vector<Column> columns{
       {has_time ? "time_s" : "tick", has_time ? "s" : "", time, "when its first bit began"},
       {has_time ? "end_s" : "end_tick", has_time ? "s" : "", time, "when its last bit ended"},
-      {"kind", "", Type::text, "exchange, request, reply or noise"},
+      {"kind", "", ColumnType::text, "exchange, request, reply or noise"},
       {"request", "", wire, "what was asked"},
       {"reply", "", wire, "what came back"},
-      {"turnaround_us", "us", Type::real, "from the end of the request to the begin of its reply"},
-      {is_linear ? "position_mm" : "angle_deg", is_linear ? "mm" : "deg", Type::real, "where the encoder stands"}};
+      {"turnaround_us", "us", ColumnType::real, "from the end of the request to the begin of its reply"},
+      {is_linear ? "position_mm" : "angle_deg", is_linear ? "mm" : "deg", ColumnType::real,
+       "where the encoder stands"}};
   for (const FieldInfo& field : unit.fields) columns.push_back(column_of(field));
-  columns.push_back({"error", "", Type::text, "why the exchange is not good"});
-  columns.push_back({"message", "", Type::text, "the same in words, and what to try"});
+  columns.push_back({"error", "", ColumnType::text, "why the exchange is not good"});
+  columns.push_back({"message", "", ColumnType::text, "the same in words, and what to try"});
   return columns;
 }
 
@@ -39,7 +41,7 @@ AnnotationRows::AnnotationRows(const Unit& unit, const Options& options, const T
 
 Value AnnotationRows::wire(const Frame& frame) const {
   if (frame.empty()) return {};
-  if (columns_[at_request].type == Type::bytes) return ByteVector(frame.bytes.begin(), frame.bytes.end());
+  if (columns_[at_request].type == ColumnType::bytes) return ByteVector(frame.bytes.begin(), frame.bytes.end());
   return to_wire_text(unit_.link, frame);
 }
 

@@ -17,18 +17,18 @@
 
 namespace absenc::client {
 
-struct Decoded::Work {
+struct Decoded::Parts {
   /// A batch of rows, which one thread passes to the other.
   using Batch = std::vector<Row>;
   struct Stopped {};
 
-  Work(const std::string& path, std::string_view protocol, const DecodeChoices& choices)
+  Parts(const std::string& path, std::string_view protocol, const DecodeChoices& choices)
       : unit(require_unit(protocol)),
         run(unit, require_options(unit, choices.model, choices.options), {path, choices}),
         clock(run.ticks_per_second()),
         rows(unit, run.options(), clock) {}
 
-  ~Work() { stop(); }
+  ~Parts() { stop(); }
 
   void stop() {
     {
@@ -41,12 +41,12 @@ struct Decoded::Work {
   // ---- In the thread that decodes
 
   struct Sink final : capture::AnnotationSink {
-    Sink(Work& for_work, const Options& of_capture) : work(for_work), options(of_capture) {}
+    Sink(Parts& decoded, const Options& of_capture) : parts(decoded), options(of_capture) {}
     void put(const capture::Annotation& annotation) override {
-      work.rows.fill(annotation, options, work.next_row());
-      if (work.filled == batch_size) work.hand_over();
+      parts.rows.fill(annotation, options, parts.next_row());
+      if (parts.filled == batch_size) parts.hand_over();
     }
-    Work& work;
+    Parts& parts;
     const Options& options;
   };
 
@@ -139,21 +139,21 @@ struct Decoded::Work {
 };
 
 Decoded::Decoded(const std::string& path, std::string_view protocol, const DecodeChoices& choices)
-    : work_(std::make_unique<Work>(path, protocol, choices)) {}
+    : parts_(std::make_unique<Parts>(path, protocol, choices)) {}
 Decoded::Decoded(Decoded&&) noexcept = default;
 Decoded& Decoded::operator=(Decoded&&) noexcept = default;
 Decoded::~Decoded() = default;
 
 Decoded::Iterator Decoded::begin() {
-  work_->thread = std::jthread([work = work_.get()] { work->decode_all(); });
+  parts_->thread = std::jthread([parts = parts_.get()] { parts->decode_all(); });
   advance();
   return Iterator(*this);
 }
 
-void Decoded::cancel() { work_->stop(); }
-void Decoded::advance() { row_ = work_->take(); }
+void Decoded::cancel() { parts_->stop(); }
+void Decoded::advance() { row_ = parts_->take(); }
 
-std::span<const Column> Decoded::columns() const { return work_->rows.columns(); }
-const std::vector<std::string>& Decoded::notes() const { return work_->notes; }
+std::span<const Column> Decoded::columns() const { return parts_->rows.columns(); }
+const std::vector<std::string>& Decoded::notes() const { return parts_->notes; }
 
 }  // namespace absenc::client

@@ -17,7 +17,7 @@ namespace {
 using capture::Tick;
 
 // Counts good frames, unanswered requests, and frames with characters that have framing or parity errors.
-struct Frames final : capture::AnnotationSink {
+struct FrameCounts final : capture::AnnotationSink {
   void put(const capture::Annotation& annotation) override {
     if (annotation.remark == capture::Remark::damaged) ++damaged;
     if (annotation.remark == capture::Remark::unanswered && annotation.error == Error::timeout) ++unanswered;
@@ -32,13 +32,13 @@ struct Frames final : capture::AnnotationSink {
 
 // Returns whether the document's rate decodes requests of a host without replies while the other rate decodes almost
 // nothing. The few level changes of such requests fit many rates.
-bool reads_silence(const Frames& at_own, const Frames& at_other) {
+bool reads_silence(const FrameCounts& at_own, const FrameCounts& at_other) {
   return at_own.damaged == 0 && at_own.unanswered > at_other.unanswered &&
          at_other.good <= std::min(at_other.damaged, at_own.unanswered);
 }
 
 /// Collects good replies with their requests and ends when there are enough.
-struct Sample final : capture::AnnotationSink {
+struct GoodReplies final : capture::AnnotationSink {
   struct Enough {};
 
   void put(const capture::Annotation& annotation) override {
@@ -77,16 +77,16 @@ CaptureRun::Speed CaptureRun::likely_speed(const Lines& lines) const {
   Speed best{choices_.how.baud, choices_.how.parity.value_or(line_.parity)};
   if (choices_.path == "-") return best;
   const auto frames_at = [&](const Speed& speed) {
-    Frames frames;
+    FrameCounts frames;
     const auto reader = open_capture(choices_);
     static_cast<void>(decode_lines(*reader, lines, speed, enough_characters, frames, [](Tick) {}));
     return frames;
   };
   const bool rate_is_open = choices_.how.baud == 0 && line_.rate != 0;
   if (!rate_is_open && choices_.how.parity) return best;
-  Frames at_best = frames_at(best);
+  FrameCounts at_best = frames_at(best);
   const auto try_at = [&](const Speed& speed, std::uint64_t handicap) {
-    const Frames frames = frames_at(speed);
+    const FrameCounts frames = frames_at(speed);
     const bool is_own = speed.baud == line_.rate && speed.parity == line_.parity;
     const bool is_better = frames.good >= std::max<std::uint64_t>(1, at_best.good + handicap);
     if (!is_better && !(is_own && reads_silence(frames, at_best))) return;
@@ -165,10 +165,10 @@ std::size_t CaptureRun::likely_pause(std::span<const capture::PauseReading> read
 
 const Options& CaptureRun::settle_options() {
   if (unit_.probe == nullptr || choices_.path == "-") return options_;
-  Sample sample;
+  GoodReplies sample;
   try {
     static_cast<void>(CaptureRun(unit_, options_, choices_).run(sample, [](Tick) {}));
-  } catch (const Sample::Enough&) {
+  } catch (const GoodReplies::Enough&) {
   }
   const std::vector<Capture> captures = sample.captures();
   Possible possible;

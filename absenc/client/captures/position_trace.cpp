@@ -10,11 +10,11 @@ namespace absenc::client {
 
 void PositionTrace::halve() {
   for (std::size_t i = 0; i < columns / 2; ++i) {
-    const Column& a = columns_[2 * i];
-    const Column& b = columns_[2 * i + 1];
+    const Extent& a = columns_[2 * i];
+    const Extent& b = columns_[2 * i + 1];
     columns_[i] = {std::min(a.least, b.least), std::max(a.most, b.most)};
   }
-  std::fill(columns_.begin() + columns / 2, columns_.end(), Column{});
+  std::fill(columns_.begin() + columns / 2, columns_.end(), Extent{});
   ++shift_;
 }
 
@@ -33,7 +33,7 @@ std::string PositionTrace::plot() const {
   constexpr int rows = 10;
   std::uint64_t least = UINT64_MAX;
   std::uint64_t most = 0;
-  for (const Column& column : columns_) {
+  for (const Extent& column : columns_) {
     least = std::min(least, column.least);
     most = std::max(most, column.most);
   }

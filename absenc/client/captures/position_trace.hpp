@@ -32,7 +32,7 @@ class PositionTrace {
     last_ = std::max(tick, first_);
     const std::uint64_t since = tick - std::min(tick, first_);
     while (since >> shift_ >= columns) halve();
-    Column& column = columns_[static_cast<std::size_t>(since >> shift_)];
+    Extent& column = columns_[static_cast<std::size_t>(since >> shift_)];
     const auto turns = static_cast<std::uint64_t>(turns_ ? reading.turns() : 0);
     const std::uint64_t counts = (reading.singleturn | turns << bits_) + offset();
     column.least = std::min(column.least, counts);
@@ -47,7 +47,7 @@ class PositionTrace {
   [[nodiscard]] std::uint64_t last() const { return last_; }
 
  private:
-  struct Column {
+  struct Extent {
     std::uint64_t least = UINT64_MAX;
     std::uint64_t most = 0;
     [[nodiscard]] bool empty() const { return least > most; }
@@ -59,7 +59,7 @@ class PositionTrace {
   [[nodiscard]] double value(std::uint64_t counts) const;
   [[nodiscard]] std::string_view unit() const;
 
-  std::array<Column, columns> columns_{};
+  std::array<Extent, columns> columns_{};
   unsigned shift_ = 0;  // each column covers 2^shift_ ticks
   std::uint64_t first_ = 0;
   std::uint64_t last_ = 0;

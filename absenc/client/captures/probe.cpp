@@ -14,7 +14,7 @@ namespace absenc::client {
 
 namespace {
 
-struct Evidence final : EvidenceSink {
+struct EvidenceList final : EvidenceSink {
   void put(const OptionEvidence& evidence) override { all.push_back(evidence); }
   std::vector<OptionEvidence> all;
 };
@@ -74,7 +74,7 @@ Probed probe(std::string_view protocol, std::string_view model, std::span<const 
   }
   Options options = require_options(unit, model, settings);
   const Captures captures(unit, requests, replies);
-  Evidence evidence;
+  EvidenceList evidence;
   Probed probed{.unit = &unit, .explained = unit.probe(options, captures.all, evidence)};
   probed.evidence = std::move(evidence.all);
   if (probed.explained) probed.settled = settled(unit, options, probed.evidence);

@@ -36,7 +36,7 @@ class SequenceWatch final : public capture::AnnotationSink {
   static constexpr std::uint64_t most_between = 100;
   static constexpr std::int64_t life_counter_end = 64;
 
-  struct Seen {
+  struct LastCounter {
     std::int64_t value;
     std::uint64_t at;
   };
@@ -51,9 +51,9 @@ class SequenceWatch final : public capture::AnnotationSink {
     for (const FieldValue& field : annotation.contents.fields) {
       const bool is_life_counter = field.info->role == Role::life_counter;
       if (!is_life_counter && (field.info->role != Role::sequence || std::exchange(has_sequence, true))) continue;
-      const Seen now{field.number, count_};
+      const LastCounter now{field.number, count_};
       const auto [last, is_first] = last_.try_emplace({address, is_life_counter ? field.info : nullptr}, now);
-      const Seen before = std::exchange(last->second, now);
+      const LastCounter before = std::exchange(last->second, now);
       if (is_first) continue;
       const bool stands = before.value == now.value && now.at - before.at < (is_life_counter ? 64 : most_between);
       const bool follows = !is_life_counter || now.value == (before.value + 1) % life_counter_end;
@@ -64,7 +64,7 @@ class SequenceWatch final : public capture::AnnotationSink {
 
   capture::AnnotationSink& sink_;
   // Last values by the encoder's address; those of life counters also by their field.
-  std::map<std::pair<std::int64_t, const FieldInfo*>, Seen> last_;
+  std::map<std::pair<std::int64_t, const FieldInfo*>, LastCounter> last_;
   std::uint64_t count_ = 0;
   std::uint64_t damaged_at_ = 0;
 };

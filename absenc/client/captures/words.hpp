@@ -22,7 +22,7 @@ class TickClock {
   [[nodiscard]] Time time(capture::Tick ticks) const;
   /// Returns seconds with the digits that a tick needs, or the number of the tick.
   [[nodiscard]] std::string text(capture::Tick tick) const;
-  /// Returns the format of seconds, for `Column::Look`.
+  /// Returns the format of seconds, for `Column::Presentation`.
   [[nodiscard]] std::string format() const;
 
  private:

@@ -26,7 +26,7 @@ constexpr std::uint32_t beside = 4;           // bytes before the written one th
 constexpr unsigned position_tolerance = 512;  // positions are equal within this fraction of a turn
 
 /// Thrown when the encoder refuses a command or its reply is bad: the clause is broken.
-struct Refused {
+struct ClauseBroken {
   std::string evidence;
 };
 
@@ -34,7 +34,7 @@ std::int64_t number_of(const Answer& answer, std::string_view field) {
   const Value& value = answer[field];
   if (const auto* number = std::get_if<std::int64_t>(&value)) return *number;
   if (const auto* counts = std::get_if<std::uint64_t>(&value)) return static_cast<std::int64_t>(*counts);
-  throw Refused{fmt::format("{} was not told", field)};
+  throw ClauseBroken{fmt::format("{} was not told", field)};
 }
 
 struct BusySink final : FieldSink {
@@ -53,7 +53,7 @@ bool is_near(const Reading& reading, std::uint64_t wanted) {
   return std::min(away, turn - away) <= turn / position_tolerance;
 }
 
-void Changes::test(const Clause& clause, ClauseResult& result) {
+void ChangeTester::test(const Clause& clause, ClauseResult& result) {
   try {
     test_one(clause, result);
   } catch (...) {
@@ -64,7 +64,7 @@ void Changes::test(const Clause& clause, ClauseResult& result) {
   if (interrupted_) throw os::Interrupted{};
 }
 
-void Changes::test_one(const Clause& clause, ClauseResult& result) {
+void ChangeTester::test_one(const Clause& clause, ClauseResult& result) {
   try {
     switch (clause.demand) {
       case Demand::byte_written:
@@ -93,7 +93,7 @@ void Changes::test_one(const Clause& clause, ClauseResult& result) {
       default:
         return;
     }
-  } catch (const Refused& refused) {
+  } catch (const ClauseBroken& refused) {
     conclude(result, false, refused.evidence);
   } catch (const os::Failure& failure) {
     if (failure.kind() != os::Failure::Kind::unsupported) throw;
@@ -103,7 +103,7 @@ void Changes::test_one(const Clause& clause, ClauseResult& result) {
 
 // ---- The memory
 
-void Changes::test_byte(const Clause& clause, ClauseResult& result) {
+void ChangeTester::test_byte(const Clause& clause, ClauseResult& result) {
   if (!clause.setting.empty()) save_setting(clause);  // reading the memory changes this setting
   const std::int64_t written = save_byte(clause.page, clause.address) ^ 0xFF;
   const Saved& byte = saved_.back();
@@ -113,7 +113,7 @@ void Changes::test_byte(const Clause& clause, ClauseResult& result) {
            fmt::format("0x{:02X} was there, 0x{:02X} was written, 0x{:02X} is read", byte.value, written, now));
 }
 
-void Changes::test_bytes_beside(const Clause& clause, ClauseResult& result) {
+void ChangeTester::test_bytes_beside(const Clause& clause, ClauseResult& result) {
   if (!clause.setting.empty()) save_setting(clause);
   const std::size_t settings = saved_.size();
   if (clause.demand == Demand::page_alone) {
@@ -136,7 +136,7 @@ void Changes::test_bytes_beside(const Clause& clause, ClauseResult& result) {
 }
 
 // Sends single requests, because the commands wait until the memory is ready.
-void Changes::test_busy(const Clause& clause, ClauseResult& result) {
+void ChangeTester::test_busy(const Clause& clause, ClauseResult& result) {
   const std::int64_t written = save_byte(clause.page, clause.address) ^ 0xFF;
   const Command& reader = *find_command(unit_, Verb::memory_read);
   const Command& writer = *find_command(unit_, Verb::memory_write);
@@ -161,7 +161,7 @@ void Changes::test_busy(const Clause& clause, ClauseResult& result) {
 }
 
 // Afterwards the test selects the page of power-on again, by reading a byte of it.
-void Changes::test_closed(const Clause& clause, ClauseResult& result) {
+void ChangeTester::test_closed(const Clause& clause, ClauseResult& result) {
   save({.look = [this] { return std::int64_t{read_byte(0, 0)}; }, .write = [](std::int64_t) {}});
   static_cast<void>(read_byte(clause.page, clause.address));
   const SingleExchange sent = line_.send(parse_wire_text(unit_.link, "a request", clause.ask.wire).bytes);
@@ -173,7 +173,7 @@ void Changes::test_closed(const Clause& clause, ClauseResult& result) {
 
 // ---- Settings
 
-void Changes::test_setting(const Clause& clause, ClauseResult& result) {
+void ChangeTester::test_setting(const Clause& clause, ClauseResult& result) {
   const std::int64_t before = save_setting(clause);
   const std::int64_t wanted = before == clause.value ? clause.other : clause.value;
   saved_.back().write(wanted);
@@ -181,7 +181,7 @@ void Changes::test_setting(const Clause& clause, ClauseResult& result) {
   conclude(result, now == wanted, fmt::format("it was {}, was set to {}, reads as {}", before, wanted, now));
 }
 
-void Changes::test_offset(const Clause& clause, ClauseResult& result) {
+void ChangeTester::test_offset(const Clause& clause, ClauseResult& result) {
   save_setting(clause);
   const Reading before = read();
   const Command& zero = *find_command(unit_, Verb::zero);
@@ -194,7 +194,7 @@ void Changes::test_offset(const Clause& clause, ClauseResult& result) {
 }
 
 // The direction shows in the position only, which is unchanged or mirrored.
-void Changes::test_direction(const Clause& clause, ClauseResult& result) {
+void ChangeTester::test_direction(const Clause& clause, ClauseResult& result) {
   const Reading before = read();
   const std::uint64_t turn = std::uint64_t{1} << before.singleturn_bits;
   const std::uint64_t mirror = (turn - before.singleturn) & (turn - 1);
@@ -205,7 +205,7 @@ void Changes::test_direction(const Clause& clause, ClauseResult& result) {
     const Reading now = read();
     if (is_near(now, mirror)) return std::int64_t{1};
     if (is_near(now, before.singleturn)) return std::int64_t{0};
-    throw Refused{
+    throw ClauseBroken{
         fmt::format("the position is {}, neither {} as before nor {}", now.singleturn, before.singleturn, mirror)};
   };
   const auto set = [this, &setter](std::int64_t value) {
@@ -232,7 +232,7 @@ void Changes::test_direction(const Clause& clause, ClauseResult& result) {
       fmt::format("with {} the position is {}, with {} {}", clause.value, words(first), clause.other, words(second)));
 }
 
-void Changes::test_pace(const Clause& clause, ClauseResult& result) {
+void ChangeTester::test_pace(const Clause& clause, ClauseResult& result) {
   constexpr Time heard_for = std::chrono::milliseconds(2200);  // long enough for two frames at one frame per second
   const Command& start = *find_command(unit_, clause.command);
   const Command& stop = *find_command(unit_, clause.stop);
@@ -258,13 +258,13 @@ void Changes::test_pace(const Clause& clause, ClauseResult& result) {
 
 // Returns whether the test may erase `what`. Without a value to lose the command is sent anyway: it may be refused, or
 // do harm.
-bool Changes::may_erase(std::string_view what, ClauseResult& result) const {
+bool ChangeTester::may_erase(std::string_view what, ClauseResult& result) const {
   if (what.empty() || resets_) return true;
   result.evidence = fmt::format("there is {}, which nothing could bring back: --resets gives it up", what);
   return false;
 }
 
-void Changes::test_zero(ClauseResult& result) {
+void ChangeTester::test_zero(ClauseResult& result) {
   const Command& zero = *find_command(unit_, Verb::zero);
   const Reading before = read();
   const bool differs = !is_near(before, 0);
@@ -277,7 +277,7 @@ void Changes::test_zero(ClauseResult& result) {
   if (differs) conclude(result, true, seen);
 }
 
-void Changes::test_reset(const Clause& clause, ClauseResult& result) {
+void ChangeTester::test_reset(const Clause& clause, ClauseResult& result) {
   const bool turns = clause.verb == Verb::reset_multiturn;
   const auto demanded = static_cast<std::uint32_t>(clause.value);
   const Reading before = read();
@@ -301,7 +301,7 @@ void Changes::test_reset(const Clause& clause, ClauseResult& result) {
   if (differs) conclude(result, true, std::move(seen));
 }
 
-void Changes::test_restart(const Clause& clause, ClauseResult& result) {
+void ChangeTester::test_restart(const Clause& clause, ClauseResult& result) {
   const Reading before = read();
   const bool turns = before.multiturn_bits != 0 && before.multiturn != 0;
   if (!may_erase(turns ? fmt::format("a count of {} turns", before.turns()) : "", result)) return;
@@ -317,13 +317,13 @@ void Changes::test_restart(const Clause& clause, ClauseResult& result) {
 
 // ---- Saved values
 
-std::int64_t Changes::save(Saved one) {
+std::int64_t ChangeTester::save(Saved one) {
   one.value = one.look();
   saved_.push_back(std::move(one));
   return saved_.back().value;
 }
 
-std::int64_t Changes::save_byte(std::uint32_t page, std::uint32_t address) {
+std::int64_t ChangeTester::save_byte(std::uint32_t page, std::uint32_t address) {
   const Command& setter = *find_command(unit_, Verb::memory_write);
   const auto write = [this, &setter, page, address](std::int64_t value) {
     const auto arguments = role_arguments(setter, {{Role::page, page}, {Role::address, address}, {Role::value, value}});
@@ -337,7 +337,7 @@ std::int64_t Changes::save_byte(std::uint32_t page, std::uint32_t address) {
   return value;
 }
 
-std::int64_t Changes::save_setting(const Clause& clause) {
+std::int64_t ChangeTester::save_setting(const Clause& clause) {
   const Setting setting = require_setting(unit_, clause.setting);
   const auto look = [this, setting, field = clause.field] {
     const CommandResult ran = run(*setting.getter, complete_arguments(*setting.getter, {}));
@@ -359,7 +359,7 @@ std::int64_t Changes::save_setting(const Clause& clause) {
   return value;
 }
 
-void Changes::put_back() {
+void ChangeTester::put_back() {
   while (!saved_.empty()) {
     const Saved one = std::move(saved_.back());
     saved_.pop_back();
@@ -368,7 +368,7 @@ void Changes::put_back() {
 }
 
 // Restores one value. Delays an interrupt until all values are restored, because the encoder would stay changed.
-bool Changes::put_back(const Saved& one) {
+bool ChangeTester::put_back(const Saved& one) {
   for (unsigned i = 0; i < tries; ++i) {
     try {
       line_.wait_for(settling);
@@ -379,7 +379,7 @@ bool Changes::put_back(const Saved& one) {
       interrupted_ = true;
     } catch (const os::Ended&) {
       interrupted_ = true;
-    } catch (const Refused&) {  // the encoder refused: try again
+    } catch (const ClauseBroken&) {  // the encoder refused: try again
     } catch (const std::exception&) {
     }
   }
@@ -388,14 +388,14 @@ bool Changes::put_back(const Saved& one) {
 
 // ---- The line
 
-CommandResult Changes::run(const Command& command, Arguments arguments) const {
+CommandResult ChangeTester::run(const Command& command, Arguments arguments) const {
   CommandResult ran = line_.run(command, arguments);
   if (ran.error == Error::none) return ran;
-  throw Refused{fmt::format("{}: {} {}", command.name, text_of(ran.error).name, ran.detail)};
+  throw ClauseBroken{fmt::format("{}: {} {}", command.name, text_of(ran.error).name, ran.detail)};
 }
 
 // Returns the decoded reply; nothing if it is not a good one.
-std::optional<BusyReply> Changes::busy_reply(const SingleExchange& sent) const {
+std::optional<BusyReply> ChangeTester::busy_reply(const SingleExchange& sent) const {
   if (sent.reply.frame().empty()) return std::nullopt;
   BusySink sink;
   const Error error = unit_.decode(line_.options(), sent.request.frame(), sent.reply.frame(), sink);
@@ -403,25 +403,25 @@ std::optional<BusyReply> Changes::busy_reply(const SingleExchange& sent) const {
   return error == Error::none || error == Error::busy ? std::optional(sink.reply) : std::nullopt;
 }
 
-SingleExchange Changes::send(const Command& command, Arguments arguments) const {
+SingleExchange ChangeTester::send(const Command& command, Arguments arguments) const {
   std::vector<std::uint8_t> request(longest_request);
   const auto size = unit_.encode(line_.options(), command, arguments, request);
-  if (!size) throw Refused{fmt::format("{}: {}", command.name, text_of(size.error()).name)};
+  if (!size) throw ClauseBroken{fmt::format("{}: {}", command.name, text_of(size.error()).name)};
   request.resize(*size);
   return line_.send(request);
 }
 
-Reading Changes::read() const {
+Reading ChangeTester::read() const {
   const CommandResult ran = run(*find_command(unit_, Verb::read), {});
-  if (!ran.reading) throw Refused{"no position was told"};
+  if (!ran.reading) throw ClauseBroken{"no position was told"};
   return *ran.reading;
 }
 
-std::uint8_t Changes::read_byte(std::uint32_t page, std::uint32_t address) const {
+std::uint8_t ChangeTester::read_byte(std::uint32_t page, std::uint32_t address) const {
   const Command& getter = *find_command(unit_, Verb::memory_read);
   const CommandResult ran =
       run(getter, role_arguments(getter, {{Role::page, page}, {Role::address, address}, {Role::count, 1}}));
-  if (ran.data.empty()) throw Refused{"no byte was told"};
+  if (ran.data.empty()) throw ClauseBroken{"no byte was told"};
   return ran.data.front();
 }
 

@@ -70,11 +70,11 @@ struct ChangesLine {
 /// Returns whether the position equals `wanted` within the noise of a shaft at rest.
 [[nodiscard]] bool is_near(const Reading& reading, std::uint64_t wanted);
 
-class Changes {
+class ChangeTester {
  public:
   /// `name` is the encoder's name in commands for the user. `resets` permits tests that erase values which cannot be
   /// restored.
-  Changes(const Unit& unit, std::string_view name, ChangesLine line, bool resets)
+  ChangeTester(const Unit& unit, std::string_view name, ChangesLine line, bool resets)
       : unit_(unit), name_(name), line_(std::move(line)), resets_(resets) {}
 
   /// Tests one clause and restores the changed values, also before an exception is passed on.

@@ -29,7 +29,7 @@ template <class Item>
 void test_all(const EncoderAddress& address, Port<Item>& port, Time latency, const ConformChoices& choices,
               std::string_view name, Conformance& conformance) {
   Tester<Item> tester(address, port, latency, choices);
-  Changes changes(*address.unit, name, tester.line(), choices.resets);
+  ChangeTester changes(*address.unit, name, tester.line(), choices.resets);
   try {
     tester.read();
     for (const Clause& clause : clauses_of(*address.unit)) {

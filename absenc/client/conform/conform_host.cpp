@@ -19,7 +19,7 @@ class EmulationStage final : public HostStage {
  public:
   explicit EmulationStage(Emulation& encoder) : encoder_(encoder) {}
 
-  HostTrial::Seen seen() override {
+  HostTrial::TrialCounts seen() override {
     return {.answered = encoder_.answer_count(),
             .missing = encoder_.fault_count(name_of(HostTrial::Fault::silence)),
             .damaged = encoder_.fault_count(name_of(HostTrial::Fault::damage)),
@@ -56,7 +56,7 @@ Conformance judge_host(const Unit& unit, HostStage& stage, const ConformHostChoi
   std::uint64_t sent = 0;
   Time heard_at = os::now();
   while (!trial.over() && !(choices.over && choices.over())) {
-    HostTrial::Seen seen = stage.seen();
+    HostTrial::TrialCounts seen = stage.seen();
     const std::uint64_t now_sent = seen.answered + seen.requests.good + seen.requests.bad;
     // The silence counts only after the first request of the host.
     if (now_sent != sent || sent == 0) heard_at = os::now();

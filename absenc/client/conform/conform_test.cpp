@@ -21,7 +21,7 @@ using namespace std::chrono_literals;
 using ByteList = std::vector<std::uint8_t>;
 using FrameList = std::vector<CanFrame>;
 template <class Item>
-using Changes = std::vector<ReplyChange<Item>>;
+using ReplyChanges = std::vector<ReplyChange<Item>>;
 
 std::size_t bits_of(const ByteList& items) { return items.size() * 8; }
 std::size_t bits_of(const FrameList& items) { return items.empty() ? 0 : 64; }
@@ -57,7 +57,7 @@ void flip_and_repair(Mutant<Item>& mutant, const EncoderAddress& address, std::s
 /// Adds mutants that change the reply to one request, to all from the third on (as a host may repeat its request), and
 /// to all from the eighth on (as some hosts use the first requests to detect the echo).
 template <class Item>
-void add_reply_mutants(Changes<Item>& all, const std::function<void(Mutant<Item>&)>& change) {
+void add_reply_mutants(ReplyChanges<Item>& all, const std::function<void(Mutant<Item>&)>& change) {
   all.push_back({.change = change});
   for (const unsigned from : {3U, 8U}) {
     all.push_back({.change = [change, from](Mutant<Item>& m) {
@@ -68,13 +68,13 @@ void add_reply_mutants(Changes<Item>& all, const std::function<void(Mutant<Item>
   }
 }
 template <class Item>
-void add_reply_mutants(Changes<Item>& all, void (*change_reply)(std::vector<Item>&, Step<Item>&)) {
+void add_reply_mutants(ReplyChanges<Item>& all, void (*change_reply)(std::vector<Item>&, Step<Item>&)) {
   add_reply_mutants<Item>(all, [change_reply](Mutant<Item>& m) { m.change_reply = change_reply; });
 }
 
 /// Adds mutants that repeat their first reply, as a whole or with its first bits before the rest of a later reply.
 template <class Item>
-void add_stale_mutants(Changes<Item>& all, const Clause& clause) {
+void add_stale_mutants(ReplyChanges<Item>& all, const Clause& clause) {
   if constexpr (std::is_same_v<Item, std::uint8_t>) {
     const auto add = [&](std::size_t kept_bits) {
       add_reply_mutants<Item>(all, [kept_bits](Mutant<Item>& m) {
@@ -98,9 +98,9 @@ void add_stale_mutants(Changes<Item>& all, const Clause& clause) {
 }
 
 template <class Item>
-Changes<Item> frame_mutants(const EncoderAddress& address, const Clause& clause) {
+ReplyChanges<Item> frame_mutants(const EncoderAddress& address, const Clause& clause) {
   using List = std::vector<Item>;
-  Changes<Item> all;
+  ReplyChanges<Item> all;
   add_stale_mutants(all, clause);
   if constexpr (std::is_same_v<Item, CanFrame>) {
     add_reply_mutants<Item>(all, [](List& reply_items, Step<Item>&) { reply_items.front().extended = true; });
@@ -143,8 +143,8 @@ Changes<Item> frame_mutants(const EncoderAddress& address, const Clause& clause)
 /// Returns mutants with a defect inside the encoder, at both ends of its range, and mutants whose line always flips a
 /// bit.
 template <class Item>
-Changes<Item> command_mutants(const EncoderAddress& address) {
-  Changes<Item> all;
+ReplyChanges<Item> command_mutants(const EncoderAddress& address) {
+  ReplyChanges<Item> all;
   for (const Condition& one : address.unit->conditions) {
     for (const std::int64_t value : {one.maximum, one.minimum, one.normal + 5}) {
       if (value == one.normal || value < one.minimum || value > one.maximum) continue;
@@ -167,10 +167,10 @@ Changes<Item> command_mutants(const EncoderAddress& address) {
 /// Returns mutants that treat requests other than the first one wrongly: like the first, not at all, or with another
 /// reply.
 template <class Item>
-Changes<Item> special_request_mutants(const Clause& clause) {
+ReplyChanges<Item> special_request_mutants(const Clause& clause) {
   using M = Mutant<Item>;
   using List = std::vector<Item>;
-  Changes<Item> all;
+  ReplyChanges<Item> all;
   const auto hears_good = [](M& m) {
     m.change_request = [&m](List& last_request) {
       if (m.is_special) last_request = m.good;
@@ -233,9 +233,9 @@ Changes<Item> special_request_mutants(const Clause& clause) {
 }
 
 template <class Item>
-Changes<Item> mutants_of(const EncoderAddress& address, const Clause& clause) {
+ReplyChanges<Item> mutants_of(const EncoderAddress& address, const Clause& clause) {
   using List = std::vector<Item>;
-  Changes<Item> all;
+  ReplyChanges<Item> all;
   switch (clause.demand) {
     case Demand::answered:
     case Demand::streamed:

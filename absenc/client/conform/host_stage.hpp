@@ -14,7 +14,7 @@ namespace absenc::client {
 
 class HostStage {
  public:
-  virtual HostTrial::Seen seen() = 0;
+  virtual HostTrial::TrialCounts seen() = 0;
   virtual void set_fault(HostTrial::Fault fault) = 0;  // replaces the previous fault
   virtual void play(Time until) = 0;                   // serves the host until this time; throws os::Interrupted
 

@@ -32,7 +32,7 @@ bool HostTrial::is_calm() const {
          (phase_ == Phase::last && counted() - phase_begin_ >= requests_to_continue);
 }
 
-HostTrial::Fault HostTrial::look(Seen seen) {
+HostTrial::Fault HostTrial::look(TrialCounts seen) {
   if (is_calm()) {
     for (const RuleCount& now : seen.rules) {
       const RuleCount& before = count_of(seen_.rules, now.rule);

@@ -22,7 +22,7 @@ class HostTrial {
   HostTrial(const Unit& unit, std::size_t answers) : unit_(unit), answers_(answers) {}
 
   /// Counts since the start.
-  struct Seen {
+  struct TrialCounts {
     std::uint64_t answered = 0;  // requests that the encoder answered, including replies that a fault suppressed
     std::uint64_t missing = 0;   // replies that the fault `silence` suppressed
     std::uint64_t damaged = 0;   // replies that the fault `damage` changed
@@ -30,7 +30,7 @@ class HostTrial {
     std::vector<RuleCount> rules{};
   };
   /// Takes new counts and returns the fault to inject from now on.
-  Fault look(Seen seen);
+  Fault look(TrialCounts seen);
   [[nodiscard]] bool over() const { return phase_ == Phase::over; }
 
   /// Judges each clause by the latest counts.
@@ -55,7 +55,7 @@ class HostTrial {
   Phase phase_ = Phase::good;
   std::uint64_t phase_begin_ = 0;  // value of `counted` when the phase began
   std::uint64_t refused_ = 0;      // requests received while the fault damages every request byte
-  Seen seen_{};
+  TrialCounts seen_{};
   // rule counts of the times with good replies, in which no earlier fault can have an effect
   std::vector<RuleCount> calm_{};
 };

@@ -110,13 +110,13 @@ class Tester {
                       .heard = !runner_.last().reply().empty()};
     if (ran.error != Error::none) return ran;
     if (const Reading* reading = ended->reading()) ran.reading = *reading;
-    Told told(ran);
+    CommandSink told(ran);
     ended->report(told);
     ran.answer = std::move(told.sink.answer);
     return ran;
   }
-  struct Told final : FieldSink {
-    explicit Told(CommandResult& into) : ran(into) {}
+  struct CommandSink final : FieldSink {
+    explicit CommandSink(CommandResult& into) : ran(into) {}
     void put(const FieldValue& field) override {
       if (field.info->role == Role::data) ran.data.assign(field.bytes.begin(), field.bytes.end());
       if (field.info->role == Role::value && ran.data.empty()) ran.data = {static_cast<std::uint8_t>(field.number)};
@@ -330,7 +330,7 @@ class Tester {
     return unit_.check(options_, request.frame(), one.exchange.reply.frame());
   }
 
-  enum class Seen : std::uint8_t { as_demanded, contrary, unclear };
+  enum class Compliance : std::uint8_t { as_demanded, contrary, unclear };
 
   void test_reaction(const Clause& clause, ClauseResult& result) {
     const bool slow = clause.ask.permille != 0;
@@ -350,13 +350,13 @@ class Tester {
       result.evidence = "with these options nothing is asked";
       if (!one) return;
       last = exchange_text(unit_.link, one->exchange.request.frame(), one->exchange.reply.frame());
-      const Seen seen = reaction_of(clause, *one);
+      const Compliance seen = reaction_of(clause, *one);
       // The port may return to the usual rate too late for the reply.
-      const bool missed = slow && (is_silent(*one) || seen == Seen::unclear);
+      const bool missed = slow && (is_silent(*one) || seen == Compliance::unclear);
       result.evidence = last + ": a port that changes its rate may be too late to hear the reply";
       if (missed) return;
-      if (seen == Seen::contrary) return conclude(result, false, std::move(last));
-      as_demanded += seen == Seen::as_demanded ? 1 : 0;
+      if (seen == Compliance::contrary) return conclude(result, false, std::move(last));
+      as_demanded += seen == Compliance::as_demanded ? 1 : 0;
       result.evidence = last + ", but the encoder does not answer any more";
       if (!answers()) return;
     }
@@ -382,16 +382,16 @@ class Tester {
     if constexpr (is_can) return {ask.wire.begin(), ask.wire.end()};
     return parse_wire_text(unit_.link, "a request", ask.wire).bytes;
   }
-  [[nodiscard]] Seen reaction_of(const Clause& clause, const Attempted& one) const {
+  [[nodiscard]] Compliance reaction_of(const Clause& clause, const Attempted& one) const {
     if (is_silent(one)) {
       const bool silent = clause.reaction == Reaction::silent || clause.reaction == Reaction::refusal_or_silent;
-      return silent ? Seen::as_demanded : Seen::contrary;
+      return silent ? Compliance::as_demanded : Compliance::contrary;
     }
-    if (clause.reaction == Reaction::silent) return Seen::contrary;
+    if (clause.reaction == Reaction::silent) return Compliance::contrary;
     const Error error = reply_error(unit_, options_, clause.as, one.exchange);
     const Error wanted = clause.reaction == Reaction::reply ? Error::none : Error::request_rejected;
-    if (error == wanted) return Seen::as_demanded;
-    return error == Error::bad_checksum || error == Error::wrong_length ? Seen::unclear : Seen::contrary;
+    if (error == wanted) return Compliance::as_demanded;
+    return error == Error::bad_checksum || error == Error::wrong_length ? Compliance::unclear : Compliance::contrary;
   }
 
   const Unit& unit_;

@@ -190,7 +190,7 @@ class Host {
     }
     return std::make_shared<sim::SimPort<Item>>(unit_.link, line, watch_);
   }
-  [[nodiscard]] HostTrial::Seen seen() const {
+  [[nodiscard]] HostTrial::TrialCounts seen() const {
     return {.answered = answered(),
             .missing = count_of(device_, HostTrial::Fault::silence),
             .damaged = count_of(device_, HostTrial::Fault::damage),

@@ -32,13 +32,13 @@ constexpr Time addresses_limit = std::chrono::seconds(4);
 constexpr Time identify_limit = std::chrono::seconds(10);
 
 bool is_serial(const EncoderAddress& address) {
-  return address.place == Place::serial || address.place == Place::slcan;
+  return address.port_kind == PortKind::serial || address.port_kind == PortKind::slcan;
 }
 
 // Where `identify` can look for others.
 bool may_be_another(const EncoderAddress& address) {
   const bool characters = address.unit->link == LinkKind::half_duplex || address.unit->link == LinkKind::full_duplex;
-  return characters && (address.place == Place::serial || address.place == Place::tcp);
+  return characters && (address.port_kind == PortKind::serial || address.port_kind == PortKind::tcp);
 }
 
 std::size_t count_good(const std::vector<Attempted>& attempts) {
@@ -73,7 +73,7 @@ class Doctor {
       throw UsageError(fmt::format("{} has no command that reads the position", address.unit->id));
     }
     seen_.limit = speed_limit(address);
-    seen_.place = address.place;
+    seen_.place = address.port_kind;
     seen_.echo = seen_.echo_said = address.echo;
     seen_.latency = address.latency;
   }
@@ -125,7 +125,7 @@ class Doctor {
       tell("reading");
       try {
         std::optional<os::WakeupWatch> watch;
-        if (surroundings_.on_the_clock && address_.place != Place::sim) watch.emplace();
+        if (surroundings_.on_the_clock && address_.port_kind != PortKind::sim) watch.emplace();
         examiner.read(*read_, choices_.readings, choices_.limit, seen_.readings);
         if (watch) seen_.woken_late = watch->latest();
         if (any_good() && choices_.turning > Time{}) {
@@ -145,7 +145,8 @@ class Doctor {
     if (none_good() && !seen_.never_silent && seen_.lateness == Time{} && !disturbs) try_others<Item>();
     if constexpr (std::is_same_v<Item, std::uint8_t>) {
       if (may_be_another(address_) && seen_.trials.empty() && is_unexplained()) identify_others();
-      if (address_.place != Place::sim && seen_.trials.empty() && !any_heard() && !seen_.refusal) ask_once_more();
+      if (address_.port_kind != PortKind::sim && seen_.trials.empty() && !any_heard() && !seen_.refusal)
+        ask_once_more();
     }
   }
 
@@ -175,8 +176,8 @@ class Doctor {
   template <class Item>
   void try_others() {
     // A pseudo-terminal has none; the bit rate behind a CAN adapter is that of the bus.
-    const bool has_rate =
-        address_.place == Place::slcan || (address_.place == Place::serial && !seen_.facts.pseudo_terminal);
+    const bool has_rate = address_.port_kind == PortKind::slcan ||
+                          (address_.port_kind == PortKind::serial && !seen_.facts.pseudo_terminal);
     if (try_each<Item>(other_models(address_), models_limit)) return;
     if (try_each<Item>(other_lines(address_, has_rate), never)) return;
     try_each<Item>(other_addresses(address_), addresses_limit);

@@ -284,7 +284,7 @@ void judge_bad_frames(const Case& one, std::vector<Finding>& findings) {
                              {fmt::format("{}", all.size()), errors_of(one.seen.readings), shown(*all.front())}));
 }
 
-Finding finding_of(const Unit& unit, const Options& options, Place place, const Attempted& last, bool usually_good,
+Finding finding_of(const Unit& unit, const Options& options, PortKind place, const Attempted& last, bool usually_good,
                    bool late) {
   const auto suited = [place](Finding found) {
     suit(found, place);

@@ -38,7 +38,7 @@ struct Refusal {
 };
 
 struct Observations {
-  Place place = Place::serial;
+  PortKind place = PortKind::serial;
   std::string port{};  // its path, where it is a serial one
   os::PortFacts facts{};
   std::optional<os::LineCounts> damage{};  // that the UART counted meanwhile
@@ -69,7 +69,7 @@ struct Observations {
 
 /// Of one reading that failed, at once: what is most likely behind it. `usually_good`: others mostly do not fail;
 /// `late`: replies came after their limit. Its evidence may be incomplete.
-[[nodiscard]] Finding finding_of(const Unit& unit, const Options& options, Place place, const Attempted& last,
+[[nodiscard]] Finding finding_of(const Unit& unit, const Options& options, PortKind place, const Attempted& last,
                                  bool usually_good, bool late);
 
 }  // namespace absenc::client

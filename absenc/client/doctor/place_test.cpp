@@ -17,22 +17,22 @@ using testing::Not;
 /// Findings that only the facts of a serial port give.
 const std::set<std::string_view> of_serial_ports{"port_is_modem", "latency_timer", "direction_unswitched"};
 
-std::string advice_of(Ailment ailment, Place place) {
+std::string advice_of(Ailment ailment, PortKind place) {
   Finding one = finding(ailment, {"", "", "", "", "", ""});
   suit(one, place);
   return one.cause + " " + one.action;
 }
 
 TEST(DoctorAdvice, NamesNothingThatThePlaceHasNot) {
-  for (const Place place : {Place::tcp, Place::spi, Place::can, Place::sim}) {
+  for (const PortKind place : {PortKind::tcp, PortKind::spi, PortKind::can, PortKind::sim}) {
     for (std::size_t i = 0; i <= static_cast<std::size_t>(Ailment::stuck_bits); ++i) {
       const auto ailment = static_cast<Ailment>(i);
       const std::string_view id = id_of(ailment);
       if (of_serial_ports.contains(id)) continue;
-      if (place == Place::sim && (id.starts_with("port_") || id == "modem_answers")) continue;  // it always opens
+      if (place == PortKind::sim && (id.starts_with("port_") || id == "modem_answers")) continue;  // it always opens
       const std::string advice = advice_of(ailment, place);
       for (const char* word : {"USB", "latency timer", "ModemManager", "/dev/serial"}) {
-        EXPECT_THAT(advice, Not(HasSubstr(word))) << id << " at " << place_names[static_cast<std::size_t>(place)];
+        EXPECT_THAT(advice, Not(HasSubstr(word))) << id << " at " << port_kind_names[static_cast<std::size_t>(place)];
       }
     }
   }
@@ -41,10 +41,10 @@ TEST(DoctorAdvice, NamesNothingThatThePlaceHasNot) {
 /// `latency` is no setting of a virtual encoder, and of SPI.
 TEST(DoctorAdvice, ProposesALatencyOnlyWhereItCanBeSet) {
   for (const Ailment ailment : {Ailment::reply_late, Ailment::sometimes_late, Ailment::sometimes_silent}) {
-    EXPECT_THAT(advice_of(ailment, Place::serial), HasSubstr("latency="));
-    EXPECT_THAT(advice_of(ailment, Place::tcp), HasSubstr("latency="));
-    EXPECT_THAT(advice_of(ailment, Place::sim), Not(HasSubstr("latency=")));
-    EXPECT_THAT(advice_of(ailment, Place::spi), Not(HasSubstr("latency=")));
+    EXPECT_THAT(advice_of(ailment, PortKind::serial), HasSubstr("latency="));
+    EXPECT_THAT(advice_of(ailment, PortKind::tcp), HasSubstr("latency="));
+    EXPECT_THAT(advice_of(ailment, PortKind::sim), Not(HasSubstr("latency=")));
+    EXPECT_THAT(advice_of(ailment, PortKind::spi), Not(HasSubstr("latency=")));
   }
 }
 

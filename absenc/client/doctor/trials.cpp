@@ -106,7 +106,7 @@ class Safety {
  public:
   explicit Safety(const EncoderAddress& address)
       : unit_(*address.unit), read_(find_command(*address.unit, Verb::read)) {
-    if (!carries_characters(unit_) || address.place == Place::sim) return;
+    if (!carries_characters(unit_) || address.port_kind == PortKind::sim) return;
     harmful_ = harmful_to_others(unit_, address.line.rate, search_of(address));
     said_ = is_harmful(address.options);
   }
@@ -150,12 +150,13 @@ bool is_possible(const Unit& unit, const Options& options) {
 
 LineSearch search_of(const EncoderAddress& address) {
   LineSearch search;
-  search.place = address.place == Place::tcp ? fmt::format("tcp:{}:{}", address.host, address.port) : address.path;
+  search.place =
+      address.port_kind == PortKind::tcp ? fmt::format("tcp:{}:{}", address.host, address.port) : address.path;
   if (address.latency) {
     const auto ms = std::chrono::ceil<std::chrono::milliseconds>(*address.latency).count();
     search.settings.push_back(fmt::format("latency={}", ms));
   }
-  if (address.place == Place::serial && address.rs485 != os::Rs485::automatic) {
+  if (address.port_kind == PortKind::serial && address.rs485 != os::Rs485::automatic) {
     search.settings.emplace_back(address.rs485 == os::Rs485::on ? "rs485=on" : "rs485=off");
   }
   return search;
@@ -163,7 +164,7 @@ LineSearch search_of(const EncoderAddress& address) {
 
 std::vector<Other> other_lines(const EncoderAddress& address, bool has_rate) {
   std::vector<Other> others;
-  if (address.place == Place::spi) add_spi(address, others);
+  if (address.port_kind == PortKind::spi) add_spi(address, others);
   if (carries_characters(*address.unit) && address.echo != host::EchoMode::automatic) {
     const bool on = address.echo == host::EchoMode::on;
     others.push_back({Ailment::wrong_echo, on ? "echo=on" : "echo=off", on ? "echo=off" : "echo=on", address});
@@ -176,7 +177,7 @@ std::vector<Other> other_lines(const EncoderAddress& address, bool has_rate) {
 std::vector<Other> other_models(const EncoderAddress& address) {
   constexpr std::size_t most = 32;
   std::vector<Other> others;
-  if (address.place == Place::sim || address.unit->link == LinkKind::can) return others;
+  if (address.port_kind == PortKind::sim || address.unit->link == LinkKind::can) return others;
   const Unit& unit = *address.unit;
   const Option* encoder = find_role(unit.options, Role::encoder);
   const Safety safety(address);
@@ -220,7 +221,7 @@ std::vector<Other> other_addresses(const EncoderAddress& address) {
   const Command* scan = find_command(unit, Verb::scan);
   const bool disturbs = scan != nullptr && !scan->disturbs.empty();
   const bool streams = unit.streams != nullptr && unit.streams(address.options);
-  if (option == nullptr || disturbs || streams || address.place == Place::sim || unit.link == LinkKind::can) {
+  if (option == nullptr || disturbs || streams || address.port_kind == PortKind::sim || unit.link == LinkKind::can) {
     return others;
   }
   const auto index = static_cast<std::size_t>(option - unit.options.data());

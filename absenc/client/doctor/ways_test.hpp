@@ -128,7 +128,7 @@ class Opener {
       machine = device(*end, far_.encoder);
     }
     end->port = std::make_unique<sim::SimPort<std::uint8_t>>(asked.unit->link, line, *machine);
-    if (far_.second) end->port->line().attach(sim::Role::device, *device(*end, *far_.second));
+    if (far_.second) end->port->line().attach(sim::NodeRole::device, *device(*end, *far_.second));
     ends_.push_back(end);
     return link_to(end, host_rate);
   }
@@ -215,7 +215,7 @@ inline Seen examined(const std::string& asked, const Far& far, const Choices& ch
   bool was_late = false;
   const Attempted one = read_once(address, again, &was_late);
   if (one.error != Error::none) {
-    seen.read_alone = finding_of(*address.unit, address.options, address.place, one, false, was_late).id;
+    seen.read_alone = finding_of(*address.unit, address.options, address.port_kind, one, false, was_late).id;
   }
   return seen;
 }

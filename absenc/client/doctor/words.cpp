@@ -218,64 +218,64 @@ constexpr auto table = std::to_array<Words>({
 /// Words to use instead where the encoder is not behind a serial port; "": the same.
 struct Elsewhere {
   Ailment ailment;
-  Place place;
+  PortKind place;
   std::string_view cause;
   std::string_view action;
 };
 constexpr auto elsewhere = std::to_array<Elsewhere>({
-    {Ailment::port_missing, Place::tcp, "the device server is off, or its host or port is another one",
+    {Ailment::port_missing, PortKind::tcp, "the device server is off, or its host or port is another one",
      "check the server's supply and cable, host and port"},
-    {Ailment::port_missing, Place::can, "the interface is not there, or its name is another one",
+    {Ailment::port_missing, PortKind::can, "the interface is not there, or its name is another one",
      "correct the name; `ip link` shows the interfaces that there are"},
-    {Ailment::port_missing, Place::spi, "the kernel has no such SPI device, or its name is another one",
+    {Ailment::port_missing, PortKind::spi, "the kernel has no such SPI device, or its name is another one",
      "correct the name; `ls /dev/spidev*` shows the devices that there are"},
-    {Ailment::port_unsuitable, Place::tcp, "", "name host and port of the device server's serial side"},
-    {Ailment::port_unsuitable, Place::can, "", "name a CAN interface; `ip link` shows those that there are"},
-    {Ailment::port_unsuitable, Place::spi, "", "name an SPI device; `ls /dev/spidev*` shows those that there are"},
-    {Ailment::port_forbidden, Place::spi, "the user is not in the group that owns the device",
+    {Ailment::port_unsuitable, PortKind::tcp, "", "name host and port of the device server's serial side"},
+    {Ailment::port_unsuitable, PortKind::can, "", "name a CAN interface; `ip link` shows those that there are"},
+    {Ailment::port_unsuitable, PortKind::spi, "", "name an SPI device; `ls /dev/spidev*` shows those that there are"},
+    {Ailment::port_forbidden, PortKind::spi, "the user is not in the group that owns the device",
      "join the group that `ls -l /dev/spidev*` shows, and log in again"},
-    {Ailment::port_lost, Place::tcp, "the network or the device server ended the connection",
+    {Ailment::port_lost, PortKind::tcp, "the network or the device server ended the connection",
      "check cable and supply of the server, and whether another client took its port"},
-    {Ailment::port_lost, Place::can, "the interface was taken down, or its adapter was unplugged",
+    {Ailment::port_lost, PortKind::can, "the interface was taken down, or its adapter was unplugged",
      "bring it up again: `ip link` shows its state"},
-    {Ailment::modem_answers, Place::tcp, "", "name host and port of the device server's serial side"},
-    {Ailment::no_answer, Place::tcp,
+    {Ailment::modem_answers, PortKind::tcp, "", "name host and port of the device server's serial side"},
+    {Ailment::no_answer, PortKind::tcp,
      "no supply, exchanged wires, another address, or another rate of the device server",
      "check the encoder's supply and ground, A and B, its address, and the rate of the device server's serial side; "
      "`absenc identify` asks in every protocol"},
-    {Ailment::no_answer, Place::can, "no supply, exchanged wires, another number of the node or another bit rate",
+    {Ailment::no_answer, PortKind::can, "no supply, exchanged wires, another number of the node or another bit rate",
      "check the encoder's supply, CANH and CANL, 120 ohms at both ends, the number of the node and the bit rate"},
-    {Ailment::no_answer, Place::slcan, "no supply, exchanged wires, another number of the node or another bit rate",
+    {Ailment::no_answer, PortKind::slcan, "no supply, exchanged wires, another number of the node or another bit rate",
      "check the encoder's supply, CANH and CANL, 120 ohms at both ends, the number of the node and the bit rate"},
-    {Ailment::no_answer, Place::sim, "a fault of the virtual encoder is set so", "leave the fault out"},
-    {Ailment::baud_pattern, Place::tcp, "the device server's serial side has another rate than the encoder",
+    {Ailment::no_answer, PortKind::sim, "a fault of the virtual encoder is set so", "leave the fault out"},
+    {Ailment::baud_pattern, PortKind::tcp, "the device server's serial side has another rate than the encoder",
      "set the rate of the device server's serial side"},
-    {Ailment::byte_before, Place::tcp, "the device server switches its direction too late",
+    {Ailment::byte_before, PortKind::tcp, "the device server switches its direction too late",
      "use a device server that switches its direction in time; bias the idle line"},
-    {Ailment::reply_late, Place::tcp,
+    {Ailment::reply_late, PortKind::tcp,
      "the network holds replies up, or the device server, which waits for more bytes before it sends them", ""},
-    {Ailment::reply_late, Place::can, "a busy bus, the adapter or a busy computer holds replies up", ""},
-    {Ailment::reply_late, Place::sim, "a fault of the virtual encoder is set so, or this computer is busy",
+    {Ailment::reply_late, PortKind::can, "a busy bus, the adapter or a busy computer holds replies up", ""},
+    {Ailment::reply_late, PortKind::sim, "a fault of the virtual encoder is set so, or this computer is busy",
      "leave the fault out, or let the computer do less meanwhile"},
-    {Ailment::sometimes_late, Place::tcp, "the network, the device server or a busy computer holds up single replies",
-     ""},
-    {Ailment::sometimes_late, Place::sim, "a fault of the virtual encoder is set so, or this computer is busy",
+    {Ailment::sometimes_late, PortKind::tcp,
+     "the network, the device server or a busy computer holds up single replies", ""},
+    {Ailment::sometimes_late, PortKind::sim, "a fault of the virtual encoder is set so, or this computer is busy",
      "leave the fault out, or let the computer do less meanwhile"},
-    {Ailment::reply_slow, Place::tcp,
+    {Ailment::reply_slow, PortKind::tcp,
      "the network holds them up, or the device server, which waits for more bytes before it sends them",
      "for more readings a second shorten the time for which the server waits, or use a serial port of the computer"},
-    {Ailment::reply_slow, Place::can, "the bus, the adapter or the computer is busy", "see what else is on the bus"},
-    {Ailment::reply_slow, Place::sim, "a fault of the virtual encoder is set so, or this computer is busy",
+    {Ailment::reply_slow, PortKind::can, "the bus, the adapter or the computer is busy", "see what else is on the bus"},
+    {Ailment::reply_slow, PortKind::sim, "a fault of the virtual encoder is set so, or this computer is busy",
      "leave the fault out, or let the computer do less meanwhile"},
-    {Ailment::reply_late, Place::spi, "this computer is busy", "let the computer do less meanwhile"},
-    {Ailment::sometimes_late, Place::spi, "this computer is busy", "let the computer do less meanwhile"},
-    {Ailment::sometimes_late, Place::can, "a busy bus, the adapter or a busy computer holds up single replies", ""},
-    {Ailment::reply_slow, Place::spi, "this computer is busy", "let the computer do less meanwhile"},
-    {Ailment::modem_answers, Place::spi, "something else than an encoder is behind this controller",
+    {Ailment::reply_late, PortKind::spi, "this computer is busy", "let the computer do less meanwhile"},
+    {Ailment::sometimes_late, PortKind::spi, "this computer is busy", "let the computer do less meanwhile"},
+    {Ailment::sometimes_late, PortKind::can, "a busy bus, the adapter or a busy computer holds up single replies", ""},
+    {Ailment::reply_slow, PortKind::spi, "this computer is busy", "let the computer do less meanwhile"},
+    {Ailment::modem_answers, PortKind::spi, "something else than an encoder is behind this controller",
      "name the SPI device of the encoder; `ls /dev/spidev*` shows those that there are"},
-    {Ailment::modem_answers, Place::can, "something else than an encoder is on this bus", "name another interface"},
-    {Ailment::sometimes_silent, Place::spi, "", "check plugs, supply and wires"},
-    {Ailment::sometimes_silent, Place::sim, "a fault of the virtual encoder is set so, or this computer is busy",
+    {Ailment::modem_answers, PortKind::can, "something else than an encoder is on this bus", "name another interface"},
+    {Ailment::sometimes_silent, PortKind::spi, "", "check plugs, supply and wires"},
+    {Ailment::sometimes_silent, PortKind::sim, "a fault of the virtual encoder is set so, or this computer is busy",
      "leave the fault out, or let the computer do less meanwhile"},
 });
 
@@ -315,7 +315,7 @@ Finding finding(Ailment ailment, const std::vector<std::string>& values) {
           filled(words.action, values)};
 }
 
-void suit(Finding& finding, Place place) {
+void suit(Finding& finding, PortKind place) {
   for (const Elsewhere& one : elsewhere) {
     if (one.ailment != finding.ailment || one.place != place) continue;
     if (!one.cause.empty()) finding.cause = one.cause;

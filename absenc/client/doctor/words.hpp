@@ -14,6 +14,6 @@ namespace absenc::client {
 [[nodiscard]] Finding finding(Ailment ailment, const std::vector<std::string>& values = {});
 
 /// Replaces a cause or an action that does not fit such a place: nothing about USB is said of a network.
-void suit(Finding& finding, Place place);
+void suit(Finding& finding, PortKind place);
 
 }  // namespace absenc::client

@@ -118,7 +118,7 @@ struct Emulation::Service {
         os::sleep_until(std::min(time, now + between_tries_to_look));
       }
     };
-    serve_forever(attended, open, wait, [](Served, std::string_view) {});
+    serve_forever(attended, open, wait, [](PortEvent, std::string_view) {});
   }
 
   // Runs the waiting orders between two steps of the encoder.

@@ -13,7 +13,7 @@
 namespace absenc::client {
 
 /// A change of the port that is reported.
-enum class Served : std::uint8_t { opened, away, back };
+enum class PortEvent : std::uint8_t { opened, away, back };
 
 /// Moves an encoder from one port to the next. If the last port was lost between a transfer and its `sent`, `left`
 /// feeds the missing `sent`.
@@ -64,14 +64,14 @@ template <class Item, class Open, class Wait, class Told>
           port->begin({.kind = Step<Item>::Kind::configure, .rate = movable.rate()});
         }
       }
-      told(was_open ? Served::back : Served::opened, {});
+      told(was_open ? PortEvent::back : PortEvent::opened, {});
       is_open = was_open = true;
       host::drive(movable, *port, [] { return true; });
     } catch (const os::Failure& failure) {
       // A rate that the port does not support now will not be supported later.
       const bool unable = is_open && failure.kind() == os::Failure::Kind::unsupported;
       if (!was_open || unable) throw;
-      if (is_open) told(Served::away, failure.what());
+      if (is_open) told(PortEvent::away, failure.what());
       is_open = false;
     }
     wait(os::now() + time_between_tries);

@@ -164,7 +164,7 @@ EncoderAddress virtual_encoder(std::string_view text, std::span<const std::strin
   const std::string_view id = text.substr(0, text.find_first_of("?:"));
   const bool bare = find_unit(id) != nullptr && (id.size() == text.size() || text[id.size()] == '?');
   EncoderAddress uri = parse_address(bare ? fmt::format("sim:{}", text) : std::string(text), settings);
-  if (uri.place != Place::sim) {
+  if (uri.port_kind != PortKind::sim) {
     throw UsageError(fmt::format("{} is no virtual encoder: waveforms are drawn of sim:{}", text, uri.unit->id));
   }
   return uri;

@@ -88,7 +88,7 @@ void ChangeRecord::find_old_value(bool good) {
   std::vector<std::int64_t> candidates;
   for (std::size_t i = 0; i < old_->columns.size(); ++i) {
     const std::optional<std::int64_t> value = integer_in(old_->values[i]);
-    if (!value || old_->columns[i].look.is_exchange) continue;
+    if (!value || old_->columns[i].presentation.is_exchange) continue;
     bool fits = !good;
     for (std::size_t j = 0; j < written.answer.columns.size(); ++j) {
       fits = fits || (written.answer.columns[j].name == old_->columns[i].name &&

@@ -80,8 +80,8 @@ class ConnectionOn final : public Connection {
  public:
   ConnectionOn(const EncoderAddress& uri, OpenLink open)
       : Connection(uri),
-        is_journaled_(!open && uri.place != Place::sim),
-        is_exact_(!open && uri.place == Place::sim),
+        is_journaled_(!open && uri.port_kind != PortKind::sim),
+        is_exact_(!open && uri.port_kind == PortKind::sim),
         open_(open ? std::move(open) : open_link),
         runner_(uri, attempts) {
     session_.set_speed_limit(speed_limit(uri));
@@ -284,7 +284,7 @@ class ConnectionOn final : public Connection {
     if (trouble.error != Error::timeout || lateness == Time{}) return;
     trouble.message += fmt::format(
         ": replies came up to {} after their requests, later than its limit, and were dropped", to_text(lateness));
-    if (uri().place == Place::sim) return;
+    if (uri().port_kind == PortKind::sim) return;
     trouble.advice = fmt::format(
         "allow the way so long with latency={} (milliseconds) behind the encoder, or find what "
         "holds replies up: a busy computer, a network, the latency timer of a USB adapter",
@@ -298,7 +298,7 @@ class ConnectionOn final : public Connection {
     const host::Counters& counters = session_.counters();
     const bool usually_good = counters.good > counters.bad();
     const Finding found =
-        finding_of(unit(), uri().options, uri().place, last, usually_good, session_.lateness() != Time{});
+        finding_of(unit(), uri().options, uri().port_kind, last, usually_good, session_.lateness() != Time{});
     return fmt::format("{}: {}", found.id, found.cause);
   }
 

@@ -349,7 +349,7 @@ MemoryImage some_bytes(std::uint32_t count) {
 TEST(ClientMemory, IsBroughtToWhatIsWantedAndReadBack) {
   Encoder encoder = open("sim:tformat");
   std::vector<std::size_t> steps;
-  MemoryChange change(encoder.memory(), some_bytes(3), Access::write);
+  MemoryChange change(encoder.memory(), some_bytes(3), MemoryAccess::write);
   change.look();
   EXPECT_EQ(change.differing(), change.wanted());
   change.write([&](std::size_t done, std::size_t all) {
@@ -361,14 +361,14 @@ TEST(ClientMemory, IsBroughtToWhatIsWantedAndReadBack) {
   EXPECT_EQ(change.written(), change.wanted());
   const MemoryImage whole = encoder.memory().read(dump_addresses(encoder.unit()));
   EXPECT_EQ(differing(some_bytes(3), whole), MemoryImage{});
-  EXPECT_THROW(MemoryChange(encoder.memory(), {{{99, 0}, 0}}, Access::write), UsageError);
+  EXPECT_THROW(MemoryChange(encoder.memory(), {{{99, 0}, 0}}, MemoryAccess::write), UsageError);
   EXPECT_THROW(static_cast<void>(encoder.memory().read({{{99, 0}, 0}})), UsageError);
 }
 
 TEST(ClientMemory, WhateverBecomesOfItSaysWhatIsWritten) {
   Emulation emulation = emulate("tformat");
   Encoder encoder = open(emulation.address() + "?latency=300");
-  MemoryChange change(encoder.memory(), some_bytes(6), Access::write);
+  MemoryChange change(encoder.memory(), some_bytes(6), MemoryAccess::write);
   change.look();
   EXPECT_THROW(change.write([&](std::size_t done, std::size_t) {
     if (done == 3) emulation.power_off();

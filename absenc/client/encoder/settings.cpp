@@ -18,7 +18,7 @@ namespace absenc::client {
 
 namespace {
 
-struct Told final : FieldSink {
+struct SettingSink final : FieldSink {
   void put(const FieldValue& value) override {
     if (value.info->role == Role::written) was_so = value.number == 0;
     sink.put(value);
@@ -28,7 +28,7 @@ struct Told final : FieldSink {
 };
 
 Answer answer_to(Connection& encoder, const Command& command) {
-  Told told;
+  SettingSink told;
   run_into(encoder, command, {}, told);
   return std::move(told.sink.answer);
 }
@@ -40,7 +40,7 @@ std::size_t place_of(const Answer& answer, std::string_view name) {
 }
 
 // Reports the state of the encoder if the port is lost during the command.
-void write(Connection& encoder, const Command& setter, Arguments arguments, Told& told) {
+void write(Connection& encoder, const Command& setter, Arguments arguments, SettingSink& told) {
   try {
     run_into(encoder, setter, arguments, told);
   } catch (const os::Failure& failure) {
@@ -139,7 +139,7 @@ SettingChange Settings::set(std::string_view name, std::span<const std::int64_t>
   const Setting setting = require_setting(connection.unit(), name);
   const std::vector<std::int64_t> values = complete_arguments(*setting.setter, arguments);
   const Options before = connection.uri().options;
-  Told told;
+  SettingSink told;
   write(connection, *setting.setter, values, told);
   const Answer& written = told.sink.answer;
   SettingChange change{written, told.was_so, connection.change().state,

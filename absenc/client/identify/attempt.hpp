@@ -35,7 +35,7 @@ inline constexpr Time late_window = 100ms;        // time after an unanswered re
 inline constexpr Time most_allowance = 400ms;     // greatest extension of the timeout if replies are late
 
 /// The encoders found by a scan.
-struct Addresses final : FieldSink {
+struct ScannedAddresses final : FieldSink {
   void put(const FieldValue& value) override {
     if (value.info->role == Role::encoder) all.push_back(value.number);
     if (value.info->role == Role::clash && value.number != 0 && !all.empty()) all.pop_back();
@@ -44,7 +44,7 @@ struct Addresses final : FieldSink {
 };
 
 /// Why a conversation was aborted.
-enum class Stop : std::uint8_t {
+enum class TryEnd : std::uint8_t {
   silent,   // no reply, or no valid one
   harmful,  // its next request would be a changing command for another encoder
 };
@@ -68,7 +68,7 @@ struct IdentitySink final : FieldSink {
 template <class Item>
 class Attempt {
  public:
-  Attempt(const LineSearch& search, const Unit& unit, Settings settings, Time patience, Time deadline,
+  Attempt(const LineSearch& search, const Unit& unit, SettingTexts settings, Time patience, Time deadline,
           LineFindings& findings)
       : search_(search),
         unit_(unit),
@@ -119,14 +119,14 @@ class Attempt {
   void ask() {
     const Command* read = find_command(unit_, Verb::read);
     if (read == nullptr || read->changes_encoder) return;
-    for (const Settings& way : settings_to_try(unit_, settings_, *read)) {
-      Settings settings = settings_;
+    for (const SettingTexts& way : settings_to_try(unit_, settings_, *read)) {
+      SettingTexts settings = settings_;
       settings.insert(settings.end(), way.begin(), way.end());
       const Options options = require_options(unit_, {}, option_settings(unit_, settings, true));
-      std::vector<Settings> targets = scanned(settings, options);
+      std::vector<SettingTexts> targets = scanned(settings, options);
       if (targets.empty()) targets.push_back(settings);
       bool answered = false;
-      for (const Settings& target : targets) {
+      for (const SettingTexts& target : targets) {
         const std::string encoder = target.size() > settings.size() ? target.back() : std::string();
         answered = ask_one(*read, target, encoder) || answered;
       }
@@ -167,15 +167,15 @@ class Attempt {
   // Checks each step and event; throws Stop to abort the conversation.
   void look_at(Step<Item>& step, Time now, Talk& talk) {
     using Kind = typename Step<Item>::Kind;
-    if (step.kind == Kind::pulse && step.wire == ExtraWire::clear) throw Stop::harmful;
+    if (step.kind == Kind::pulse && step.wire == ExtraWire::clear) throw TryEnd::harmful;
     if (talk.patience.is_over(now) && !talk.understood) {
       talk.understood = is_good(heard_exchange(runner_.last()), talk.options);
-      if (!talk.understood) throw Stop::silent;
+      if (!talk.understood) throw TryEnd::silent;
     }
     if (step.answer != Time{}) step.answer += allowance_;
     talk.patience.see(step, now);
     if constexpr (!is_can) {  // not on CAN, where identifiers distinguish nodes
-      if (step.kind == Kind::transfer && begins_harmful(step.out)) throw Stop::harmful;
+      if (step.kind == Kind::transfer && begins_harmful(step.out)) throw TryEnd::harmful;
     }
   }
   [[nodiscard]] bool begins_harmful(Bytes request) const {
@@ -235,10 +235,10 @@ class Attempt {
       one.error = ended->error();
       one.detail = ended->detail();
       if (sink != nullptr && one.error == Error::none) ended->report(*sink);
-    } catch (const Stop& stop) {
+    } catch (const TryEnd& stop) {
       talk_ = nullptr;
-      cut_ = cut_ || (scans && stop == Stop::silent && talk.patience.heard() == 0);
-      if (stop == Stop::harmful) {
+      cut_ = cut_ || (scans && stop == TryEnd::silent && talk.patience.heard() == 0);
+      if (stop == TryEnd::harmful) {
         findings_.notes.push_back(
             fmt::format("{} of {} was not sent: to another encoder it might be a command", command.name, unit_.id));
       }
@@ -272,15 +272,15 @@ class Attempt {
   }
 
   // Returns the settings of each encoder that replies to a scan.
-  std::vector<Settings> scanned(const Settings& settings, const Options& options) {
-    std::vector<Settings> targets;
+  std::vector<SettingTexts> scanned(const SettingTexts& settings, const Options& options) {
+    std::vector<SettingTexts> targets;
     const Command* command = find_command(unit_, Verb::scan);
     if (command == nullptr || command->changes_encoder) return targets;
     if (!command->disturbs.empty()) {
       findings_.notes.push_back(fmt::format("{} of {} was not sent: {}", command->name, unit_.id, command->disturbs));
       return targets;
     }
-    Addresses addresses;
+    ScannedAddresses addresses;
     std::vector<ObservedExchange> ignored;
     converse(*command, options, ignored, &addresses);
     const Option* option = find_role(unit_.options, Role::encoder);
@@ -292,7 +292,7 @@ class Attempt {
   }
 
   // Returns whether anything was received. `encoder` is the address setting of the polled encoder.
-  bool ask_one(const Command& read, const Settings& settings, const std::string& encoder) {
+  bool ask_one(const Command& read, const SettingTexts& settings, const std::string& encoder) {
     const std::vector<OptionText> known = option_settings(unit_, settings, false);
     const Options options = require_options(unit_, {}, option_settings(unit_, settings, true));
     std::vector<ObservedExchange> exchanges;
@@ -332,14 +332,14 @@ class Attempt {
   // Returns whether the reply is from another encoder than the polled one: CAN nodes may also send unsolicited frames.
   [[nodiscard]] bool is_of_another(const ObservedExchange& exchange, const Options& options) const {
     const Option* asked = find_role(unit_.options, Role::encoder);
-    Addresses who;
+    ScannedAddresses who;
     if (asked == nullptr || unit_.decode(options, {}, exchange.reply.frame(), who) != Error::none) return false;
     const auto index = static_cast<std::size_t>(asked - unit_.options.data());
     return !who.all.empty() && who.all.front() != options.values[index];
   }
 
-  void keep(const std::vector<Hypothesis>& found, const Settings& settings, const std::string& encoder) {
-    Settings of_port;
+  void keep(const std::vector<Hypothesis>& found, const SettingTexts& settings, const std::string& encoder) {
+    SettingTexts of_port;
     for (const std::string& setting : settings) {
       if (find_link_parameter(split_setting(setting).name) != nullptr) of_port.push_back(setting);
     }
@@ -350,7 +350,7 @@ class Attempt {
 
   const LineSearch& search_;
   const Unit& unit_;
-  Settings settings_;
+  SettingTexts settings_;
   Time patience_;
   LineFindings& findings_;
   EncoderAddress address_;

@@ -9,7 +9,7 @@ namespace absenc::client {
 
 namespace {
 
-Found found(const Candidate& candidate, std::string_view place) {
+FoundEncoder found(const Candidate& candidate, std::string_view place) {
   const capture::Hypothesis& one = candidate.hypothesis;
   return {.unit = candidate.unit,
           .options = one.options,

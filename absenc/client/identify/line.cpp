@@ -47,7 +47,7 @@ std::vector<Sender> senders(const Unit& unit, std::span<const CanFrame> frames) 
   std::vector<Sender> all;
   for (const CanFrame& frame : frames) {
     Sender sender{.exchanges = {{.reply = {.can = frame}}}};
-    Addresses addresses;
+    ScannedAddresses addresses;
     const Frame reply = sender.exchanges.front().reply.frame();
     if (!likely.empty() && unit.decode(likely.front(), {}, reply, addresses) == Error::none) {
       if (!addresses.all.empty()) sender.option = find_role(unit.options, Role::encoder);
@@ -180,13 +180,13 @@ class Search {
     for (const std::string& value : rates) {
       // An encoder that replies well at one rate is not searched at others.
       if (is_beyond_doubt() || is_explained(unit)) return;
-      Settings settings = search_.settings;
+      SettingTexts settings = search_.settings;
       settings.push_back(fmt::format("{}={}", rate_setting, value));
       attempt(unit, settings);
     }
   }
 
-  void attempt(const Unit& unit, const Settings& settings) {
+  void attempt(const Unit& unit, const SettingTexts& settings) {
     if (!takes_rate(unit)) return;
     if (unit.link == LinkKind::can) return attempt_on<CanFrame>(unit, settings);
     attempt_on<std::uint8_t>(unit, settings);
@@ -204,7 +204,7 @@ class Search {
   }
 
   template <class Item>
-  void attempt_on(const Unit& unit, const Settings& settings) {
+  void attempt_on(const Unit& unit, const SettingTexts& settings) {
     if (search_.now() >= deadline_) throw OutOfTime{};
     const Time patience = is_beyond_doubt() ? brief_patience : patience_;
     Attempt<Item> one(search_, unit, settings, patience, deadline_, findings_);
@@ -274,7 +274,7 @@ class Search {
       if (!same_line || bytes.empty()) continue;
       ++findings_.searches;
       for (Hypothesis& one : capture::find_stream_hypotheses(*other, bytes, listening)) {
-        Settings settings = search_.settings;
+        SettingTexts settings = search_.settings;
         const bool needs_rate = other->line.rate != line.rate && medium_of(search_) == Medium::serial &&
                                 !has_setting(settings, rate_setting) && !os::is_pseudo_terminal(search_.place);
         if (needs_rate) settings.push_back(fmt::format("{}={}", rate_setting, line.rate));

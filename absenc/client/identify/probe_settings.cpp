@@ -33,12 +33,12 @@ bool can_receive(const Unit& unit, std::uint32_t rate, const LineSearch& search)
   return any_rate || users_rate || medium_of(search) == Medium::tcp || unit.line.rate == rate;
 }
 
-bool has_setting(const Settings& settings, std::string_view name) {
+bool has_setting(const SettingTexts& settings, std::string_view name) {
   return std::any_of(settings.begin(), settings.end(),
                      [&](const std::string& one) { return split_setting(one).name == name; });
 }
 
-std::vector<OptionText> option_settings(const Unit& unit, const Settings& settings, bool with_model) {
+std::vector<OptionText> option_settings(const Unit& unit, const SettingTexts& settings, bool with_model) {
   std::vector<OptionText> options;
   for (const std::string& setting : settings) {
     const OptionText one = split_setting(setting);
@@ -60,13 +60,13 @@ std::vector<std::uint8_t> request_of(const Unit& unit, const Options& options, c
   return {bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(*size)};
 }
 
-std::vector<Settings> settings_to_try(const Unit& unit, const Settings& settings, const Command& read) {
+std::vector<SettingTexts> settings_to_try(const Unit& unit, const SettingTexts& settings, const Command& read) {
   constexpr std::size_t most_ways = 8;
-  std::vector<Settings> all;
+  std::vector<SettingTexts> all;
   std::vector<std::vector<std::uint8_t>> requests;
   const Command* scan = find_command(unit, Verb::scan);
-  const auto add = [&](const Settings& way) {
-    Settings together = settings;
+  const auto add = [&](const SettingTexts& way) {
+    SettingTexts together = settings;
     together.insert(together.end(), way.begin(), way.end());
     const Options options = require_options(unit, {}, option_settings(unit, together, true));
     if (all.size() >= most_ways || (unit.streams != nullptr && unit.streams(options))) return;

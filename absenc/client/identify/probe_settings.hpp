@@ -12,7 +12,7 @@
 
 namespace absenc::client {
 
-using Settings = std::vector<std::string>;  // each as "address=3"
+using SettingTexts = std::vector<std::string>;  // each as "address=3"
 
 enum class Medium : std::uint8_t { serial, tcp, spi, can };
 
@@ -25,10 +25,10 @@ enum class Medium : std::uint8_t { serial, tcp, spi, can };
 /// Returns whether an encoder of this unit may receive requests at `rate`, in bits per second.
 [[nodiscard]] bool can_receive(const Unit& unit, std::uint32_t rate, const LineSearch& search);
 
-[[nodiscard]] bool has_setting(const Settings& settings, std::string_view name);
+[[nodiscard]] bool has_setting(const SettingTexts& settings, std::string_view name);
 
 /// Returns the settings that are options of the unit.
-[[nodiscard]] std::vector<OptionText> option_settings(const Unit& unit, const Settings& settings, bool with_model);
+[[nodiscard]] std::vector<OptionText> option_settings(const Unit& unit, const SettingTexts& settings, bool with_model);
 
 /// Returns the request of a command with its default arguments; empty if it has none.
 [[nodiscard]] std::vector<std::uint8_t> request_of(const Unit& unit, const Options& options, const Command& command);
@@ -36,7 +36,8 @@ enum class Medium : std::uint8_t { serial, tcp, spi, can };
 /// Returns the sets of settings to try in addition to `settings`, at most 8: none, each model, and single choices that
 /// change the request. On clocked lines the request is the same for all models, which differ in their number of bits.
 /// Settings with which the encoder sends by itself are left out.
-[[nodiscard]] std::vector<Settings> settings_to_try(const Unit& unit, const Settings& settings, const Command& read);
+[[nodiscard]] std::vector<SettingTexts> settings_to_try(const Unit& unit, const SettingTexts& settings,
+                                                        const Command& read);
 
 /// Returns the requests that would change encoders of other units that may receive them.
 [[nodiscard]] std::vector<std::vector<std::uint8_t>> harmful_to_others(const Unit& unit, std::uint32_t rate,

@@ -15,7 +15,7 @@ constexpr Time settling = std::chrono::milliseconds(50);
 
 }  // namespace
 
-MemoryChange::MemoryChange(Memory memory, MemoryImage wanted, Access access)
+MemoryChange::MemoryChange(Memory memory, MemoryImage wanted, MemoryAccess access)
     : memory_(memory), wanted_(std::move(wanted)), access_(access) {
   require_memory(memory_.unit(), access_);
   require_open(memory_.unit(), wanted_, access_);

@@ -46,9 +46,10 @@ std::vector<std::string> header(const Unit& unit, const Options& options) {
   return lines;
 }
 
-class Parser {
+class DumpParser {
  public:
-  Parser(const std::string& name, std::string_view text, const Unit& unit, const Options& options, Access access)
+  DumpParser(const std::string& name, std::string_view text, const Unit& unit, const Options& options,
+             MemoryAccess access)
       : name_(name), lines_(text), unit_(unit), options_(options), access_(access) {}
 
   Dump parse() {
@@ -153,10 +154,10 @@ class Parser {
   }
 
   const std::string& name_;
-  LineReader lines_;
+  SignificantLines lines_;
   const Unit& unit_;
   const Options& options_;
-  Access access_;
+  MemoryAccess access_;
   Checksum sum_;
   Dump dump_;
   std::map<MemoryAddress, std::size_t> given_in_;  // the line in which each address was given
@@ -183,8 +184,8 @@ std::string to_dump(const Unit& unit, const Options& options, const MemoryImage&
 }
 
 Dump parse_dump(const std::string& name, std::string_view text, const Unit& unit, const Options& options,
-                Access access) {
-  return Parser(name, text, unit, options, access).parse();
+                MemoryAccess access) {
+  return DumpParser(name, text, unit, options, access).parse();
 }
 
 }  // namespace absenc::client

@@ -20,6 +20,6 @@ struct Dump {
 /// Parses a dump. `name` is for messages. Throws Failure for a text that is damaged, is from another kind of encoder,
 /// or has addresses that do not permit `access`.
 [[nodiscard]] Dump parse_dump(const std::string& name, std::string_view text, const Unit& unit, const Options& options,
-                              Access access);
+                              MemoryAccess access);
 
 }  // namespace absenc::client

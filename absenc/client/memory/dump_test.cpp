@@ -24,7 +24,7 @@ std::string replaced(std::string text, std::string_view from, std::string_view t
 }
 
 /// Returns the error for a text that must be refused.
-std::string refusal(std::string_view text, Access access = Access::write) {
+std::string refusal(std::string_view text, MemoryAccess access = MemoryAccess::write) {
   try {
     static_cast<void>(parse_dump("file", text, unit, options_of("TS5700N8500"), access));
   } catch (const Failure& failure) {
@@ -57,7 +57,7 @@ TEST(DumpFile, RoundTrip) {
     const bool known = *rc::gen::arbitrary<bool>();
     Options options = options_of("23-bit");
     if (!known) options.model = nullptr;
-    const Dump dump = parse_dump("file", to_dump(unit, options, image), unit, options, Access::write);
+    const Dump dump = parse_dump("file", to_dump(unit, options, image), unit, options, MemoryAccess::write);
     RC_ASSERT(dump.image == image);
     RC_ASSERT(dump.checked);
   });
@@ -78,8 +78,9 @@ TEST(DumpFile, WhateverIsEditedIsReadOrRefused) {
       text.replace(at, taken, piece);
     }
     try {
-      for (const auto& [at, value] : parse_dump("file", text, unit, options_of("TS5700N8500"), Access::write).image) {
-        RC_ASSERT(closed(unit, at, Access::write).empty());
+      for (const auto& [at, value] :
+           parse_dump("file", text, unit, options_of("TS5700N8500"), MemoryAccess::write).image) {
+        RC_ASSERT(closed(unit, at, MemoryAccess::write).empty());
       }
     } catch (const Failure& failure) {
       RC_ASSERT(std::string_view(failure.what()).starts_with("file"));
@@ -119,12 +120,12 @@ TEST(DumpFile, ChecksumIsTheDocumentedOne) {
 }
 
 TEST(DumpFile, WithoutChecksumIsNotChecked) {
-  EXPECT_FALSE(parse_dump("file", small, unit, options_of("TS5700N8500"), Access::write).checked);
+  EXPECT_FALSE(parse_dump("file", small, unit, options_of("TS5700N8500"), MemoryAccess::write).checked);
 }
 
 TEST(DumpFile, NumbersAsPeopleWriteThem) {
   const Dump dump = parse_dump("file", std::string(small) + "page 0x1 address 16: 01 02\r\n", unit,
-                               options_of("TS5700N8500"), Access::write);
+                               options_of("TS5700N8500"), MemoryAccess::write);
   EXPECT_EQ(dump.image, (MemoryImage{{{0, 5}, 0x5A}, {{0, 6}, 0x5B}, {{1, 16}, 1}, {{1, 17}, 2}}));
 }
 
@@ -148,7 +149,7 @@ TEST(DumpFile, RefusesOtherOptionsWithoutAModel) {
   EXPECT_NE(text.find("option: singleturn_bits=17\n"), std::string::npos) << text;
   Options other = options;
   other.values[0] = 20;
-  EXPECT_THROW(static_cast<void>(parse_dump("file", text, unit, other, Access::write)), Failure);
+  EXPECT_THROW(static_cast<void>(parse_dump("file", text, unit, other, MemoryAccess::write)), Failure);
 }
 
 TEST(DumpFile, NamesLineAndTrouble) {
@@ -170,7 +171,7 @@ TEST(DumpFile, NamesLineAndTrouble) {
 TEST(DumpFile, WhatCanOnlyBeReadMayBeComparedButNotWritten) {
   const std::string text = std::string(small) + "page 7 address 5: 23\n";
   expect_refusal(text, {"line 5", "temperature", "only be read"});
-  EXPECT_EQ(refusal(text, Access::read), "nothing");
+  EXPECT_EQ(refusal(text, MemoryAccess::read), "nothing");
 }
 
 TEST(MemoryImage, AddressesInWords) {

@@ -86,13 +86,13 @@ std::string addresses_in_words(const Unit& unit, const MemoryImage& image) {
   return fmt::format("{}", fmt::join(pages, "; "));
 }
 
-std::string closed(const Unit& unit, MemoryAddress at, Access access) {
+std::string closed(const Unit& unit, MemoryAddress at, MemoryAccess access) {
   const MemoryArea* area = find_area(unit, at);
   if (area != nullptr) {
-    if (access == Access::read) return {};
+    if (access == MemoryAccess::read) return {};
     const std::string where = fmt::format("{} ({})", to_text(unit, at), area->meaning);
     if (!area->writable) return fmt::format("{} can only be read", where);
-    if (access == Access::force || area->protection.empty()) return {};
+    if (access == MemoryAccess::force || area->protection.empty()) return {};
     return fmt::format("{} is written only with --force: {}", where, area->protection);
   }
   MemoryImage all;
@@ -100,8 +100,8 @@ std::string closed(const Unit& unit, MemoryAddress at, Access access) {
   return fmt::format("{} has no {}; it has {}", unit.id, to_text(unit, at), addresses_in_words(unit, all));
 }
 
-void require_memory(const Unit& unit, Access access) {
-  const bool for_writing = access != Access::read;
+void require_memory(const Unit& unit, MemoryAccess access) {
+  const bool for_writing = access != MemoryAccess::read;
   const Verb verb = for_writing ? Verb::memory_write : Verb::memory_read;
   if (!unit.memory.empty() && find_command(unit, verb) != nullptr) return;
   if (!unit.registers.empty()) {
@@ -113,7 +113,7 @@ void require_memory(const Unit& unit, Access access) {
   throw UsageError(fmt::format("the memory of a {} encoder cannot be {}", unit.id, for_writing ? "written" : "read"));
 }
 
-void require_open(const Unit& unit, const MemoryImage& image, Access access) {
+void require_open(const Unit& unit, const MemoryImage& image, MemoryAccess access) {
   for (const auto& [at, value] : image) {
     if (const std::string why = closed(unit, at, access); !why.empty()) throw UsageError(why);
   }

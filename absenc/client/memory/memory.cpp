@@ -43,8 +43,8 @@ void Memory::check_model() {
 }
 
 MemoryImage Memory::read(const MemoryImage& image, const MemoryProgress& progress) {
-  require_memory(unit(), Access::read);
-  require_open(unit(), image, Access::read);
+  require_memory(unit(), MemoryAccess::read);
+  require_open(unit(), image, MemoryAccess::read);
   const Command& command = *find_command(unit(), Verb::memory_read);
   MemoryImage found;
   for (const MemoryRun& run : runs(image)) {
@@ -73,7 +73,7 @@ std::vector<std::uint8_t> Memory::read_run(MemoryAddress at, std::size_t count) 
       fmt::format("{} bytes were to be read from {}, but {} came", count, to_text(unit(), at), bytes.data.size()));
 }
 
-void Memory::write(MemoryAddress at, std::uint8_t value, Access access, std::optional<std::uint8_t> before) {
+void Memory::write(MemoryAddress at, std::uint8_t value, MemoryAccess access, std::optional<std::uint8_t> before) {
   if (before) connection_of(*encoder_).know_before(*before);
   const Command& command = *find_command(unit(), Verb::memory_write);
   ReadBytes ignored;
@@ -81,7 +81,7 @@ void Memory::write(MemoryAddress at, std::uint8_t value, Access access, std::opt
            role_arguments(command, {{Role::page, at.page},
                                     {Role::address, at.address},
                                     {Role::value, value},
-                                    {Role::force, access == Access::force ? 1 : 0}}),
+                                    {Role::force, access == MemoryAccess::force ? 1 : 0}}),
            ignored);
 }
 

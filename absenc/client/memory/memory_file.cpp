@@ -19,11 +19,11 @@ namespace absenc::client {
 
 namespace {
 
-[[noreturn]] void refuse(const std::string& path, const LineReader& lines, std::string_view what) {
+[[noreturn]] void refuse(const std::string& path, const SignificantLines& lines, std::string_view what) {
   throw Failure(fmt::format("the memory file {}, line {}: {}; it was left as it is", path, lines.number, what));
 }
 
-void expect(const std::string& path, LineReader& lines, std::string_view name, std::string_view value) {
+void expect(const std::string& path, SignificantLines& lines, std::string_view name, std::string_view value) {
   const std::string wanted = fmt::format("{}: {}", name, value);
   if (!lines.next() || !lines.line.starts_with(fmt::format("{}: ", name))) {
     refuse(path, lines, fmt::format("there should be \"{}\"", wanted));
@@ -68,7 +68,7 @@ void MemoryFile::load(MutableBytes memory) {
 }
 
 void MemoryFile::parse(std::string_view text, MutableBytes memory) const {
-  LineReader lines(text);
+  SignificantLines lines(text);
   lines.next();
   if (lines.line == dump_title) {
     throw Failure(

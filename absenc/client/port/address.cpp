@@ -63,7 +63,7 @@ void set_link_parameter(EncoderAddress& uri, const OptionText& setting) {
     return set_pulse_wire(uri.wires.clear, setting.name.substr(clear.size()), setting);
   }
   if (setting.name == rate_setting) {
-    std::uint32_t& rate = uri.place == Place::slcan ? uri.adapter_rate : uri.line.rate;
+    std::uint32_t& rate = uri.port_kind == PortKind::slcan ? uri.adapter_rate : uri.line.rate;
     rate = static_cast<std::uint32_t>(number_of(setting, 1, 100'000'000));
   } else if (setting.name == "log") {
     if (uri.unit->link != LinkKind::can) throw UsageError("log cannot be set here: it takes down frames of a CAN bus");
@@ -110,10 +110,10 @@ void set_link_parameter(EncoderAddress& uri, const OptionText& setting) {
   }
 }
 
-bool allowed(const LinkParameter& parameter, Place place) {
+bool allowed(const LinkParameter& parameter, PortKind place) {
   constexpr std::string_view separator = ", ";
-  const std::string_view name = place_names[static_cast<std::size_t>(place)];
-  for (std::string_view rest = parameter.places;;) {
+  const std::string_view name = port_kind_names[static_cast<std::size_t>(place)];
+  for (std::string_view rest = parameter.port_kinds;;) {
     const std::size_t end = rest.find(separator);
     if (rest.substr(0, end) == name) return true;
     if (end == std::string_view::npos) return false;
@@ -141,15 +141,15 @@ void take_settings(EncoderAddress& uri, std::span<const OptionText> settings) {
     const Option* option = find_option(*uri.unit, setting.name);
     if (parameter == nullptr || option != nullptr) {
       options.push_back({option != nullptr ? option->name : setting.name, setting.value});
-    } else if (allowed(*parameter, uri.place)) {
+    } else if (allowed(*parameter, uri.port_kind)) {
       of_link.push_back(setting);
     } else {
-      throw UsageError(fmt::format("{} cannot be set here, it is for: {}", setting.name, parameter->places));
+      throw UsageError(fmt::format("{} cannot be set here, it is for: {}", setting.name, parameter->port_kinds));
     }
   }
   std::vector<std::string_view> names;
   for (const LinkParameter& parameter : link_parameters) {
-    if (allowed(parameter, uri.place)) names.push_back(parameter.name);
+    if (allowed(parameter, uri.port_kind)) names.push_back(parameter.name);
   }
   uri.options = require_options(*uri.unit, {}, options, names);
   uri.line = line_settings(*uri.unit, uri.options);
@@ -157,7 +157,7 @@ void take_settings(EncoderAddress& uri, std::span<const OptionText> settings) {
   check_speed_limit(uri);
   check_joint(of_link, uri.unit->resolution(uri.options).unit_um > 0);
   const bool any_rate_does =
-      uri.place == Place::sim || (uri.place == Place::serial && os::is_pseudo_terminal(uri.path));
+      uri.port_kind == PortKind::sim || (uri.port_kind == PortKind::serial && os::is_pseudo_terminal(uri.path));
   if (any_rate_does) uri.line = uri.line.with_some_rate();
 }
 
@@ -181,15 +181,15 @@ std::string examples(const Unit& unit) {
 
 // Checks that the place can carry the unit's kind of line.
 void check_place(const EncoderAddress& uri, std::string_view address) {
-  const bool is_can = uri.place == Place::can || uri.place == Place::slcan;
-  const bool fits = is_can                    ? uri.unit->link == LinkKind::can
-                    : uri.place == Place::spi ? goes_over_spi(*uri.unit)
-                                              : goes_over_serial(*uri.unit);
+  const bool is_can = uri.port_kind == PortKind::can || uri.port_kind == PortKind::slcan;
+  const bool fits = is_can                           ? uri.unit->link == LinkKind::can
+                    : uri.port_kind == PortKind::spi ? goes_over_spi(*uri.unit)
+                                                     : goes_over_serial(*uri.unit);
   if (fits) return;
-  const std::string_view place = is_can                    ? "a CAN adapter"
-                                 : uri.place == Place::spi ? "an SPI controller"
-                                 : uri.place == Place::tcp ? "TCP"
-                                                           : "a serial port";
+  const std::string_view place = is_can                           ? "a CAN adapter"
+                                 : uri.port_kind == PortKind::spi ? "an SPI controller"
+                                 : uri.port_kind == PortKind::tcp ? "TCP"
+                                                                  : "a serial port";
   throw UsageError(fmt::format("\"{}\": {} ({}) does not go over {}: write {}", address, uri.unit->id,
                                line_of(*uri.unit), place, examples(*uri.unit)));
 }
@@ -222,7 +222,7 @@ void parse_where(EncoderAddress& uri, std::string_view address) {
     if (colon == std::string_view::npos || colon + 1 == address.size()) {
       throw UsageError(fmt::format("\"{}\" does not say which encoder: write sim:{}", address, all_units()[0]->id));
     }
-    uri.place = Place::sim;
+    uri.port_kind = PortKind::sim;
     uri.unit = &require_unit(address.substr(colon + 1));
     return;
   }
@@ -232,20 +232,21 @@ void parse_where(EncoderAddress& uri, std::string_view address) {
   }
   const std::string_view where = address.substr(colon + 1);
   if (where.starts_with("tcp:")) {
-    uri.place = Place::tcp;
+    uri.port_kind = PortKind::tcp;
   } else if (where.starts_with("spi:")) {
-    uri.place = Place::spi;
+    uri.port_kind = PortKind::spi;
     if (uri.unit->over_spi != nullptr) uri.unit = uri.unit->over_spi;
   } else if (where.starts_with("slcan:")) {
-    uri.place = Place::slcan;
+    uri.port_kind = PortKind::slcan;
   } else if (uri.unit->link == LinkKind::can && where.find('/') == std::string_view::npos) {
-    uri.place = Place::can;
+    uri.port_kind = PortKind::can;
   }
   check_place(uri, address);
-  if (uri.place == Place::tcp) return parse_tcp(uri, where.substr(4));
-  uri.path = uri.place == Place::spi || uri.place == Place::slcan ? where.substr(where.find(':') + 1) : where;
+  if (uri.port_kind == PortKind::tcp) return parse_tcp(uri, where.substr(4));
+  uri.path =
+      uri.port_kind == PortKind::spi || uri.port_kind == PortKind::slcan ? where.substr(where.find(':') + 1) : where;
   if (uri.path.empty()) {
-    const std::string_view what = uri.place == Place::spi ? "SPI device" : "serial port of the adapter";
+    const std::string_view what = uri.port_kind == PortKind::spi ? "SPI device" : "serial port of the adapter";
     throw UsageError(fmt::format("\"{}\" does not say which {}: write {}", address, what, examples(*uri.unit)));
   }
 }
@@ -275,7 +276,7 @@ bool is_in_settings_file(std::string_view name) {
 
 bool fits(const EncoderAddress& uri, std::string_view setting) {
   if (find_option(*uri.unit, setting) != nullptr) return true;
-  if (const LinkParameter* parameter = find_link_parameter(setting)) return allowed(*parameter, uri.place);
+  if (const LinkParameter* parameter = find_link_parameter(setting)) return allowed(*parameter, uri.port_kind);
   return setting == word_option_name && takes_word(*uri.unit);
 }
 
@@ -297,7 +298,7 @@ void require_once(std::span<const OptionText> settings) {
 void try_settings(EncoderAddress uri, std::span<const OptionText> settings) {
   take_settings(uri, settings);
   const bool options_are_set = find_link_parameter(settings.back().name) != nullptr;
-  if (uri.place == Place::sim && options_are_set) VirtualDevice(*uri.unit, uri.options, uri.device);
+  if (uri.port_kind == PortKind::sim && options_are_set) VirtualDevice(*uri.unit, uri.options, uri.device);
 }
 
 EncoderAddress parse_named(std::string_view name, std::span<const OptionText> written, const NamedEncoders& names) {
@@ -399,10 +400,10 @@ host::SpeedLimit speed_limit(const EncoderAddress& uri) {
 }
 
 std::string address_of(const EncoderAddress& uri) {
-  if (uri.place == Place::sim) return fmt::format("sim:{}", uri.unit->id);
-  if (uri.place == Place::spi) return fmt::format("{}:spi:{}", uri.unit->id, uri.path);
-  if (uri.place == Place::tcp) return fmt::format("{}:tcp:{}:{}", uri.unit->id, uri.host, uri.port);
-  if (uri.place == Place::slcan) return fmt::format("{}:slcan:{}", uri.unit->id, uri.path);
+  if (uri.port_kind == PortKind::sim) return fmt::format("sim:{}", uri.unit->id);
+  if (uri.port_kind == PortKind::spi) return fmt::format("{}:spi:{}", uri.unit->id, uri.path);
+  if (uri.port_kind == PortKind::tcp) return fmt::format("{}:tcp:{}:{}", uri.unit->id, uri.host, uri.port);
+  if (uri.port_kind == PortKind::slcan) return fmt::format("{}:slcan:{}", uri.unit->id, uri.path);
   return fmt::format("{}:{}", uri.unit->id, uri.path);
 }
 

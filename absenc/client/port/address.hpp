@@ -20,8 +20,8 @@
 
 namespace absenc::client {
 
-enum class Place : std::uint8_t { serial, tcp, spi, can, slcan, sim };
-inline constexpr std::array<std::string_view, 6> place_names{"serial", "tcp", "spi", "can", "slcan", "sim"};
+enum class PortKind : std::uint8_t { serial, tcp, spi, can, slcan, sim };
+inline constexpr std::array<std::string_view, 6> port_kind_names{"serial", "tcp", "spi", "can", "slcan", "sim"};
 
 /// Name of the setting for the rate of an asynchronous line.
 inline constexpr std::string_view rate_setting = "baud";
@@ -31,7 +31,7 @@ struct LinkParameter {
   std::string_view name;
   std::string_view value;
   std::string_view meaning;
-  std::string_view places;  // places for which it is allowed, by the names of `place_names`
+  std::string_view port_kinds;  // places for which it is allowed, by the names of `port_kind_names`
   bool repeatable = false;
 };
 
@@ -91,7 +91,7 @@ inline constexpr std::array<LinkParameter, 30> link_parameters{{
 struct EncoderAddress {
   const Unit* unit = nullptr;
   Options options;
-  Place place = Place::serial;
+  PortKind port_kind = PortKind::serial;
   std::string path;  // path for serial, spi, slcan; name of the interface for can
   std::string host;  // host name for tcp
   std::uint16_t port = 0;

@@ -127,7 +127,7 @@ std::shared_ptr<os::LineFile> log_file(const std::string& path) {
 
 // Inserts the CAN log in front of the port.
 void keep_log(Link& link, const EncoderAddress& uri) {
-  const std::string name = uri.place == Place::sim ? "sim" : std::filesystem::path(uri.path).filename().string();
+  const std::string name = uri.port_kind == PortKind::sim ? "sim" : std::filesystem::path(uri.path).filename().string();
   auto log = std::make_shared<CanLog>(*link.frames, link.owner, log_file(uri.log), name);
   link.frames = log.get();
   link.owner = std::move(log);
@@ -157,18 +157,18 @@ Link open_sim(const EncoderAddress& uri) {
 
 Link open_link(const EncoderAddress& uri) {
   const auto open = [&] {
-    switch (uri.place) {
-      case Place::serial:
+    switch (uri.port_kind) {
+      case PortKind::serial:
         return open_serial(uri);
-      case Place::tcp:
+      case PortKind::tcp:
         return open_tcp(uri);
-      case Place::spi:
+      case PortKind::spi:
         return open_spi(uri);
-      case Place::can:
+      case PortKind::can:
         return open_can(uri);
-      case Place::slcan:
+      case PortKind::slcan:
         return open_slcan(uri);
-      case Place::sim:
+      case PortKind::sim:
         break;
     }
     return open_sim(uri);
@@ -179,20 +179,20 @@ Link open_link(const EncoderAddress& uri) {
 }
 
 Link open_receiving(const EncoderAddress& uri) {
-  switch (uri.place) {
-    case Place::serial:
+  switch (uri.port_kind) {
+    case PortKind::serial:
       return open_serial_receiving(uri);
-    case Place::tcp:
+    case PortKind::tcp:
       return open_tcp(uri);
-    case Place::can:
+    case PortKind::can:
       throw UsageError(fmt::format("frames of a CAN interface come from candump: candump -L {0} | absenc decode {1} -",
                                    uri.path, uri.unit->id));
-    case Place::slcan:
+    case PortKind::slcan:
       throw UsageError(
           "an slcan adapter has to be asked to receive: make an interface of it with slcand, and use candump");
-    case Place::spi:
+    case PortKind::spi:
       throw UsageError("a clocked line is received by a logic analyser: see `absenc decode --help`");
-    case Place::sim:
+    case PortKind::sim:
       break;
   }
   throw UsageError("a virtual encoder inside this command has no line: `absenc emulate` makes one");

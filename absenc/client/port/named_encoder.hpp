@@ -39,13 +39,13 @@ class NamedEncoders {
   [[nodiscard]] NamedEncoder require(std::string_view name) const;
 
  private:
-  using Index = std::unordered_map<std::string_view, const FileSection*>;
+  using SectionsByName = std::unordered_map<std::string_view, const FileSection*>;
   void check_line(const FileSection& encoder) const;
   void check_encoder(const FileSection& encoder) const;
 
   SettingsFile file_;
-  Index buses_;
-  Index encoders_;
+  SectionsByName buses_;
+  SectionsByName encoders_;
   std::unordered_map<std::string_view, std::size_t> on_bus_;  // number of encoders on each bus
 };
 

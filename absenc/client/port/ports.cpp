@@ -9,20 +9,20 @@
 
 namespace absenc::client {
 
-std::string Port::next_command() const {
+std::string FoundPort::next_command() const {
   if (!serial.refusal.empty() || !serial.holder.empty() || os::is_modem_driver(serial.driver)) return {};
   return fmt::format("absenc identify {}{}", kind == "spi" ? "spi:" : "", path);
 }
 
-std::vector<Port> ports() {
-  std::vector<Port> all;
+std::vector<FoundPort> ports() {
+  std::vector<FoundPort> all;
   for (const std::string& path : os::serial_ports()) all.push_back({path, "serial", os::inspect_port(path)});
   for (const std::string& interface : os::can_interfaces()) all.push_back({interface, "can"});
   for (const std::string& device : os::spi_devices()) all.push_back({device, "spi"});
   return all;
 }
 
-Json to_json(const Port& port) {
+Json to_json(const FoundPort& port) {
   Json json = Json::object().set("port", port.path).set("kind", port.kind);
   if (port.kind != "serial") return json;
   const auto known = [](const std::string& text) { return text.empty() ? Json() : Json(text); };

@@ -11,7 +11,7 @@
 
 namespace absenc::client {
 
-struct Port {
+struct FoundPort {
   std::string path{};       // path or name: "/dev/ttyUSB0", "can0", "/dev/spidev0.0"
   std::string_view kind{};  // "serial", "can" or "spi"
   os::ListedPort serial{};  // details of a serial port
@@ -22,10 +22,10 @@ struct Port {
 };
 
 /// Returns all ports without opening any, because that would reset some boards.
-[[nodiscard]] std::vector<Port> ports();
+[[nodiscard]] std::vector<FoundPort> ports();
 
 /// Returns {"port","kind"}; for a serial port also "lasting_name","maker","adapter","serial_number","chip","driver",
 /// "latency_timer_ms","highest_rate","may_open","refusal","in_use_by". Unknown values are null.
-[[nodiscard]] Json to_json(const Port& port);
+[[nodiscard]] Json to_json(const FoundPort& port);
 
 }  // namespace absenc::client

@@ -53,9 +53,9 @@ std::vector<std::pair<const toml::key*, const toml::node*>> in_file_order(const 
 }
 
 /// Reads one file.
-class Reader {
+class SettingsFileReader {
  public:
-  explicit Reader(const std::string& path) : path_(path) {}
+  explicit SettingsFileReader(const std::string& path) : path_(path) {}
 
   [[nodiscard]] std::string place(const toml::source_position& position) const {
     return fmt::format("{}:{}:{}", path_, position.line, position.column);
@@ -149,7 +149,7 @@ std::size_t end_of_string(std::string_view text, std::size_t at) {
 
 // Refuses deep nesting, because the library recurses as deep as the file; absenc.toml needs only a list in
 // [encoder.NAME]. Throws UsageError.
-void check_depth(std::string_view text, const Reader& reader) {
+void check_depth(std::string_view text, const SettingsFileReader& reader) {
   constexpr std::size_t deepest = 16;
   std::size_t brackets = 0;
   std::size_t dots = 0;  // number of dots in a dotted name
@@ -206,7 +206,7 @@ const FileSetting* FileSection::find(std::string_view setting) const {
 }
 
 SettingsFile parse_settings_file(std::string_view text, const std::string& path) {
-  const Reader reader(path);
+  const SettingsFileReader reader(path);
   check_depth(text, reader);
   try {
     return reader.config(toml::parse(text, path));

@@ -24,24 +24,24 @@ fs::path device(const std::string& path) {
 
 // Returns a key that is equal for encoders at the same place; "" if the place cannot be shared.
 std::string place_key(const EncoderAddress& one) {
-  const std::string_view place = place_names[static_cast<std::size_t>(one.place)];
-  switch (one.place) {
-    case Place::serial:
-    case Place::slcan:
+  const std::string_view place = port_kind_names[static_cast<std::size_t>(one.port_kind)];
+  switch (one.port_kind) {
+    case PortKind::serial:
+    case PortKind::slcan:
       return fmt::format("{}:{}", place, device(one.path).string());
-    case Place::can:
-    case Place::spi:
+    case PortKind::can:
+    case PortKind::spi:
       return fmt::format("{}:{}", place, one.path);
-    case Place::tcp:
+    case PortKind::tcp:
       return fmt::format("{}:{}:{}", place, one.host, one.port);
-    case Place::sim:
+    case PortKind::sim:
       break;
   }
   return {};
 }
 
 bool same_place(const EncoderAddress& one, const EncoderAddress& other) {
-  return one.place == other.place && one.place != Place::spi && one.place != Place::sim &&
+  return one.port_kind == other.port_kind && one.port_kind != PortKind::spi && one.port_kind != PortKind::sim &&
          place_key(one) == place_key(other);
 }
 
@@ -108,7 +108,7 @@ void require_different(std::span<const EncoderAddress> encoders, std::span<const
     for (const std::size_t other : at_place[key]) {
       const EncoderAddress& one = encoders[i];
       const EncoderAddress& before = encoders[other];
-      if (one.place == Place::spi && before.place == Place::spi && one.path == before.path) {
+      if (one.port_kind == PortKind::spi && before.port_kind == PortKind::spi && one.path == before.path) {
         throw UsageError(fmt::format("{} and {} are the same SPI device", names[other], names[i]));
       }
       if (!share_line(one, before)) continue;

@@ -124,7 +124,7 @@ void Hdf5Store::read(std::uint64_t at, MutableBytes bytes) {
 // A block is written after the blocks that it points to. An exception is the B-tree: the upper node is written first.
 // After a split it points to both halves, and a reader does not search the old node for the moved half. Object headers,
 // which hold the number of rows, are written last.
-int Hdf5Store::rank(const Block& block) {
+int Hdf5Store::rank(const StoredBlock& block) {
   constexpr int last = 1000;
   switch (block.type) {
     case H5FD_MEM_SUPER:
@@ -141,7 +141,7 @@ int Hdf5Store::rank(const Block& block) {
 }
 
 void Hdf5Store::commit() {
-  using Entry = std::pair<const std::uint64_t, Block>;
+  using Entry = std::pair<const std::uint64_t, StoredBlock>;
   std::vector<const Entry*> again;
   // New blocks are invisible to readers until the remaining blocks are written.
   for (const Entry& one : blocks_) {

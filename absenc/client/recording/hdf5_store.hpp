@@ -36,14 +36,14 @@ class Hdf5Store {
   std::uint64_t end = 0;  // end of the space that the library has allocated
 
  private:
-  struct Block {
+  struct StoredBlock {
     H5FD_mem_t type;
     std::vector<std::uint8_t> bytes;
   };
-  [[nodiscard]] static int rank(const Block& block);
+  [[nodiscard]] static int rank(const StoredBlock& block);
 
   Disk disk_;
-  std::map<std::uint64_t, Block> blocks_;
+  std::map<std::uint64_t, StoredBlock> blocks_;
   std::uint64_t committed_end_ = 0;
 };
 

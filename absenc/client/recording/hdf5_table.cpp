@@ -41,21 +41,21 @@ class Handle {
   Release release_;
 };
 
-Handle hdf5_type(Type type) {
+Handle hdf5_type(ColumnType type) {
   const auto made = [&] {
     switch (type) {
-      case Type::int64:
+      case ColumnType::int64:
         return H5Tcopy(H5T_STD_I64LE);
-      case Type::uint64:
+      case ColumnType::uint64:
         return H5Tcopy(H5T_STD_U64LE);
-      case Type::real:
+      case ColumnType::real:
         return H5Tcopy(H5T_IEEE_F64LE);
-      case Type::boolean:
+      case ColumnType::boolean:
         return H5Tcopy(H5T_STD_I8LE);
-      case Type::flags:
+      case ColumnType::flags:
         return H5Tcopy(H5T_STD_U32LE);
-      case Type::text:
-      case Type::bytes:
+      case ColumnType::text:
+      case ColumnType::bytes:
         break;
     }
     const hid_t text = H5Tcopy(H5T_C_S1);
@@ -83,27 +83,27 @@ void append_text(Elements& elements, std::string_view text) {
 }
 
 // Returns the value that stands for a missing one.
-void append_missing(Elements& elements, Type type) {
+void append_missing(Elements& elements, ColumnType type) {
   switch (type) {
-    case Type::int64:
+    case ColumnType::int64:
       return append(elements, std::numeric_limits<std::int64_t>::min());
-    case Type::uint64:
+    case ColumnType::uint64:
       return append(elements, std::numeric_limits<std::uint64_t>::max());
-    case Type::real:
+    case ColumnType::real:
       return append(elements, std::numeric_limits<double>::quiet_NaN());
-    case Type::boolean:
+    case ColumnType::boolean:
       return append(elements, std::int8_t{-1});
-    case Type::flags:
+    case ColumnType::flags:
       return append(elements, std::numeric_limits<std::uint32_t>::max());
-    case Type::text:
-    case Type::bytes:
+    case ColumnType::text:
+    case ColumnType::bytes:
       break;
   }
   append_text(elements, {});
 }
 
-void append_value(Elements& elements, Type type, const Value& value) {
-  if (type == Type::text || type == Type::bytes) return append_text(elements, to_text(value));
+void append_value(Elements& elements, ColumnType type, const Value& value) {
+  if (type == ColumnType::text || type == ColumnType::bytes) return append_text(elements, to_text(value));
   const auto put = [&](const auto& one) {
     using One = std::decay_t<decltype(one)>;
     if constexpr (std::is_same_v<One, bool>) {
@@ -144,7 +144,7 @@ constexpr const char* rows_name = "rows";
 
 Hdf5Rows::Hdf5Rows(std::span<const Column> columns) {
   for (std::size_t i = 0; i < columns.size(); ++i) {
-    if (columns[i].look.is_detail) continue;
+    if (columns[i].presentation.is_detail) continue;
     columns_.push_back(i);
     types_.push_back(columns[i].type);
   }
@@ -182,7 +182,7 @@ Hdf5Table::Hdf5Table(Hdf5Store::Disk disk, std::span<const Column> columns, cons
   put_attribute(file_, rows_name, hdf5_not_ended);
   std::string names;
   for (const Column& column : columns) {
-    if (column.look.is_detail) continue;
+    if (column.presentation.is_detail) continue;
     make(column);
     names += (names.empty() ? "" : ",") + std::string(column.name);
   }

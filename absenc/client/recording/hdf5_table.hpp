@@ -27,7 +27,7 @@ class Hdf5Rows {
  private:
   friend class Hdf5Table;
   std::vector<std::size_t> columns_;  // indexes of the columns in a row
-  std::vector<Type> types_;
+  std::vector<ColumnType> types_;
   std::vector<std::vector<std::uint8_t>> elements_;
   std::uint64_t count_ = 0;
 };

@@ -15,8 +15,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::array<Column, 3> columns{
-    {{"time_s", "s", Type::real, "seconds"}, {"position", "counts", Type::int64, ""}, {"event", "", Type::text, ""}}};
+constexpr std::array<Column, 3> columns{{{"time_s", "s", ColumnType::real, "seconds"},
+                                         {"position", "counts", ColumnType::int64, ""},
+                                         {"event", "", ColumnType::text, ""}}};
 
 struct Write {
   std::uint64_t at;

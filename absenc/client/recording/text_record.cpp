@@ -10,7 +10,7 @@ namespace absenc::client {
 
 namespace {
 
-bool is_explained(const Column& column) { return !column.look.is_detail && !column.meaning.empty(); }
+bool is_explained(const Column& column) { return !column.presentation.is_detail && !column.meaning.empty(); }
 
 std::string csv_begin(std::span<const Column> columns, const RecordHeader& header) {
   std::string text = fmt::format(

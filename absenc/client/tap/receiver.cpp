@@ -40,7 +40,7 @@ void Receiver::cancel() {
   changed_.notify_all();
 }
 
-Receiver::End Receiver::end() const {
+Receiver::ReceiveEnd Receiver::end() const {
   const std::lock_guard lock(mutex_);
   return end_;
 }
@@ -55,7 +55,7 @@ std::uint64_t Receiver::dropped() const {
 
 std::optional<Received> Receiver::next(Time deadline) {
   std::unique_lock lock(mutex_);
-  const auto has_something = [this] { return cancelled_ || !waiting_.empty() || end_ != End::none; };
+  const auto has_something = [this] { return cancelled_ || !waiting_.empty() || end_ != ReceiveEnd::none; };
   constexpr Time longest = 1h;
   for (;;) {
     const Time patience =
@@ -82,11 +82,11 @@ void Receiver::receive() {
       receive_from_input();
     }
   } catch (const os::Ended&) {
-    finish(End::time);
+    finish(ReceiveEnd::time);
   } catch (const os::Interrupted&) {
-    finish(End::interrupted);
+    finish(ReceiveEnd::interrupted);
   } catch (const std::exception& failure) {
-    finish(End::lost, failure.what());
+    finish(ReceiveEnd::lost, failure.what());
   }
 }
 
@@ -112,7 +112,7 @@ void Receiver::receive_from_input() {
   for (;;) {
     const std::optional<std::size_t> size = os::read_standard_input(buffer, std::min(quiet_at, end_time_));
     const Time now = os::now();
-    if (size && *size == 0) return finish(End::input);
+    if (size && *size == 0) return finish(ReceiveEnd::input);
     if (size) {
       put({now, {buffer.begin(), buffer.begin() + static_cast<std::ptrdiff_t>(*size)}});
     } else if (now >= quiet_at) {
@@ -134,7 +134,7 @@ void Receiver::put(Received received) {
   changed_.notify_all();
 }
 
-void Receiver::finish(End end, const std::string& problem) {
+void Receiver::finish(ReceiveEnd end, const std::string& problem) {
   const std::lock_guard lock(mutex_);
   end_ = end;
   problem_ = problem;

@@ -28,7 +28,7 @@ struct Received {
 
 class Receiver {
  public:
-  enum class End : std::uint8_t { none, input, time, interrupted, lost };
+  enum class ReceiveEnd : std::uint8_t { none, input, time, interrupted, lost };
 
   /// Opens the port of the address. Throws os::Failure, UsageError.
   explicit Receiver(const EncoderAddress& uri);
@@ -46,7 +46,7 @@ class Receiver {
   void cancel();
 
   /// Returns why the port was lost; `none` while it is open.
-  [[nodiscard]] End end() const;
+  [[nodiscard]] ReceiveEnd end() const;
   /// Returns in words why the port was lost.
   [[nodiscard]] std::string problem() const;
   /// Returns the number of dropped bytes. Bytes are dropped if the reader is too slow for too long.
@@ -67,7 +67,7 @@ class Receiver {
   void receive_from_port();
   void receive_from_input();
   void put(Received received);
-  void finish(End end, const std::string& problem = {});
+  void finish(ReceiveEnd end, const std::string& problem = {});
 
   Link link_;
   std::string place_;
@@ -78,7 +78,7 @@ class Receiver {
   std::deque<Received> waiting_;
   std::size_t waiting_size_ = 0;
   std::uint64_t dropped_ = 0;
-  End end_ = End::none;
+  ReceiveEnd end_ = ReceiveEnd::none;
   std::string problem_;
   bool cancelled_ = false;
 

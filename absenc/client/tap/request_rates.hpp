@@ -17,7 +17,7 @@ namespace absenc::client {
 
 class RequestRates final : public capture::AnnotationSink {
  public:
-  struct Kind {
+  struct RequestKind {
     std::string name{};                 // name of the protocol's command; "": no command sends such a request
     std::vector<std::uint8_t> first{};  // the first request of this kind
     std::uint64_t count = 0;
@@ -50,24 +50,24 @@ class RequestRates final : public capture::AnnotationSink {
     using AnnotationKind = capture::Annotation::Kind;
     const bool asks = annotation.kind == AnnotationKind::exchange || annotation.kind == AnnotationKind::request;
     if (!asks || annotation.composed) return;
-    Kind& kind = kind_of(annotation.request.bytes);
+    RequestKind& kind = kind_of(annotation.request.bytes);
     if (kind.count++ == 0) kind.begin = annotation.begin;
     kind.last = annotation.begin;
     kind.errors += annotation.error != Error::none ? 1 : 0;
   }
 
   /// Returns the kinds, the most frequent first. A damaged request is a kind of its own while there is room.
-  [[nodiscard]] std::vector<Kind> kinds() const {
-    std::vector<Kind> all = kinds_;
+  [[nodiscard]] std::vector<RequestKind> kinds() const {
+    std::vector<RequestKind> all = kinds_;
     std::stable_sort(all.begin(), all.end(),
-                     [](const Kind& one, const Kind& other) { return one.count > other.count; });
+                     [](const RequestKind& one, const RequestKind& other) { return one.count > other.count; });
     return all;
   }
 
  private:
   static constexpr std::size_t most_kinds = 64;  // further kinds are counted as the last one
 
-  struct Sample {
+  struct SampleRequest {
     std::string_view command;
     std::vector<std::uint8_t> bytes;
     bool varies;  // the command has arguments
@@ -75,27 +75,27 @@ class RequestRates final : public capture::AnnotationSink {
 
   // Requests of a command with arguments have the same beginning and the same length.
   [[nodiscard]] std::string_view command_of(Bytes request) const {
-    for (const Sample& one : samples_) {
+    for (const SampleRequest& one : samples_) {
       if (std::equal(one.bytes.begin(), one.bytes.end(), request.begin(), request.end())) return one.command;
     }
-    for (const Sample& one : samples_) {
+    for (const SampleRequest& one : samples_) {
       if (one.varies && one.bytes.size() == request.size() && one.bytes[0] == request[0]) return one.command;
     }
     return {};
   }
 
-  Kind& kind_of(Bytes request) {
+  RequestKind& kind_of(Bytes request) {
     const std::string_view name = command_of(request);
-    for (Kind& kind : kinds_) {
+    for (RequestKind& kind : kinds_) {
       const bool same = std::equal(kind.first.begin(), kind.first.end(), request.begin(), request.end());
       if (name.empty() ? kind.name.empty() && same : kind.name == name) return kind;
     }
     if (kinds_.size() == most_kinds) return kinds_.back();
-    return kinds_.emplace_back(Kind{std::string(name), {request.begin(), request.end()}});
+    return kinds_.emplace_back(RequestKind{std::string(name), {request.begin(), request.end()}});
   }
 
-  std::vector<Sample> samples_;
-  std::vector<Kind> kinds_;
+  std::vector<SampleRequest> samples_;
+  std::vector<RequestKind> kinds_;
 };
 
 }  // namespace absenc::client

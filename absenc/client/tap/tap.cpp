@@ -11,13 +11,13 @@
 
 namespace absenc::client {
 
-struct Tap::Work final : capture::AnnotationSink {
-  Work(const std::string& place, const TapChoices& choices)
+struct Tap::Parts final : capture::AnnotationSink {
+  Parts(const std::string& place, const TapChoices& choices)
       : run(place, choices), rows(settled(run), run.options(), clock) {}
 
   static const Unit& settled(TapRun& run) {
     if (run.settle([](const std::string&) {})) return run.unit();
-    if (run.outcome().end == Receiver::End::interrupted) throw os::Interrupted{};
+    if (run.outcome().end == Receiver::ReceiveEnd::interrupted) throw os::Interrupted{};
     if (!run.outcome().problem.empty()) throw Failure(run.outcome().problem);
     throw Failure(run.received_bytes() == 0
                       ? "nothing came: does the drive ask the encoder?"
@@ -42,7 +42,7 @@ struct Tap::Work final : capture::AnnotationSink {
   const Row* end() {
     if (is_cancelled) throw Cancelled{};
     const TapOutcome outcome = run.outcome();
-    if (outcome.end == Receiver::End::interrupted) throw os::Interrupted{};
+    if (outcome.end == Receiver::ReceiveEnd::interrupted) throw os::Interrupted{};
     if (!outcome.problem.empty()) throw Failure(outcome.problem);
     return nullptr;
   }
@@ -57,27 +57,27 @@ struct Tap::Work final : capture::AnnotationSink {
   std::atomic<bool> is_cancelled = false;
 };
 
-Tap::Tap(const std::string& place, const TapChoices& choices) : work_(std::make_unique<Work>(place, choices)) {}
+Tap::Tap(const std::string& place, const TapChoices& choices) : parts_(std::make_unique<Parts>(place, choices)) {}
 Tap::Tap(Tap&&) noexcept = default;
 Tap& Tap::operator=(Tap&&) noexcept = default;
 Tap::~Tap() = default;
 
 Tap::Iterator Tap::begin() {
-  work_->run.begin(*work_);
-  --work_->at;
+  parts_->run.begin(*parts_);
+  --parts_->at;
   advance();
   return Iterator(*this);
 }
 
-void Tap::advance() { row_ = work_->take(); }
+void Tap::advance() { row_ = parts_->take(); }
 
 void Tap::cancel() {
-  work_->is_cancelled = true;
-  work_->run.cancel();
+  parts_->is_cancelled = true;
+  parts_->run.cancel();
 }
 
-std::string_view Tap::protocol() const { return work_->run.unit().id; }
-std::vector<std::string> Tap::options() const { return settings_for(work_->run.unit(), work_->run.options()); }
-std::span<const Column> Tap::columns() const { return work_->rows.columns(); }
+std::string_view Tap::protocol() const { return parts_->run.unit().id; }
+std::vector<std::string> Tap::options() const { return settings_for(parts_->run.unit(), parts_->run.options()); }
+std::span<const Column> Tap::columns() const { return parts_->rows.columns(); }
 
 }  // namespace absenc::client

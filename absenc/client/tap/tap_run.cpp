@@ -106,7 +106,7 @@ TapRun::TapRun(std::string_view place, TapChoices choices) : choices_(std::move(
 
 TapRun::~TapRun() = default;
 
-std::vector<TapRun::Line> TapRun::lines_to_try() {
+std::vector<TapRun::LineToTry> TapRun::lines_to_try() {
   if (!choices_.protocol.empty()) {
     unit_ = &require_unit(choices_.protocol);
     if (!is_asynchronous(*unit_)) {
@@ -134,15 +134,15 @@ std::vector<TapRun::Line> TapRun::lines_to_try() {
     throw UsageError(
         fmt::format("frames of a CAN interface come from candump: candump -L {} | absenc decode PROTOCOL -", place_));
   }
-  std::vector<Line> lines;
+  std::vector<LineToTry> lines;
   std::optional<UsageError> refusal;
   for (const Unit* unit : all_units()) {
     if (!is_asynchronous(*unit)) continue;
     try {
       EncoderAddress address = parse_address(fmt::format("{}:{}", unit->id, place_), settings_);
-      const bool has_rates = address.place == Place::serial && !os::is_pseudo_terminal(address.path);
+      const bool has_rates = address.port_kind == PortKind::serial && !os::is_pseudo_terminal(address.path);
       if (has_rates && address.line.rate == 0) continue;
-      const bool known = std::any_of(lines.begin(), lines.end(), [&](const Line& one) {
+      const bool known = std::any_of(lines.begin(), lines.end(), [&](const LineToTry& one) {
         return !has_rates || (one.settings.rate == address.line.rate && one.settings.parity == address.line.parity &&
                               one.settings.stop_bits == address.line.stop_bits);
       });
@@ -155,7 +155,7 @@ std::vector<TapRun::Line> TapRun::lines_to_try() {
   return lines;
 }
 
-void TapRun::open(const Line& line) {
+void TapRun::open(const LineToTry& line) {
   receiver_.reset();  // closes the port first, because it is locked
   receiver_ = line.address ? std::make_unique<Receiver>(*line.address) : std::make_unique<Receiver>();
   receiver_->start(end_time_);
@@ -219,7 +219,7 @@ bool TapRun::identify(const std::function<void(const std::string&)>& progress) {
       }
       if (identify_line(progress)) return true;
       has_received = has_received || bytes_ != 0;
-      if (receiver_->end() != Receiver::End::none) return false;
+      if (receiver_->end() != Receiver::ReceiveEnd::none) return false;
     }
     if (has_received || lines_.size() == 1) return false;
   }
@@ -234,7 +234,7 @@ bool TapRun::identify_line(const std::function<void(const std::string&)>& progre
     const Time deadline = is_only_line || bytes_ != 0 ? never : os::now() + patience_at_rate;
     const std::optional<Received> received = collect(deadline);
     const bool is_silent = received && received->bytes.empty();
-    const bool is_over = !received && (bytes_ != 0 || receiver_->end() != Receiver::End::none);
+    const bool is_over = !received && (bytes_ != 0 || receiver_->end() != Receiver::ReceiveEnd::none);
     if (bytes_ >= next_search || (bytes_ != 0 && (is_silent || is_over))) {
       if (search(progress)) return true;
       while (next_search <= bytes_) next_search *= 2;

@@ -22,7 +22,7 @@
 namespace absenc::client {
 
 struct TapOutcome {
-  Receiver::End end = Receiver::End::none;
+  Receiver::ReceiveEnd end = Receiver::ReceiveEnd::none;
   std::string problem{};      // why the port was lost
   std::uint64_t bytes = 0;    // number of received bytes
   std::uint64_t dropped = 0;  // number of bytes received but dropped before decoding
@@ -60,13 +60,13 @@ class TapRun {
 
  private:
   struct Sinks;
-  struct Line {
+  struct LineToTry {
     LineSettings settings;
     std::optional<EncoderAddress> address;  // address of the port; nothing: standard input
   };
 
-  [[nodiscard]] std::vector<Line> lines_to_try();
-  void open(const Line& line);
+  [[nodiscard]] std::vector<LineToTry> lines_to_try();
+  void open(const LineToTry& line);
   std::optional<Received> collect(Time deadline);
   [[nodiscard]] CaptureChoices collected() const;
   bool identify(const std::function<void(const std::string&)>& progress);
@@ -80,7 +80,7 @@ class TapRun {
   Time end_time_ = never;
   const Unit* unit_ = nullptr;
   Options options_{};
-  std::vector<Line> lines_;
+  std::vector<LineToTry> lines_;
   std::unique_ptr<Receiver> receiver_;
   std::unique_ptr<TapRecord> record_;
   std::deque<Received> collected_;  // bytes received before the protocol was identified

@@ -53,8 +53,8 @@ class Json {
   [[nodiscard]] std::string line() const;
 
  private:
-  struct Value;
-  std::unique_ptr<Value> value_;
+  struct Parts;
+  std::unique_ptr<Parts> parts_;
 };
 
 }  // namespace absenc::client

@@ -25,7 +25,7 @@ std::size_t index_of(std::span<const Column> columns, std::string_view name) {
   throw UsageError(fmt::format("there is no column \"{}\"{}", name, suggestion(name, names)));
 }
 
-struct Text {
+struct ValueText {
   std::string operator()(std::monostate) const { return {}; }
   std::string operator()(Invalid) const { return {}; }
   std::string operator()(Unknown) const { return {}; }
@@ -59,11 +59,11 @@ Value value_of(Validity validity) {
   }
 }
 
-std::string to_text(const Value& value) { return std::visit(Text{}, value); }
+std::string to_text(const Value& value) { return std::visit(ValueText{}, value); }
 
 std::string to_text(const Column& column, const Value& value) {
   const auto* const number = std::get_if<std::int64_t>(&value);
-  const std::string text = number != nullptr && column.look.in_hex ? hexadecimal(*number) : to_text(value);
+  const std::string text = number != nullptr && column.presentation.in_hex ? hexadecimal(*number) : to_text(value);
   return column.unit.empty() || text.empty() ? text : fmt::format("{} {}", text, column.unit);
 }
 
@@ -71,11 +71,11 @@ const Value& Row::operator[](std::string_view name) const { return values[index_
 const Value& Answer::operator[](std::string_view name) const { return values[index_of(columns, name)]; }
 
 Column column_of(const FieldInfo& field) {
-  static constexpr std::array types{Type::int64, Type::uint64, Type::boolean, Type::flags,
-                                    Type::real,  Type::text,   Type::bytes};
+  static constexpr std::array types{ColumnType::int64, ColumnType::uint64, ColumnType::boolean, ColumnType::flags,
+                                    ColumnType::real,  ColumnType::text,   ColumnType::bytes};
   const bool is_exchange = field.role == Role::exchange || field.role == Role::data;
-  const Column::Look look{.in_hex = field.in_hex, .is_exchange = is_exchange};
-  return {field.name, field.unit, types[static_cast<std::size_t>(field.kind)], field.meaning, look};
+  const Column::Presentation presentation{.in_hex = field.in_hex, .is_exchange = is_exchange};
+  return {field.name, field.unit, types[static_cast<std::size_t>(field.kind)], field.meaning, presentation};
 }
 
 Value value_of(const FieldValue& value) {

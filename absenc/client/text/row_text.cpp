@@ -52,7 +52,7 @@ struct Cell {
 std::string csv_header(std::span<const Column> columns) {
   std::string names;
   for (const Column& column : columns) {
-    if (!column.look.is_detail) names += fmt::format("{}{}", names.empty() ? "" : ",", column.name);
+    if (!column.presentation.is_detail) names += fmt::format("{}{}", names.empty() ? "" : ",", column.name);
   }
   return names;
 }
@@ -61,10 +61,10 @@ void append_csv(std::string& text, const Row& row) {
   bool is_first = true;
   for (std::size_t i = 0; i < row.columns.size(); ++i) {
     const Column& column = row.columns[i];
-    if (column.look.is_detail) continue;
+    if (column.presentation.is_detail) continue;
     if (!is_first) text += ',';
     is_first = false;
-    std::visit(Cell{text, column.look.format}, row.values[i]);
+    std::visit(Cell{text, column.presentation.format}, row.values[i]);
   }
 }
 

@@ -61,7 +61,7 @@ void require_replaceable(const std::string& path) {
   if (const int error = os::replaceable(path); error != 0) refuse(std::strerror(error));
 }
 
-bool LineReader::next() {
+bool SignificantLines::next() {
   while (!rest_.empty()) {
     const std::size_t end = std::min(rest_.find('\n'), rest_.size());
     line = rest_.substr(0, end);

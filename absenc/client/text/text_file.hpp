@@ -24,9 +24,9 @@ inline constexpr std::string_view dump_title = "absenc dump 1";           // cop
 void require_replaceable(const std::string& path);
 
 /// Iterates over the lines that are not ignored, without blanks at their end.
-class LineReader {
+class SignificantLines {
  public:
-  explicit LineReader(std::string_view text) : rest_(text) {}
+  explicit SignificantLines(std::string_view text) : rest_(text) {}
 
   bool next();
 

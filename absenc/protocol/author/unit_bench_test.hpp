@@ -156,7 +156,7 @@ struct HostedLine : sim::Line<std::uint8_t> {
 
   void put_on(Machine<std::uint8_t>& host) {
     if (node) return replace(*node, host);
-    node = attach(sim::Role::host, host, [this] { return !on_emit || on_emit(); });
+    node = attach(sim::NodeRole::host, host, [this] { return !on_emit || on_emit(); });
   }
   /// Runs a host and returns whether it came to its end.
   bool converse(Machine<std::uint8_t>& host) {
@@ -184,7 +184,7 @@ struct UnitBench {
   UnitBench(const Unit& of, std::string_view settings) : UnitBench(of, options_of(of, settings)) {}
   UnitBench(const Unit& of, const Options& with) : unit(of), options(with) {
     device.power_on(Time{}, PowerOn::skip);
-    line.attach(sim::Role::device, tampered);
+    line.attach(sim::NodeRole::device, tampered);
   }
 
   /// Runs a command of the unit to its end with these `options`, one that streams to its first result. `on_emit` is

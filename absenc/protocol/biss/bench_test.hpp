@@ -53,13 +53,13 @@ struct ClockedBench {
   explicit ClockedBench(const LineSettings& settings, const Format& format, const More&... more)
       : encoder(format, shaft, more...), line(LinkKind::clocked, settings) {
     encoder.power_on(Time{}, absenc::Device<std::uint8_t>::PowerOn::skip);
-    line.attach(sim::Role::device, encoder);
+    line.attach(sim::NodeRole::device, encoder);
   }
 
   template <class Host>
   Host& run(Host& host) {
     if (node == none) {
-      node = line.attach(sim::Role::host, host);
+      node = line.attach(sim::NodeRole::host, host);
     } else {
       line.replace(node, host);
     }

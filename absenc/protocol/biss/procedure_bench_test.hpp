@@ -26,14 +26,14 @@ struct ProcedureRun final : author::Run<Protocol, ControlResults, procedure, bou
 struct ProcedureBench {
   explicit ProcedureBench(const Format& of = bits_24) : format(of), encoder(of, motion) {
     encoder.power_on(Time{}, Device<std::uint8_t>::PowerOn::skip);
-    line.attach(sim::Role::device, encoder);
+    line.attach(sim::NodeRole::device, encoder);
   }
   template <auto procedure, auto... bound>
   ControlResults ask(std::initializer_list<std::int64_t> arguments = {}, Error expected = Error::none) {
     std::vector<std::byte> storage(4096);
     ProcedureRun<procedure, bound...> asking(format, {arguments.begin(), arguments.size()}, storage);
     if (node == none) {
-      node = line.attach(sim::Role::host, asking);
+      node = line.attach(sim::NodeRole::host, asking);
     } else {
       line.replace(node, asking);
     }

@@ -103,11 +103,11 @@ TEST(BissProcedures, FailsWriteThatTheEncoderLoses) {
   encoder.power_on(Time{}, Device<std::uint8_t>::PowerOn::skip);
   ForgetfulEncoder forgets(encoder);
   sim::Line<std::uint8_t> line(LinkKind::clocked, line_settings);
-  line.attach(sim::Role::device, forgets);
+  line.attach(sim::NodeRole::device, forgets);
   const std::array<std::int64_t, 4> arguments{3, 7, 0, 0};
   std::vector<std::byte> storage(4096);
   ProcedureRun<write_memory<Format>> asking(testing::bits_24, arguments, storage);
-  EXPECT_TRUE(line.run(line.attach(sim::Role::host, asking), 10s));
+  EXPECT_TRUE(line.run(line.attach(sim::NodeRole::host, asking), 10s));
   EXPECT_EQ(asking.error(), Error::cross_check_failed);
 }
 

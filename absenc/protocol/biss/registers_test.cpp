@@ -120,7 +120,7 @@ Outcome run(Host<F>& host, const F& format, const sim::FaultRates& rates) {
   encoder.power_on(Time{}, Device<std::uint8_t>::PowerOn::skip);
   sim::FaultyDevice faulty(encoder, rates, 7);
   sim::Line<std::uint8_t> line(LinkKind::clocked, line_settings);
-  line.attach(sim::Role::device, faulty);
+  line.attach(sim::NodeRole::device, faulty);
   Outcome outcome;
   const auto on_emit = [&] {
     const Reading& reading = host.machine.position();
@@ -134,7 +134,7 @@ Outcome run(Host<F>& host, const F& format, const sim::FaultRates& rates) {
     if (last_end >= Time{} && seen.start != last_end + timeout_maximum) ++outcome.gaps;
     last_end = seen.end;
   });
-  const auto node = line.attach(sim::Role::host, host.machine, on_emit);
+  const auto node = line.attach(sim::NodeRole::host, host.machine, on_emit);
   EXPECT_TRUE(line.run(node, std::chrono::hours(24)));
   outcome.damaged = faulty.damaged_replies();
   outcome.faults = faulty.counts();
@@ -295,8 +295,8 @@ TEST(BissRegisters, UsesByteOrderOfFormat) {
       std::vector<std::byte> storage(4096);
       testing::ProcedureRun<read_info<Format>> asked(of_host, {}, storage);
       sim::Line<std::uint8_t> line(LinkKind::clocked, line_settings);
-      line.attach(sim::Role::device, encoder);
-      EXPECT_TRUE(line.run(line.attach(sim::Role::host, asked), 10s));
+      line.attach(sim::NodeRole::device, encoder);
+      EXPECT_TRUE(line.run(line.attach(sim::NodeRole::host, asked), 10s));
       ASSERT_EQ(asked.error(), Error::none);
       EXPECT_EQ(asked.found().serial_number, encoders == hosts ? 1u : 0x0100'0000u);
     }

@@ -71,7 +71,7 @@ TEST(E201Sweep, AbortRestoresTheClockAtAnyStep) {
     bench.raw("M6\r");
     const author::testing::Talk<std::uint8_t> talk(unit, bench.options, "clock-sweep", {100});
     Conversation<std::uint8_t>& sweep = *talk;
-    const std::size_t host = bench.line.attach(sim::Role::host, sweep);
+    const std::size_t host = bench.line.attach(sim::NodeRole::host, sweep);
     for (unsigned i = 0; i < steps && !bench.line.done(host); ++i) bench.line.step();
     const Time asked = bench.line.now();
     EXPECT_TRUE(sweep.abort());
@@ -108,7 +108,7 @@ TEST(E201Sweep, ReportLeftNamesClockThatWasSetLast) {
   bench.raw("M6\r");
   const author::testing::Talk<std::uint8_t> talk(unit, bench.options, "clock-sweep", {3});
   Conversation<std::uint8_t>& sweep = *talk;
-  const std::size_t host = bench.line.attach(sim::Role::host, sweep);
+  const std::size_t host = bench.line.attach(sim::NodeRole::host, sweep);
   std::string left;
   while (!bench.line.done(host)) {
     bench.line.step();

@@ -113,9 +113,9 @@ TEST(EncolinkDevice, ReportsBrokenSpiTimes) {
             {early, 5us, "clock less than 5 us after NCS went low"}})) {
     Bench bench(testing::single, Interface::spi);
     sim::Line<std::uint8_t> line{LinkKind::spi, settings};
-    line.attach(sim::Role::device, bench.encoder);
+    line.attach(sim::NodeRole::device, bench.encoder);
     SpiHost host(pause);
-    line.run(line.attach(sim::Role::host, host));
+    line.run(line.attach(sim::NodeRole::host, host));
     EXPECT_EQ(bench.first_violation(), rule);
   }
 }

@@ -23,7 +23,7 @@ struct Line8 {
       encoders.push_back(
           std::make_unique<VirtualEncoder>(Profile{.address = address, .bus = sharing_yes}, *shafts.back()));
       encoders.back()->power_on(Time{}, testing::PowerOn::skip);
-      line.attach(sim::Role::device, *encoders.back());
+      line.attach(sim::NodeRole::device, *encoders.back());
     }
   }
   std::vector<std::unique_ptr<testing::TestShaft>> shafts;

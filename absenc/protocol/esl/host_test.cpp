@@ -281,7 +281,7 @@ TEST(EslHost, ANodeThatNeverStopsDoesNotHoldTheHost) {
   for (const char* command : {"position", "zero", "scan"}) {
     Shouting shouting;
     Bench bench;
-    bench.line.attach(sim::Role::device, shouting);
+    bench.line.attach(sim::NodeRole::device, shouting);
     const Told read = bench.run(command);
     EXPECT_EQ(read.error, Error::wrong_length);
     EXPECT_TRUE(read.finished);

@@ -396,7 +396,7 @@ TEST(EslSafetyCampaign, SafePositionsOverABadLine) {
   encoder.power_on(Time{}, testing::PowerOn::skip);
   sim::FaultyDevice faulty(encoder, rates, 1);
   sim::Line<std::uint8_t> line{LinkKind::half_duplex, line_settings};
-  line.attach(sim::Role::device, faulty);
+  line.attach(sim::NodeRole::device, faulty);
   host::testing::GuardedHost<std::uint8_t> host(unit, line);
   unsigned safe = 0;
   while (encoder.answer_count() < 50'000) {

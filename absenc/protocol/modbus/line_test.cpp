@@ -81,12 +81,12 @@ struct Bench {
       if (start - last_end > character) silences.push_back(start - last_end);
       last_end = end;
     });
-    line.attach(sim::Role::device, server);
+    line.attach(sim::NodeRole::device, server);
   }
   template <class Machine>
   Machine& run(Machine& machine) {
     if (host) line.replace(*host, machine);
-    if (!host) host = line.attach(sim::Role::host, machine);
+    if (!host) host = line.attach(sim::NodeRole::host, machine);
     EXPECT_TRUE(line.run(*host, line.now() + 10s));
     return machine;
   }

@@ -76,7 +76,7 @@ struct Bench {
   Encoder& add(const Format& of_it) {
     encoders.emplace_back(of_it, shaft);
     encoders.back().power_on(line.now(), Device<Item>::PowerOn::skip);
-    line.attach(sim::Role::device, encoders.back());
+    line.attach(sim::NodeRole::device, encoders.back());
     return encoders.back();
   }
   Encoder& encoder() { return encoders.front(); }
@@ -89,7 +89,7 @@ struct Bench {
     if (host_end) {
       line.replace(*host_end, machine);  // the new host starts at the rate that the host before has set
     } else {
-      host_end = line.attach(sim::Role::host, machine, [this] { return !emitted || emitted(); });
+      host_end = line.attach(sim::NodeRole::host, machine, [this] { return !emitted || emitted(); });
     }
     EXPECT_TRUE(line.run(*host_end, start + std::chrono::seconds(60)) || on_emit);
     took = line.now() - start;

@@ -103,7 +103,7 @@ TEST(TformatDevice, ADamagedCharacterIsADelimiterError) {
   bench.line.observe([&answer](auto sender, Time, Time, std::uint8_t byte) {
     if (sender == 0) answer.push_back(byte);
   });
-  bench.line.attach(sim::Role::host, host);
+  bench.line.attach(sim::NodeRole::host, host);
   bench.pass(1ms);
   EXPECT_EQ(answer, wire(Reply{.status = status::delimiter_error, .encoder_id = 0x11}));
 }

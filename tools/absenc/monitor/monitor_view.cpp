@@ -46,7 +46,7 @@ std::string age(const Snapshot& snapshot) {
   return fmt::format("   ({:.1f} s old)", std::chrono::duration<double>(snapshot.age).count());
 }
 
-double unit_um(const Shown& shown) {
+double unit_um(const MonitoredEncoder& shown) {
   const EncoderAddress& uri = shown.watch->uri();
   return uri.unit->resolution(uri.options).unit_um;
 }
@@ -89,7 +89,7 @@ std::string measured_speed_text(const Snapshot& snapshot, std::string_view sign)
 }
 
 // Returns whether an alarm is raised. If not all alarms are reported, a status flag with advice counts too.
-bool has_alarm(const Shown& shown) {
+bool has_alarm(const MonitoredEncoder& shown) {
   const Unit& unit = *shown.watch->uri().unit;
   const Reading& reading = shown.snapshot.last.reading;
   bool is_complete = unit.alarms != nullptr;
@@ -115,14 +115,14 @@ constexpr int values_width = 43;  // width of all columns after the state
 
 std::vector<std::string> names_in(const View& view, int width) {
   std::vector<std::string> names;
-  for (const Shown& shown : view.encoders) names.push_back(shown.watch->name());
+  for (const MonitoredEncoder& shown : view.encoders) names.push_back(shown.watch->name());
   return short_names(names, static_cast<std::size_t>(std::max(width, 8)));
 }
 
 // Returns the width of the name column, next to the values and the mark of alarms.
 int name_width(const Screen& screen) { return std::clamp(screen.columns() - values_width - 13, 8, 40); }
 
-void draw_list_line(Screen& screen, int row, const Shown& shown, const std::string& name, bool selected) {
+void draw_list_line(Screen& screen, int row, const MonitoredEncoder& shown, const std::string& name, bool selected) {
   const Snapshot& snapshot = shown.snapshot;
   const int width = name_width(screen);
   screen.put(row, 0, selected ? ">" : " ", Style::bold);
@@ -140,8 +140,8 @@ void draw_list_line(Screen& screen, int row, const Shown& shown, const std::stri
 
 // Returns the texts of the columns position and speed.
 std::array<std::string_view, 2> units_of(const View& view) {
-  const auto linear =
-      std::count_if(view.encoders.begin(), view.encoders.end(), [](const Shown& one) { return unit_um(one) > 0; });
+  const auto linear = std::count_if(view.encoders.begin(), view.encoders.end(),
+                                    [](const MonitoredEncoder& one) { return unit_um(one) > 0; });
   if (linear == 0) return {"degrees", "rpm"};
   if (linear < std::ssize(view.encoders)) return {"deg, mm", "rpm, mm/s"};
   return {"mm", "mm/s"};
@@ -170,14 +170,14 @@ int draw_list(Screen& screen, int row, const View& view) {
 // ---- One encoder
 
 // Returns the range of the bar: one turn, or the whole range of a linear encoder.
-std::string range_text(const Shown& shown) {
+std::string range_text(const MonitoredEncoder& shown) {
   const EncoderAddress& uri = shown.watch->uri();
   const Resolution resolution = uri.unit->resolution(uri.options);
   if (resolution.unit_um == 0) return "360";
   return fmt::format("{:.6g} mm", std::ldexp(resolution.unit_um, static_cast<int>(resolution.singleturn_bits)) / 1000);
 }
 
-void draw_bar(Screen& screen, int row, const Shown& shown) {
+void draw_bar(Screen& screen, int row, const MonitoredEncoder& shown) {
   const Snapshot& snapshot = shown.snapshot;
   const std::string range = range_text(shown);
   const int width = std::min(screen.columns() - 9 - static_cast<int>(range.size()), 73);
@@ -191,7 +191,7 @@ void draw_bar(Screen& screen, int row, const Shown& shown) {
   screen.put(row, 2, fmt::format("0 |{}| {}", bar, range), has_position(snapshot) ? Style::plain : Style::faint);
 }
 
-void draw_position(Screen& screen, int row, const Shown& shown) {
+void draw_position(Screen& screen, int row, const MonitoredEncoder& shown) {
   const Snapshot& snapshot = shown.snapshot;
   const Unit& unit = *shown.watch->uri().unit;
   if (is_live(snapshot)) {
@@ -249,7 +249,7 @@ int draw_words(Screen& screen, int row, int end, std::string_view text, Style st
   return row;
 }
 
-int draw_alarms(Screen& screen, int row, int end, const Shown& shown) {
+int draw_alarms(Screen& screen, int row, int end, const MonitoredEncoder& shown) {
   const Unit& unit = *shown.watch->uri().unit;
   const std::string words = is_live(shown.snapshot) ? alarms_in_words(unit, shown.snapshot.last.reading) : "";
   std::string_view rest = words;
@@ -298,7 +298,7 @@ void draw_trace(Screen& screen, int row, int end, const Snapshot& snapshot) {
 }
 
 // Draws the last bad exchanges with sent and received bytes, repeated attempts included.
-void draw_errors(Screen& screen, int row, int end, const Shown& shown) {
+void draw_errors(Screen& screen, int row, int end, const MonitoredEncoder& shown) {
   if (shown.snapshot.bad.empty()) return screen.put(row, 2, "no exchange has failed");
   for (const BadExchangeText& bad : shown.snapshot.bad) {
     const double seconds = std::chrono::duration<double>(bad.at - shown.watch->start()).count();
@@ -308,7 +308,7 @@ void draw_errors(Screen& screen, int row, int end, const Shown& shown) {
   }
 }
 
-void draw_encoder(Screen& screen, int row, int end, const Shown& shown, bool errors) {
+void draw_encoder(Screen& screen, int row, int end, const MonitoredEncoder& shown, bool errors) {
   const Snapshot& snapshot = shown.snapshot;
   draw_position(screen, row++, shown);
   draw_bar(screen, row++, shown);
@@ -369,7 +369,7 @@ void draw(Screen& screen, const View& view) {
     screen.put(2, 0, "q: quit");
     return screen.show();
   }
-  const Shown& selected = view.encoders[view.selected];
+  const MonitoredEncoder& selected = view.encoders[view.selected];
   const std::string_view paused = view.paused ? "   PAUSED" : "";
   const int title_width = screen.columns() - 18 - static_cast<int>(paused.size());
   screen.fill(0, fmt::format(" absenc monitor   {}{}", names_in(view, title_width)[view.selected], paused),
@@ -386,7 +386,7 @@ void draw(Screen& screen, const View& view) {
   screen.show();
 }
 
-std::string to_line(const Shown& shown) {
+std::string to_line(const MonitoredEncoder& shown) {
   const Snapshot& snapshot = shown.snapshot;
   std::string text = fmt::format("{}: ", shown.watch->name());
   if (is_live(snapshot)) {
@@ -399,7 +399,7 @@ std::string to_line(const Shown& shown) {
   return text + fmt::format("   {:.1f} a second   {} failed", snapshot.rate, failures(snapshot));
 }
 
-Json to_json(const Shown& shown) {
+Json to_json(const MonitoredEncoder& shown) {
   const Snapshot& snapshot = shown.snapshot;
   const EncoderAddress& uri = shown.watch->uri();
   Json json = Json::object().set("encoder", shown.watch->name()).set("state", name_of(snapshot.state));

@@ -12,13 +12,13 @@
 
 namespace absenc::tool {
 
-struct Shown {
+struct MonitoredEncoder {
   const Watch* watch;
   Snapshot snapshot;
 };
 
 struct View {
-  std::vector<Shown> encoders;
+  std::vector<MonitoredEncoder> encoders;
   std::size_t selected = 0;
   bool paused = false;
   enum class Below : std::uint8_t { trace, errors, help } below = Below::trace;
@@ -33,7 +33,7 @@ void draw(Screen& screen, const View& view);
 
 /// Returns "elbow: 123.456 deg ..." for output without a screen. A reading that is not live is never printed as a
 /// value.
-[[nodiscard]] std::string to_line(const Shown& shown);
-[[nodiscard]] Json to_json(const Shown& shown);
+[[nodiscard]] std::string to_line(const MonitoredEncoder& shown);
+[[nodiscard]] Json to_json(const MonitoredEncoder& shown);
 
 }  // namespace absenc::tool

@@ -20,22 +20,22 @@ struct Screen::Terminal {
 
 namespace {
 
-struct Look {
+struct TextAttributes {
   attr_t attributes;
   short colour;  // of the colour pair, which has the same number; 0: none
 };
 
 // Indexed by Style. Terminals without colours only show the attributes.
-constexpr std::array<Look, 7> looks{{{A_NORMAL, 0},
-                                     {A_DIM, 0},
-                                     {A_BOLD, 0},
-                                     {A_REVERSE, 0},
-                                     {A_NORMAL, COLOR_GREEN},
-                                     {A_BOLD, COLOR_YELLOW},
-                                     {A_BOLD, COLOR_RED}}};
+constexpr std::array<TextAttributes, 7> looks{{{A_NORMAL, 0},
+                                               {A_DIM, 0},
+                                               {A_BOLD, 0},
+                                               {A_REVERSE, 0},
+                                               {A_NORMAL, COLOR_GREEN},
+                                               {A_BOLD, COLOR_YELLOW},
+                                               {A_BOLD, COLOR_RED}}};
 
 attr_t attributes_of(Style style, bool colours) {
-  const Look& look = looks[static_cast<std::size_t>(style)];
+  const TextAttributes& look = looks[static_cast<std::size_t>(style)];
   return look.attributes | (colours && look.colour != 0 ? static_cast<attr_t>(COLOR_PAIR(look.colour)) : 0);
 }
 
@@ -46,39 +46,39 @@ std::string shown(std::string_view text, std::size_t width) {
   return line;
 }
 
-Key key_of(int key) {
+KeyPress key_of(int key) {
   switch (key) {
     case ERR:
-      return Key::none;
+      return KeyPress::none;
     case 'q':
     case 'Q':
-      return Key::quit;
+      return KeyPress::quit;
     case ' ':
     case 'p':
-      return Key::pause;
+      return KeyPress::pause;
     case 'z':
-      return Key::zero;
+      return KeyPress::zero;
     case 'c':
-      return Key::clear_alarms;
+      return KeyPress::clear_alarms;
     case 'n':
     case '\t':
     case KEY_DOWN:
-      return Key::next;
+      return KeyPress::next;
     case KEY_UP:
     case KEY_BTAB:
-      return Key::previous;
+      return KeyPress::previous;
     case 'e':
-      return Key::errors;
+      return KeyPress::errors;
     case 'h':
     case '?':
-      return Key::help;
+      return KeyPress::help;
     case 'y':
     case 'Y':
-      return Key::yes;
+      return KeyPress::yes;
     case KEY_RESIZE:
-      return Key::resized;
+      return KeyPress::resized;
     default:
-      return Key::other;
+      return KeyPress::other;
   }
 }
 
@@ -107,7 +107,7 @@ std::unique_ptr<Screen> Screen::open() {
   terminal->colours = wants_colours() && ::has_colors() && ::start_color() == OK;
   if (terminal->colours) {
     ::use_default_colors();
-    for (const Look& look : looks) {
+    for (const TextAttributes& look : looks) {
       if (look.colour != 0) ::init_pair(look.colour, look.colour, -1);
     }
   }
@@ -141,7 +141,7 @@ void Screen::fill(int row, std::string_view text, Style style) {
 
 void Screen::show() { ::refresh(); }
 
-Key Screen::key(Time limit) {
+KeyPress Screen::key(Time limit) {
   ::timeout(static_cast<int>(std::chrono::duration_cast<std::chrono::milliseconds>(limit).count()));
   return key_of(::getch());
 }

@@ -12,7 +12,7 @@ namespace absenc::tool {
 
 enum class Style : std::uint8_t { plain, faint, bold, title, good, warning, bad };
 
-enum class Key : std::uint8_t {
+enum class KeyPress : std::uint8_t {
   none,
   quit,
   pause,
@@ -47,7 +47,7 @@ class Screen {
   void show();
 
   /// Returns the next key; waits for it at most `limit`.
-  [[nodiscard]] Key key(Time limit);
+  [[nodiscard]] KeyPress key(Time limit);
 
  private:
   struct Terminal;

@@ -45,7 +45,7 @@ std::string field_words(const capture::Contents& contents) {
 }
 
 // Number of CSV columns before the fields.
-enum Place : std::size_t { at_time, at_kind, at_request, at_reply, at_turnaround, at_reading };
+enum ColumnPosition : std::size_t { at_time, at_kind, at_request, at_reply, at_turnaround, at_reading };
 enum Behind : std::size_t { at_fields, at_error, at_message, behind_all };
 
 }  // namespace
@@ -67,15 +67,19 @@ AnnotationPrinter::AnnotationPrinter(const Unit& unit, const Options& options, c
       reading_(unit, options) {
   if (format != AnnotationFormat::csv) return;
   const bool has_time = clock.has_time();
-  columns_ = {{has_time ? "time_s" : "tick", "", has_time ? Type::real : Type::uint64, "", {.format = time_format_}},
-              {"kind", "", Type::text, ""},
-              {"request", "", Type::text, ""},
-              {"reply", "", Type::text, ""},
-              {"turnaround_us", "us", Type::real, "", {.format = "{:.3f}"}}};
+  columns_ = {{has_time ? "time_s" : "tick",
+               "",
+               has_time ? ColumnType::real : ColumnType::uint64,
+               "",
+               {.format = time_format_}},
+              {"kind", "", ColumnType::text, ""},
+              {"request", "", ColumnType::text, ""},
+              {"reply", "", ColumnType::text, ""},
+              {"turnaround_us", "us", ColumnType::real, "", {.format = "{:.3f}"}}};
   columns_.insert(columns_.end(), reading_.columns().begin(), reading_.columns().end());
-  columns_.push_back({"fields", "", Type::text, ""});
-  columns_.push_back({"error", "", Type::text, ""});
-  columns_.push_back({"message", "", Type::text, ""});
+  columns_.push_back({"fields", "", ColumnType::text, ""});
+  columns_.push_back({"error", "", ColumnType::text, ""});
+  columns_.push_back({"message", "", ColumnType::text, ""});
   row_.columns = columns_;
   kept_ = csv_header(columns_) + '\n';
 }

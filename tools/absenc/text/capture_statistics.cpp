@@ -70,7 +70,7 @@ void CaptureStatistics::put(const Annotation& annotation) {
     repeated_ += annotation.remark == Remark::repeated ? 1 : 0;
   }
   if (annotation.error != Error::none) return put_error(annotation);
-  row_.count = 0;
+  error_run_.count = 0;
   // The position of a composed frame was known from the first exchange that carried a byte of it.
   if (annotation.contents.reading != nullptr && !annotation.composed)
     trace_.add(annotation.begin, *annotation.contents.reading);
@@ -78,15 +78,15 @@ void CaptureStatistics::put(const Annotation& annotation) {
 
 void CaptureStatistics::put_error(const Annotation& annotation) {
   ++errors_;
-  if (row_.count++ == 0) row_.begin = annotation.begin;
-  row_.end = annotation.end;
-  if (row_.count > worst_row_.count) worst_row_ = row_;
+  if (error_run_.count++ == 0) error_run_.begin = annotation.begin;
+  error_run_.end = annotation.end;
+  if (error_run_.count > longest_error_run_.count) longest_error_run_ = error_run_;
   const auto kind = static_cast<std::size_t>(annotation.error);
   if (by_error_[kind]++ == 0) keep(annotation, first_of_kind_[kind]);
   if (first_count_ < most_kept) keep(annotation, first_[first_count_++]);
 }
 
-void CaptureStatistics::keep(const Annotation& annotation, Kept& kept) const {
+void CaptureStatistics::keep(const Annotation& annotation, StoredError& kept) const {
   const auto cut = [](Bytes bytes, std::size_t size) { return bytes.first(std::min(bytes.size(), size)); };
   kept.annotation = annotation;
   kept.annotation.contents = {};
@@ -98,7 +98,7 @@ void CaptureStatistics::keep(const Annotation& annotation, Kept& kept) const {
   if (annotation.reply.can != nullptr) kept.reply_can = *annotation.reply.can;
 }
 
-Annotation CaptureStatistics::restored(const Kept& kept) const {
+Annotation CaptureStatistics::restored(const StoredError& kept) const {
   Annotation annotation = kept.annotation;
   annotation.request.bytes = kept.request;
   annotation.reply.bytes = kept.reply;
@@ -178,7 +178,7 @@ std::string CaptureStatistics::turnaround_text() const {
   return text;
 }
 
-std::string CaptureStatistics::error_line(const Kept& kept) const {
+std::string CaptureStatistics::error_line(const StoredError& kept) const {
   const Annotation annotation = restored(kept);
   std::string line = fmt::format("  {:>14}  {}", clock_.text(annotation.begin), text_of(annotation.error).name);
   if (!annotation.request.empty()) line += "  " + to_wire_text(unit_.link, annotation.request) + " >";
@@ -195,9 +195,9 @@ std::string CaptureStatistics::errors_text() const {
     if (by_error_[i] == 0 || first_of_kind_[i].annotation.begin <= last) continue;
     text += fmt::format("first {}:\n{}", error_texts[i].name, error_line(first_of_kind_[i]));
   }
-  if (worst_row_.count > 1) {
-    text += fmt::format("worst: {} in a row, from {} to {}\n", worst_row_.count, clock_.text(worst_row_.begin),
-                        clock_.text(worst_row_.end));
+  if (longest_error_run_.count > 1) {
+    text += fmt::format("worst: {} in a row, from {} to {}\n", longest_error_run_.count,
+                        clock_.text(longest_error_run_.begin), clock_.text(longest_error_run_.end));
   }
   return text;
 }
@@ -231,7 +231,7 @@ Json CaptureStatistics::json(const CaptureOutcome& outcome) const {
                       unit_.timing.turnaround.count() == 0 ? Json() : Json(microseconds(unit_.timing.turnaround))));
   }
   if (!outcome.baud.empty()) json.set("baud", Json::list(outcome.baud));
-  const Json first_errors = Json::list(std::span(first_).first(first_count_), [&](const Kept& kept) {
+  const Json first_errors = Json::list(std::span(first_).first(first_count_), [&](const StoredError& kept) {
     const Annotation annotation = restored(kept);
     Json one = Json::object();
     if (clock_.has_time()) {
@@ -245,7 +245,7 @@ Json CaptureStatistics::json(const CaptureOutcome& outcome) const {
     return one.set("message", message_of(unit_, options_, annotation));
   });
   json.set("first_errors", first_errors);
-  if (worst_row_.count > 1) json.set("most_errors_in_a_row", worst_row_.count);
+  if (longest_error_run_.count > 1) json.set("most_errors_in_a_row", longest_error_run_.count);
   return json;
 }
 

@@ -63,29 +63,29 @@ class CaptureStatistics final : public capture::AnnotationSink {
   static constexpr std::size_t error_kinds = error_texts.size();
 
   // Beginning of the frame with an error, cut to a fixed length.
-  struct Kept {
+  struct StoredError {
     capture::Annotation annotation{};
     ByteBuffer<32> request{};
     ByteBuffer<96> reply{};
     CanFrame request_can{};
     CanFrame reply_can{};
   };
-  struct Row {
+  struct ErrorRun {
     std::uint64_t count = 0;
     capture::Tick begin = 0;
     capture::Tick end = 0;
   };
 
   void put_error(const capture::Annotation& annotation);
-  void keep(const capture::Annotation& annotation, Kept& kept) const;
-  [[nodiscard]] capture::Annotation restored(const Kept& kept) const;
+  void keep(const capture::Annotation& annotation, StoredError& kept) const;
+  [[nodiscard]] capture::Annotation restored(const StoredError& kept) const;
   [[nodiscard]] Time span() const;
   [[nodiscard]] double per_second() const;
 
   [[nodiscard]] std::string counts_text(const CaptureOutcome& outcome) const;
   [[nodiscard]] std::string turnaround_text() const;
   [[nodiscard]] std::string errors_text() const;
-  [[nodiscard]] std::string error_line(const Kept& kept) const;
+  [[nodiscard]] std::string error_line(const StoredError& kept) const;
 
   const Unit& unit_;
   const Options& options_;
@@ -104,11 +104,11 @@ class CaptureStatistics final : public capture::AnnotationSink {
   TimeHistogram histogram_;
   Time shortest_ = never;
   PositionTrace trace_;
-  std::array<Kept, most_kept> first_{};
+  std::array<StoredError, most_kept> first_{};
   std::size_t first_count_ = 0;
-  std::array<Kept, error_kinds> first_of_kind_{};
-  Row row_;
-  Row worst_row_;
+  std::array<StoredError, error_kinds> first_of_kind_{};
+  ErrorRun error_run_;
+  ErrorRun longest_error_run_;
 };
 
 }  // namespace absenc::tool

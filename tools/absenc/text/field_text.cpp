@@ -24,7 +24,7 @@ void JsonFields::put(const FieldValue& value) {
 }
 
 void JsonFields::put_reading(const Reading& reading) {
-  for (Judged& judged : judged_) {
+  for (ValidatedField& judged : judged_) {
     const Validity validity = validity_of(*judged.info, reading);
     if (judged.validity == Validity::valid || validity == Validity::invalid) judged.validity = validity;
     if (judged.validity == Validity::valid) continue;
@@ -80,7 +80,7 @@ std::vector<std::vector<std::string>> to_table(const Row& row) {
 }
 
 void FieldTable::put_reading(const Reading& reading) {
-  std::erase_if(judged_, [&](const Judged& judged) {
+  std::erase_if(judged_, [&](const ValidatedRow& judged) {
     if (holds(*judged.info, reading)) return false;
     rows[judged.row][1] = marked(*judged.info, rows[judged.row][1], reading);
     return true;  // point to the alarms only once

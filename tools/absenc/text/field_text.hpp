@@ -26,11 +26,11 @@ struct JsonFields final : FieldSink {
   Json fields = Json::object();
 
  private:
-  struct Judged {
+  struct ValidatedField {
     const FieldInfo* info;
     Validity validity;
   };
-  std::vector<Judged> judged_;
+  std::vector<ValidatedField> judged_;
 };
 
 /// Returns rows for `table`: name, value, unit or meaning; one row for each flag that is set.
@@ -43,13 +43,13 @@ struct FieldTable final : FieldSink {
   std::vector<std::vector<std::string>> rows;
 
  private:
-  struct Judged {
+  struct ValidatedRow {
     const FieldInfo* info;
     std::size_t row;
   };
   void put_flags(const FieldInfo& field, std::uint64_t bits);
 
-  std::vector<Judged> judged_;
+  std::vector<ValidatedRow> judged_;
   std::vector<std::pair<std::size_t, const FlagInfo*>>
       sends_to_alarms_;  // rows of the flags whose advice is to look at the alarms
   bool shows_alarms_ = false;

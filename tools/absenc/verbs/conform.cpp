@@ -91,7 +91,7 @@ class SpidevStage final : public HostStage {
   }
 
   [[nodiscard]] const std::string& path() const { return node_.path(); }
-  HostTrial::Seen seen() override {
+  HostTrial::TrialCounts seen() override {
     return {.answered = device_.device().bytes->answer_count(),
             .missing = count_of(device_, HostTrial::Fault::silence),
             .damaged = count_of(device_, HostTrial::Fault::damage),

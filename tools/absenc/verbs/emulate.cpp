@@ -138,8 +138,8 @@ void check_line(const Unit& unit, const Options& options, const Invocation& invo
 
 /// The virtual line, its memory file and the end of its time.
 template <class Item>
-struct Emulation {
-  Emulation(const Unit& unit, const Options& options, const Invocation& invocation)
+struct EmulationRun {
+  EmulationRun(const Unit& unit, const Options& options, const Invocation& invocation)
       : line(unit, options, invocation),
         file(std::string(invocation.text("--memory")), unit.id,
              options.model != nullptr ? options.model->name : "none"),
@@ -228,7 +228,7 @@ Notes serve_spi(Machine<std::uint8_t>& machine, const Unit& unit, const LineSett
 int emulate_bytes(const Unit& unit, const Options& options, const Invocation& invocation) {
   std::optional<EncoderAddress> served;
   if (invocation.has("--port")) served = parse_served_port(unit, invocation.text("--port"));
-  Emulation<std::uint8_t> emulation(unit, options, invocation);
+  EmulationRun<std::uint8_t> emulation(unit, options, invocation);
   const Time end = emulation.end();
   return emulation.run([&](Machine<std::uint8_t>& machine) -> Notes {
     if (invocation.has("--spidev")) return serve_spi(machine, unit, line_settings(unit, options), invocation, end);
@@ -254,7 +254,7 @@ Notes serve_adapter(Machine<CanFrame>& machine, const LineSettings& line, const 
 }
 
 int emulate_frames(const Unit& unit, const Options& options, const Invocation& invocation) {
-  Emulation<CanFrame> emulation(unit, options, invocation);
+  EmulationRun<CanFrame> emulation(unit, options, invocation);
   const Time end = emulation.end();
   const LineSettings line = line_settings(unit, options);
   return emulation.run([&](Machine<CanFrame>& machine) -> Notes {

@@ -97,7 +97,7 @@ Rows word_rows(const Unit& unit) {
 Rows port_rows() {
   Rows rows;
   for (const LinkParameter& parameter : link_parameters) {
-    rows.push_back({fmt::format("{}={}", parameter.name, parameter.value), std::string(parameter.places),
+    rows.push_back({fmt::format("{}={}", parameter.name, parameter.value), std::string(parameter.port_kinds),
                     std::string(parameter.meaning)});
   }
   return rows;

@@ -83,12 +83,12 @@ int run_memory_read(const Invocation& invocation) {
   os::catch_interrupts();
   const EncoderAddress uri = parse_address(invocation.text("encoder"), invocation.texts("--option"));
   if (!uri.unit->registers.empty()) return read_register(invocation, uri);
-  require_memory(*uri.unit, Access::read);
+  require_memory(*uri.unit, MemoryAccess::read);
   const MemoryAddress first = first_address(invocation);
   const std::int64_t count = invocation.number("--count", 1, 1, most_bytes);
   MemoryImage image;
   for (std::uint32_t i = 0; i < count; ++i) image[{first.page, first.address + i}] = 0;
-  require_open(*uri.unit, image, Access::read);
+  require_open(*uri.unit, image, MemoryAccess::read);
 
   Encoder encoder = open_encoder(uri);
   Memory memory = encoder.memory();
@@ -111,7 +111,7 @@ int run_write(const Invocation& invocation) {
   os::catch_interrupts();
   const EncoderAddress uri = parse_address(invocation.text("encoder"), invocation.texts("--option"));
   if (!uri.unit->registers.empty()) return write_register(invocation, uri);
-  const Access access = write_access(invocation);
+  const MemoryAccess access = write_access(invocation);
   require_memory(*uri.unit, access);
   MemoryAddress at = first_address(invocation);
   MemoryImage wanted;

@@ -50,9 +50,9 @@ void with_progress(std::string_view doing, const Work& work) {
   work([&](std::size_t done, std::size_t all) { progress.show(fmt::format("{} {} of {} bytes", doing, done, all)); });
 }
 
-class Change {
+class MemoryWrite {
  public:
-  Change(const Invocation& invocation, const EncoderAddress& uri, const MemoryImage& wanted, Access access)
+  MemoryWrite(const Invocation& invocation, const EncoderAddress& uri, const MemoryImage& wanted, MemoryAccess access)
       : invocation_(invocation), uri_(uri), unit_(*uri.unit), wanted_(wanted), access_(access) {}
 
   int run() {
@@ -159,7 +159,7 @@ class Change {
   const EncoderAddress& uri_;
   const Unit& unit_;
   const MemoryImage& wanted_;
-  Access access_;
+  MemoryAccess access_;
   bool asks_ = false;
   std::optional<Encoder> encoder_;
   std::optional<MemoryChange> change_;
@@ -167,8 +167,9 @@ class Change {
 
 }  // namespace
 
-int change_memory(const Invocation& invocation, const EncoderAddress& uri, const MemoryImage& wanted, Access access) {
-  return Change(invocation, uri, wanted, access).run();
+int change_memory(const Invocation& invocation, const EncoderAddress& uri, const MemoryImage& wanted,
+                  MemoryAccess access) {
+  return MemoryWrite(invocation, uri, wanted, access).run();
 }
 
 MemoryImage read_memory(Memory& memory, const MemoryImage& image) {

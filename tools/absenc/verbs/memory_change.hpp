@@ -12,13 +12,14 @@ namespace absenc::tool {
 using namespace client;
 
 /// Returns the access: with --force also to protected memory.
-[[nodiscard]] inline Access write_access(const Invocation& invocation) {
-  return invocation.has("--force") ? Access::force : Access::write;
+[[nodiscard]] inline MemoryAccess write_access(const Invocation& invocation) {
+  return invocation.has("--force") ? MemoryAccess::force : MemoryAccess::write;
 }
 
 /// Writes `wanted`, with --yes, --json and --dry-run; returns the exit status. If it ends early, it prints which bytes
 /// were written and which were not. All addresses of `wanted` must be writable. Throws UsageError without a terminal.
-int change_memory(const Invocation& invocation, const EncoderAddress& uri, const MemoryImage& wanted, Access access);
+int change_memory(const Invocation& invocation, const EncoderAddress& uri, const MemoryImage& wanted,
+                  MemoryAccess access);
 
 /// Returns the encoder's bytes at the addresses of `image`, with progress on a terminal.
 [[nodiscard]] MemoryImage read_memory(Memory& memory, const MemoryImage& image);

@@ -22,7 +22,7 @@ namespace {
 int run_dump(const Invocation& invocation) {
   os::catch_interrupts();
   const EncoderAddress uri = parse_address(invocation.text("encoder"), invocation.texts("--option"));
-  require_memory(*uri.unit, Access::read);
+  require_memory(*uri.unit, MemoryAccess::read);
   const bool to_file = invocation.has("--output");
   const std::string path = to_file ? link_target(std::string(invocation.text("--output"))) : "";
   if (to_file) require_replaceable(path);
@@ -41,7 +41,7 @@ int run_dump(const Invocation& invocation) {
   return exit_good;
 }
 
-MemoryImage read_dump(const Invocation& invocation, const EncoderAddress& uri, Access access) {
+MemoryImage read_dump(const Invocation& invocation, const EncoderAddress& uri, MemoryAccess access) {
   const std::string path(invocation.text("file"));
   const std::string text = read_text_file("the dump", path);
   const Dump dump = parse_dump(path, text, *uri.unit, uri.options, access);
@@ -60,7 +60,7 @@ MemoryImage read_dump(const Invocation& invocation, const EncoderAddress& uri, A
 int run_load(const Invocation& invocation) {
   os::catch_interrupts();
   const EncoderAddress uri = parse_address(invocation.text("encoder"), invocation.texts("--option"));
-  const Access access = write_access(invocation);
+  const MemoryAccess access = write_access(invocation);
   require_memory(*uri.unit, access);
   return change_memory(invocation, uri, read_dump(invocation, uri, access), access);
 }
@@ -68,8 +68,8 @@ int run_load(const Invocation& invocation) {
 int run_verify(const Invocation& invocation) {
   os::catch_interrupts();
   const EncoderAddress uri = parse_address(invocation.text("encoder"), invocation.texts("--option"));
-  require_memory(*uri.unit, Access::read);
-  const MemoryImage wanted = read_dump(invocation, uri, Access::read);
+  require_memory(*uri.unit, MemoryAccess::read);
+  const MemoryImage wanted = read_dump(invocation, uri, MemoryAccess::read);
   Encoder encoder = open_encoder(uri);
   Memory memory = encoder.memory();
   memory.check_model();

@@ -29,8 +29,8 @@ using Watches = std::vector<std::unique_ptr<Watch>>;
 
 constexpr Time refresh = 100ms;
 
-std::vector<Shown> look_at(const Watches& watches, std::size_t selected) {
-  std::vector<Shown> shown;
+std::vector<MonitoredEncoder> look_at(const Watches& watches, std::size_t selected) {
+  std::vector<MonitoredEncoder> shown;
   for (const auto& watch : watches) shown.push_back({watch.get(), watch->snapshot(shown.size() == selected)});
   return shown;
 }
@@ -43,36 +43,36 @@ class Controls {
   explicit Controls(Watches& watches) : watches_(&watches) {}
 
   /// Handles a key; returns false to quit.
-  bool take(Key key) {
-    const bool answers = !view_.question.empty() && key != Key::none && key != Key::resized;
+  bool take(KeyPress key) {
+    const bool answers = !view_.question.empty() && key != KeyPress::none && key != KeyPress::resized;
     if (answers) {
-      if (key == Key::yes) selected().run(*asked_);
+      if (key == KeyPress::yes) selected().run(*asked_);
       view_.question.clear();
       return true;
     }
     switch (key) {
-      case Key::quit:
+      case KeyPress::quit:
         return false;
-      case Key::pause:
+      case KeyPress::pause:
         view_.paused = !view_.paused;
         for (const auto& watch : *watches_) watch->pause(view_.paused);
         break;
-      case Key::zero:
+      case KeyPress::zero:
         ask_for(Verb::zero);
         break;
-      case Key::clear_alarms:
+      case KeyPress::clear_alarms:
         ask_for(Verb::clear_alarms);
         break;
-      case Key::next:
+      case KeyPress::next:
         view_.selected = (view_.selected + 1) % watches_->size();
         break;
-      case Key::previous:
+      case KeyPress::previous:
         view_.selected = (view_.selected + watches_->size() - 1) % watches_->size();
         break;
-      case Key::errors:
+      case KeyPress::errors:
         toggle(View::Below::errors);
         break;
-      case Key::help:
+      case KeyPress::help:
         toggle(View::Below::help);
         break;
       default:
@@ -117,10 +117,10 @@ void run_on_screen(Screen& screen, Watches& watches, Time end) {
 // ---- Without a terminal
 
 /// Prints to standard error when an encoder's state changes.
-class Changes {
+class StateChanges {
  public:
-  void tell(const std::vector<Shown>& encoders) {
-    for (const Shown& shown : encoders) {
+  void tell(const std::vector<MonitoredEncoder>& encoders) {
+    for (const MonitoredEncoder& shown : encoders) {
       Snapshot::State& before = states_.try_emplace(shown.watch, Snapshot::State::opening).first->second;
       const Snapshot& now = shown.snapshot;
       if (now.state == before) continue;
@@ -136,17 +136,17 @@ class Changes {
 };
 
 void print_lines(const Watches& watches, bool json, Time interval, Time end) {
-  Changes changes;
+  StateChanges changes;
   Time next = os::now() + std::min<Time>(interval, 500ms);  // the first lines once encoders had time to reply
   try {
     while (os::now() < end) {
       os::sleep_until(std::min({next, end, os::now() + refresh}));
       if (os::interrupted()) return;
-      const std::vector<Shown> encoders = look_at(watches, watches.size());
+      const std::vector<MonitoredEncoder> encoders = look_at(watches, watches.size());
       changes.tell(encoders);
       if (os::now() < next) continue;
       next += interval;
-      for (const Shown& shown : encoders) print_line(json ? to_json(shown).line() : to_line(shown));
+      for (const MonitoredEncoder& shown : encoders) print_line(json ? to_json(shown).line() : to_line(shown));
     }
   } catch (const os::Interrupted&) {
   }

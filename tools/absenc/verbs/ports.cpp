@@ -38,7 +38,7 @@ std::string way_text(const ListedPort& port) {
   return text;
 }
 
-std::string text_of_serial(const client::Port& listed) {
+std::string text_of_serial(const client::FoundPort& listed) {
   const ListedPort& port = listed.serial;
   std::string text = fmt::format("{}: {}\n  {}\n", port.path, adapter_text(port), way_text(port));
   if (!port.lasting_path.empty()) text += fmt::format("  lasting name: {}\n", port.lasting_path);
@@ -48,7 +48,7 @@ std::string text_of_serial(const client::Port& listed) {
   return text + fmt::format("  free; next: {}\n", listed.next_command());
 }
 
-std::string text_of(const client::Port& port) {
+std::string text_of(const client::FoundPort& port) {
   if (port.kind == "serial") return text_of_serial(port);
   const std::string_view words = port.kind == "can" ? "a CAN interface" : "an SPI controller";
   return fmt::format("{}: {}\n  next: {}\n", port.path, words, port.next_command());
@@ -57,7 +57,7 @@ std::string text_of(const client::Port& port) {
 int run_ports(const Invocation& invocation) {
   const bool json = invocation.has("--json");
   std::string text;
-  for (const client::Port& port : client::ports()) text += json ? to_json(port).line() + '\n' : text_of(port);
+  for (const client::FoundPort& port : client::ports()) text += json ? to_json(port).line() + '\n' : text_of(port);
   if (!text.empty()) {
     print_line(text);
   } else if (!json) {

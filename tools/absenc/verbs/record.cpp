@@ -22,7 +22,7 @@ namespace absenc::tool {
 namespace {
 
 /// Shows the progress of a recording once a second.
-class Report {
+class RecordingProgress {
  public:
   void show(const Recording& recording, const Encoder& live) {
     const Time now = os::now();
@@ -42,7 +42,7 @@ class Report {
 };
 
 // Prints losses, returns and failures between readings; the file has them too.
-void tell(const Sample& sample, const Encoder& live, Report& report) {
+void tell(const Sample& sample, const Encoder& live, RecordingProgress& report) {
   if (sample.restarted && live.restarts() == 1) {  // only the first time; the summary has the count
     report.clear();
     print_message(sample.message);
@@ -96,7 +96,7 @@ int run_record(const Invocation& invocation) {
   Encoder live = open_encoder(uri, Pace(settings.rate_hz).period());
   if (const std::string note = live.rate_note(); !note.empty()) print_message(fmt::format("note: {}", note));
   Recording recording(settings, live);
-  Report report;
+  RecordingProgress report;
   bool good = false;
   bool whole = true;
   const auto end_early = [&](std::string_view why) {

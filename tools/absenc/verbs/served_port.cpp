@@ -22,13 +22,13 @@ namespace absenc::tool {
 
 namespace {
 
-void tell_of_port(const std::string& name, Served what, std::string_view why) {
+void tell_of_port(const std::string& name, PortEvent what, std::string_view why) {
   switch (what) {
-    case Served::opened:
+    case PortEvent::opened:
       return print_line(fmt::format("ready: {}", name));
-    case Served::away:
+    case PortEvent::away:
       return print_message(fmt::format("{}\n  Waiting for it to come back.", why));
-    case Served::back:
+    case PortEvent::back:
       return print_message(fmt::format("the port {} is back", name));
   }
 }
@@ -46,7 +46,8 @@ void serve_as(Machine<Item>& machine, const std::string& name, Time end, const O
     os::sleep_until(std::min(time, end));
   };
   try {
-    serve_forever(machine, with_end, wait, [&](Served what, std::string_view why) { tell_of_port(name, what, why); });
+    serve_forever(machine, with_end, wait,
+                  [&](PortEvent what, std::string_view why) { tell_of_port(name, what, why); });
   } catch (const os::Interrupted&) {
   } catch (const os::Ended&) {
   }
@@ -56,7 +57,7 @@ void serve_as(Machine<Item>& machine, const std::string& name, Time end, const O
 
 EncoderAddress parse_served_port(const Unit& unit, std::string_view text) {
   const EncoderAddress uri = parse_address(fmt::format("{}:{}", unit.id, text));
-  if (uri.place != Place::serial) {
+  if (uri.port_kind != PortKind::serial) {
     throw UsageError(fmt::format("--port is \"{}\", but must be a serial port, as in /dev/ttyUSB1", text));
   }
   std::string_view rest = text.substr(std::min(text.find('?'), text.size()));

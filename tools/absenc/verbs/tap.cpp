@@ -53,7 +53,7 @@ struct TapCounts final : capture::AnnotationSink {
 
 std::string rates_text(const Unit& unit, const RequestRates& rates) {
   std::vector<std::vector<std::string>> rows{{"request", "first", "count", "a second", "bad or unanswered"}};
-  for (const RequestRates::Kind& kind : rates.kinds()) {
+  for (const RequestRates::RequestKind& kind : rates.kinds()) {
     const double rate = kind.per_second();
     rows.push_back({kind.name.empty() ? "of no command" : kind.name, to_wire_text(unit.link, {.bytes = kind.first}),
                     fmt::format("{}", kind.count), rate == 0 ? "" : fmt::format("{:.1f}", rate),
@@ -63,7 +63,7 @@ std::string rates_text(const Unit& unit, const RequestRates& rates) {
 }
 
 Json rates_json(const Unit& unit, const RequestRates& rates) {
-  return Json::list(rates.kinds(), [&](const RequestRates::Kind& kind) {
+  return Json::list(rates.kinds(), [&](const RequestRates::RequestKind& kind) {
     return Json::object()
         .set("command", kind.name.empty() ? Json() : Json(kind.name))
         .set("request", to_compact_wire_text(unit.link, {.bytes = kind.first}))

@@ -122,9 +122,9 @@ struct Scripted final : Machine<CanFrame> {
 inline CommandResult with(Scripted node, std::string_view command, std::vector<std::int64_t> arguments = {},
                           const Format& format = {}, std::uint32_t rate = 250'000) {
   sim::Line<CanFrame> line(LinkKind::can, {.rate = rate});
-  line.attach(sim::Role::device, node);
+  line.attach(sim::NodeRole::device, node);
   raa38::testing::Talk<CanFrame> talk(can_unit, options_of(format), command, std::move(arguments));
-  EXPECT_TRUE(line.run(line.attach(sim::Role::host, *talk), 20s));
+  EXPECT_TRUE(line.run(line.attach(sim::NodeRole::host, *talk), 20s));
   return raa38::testing::result_of<CanFrame>(*talk);
 }
 

@@ -52,9 +52,9 @@ std::vector<std::uint32_t> identifiers_of(std::string_view command, const Format
   std::vector<std::uint32_t> sent;
   line.observe([&](std::size_t, Time, Time, const CanFrame& frame) { sent.push_back(frame.id); });
   Scripted listener([](const CanFrame&) { return Frames{}; });  // acknowledges frames on the bus
-  line.attach(sim::Role::device, listener);
+  line.attach(sim::NodeRole::device, listener);
   raa38::testing::Talk<CanFrame> talk(can_unit, options_of(format), command, {});
-  EXPECT_TRUE(line.run(line.attach(sim::Role::host, *talk), 20s));
+  EXPECT_TRUE(line.run(line.attach(sim::NodeRole::host, *talk), 20s));
   return sent;
 }
 
@@ -76,9 +76,9 @@ TEST(Raa38CanNode, CommandsThatPollOtherNodesWarn) {
     line.observe([&](std::size_t, Time, Time, const CanFrame& frame) {
       asks_others = asks_others || (function_of(frame) == Function::command && node_of(frame) != 0x20);
     });
-    line.attach(sim::Role::device, silent);
+    line.attach(sim::NodeRole::device, silent);
     raa38::testing::Talk<CanFrame> talk(can_unit, options_of({}), command.name, arguments);
-    EXPECT_TRUE(line.run(line.attach(sim::Role::host, *talk), 60s)) << command.name;
+    EXPECT_TRUE(line.run(line.attach(sim::NodeRole::host, *talk), 60s)) << command.name;
     EXPECT_EQ(asks_others, !command.disturbs.empty()) << command.name;
   }
 }

@@ -102,8 +102,8 @@ struct ScriptedResult : CommandResult {
   sim::Line<std::uint8_t> line{LinkKind::half_duplex, line_settings};
   Scripted scripted(script);
   Talk talk(format, command, std::move(arguments));
-  line.attach(sim::Role::device, scripted);
-  EXPECT_TRUE(line.run(line.attach(sim::Role::host, *talk), 60s));
+  line.attach(sim::NodeRole::device, scripted);
+  EXPECT_TRUE(line.run(line.attach(sim::NodeRole::host, *talk), 60s));
   return {raa38::testing::result_of<std::uint8_t>(*talk), scripted.requests, scripted.request_times};
 }
 
