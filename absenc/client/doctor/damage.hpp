@@ -28,8 +28,18 @@ template <class Is>
 /// behind it, or the same again. Links of characters only.
 [[nodiscard]] bool has_good_part(const Case& one, const Attempted& attempt);
 
-/// Whether the frame that begins the reply needs more bytes than came. Links of characters only.
+/// Whether the frame that begins the reply, or the protocol, needs more bytes than came. Links of characters only.
 [[nodiscard]] bool is_cut(const Case& one, const Attempted& attempt);
+
+/// Replies that came behind another request than their own.
+struct Belated {
+  All requests{};   // behind which they came
+  Time lateness{};  // of the latest
+};
+
+/// Finds good replies to a request that was not answered in time, behind or before the reply to a later one, or in its
+/// place. Links of characters only.
+[[nodiscard]] Belated belated_replies(const Case& one);
 
 /// How many of the replies become good when one of their bits is flipped; 0 when these are no more than of random
 /// replies of the same length, for a short checksum lets many pass by chance.

@@ -126,7 +126,7 @@ class Doctor {
       try {
         std::optional<os::WakeupWatch> watch;
         if (surroundings_.on_the_clock && address_.port_kind != PortKind::sim) watch.emplace();
-        examiner.read(*read_, choices_.readings, choices_.limit, seen_.readings);
+        examiner.observe(*read_, choices_.readings, choices_.limit, seen_);
         if (watch) seen_.woken_late = watch->latest();
         if (any_good() && choices_.turning > Time{}) {
           tell("turn the shaft by hand now");
@@ -234,7 +234,7 @@ class Doctor {
   void read_again() {
     tell("reading");
     Examiner<Item> examiner(address_, surroundings_.open(address_), choices_.over);
-    examiner.read(*read_, choices_.readings, choices_.limit, seen_.readings);
+    examiner.observe(*read_, choices_.readings, choices_.limit, seen_);
     examiner.conclude(seen_);
   }
 

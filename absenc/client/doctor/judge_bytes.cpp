@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "absenc/client/doctor/chance.hpp"
 #include "absenc/client/doctor/damage.hpp"
 #include "absenc/client/doctor/judges.hpp"
 #include "absenc/client/doctor/words.hpp"
@@ -35,7 +36,11 @@ class Mender {
 
   /// `random`: undoes something else in its place, which shows how often chance does as well; null: the thing itself.
   Mender(const Case& one, const Attempted& attempt, sim::Random* random)
-      : one_(one), request_(attempt.exchange.request.frame()), raw_(attempt.raw), random_(random) {}
+      : one_(one),
+        request_(attempt.exchange.request.frame()),
+        raw_(attempt.raw),
+        expected_(attempt.expected),
+        random_(random) {}
 
   [[nodiscard]] const ByteList& raw() const { return raw_; }
   [[nodiscard]] sim::Random* random() const { return random_; }
@@ -78,10 +83,15 @@ class Mender {
       for (std::uint8_t& value : used) value = static_cast<std::uint8_t>(0x20 + random_->below(0xE0));
     }
     std::size_t tries = most_tries;
-    // As many at least as the frame lacks.
+    // As many as the protocol expects; else at least those that the frame lacks.
     const FrameEnd end = one_.unit.frame_end(one_.options, Direction::reply, raw_);
     const bool is_cut = end.kind == FrameEnd::Kind::incomplete && end.size > raw_.size();
-    for (put = is_cut ? std::min(end.size - raw_.size(), most) : 1; put <= most && tries > 0; ++put) {
+    put = is_cut ? std::min(end.size - raw_.size(), most) : 1;
+    if (expected_ != 0) {
+      if (expected_ <= raw_.size() || expected_ - raw_.size() > most) return false;
+      put = most = expected_ - raw_.size();
+    }
+    for (; put <= most && tries > 0; ++put) {
       ByteList bytes = raw_;
       if (insert(bytes, used, 0, put, tries)) return true;
     }
@@ -141,6 +151,7 @@ class Mender {
   const Case& one_;
   Frame request_;
   const ByteList& raw_;
+  std::size_t expected_;
   sim::Random* random_;
 };
 
@@ -230,7 +241,7 @@ bool fits_seven_bits(const ByteList& raw) {
 bool undo_seven_bits(const Mender& mender, std::size_t& count) { return mender.with_eighth_bits(count); }
 
 constexpr std::size_t cheap = 24;  // replies that are looked at
-constexpr std::size_t dear = 10;   // where each is decoded thousands of times
+constexpr std::size_t dear = 16;   // where each is decoded thousands of times
 
 // Changes at any place come before changes at one end.
 constexpr auto suspicions = std::to_array<Suspicion>({
@@ -271,6 +282,7 @@ std::optional<Finding> suspected(const Case& one, const All& all, const Suspicio
   const bool fits = std::all_of(one.seen.readings.begin(), one.seen.readings.end(),
                                 [&](const Attempted& attempt) { return suspicion.fits(attempt.raw); });
   if (!fits) return {};
+  constexpr std::size_t others = 2;  // changes by chance of each reply
   sim::Random random(1);
   std::size_t tried = 0;
   std::size_t mended = 0;
@@ -287,7 +299,8 @@ std::optional<Finding> suspected(const Case& one, const All& all, const Suspicio
       concerned = std::max(concerned, count);
       example = attempt;
     }
-    by_chance += suspicion.undo(Mender(one, *attempt, &random), ignored) ? 1 : 0;
+    for (std::size_t i = 0; i < others; ++i)
+      by_chance += suspicion.undo(Mender(one, *attempt, &random), ignored) ? 1 : 0;
     // A change that explains none of the first replies does not explain nearly all.
     if (tried >= enough && mended == 0) return {};
   }
@@ -295,7 +308,8 @@ std::optional<Finding> suspected(const Case& one, const All& all, const Suspicio
   if (tried < enough || mended * 10 < tried * 8) return {};
   constexpr std::size_t varied = 24;
   const bool is_seen = suspicion.ailment == Ailment::seven_bits && variety(all) >= varied;
-  if (!is_seen && mended < by_chance + tried / 2) return {};
+  const double share = static_cast<double>(by_chance + 1) / static_cast<double>(tried * others + 2);
+  if (!is_seen && chance_of(mended, tried, share) > 1e-3) return {};
   return finding(suspicion.ailment,
                  {fmt::format("{}", mended), fmt::format("{}", tried), bytes_of(concerned),
                   to_hex(Bytes(example->raw).first(std::min<std::size_t>(example->raw.size(), 24)))});
@@ -312,7 +326,9 @@ std::optional<Finding> seven_bits_of_good(const Case& one) {
   std::size_t good = 0;
   for (const Attempted& attempt : one.seen.readings) {
     if (!fits_seven_bits(attempt.raw)) return {};
-    if (attempt.error != Error::none) continue;
+    // Other replies than those with the position may have any bytes.
+    const bool is_position = attempt.reading || attempt.exchange.request.frame().empty();
+    if (attempt.error != Error::none || !is_position) continue;
     ++good;
     const bool is_alike = before != nullptr && before->raw.size() == attempt.raw.size();
     wraps.resize(std::max(wraps.size(), attempt.raw.size()));

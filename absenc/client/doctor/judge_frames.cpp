@@ -34,8 +34,6 @@ std::string errors_of(const std::vector<Attempted>& readings) {
   return fmt::format("{}", fmt::join(names, ", "));
 }
 
-bool is_good(const Case& one, const Frame& request, Bytes reply) { return decodes(one, request, {.bytes = reply}); }
-
 // ---- None is good
 
 All damaged(const Case& one) {
@@ -86,7 +84,8 @@ bool holds_two(const Case& one, const Attempted& attempt) {
   const Frame request = attempt.exchange.request.frame();
   const Bytes bytes = attempt.exchange.reply.bytes;
   for (std::size_t size = 2; size + 1 < bytes.size(); ++size) {
-    if (is_good(one, request, bytes.first(size)) && is_good(one, request, bytes.subspan(size))) return true;
+    if (decodes(one, request, {.bytes = bytes.first(size)}) && decodes(one, request, {.bytes = bytes.subspan(size)}))
+      return true;
   }
   return false;
 }
@@ -267,6 +266,15 @@ Finding some_damage(const Case& one, const All& all) {
 
 }  // namespace
 
+Finding silence_of(const Case& one, std::size_t silent) {
+  const std::vector<Attempted>& readings = one.seen.readings;
+  const bool sends_by_itself = one.unit.streams != nullptr && one.unit.streams(one.options) && !readings.empty() &&
+                               readings.front().exchange.request.frame().empty();
+  return finding(Ailment::sometimes_silent,
+                 {fmt::format("{}", silent), fmt::format("{}", readings.size()),
+                  sends_by_itself ? "frames did not come when they were due" : "requests were not answered"});
+}
+
 void judge_bad_frames(const Case& one, std::vector<Finding>& findings) {
   const All all = damaged(one);
   if (all.empty()) return;
@@ -293,7 +301,7 @@ Finding finding_of(const Unit& unit, const Options& options, PortKind place, con
   if (late && last.error == Error::timeout) return suited(finding(Ailment::reply_late, {"", "", "", ""}));
   if (usually_good) {
     return suited(last.heard ? finding(Ailment::sometimes_damaged, {"", "", ""})
-                             : finding(Ailment::sometimes_silent, {"", ""}));
+                             : finding(Ailment::sometimes_silent, {"", "", ""}));
   }
   // A single frame can show another model, as many frames do for the doctor.
   const auto& [request, reply] = last.exchange;
@@ -309,7 +317,7 @@ Finding finding_of(const Unit& unit, const Options& options, PortKind place, con
 }
 
 void judge_mixed_frames(const Case& one, std::vector<Finding>& findings) {
-  All all = damaged(one);
+  All all = chosen(damaged(one), [](const Attempted& attempt) { return !is_silent(attempt); });
   if (std::optional<Finding> adapter = damage_by_adapter(one, all)) {
     findings.push_back(std::move(*adapter));
     return;
@@ -326,6 +334,16 @@ void judge_mixed_frames(const Case& one, std::vector<Finding>& findings) {
     });
     return taken;
   };
+  const Belated belated = belated_replies(one);
+  static_cast<void>(take([&](const Attempted& attempt) {
+    return std::ranges::find(belated.requests, &attempt) != belated.requests.end();
+  }));
+  const std::size_t late =
+      one.unit.link == LinkKind::can ? 0 : std::max<std::size_t>(one.seen.late, belated.requests.size());
+  // A late reply can cost the next readings, too.
+  const bool is_lateness_found =
+      std::ranges::any_of(findings, [](const Finding& found) { return found.ailment == Ailment::sometimes_late; });
+  if (is_lateness_found && all.size() <= 2 * late) all.clear();
   // Where the host is the clock, a line that never moved is silence.
   const All stuck = take([](const Attempted& attempt) { return attempt.error == Error::line_stuck; });
   const auto is_misheard = [&](const Attempted& attempt) {
@@ -357,15 +375,10 @@ void judge_mixed_frames(const Case& one, std::vector<Finding>& findings) {
   } else if (!all.empty()) {
     findings.push_back(some_damage(one, all));
   }
-  const auto silent =
-      stuck.size() + static_cast<std::size_t>(std::count_if(
-                         one.seen.readings.begin(), one.seen.readings.end(),
-                         [](const Attempted& attempt) { return attempt.error != Error::none && !attempt.heard; }));
-  const std::size_t late = one.unit.link == LinkKind::can ? 0 : one.seen.late;
-  // A late reply can cost the next reading, too.
+  const std::size_t silent =
+      stuck.size() + static_cast<std::size_t>(std::ranges::count_if(one.seen.readings, is_silent));
   if (silent > 2 * late && !may_be_the_computer(one.seen, silent)) {
-    findings.push_back(
-        finding(Ailment::sometimes_silent, {fmt::format("{}", silent), fmt::format("{}", one.seen.readings.size())}));
+    findings.push_back(silence_of(one, silent));
   }
 }
 

@@ -131,7 +131,13 @@ std::optional<Finding> other_settings(const Case& one, const All& all) {
   constexpr std::size_t enough = 4;  // frames: fewer prove little
   if (all.size() < enough) return {};
   std::vector<capture::ObservedExchange> exchanges;
-  for (const Attempted* attempt : all) exchanges.push_back(attempt->exchange);
+  // Those before it in a reading may tell what the encoder is, too.
+  for (const Attempted& attempt : one.seen.exchanges) {
+    if (attempt.answered) exchanges.push_back(attempt.exchange);
+  }
+  if (exchanges.empty()) {
+    for (const Attempted* attempt : all) exchanges.push_back(attempt->exchange);
+  }
   constexpr std::size_t most_tried = 32;  // each is decoded with many sets of options
   exchanges.resize(std::min(exchanges.size(), most_tried));
   const std::vector<std::string> address = address_settings(one.unit, one.options);

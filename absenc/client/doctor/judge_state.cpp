@@ -3,12 +3,14 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <optional>
 #include <set>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "absenc/client/doctor/chance.hpp"
 #include "absenc/client/doctor/judges.hpp"
 #include "absenc/client/doctor/words.hpp"
 #include "absenc/client/reading.hpp"
@@ -137,15 +139,18 @@ void judge_state(const Case& one, std::vector<Finding>& findings) {
 }
 
 std::optional<Finding> judge_start(const Case& one) {
-  constexpr std::size_t enough = 20;  // good ones
+  constexpr double chance = 1e-3;  // that so many failures, in any order, all come first
   const std::vector<Attempted>& readings = one.seen.readings;
-  const auto first =
-      std::ranges::find_if(readings, [](const Attempted& attempt) { return attempt.error == Error::none; });
-  const auto silent = static_cast<std::size_t>(first - readings.begin());
-  const bool was_silent = std::all_of(readings.begin(), first, [](const Attempted& attempt) { return !attempt.heard; });
-  if (silent < 4 || !was_silent || one.good < enough || silent + one.good != readings.size()) return {};
-  return finding(Ailment::starting, {fmt::format("nothing came for the first {}, and then all {} readings were good",
-                                                 to_text(first->began - readings.front().began), one.good)});
+  const auto first = std::ranges::find_if(readings, is_good);
+  const auto failed = static_cast<std::size_t>(first - readings.begin());
+  if (failed < 2 || failed + one.good != readings.size()) return {};
+  const auto silent = static_cast<std::size_t>(std::count_if(readings.begin(), first, is_silent));
+  // The last ones may be damaged, as the encoder comes up while it is asked.
+  if (silent * 2 < failed || may_be_the_computer(one.seen, failed)) return {};
+  if (-log_choose(readings.size(), failed) > std::log(chance)) return {};
+  return finding(Ailment::starting,
+                 {fmt::format("nothing good came for the first {}, and then all {} readings were good",
+                              to_text(first->began - readings.front().began), one.good)});
 }
 
 }  // namespace absenc::client

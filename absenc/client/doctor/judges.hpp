@@ -18,6 +18,13 @@ struct Case {
   std::size_t good = 0;
 };
 
+[[nodiscard]] inline bool is_good(const Attempted& one) { return one.error == Error::none; }
+
+/// Whether nothing answered: an adapter's echo of the request is no answer.
+[[nodiscard]] inline bool is_silent(const Attempted& one) {
+  return one.error != Error::none && (!one.heard || (!one.raw.empty() && one.raw == one.exchange.request.bytes));
+}
+
 /// Whether so many replies that were late or did not come may be due to this computer, which was busy: the encoder may
 /// be a program on it, or an adapter whose driver waits, too. A single one may be where there are many readings, and
 /// one of a hundred where the computer stood still for as long as a reply may take.
@@ -36,6 +43,8 @@ void judge_port(const Case& one, std::vector<Finding>& findings);
 void judge_line(const Case& one, std::vector<Finding>& findings);
 /// Of replies of which none is good.
 void judge_bad_frames(const Case& one, std::vector<Finding>& findings);
+/// So many of the requests that were not answered, or of the frames that an encoder was to send by itself.
+[[nodiscard]] Finding silence_of(const Case& one, std::size_t silent);
 /// Failures that come together, with pauses between them.
 [[nodiscard]] std::optional<Finding> coming_and_going(const Case& one);
 /// Of replies of which some are.

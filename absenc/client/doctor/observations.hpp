@@ -45,8 +45,12 @@ struct Observations {
   std::optional<Refusal> refusal{};
   std::vector<std::uint8_t> unsolicited{};  // before anything was sent
   Time listened{};
-  bool never_silent = false;  // meanwhile
+  bool never_silent = false;      // meanwhile
+  std::size_t within_frames = 0;  // of an encoder that sends by itself: so many bytes are good frames, the others not
   std::vector<Attempted> readings{};
+  /// Each request with its reply, where a reading took several; the frames, where the encoder sends by itself, and
+  /// those that did not come in time. Empty: `readings` are all.
+  std::vector<Attempted> exchanges{};
   std::vector<Attempted> turned{};  // while somebody turned the shaft by hand
   std::uint64_t line_errors = 0;    // of a CAN bus
   std::uint64_t late = 0;           // replies that came after their limit

@@ -61,8 +61,7 @@ constexpr auto table = std::to_array<Words>({
      "nobody acknowledges, or nodes have different bit rates",
      "check the encoder's supply, CANH and CANL, 120 ohms at both ends, and the bit rate"},
 
-    {Ailment::never_silent, "never_silent", fault,
-     "{0} bytes came in {1} before anything was asked, without a pause, such as {2}",
+    {Ailment::never_silent, "never_silent", fault, "{0} bytes came in {1} {3}, such as {2}",
      "another host or an encoder that sends by itself has the line, or the line is open and picks up noise",
      "disconnect what else sends; set the mode in which it sends by itself; bias the idle line"},
     {Ailment::line_inverted, "line_inverted", fault, "the idle line is low: {0}",
@@ -98,7 +97,7 @@ constexpr auto table = std::to_array<Words>({
      "the sender is many times slower or faster than the port is set", "set the rate of the encoder with baud=RATE"},
 
     {Ailment::byte_before, "byte_before", fault,
-     "{0} of {1} replies are good without the {2} before each of them, such as {3}",
+     "{0} of {1} replies are good without {2} before each of them, such as {3}",
      "the adapter switches its direction too late, or receives while it still sends",
      "use an adapter that switches its direction by itself, or rs485=on; bias the idle line"},
     {Ailment::byte_after, "byte_after", fault,
@@ -158,7 +157,7 @@ constexpr auto table = std::to_array<Words>({
     {Ailment::sometimes_damaged, "sometimes_damaged", warning, "{0} of {1} replies are damaged ({2})",
      "noise, reflections or a loose contact",
      "check termination, shielding and plugs; look again at standstill to hear which bits"},
-    {Ailment::sometimes_silent, "sometimes_silent", warning, "{0} of {1} requests were not answered",
+    {Ailment::sometimes_silent, "sometimes_silent", warning, "{0} of {1} {2}",
      "the request does not always arrive, or a contact is loose",
      "check plugs, supply and termination; a busy computer needs latency=MS behind the encoder"},
     {Ailment::comes_and_goes, "comes_and_goes", warning, "{0} of {1} readings failed, in {2} bursts{3}",

@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: Apache-2.0
+// How likely chance makes what was seen.
+#pragma once
+
+#include <cmath>
+#include <cstddef>
+
+namespace absenc::client {
+
+/// Returns the logarithm of the number of ways to choose `some` of `all`.
+[[nodiscard]] inline double log_choose(std::size_t all, std::size_t some) {
+  return std::lgamma(static_cast<double>(all + 1)) - std::lgamma(static_cast<double>(some + 1)) -
+         std::lgamma(static_cast<double>(all - some + 1));
+}
+
+/// Returns the probability that `some` or more of `all` are so, where each is with probability `share`, which is
+/// neither 0 nor 1.
+[[nodiscard]] inline double chance_of(std::size_t some, std::size_t all, double share) {
+  double sum = 0;
+  for (std::size_t more = some; more <= all; ++more) {
+    sum += std::exp(log_choose(all, more) + static_cast<double>(more) * std::log(share) +
+                    static_cast<double>(all - more) * std::log1p(-share));
+  }
+  return sum;
+}
+
+}  // namespace absenc::client
