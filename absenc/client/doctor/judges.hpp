@@ -22,7 +22,8 @@ struct Case {
 
 /// Whether nothing answered: an adapter's echo of the request is no answer.
 [[nodiscard]] inline bool is_silent(const Attempted& one) {
-  return one.error != Error::none && (!one.heard || (!one.raw.empty() && one.raw == one.exchange.request.bytes));
+  const bool is_echo = !one.answered && one.raw == one.exchange.request.bytes;
+  return one.error != Error::none && (!one.heard || is_echo);
 }
 
 /// Whether so many replies that were late or did not come may be due to this computer, which was busy: the encoder may

@@ -43,15 +43,19 @@ std::vector<Piece> pieces_of(const StreamBytes& stream, Time pause) {
   return pieces;
 }
 
+// Returns the size that most pieces have, and how many have it.
+std::pair<std::size_t, std::size_t> usual_size(const std::vector<Piece>& pieces) {
+  std::map<std::size_t, std::size_t> sizes;
+  for (const Piece& piece : pieces) ++sizes[piece.bytes.size()];
+  return *std::ranges::max_element(sizes, {}, [](const auto& one) { return one.second; });
+}
+
 // Returns the share of the size that most pieces have; 0: of pieces that are no frames.
 double evenness(const std::vector<Piece>& pieces) {
   constexpr std::size_t shortest = 2;
   if (pieces.size() < enough) return 0;
-  std::map<std::size_t, std::size_t> sizes;
-  for (const Piece& piece : pieces) ++sizes[piece.bytes.size()];
-  const auto usual = std::ranges::max_element(sizes, {}, [](const auto& one) { return one.second; });
-  if (usual->first < shortest) return 0;
-  return static_cast<double>(usual->second) / static_cast<double>(pieces.size());
+  const auto [size, count] = usual_size(pieces);
+  return size < shortest ? 0 : static_cast<double>(count) / static_cast<double>(pieces.size());
 }
 
 // The pause that ends a frame is not known: each is tried, and the middle one of those that make the most even pieces
@@ -115,20 +119,36 @@ struct Group {
   std::size_t missing = 0;  // frames that were due before it
 };
 
-std::vector<Group> groups_of(const Unit& unit, const Options& options, std::vector<Piece> pieces) {
+// Returns the ends of the frames in a piece that is longer than most are: some of its frames are damaged, and they
+// arrived together.
+std::vector<std::size_t> joined_frames(const Unit& unit, const Options& options, Bytes bytes, std::size_t usual) {
+  std::vector<std::size_t> ends;
+  std::size_t at = 0;
+  const bool is_even = bytes.size() % usual == 0;
+  while ((bytes.size() - at) * 2 > usual * 3) {
+    const std::size_t size = is_even ? 0 : good_frame(unit, options, bytes.subspan(at));
+    ends.push_back(at += size != 0 ? size : usual);
+  }
+  ends.push_back(bytes.size());
+  return ends;
+}
+
+std::vector<Group> groups_of(const Unit& unit, const Options& options, const std::vector<Piece>& pieces) {
+  if (pieces.empty()) return {};
   const bool doubled = are_doubled(pieces);
+  const std::size_t usual = usual_size(pieces).first;
   std::vector<Group> groups;
-  for (Piece& piece : pieces) {
+  for (const Piece& piece : pieces) {
     Group group{.at = piece.at};
-    const std::vector<std::size_t> ends =
-        doubled ? std::vector<std::size_t>{} : good_frames(unit, options, piece.bytes);
+    std::vector<std::size_t> ends;
+    if (!doubled) ends = good_frames(unit, options, piece.bytes);
+    if (ends.empty()) ends = joined_frames(unit, options, piece.bytes, usual);
     std::size_t begin = 0;
     for (const std::size_t end : ends) {
       group.frames.emplace_back(piece.bytes.begin() + static_cast<std::ptrdiff_t>(begin),
                                 piece.bytes.begin() + static_cast<std::ptrdiff_t>(end));
       begin = end;
     }
-    if (ends.empty()) group.frames.push_back(std::move(piece.bytes));
     groups.push_back(std::move(group));
   }
   return groups;

@@ -126,6 +126,16 @@ TEST_F(StreamFrames, FramesThatWereHeldBackAreNotMissing) {
   EXPECT_EQ(missing(frames), 0u);
 }
 
+TEST_F(StreamFrames, DamagedFramesThatWereHeldBackAreSplit) {
+  std::vector<Time> times;
+  for (int i = 0; i < 60; ++i) times.push_back(i >= 20 && i < 30 ? 300ms : i * 10ms);
+  StreamBytes stream = stream_of(times);
+  for (std::uint8_t& byte : stream.bytes) byte &= 0x7F;
+  const std::vector<Attempted> frames = frames_of(stream);
+  EXPECT_EQ(frames.size(), 58u);
+  EXPECT_TRUE(std::ranges::all_of(frames, [](const Attempted& one) { return one.raw.size() == 5; }));
+}
+
 TEST_F(StreamFrames, FrameThatDoesNotComeIsMissing) {
   std::vector<Time> times;
   for (int i = 0; i < 60; ++i) {
