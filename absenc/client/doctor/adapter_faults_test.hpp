@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// For tests of doctor: faults with the finding that each is, those of adapters and of other encoders among them.
+// Faults for tests of doctor, each with its expected finding, including those of adapters and of other encoders.
 #pragma once
 
 #include <functional>
@@ -10,13 +10,13 @@
 
 namespace absenc::client {
 
-/// A fault, and how it comes about.
+/// A fault and how the test produces it.
 struct Fault {
   std::string id;
   std::function<Examination()> examine;
 };
 
-/// Each of the first unit that can have it.
+/// Returns each fault, produced with the first unit that can have it.
 inline std::vector<Fault> adapter_faults() {
   std::vector<Fault> faults;
   std::vector<ways::WayFault> all = ways::faults_of_bytes();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// How likely chance makes what was seen.
+// Probabilities that chance explains an observation.
 #pragma once
 
 #include <cmath>
@@ -13,8 +13,8 @@ namespace absenc::client {
          std::lgamma(static_cast<double>(all - some + 1));
 }
 
-/// Returns the probability that `some` or more of `all` are so, where each is with probability `share`, which is
-/// neither 0 nor 1.
+/// Returns the probability that an event of probability `share` (above 0 and below 1) occurs in `some` or more of `all`
+/// trials.
 [[nodiscard]] inline double chance_of(std::size_t some, std::size_t all, double share) {
   double sum = 0;
   for (std::size_t more = some; more <= all; ++more) {

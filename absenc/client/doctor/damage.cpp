@@ -13,11 +13,11 @@ bool has_characters(const Case& one) {
   return one.unit.link == LinkKind::half_duplex || one.unit.link == LinkKind::full_duplex;
 }
 
-// Whether some single bit makes it good.
+// Returns whether flipping a single bit makes the reply good.
 bool is_mended(const Case& one, const Frame& request, std::vector<std::uint8_t> bytes, std::size_t bits) {
   const std::size_t count = bits != 0 ? bits : bytes.size() * 8;
   for (std::size_t bit = 0; bit < count; ++bit) {
-    // Clocked bits count from the most significant: which of a byte is flipped first does not matter, all are tried.
+    // Clocked bits are numbered from the most significant; the order does not matter here, because all bits are tried.
     bytes[bit / 8] ^= static_cast<std::uint8_t>(0x80u >> (bit % 8));
     const bool is_good = decodes(one, request, {.bytes = bytes, .bits = bits});
     bytes[bit / 8] ^= static_cast<std::uint8_t>(0x80u >> (bit % 8));
@@ -40,14 +40,15 @@ bool has_good_part(const Case& one, const Attempted& attempt) {
     return end.kind == FrameEnd::Kind::complete && end.size == bytes.size() && decodes(one, request, {.bytes = bytes});
   };
   const Bytes raw = attempt.raw;
-  if (attempt.exchange.reply.bytes.size() < attempt.expected) return false;  // a shorter frame in it is there by chance
-  if (is_frame(raw)) return false;                                           // all of it is one: no byte is beside it
+  if (attempt.exchange.reply.bytes.size() < attempt.expected)
+    return false;                   // a shorter frame inside the reply occurs by chance
+  if (is_frame(raw)) return false;  // the whole reply is one frame, without other bytes
   const Bytes sent = request.bytes;
   if (!sent.empty() && raw.size() > sent.size() && std::equal(sent.begin(), sent.end(), raw.begin()) &&
       is_frame(raw.subspan(sent.size()))) {
     return true;
   }
-  // Both of two frames are good; with more than half of a frame beside it, one follows on another that was damaged.
+  // Two good frames, or a good frame after more than half of another one: the other one is a damaged reply, not noise.
   for (std::size_t size = 2; size < raw.size(); ++size) {
     const bool is_long = size * 3 >= raw.size() * 2;
     if (is_long ? is_frame(raw.first(size)) || is_frame(raw.last(size))
@@ -68,7 +69,7 @@ bool is_cut(const Case& one, const Attempted& attempt) {
 
 namespace {
 
-// Whether these bytes are the reply to the request, and its check would refuse others in their place.
+// Returns whether these bytes are a good reply to the request whose checksum would refuse random bytes.
 bool is_surely_reply(const Case& one, const Attempted& asked, Bytes reply) {
   constexpr int others = 8;
   const Frame request = asked.exchange.request.frame();
@@ -82,7 +83,7 @@ bool is_surely_reply(const Case& one, const Attempted& asked, Bytes reply) {
   return true;
 }
 
-// Whether the bytes are replies to these requests, one behind the other in any order.
+// Returns whether the bytes are replies to these requests, one after the other in any order.
 bool are_replies(const Case& one, const All& requests, Bytes bytes) {
   constexpr std::size_t shortest = 2;
   std::vector<bool> is_end(bytes.size() + 1, false);
@@ -104,7 +105,7 @@ Belated belated_replies(const Case& one) {
   constexpr std::size_t most_bytes = 128;
   Belated belated;
   if (!has_characters(one)) return belated;
-  All owed;  // requests that were not answered, since one was
+  All owed;  // requests without a reply since the last reply
   for (const Attempted& attempt : one.seen.readings) {
     const Bytes bytes = attempt.exchange.reply.bytes;
     const bool asked = !attempt.exchange.request.frame().empty();

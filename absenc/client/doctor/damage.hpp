@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The remains of good frames in damaged replies.
+// Analyses damaged replies for parts of good frames.
 #pragma once
 
 #include <algorithm>
@@ -13,7 +13,7 @@ namespace absenc::client {
 
 using All = std::vector<const Attempted*>;
 
-/// Those of which `is` is true, in their order.
+/// Returns the attempts for which `is` is true, in order.
 template <class Is>
 [[nodiscard]] All chosen(const All& all, const Is& is) {
   All those;
@@ -21,35 +21,36 @@ template <class Is>
   return those;
 }
 
-/// Whether the unit takes this reply for a good one with the options of the user. An empty request: to any request.
+/// Returns whether the reply is good with the user's options. With an empty request: a good reply to any request.
 [[nodiscard]] bool decodes(const Case& one, const Frame& request, const Frame& reply);
 
-/// Whether a good reply to the request came with other bytes beside it: the request before it, a few bytes before or
-/// behind it, or the same again. Links of characters only.
+/// Returns whether a good reply has other bytes beside it: the request before it, a few bytes before or after it, or
+/// the same reply again. Only for lines of characters.
 [[nodiscard]] bool has_good_part(const Case& one, const Attempted& attempt);
 
-/// Whether the frame that begins the reply, or the protocol, needs more bytes than came. Links of characters only.
+/// Returns whether fewer bytes arrived than the beginning of the frame, or the protocol, requires. Only for lines of
+/// characters.
 [[nodiscard]] bool is_cut(const Case& one, const Attempted& attempt);
 
-/// Replies that came behind another request than their own.
+/// Replies that arrived after a later request than their own.
 struct Belated {
-  All requests{};   // behind which they came
-  Time lateness{};  // of the latest
+  All requests{};   // the requests after which they arrived
+  Time lateness{};  // delay of the latest of them
 };
 
-/// Finds good replies to a request that was not answered in time, behind or before the reply to a later one, or in its
-/// place. Links of characters only.
+/// Finds good replies to an unanswered request that arrived after, before or instead of the reply to a later one. Only
+/// for lines of characters.
 [[nodiscard]] Belated belated_replies(const Case& one);
 
-/// How many of the replies become good when one of their bits is flipped; 0 when these are no more than of random
-/// replies of the same length, for a short checksum lets many pass by chance.
+/// Returns how many of the replies become good if one bit is flipped; 0 if random replies of the same length become
+/// good as often, because a short checksum accepts many by chance.
 [[nodiscard]] std::size_t mended_by_one_bit(const Case& one, const All& all);
 
-/// Returns what an adapter, a driver or a device server did to the bytes of nearly all these damaged replies, or beside
-/// the good ones: undone, they are good, and by far more of them than chance makes so. Links of characters only.
+/// Returns the change that an adapter, a driver or a device server made to nearly all these damaged replies, or beside
+/// the good ones. Undoing it makes far more of them good than chance would. Only for lines of characters.
 [[nodiscard]] std::optional<Finding> damage_by_adapter(const Case& one, const All& all);
 
-/// Finds text of a modem, a console or a GPS receiver. Nothing where the unit's own replies are text that looks so.
+/// Finds text of a modem, a console or a GPS receiver; nothing if the unit's own replies are similar text.
 [[nodiscard]] std::optional<Finding> text_of_others(const Case& one, Bytes bytes);
 
 /// Finds another model or other options of the unit, with which these damaged replies are good.

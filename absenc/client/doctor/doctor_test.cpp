@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Each fault is found and named; healthy encoders give no finding, however their timing falls.
+// Checks that doctor names each fault, and that healthy encoders give no finding at any timing.
 #include <gmock/gmock-more-matchers.h>
 #include <gtest/gtest.h>
 
@@ -28,14 +28,14 @@ namespace {
 
 // ---- Examinations
 
-/// Of a serial encoder; nothing is known of its port.
+/// Examines a serial encoder without facts about its port.
 Examination examine_with(std::string_view text, const std::function<Link(const EncoderAddress&)>& open,
                          const os::PortFacts& facts = {}) {
   const Surroundings surroundings{open, [&](const std::string&) { return facts; }};
   return examine(parse_address(text), {.readings = 120, .limit = 20s}, surroundings);
 }
 
-/// Of what is answered so.
+/// Examines a line on which `answer` makes the replies.
 Examination examine_line(std::function<ByteList(const ByteList&)> answer, ByteList babble = {},
                          const os::PortFacts& facts = {}) {
   return examine_with(
@@ -49,7 +49,7 @@ Examination examine_line(std::function<ByteList(const ByteList&)> answer, ByteLi
       facts);
 }
 
-/// Of a virtual encoder in virtual time.
+/// Examines a virtual encoder in virtual time.
 Examination examine_sim(std::string_view text) {
   return examine_with(text, [](const EncoderAddress& address) { return virtual_link(address); });
 }
@@ -103,7 +103,7 @@ std::vector<Fault> port_faults() {
   return faults;
 }
 
-/// Good at one rate, silent at all others.
+/// A line that is good at one rate and silent at all others.
 Examination examine_rate(std::string_view text, std::uint32_t rate) {
   return examine_with(text, [rate](const EncoderAddress& address) {
     auto port = std::make_shared<ScriptedPort<std::uint8_t>>();
@@ -112,7 +112,7 @@ Examination examine_rate(std::string_view text, std::uint32_t rate) {
   });
 }
 
-/// An encoder on SPI that is understood with these settings alone.
+/// An encoder on SPI whose replies are good only with these settings.
 Examination examine_spi(const std::function<bool(const EncoderAddress&)>& understands) {
   return examine_with("encolink-spi:spi:/dev/spidev0.0", [understands](const EncoderAddress& address) {
     if (understands(address)) return virtual_link(address);
@@ -165,7 +165,7 @@ std::vector<Fault> line_faults() {
   return faults;
 }
 
-/// Replies of a moving encoder that has a CRC in place of the sum.
+/// Returns replies of a moving encoder that has a CRC instead of the sum.
 ByteList with_other_checksum(unsigned number) {
   ByteList reply = good_reply();
   for (std::size_t i = 2; i < 5; ++i) reply[i] = static_cast<std::uint8_t>(number * (37 + 11 * i) + number * number);
@@ -252,7 +252,7 @@ std::vector<Fault> other_faults() {
   return faults;
 }
 
-/// Replies to requests of which some are cut, have bytes before them, or are refused.
+/// Returns replies to requests, some of which are cut, have bytes before them, or are refused.
 std::vector<Fault> partial_faults() {
   std::vector<Fault> faults;
   faults.push_back({"extra_bytes", [] {
@@ -358,7 +358,7 @@ TEST(Doctor, FindingsSayWhatHelps) {
 
 // ---- Health
 
-/// As often as it is said over all units, each with random pauses; every second one turns.
+/// Examines all units with random pauses; every second encoder turns.
 TEST(Doctor, AThousandHealthyEncodersGiveNoFinding) {
   std::mt19937_64 random(16);
   std::size_t runs = 0;
@@ -380,14 +380,14 @@ TEST(Doctor, AThousandHealthyEncodersGiveNoFinding) {
   }
 }
 
-/// That stands still has no noise, however it is disturbed by a count.
+/// A shaft at rest that moves to and fro by a count is not noise.
 TEST(Doctor, AFlickeringLastBitIsNoNoise) {
   EXPECT_THAT(ids(judged(positions([](std::size_t i) { return i % 2; }))), IsEmpty());
   EXPECT_THAT(ids(judged(positions([](std::size_t i) { return i * 13; }))), IsEmpty());
   EXPECT_THAT(ids(judged(positions([](std::size_t i) { return i * i / 3 + i; }))), IsEmpty());
 }
 
-/// Whatever it does then: listening, reading, or trying other rates where nobody answers.
+/// Ends the examination while it listens, reads, or tries other rates.
 TEST(Doctor, EndsAsSoonAsItIsToldTo) {
   for (const bool answers : {true, false}) {
     const auto open = [&](const EncoderAddress&) {

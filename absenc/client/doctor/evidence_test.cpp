@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// An encoder is called good or ill only after enough of it was looked at.
+// Checks that doctor judges an encoder only by sufficient evidence.
 #include <gmock/gmock-more-matchers.h>
 #include <gtest/gtest.h>
 
@@ -17,31 +17,33 @@ using testing::IsEmpty;
 using testing::Not;
 using testing::StartsWith;
 
-/// As long as it is told to, and not until so many readings: a contact that is loose now and then would not be seen.
+/// Doctor reads for the whole time, not only until a number of readings, so that it sees a loose contact.
 TEST(Doctor, FailuresThatComeAndGoAreToldWithTheirPeriod) {
   const Examination even = examine_contact(5s, [](Time at) { return at % 1s < 300ms; });
   EXPECT_THAT(even.findings.at(0).evidence, AllOf(HasSubstr("bursts of about 3"), HasSubstr("one every 1 s")));
   const Examination uneven = examine_contact(
       6s, [](Time at) { return (at > 1s && at < 1100ms) || (at > 1900ms && at < 2s) || (at > 5s && at < 5100ms); });
   EXPECT_THAT(uneven.findings.at(0).evidence, AllOf(HasSubstr("in 3 bursts"), HasSubstr("at uneven distances")));
-  // Independent of each other: no bursts.
+  // Independent failures are not bursts.
   std::mt19937 random(5);
   const Examination any = examine_contact(5s, [&](Time) { return random() % 10 == 0; });
   EXPECT_THAT(ids(any), Contains("sometimes_silent"));
   EXPECT_THAT(ids(any), Not(Contains("comes_and_goes")));
 }
 
-/// The shaft is turned, and every encoder follows: the counter of turns changes where the position passes zero.
+/// The shaft is turned; the turn counter changes where the position passes zero.
 TEST(Doctor, AShaftThatFollowsTheHandGivesNoFinding) {
   const auto place = [](std::size_t i) { return i * hand_counts; };
   EXPECT_THAT(ids(judged(turned_by_hand(
                   place, [](std::size_t i) { return static_cast<std::int64_t>(i * hand_counts >> 17); }))),
               IsEmpty());
-  const auto less_than_a_turn = [](std::size_t i) { return i * 600; };  // 120 000 counts of 131 072
+  const auto less_than_a_turn = [](std::size_t i) {
+    return i * 600;
+  };  // 200 readings: 120 000 of the 131 072 counts of a turn
   EXPECT_THAT(ids(judged(turned_by_hand(less_than_a_turn, [](std::size_t) { return 3; }))), IsEmpty());
 }
 
-/// A reply that is no later than this computer itself tells nothing of the encoder.
+/// A reply that is no later than this computer's own delay is no evidence against the encoder.
 TEST(Doctor, ALatenessOfThisComputerIsNotTheEncoders) {
   Observations seen = positions([](std::size_t) { return 5; });
   for (Attempted& one : seen.readings) one.limit = 3ms;
@@ -52,7 +54,7 @@ TEST(Doctor, ALatenessOfThisComputerIsNotTheEncoders) {
   EXPECT_THAT(ids(judged(seen)), Contains("sometimes_late"));
   seen.woken_late = 13ms;
   EXPECT_THAT(ids(judged(seen)), IsEmpty());
-  // One of few is a tenth of all, but no more than one.
+  // One late reply of few is a tenth of all, but still a single one.
   seen.readings.resize(9);
   EXPECT_THAT(ids(judged(seen)), Contains("reply_late"));
   seen.late = 1;
@@ -61,7 +63,7 @@ TEST(Doctor, ALatenessOfThisComputerIsNotTheEncoders) {
   EXPECT_THAT(ids(judged(seen)), Contains("reply_late"));
 }
 
-/// On a computer that was busy meanwhile less than 0.1 % tell nothing; on another one they do.
+/// On a busy computer less than 0.1 % late replies are no finding; on an idle one they are.
 TEST(Doctor, FewOfThousandsMayBeABusyComputer) {
   Observations seen = positions([](std::size_t) { return 5; });
   const std::vector<Attempted> some = seen.readings;
@@ -86,8 +88,8 @@ TEST(Doctor, FewOfThousandsMayBeABusyComputer) {
   }
 }
 
-/// One failure among 200 readings is no finding where the computer was busy. It is one where the computer was not, and
-/// among three readings.
+/// One failure among 200 readings is no finding on a busy computer. It is a finding on an idle one, and among three
+/// readings.
 TEST(Doctor, OneOfManyMayBeABusyComputer) {
   const auto with_one = [](std::size_t count, const Attempted& failed) {
     Observations seen = positions([](std::size_t) { return 5; });
@@ -111,7 +113,7 @@ TEST(Doctor, OneOfManyMayBeABusyComputer) {
     many.woken_late = 2ms;
     EXPECT_THAT(ids(judged(many)), IsEmpty());
   }
-  // A byte behind a reply is no reply that was late.
+  // A byte after a reply is not a late reply.
   Attempted noise = late_and_next;
   noise.exchange.reply.bytes.resize(good_reply().size() + 1);
   noise.raw = noise.exchange.reply.bytes;
@@ -120,7 +122,7 @@ TEST(Doctor, OneOfManyMayBeABusyComputer) {
   EXPECT_THAT(ids(judged(busy)), Contains("extra_bytes"));
 }
 
-/// Two of 300 readings whose replies may take 300 ms.
+/// Two failures among 300 readings with a timeout of 300 ms.
 TEST(Doctor, AComputerThatStoodStillExplainsSilence) {
   Observations seen = positions([](std::size_t) { return 5; });
   const std::vector<Attempted> some = seen.readings;
@@ -138,10 +140,11 @@ TEST(Doctor, AComputerThatStoodStillExplainsSilence) {
   EXPECT_THAT(ids(judged(seen)), Contains("sometimes_silent"));
 }
 
-/// A stream whose frames wait in this computer comes all at once: how fast the shaft was then is not known.
+/// Frames of a stream that waited in this computer are read at once, so the speed of the shaft between them is unknown.
 TEST(Doctor, APositionThatThisComputerTookLateIsNoJump) {
   Observations seen = positions([](std::size_t i) { return i * 20; });
-  for (std::size_t i = 100; i < 150; ++i) seen.readings[i].reading->latched += 49ms;  // read together with the 150th
+  for (std::size_t i = 100; i < 150; ++i)
+    seen.readings[i].reading->latched += 49ms;  // these frames are read together with the 150th
   for (std::size_t i = 101; i < 150; ++i) {
     seen.readings[i].reading->latched = seen.readings[100].reading->latched + static_cast<std::int64_t>(i) * 1us;
   }

@@ -23,11 +23,12 @@ namespace absenc::client {
 
 namespace {
 
-constexpr std::size_t first_readings = 2;  // with another setting: one that is not answered at all is asked no more
-constexpr std::size_t trial_readings = 5;  // each time it is its turn
+constexpr std::size_t first_readings =
+    2;  // readings with another setting before the comparison; a setting without any reply is not tried again
+constexpr std::size_t trial_readings = 5;  // readings per turn of the comparison
 constexpr unsigned trial_turns = 2;
 constexpr Time trial_limit = std::chrono::milliseconds(500);
-constexpr Time models_limit = std::chrono::seconds(3);  // of all of them
+constexpr Time models_limit = std::chrono::seconds(3);  // time limit for trying all models
 constexpr Time addresses_limit = std::chrono::seconds(4);
 constexpr Time identify_limit = std::chrono::seconds(10);
 
@@ -35,7 +36,7 @@ bool is_serial(const EncoderAddress& address) {
   return address.port_kind == PortKind::serial || address.port_kind == PortKind::slcan;
 }
 
-// Where `identify` can look for others.
+// Returns the port on which `identify` can search for other encoders.
 bool may_be_another(const EncoderAddress& address) {
   const bool characters = address.unit->link == LinkKind::half_duplex || address.unit->link == LinkKind::full_duplex;
   return characters && (address.port_kind == PortKind::serial || address.port_kind == PortKind::tcp);
@@ -50,7 +51,7 @@ bool streams(const EncoderAddress& address) {
   return address.unit->streams != nullptr && address.unit->streams(address.options);
 }
 
-// Address at which a scan finds what is damaged every time.
+// Returns the address at which a scan receives only damaged replies.
 struct Clashes final : FieldSink {
   void put(const FieldValue& value) override {
     if (value.info->role == Role::encoder) address = value.number;
@@ -96,7 +97,7 @@ class Doctor {
       seen_.port = address_.path;
       seen_.facts = surroundings_.facts(address_.path);
     }
-    // What a controller has no connection for goes on: others of its settings may help.
+    // A setting that the controller does not support is skipped; other settings may help.
     if (address_.unit->link == LinkKind::can) {
       look_over<CanFrame>();
     } else {
@@ -105,12 +106,12 @@ class Doctor {
     if (is_serial(address_)) count_damage();
   }
 
-  // The port is closed again: what its driver counted can be asked for.
+  // Reads the driver's error counters after the port was closed.
   void count_damage() {
     const os::PortFacts now = surroundings_.facts(address_.path);
     if (now.counts && seen_.facts.counts) seen_.damage = now.counts->since(*seen_.facts.counts);
     seen_.facts.kernel_direction = now.kernel_direction;
-    seen_.facts.latency_timer = now.latency_timer;  // a port's driver may have shortened it
+    seen_.facts.latency_timer = now.latency_timer;  // opening the port may have shortened the latency timer
   }
 
   template <class Item>
@@ -140,7 +141,7 @@ class Doctor {
       }
       examiner.conclude(seen_);
     }
-    // Another bit rate would destroy what others say on a bus: only where nobody does.
+    // Another bit rate would destroy frames of other devices on a bus, so it is tried only on a silent one.
     const bool disturbs = std::is_same_v<Item, CanFrame> && any_heard();
     if (none_good() && !seen_.never_silent && seen_.lateness == Time{} && !disturbs) try_others<Item>();
     if constexpr (std::is_same_v<Item, std::uint8_t>) {
@@ -150,7 +151,7 @@ class Doctor {
     }
   }
 
-  // A short checksum lets some damaged replies pass.
+  // A short checksum accepts some damaged replies.
   [[nodiscard]] bool none_good() const { return count_good(seen_.readings) * 20 < seen_.readings.size() + 1; }
   [[nodiscard]] bool any_good() const {
     return std::any_of(seen_.readings.begin(), seen_.readings.end(),
@@ -160,7 +161,7 @@ class Doctor {
     return std::any_of(seen_.readings.begin(), seen_.readings.end(), [](const Attempted& one) { return one.heard; });
   }
 
-  // Whether two encoders have the address that is read.
+  // Checks whether two encoders have the same address.
   template <class Item>
   void scan(Examiner<Item>& examiner) {
     const Command* command = find_command(*address_.unit, Verb::scan);
@@ -175,7 +176,7 @@ class Doctor {
 
   template <class Item>
   void try_others() {
-    // A pseudo-terminal has none; the bit rate behind a CAN adapter is that of the bus.
+    // A pseudo-terminal has no rate; the rate of a CAN adapter is the bit rate of the bus.
     const bool has_rate = address_.port_kind == PortKind::slcan ||
                           (address_.port_kind == PortKind::serial && !seen_.facts.pseudo_terminal);
     if (try_each<Item>(other_models(address_), models_limit)) return;
@@ -183,7 +184,8 @@ class Doctor {
     try_each<Item>(other_addresses(address_), addresses_limit);
   }
 
-  // Ends with the first that helps, and when the user's own setting is answered now. Returns whether it is over.
+  // Tries settings until one helps, or until the encoder replies with the user's own setting. Returns whether the
+  // search is over.
   template <class Item>
   bool try_each(const std::vector<Other>& others, Time limit) {
     Time spent{};
@@ -199,8 +201,8 @@ class Doctor {
     return false;
   }
 
-  // Both in turns: an encoder that was silent for a while would else speak for whatever is tried then. Returns whether
-  // the search is over.
+  // Tries both settings in turns; otherwise an encoder that was silent for a while would count as evidence for the
+  // setting tried afterwards. Returns whether the search is over.
   template <class Item>
   bool compare(const EncoderAddress& other, Trial& trial) {
     std::vector<Attempted> theirs;
@@ -222,14 +224,14 @@ class Doctor {
     return true;
   }
 
-  // It may have been switched on meanwhile.
+  // The encoder may have been powered on meanwhile.
   void ask_once_more() {
     std::vector<Attempted> attempts;
     ask<std::uint8_t>(address_, first_readings, attempts);
     if (count_good(attempts) == first_readings) read_again<std::uint8_t>();
   }
 
-  // The encoder is answering now.
+  // The encoder replies now.
   template <class Item>
   void read_again() {
     tell("reading");
@@ -238,7 +240,7 @@ class Doctor {
     examiner.conclude(seen_);
   }
 
-  // Returns how long it took. A port that does not open gives no attempts.
+  // Returns the duration. A port that does not open gives no attempts.
   template <class Item>
   Time ask(const EncoderAddress& address, std::size_t count, std::vector<Attempted>& attempts) {
     const Command* read = find_command(*address.unit, Verb::read);
@@ -248,13 +250,13 @@ class Doctor {
       const Time begin = examiner.now();
       examiner.read(*read, count, trial_limit, attempts);
       return examiner.now() - begin;
-    } catch (const os::Failure&) {  // a rate that this port has not
-    } catch (const UsageError&) {   // options that need a wire which is not connected
+    } catch (const os::Failure&) {  // the port does not support this rate
+    } catch (const UsageError&) {   // the options need a wire that is not connected
     }
     return {};
   }
 
-  // Whether another protocol may explain what was seen.
+  // Returns whether another protocol may explain the received bytes.
   [[nodiscard]] bool is_unexplained() const {
     if (any_good() || seen_.never_silent || seen_.lateness != Time{}) return false;
     const Examination so_far = judge(*address_.unit, address_.options, seen_);

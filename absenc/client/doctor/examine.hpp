@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// An examination whose surroundings are given: a test has its own. And what it found, for programs.
+// Runs an examination with replaceable surroundings (port, clock), and converts its result to JSON.
 #pragma once
 
 #include <functional>
@@ -16,16 +16,16 @@ struct Surroundings {
   std::function<os::PortFacts(const std::string& path)> facts = [](const std::string& path) {
     return os::port_facts(path);
   };
-  bool on_the_clock = false;  // the port keeps real time: how late this computer wakes a thread is measured meanwhile
+  bool on_the_clock = false;  // the port runs in real time, so the wake-up delay of this computer is measured
 };
 
-/// As the one of client/doctor.hpp.
+/// Examines as client::examine of client/doctor.hpp does.
 [[nodiscard]] Examination examine(const EncoderAddress& address, const DoctorChoices& choices,
                                   const Surroundings& surroundings = {.on_the_clock = true});
 
-/// {"ok","findings":[{"id","severity","evidence","cause","action"}],"readings","good","complete","seconds",
-/// "failures_below","verdict"}; where they are known, "readings_per_second", "echo", "latency_ms",
-/// "quickest_reply_ms","slowest_reply_ms".
+/// Returns {"ok","findings":[{"id","severity","evidence","cause","action"}],"readings","good","complete","seconds",
+/// "failures_below","verdict"}; if known, also "readings_per_second", "echo", "latency_ms", "quickest_reply_ms",
+/// "slowest_reply_ms".
 [[nodiscard]] Json to_json(const Examination& examination);
 
 }  // namespace absenc::client

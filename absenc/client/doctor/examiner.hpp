@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Listens to an open link and reads over it, each time once, and keeps all that was seen.
+// Listens to an open link, reads over it, and records the observations.
 #pragma once
 
 #include <algorithm>
@@ -16,7 +16,7 @@ namespace absenc::client {
 template <class Item>
 class Examiner {
  public:
-  /// All waiting ends with os::Ended from the moment on in which `over` is true; empty: never.
+  /// All waiting ends with os::Ended as soon as `over` returns true; empty: never.
   Examiner(const EncoderAddress& address, Link link, std::function<bool()> over)
       : link_(std::move(link)),
         runner_(address),
@@ -31,7 +31,7 @@ class Examiner {
     runner_.port().over = std::move(over);
   }
 
-  /// What comes though nothing is asked, in pieces of the time.
+  /// Records unsolicited bytes or frames for a time.
   void listen(Observations& seen) {
     if constexpr (!std::is_same_v<Item, CanFrame>) {
       unsigned busy = 0;
@@ -50,10 +50,10 @@ class Examiner {
     }
   }
 
-  /// What comes when all was given up: one that answers later than anybody waited for.
+  /// Records bytes that arrive after the last timeout, from an encoder that is later than every timeout.
   void listen_for_late() { runner_.listen(pieces * piece_time); }
 
-  /// Readings as `read` takes them, and what each of them took on the line.
+  /// Takes readings as `read` does, and records the exchanges of each.
   void observe(const Command& command, std::size_t count, Time limit, Observations& seen) {
     if constexpr (std::is_same_v<Item, CanFrame>) {
       read(command, count, limit, seen.readings);
@@ -63,18 +63,18 @@ class Examiner {
       ExchangeLog log(unit_, options_, seen);
       const Watch watch(runner_, log, streams_);
       read(command, count, limit, seen.readings, &log);
-      // One that sends by a pulse is asked, too.
+      // A pulse is a request, too.
       if (streams_ && runner_.port().requests == 0) log.conclude_stream();
     }
   }
 
-  /// Up to `count` readings within `limit`; fewer when nobody answers at all. Throws as the port.
+  /// Takes up to `count` readings within `limit`; ends early without any reply. Throws as the port.
   void read(const Command& command, std::size_t count, Time limit, std::vector<Attempted>& into,
             ExchangeLog* log = nullptr) {
     const auto attempt = [&] {
       Attempted one = runner_.once(command);
       if (log != nullptr) log->add_reading(one);
-      // A second encoder's reply comes at once behind the first, or into the next request.
+      // A second encoder's reply follows the first one at once, or collides with the next request.
       const Time behind = 3 * runner_.character();
       if (one.error == Error::none && behind != Time{} && !streams_) runner_.settle(behind, longest_reply);
       return one;
@@ -82,13 +82,13 @@ class Examiner {
     runner_.repeat({.count = count, .limit = limit, .patience = never, .least = longest_gap}, attempt, into);
   }
 
-  /// Fields of another command that only reads. Throws as the port.
+  /// Returns the fields of another reading command. Throws as the port.
   void report(const Command& command, Arguments arguments, FieldSink& sink) {
     const Conversation<Item>* conversation = runner_.run(command, arguments);
     if (conversation != nullptr && conversation->error() == Error::none) conversation->report(sink);
   }
 
-  /// Time on the port's clock.
+  /// Returns the time of the port's clock.
   [[nodiscard]] Time now() { return runner_.port().now(); }
 
   void conclude(Observations& seen) const {
@@ -104,7 +104,7 @@ class Examiner {
   }
 
  private:
-  /// Hands what comes to the log, for as long as this lives.
+  /// Passes received bytes to the log during its lifetime.
   class Watch {
    public:
     Watch(Runner<Item>& runner, ExchangeLog& log, bool streams) : runner_(runner) {
@@ -135,7 +135,7 @@ class Examiner {
   static constexpr unsigned pieces = 5;
   static constexpr Time piece_time = std::chrono::milliseconds(20);
   static constexpr std::size_t most_heard = 4096;
-  static constexpr Time longest_gap = std::chrono::milliseconds(500);  // of a contact that is loose now and then
+  static constexpr Time longest_gap = std::chrono::milliseconds(500);  // longest silence of a loose contact
   static constexpr Time longest_reply = std::chrono::milliseconds(100);
 
   Link link_;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Collects what readings take on a line of characters beside their last exchange: a reading may need several requests,
-// and it repeats those that fail.
+// Collects all exchanges of readings on a line of characters. A reading may need several requests and repeats failed
+// ones, and itself stores only its last exchange.
 #pragma once
 
 #include <utility>
@@ -13,36 +13,36 @@ namespace absenc::client {
 
 class ExchangeLog {
  public:
-  /// `seen` takes what is collected; all must outlive this.
+  /// `seen` receives the exchanges; all arguments must outlive the object.
   ExchangeLog(const Unit& unit, const Options& options, Observations& seen)
       : unit_(unit), options_(options), seen_(seen) {}
 
-  /// Takes a request that was sent, and what came until the next one. One that nobody answers is left out.
+  /// Adds a request and the bytes received until the next one. A request that expects no reply is left out.
   void add_exchange(Attempted one) {
     const Frame request = one.exchange.request.frame();
     if (unit_.is_answered != nullptr && !unit_.is_answered(options_, request)) return;
     one.error = one.answered ? unit_.check(options_, request, one.exchange.reply.frame()) : Error::timeout;
     exchanges_.push_back(std::move(one));
   }
-  /// Takes bytes that came.
+  /// Adds received bytes.
   void add_bytes(Bytes items, Time at) {
     constexpr std::size_t most = 1u << 20;
     if (stream_.bytes.size() >= most) return;
     stream_.bytes.insert(stream_.bytes.end(), items.begin(), items.end());
     stream_.marks.push_back({at, stream_.bytes.size()});
   }
-  /// Ends a reading, which will be the next one of `seen.readings`; its last exchange is its own.
+  /// Ends a reading, which becomes the next one of `seen.readings` with its last exchange.
   void add_reading(const Attempted& one) {
-    // Most units need one request a reading: then nothing is kept twice.
+    // Most units need one request per reading; then nothing is stored twice.
     if (exchanges_.size() > 1 && seen_.exchanges.empty()) seen_.exchanges = seen_.readings;
     if (exchanges_.size() > 1 || !seen_.exchanges.empty()) {
       for (std::size_t i = 0; i + 1 < exchanges_.size(); ++i) seen_.exchanges.push_back(std::move(exchanges_[i]));
       seen_.exchanges.push_back(one);
-      if (!exchanges_.empty()) seen_.exchanges.back().began = exchanges_.back().began;  // of the request
+      if (!exchanges_.empty()) seen_.exchanges.back().began = exchanges_.back().began;  // time of the request
     }
     exchanges_.clear();
   }
-  /// Ends the readings of an encoder that sends by itself.
+  /// Ends the readings of an encoder that sends by itself, and cuts its stream into frames.
   void conclude_stream() {
     if (const std::size_t within = bytes_among_others(unit_, options_, stream_)) {
       seen_.never_silent = true;
@@ -59,7 +59,7 @@ class ExchangeLog {
   const Unit& unit_;
   const Options& options_;
   Observations& seen_;
-  std::vector<Attempted> exchanges_;  // of the present reading
+  std::vector<Attempted> exchanges_;  // exchanges of the present reading
   StreamBytes stream_;
 };
 

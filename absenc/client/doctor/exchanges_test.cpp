@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Each request is judged, not only each reading: what a reading repeated, what came behind a later request, and what
-// was silent at first.
+// Checks that doctor judges each request, not only each reading: repeated requests, replies after a later request, and
+// silence at the beginning.
 #include <gtest/gtest.h>
 
 #include "absenc/client/doctor/observed_test.hpp"

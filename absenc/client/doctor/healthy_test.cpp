@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// No healthy encoder is called ill: each unit and model in each of its modes, examined again and again at random
-// places, speeds and pauses between the readings.
+// Checks that no healthy encoder gets a finding: each unit and model in each mode, examined repeatedly at random
+// positions, speeds and pauses between readings.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
@@ -21,7 +21,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-constexpr unsigned examinations = 200;  // of each model and mode
+constexpr unsigned examinations = 200;  // examinations of each model and mode
 constexpr std::size_t readings = 40;
 
 class HealthyEncoder : public ::testing::TestWithParam<const Unit*> {};
@@ -63,8 +63,8 @@ TEST_P(HealthyEncoder, IsNeverCalledIll) {
     std::optional<EncoderAddress> usual;
     try {
       usual = parse_address(fmt::format("sim:{}{}{}", unit.id, mode.empty() ? "" : "?", mode));
-      if (examined(*usual, 1).good == 0) continue;  // the virtual encoder cannot be read so
-    } catch (const std::exception&) {               // options that exclude each other
+      if (examined(*usual, 1).good == 0) continue;  // the virtual encoder cannot be read with these options
+    } catch (const std::exception&) {               // the options exclude each other
       continue;
     }
     ++modes;
@@ -72,8 +72,8 @@ TEST_P(HealthyEncoder, IsNeverCalledIll) {
     const unsigned bits = std::min(unit.resolution(usual->options).singleturn_bits, 62u);
     unsigned ill = 0;
     for (unsigned i = 0; i < examinations && ill < 3; ++i) {
-      // Backwards from there no counter of turns ends. Modes may lose the turns when they are switched on, and begin at
-      // 0.
+      // From here the counter of turns does not wrap when it turns backwards. Some modes lose the turns at power-on and
+      // begin at 0.
       const bool has_turns = unit.resolution(usual->options).multiturn_bits >= 8;
       const std::string turns = has_turns ? "&multiturn=100" : "";
       const std::string state = fmt::format("singleturn={}{}&motion={}", random.below(std::uint64_t{1} << bits), turns,

@@ -18,7 +18,7 @@ namespace absenc::client {
 
 namespace {
 
-constexpr Time slow = std::chrono::milliseconds(8);  // half a USB adapter's latency timer as it comes
+constexpr Time slow = std::chrono::milliseconds(8);  // half of the default latency timer of a USB adapter
 
 Ailment ailment_of(const Refusal& refusal) {
   using Kind = os::Failure::Kind;
@@ -74,7 +74,7 @@ std::string hex(const std::vector<std::uint8_t>& bytes, std::size_t most) {
   return to_hex(Bytes(bytes).first(std::min(bytes.size(), most)));
 }
 
-// What an inverted line shows; "": nothing.
+// Returns the evidence of an inverted line; "" if there is none.
 std::string inversion(const Case& one) {
   const Observations& seen = one.seen;
   if (seen.damage && seen.damage->breaks > 0) {
@@ -87,7 +87,7 @@ std::string inversion(const Case& one) {
   std::size_t zeros = 0;
   for (const Attempted& attempt : seen.readings) {
     const auto& reply = attempt.exchange.reply.bytes;
-    // A frame that was cut behind its first bytes has fewer zeros.
+    // A frame that was cut after its first bytes has fewer zeros.
     constexpr std::size_t many = 8;
     if (!reply.empty() && all_are(reply, 0) && (reply.size() >= many || !is_cut(one, attempt))) ++zeros;
   }
@@ -96,7 +96,7 @@ std::string inversion(const Case& one) {
   return {};
 }
 
-// The port's silence, of whatever kind of line.
+// Judges missing replies on any kind of line.
 void judge_silence(const Case& one, std::vector<Finding>& findings) {
   const Observations& seen = one.seen;
   if (seen.readings.empty() || count(seen.readings, was_heard) != 0 || seen.never_silent) return;
@@ -120,9 +120,9 @@ void judge_lateness(const Case& one, std::vector<Finding>& findings) {
   const Belated belated = belated_replies(one);
   const std::size_t late = std::max<std::size_t>(seen.late, belated.requests.size());
   const Time lateness = std::max(seen.lateness, belated.lateness);
-  // On a CAN bus encoders send unsolicited: what comes behind a request that was not answered is no late answer to it.
+  // On a CAN bus encoders send unsolicited frames, so a frame after an unanswered request is not a late reply to it.
   if (late == 0 || one.unit.link == LinkKind::can) return;
-  // A single one may be this computer, which was busy. The verdict counts it all the same.
+  // A single late reply may be due to this busy computer. The verdict counts it nevertheless.
   const bool nothing_else = one.good == 0 && count(seen.readings, was_heard) * 10 < tried;
   const bool often = late * 10 >= tried || nothing_else;
   if (!often && (late < 2 || may_be_the_computer(seen, late))) return;
@@ -130,7 +130,7 @@ void judge_lateness(const Case& one, std::vector<Finding>& findings) {
   for (const Attempted& attempt : seen.readings) limit = std::max(limit, attempt.limit);
   const bool is_ours = seen.woken_late > Time{} && lateness - limit <= seen.woken_late;
   const bool is_one_of_few = late < 2 && !nothing_else;
-  if ((!often || is_one_of_few) && is_ours) return;  // no later than this computer itself
+  if ((!often || is_one_of_few) && is_ours) return;  // no later than this computer's own delay
   const auto allowance = std::chrono::ceil<std::chrono::milliseconds>(lateness * 3 / 2).count();
   findings.push_back(finding(often ? Ailment::reply_late : Ailment::sometimes_late,
                              {fmt::format("{}", std::min(late, tried)), fmt::format("{}", tried), to_text(lateness),
@@ -215,7 +215,7 @@ void judge_line(const Case& one, std::vector<Finding>& findings) {
 
 namespace {
 
-// A counter that every reply carries and that never moved.
+// Finds a counter in every reply that never changed.
 void judge_counter(const Case& one, std::vector<Finding>& findings) {
   constexpr std::size_t enough = 8;
   std::set<std::int64_t> values;
@@ -232,7 +232,7 @@ void judge_counter(const Case& one, std::vector<Finding>& findings) {
                              {std::string(field->name), fmt::format("{}", *values.begin()), fmt::format("{}", count)}));
 }
 
-// The alarms of this mask that have a name, in both channels.
+// Returns the names of the alarms in this mask, of both channels.
 std::set<std::string_view> alarm_names(const Unit& unit, std::uint32_t mask) {
   std::set<std::string_view> names;
   for (const Flags& flags : alarms_of(unit, {.alarms = mask})) {
@@ -287,8 +287,8 @@ Reported reported_by(const Unit& unit, const Observations& seen) {
   return reported;
 }
 
-// Returns the same with what was on the line in place of readings; nothing where both are the same. Where no reading is
-// good, the good exchanges before its last one explain nothing; frames of a stream always do.
+// Returns the observations with the exchanges on the line instead of the readings; nothing if both are the same. If no
+// reading is good, good exchanges before its last one are no evidence; frames of a stream always are.
 std::optional<Observations> line_of(const Observations& seen, std::size_t good) {
   const bool asked = !seen.readings.empty() && !seen.readings.front().exchange.request.frame().empty();
   if (seen.exchanges.empty() || (asked && good == 0)) return {};
@@ -308,11 +308,11 @@ Examination judge(const Unit& unit, const Options& options, const Observations& 
   const std::optional<Observations> on_the_line = line_of(seen, result.good);
   const Case line = on_the_line ? Case{unit, options, *on_the_line, count(on_the_line->readings, is_good)} : one;
   judge_line(line, result.findings);
-  // What the line explains is not said again of each frame.
+  // A fault of the line explains bad frames, which then give no finding of their own.
   const bool explained = std::any_of(result.findings.begin(), result.findings.end(), [](const Finding& found) {
     return found.severity == Severity::fault && found.ailment != Ailment::can_errors;
   });
-  // One of 256 damaged frames has a good checksum of 8 bits: a few good ones make no good line.
+  // One of 256 damaged frames passes a checksum of 8 bits, so a few good frames do not make a good line.
   if (line.good * 20 < line.seen.readings.size() || line.good == 0) {
     if (!explained) judge_bad_frames(line, result.findings);
   } else if (std::optional<Finding> start = judge_start(line)) {
@@ -329,7 +329,7 @@ Examination judge(const Unit& unit, const Options& options, const Observations& 
   }
   const std::size_t failed = result.tried - result.good;
   if (failed * 20 > result.tried && result.first() == nullptr) {
-    // Nothing above explains it, and it is not good.
+    // No judge explains the failures: reports them without a specific cause.
     const std::size_t silent = result.tried - count(seen.readings, was_heard);
     const std::string all = fmt::format("{}", result.tried);
     if (silent * 2 < failed) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Whether readings fail in bursts, and with which period.
+// Finds bursts of failed readings and their period.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -16,16 +16,16 @@ namespace absenc::client {
 
 namespace {
 
-/// Readings that failed one after the other.
+/// A series of consecutive failed readings.
 struct Burst {
   Time begin{};
   Time end{};
   std::size_t count = 0;
 };
 
-// Those that are too long for failures that are independent of each other.
+// Returns the series that are too long for independent failures.
 std::vector<Burst> bursts_of(const std::vector<Attempted>& readings, std::size_t failed) {
-  constexpr double chance = 1e-3;  // that one so long is among all these readings
+  constexpr double chance = 1e-3;  // greatest probability that such a series occurs among all these readings
   const auto all = static_cast<double>(readings.size());
   const double longest = std::log(chance / all) / std::log(static_cast<double>(failed) / all);
   const auto least = static_cast<std::size_t>(std::max(3.0, std::ceil(longest)));
@@ -40,10 +40,10 @@ std::vector<Burst> bursts_of(const std::vector<Attempted>& readings, std::size_t
     if (burst.count >= least) bursts.push_back(burst);
     burst = {};
   }
-  return bursts;  // the last one, which may go on, is left out
+  return bursts;  // leaves out the last series, which may continue
 }
 
-// "of about 300 ms each, one every 1 s", where they come at even distances.
+// Returns "of about 300 ms each, one every 1 s" if the bursts are periodic.
 std::string rhythm(const std::vector<Burst>& bursts) {
   std::vector<Time> lengths;
   std::vector<Time> periods;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Finds what adapters, drivers and device servers do to bytes: when it is undone, the replies are good.
+// Finds changes of bytes by adapters, drivers and device servers: undoing the change makes the replies good.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -29,12 +29,13 @@ constexpr std::uint8_t xoff = 0x13;
 constexpr std::uint8_t lf = 0x0A;
 constexpr std::uint8_t cr = 0x0D;
 
-/// Looks for what makes one reply good again.
+/// Tries to make one reply good by undoing a change.
 class Mender {
  public:
-  static constexpr std::size_t most_bytes = 12;  // in which all combinations of 8th bits are tried
+  static constexpr std::size_t most_bytes = 12;  // longest reply for which all combinations of 8th bits are tried
 
-  /// `random`: undoes something else in its place, which shows how often chance does as well; null: the thing itself.
+  /// `random`: undoes random changes instead, which measures how often chance makes the reply good; null: undoes the
+  /// change.
   Mender(const Case& one, const Attempted& attempt, sim::Random* random)
       : one_(one),
         request_(attempt.exchange.request.frame()),
@@ -46,13 +47,14 @@ class Mender {
   [[nodiscard]] sim::Random* random() const { return random_; }
   [[nodiscard]] bool is_good(Bytes bytes) const { return decodes(one_, request_, {.bytes = bytes}); }
 
-  /// Whether its first `size` bytes are the whole request.
+  /// Returns whether the first `size` bytes are the whole request.
   [[nodiscard]] bool begins_with_request(std::size_t size) const {
     const Bytes sent = request_.bytes;
     return sent.size() == size && raw_.size() >= size && std::equal(sent.begin(), sent.end(), raw_.begin());
   }
 
-  /// Whether it is good without the bytes at these places, in ascending order; by chance: without as many others.
+  /// Returns whether the reply is good without the bytes at these indexes, in ascending order (or, by chance, without
+  /// as many others).
   [[nodiscard]] bool without(const std::vector<std::size_t>& places) const {
     if (places.empty() || places.size() >= raw_.size()) return false;
     std::vector<bool> removed(raw_.size(), false);
@@ -75,15 +77,15 @@ class Mender {
     return is_good(rest);
   }
 
-  /// Whether it is good with up to `most` of these values put in anywhere; by chance: with others in their place. Keeps
-  /// how many.
+  /// Returns whether the reply is good with up to `most` of these values inserted anywhere (or, by chance, other
+  /// values). Stores their number.
   [[nodiscard]] bool with(Bytes values, std::size_t most, std::size_t& put) const {
     ByteList used(values.begin(), values.end());
     if (random_ != nullptr) {
       for (std::uint8_t& value : used) value = static_cast<std::uint8_t>(0x20 + random_->below(0xE0));
     }
     std::size_t tries = most_tries;
-    // As many as the protocol expects; else at least those that the frame lacks.
+    // Inserts as many bytes as the protocol expects, or else at least as many as the frame lacks.
     const FrameEnd end = one_.unit.frame_end(one_.options, Direction::reply, raw_);
     const bool is_cut = end.kind == FrameEnd::Kind::incomplete && end.size > raw_.size();
     put = is_cut ? std::min(end.size - raw_.size(), most) : 1;
@@ -98,14 +100,15 @@ class Mender {
     return false;
   }
 
-  /// Whether it is good with the 8th bit of some bytes set; by chance: of the same with two other bits changed.
+  /// Returns whether the reply is good with the 8th bit of some bytes set (or, by chance, also with two other bits
+  /// changed).
   [[nodiscard]] bool with_eighth_bits(std::size_t& set) const {
     ByteList bytes = raw_;
     if (random_ != nullptr && bytes.size() > 2) {
       for (int i = 0; i < 2; ++i)
         bytes[random_->below(bytes.size())] ^= static_cast<std::uint8_t>(1u << random_->below(7));
     }
-    if (bytes.size() > most_bytes) {  // of longer ones only whether they are whole
+    if (bytes.size() > most_bytes) {  // checks longer replies only for completeness
       const FrameEnd end = one_.unit.frame_end(one_.options, Direction::reply, bytes);
       set = bytes.size();
       return end.kind == FrameEnd::Kind::complete && end.size == bytes.size();
@@ -124,9 +127,9 @@ class Mender {
   }
 
  private:
-  static constexpr std::size_t most_tries = 5000;  // decodings of one reply
+  static constexpr std::size_t most_tries = 5000;  // greatest number of decodings of one reply
 
-  // In all places from `from` on.
+  // Inserts at all indexes from `from` on.
   [[nodiscard]] bool insert(ByteList& bytes, const ByteList& values, std::size_t from, std::size_t count,
                             std::size_t& tries) const {
     if (count == 0) {
@@ -136,7 +139,7 @@ class Mender {
     }
     for (std::size_t place = from; place <= bytes.size(); ++place) {
       for (const std::uint8_t value : values) {
-        // In front of the same value it is the same as behind it.
+        // Inserting before or after the same value gives the same bytes.
         if (place < bytes.size() && bytes[place] == value) continue;
         bytes.insert(bytes.begin() + static_cast<std::ptrdiff_t>(place), value);
         const bool good = insert(bytes, values, place + 1, count - 1, tries);
@@ -159,21 +162,21 @@ bool contains(const ByteList& bytes, std::uint8_t value) {
   return std::find(bytes.begin(), bytes.end(), value) != bytes.end();
 }
 
-/// Something that is done to the bytes of every reply.
+/// A change that is made to the bytes of every reply.
 struct Suspicion {
   Ailment ailment;
-  bool (*fits)(const ByteList& raw);  // false: this reply, good or not, shows that it is not done
-  /// Whether the reply is good when it is undone; `count`: how many bytes are concerned.
+  bool (*fits)(const ByteList& raw);  // returns false if this reply, good or not, shows that the change is not made
+  /// Returns whether undoing the change makes the reply good; `count` is the number of bytes changed.
   bool (*undo)(const Mender& mender, std::size_t& count);
-  std::size_t most_tried;      // replies
-  bool of_each_reply = false;  // whatever its bytes are
+  std::size_t most_tried;      // greatest number of replies that are tried
+  bool of_each_reply = false;  // the change affects each reply, independent of its bytes
 };
 
 // ---- Each of them
 
 bool fits_any(const ByteList&) { return true; }
 
-// Bytes in front of each reply. The request itself there is an echo.
+// Bytes before each reply. If they are the request itself, that is an echo.
 template <std::size_t size>
 bool undo_bytes_before(const Mender& mender, std::size_t& count) {
   count = size;
@@ -206,7 +209,7 @@ bool undo_newline(const Mender& mender, std::size_t& count) {
   return mender.without(places);
 }
 
-// The second of each two FF.
+// Removes the second FF of each pair.
 std::vector<std::size_t> doubled(const ByteList& raw) {
   std::vector<std::size_t> places;
   for (std::size_t i = 0; i + 1 < raw.size(); ++i) {
@@ -240,10 +243,10 @@ bool fits_seven_bits(const ByteList& raw) {
 }
 bool undo_seven_bits(const Mender& mender, std::size_t& count) { return mender.with_eighth_bits(count); }
 
-constexpr std::size_t cheap = 24;  // replies that are looked at
-constexpr std::size_t dear = 16;   // where each is decoded thousands of times
+constexpr std::size_t cheap = 24;  // number of replies that are tried
+constexpr std::size_t dear = 16;   // number of replies if each is decoded thousands of times
 
-// Changes at any place come before changes at one end.
+// Changes at any index are tried before changes at one end.
 constexpr auto suspicions = std::to_array<Suspicion>({
     {Ailment::telnet_doubled, fits_telnet, undo_telnet, cheap},
     {Ailment::newline_translated, fits_newline, undo_newline, cheap},
@@ -258,8 +261,8 @@ constexpr auto suspicions = std::to_array<Suspicion>({
 
 std::string bytes_of(std::size_t count) { return count == 1 ? "a byte" : fmt::format("{} bytes", count); }
 
-// Returns how many values were seen in each place beyond the first, summed: the more there are, the less likely is it
-// that none of them has a certain bit by chance.
+// Returns the sum, over all byte indexes, of the number of different values minus one. The more values there are, the
+// less likely chance is the reason that a bit is never set.
 std::size_t variety(const All& all) {
   std::vector<std::set<std::uint8_t>> values;
   for (const Attempted* attempt : all) {
@@ -271,18 +274,18 @@ std::size_t variety(const All& all) {
   return sum;
 }
 
-// Nearly all damaged replies must become good.
+// Requires that nearly all damaged replies become good.
 std::optional<Finding> suspected(const Case& one, const All& all, const Suspicion& suspicion) {
   constexpr std::size_t enough = 4;
   const bool of_nearly_all = all.size() * 10 >= one.seen.readings.size() * 8;
   if (suspicion.of_each_reply && !of_nearly_all) return {};
-  // Hardly a reply of more bytes is good without their 8th bits: those of text are, whose damage has another cause.
+  // Longer replies are rarely good without 8th bits, except replies of text, whose damage then has another cause.
   const auto is_long = [](const Attempted* attempt) { return attempt->raw.size() > Mender::most_bytes; };
   if (suspicion.ailment == Ailment::seven_bits && !of_nearly_all && std::ranges::any_of(all, is_long)) return {};
   const bool fits = std::all_of(one.seen.readings.begin(), one.seen.readings.end(),
                                 [&](const Attempted& attempt) { return suspicion.fits(attempt.raw); });
   if (!fits) return {};
-  constexpr std::size_t others = 2;  // changes by chance of each reply
+  constexpr std::size_t others = 2;  // random changes tried for each reply
   sim::Random random(1);
   std::size_t tried = 0;
   std::size_t mended = 0;
@@ -301,7 +304,7 @@ std::optional<Finding> suspected(const Case& one, const All& all, const Suspicio
     }
     for (std::size_t i = 0; i < others; ++i)
       by_chance += suspicion.undo(Mender(one, *attempt, &random), ignored) ? 1 : 0;
-    // A change that explains none of the first replies does not explain nearly all.
+    // A change that explains none of the first replies cannot explain nearly all.
     if (tried >= enough && mended == 0) return {};
   }
   tried = std::min(tried, suspicion.most_tried);
@@ -315,7 +318,7 @@ std::optional<Finding> suspected(const Case& one, const All& all, const Suspicio
                   to_hex(Bytes(example->raw).first(std::min<std::size_t>(example->raw.size(), 24)))});
 }
 
-// A sum by XOR is good without the 8th bits, too: a byte of the position then goes from 7F to 00, again and again.
+// An XOR checksum is also good without the 8th bits; then a byte of the position repeatedly goes from 7F to 00.
 std::optional<Finding> seven_bits_of_good(const Case& one) {
   constexpr std::size_t enough = 40;
   constexpr std::size_t least_wraps = 2;
@@ -326,7 +329,7 @@ std::optional<Finding> seven_bits_of_good(const Case& one) {
   std::size_t good = 0;
   for (const Attempted& attempt : one.seen.readings) {
     if (!fits_seven_bits(attempt.raw)) return {};
-    // Other replies than those with the position may have any bytes.
+    // Replies without a position may have any bytes.
     const bool is_position = attempt.reading || attempt.exchange.request.frame().empty();
     if (attempt.error != Error::none || !is_position) continue;
     ++good;
@@ -345,7 +348,7 @@ std::optional<Finding> seven_bits_of_good(const Case& one) {
                   to_hex(Bytes(before->raw).first(std::min<std::size_t>(before->raw.size(), 24)))});
 }
 
-// Finds a byte before each reply to a request of one byte, which the port took for its echo.
+// Finds a byte before each reply to a request of one byte, which the port took for the echo.
 std::optional<Finding> false_echo(const Case& one) {
   std::size_t good = 0;
   std::size_t wrong = 0;
@@ -369,7 +372,7 @@ std::optional<Finding> false_echo(const Case& one) {
                   to_hex(Bytes(example->raw).first(std::min<std::size_t>(example->raw.size(), 24)))});
 }
 
-// Finds bytes behind good replies that are too few for a second reply.
+// Finds bytes after good replies that are too few for a second reply.
 std::optional<Finding> byte_behind_good(const Case& one) {
   const Observations& seen = one.seen;
   if (seen.overfull * 10 < one.good * 8 || one.good < 4 || seen.most_behind == 0 || seen.most_behind > 2) return {};

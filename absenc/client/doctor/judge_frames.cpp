@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What damaged replies look like.
+// Judges damaged replies by their content.
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
@@ -24,7 +24,7 @@ using ByteList = std::vector<std::uint8_t>;
 
 bool is_damaged(const Attempted& one) { return one.error != Error::none && one.heard; }
 
-// "bad_checksum, wrong_length"
+// Returns the errors of the replies: "bad_checksum, wrong_length".
 std::string errors_of(const std::vector<Attempted>& readings) {
   std::vector<std::string_view> names;
   for (const Attempted& one : readings) {
@@ -50,7 +50,7 @@ Finding counted(Ailment ailment, const Case& one, const All& those) {
                   to_hex(Bytes(those.front()->raw).first(std::min<std::size_t>(those.front()->raw.size(), 16)))});
 }
 
-// Whether nearly all are: one or two may be noise.
+// Returns whether nearly all attempts fulfil `is`; one or two may be noise.
 template <class Is>
 bool most(const All& all, const Is& is) {
   const auto those = std::count_if(all.begin(), all.end(), [&](const Attempted* one) { return is(*one); });
@@ -99,7 +99,7 @@ std::optional<Finding> two_frames(const Case& one, const All& all) {
   return finding(Ailment::two_answer, {fmt::format("{}", two), fmt::format("{}", all.size()), shown(**first)});
 }
 
-// Two that answer at once do not make frames that a single bit would mend.
+// If two encoders reply at once, flipping a single bit does not make the replies good.
 std::optional<Finding> same_address(const Case& one, const All&) {
   if (one.seen.clash.empty()) return {};
   return finding(Ailment::same_address, {one.seen.clash});
@@ -125,7 +125,7 @@ std::optional<Finding> single_bits(const Case& one, const All& all) {
                   errors_of(one.seen.readings), fmt::format("{} would be good with one bit changed", mended)});
 }
 
-// A reply that is good by itself, though not to this request.
+// The reply is good by itself, but not a reply to this request.
 bool answers_another(const Case& one, const Attempted& attempt) {
   return attempt.error != Error::none && one.unit.link != LinkKind::can && !attempt.exchange.request.frame().empty() &&
          !attempt.exchange.reply.frame().empty() && decodes(one, {}, attempt.exchange.reply.frame());
@@ -136,7 +136,7 @@ bool is_contradiction(const Attempted& attempt) {
          attempt.error == Error::unexpected_reply;
 }
 
-// These are found behind a good checksum: neither the line nor another protocol makes such replies.
+// These errors are found after a good checksum, so neither the line nor another protocol is the cause.
 Finding contradiction(const Case& one, const All& all) {
   std::size_t count = 0;
   const Attempted* last = nullptr;
@@ -169,8 +169,8 @@ std::optional<Finding> refusal(const Case&, const All& all) {
                                     last.advice.empty() ? std::string(text.advice) : last.advice});
 }
 
-// Bits of a sender that is several times slower than the receiver come out as long runs: no byte changes its level
-// more than once, which those of a frame with a check do.
+// A sender that is several times slower than the receiver produces long runs of equal bits: no byte has more than one
+// level change, unlike the bytes of a frame with a checksum.
 std::optional<Finding> stretched(const Case& one, const All& all) {
   if (one.unit.link != LinkKind::half_duplex && one.unit.link != LinkKind::full_duplex) return {};
   if (const auto& damage = one.seen.damage; damage && damage->framing > 0) {
@@ -194,9 +194,9 @@ std::optional<Finding> stretched(const Case& one, const All& all) {
 
 // ---- Some are good
 
-// Which bits differ from what a good reply has at standstill.
+// The bits in which a damaged reply differs from the good ones of a shaft at rest.
 struct Damage {
-  std::size_t first = 0;  // bytes that are touched
+  std::size_t first = 0;  // first and last damaged byte
   std::size_t last = 0;
   std::size_t flips = 0;
 };
@@ -214,7 +214,7 @@ std::optional<Damage> compare(const ByteList& reply, const ByteList& good) {
   return damage;
 }
 
-// The reply that nearly all good ones are; empty: the shaft moves, or the frames count.
+// Returns the reply that nearly all good ones equal; empty if the shaft moves, or if frames have a counter.
 ByteList usual_reply(const std::vector<Attempted>& readings) {
   std::map<ByteList, std::size_t> counts;
   std::size_t good = 0;
@@ -229,7 +229,7 @@ ByteList usual_reply(const std::vector<Attempted>& readings) {
   return is_usual ? usual->first : ByteList{};
 }
 
-// A stream goes on to its next good frame: more of them may be damaged than were reported.
+// Reading a stream continues to its next good frame, so more frames may be damaged than were reported.
 std::size_t unreported(const std::vector<Attempted>& readings) {
   std::size_t count = 0;
   for (const Attempted& one : readings) {
@@ -244,7 +244,7 @@ Finding some_damage(const Case& one, const All& all) {
                                   fmt::format("{}", one.seen.readings.size() + more), errors_of(one.seen.readings)};
   const ByteList usual = usual_reply(one.seen.readings);
   if (usual.empty()) return finding(Ailment::sometimes_damaged, values);
-  constexpr std::size_t few = 3;  // bits that a disturbance of one bit's length changes, at most
+  constexpr std::size_t few = 3;  // greatest number of bits that a disturbance of one bit's length changes
   std::size_t single = 0;
   std::size_t compared = 0;
   Damage sum{.first = usual.size()};
@@ -287,7 +287,7 @@ void judge_bad_frames(const Case& one, std::vector<Finding>& findings) {
       return;
     }
   }
-  if (all.size() * 10 < one.seen.readings.size()) return;  // silence is what is to be explained
+  if (all.size() * 10 < one.seen.readings.size()) return;  // silence is the main fault, which other judges explain
   findings.push_back(finding(Ailment::always_damaged,
                              {fmt::format("{}", all.size()), errors_of(one.seen.readings), shown(*all.front())}));
 }
@@ -303,7 +303,7 @@ Finding finding_of(const Unit& unit, const Options& options, PortKind place, con
     return suited(last.heard ? finding(Ailment::sometimes_damaged, {"", "", ""})
                              : finding(Ailment::sometimes_silent, {"", "", ""}));
   }
-  // A single frame can show another model, as many frames do for the doctor.
+  // A single frame can show another model, as many frames do in an examination.
   const auto& [request, reply] = last.exchange;
   if (last.error != Error::none && !reply.frame().empty()) {
     const std::string setting = diagnose(unit, options, request.frame(), reply.frame()).setting;
@@ -340,11 +340,11 @@ void judge_mixed_frames(const Case& one, std::vector<Finding>& findings) {
   }));
   const std::size_t late =
       one.unit.link == LinkKind::can ? 0 : std::max<std::size_t>(one.seen.late, belated.requests.size());
-  // A late reply can cost the next readings, too.
+  // A late reply can make the next readings fail, too.
   const bool is_lateness_found =
       std::ranges::any_of(findings, [](const Finding& found) { return found.ailment == Ailment::sometimes_late; });
   if (is_lateness_found && all.size() <= 2 * late) all.clear();
-  // Where the host is the clock, a line that never moved is silence.
+  // On a clocked line, a data line that never changes counts as silence.
   const All stuck = take([](const Attempted& attempt) { return attempt.error == Error::line_stuck; });
   const auto is_misheard = [&](const Attempted& attempt) {
     return is_refusal(attempt) || (!has_good_part(one, attempt) && answers_another(one, attempt));
@@ -355,7 +355,7 @@ void judge_mixed_frames(const Case& one, std::vector<Finding>& findings) {
                                 refused.back()->detail.empty() ? std::string(text_of(refused.back()->error).description)
                                                                : refused.back()->detail}));
   }
-  // With damage beside them they may be damage that the checksum does not see.
+  // Beside damaged replies, these may be damage that the checksum misses.
   if (!all.empty() && std::ranges::all_of(all, [](const Attempted* attempt) { return is_contradiction(*attempt); })) {
     findings.push_back(contradiction(one, all));
     all.clear();
@@ -369,7 +369,7 @@ void judge_mixed_frames(const Case& one, std::vector<Finding>& findings) {
         finding(Ailment::two_answer, {fmt::format("{}", one.seen.overfull), fmt::format("{}", one.seen.readings.size()),
                                       to_hex(example.first(std::min(example.size(), most_shown)))}));
   } else if (std::optional<Finding> extra = extra_bytes(one, all)) {
-    // A whole reply behind a reply may be the next one, where the first was late.
+    // A complete reply after a reply may be the next one, if the first was late.
     const bool may_be_late = std::ranges::all_of(all, [&](const Attempted* one_of) { return holds_two(one, *one_of); });
     if (!may_be_late || !may_be_the_computer(one.seen, all.size())) findings.push_back(std::move(*extra));
   } else if (!all.empty()) {

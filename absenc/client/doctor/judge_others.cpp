@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Replies that something else than the encoder of the user's settings sends: another model, another checksum, text.
+// Judges replies that do not come from the encoder of the user's settings: another model, another checksum, text.
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
@@ -24,7 +24,7 @@ namespace absenc::client {
 
 namespace {
 
-// The address of the encoder that was asked.
+// Returns the address setting of the polled encoder.
 std::vector<std::string> address_settings(const Unit& unit, const Options& options) {
   const Option* option = find_role(unit.options, Role::encoder);
   if (option == nullptr) return {};
@@ -38,7 +38,7 @@ std::size_t printed(Bytes bytes) {
   return static_cast<std::size_t>(std::count_if(bytes.begin(), bytes.end(), is_printed));
 }
 
-// Whether the unit's own replies are text.
+// Returns whether the unit's own replies are text.
 bool speaks_text(const Unit& unit) {
   std::size_t all = 0;
   std::size_t text = 0;
@@ -50,7 +50,7 @@ bool speaks_text(const Unit& unit) {
   return all != 0 && text * 10 >= all * 9;
 }
 
-// "$GPGGA,120000", the first characters from `at` on.
+// Returns the first characters from `at` on: "$GPGGA,120000".
 std::string quoted(Bytes bytes, std::size_t at) {
   constexpr std::size_t most = 32;
   std::string text = "\"";
@@ -65,7 +65,7 @@ std::string quoted(Bytes bytes, std::size_t at) {
 CheckFindings checks_of(const std::vector<CheckedFrame>& frames) {
   try {
     return find_crc(frames);
-  } catch (const UsageError&) {  // too few, or of kinds in which no check is looked for
+  } catch (const UsageError&) {  // too few frames, or of a kind in which no checksum is searched
     return {};
   }
 }
@@ -75,7 +75,7 @@ bool is_same_kind(const FoundCheck& one, const FoundCheck& other) {
                                                           one.parameters.poly == other.parameters.poly));
 }
 
-// With another start value the unit's own check is no other one.
+// The unit's own checksum with another initial value is not another checksum.
 bool is_of_unit(const FoundCheck& check, const Unit& unit) {
   std::vector<CheckedFrame> frames;
   for (const Vector& vector : unit.vectors) {
@@ -117,7 +117,8 @@ std::optional<Finding> text_of_others(const Case& one, Bytes bytes) {
     const std::size_t at = text.find(word);
     if (at != std::string::npos) return finding(Ailment::modem_answers, {quoted(bytes, at)});
   }
-  constexpr std::size_t enough_kinds = 6;  // of characters: a frame that comes again and again may have letters, too
+  constexpr std::size_t enough_kinds =
+      6;  // number of different characters; a frame that repeats may contain letters, too
   const bool has_lines = text.find_first_of("\r\n") != std::string::npos;
   if (bytes.size() < enough || !has_lines || std::set(text.begin(), text.end()).size() < enough_kinds) return {};
   if (printed(bytes) * 20 < bytes.size() * 19 || speaks_text(one.unit)) return {};
@@ -126,19 +127,19 @@ std::optional<Finding> text_of_others(const Case& one, Bytes bytes) {
   return finding(Ailment::modem_answers, {quoted(bytes, static_cast<std::size_t>(begin - bytes.begin()))});
 }
 
-// The machinery of `identify`, held to this unit and to this encoder of it.
+// Searches options as `identify` does, limited to this unit and this encoder.
 std::optional<Finding> other_settings(const Case& one, const All& all) {
-  constexpr std::size_t enough = 4;  // frames: fewer prove little
+  constexpr std::size_t enough = 4;  // number of frames; fewer are weak evidence
   if (all.size() < enough) return {};
   std::vector<capture::ObservedExchange> exchanges;
-  // Those before it in a reading may tell what the encoder is, too.
+  // Earlier exchanges of a reading may identify the encoder, too.
   for (const Attempted& attempt : one.seen.exchanges) {
     if (attempt.answered) exchanges.push_back(attempt.exchange);
   }
   if (exchanges.empty()) {
     for (const Attempted* attempt : all) exchanges.push_back(attempt->exchange);
   }
-  constexpr std::size_t most_tried = 32;  // each is decoded with many sets of options
+  constexpr std::size_t most_tried = 32;  // number of frames, because each is decoded with many sets of options
   exchanges.resize(std::min(exchanges.size(), most_tried));
   const std::vector<std::string> address = address_settings(one.unit, one.options);
   std::vector<OptionText> known;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Whether positions behave as those of a shaft: quiet at standstill, no faster than it can turn, with every code.
+// Judges whether positions move as those of a shaft: steady at rest, not too fast, without missing codes.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -16,23 +16,23 @@ namespace absenc::client {
 
 namespace {
 
-constexpr double quiet_share = 1e-4;  // of a turn, 0.04 degrees: what stands may go to and fro by so much
+constexpr double quiet_share = 1e-4;  // fraction of a turn, 0.04 degrees, by which a position at rest may vary
 constexpr std::int64_t quiet_counts = 4;
 constexpr std::uint32_t hand_rpm = 600;
 
-/// How the position went from reading to reading.
+/// The movement of the position from reading to reading.
 struct Walk {
   unsigned bits = 0;
   double unit_um = 0;
   std::vector<std::uint64_t> places{};
   std::vector<std::int64_t> steps{};
   std::vector<Time> pauses{};
-  std::int64_t lowest = 0;  // as it goes on past the end of a turn, from the first
+  std::int64_t lowest = 0;  // lowest continuous position, relative to the first
   std::int64_t highest = 0;
   std::int64_t end = 0;
-  std::set<std::int64_t> turns{};  // that were reported as valid
+  std::set<std::int64_t> turns{};  // turns that were reported as valid
   std::size_t zero_crossings = 0;
-  Time time{};  // from the first to the last
+  Time time{};  // time from the first to the last reading
 
   [[nodiscard]] std::int64_t span() const { return highest - lowest; }
 };
@@ -68,7 +68,7 @@ std::int64_t quiet(const Walk& walk) {
   return std::max(quiet_counts, static_cast<std::int64_t>(std::ldexp(quiet_share, static_cast<int>(walk.bits))));
 }
 
-// What turns goes one way, or swings; what stands and is disturbed turns round all the time.
+// A turning shaft moves in one direction or swings; the noise of a shaft at rest changes direction all the time.
 void judge_noise(const Walk& walk, std::vector<Finding>& findings) {
   constexpr std::size_t enough = 40;
   std::size_t turns = 0;
@@ -81,7 +81,7 @@ void judge_noise(const Walk& walk, std::vector<Finding>& findings) {
     ++moved;
   }
   if (walk.steps.size() < enough || walk.span() <= quiet(walk) || moved * 4 < walk.steps.size()) return;
-  // A swing that is slow enough to be seen does not turn round at every third step; one that is wide is no noise.
+  // A visible swing does not change direction at every third step, and a wide movement is not noise.
   const bool wide = walk.unit_um > 0 ? walk.span() > 1000 : walk.span() > (std::int64_t{1} << walk.bits) / 32;
   if (turns * 3 < moved || wide) return;
   const std::string size = walk.unit_um > 0
@@ -91,7 +91,8 @@ void judge_noise(const Walk& walk, std::vector<Finding>& findings) {
   findings.push_back(finding(Ailment::position_noise, {fmt::format("{}", walk.span()), size}));
 }
 
-// Counts that can be passed in this time; as many as half of them cannot be told from the other way round.
+// Returns the counts that the shaft can pass in this time, limited to half of the range, beyond which the direction is
+// ambiguous.
 double reach(const Walk& walk, Time pause, const host::SpeedLimit& limit) {
   const double seconds = std::chrono::duration<double>(pause).count();
   const double counts =
@@ -99,9 +100,9 @@ double reach(const Walk& walk, Time pause, const host::SpeedLimit& limit) {
   return 1.25 * counts * seconds + static_cast<double>(quiet(walk));
 }
 
-// `damaged`: so many readings were seen to be. A sum of 8 bits passes one of 20 in which three bits are damaged, and
-// each goes there and back: no more jumps than damaged readings are damage, too. `woken_late`: a pause may have been
-// longer by so much, because this computer took the first of the two positions late.
+// `damaged` is the number of readings seen as damaged. A sum of 8 bits misses one of 20 errors of three bits, and each
+// missed one causes two jumps; so up to as many jumps as damaged readings count as damage. `woken_late`: a pause may
+// have been this much longer, because this computer read the first of two positions late.
 void judge_jumps(const Walk& walk, const host::SpeedLimit& limit, Time woken_late, std::size_t damaged,
                  std::vector<Finding>& findings) {
   std::size_t jumps = 0;
@@ -117,7 +118,7 @@ void judge_jumps(const Walk& walk, const host::SpeedLimit& limit, Time woken_lat
   findings.push_back(finding(Ailment::position_jumps, {fmt::format("{}", jumps), fmt::format("{}", furthest)}));
 }
 
-// A shaft that turns under the hand moves, and somewhere on a whole turn its turns are counted.
+// A shaft turned by hand moves its position, and its turns change within each whole turn.
 void judge_turning(const Walk& walk, std::vector<Finding>& findings) {
   constexpr std::size_t enough = 20;
   if (walk.steps.size() < enough) return;
@@ -132,8 +133,8 @@ void judge_turning(const Walk& walk, std::vector<Finding>& findings) {
   }
 }
 
-// A bit that stays as it is though the position went past several of its changes, at uneven steps: even ones may always
-// come to the same.
+// Finds a bit that never changes although the position passed several of its changes in uneven steps. With even steps
+// the bit may always have the same value.
 void judge_bits(const Walk& walk, std::vector<Finding>& findings) {
   constexpr std::size_t enough = 64;
   constexpr std::size_t uneven = 8;

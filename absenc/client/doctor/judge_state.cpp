@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Judges what the encoder reports of itself: that it is starting, alarms, status, and whether its position holds.
+// Judges the state that the encoder reports: starting, alarms, status, and the validity of its position.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -20,21 +20,21 @@ namespace absenc::client {
 
 namespace {
 
-// A flag that some reading reported as raised.
+// A flag that a reading reported as raised.
 struct RaisedFlag {
   const FlagInfo* flag = nullptr;
   bool is_alarm = false;
-  std::set<std::string_view> channels{};  // the fields that report it
-  const Reading* last = nullptr;          // the last of the readings
+  std::set<std::string_view> channels{};  // names of the fields that report the flag
+  const Reading* last = nullptr;          // the last reading that reports the flag
   std::size_t readings = 0;
-  std::size_t invalid = 0;  // of them, with a position or turns that do not hold
+  std::size_t invalid = 0;  // number of these readings with an invalid position or invalid turns
 };
 
 bool is_invalid(const Reading& reading) {
   return reading.singleturn_validity() == Validity::invalid || reading.multiturn_validity() == Validity::invalid;
 }
 
-// The raised alarms of both channels, by the bits of the first.
+// Returns the raised alarms of both channels, as bits of the first.
 std::uint32_t alarms_of_either(const Unit& unit, const Reading& reading) {
   std::uint32_t bits = 0;
   for (const Flags& flags : alarms_of(unit, reading)) bits |= flags.bits;
@@ -46,12 +46,12 @@ void count_flags(const std::vector<Flags>& all, bool is_alarm, const Reading& re
   for (const Flags& flags : all) {
     for (const FlagInfo* flag : raised(*flags.field, flags.bits)) {
       if (!is_alarm && (flag->action.empty() || (flag->sums & alarms) != 0)) continue;
-      // Channels have fields of their own with the same words.
+      // Each channel has a field of its own with the same flag names.
       auto count = std::ranges::find_if(counts, [&](const RaisedFlag& known) {
         return known.is_alarm == is_alarm && known.flag->name == flag->name;
       });
       if (count == counts.end()) count = counts.insert(counts.end(), {.flag = flag, .is_alarm = is_alarm});
-      // A reading in which both channels report it counts once.
+      // Counts a reading once if both channels report the flag.
       const bool is_known = std::exchange(count->last, &reading) == &reading;
       count->channels.insert(flags.field->name);
       if (is_known) continue;
@@ -65,8 +65,8 @@ std::string share(std::size_t some, std::size_t all) {
   return some == all ? fmt::format("all {}", all) : fmt::format("{} of {}", some, all);
 }
 
-// Judges positions and turns that are invalid without an alarm that says why. `is_damage`: so few of them
-// are damage that the checksum did not see.
+// Judges positions and turns that are invalid without an alarm. `is_damage` returns whether so few may be damage that
+// the checksum missed.
 template <class IsDamage>
 void judge_validity(const std::vector<const Reading*>& readings, const IsDamage& is_damage,
                     std::vector<Finding>& findings) {
@@ -91,7 +91,7 @@ void judge_validity(const std::vector<const Reading*>& readings, const IsDamage&
 
 void judge_state(const Case& one, std::vector<Finding>& findings) {
   std::vector<const Reading*> readings;
-  std::vector<const Reading*> ready;  // of one that starts nothing else counts
+  std::vector<const Reading*> ready;  // readings after the start-up, because alarms during start-up do not count
   for (const Attempted& attempt : one.seen.readings) {
     if (!attempt.reading) continue;
     readings.push_back(&*attempt.reading);
@@ -111,10 +111,10 @@ void judge_state(const Case& one, std::vector<Finding>& findings) {
     count_flags(status_of(one.unit, *reading), false, *reading, alarms, flags);
   }
   std::stable_sort(flags.begin(), flags.end(), [](const RaisedFlag& before, const RaisedFlag& after) {
-    return (before.invalid > 0) > (after.invalid > 0);  // what makes the position invalid is mended first
+    return (before.invalid > 0) > (after.invalid > 0);  // flags that make the position invalid come first
   });
-  // A checksum of 6 bits passes one of 64 damaged replies, by chance a few more: the encoder may not have raised these
-  // flags.
+  // A checksum of 6 bits misses one of 64 damaged replies, by chance a few more, so the encoder may not have raised
+  // these flags.
   const std::size_t failed = one.seen.readings.size() - one.good;
   const auto is_damage = [failed](std::size_t count) { return count * 10 < failed; };
   std::erase_if(flags, [&](const RaisedFlag& rare) { return is_damage(rare.readings); });
@@ -139,13 +139,13 @@ void judge_state(const Case& one, std::vector<Finding>& findings) {
 }
 
 std::optional<Finding> judge_start(const Case& one) {
-  constexpr double chance = 1e-3;  // that so many failures, in any order, all come first
+  constexpr double chance = 1e-3;  // greatest probability that all failures come first by chance
   const std::vector<Attempted>& readings = one.seen.readings;
   const auto first = std::ranges::find_if(readings, is_good);
   const auto failed = static_cast<std::size_t>(first - readings.begin());
   if (failed < 2 || failed + one.good != readings.size()) return {};
   const auto silent = static_cast<std::size_t>(std::count_if(readings.begin(), first, is_silent));
-  // The last ones may be damaged, as the encoder comes up while it is asked.
+  // The last failures may be damaged replies, if the encoder starts during a request.
   if (silent * 2 < failed || may_be_the_computer(one.seen, failed)) return {};
   if (-log_choose(readings.size(), failed) > std::log(chance)) return {};
   return finding(Ailment::starting,

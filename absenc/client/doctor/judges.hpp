@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The parts of the judgement: each adds what it finds.
+// The judges: each adds its findings.
 #pragma once
 
 #include <algorithm>
@@ -10,7 +10,7 @@
 
 namespace absenc::client {
 
-/// What was seen, and how many of its readings were good.
+/// The observations and the number of good readings among them.
 struct Case {
   const Unit& unit;
   const Options& options;
@@ -20,15 +20,15 @@ struct Case {
 
 [[nodiscard]] inline bool is_good(const Attempted& one) { return one.error == Error::none; }
 
-/// Whether nothing answered: an adapter's echo of the request is no answer.
+/// Returns whether no reply arrived; an adapter's echo of the request is not a reply.
 [[nodiscard]] inline bool is_silent(const Attempted& one) {
   const bool is_echo = !one.answered && one.raw == one.exchange.request.bytes;
   return one.error != Error::none && (!one.heard || is_echo);
 }
 
-/// Whether so many replies that were late or did not come may be due to this computer, which was busy: the encoder may
-/// be a program on it, or an adapter whose driver waits, too. A single one may be where there are many readings, and
-/// one of a hundred where the computer stood still for as long as a reply may take.
+/// Returns whether this number of late or missing replies may be due to this busy computer; an emulator or an adapter's
+/// driver on it is delayed, too. That may be a single one among many readings, or one of a hundred if the computer
+/// stood still for as long as the timeout.
 [[nodiscard]] inline bool may_be_the_computer(const Observations& seen, std::size_t some) {
   constexpr Time busy = std::chrono::milliseconds(1);
   constexpr std::size_t many = 20;
@@ -42,21 +42,21 @@ struct Case {
 
 void judge_port(const Case& one, std::vector<Finding>& findings);
 void judge_line(const Case& one, std::vector<Finding>& findings);
-/// Of replies of which none is good.
+/// Judges replies of which none is good.
 void judge_bad_frames(const Case& one, std::vector<Finding>& findings);
-/// So many of the requests that were not answered, or of the frames that an encoder was to send by itself.
+/// Returns the finding for this number of missing replies, or of missing frames of an encoder that sends by itself.
 [[nodiscard]] Finding silence_of(const Case& one, std::size_t silent);
-/// Failures that come together, with pauses between them.
+/// Judges bursts of failures with good readings between them.
 [[nodiscard]] std::optional<Finding> coming_and_going(const Case& one);
-/// Of replies of which some are.
+/// Judges replies of which some are good.
 void judge_mixed_frames(const Case& one, std::vector<Finding>& findings);
-/// Finds an encoder that was switched on meanwhile: nothing came at first, and from then on every reading was good.
+/// Finds an encoder that was powered on meanwhile: no replies at first, then only good readings.
 [[nodiscard]] std::optional<Finding> judge_start(const Case& one);
 void judge_state(const Case& one, std::vector<Finding>& findings);
 void judge_position(const Case& one, const std::vector<Attempted>& readings, bool by_hand,
                     std::vector<Finding>& findings);
 
-/// "1A 20 45", the begin of what is long.
+/// Returns bytes as "1A 20 45", cut after `most` bytes.
 [[nodiscard]] std::string shown(const Attempted& one);
 
 }  // namespace absenc::client

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// For tests of what is found: lines that follow a script.
+// Scripted lines for tests of doctor.
 #pragma once
 
 #include <algorithm>
@@ -16,16 +16,16 @@ namespace absenc::client {
 
 using namespace std::chrono_literals;
 
-/// A line on which a request is answered by a function, and on which somebody may talk all the time.
+/// A line on which a function makes the replies, and on which another device may send all the time.
 template <class Item>
 class ScriptedPort final : public Port<Item> {
  public:
   using List = std::vector<Item>;
   std::function<List(const List& request)> answer = [](const List&) { return List{}; };
-  List babble{};  // every millisecond
+  List babble{};  // bytes that the other device sends every millisecond
   Time after = 100us;
   Time latency{};
-  bool destroys = false;  // every frame, as a CAN bus on which nobody acknowledges
+  bool destroys = false;  // every frame is destroyed, as on a CAN bus without acknowledgement
 
   Time now() override { return now_; }
   void begin(const Step<Item>& step) override {

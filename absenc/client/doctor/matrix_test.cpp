@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Doctor's matrix, in virtual time: every unit in every mode, with each alarm, each condition at both ends of its
-// range, and each fault at 1, 10 and 100 %. Nothing that was reported or damaged is called good, and no finding names
-// another cause. docs/doctor.md holds the table of first lines; ABSENC_UPDATE_DOCS=1 writes it anew.
+// Checks doctor in virtual time with every unit in every mode, each alarm, each condition at both ends of its range,
+// and each fault at 1, 10 and 100 %. Reported or damaged encoders are never called good, and no finding names another
+// cause. docs/doctor.md has the tables of first findings; ABSENC_UPDATE_DOCS=1 updates them.
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <gmock/gmock-more-matchers.h>
@@ -30,10 +30,10 @@ using Ids = std::set<std::string_view>;
 
 constexpr std::size_t readings = 200;
 
-/// A position of which no byte is 0: of such a frame what is left of it may be a good one.
+/// A position without a byte 0: the rest of a truncated frame with zeros could be a good frame.
 constexpr std::string_view at_no_zero = "singleturn=1383&";
 
-/// A virtual encoder whose faults and state can be asked when the examination is over.
+/// A virtual encoder whose faults and state can be read after the examination.
 struct Watched {
   std::shared_ptr<VirtualDevice> device;
   Examination examination{};
@@ -47,7 +47,7 @@ struct Watched {
   }
 };
 
-/// The device behind a line in virtual time.
+/// A device on a line in virtual time.
 Link link_on(const EncoderAddress& address, const std::shared_ptr<VirtualDevice>& device) {
   struct Both {
     std::shared_ptr<VirtualDevice> device;
@@ -96,7 +96,7 @@ Ids ids_of(const Examination& examination) {
   return ids;
 }
 
-/// One reading without doctor: what the encoder reports in this state, and how it stands on the wire.
+/// Takes one reading without doctor: the reported state and the bytes on the wire.
 struct Read {
   Error error = Error::unsupported;
   std::optional<Reading> reading{};
@@ -129,7 +129,7 @@ Read reading_of(const EncoderAddress& address) {
   return link.bytes != nullptr ? reading_on(address, *link.bytes) : reading_on(address, *link.frames);
 }
 
-/// Returns the bits that name a defect: a status without an action is none.
+/// Returns the bits of flags that are defects; a status flag without advice is none.
 std::uint64_t ailments_of(const Unit& unit, const Reading& reading) {
   std::uint64_t bits = reading.alarms;
   unsigned at = 0;
@@ -143,31 +143,32 @@ std::uint64_t ailments_of(const Unit& unit, const Reading& reading) {
   return bits;
 }
 
-/// Findings that may name a state which the encoder reports by itself.
+/// Findings that may result from a state that the encoder reports.
 const Ids of_state{"starting", "alarm", "status", "position_invalid", "contradictory", "counter_stands", "refused"};
 
-/// And of each fault, by its kind. Damage shows as what the frames make of it.
+/// Findings that may result from each kind of fault; damage appears differently in each frame format.
 const Ids& causes_of(const Unit& unit, sim::FaultKind kind) {
   using enum sim::FaultKind;
   static const Ids damage{"damaged_bits",   "damaged_bursts", "sometimes_damaged", "always_damaged", "bytes_missing",
                           "position_jumps", "position_noise", "stuck_bits",        "can_errors"};
   static const std::map<sim::FaultKind, Ids> others{
-      // Where the next request is answered before the late reply comes, nothing shows that one came.
+      // If the next reply arrives before the late one, nothing shows a late reply.
       {delay, {"reply_late", "sometimes_late", "sometimes_silent"}},
       {echo, {"wrong_echo", "two_answer", "extra_bytes"}},
-      // On a bus random bytes may be two encoders that speak at the same time.
+      // On a bus random bytes may look like two encoders that send at the same time.
       {garbage,
        {"same_address", "extra_bytes", "bytes_missing", "sometimes_damaged", "damaged_bits", "damaged_bursts",
         "always_damaged", "position_jumps", "position_noise", "stuck_bits"}},
       {silence, {"no_answer", "sometimes_silent", "miso_stuck"}},
       {repeat, {"two_answer", "extra_bytes"}},
-      // A request that is taken for another has a reply that does not fit; which way was damaged cannot be seen then.
+      // If a damaged request is taken for another one, its reply does not fit; it is unknown which direction was
+      // damaged.
       {request_corrupt,
        {"requests_damaged", "sometimes_silent", "no_answer", "refused", "damaged_bits", "damaged_bursts",
         "sometimes_damaged", "always_damaged", "bytes_missing", "contradictory", "position_jumps"}},
   };
-  // Where the host is the clock, something is always clocked in: whatever the encoder does wrong is damage, or a level
-  // that never changes.
+  // On a clocked line the host always receives bits, so every fault appears as damage, or as a level that never
+  // changes.
   static const Ids clocked = [] {
     Ids all = damage;
     all.insert({"miso_stuck", "sometimes_silent", "contradictory", "requests_damaged", "other_checksum"});
@@ -197,7 +198,7 @@ class Matrix : public ::testing::TestWithParam<const Unit*> {
   const Unit& unit() const { return *GetParam(); }
 };
 
-/// Those with which a virtual encoder is read at all, each way of being read once.
+/// Returns the settings with which a virtual encoder can be read, each manner of reading once.
 std::vector<std::string> readable_modes(const Unit& unit) {
   std::vector<std::string> modes;
   std::set<std::string> known;
@@ -229,7 +230,7 @@ TEST_P(Matrix, AHealthyEncoderIsGoodAndItsVerdictSaysWhatWasLookedAt) {
   }
 }
 
-/// Each alarm, and each condition at both ends of its range, as settings of a virtual encoder.
+/// Returns each alarm, and each condition at both ends of its range, as settings of a virtual encoder.
 std::vector<std::string> states_of(const Unit& unit) {
   std::vector<std::string> states;
   const Options options = parse_address("sim:" + std::string(unit.id)).options;
@@ -283,7 +284,7 @@ TEST_P(Matrix, WhatTheEncoderReportsIsNeverGood) {
   std::printf("%s: %zu states reported, %zu not\n", std::string(unit().id).c_str(), reported, unreported);
 }
 
-/// How its frames are damaged depends on whether it is asked or sends by itself, not on what they carry.
+/// The damage of frames depends on whether the encoder is polled or sends by itself, not on their content.
 std::vector<std::string> damaged_modes(const Unit& unit) {
   std::vector<std::string> modes;
   std::set<bool> known;
@@ -304,7 +305,7 @@ TEST_P(Matrix, DamageIsNeverGoodAndNamedAsWhatItIs) {
         const Watched one = examined(address);
         const Examination& examination = one.examination;
         const bool all_good = examination.good == examination.tried;
-        // A fault that changes nothing for the host is none: a delay within its limit.
+        // A fault without effect on the host is none, such as a delay within the timeout.
         if (one.injected() == 0 || (all_good && examination.findings.empty())) continue;
         EXPECT_FALSE(examination.healthy()) << sentences(examination);
         EXPECT_EQ(differences(ids_of(examination), causes_of(unit(), static_cast<sim::FaultKind>(kind))), "")
@@ -321,7 +322,8 @@ std::string first_of(const Examination& examination) {
   return first == nullptr ? "good" : std::string(first->id);
 }
 
-/// A row a unit, a column a fault: the first finding at 1, 10 and 100 %, once where they are the same.
+/// Returns the table with a row for each unit and a column for each fault: the first findings at 1, 10 and 100 %, once
+/// if they are equal.
 std::string fault_table() {
   std::string table = "| protocol |";
   for (const std::string_view name : sim::fault_names) table += fmt::format(" {} |", name);
@@ -344,7 +346,7 @@ std::string fault_table() {
   return table;
 }
 
-/// Each alarm and each condition at its ends, with the finding and what it says was seen.
+/// Returns the table of each alarm and each condition at its ends, with the first finding and its evidence.
 std::string state_table() {
   std::string table = "| protocol | state of the encoder | first finding | evidence |\n|---|---|---|---|\n";
   for (const Unit* unit : all_units()) {
@@ -363,7 +365,7 @@ std::string state_table() {
   return table;
 }
 
-/// The lines between `<!-- name -->` and `<!-- end -->`.
+/// Replaces the lines between `<!-- name -->` and `<!-- end -->`.
 std::string& replace_between(std::string& text, const std::string& name, const std::string& with) {
   const std::string begin = fmt::format("<!-- {} -->\n", name);
   const std::size_t from = text.find(begin);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What was seen of an encoder and its way, before anybody judges it.
+// The observations of an encoder and its port, which the judges evaluate.
 #pragma once
 
 #include <cstdint>
@@ -17,19 +17,19 @@
 
 namespace absenc::client {
 
-/// A setting that was tried in place of that of the user.
+/// A setting that was tried instead of the user's.
 struct Trial {
-  Ailment ailment{};      // what it is when this one helps
-  std::string said{};     // "baud=115200"
-  std::string setting{};  // "baud=9600"
+  Ailment ailment{};      // the finding if this setting helps
+  std::string said{};     // the user's setting, "baud=115200"
+  std::string setting{};  // the setting tried, "baud=9600"
   std::size_t good = 0;
   std::size_t tried = 0;
-  std::size_t good_as_said = 0;  // meanwhile, with the setting of the user
+  std::size_t good_as_said = 0;  // good readings with the user's setting in the same turns
   std::size_t tried_as_said = 0;
-  std::string command{};  // other_protocol: the address to read it by
+  std::string command{};  // other_protocol: the command that reads the encoder
 };
 
-/// Why the port did not open, or went away.
+/// Why the port did not open, or was lost.
 struct Refusal {
   os::Failure::Kind kind{};
   std::string sentence{};
@@ -39,40 +39,41 @@ struct Refusal {
 
 struct Observations {
   PortKind place = PortKind::serial;
-  std::string port{};  // its path, where it is a serial one
+  std::string port{};  // path of a serial port
   os::PortFacts facts{};
-  std::optional<os::LineCounts> damage{};  // that the UART counted meanwhile
+  std::optional<os::LineCounts> damage{};  // errors that the UART counted during the examination
   std::optional<Refusal> refusal{};
-  std::vector<std::uint8_t> unsolicited{};  // before anything was sent
+  std::vector<std::uint8_t> unsolicited{};  // bytes received before the first request
   Time listened{};
-  bool never_silent = false;      // meanwhile
-  std::size_t within_frames = 0;  // of an encoder that sends by itself: so many bytes are good frames, the others not
+  bool never_silent = false;  // the line was never silent while listening
+  std::size_t within_frames =
+      0;  // encoders that send by themselves: number of unsolicited bytes that are good frames, if most are not
   std::vector<Attempted> readings{};
-  /// Each request with its reply, where a reading took several; the frames, where the encoder sends by itself, and
-  /// those that did not come in time. Empty: `readings` are all.
+  /// Each request with its reply, if a reading has several; for an encoder that sends by itself each frame, and the
+  /// missing ones. Empty if `readings` has all of them.
   std::vector<Attempted> exchanges{};
-  std::vector<Attempted> turned{};  // while somebody turned the shaft by hand
-  std::uint64_t line_errors = 0;    // of a CAN bus
-  std::uint64_t late = 0;           // replies that came after their limit
-  Time lateness{};                  // of the latest
-  std::uint64_t overfull = 0;       // good replies behind which more came
+  std::vector<Attempted> turned{};  // readings while the shaft was turned by hand
+  std::uint64_t line_errors = 0;    // number of error frames of a CAN bus
+  std::uint64_t late = 0;           // number of replies after their timeout
+  Time lateness{};                  // delay of the latest of them
+  std::uint64_t overfull = 0;       // number of good replies that were followed by more items
   std::vector<std::uint8_t> overfull_example{};
-  std::size_t most_behind = 0;  // items behind one of them
+  std::size_t most_behind = 0;  // greatest number of items after one of them
   std::vector<Trial> trials{};
-  host::EchoMode echo_said{};     // by the user
-  host::EchoMode echo{};          // as it was found
-  std::optional<Time> latency{};  // as the user said
-  Time woken_late{};              // how late this computer woke who waited meanwhile, at most
-  host::SpeedLimit limit{};       // how fast it may move
-  std::string clash{};            // "address 3": whatever answers there is damaged every time
+  host::EchoMode echo_said{};     // echo mode that the user set
+  host::EchoMode echo{};          // echo mode that was detected
+  std::optional<Time> latency{};  // latency that the user set
+  Time woken_late{};              // greatest wake-up delay of this computer during the examination
+  host::SpeedLimit limit{};       // speed limit of the encoder
+  std::string clash{};            // "address 3", if all replies of that address are damaged
   bool complete = true;
 };
 
-/// What is wrong, in the order of `Ailment`.
+/// Judges the observations; findings are in the order of their kinds.
 [[nodiscard]] Examination judge(const Unit& unit, const Options& options, const Observations& seen);
 
-/// Of one reading that failed, at once: what is most likely behind it. `usually_good`: others mostly do not fail;
-/// `late`: replies came after their limit. Its evidence may be incomplete.
+/// Returns the most likely finding for a single failed reading. `usually_good`: other readings mostly succeed; `late`:
+/// replies arrived after their timeout. The evidence may be incomplete.
 [[nodiscard]] Finding finding_of(const Unit& unit, const Options& options, PortKind place, const Attempted& last,
                                  bool usually_good, bool late);
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The doctor's advice fits the place: a network has no USB adapter, and a port that absenc holds no ModemManager.
+// Checks that the advice fits the place: none about USB for a network, none about ModemManager for absenc's own port.
 #include <gmock/gmock-more-matchers.h>
 #include <gtest/gtest.h>
 
@@ -14,7 +14,7 @@ namespace {
 using testing::HasSubstr;
 using testing::Not;
 
-/// Findings that only the facts of a serial port give.
+/// Findings that need facts of a serial port.
 const std::set<std::string_view> of_serial_ports{"port_is_modem", "latency_timer", "direction_unswitched"};
 
 std::string advice_of(Ailment ailment, PortKind place) {
@@ -29,7 +29,8 @@ TEST(DoctorAdvice, NamesNothingThatThePlaceHasNot) {
       const auto ailment = static_cast<Ailment>(i);
       const std::string_view id = id_of(ailment);
       if (of_serial_ports.contains(id)) continue;
-      if (place == PortKind::sim && (id.starts_with("port_") || id == "modem_answers")) continue;  // it always opens
+      if (place == PortKind::sim && (id.starts_with("port_") || id == "modem_answers"))
+        continue;  // the simulated port always opens
       const std::string advice = advice_of(ailment, place);
       for (const char* word : {"USB", "latency timer", "ModemManager", "/dev/serial"}) {
         EXPECT_THAT(advice, Not(HasSubstr(word))) << id << " at " << port_kind_names[static_cast<std::size_t>(place)];
@@ -38,7 +39,7 @@ TEST(DoctorAdvice, NamesNothingThatThePlaceHasNot) {
   }
 }
 
-/// `latency` is no setting of a virtual encoder, and of SPI.
+/// Virtual encoders and SPI have no setting `latency`.
 TEST(DoctorAdvice, ProposesALatencyOnlyWhereItCanBeSet) {
   for (const Ailment ailment : {Ailment::reply_late, Ailment::sometimes_late, Ailment::sometimes_silent}) {
     EXPECT_THAT(advice_of(ailment, PortKind::serial), HasSubstr("latency="));

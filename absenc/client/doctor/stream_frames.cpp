@@ -16,15 +16,15 @@ namespace {
 using namespace std::chrono_literals;
 using ByteList = std::vector<std::uint8_t>;
 
-constexpr std::size_t enough = 8;  // frames
+constexpr std::size_t enough = 8;  // least number of frames
 
-/// Bytes without a pause between them.
+/// A piece of the stream: bytes without a pause between them.
 struct Piece {
-  Time at{};  // of the first byte
+  Time at{};  // arrival time of the first byte
   ByteList bytes{};
 };
 
-// The first and the last one may be parts of frames: the port was opened and closed meanwhile.
+// Leaves out the first and the last piece, which may be parts of frames because the port was opened and closed.
 std::vector<Piece> pieces_of(const StreamBytes& stream, Time pause) {
   std::vector<Piece> pieces;
   std::size_t begin = 0;
@@ -43,14 +43,14 @@ std::vector<Piece> pieces_of(const StreamBytes& stream, Time pause) {
   return pieces;
 }
 
-// Returns the size that most pieces have, and how many have it.
+// Returns the most frequent size of pieces, and the number of pieces with it.
 std::pair<std::size_t, std::size_t> usual_size(const std::vector<Piece>& pieces) {
   std::map<std::size_t, std::size_t> sizes;
   for (const Piece& piece : pieces) ++sizes[piece.bytes.size()];
   return *std::ranges::max_element(sizes, {}, [](const auto& one) { return one.second; });
 }
 
-// Returns the share of the size that most pieces have; 0: of pieces that are no frames.
+// Returns the fraction of pieces with the most frequent size; 0 if such pieces are not frames.
 double evenness(const std::vector<Piece>& pieces) {
   constexpr std::size_t shortest = 2;
   if (pieces.size() < enough) return 0;
@@ -58,8 +58,8 @@ double evenness(const std::vector<Piece>& pieces) {
   return size < shortest ? 0 : static_cast<double>(count) / static_cast<double>(pieces.size());
 }
 
-// The pause that ends a frame is not known: each is tried, and the middle one of those that make the most even pieces
-// is taken, as far from the pauses within a frame as from those between two.
+// The pause that ends a frame is unknown. Tries each length and takes the middle of those that give the most equal
+// pieces, far from the pauses within a frame and from those between frames.
 std::vector<Piece> most_even_pieces(const StreamBytes& stream) {
   constexpr Time shortest = 100us;
   constexpr Time longest = 200ms;
@@ -76,14 +76,14 @@ std::vector<Piece> most_even_pieces(const StreamBytes& stream) {
   return pieces_of(stream, tried[tried.size() / 2].first);
 }
 
-// Returns the length of the good frame at the beginning; 0: there is none.
+// Returns the length of the good frame at the beginning; 0 if there is none.
 std::size_t good_frame(const Unit& unit, const Options& options, Bytes bytes) {
   const FrameEnd end = unit.frame_end(options, Direction::reply, bytes);
   if (end.kind != FrameEnd::Kind::complete || end.size == 0 || end.size > bytes.size()) return 0;
   return unit.check(options, {}, {.bytes = bytes.first(end.size)}) == Error::none ? end.size : 0;
 }
 
-// Returns the ends of the good frames that the bytes are, one behind the other; empty: they are not.
+// Returns the ends of the good frames that make up the bytes; empty if other bytes are among them.
 std::vector<std::size_t> good_frames(const Unit& unit, const Options& options, Bytes bytes) {
   std::vector<std::size_t> ends;
   for (std::size_t at = 0; at < bytes.size();) {
@@ -100,7 +100,7 @@ bool is_twice_the_same(const ByteList& bytes) {
                                              bytes.begin() + static_cast<std::ptrdiff_t>(half));
 }
 
-// Whether each frame came twice while the shaft moved. An adapter that holds bytes back also makes pieces of two
+// Returns whether each frame arrived twice while the shaft moved. An adapter with latency also makes pieces of two
 // frames, but those differ.
 bool are_doubled(const std::vector<Piece>& pieces) {
   std::size_t doubled = 0;
@@ -112,15 +112,14 @@ bool are_doubled(const std::vector<Piece>& pieces) {
   return doubled * 10 >= pieces.size() * 8 && moved * 2 >= pieces.size();
 }
 
-/// Frames that arrived together.
+/// A group of frames that arrived together.
 struct Group {
   Time at{};
   std::vector<ByteList> frames{};
-  std::size_t missing = 0;  // frames that were due before it
+  std::size_t missing = 0;  // number of missing frames before the group
 };
 
-// Returns the ends of the frames in a piece that is longer than most are: some of its frames are damaged, and they
-// arrived together.
+// Returns the ends of the frames in a piece longer than most: frames that arrived together, some of them damaged.
 std::vector<std::size_t> joined_frames(const Unit& unit, const Options& options, Bytes bytes, std::size_t usual) {
   std::vector<std::size_t> ends;
   std::size_t at = 0;
@@ -154,7 +153,7 @@ std::vector<Group> groups_of(const Unit& unit, const Options& options, const std
   return groups;
 }
 
-// Time between two frames; 0: the distances are not even.
+// Returns the period of frames; 0 if they are not periodic.
 Time period_of(const std::vector<Group>& groups) {
   std::vector<Time> distances;
   for (std::size_t i = 1; i < groups.size(); ++i) {
@@ -167,9 +166,9 @@ Time period_of(const std::vector<Group>& groups) {
   return static_cast<std::size_t>(even) * 10 >= distances.size() * 7 ? period : Time{};
 }
 
-// A frame that comes late is missing until it comes: those behind it then come too early.
+// A late frame counts as missing until it arrives; the frames after it then arrive too early.
 void count_missing(std::vector<Group>& groups, Time period) {
-  constexpr std::size_t most_late = 16;  // groups
+  constexpr std::size_t most_late = 16;  // limit in groups
   for (std::size_t i = 1; i < groups.size(); ++i) {
     const double periods =
         static_cast<double>((groups[i].at - groups[i - 1].at).count()) / static_cast<double>(period.count());
@@ -214,7 +213,7 @@ std::vector<Attempted> stream_frames(const Unit& unit, const Options& options, c
 
 namespace {
 
-// How many bytes belong to good frames, wherever these begin.
+// Returns the number of bytes that belong to good frames, wherever these begin.
 std::size_t bytes_in_frames(const Unit& unit, const Options& options, Bytes bytes, std::size_t& frames) {
   std::size_t sum = 0;
   frames = 0;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Cuts what an encoder sent by itself into frames by its pauses, so that damaged frames and missing ones can be judged
-// like replies.
+// Cuts the stream of an encoder that sends by itself into frames by its pauses, so that damaged and missing frames can
+// be judged like replies.
 #pragma once
 
 #include <cstdint>
@@ -10,9 +10,9 @@
 
 namespace absenc::client {
 
-/// The bytes of a stream, and when they arrived.
+/// The bytes of a stream with their arrival times.
 struct StreamBytes {
-  /// When all bytes up to `end` were there.
+  /// The time at which all bytes up to index `end` had arrived.
   struct Mark {
     Time at{};
     std::size_t end = 0;
@@ -21,13 +21,12 @@ struct StreamBytes {
   std::vector<Mark> marks{};
 };
 
-/// Returns each frame, good or damaged, in the order of time. Where the frames come at even distances, one that did not
-/// come is among them, with Error::timeout. Nothing where the pauses do not show where a frame ends: a stream without
-/// pauses, or too few frames.
+/// Returns each frame, good or damaged, in order. If the frames are periodic, a missing one is included with
+/// Error::timeout. Returns nothing if pauses do not separate the frames, or if there are too few frames.
 [[nodiscard]] std::vector<Attempted> stream_frames(const Unit& unit, const Options& options, const StreamBytes& stream);
 
-/// Returns how many of the bytes belong to good frames between other bytes, which are most of them: somebody else
-/// sends, too. 0: it is not so, or chance makes as many good frames of other bytes.
+/// Returns the number of bytes that belong to good frames if most bytes do not, because another device sends too; 0
+/// otherwise, or if chance would make as many good frames of random bytes.
 [[nodiscard]] std::size_t bytes_among_others(const Unit& unit, const Options& options, const StreamBytes& stream);
 
 }  // namespace absenc::client

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Faults of an encoder that sends by itself: its frames are judged by the pauses between them, as replies are.
+// Checks faults of encoders that send by themselves, whose frames are separated by pauses and judged like replies.
 #include <gtest/gtest.h>
 
 #include "absenc/client/doctor/stream_frames.hpp"
@@ -8,7 +8,7 @@
 namespace absenc::client::ways {
 namespace {
 
-/// Units that send by themselves with their usual settings.
+/// Returns the units that send by themselves with their default settings.
 std::vector<const Unit*> streaming_units() {
   std::vector<const Unit*> units;
   for (const Unit* unit : character_units()) {
@@ -23,7 +23,7 @@ std::string sentences(const Examination& examination) {
   return text;
 }
 
-/// The first finding of each of these units, while its shaft turns.
+/// Returns the first finding of each of these units while its shaft turns.
 void expect_first(const Ids& causes, const std::function<void(Far&)>& spoil) {
   ASSERT_FALSE(streaming_units().empty());
   for (const Unit* unit : streaming_units()) {
@@ -34,7 +34,7 @@ void expect_first(const Ids& causes, const std::function<void(Far&)>& spoil) {
   }
 }
 
-/// Leaves out one frame of `count`.
+/// Drops one frame of `count`.
 Change leave_out(unsigned count) {
   return [count, number = 0u](const ByteList&, ByteList reply) mutable {
     return ++number % count == 0 ? ByteList{} : reply;
@@ -87,7 +87,7 @@ TEST(DoctorStreams, LooseContactComesAndGoes) {
 
 class StreamFrames : public ::testing::Test {
  protected:
-  /// Frames of different positions at these times, each of which may be followed at once by more.
+  /// Returns frames of different positions at these times, each of which may be followed at once by more.
   StreamBytes stream_of(const std::vector<Time>& times) {
     StreamBytes stream;
     std::uint8_t number = 0;
@@ -114,7 +114,7 @@ TEST_F(StreamFrames, FrameThatComesLateIsNotMissing) {
   std::vector<Time> times;
   for (int i = 0; i < 60; ++i) times.push_back(i * 10ms + (i % 20 == 7 ? 9ms : 0ms));
   const std::vector<Attempted> frames = frames_of(stream_of(times));
-  EXPECT_EQ(frames.size(), 58u);  // the first and the last may be parts
+  EXPECT_EQ(frames.size(), 58u);  // without the first and the last, which may be parts
   EXPECT_EQ(missing(frames), 0u);
 }
 

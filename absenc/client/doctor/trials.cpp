@@ -29,7 +29,7 @@ bool carries_characters(const Unit& unit) {
 
 // ---- Rates
 
-// Nothing where the unit has no such rate.
+// Returns the trial of a rate; nothing if the unit has no such rate.
 std::optional<EncoderAddress> with_rate(const EncoderAddress& address, std::uint32_t rate) {
   EncoderAddress other = address;
   const Option* option = find_role(address.unit->options, Role::rate);
@@ -51,7 +51,7 @@ std::optional<EncoderAddress> with_rate(const EncoderAddress& address, std::uint
   return other;
 }
 
-// Those of the protocol and its models first, then those that are common.
+// Returns rates to try: those of the protocol and its models, then common ones.
 std::vector<std::uint32_t> rates_of(const Unit& unit) {
   std::vector<std::uint32_t> rates;
   const auto add = [&](std::uint32_t rate) {
@@ -102,7 +102,7 @@ void add_spi(const EncoderAddress& address, std::vector<Other>& others) {
 
 // ---- Models and addresses
 
-/// Keeps away what could change an encoder of another protocol, of which there may be one on the line.
+/// Refuses requests that could change an encoder of another protocol on the line.
 class Safety {
  public:
   explicit Safety(const EncoderAddress& address)
@@ -111,7 +111,7 @@ class Safety {
     harmful_ = harmful_to_others(unit_, address.line.rate, search_of(address));
     said_ = is_harmful(address.options);
   }
-  /// The request that the user asks for is always allowed.
+  /// The request of the user's own command is always allowed.
   [[nodiscard]] bool allows(const Options& options) const { return said_ || !is_harmful(options); }
 
  private:
@@ -128,7 +128,7 @@ class Safety {
   bool said_ = false;
 };
 
-// On the same port; the rate that the user said stays.
+// Returns the address with another setting on the same port; keeps the user's rate.
 EncoderAddress with_options(const EncoderAddress& address, const Options& options) {
   EncoderAddress other = address;
   other.options = options;
@@ -138,7 +138,7 @@ EncoderAddress with_options(const EncoderAddress& address, const Options& option
   return other;
 }
 
-// A choice is only tried where the unit accepts the options that follow from it.
+// Tries a choice only if the unit accepts the resulting options.
 bool is_possible(const Unit& unit, const Options& options) {
   std::vector<std::string> texts = option_texts(unit, options);
   std::vector<OptionText> settings;
@@ -184,7 +184,7 @@ std::vector<Other> other_models(const EncoderAddress& address) {
   const Safety safety(address);
   const std::string said = said_settings(unit, address.options);
   const auto add = [&](Options options) {
-    if (encoder != nullptr) {  // another model, but the same encoder on the line
+    if (encoder != nullptr) {  // keeps the address: another model, but the same encoder on the line
       const auto index = static_cast<std::size_t>(encoder - unit.options.data());
       options.values[index] = address.options[index];
     }
@@ -243,7 +243,7 @@ bool is_far_better(std::size_t good, std::size_t tried, std::size_t good_as_said
   constexpr double chance = 1e-3;
   if (tried == 0 || good * 10 < tried * 8) return false;
   const std::size_t all_good = good + good_as_said;
-  double sum = 0;  // that as many or more of the good ones fall to this setting
+  double sum = 0;  // probability that as many or more good readings have this setting
   for (std::size_t more = good; more <= std::min(tried, all_good); ++more) {
     if (all_good - more > tried_as_said) continue;
     sum += std::exp(log_choose(tried, more) + log_choose(tried_as_said, all_good - more) -

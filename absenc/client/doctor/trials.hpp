@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Settings that may be the right ones where no reading is good: rates, SPI modes, echo, models, addresses.
+// Settings to try if no reading is good: rates, SPI modes, echo, models, addresses.
 #pragma once
 
 #include <cstddef>
@@ -13,29 +13,29 @@
 
 namespace absenc::client {
 
-/// A setting to try in place of the user's.
+/// A setting to try instead of the user's.
 struct Other {
-  Ailment ailment{};      // what it is when this one helps
-  std::string said{};     // "baud=115200"
-  std::string setting{};  // "baud=9600"
+  Ailment ailment{};      // the finding if this setting helps
+  std::string said{};     // the user's setting, "baud=115200"
+  std::string setting{};  // the setting to try, "baud=9600"
   EncoderAddress address{};
 };
 
-/// SPI modes and clocks, echo, and where the port `has_rate` other rates.
+/// Returns SPI modes and clocks, echo, and other rates if the port has a rate (`has_rate`).
 [[nodiscard]] std::vector<Other> other_lines(const EncoderAddress& address, bool has_rate);
 
-/// Each other model, and on lines of characters each other choice of an option. None of their requests is one by which
-/// another encoder on the line would be changed. None of a virtual encoder, which is whatever it is said to be.
+/// Returns each other model, and on lines of characters each other choice of an option. None of their requests would
+/// change another encoder on the line. Returns none for a virtual encoder, which always has the given options.
 [[nodiscard]] std::vector<Other> other_models(const EncoderAddress& address);
 
-/// Each other address of the encoder on its line, the lowest first; none where asking others disturbs them.
+/// Returns each other address on the line, the lowest first; none if polling would disturb other devices.
 [[nodiscard]] std::vector<Other> other_addresses(const EncoderAddress& address);
 
-/// Returns where `identify` is to look for encoders of other protocols. Only of lines of characters.
+/// Returns the search of `identify` for encoders of other protocols. Only for lines of characters.
 [[nodiscard]] LineSearch search_of(const EncoderAddress& address);
 
-/// Whether `good` of `tried` is more than `good_as_said` of `tried_as_said` by far more than chance (Fisher's exact
-/// test), and nearly all.
+/// Returns whether `good` of `tried` are nearly all and exceed `good_as_said` of `tried_as_said` by far more than
+/// chance (Fisher's exact test).
 [[nodiscard]] bool is_far_better(std::size_t good, std::size_t tried, std::size_t good_as_said,
                                  std::size_t tried_as_said);
 

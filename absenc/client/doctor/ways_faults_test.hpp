@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// For tests of doctor: each fault of an adapter and of what else may be at the other end, and which finding it is.
+// Each fault of an adapter or of another device at the other end, with its expected finding, for tests of doctor.
 #pragma once
 
 #include <set>
@@ -12,10 +12,10 @@ namespace absenc::client::ways {
 
 using Ids = std::set<std::string>;
 
-/// The outcome of one fault; nothing: this unit cannot have it.
+/// The outcome of one fault; nothing if this unit cannot have it.
 struct Outcome {
   Seen seen{};
-  Ids causes{};  // the first finding is one of these
+  Ids causes{};  // the allowed first findings
 };
 
 struct WayFault {
@@ -42,7 +42,7 @@ inline ByteList with_before(const ByteList& bytes, std::uint8_t value, std::uint
   return all;
 }
 
-/// Positions in whose replies one of these bytes stands, however the frame places them.
+/// Returns positions whose replies contain one of these bytes.
 inline std::vector<std::string> positions_with(const Unit& unit, const Options& options,
                                                const std::vector<std::uint64_t>& values) {
   std::vector<std::string> all;
@@ -55,7 +55,7 @@ inline std::vector<std::string> positions_with(const Unit& unit, const Options& 
   return all;
 }
 
-/// A check of so few bits passes many a damaged reply: what was done to them cannot be told.
+/// A checksum of few bits accepts many damaged replies, so the change of bytes cannot be recognised.
 inline bool has_weak_check(const Pair& pair) {
   Opener opener(pair.far);
   const EncoderAddress asked = parse_address(pair.asked);
@@ -63,7 +63,8 @@ inline bool has_weak_check(const Pair& pair) {
   return capture::acceptance(*asked.unit, asked.options, one.exchange, 1u << 10) > 0.05;
 }
 
-/// The shaft swings a little about a place at which most replies are changed; nothing where there is no such place.
+/// Returns a small swing of the shaft about a position at which most replies are changed; nothing without such a
+/// position.
 inline WayFault of_bytes(const std::string& name, const std::vector<std::uint64_t>& values, const Change& change,
                          Ids causes = {}) {
   causes.insert(name);
@@ -113,7 +114,7 @@ inline std::vector<WayFault> faults_of_bytes() {
                       if (one.seen.changed != 0) outcome = one;
                       return outcome;
                     }});
-  // Too little is left of a frame that is mostly 00.
+  // A frame that is mostly 00 loses nearly all of its bytes.
   faults.push_back(of_bytes("nul_lost", {0x00},
                             [](const ByteList&, const ByteList& reply) { return without(reply, {0x00}); },
                             {"bytes_missing"}));
@@ -136,7 +137,7 @@ inline WayFault of_encoder_fault(const std::string& name, const std::string& fau
               pair.far.encoder.device.delay = limit * 5 / 4;
             }
             Outcome one{examined(pair.asked, pair.far, {.readings = 400, .limit = 60s}), causes};
-            // Where the unit asks again by itself, no reading fails.
+            // If the unit itself repeats requests, no reading fails.
             const bool is_spared =
                 one.seen.first() == "good" && one.seen.examination.good == one.seen.examination.tried;
             if (!is_spared) outcome = one;
@@ -147,7 +148,7 @@ inline WayFault of_encoder_fault(const std::string& name, const std::string& fau
 inline WayFault of_talker(const std::string& name, const std::string& text, Time period, bool answers, Ids causes) {
   return {name, [=](const Unit& unit, const std::string& mode, const std::string& rate) {
             Pair pair = pair_of(unit, mode, rate);
-            // One that takes the first bytes of a text for its reply.
+            // The unit takes the first bytes of the text for its reply.
             if (has_weak_check(pair)) return std::optional<Outcome>();
 
             pair.far.other = [=] {
@@ -164,7 +165,7 @@ inline std::vector<WayFault> faults_of_line() {
   faults.push_back(of_encoder_fault("lost 10 %", "fault=silence=0.1", {"sometimes_silent"}));
   faults.push_back(of_encoder_fault("corrupt 2 %", "fault=corrupt=0.02", damage));
   faults.push_back(of_encoder_fault("always late", "fault=delay=1", {"reply_late"}));
-  // Where the next request is answered before the late reply comes, nothing shows that one came.
+  // If the next reply arrives before the late one, nothing shows a late reply.
   faults.push_back(
       of_encoder_fault("randomly late", "fault=delay=0.2", {"reply_late", "sometimes_late", "sometimes_silent"}));
   faults.push_back({"line low", [](const Unit& unit, const std::string& mode, const std::string& rate) {
@@ -182,7 +183,7 @@ inline std::vector<WayFault> faults_of_line() {
 
 // ---- Other encoders than the one that was said
 
-/// Options of models that make a difference on the wire; "" for the usual ones.
+/// Returns options of models that change the frames; "" for the default ones.
 inline std::vector<std::string> models_of(const Unit& unit) {
   std::vector<std::string> models{""};
   for (const Model& model : unit.models) models.push_back(fmt::format("model={}", model.name));
@@ -193,7 +194,7 @@ inline std::vector<WayFault> faults_of_others() {
   std::vector<WayFault> faults;
   faults.push_back({"another protocol", [](const Unit& unit, const std::string& mode, const std::string& rate) {
                       std::optional<Outcome> last;
-                      // The first whose encoder is found at all, and which is no variant of this one.
+                      // Takes the first protocol that `identify` can find and that is not a variant of this one.
                       for (const Unit* other : character_units()) {
                         if (other == &unit || other->line.rate == 0) continue;
                         Pair pair = pair_of(unit, mode, rate);
@@ -240,7 +241,7 @@ inline std::vector<WayFault> faults_of_state() {
                       Pair pair = pair_of(unit, mode, rate, {"singleturn=1383"});
                       Opener opener(pair.far);
                       const Attempted usual = read_once(parse_address(pair.asked), opener);
-                      // So long that many readings are good, and a host waits for replies in vain many times.
+                      // The times are long enough for many good readings and for many timeouts.
                       const Time period = std::max({300 * usual.after, 60 * usual.limit, Time(50ms)});
                       pair.far.is_cut = [period](Time now) { return now % period > period * 7 / 10; };
                       const Choices choices{.readings = 100'000, .limit = 5 * period};
@@ -258,7 +259,7 @@ inline std::vector<WayFault> faults_of_state() {
                         if (condition.name != "battery") continue;
                         const Pair pair = pair_of(unit, mode, rate, {"condition=battery=0"});
                         Outcome outcome{examined(pair.asked, pair.far), {"alarm", "status", "position_invalid"}};
-                        // Some have a battery of which their replies say nothing.
+                        // The replies of some units do not report the battery.
                         if (unit.alarms == nullptr) return none;
                         return std::optional(outcome);
                       }
@@ -275,7 +276,8 @@ inline std::vector<WayFault> way_faults() {
   return all;
 }
 
-/// A row a unit, a column a fault: the first finding; "-" where the unit cannot have it.
+/// Returns the table with a row for each unit and a column for each fault: the first finding; "-" if the unit cannot
+/// have the fault.
 inline std::string way_table() {
   const std::vector<WayFault> faults = way_faults();
   std::string table = "| protocol |";

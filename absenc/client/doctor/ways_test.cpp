@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Each fault of an adapter, and each other device at the other end, is the first finding, for every unit at every rate.
+// Checks that each fault of an adapter and each other device at the other end is the first finding, for every unit and
+// rate.
 #include <gtest/gtest.h>
 
 #include "absenc/client/doctor/ways_faults_test.hpp"
@@ -16,7 +17,7 @@ class DoctorWays : public ::testing::TestWithParam<const Unit*> {
     return text;
   }
 
-  /// Each of these faults at each rate.
+  /// Tests each of these faults at each rate.
   void examine_each(const std::vector<WayFault>& faults) const {
     const Unit& unit = *GetParam();
     const std::string mode = asked_mode(unit);
@@ -37,7 +38,7 @@ TEST_P(DoctorWays, FaultOfLineIsNamed) { examine_each(faults_of_line()); }
 TEST_P(DoctorWays, OtherEncoderIsNamed) { examine_each(faults_of_others()); }
 TEST_P(DoctorWays, StateIsNamed) { examine_each(faults_of_state()); }
 
-/// Whatever model is said and whatever model is there.
+/// Tests each given model with each real model.
 TEST_P(DoctorWays, OtherModelIsNamedInBothDirections) {
   const Unit& unit = *GetParam();
   const std::string mode = asked_mode(unit);
@@ -49,7 +50,7 @@ TEST_P(DoctorWays, OtherModelIsNamedInBothDirections) {
       Pair pair = pair_of(unit, said, mode, {});
       pair.far = pair_of(unit, there, mode, {"motion=rpm=20"}).far;
       const Seen seen = examined(pair.asked, pair.far);
-      // Where the frames are the same, nothing is wrong with them.
+      // If both models have equal frames, there is no finding.
       const bool is_same = seen.examination.good == seen.examination.tried;
       if (is_same) continue;
       EXPECT_EQ(seen.first(), "wrong_settings") << sentences(seen.examination);
@@ -57,7 +58,7 @@ TEST_P(DoctorWays, OtherModelIsNamedInBothDirections) {
   }
 }
 
-/// `read` names for a single reading the finding of doctor, or none.
+/// For a single reading `read` names the same finding as doctor, or none.
 TEST_P(DoctorWays, ReadSaysTheSameOrLeavesItOpen) {
   static const Ids open{"no_answer", "always_damaged", "extra_bytes", "bytes_missing", "sometimes_damaged"};
   const Unit& unit = *GetParam();

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// For tests of doctor: what adapters, drivers and other devices do between the host and a virtual encoder, in virtual
-// time, for every unit on a line of characters.
+// Adapters, drivers and other devices between host and virtual encoder in virtual time, for tests of doctor with every
+// unit on a line of characters.
 #pragma once
 
 #include <fmt/format.h>
@@ -25,10 +25,10 @@ namespace absenc::client::ways {
 using namespace std::chrono_literals;
 using ByteList = std::vector<std::uint8_t>;
 
-/// Changes the bytes of a reply to this request.
+/// A function that changes the bytes of a reply to this request.
 using Change = std::function<ByteList(const ByteList& request, ByteList reply)>;
 
-/// Stands between a device and the line, as the receiving side of an adapter does.
+/// Changes the bytes between a device and the line, like the receiving side of an adapter.
 class Adapter final : public Machine<std::uint8_t> {
  public:
   Adapter(Machine<std::uint8_t>& device, Change change, std::function<bool(Time)> is_cut)
@@ -67,7 +67,7 @@ class Adapter final : public Machine<std::uint8_t> {
   std::size_t changed_ = 0;
 };
 
-/// Sends the same by itself, or when something comes.
+/// A device that sends the same text periodically, or after each request.
 class Talker final : public Machine<std::uint8_t> {
  public:
   Talker(ByteList text, Time period, bool answers) : text_(std::move(text)), period_(period), answers_(answers) {}
@@ -98,18 +98,18 @@ class Talker final : public Machine<std::uint8_t> {
   Time at_{};
 };
 
-/// The other end of the port.
+/// The device at the other end of the port.
 struct Far {
-  EncoderAddress encoder;                  // "sim:tformat?model=23-bit"
-  std::uint32_t rate = 0;                  // of its line
-  Change change{};                         // what the adapter does; empty: nothing
-  std::optional<EncoderAddress> second{};  // another one on the same line
-  std::function<bool(Time now)> is_cut{};  // while a contact is open
-  bool goes_on = false;                    // the encoder's time goes on from one opening of the port to the next
-  std::function<std::unique_ptr<Talker>()> other{};  // no encoder, but this
+  EncoderAddress encoder;                  // address of the encoder, "sim:tformat?model=23-bit"
+  std::uint32_t rate = 0;                  // rate of its line; 0: the encoder's
+  Change change{};                         // change by the adapter; empty: none
+  std::optional<EncoderAddress> second{};  // another encoder on the same line
+  std::function<bool(Time now)> is_cut{};  // returns true while a contact is open
+  bool goes_on = false;                    // the encoder's time continues from one opening of the port to the next
+  std::function<std::unique_ptr<Talker>()> other{};  // makes another device instead of an encoder
 };
 
-/// Opens it, as often as doctor does.
+/// Opens a link to the device, as often as doctor needs it.
 class Opener {
  public:
   explicit Opener(Far far) : far_(std::move(far)) {}
@@ -132,7 +132,7 @@ class Opener {
     ends_.push_back(end);
     return link_to(end, host_rate);
   }
-  /// Replies that the adapter changed.
+  /// Number of replies that the adapter changed.
   [[nodiscard]] std::size_t changed() const {
     std::size_t sum = 0;
     for (const auto& end : ends_) {
@@ -177,7 +177,7 @@ class Opener {
 struct Seen {
   Examination examination{};
   std::size_t changed = 0;
-  std::string read_alone{};  // the finding that `read` names of the first reading; "": it was good
+  std::string read_alone{};  // the finding that `read` names for the first reading; "": it was good
 
   [[nodiscard]] std::string first() const {
     const Finding* one = examination.first();
@@ -192,7 +192,7 @@ struct Choices {
   os::PortFacts facts{};
 };
 
-/// One reading, as `read` takes it.
+/// Takes one reading as `read` does.
 inline Attempted read_once(const EncoderAddress& address, Opener& opener, bool* was_late = nullptr) {
   const Link link = opener.open(address);
   Runner<std::uint8_t> runner(address);
@@ -234,7 +234,7 @@ inline std::vector<const Unit*> character_units() {
   return units;
 }
 
-/// The settings with which it answers requests: the usual ones, or the first choice that makes it so.
+/// Returns settings with which the unit replies to requests: the default ones, or else the first choice that does.
 inline std::string asked_mode(const Unit& unit) {
   const auto streams = [&](const std::string& mode) {
     const auto address = parse_address(fmt::format("sim:{}{}{}", unit.id, mode.empty() ? "" : "?", mode));
@@ -250,7 +250,7 @@ inline std::string asked_mode(const Unit& unit) {
   return "";
 }
 
-/// The setting of each rate that the unit has: "rate=9600", or of the line "baud=9600".
+/// Returns the setting of each rate of the unit: "rate=9600", or "baud=9600" of the line.
 inline std::vector<std::string> rates_of(const Unit& unit) {
   std::vector<std::string> rates;
   if (const Option* option = find_role(unit.options, Role::rate)) {
@@ -271,7 +271,7 @@ inline std::string joined(const std::vector<std::string>& settings) {
   return text;
 }
 
-/// Returns the setting if it is also one of the virtual encoder, and "" if it is one of the line alone.
+/// Returns the setting if the virtual encoder has it too; "" if it is only one of the line.
 inline std::string of_encoder(const Unit& unit, const std::string& setting) {
   if (setting.empty()) return "";
   const std::string_view name = split_setting(setting).name;
@@ -279,11 +279,11 @@ inline std::string of_encoder(const Unit& unit, const std::string& setting) {
 }
 
 struct Pair {
-  std::string asked;  // what the user writes
+  std::string asked;  // the address that the user writes
   Far far;
 };
 
-/// A user and an encoder that agree; `state` is of the encoder alone, "motion=rpm=60".
+/// An address and an encoder that agree; `state` only applies to the encoder, "motion=rpm=60".
 inline Pair pair_of(const Unit& unit, const std::string& mode, const std::string& rate,
                     const std::vector<std::string>& state = {}) {
   std::vector<std::string> settings{mode, of_encoder(unit, rate)};

@@ -25,9 +25,9 @@ struct Words {
 
 using enum Severity;
 
-// {0}, {1} ... are what was seen, as whoever finds it hands it out.
+// {0}, {1} ... are the values that the judge passes to `finding`.
 constexpr auto table = std::to_array<Words>({
-    // {0}: what the system said, and what it proposes
+    // {0}: the error of the system and its advice
     {Ailment::port_missing, "port_missing", fault, "{0}", "the adapter is not plugged in, or the name is another one",
      "plug it in, or correct the name; `ls /dev/serial/by-id` shows adapters by their own names"},
     {Ailment::port_forbidden, "port_forbidden", fault, "{0}", "the user is not in the group that owns the port",
@@ -187,7 +187,7 @@ constexpr auto table = std::to_array<Words>({
 
     {Ailment::starting, "starting", warning, "{0}", "it was switched on just now, or its supply is too weak to come up",
      "wait, then look again; measure the supply"},
-    // The words of the encoder's document
+    // The text is from the encoder's document
     {Ailment::alarm, "alarm", warning, "the encoder reports {0}", "{1}", "{2}"},
     {Ailment::status, "status", warning, "the status of the encoder has {0}", "{1}", "{2}"},
     {Ailment::position_invalid, "position_invalid", fault,
@@ -214,7 +214,7 @@ constexpr auto table = std::to_array<Words>({
      "the resolution is another one, or codes are missing", "check the resolution of the model; replace the encoder"},
 });
 
-/// Words to use instead where the encoder is not behind a serial port; "": the same.
+/// Texts to use if the encoder is not on a serial port; "": the same text.
 struct Elsewhere {
   Ailment ailment;
   PortKind place;
@@ -288,7 +288,7 @@ static_assert(is_in_order() && table.size() == static_cast<std::size_t>(Ailment:
 
 const Words& words_of(Ailment ailment) { return table[static_cast<std::size_t>(ailment)]; }
 
-// As the start of a sentence whose end is added by whoever shows it.
+// Beginning of a sentence that the caller completes.
 std::string filled(std::string_view text, const std::vector<std::string>& values) {
   fmt::dynamic_format_arg_store<fmt::format_context> arguments;
   for (const std::string& value : values) arguments.push_back(value);

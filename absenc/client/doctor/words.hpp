@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The words of all findings, in one table.
+// The texts of all findings, in one table.
 #pragma once
 
 #include <string>
@@ -10,10 +10,10 @@
 
 namespace absenc::client {
 
-/// `values` stand for {0}, {1} ... in the texts of the table.
+/// Returns a finding; `values` replace {0}, {1} ... in its texts.
 [[nodiscard]] Finding finding(Ailment ailment, const std::vector<std::string>& values = {});
 
-/// Replaces a cause or an action that does not fit such a place: nothing about USB is said of a network.
+/// Replaces a cause or an action that does not fit the place: no advice about USB for a network.
 void suit(Finding& finding, PortKind place);
 
 }  // namespace absenc::client
