@@ -61,7 +61,7 @@ struct Clashes final : FieldSink {
   std::set<std::int64_t> all;
 };
 
-// ---- One after the other
+// ---- The steps of an examination
 
 class Doctor {
  public:

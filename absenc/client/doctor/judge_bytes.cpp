@@ -172,7 +172,7 @@ struct Suspicion {
   bool of_each_reply = false;  // the change affects each reply, independent of its bytes
 };
 
-// ---- Each of them
+// ---- The changes
 
 bool fits_any(const ByteList&) { return true; }
 

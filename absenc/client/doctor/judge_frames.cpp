@@ -34,7 +34,7 @@ std::string errors_of(const std::vector<Attempted>& readings) {
   return fmt::format("{}", fmt::join(names, ", "));
 }
 
-// ---- None is good
+// ---- No reply is good
 
 All damaged(const Case& one) {
   All all;
@@ -192,7 +192,7 @@ std::optional<Finding> stretched(const Case& one, const All& all) {
   return finding(Ailment::baud_pattern, {fmt::format("long runs of equal bits, such as {}", shown(*all.front()))});
 }
 
-// ---- Some are good
+// ---- Some replies are good
 
 // The bits in which a damaged reply differs from the good ones of a shaft at rest.
 struct Damage {

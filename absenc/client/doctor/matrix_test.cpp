@@ -254,7 +254,7 @@ TEST_P(Matrix, WhatTheEncoderReportsIsNeverGood) {
       try {
         address = address_of(unit(), mode, state);
         static_cast<void>(device_of(*address));
-      } catch (const std::exception&) {  // the options exclude it
+      } catch (const std::exception&) {  // the options exclude this state
         continue;
       }
       const auto [error, reading, wire] = reading_of(*address);
@@ -354,7 +354,7 @@ std::string state_table() {
       std::optional<Examination> examination;
       try {
         examination = examined(address_of(*unit, "", state)).examination;
-      } catch (const std::exception&) {  // the options exclude it
+      } catch (const std::exception&) {  // the options exclude this state
         continue;
       }
       const Finding* first = examination->first();

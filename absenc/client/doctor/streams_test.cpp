@@ -83,7 +83,7 @@ TEST(DoctorStreams, LooseContactComesAndGoes) {
   expect_first({"comes_and_goes"}, [](Far& far) { far.is_cut = [](Time now) { return now % 500ms < 150ms; }; });
 }
 
-// ---- Cut by the pauses
+// ---- Division by pauses
 
 class StreamFrames : public ::testing::Test {
  protected:

@@ -23,7 +23,7 @@ struct WayFault {
   std::function<std::optional<Outcome>(const Unit& unit, const std::string& mode, const std::string& rate)> examine;
 };
 
-// ---- What adapters do to bytes
+// ---- Changes of bytes by adapters
 
 inline ByteList without(const ByteList& bytes, std::initializer_list<std::uint8_t> values) {
   ByteList rest;
@@ -123,7 +123,7 @@ inline std::vector<WayFault> faults_of_bytes() {
   return faults;
 }
 
-// ---- Faults of the virtual encoder and of its line
+// ---- Faults of the virtual encoder and its line
 
 inline WayFault of_encoder_fault(const std::string& name, const std::string& fault, const Ids& causes) {
   return {name, [=](const Unit& unit, const std::string& mode, const std::string& rate) {
@@ -181,7 +181,7 @@ inline std::vector<WayFault> faults_of_line() {
   return faults;
 }
 
-// ---- Other encoders than the one that was said
+// ---- Other encoders than the given one
 
 /// Returns options of models that change the frames; "" for the default ones.
 inline std::vector<std::string> models_of(const Unit& unit) {
@@ -227,7 +227,7 @@ inline std::vector<WayFault> faults_of_others() {
   return faults;
 }
 
-// ---- States of an encoder that answers well
+// ---- States of an encoder that replies
 
 inline std::vector<WayFault> faults_of_state() {
   std::vector<WayFault> faults;

@@ -220,7 +220,7 @@ inline Seen examined(const std::string& asked, const Far& far, const Choices& ch
   return seen;
 }
 
-// ---- Units and how each is read
+// ---- Units and their settings
 
 inline bool has_characters(const Unit& unit) {
   return unit.link == LinkKind::half_duplex || unit.link == LinkKind::full_duplex;
