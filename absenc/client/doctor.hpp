@@ -16,7 +16,7 @@
 namespace absenc::client {
 
 /// Kinds of findings, in the order of the diagnosis.
-enum class Ailment : std::uint8_t {
+enum class FindingKind : std::uint8_t {
   // The port
   port_missing,
   port_forbidden,
@@ -96,12 +96,12 @@ enum class Severity : std::uint8_t {
 
 /// A finding, as data and in words.
 struct Finding {
-  Ailment ailment{};       ///< The fault that was found.
-  std::string_view id{};   ///< Identifier of the kind, as "only_echo".
-  Severity severity{};     ///< How serious it is.
-  std::string evidence{};  ///< What was observed.
-  std::string cause{};     ///< The most probable cause.
-  std::string action{};    ///< What the user should do.
+  FindingKind finding_kind{};  ///< The fault that was found.
+  std::string_view id{};       ///< Identifier of the kind, as "only_echo".
+  Severity severity{};         ///< How serious it is.
+  std::string evidence{};      ///< What was observed.
+  std::string cause{};         ///< The most probable cause.
+  std::string action{};        ///< What the user should do.
 
   /// Returns "only_echo: EVIDENCE. Likely: CAUSE. Try: ACTION", on one line.
   [[nodiscard]] std::string sentence() const;
@@ -158,7 +158,7 @@ struct DoctorChoices {
 /// Returns "note", "warning" or "fault".
 [[nodiscard]] std::string_view name_of(Severity severity);
 /// Returns the identifier of the kind, as "only_echo".
-[[nodiscard]] std::string_view id_of(Ailment ailment);
+[[nodiscard]] std::string_view id_of(FindingKind finding_kind);
 
 /// Diagnoses an encoder from the port upwards, by readings; never writes to the encoder. `text` and `settings` are
 /// those of `open`. A port that does not open is a finding. Throws UsageError, Cancelled.

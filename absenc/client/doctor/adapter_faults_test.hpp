@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "absenc/client/doctor/ways_faults_test.hpp"
+#include "absenc/client/doctor/path_faults_test.hpp"
 
 namespace absenc::client {
 
@@ -19,14 +19,14 @@ struct Fault {
 /// Returns each fault, produced with the first unit that can have it.
 inline std::vector<Fault> adapter_faults() {
   std::vector<Fault> faults;
-  std::vector<ways::WayFault> all = ways::faults_of_bytes();
-  for (const ways::WayFault& one : ways::faults_of_others()) {
+  std::vector<path_faults::PathFault> all = path_faults::faults_of_bytes();
+  for (const path_faults::PathFault& one : path_faults::faults_of_others()) {
     if (one.name == "another protocol" || one.name == "another address") all.push_back(one);
   }
-  for (const ways::WayFault& one : all) {
-    for (const Unit* unit : ways::character_units()) {
-      const std::optional<ways::Outcome> outcome =
-          one.examine(*unit, ways::asked_mode(*unit), ways::rates_of(*unit).front());
+  for (const path_faults::PathFault& one : all) {
+    for (const Unit* unit : path_faults::character_units()) {
+      const std::optional<path_faults::Outcome> outcome =
+          one.examine(*unit, path_faults::asked_mode(*unit), path_faults::rates_of(*unit).front());
       if (!outcome) continue;
       const bool is_named = outcome->causes.contains(one.name);
       faults.push_back(

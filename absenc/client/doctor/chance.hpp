@@ -7,7 +7,7 @@
 
 namespace absenc::client {
 
-/// Returns the logarithm of the number of ways to choose `some` of `all`.
+/// Returns the logarithm of the number of path_faults to choose `some` of `all`.
 [[nodiscard]] inline double log_choose(std::size_t all, std::size_t some) {
   return std::lgamma(static_cast<double>(all + 1)) - std::lgamma(static_cast<double>(some + 1)) -
          std::lgamma(static_cast<double>(all - some + 1));

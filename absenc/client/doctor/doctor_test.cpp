@@ -336,8 +336,8 @@ TEST(Doctor, EachFaultIsNamedRightAndFirst) {
     }
     named.insert(fault.id);
   }
-  for (std::size_t i = 0; i <= static_cast<std::size_t>(Ailment::stuck_bits); ++i) {
-    EXPECT_TRUE(named.contains(std::string(id_of(static_cast<Ailment>(i))))) << id_of(static_cast<Ailment>(i));
+  for (std::size_t i = 0; i <= static_cast<std::size_t>(FindingKind::stuck_bits); ++i) {
+    EXPECT_TRUE(named.contains(std::string(id_of(static_cast<FindingKind>(i))))) << id_of(static_cast<FindingKind>(i));
   }
 }
 

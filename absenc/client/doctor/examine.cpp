@@ -195,7 +195,7 @@ class Doctor {
       std::vector<Attempted> attempts;
       spent += ask<Item>(other.address, first_readings, attempts);
       if (count_good(attempts) == 0) continue;
-      Trial trial{other.ailment, other.said, other.setting};
+      Trial trial{other.finding_kind, other.said, other.setting};
       if (compare<Item>(other.address, trial)) return true;
     }
     return false;
@@ -262,10 +262,11 @@ class Doctor {
     const Examination so_far = judge(*address_.unit, address_.options, seen_);
     const Finding* first = so_far.first();
     if (first == nullptr) return true;
-    constexpr std::array unsure{Ailment::no_answer,     Ailment::only_echo,      Ailment::baud_pattern,
-                                Ailment::extra_bytes,   Ailment::bytes_missing,  Ailment::other_checksum,
-                                Ailment::contradictory, Ailment::always_damaged, Ailment::direction_unswitched};
-    return std::ranges::find(unsure, first->ailment) != unsure.end();
+    constexpr std::array unsure{
+        FindingKind::no_answer,     FindingKind::only_echo,      FindingKind::baud_pattern,
+        FindingKind::extra_bytes,   FindingKind::bytes_missing,  FindingKind::other_checksum,
+        FindingKind::contradictory, FindingKind::always_damaged, FindingKind::direction_unswitched};
+    return std::ranges::find(unsure, first->finding_kind) != unsure.end();
   }
 
   void identify_others() {
@@ -282,7 +283,7 @@ class Doctor {
       const EncoderAddress other = parse_address(command);
       const bool is_ours = candidate.unit == address_.unit;
       Trial trial{
-          is_ours ? Ailment::wrong_settings : Ailment::other_protocol,
+          is_ours ? FindingKind::wrong_settings : FindingKind::other_protocol,
           is_ours ? said_settings(*address_.unit, address_.options) : std::string(address_.unit->id),
           is_ours ? fmt::format("{}", fmt::join(all_settings(candidate), ", ")) : std::string(candidate.unit->id)};
       trial.command = command;

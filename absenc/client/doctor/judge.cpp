@@ -20,27 +20,27 @@ namespace {
 
 constexpr Time slow = std::chrono::milliseconds(8);  // half of the default latency timer of a USB adapter
 
-Ailment ailment_of(const Refusal& refusal) {
+FindingKind ailment_of(const Refusal& refusal) {
   using Kind = os::Failure::Kind;
-  if (refusal.bus == os::Failure::Bus::off) return Ailment::can_bus_off;
-  if (refusal.bus == os::Failure::Bus::not_acknowledged) return Ailment::can_not_acknowledged;
+  if (refusal.bus == os::Failure::Bus::off) return FindingKind::can_bus_off;
+  if (refusal.bus == os::Failure::Bus::not_acknowledged) return FindingKind::can_not_acknowledged;
   switch (refusal.kind) {
     case Kind::not_found:
-      return Ailment::port_missing;
+      return FindingKind::port_missing;
     case Kind::no_permission:
-      return Ailment::port_forbidden;
+      return FindingKind::port_forbidden;
     case Kind::in_use:
-      return Ailment::port_in_use;
+      return FindingKind::port_in_use;
     case Kind::unsupported:
-      return Ailment::port_unsuitable;
+      return FindingKind::port_unsuitable;
     case Kind::bad_rate:
-      return Ailment::port_rate;
+      return FindingKind::port_rate;
     case Kind::lost:
-      return Ailment::port_lost;
+      return FindingKind::port_lost;
     case Kind::system:
       break;
   }
-  return Ailment::port_failed;
+  return FindingKind::port_failed;
 }
 
 // Returns how a port that is in use becomes free.
@@ -106,11 +106,11 @@ void judge_silence(const Case& one, std::vector<Finding>& findings) {
   const bool unswitched = one.unit.link == LinkKind::half_duplex && os::is_bare_uart(seen.facts.driver) &&
                           !seen.facts.kernel_direction.value_or(false);
   if (unswitched) {
-    findings.push_back(finding(Ailment::direction_unswitched, {seen.port, seen.facts.driver}));
+    findings.push_back(finding(FindingKind::direction_unswitched, {seen.port, seen.facts.driver}));
   } else {
     findings.push_back(
-        finding(Ailment::no_answer, {fmt::format("{}", seen.readings.size()),
-                                     seen.unsolicited.empty() ? "" : ", though something was heard before"}));
+        finding(FindingKind::no_answer, {fmt::format("{}", seen.readings.size()),
+                                         seen.unsolicited.empty() ? "" : ", though something was heard before"}));
   }
 }
 
@@ -132,7 +132,7 @@ void judge_lateness(const Case& one, std::vector<Finding>& findings) {
   const bool is_one_of_few = late < 2 && !nothing_else;
   if ((!often || is_one_of_few) && is_ours) return;  // no later than this computer's own delay
   const auto allowance = std::chrono::ceil<std::chrono::milliseconds>(lateness * 3 / 2).count();
-  findings.push_back(finding(often ? Ailment::reply_late : Ailment::sometimes_late,
+  findings.push_back(finding(often ? FindingKind::reply_late : FindingKind::sometimes_late,
                              {fmt::format("{}", std::min(late, tried)), fmt::format("{}", tried), to_text(lateness),
                               fmt::format("{}", allowance)}));
 }
@@ -148,7 +148,7 @@ void judge_slowness(const Case& one, std::vector<Finding>& findings) {
   if (excess.size() < 10) return;
   std::sort(excess.begin(), excess.end());
   const Time fastest = excess[excess.size() / 10];
-  if (fastest > slow) findings.push_back(finding(Ailment::reply_slow, {to_text(fastest), to_text(allowed)}));
+  if (fastest > slow) findings.push_back(finding(FindingKind::reply_slow, {to_text(fastest), to_text(allowed)}));
 }
 
 }  // namespace
@@ -162,7 +162,7 @@ std::string shown(const Attempted& one) {
 void judge_port(const Case& one, std::vector<Finding>& findings) {
   const Observations& seen = one.seen;
   if (os::is_modem_driver(seen.facts.driver)) {
-    findings.push_back(finding(Ailment::port_is_modem, {seen.port, seen.facts.driver}));
+    findings.push_back(finding(FindingKind::port_is_modem, {seen.port, seen.facts.driver}));
   }
   if (seen.refusal) {
     findings.push_back(
@@ -170,7 +170,7 @@ void judge_port(const Case& one, std::vector<Finding>& findings) {
   }
   if (const auto timer = seen.facts.latency_timer; timer && *timer > 1) {
     const std::string terminal = std::filesystem::path(seen.port).filename();
-    findings.push_back(finding(Ailment::latency_timer, {terminal, fmt::format("{}", *timer)}));
+    findings.push_back(finding(FindingKind::latency_timer, {terminal, fmt::format("{}", *timer)}));
   }
 }
 
@@ -178,15 +178,15 @@ void judge_line(const Case& one, std::vector<Finding>& findings) {
   const Observations& seen = one.seen;
   if (seen.line_errors > 0 && one.unit.link == LinkKind::can) {
     findings.push_back(finding(
-        Ailment::can_errors,
+        FindingKind::can_errors,
         {fmt::format("{}", seen.line_errors), fmt::format("{}", seen.readings.size()), fmt::format("{}", one.good)}));
   }
   for (const Trial& trial : seen.trials) {
     const std::string as_said = trial.good_as_said == 0
                                     ? "no good reply"
                                     : fmt::format("{} of {} replies good", trial.good_as_said, trial.tried_as_said);
-    findings.push_back(finding(trial.ailment, {trial.said, trial.setting, fmt::format("{}", trial.good),
-                                               fmt::format("{}", trial.tried), as_said, trial.command}));
+    findings.push_back(finding(trial.finding_kind, {trial.said, trial.setting, fmt::format("{}", trial.good),
+                                                    fmt::format("{}", trial.tried), as_said, trial.command}));
   }
   const bool characters = one.unit.link == LinkKind::half_duplex || one.unit.link == LinkKind::full_duplex;
   if (characters && one.good == 0 && seen.trials.empty()) {
@@ -200,15 +200,15 @@ void judge_line(const Case& one, std::vector<Finding>& findings) {
   const bool in_doubt = one.good == 0 && seen.trials.empty() && characters;
   const std::string inverted = in_doubt ? inversion(one) : "";
   if (!inverted.empty()) {
-    findings.push_back(finding(Ailment::line_inverted, {inverted}));
+    findings.push_back(finding(FindingKind::line_inverted, {inverted}));
   } else if (seen.never_silent && one.good * 10 < seen.readings.size() * 9 + 1) {
     const std::string how = seen.within_frames == 0
                                 ? "before anything was asked, without a pause"
                                 : fmt::format("of which {} belong to good frames", seen.within_frames);
-    findings.push_back(finding(Ailment::never_silent, {fmt::format("{}", seen.unsolicited.size()),
-                                                       to_text(seen.listened), hex(seen.unsolicited, 8), how}));
+    findings.push_back(finding(FindingKind::never_silent, {fmt::format("{}", seen.unsolicited.size()),
+                                                           to_text(seen.listened), hex(seen.unsolicited, 8), how}));
   }
-  if (findings.empty() || findings.back().ailment != Ailment::line_inverted) judge_silence(one, findings);
+  if (findings.empty() || findings.back().finding_kind != FindingKind::line_inverted) judge_silence(one, findings);
   judge_lateness(one, findings);
   judge_slowness(one, findings);
 }
@@ -228,7 +228,7 @@ void judge_counter(const Case& one, std::vector<Finding>& findings) {
     ++count;
   }
   if (count < enough || values.size() != 1) return;
-  findings.push_back(finding(Ailment::counter_stands,
+  findings.push_back(finding(FindingKind::counter_stands,
                              {std::string(field->name), fmt::format("{}", *values.begin()), fmt::format("{}", count)}));
 }
 
@@ -310,7 +310,7 @@ Examination judge(const Unit& unit, const Options& options, const Observations& 
   judge_line(line, result.findings);
   // A fault of the line explains bad frames, which then give no finding of their own.
   const bool explained = std::any_of(result.findings.begin(), result.findings.end(), [](const Finding& found) {
-    return found.severity == Severity::fault && found.ailment != Ailment::can_errors;
+    return found.severity == Severity::fault && found.finding_kind != FindingKind::can_errors;
   });
   // One of 256 damaged frames passes a checksum of 8 bits, so a few good frames do not make a good line.
   if (line.good * 20 < line.seen.readings.size() || line.good == 0) {
@@ -334,15 +334,16 @@ Examination judge(const Unit& unit, const Options& options, const Observations& 
     const std::string all = fmt::format("{}", result.tried);
     if (silent * 2 < failed) {
       const std::string last = shown(seen.readings.back());
-      result.findings.push_back(finding(Ailment::always_damaged, {all, "none was taken for a reply", last}));
+      result.findings.push_back(finding(FindingKind::always_damaged, {all, "none was taken for a reply", last}));
     } else {
       const bool is_nobody = silent == result.tried;
-      result.findings.push_back(is_nobody ? finding(Ailment::no_answer, {all, ""}) : silence_of(one, failed));
+      result.findings.push_back(is_nobody ? finding(FindingKind::no_answer, {all, ""}) : silence_of(one, failed));
     }
   }
   for (Finding& found : result.findings) suit(found, seen.place);
-  std::stable_sort(result.findings.begin(), result.findings.end(),
-                   [](const Finding& before, const Finding& after) { return before.ailment < after.ailment; });
+  std::stable_sort(result.findings.begin(), result.findings.end(), [](const Finding& before, const Finding& after) {
+    return before.finding_kind < after.finding_kind;
+  });
   return result;
 }
 

@@ -70,8 +70,8 @@ std::optional<Finding> coming_and_going(const Case& one) {
   std::size_t in_bursts = 0;
   for (const Burst& burst : bursts) in_bursts += burst.count;
   if (bursts.size() < enough || in_bursts * 10 < failed * 7) return std::nullopt;
-  return finding(Ailment::comes_and_goes, {fmt::format("{}", failed), fmt::format("{}", readings.size()),
-                                           fmt::format("{}", bursts.size()), rhythm(bursts)});
+  return finding(FindingKind::comes_and_goes, {fmt::format("{}", failed), fmt::format("{}", readings.size()),
+                                               fmt::format("{}", bursts.size()), rhythm(bursts)});
 }
 
 }  // namespace absenc::client

@@ -164,7 +164,7 @@ bool contains(const ByteList& bytes, std::uint8_t value) {
 
 /// A change that is made to the bytes of every reply.
 struct Suspicion {
-  Ailment ailment;
+  FindingKind finding_kind;
   bool (*fits)(const ByteList& raw);  // returns false if this reply, good or not, shows that the change is not made
   /// Returns whether undoing the change makes the reply good; `count` is the number of bytes changed.
   bool (*undo)(const Mender& mender, std::size_t& count);
@@ -248,15 +248,15 @@ constexpr std::size_t dear = 16;   // number of replies if each is decoded thous
 
 // Changes at any index are tried before changes at one end.
 constexpr auto suspicions = std::to_array<Suspicion>({
-    {Ailment::telnet_doubled, fits_telnet, undo_telnet, cheap},
-    {Ailment::newline_translated, fits_newline, undo_newline, cheap},
-    {Ailment::byte_before, fits_any, undo_bytes_before<1>, cheap, true},
-    {Ailment::byte_before, fits_any, undo_bytes_before<2>, cheap, true},
-    {Ailment::byte_after, fits_any, undo_bytes_after<1>, cheap, true},
-    {Ailment::byte_after, fits_any, undo_bytes_after<2>, cheap, true},
-    {Ailment::flow_control, fits_flow_control, undo_flow_control, dear},
-    {Ailment::nul_lost, fits_nul_lost, undo_nul_lost, dear},
-    {Ailment::seven_bits, fits_seven_bits, undo_seven_bits, dear},
+    {FindingKind::telnet_doubled, fits_telnet, undo_telnet, cheap},
+    {FindingKind::newline_translated, fits_newline, undo_newline, cheap},
+    {FindingKind::byte_before, fits_any, undo_bytes_before<1>, cheap, true},
+    {FindingKind::byte_before, fits_any, undo_bytes_before<2>, cheap, true},
+    {FindingKind::byte_after, fits_any, undo_bytes_after<1>, cheap, true},
+    {FindingKind::byte_after, fits_any, undo_bytes_after<2>, cheap, true},
+    {FindingKind::flow_control, fits_flow_control, undo_flow_control, dear},
+    {FindingKind::nul_lost, fits_nul_lost, undo_nul_lost, dear},
+    {FindingKind::seven_bits, fits_seven_bits, undo_seven_bits, dear},
 });
 
 std::string bytes_of(std::size_t count) { return count == 1 ? "a byte" : fmt::format("{} bytes", count); }
@@ -281,7 +281,8 @@ std::optional<Finding> suspected(const Case& one, const All& all, const Suspicio
   if (suspicion.of_each_reply && !of_nearly_all) return {};
   // Longer replies are rarely good without 8th bits, except replies of text, whose damage then has another cause.
   const auto is_long = [](const Attempted* attempt) { return attempt->raw.size() > Mender::most_bytes; };
-  if (suspicion.ailment == Ailment::seven_bits && !of_nearly_all && std::ranges::any_of(all, is_long)) return {};
+  if (suspicion.finding_kind == FindingKind::seven_bits && !of_nearly_all && std::ranges::any_of(all, is_long))
+    return {};
   const bool fits = std::all_of(one.seen.readings.begin(), one.seen.readings.end(),
                                 [&](const Attempted& attempt) { return suspicion.fits(attempt.raw); });
   if (!fits) return {};
@@ -310,10 +311,10 @@ std::optional<Finding> suspected(const Case& one, const All& all, const Suspicio
   tried = std::min(tried, suspicion.most_tried);
   if (tried < enough || mended * 10 < tried * 8) return {};
   constexpr std::size_t varied = 24;
-  const bool is_seen = suspicion.ailment == Ailment::seven_bits && variety(all) >= varied;
+  const bool is_seen = suspicion.finding_kind == FindingKind::seven_bits && variety(all) >= varied;
   const double share = static_cast<double>(by_chance + 1) / static_cast<double>(tried * others + 2);
   if (!is_seen && chance_of(mended, tried, share) > 1e-3) return {};
-  return finding(suspicion.ailment,
+  return finding(suspicion.finding_kind,
                  {fmt::format("{}", mended), fmt::format("{}", tried), bytes_of(concerned),
                   to_hex(Bytes(example->raw).first(std::min<std::size_t>(example->raw.size(), 24)))});
 }
@@ -343,7 +344,7 @@ std::optional<Finding> seven_bits_of_good(const Case& one) {
   }
   const bool is_seen = std::ranges::any_of(wraps, [](std::size_t count) { return count >= least_wraps; });
   if (good < enough || !is_seen) return {};
-  return finding(Ailment::seven_bits,
+  return finding(FindingKind::seven_bits,
                  {fmt::format("{}", good), fmt::format("{}", one.seen.readings.size()), "any bytes",
                   to_hex(Bytes(before->raw).first(std::min<std::size_t>(before->raw.size(), 24)))});
 }
@@ -367,7 +368,7 @@ std::optional<Finding> false_echo(const Case& one) {
     example = &attempt;
   }
   if (good < 4 || wrong * 10 < good * 8) return {};
-  return finding(Ailment::byte_before,
+  return finding(FindingKind::byte_before,
                  {fmt::format("{}", wrong), fmt::format("{}", good), bytes_of(longest),
                   to_hex(Bytes(example->raw).first(std::min<std::size_t>(example->raw.size(), 24)))});
 }
@@ -378,7 +379,7 @@ std::optional<Finding> byte_behind_good(const Case& one) {
   if (seen.overfull * 10 < one.good * 8 || one.good < 4 || seen.most_behind == 0 || seen.most_behind > 2) return {};
   const ByteList& example = seen.overfull_example;
   if (example.size() < 3 * seen.most_behind) return {};
-  return finding(Ailment::byte_after,
+  return finding(FindingKind::byte_after,
                  {fmt::format("{}", seen.overfull), fmt::format("{}", seen.readings.size()), bytes_of(seen.most_behind),
                   to_hex(Bytes(example).first(std::min<std::size_t>(example.size(), 24)))});
 }

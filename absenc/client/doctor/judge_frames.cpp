@@ -44,8 +44,8 @@ All damaged(const Case& one) {
   return all;
 }
 
-Finding counted(Ailment ailment, const Case& one, const All& those) {
-  return finding(ailment,
+Finding counted(FindingKind finding_kind, const Case& one, const All& those) {
+  return finding(finding_kind,
                  {fmt::format("{}", those.size()), fmt::format("{}", one.seen.readings.size()),
                   to_hex(Bytes(those.front()->raw).first(std::min<std::size_t>(those.front()->raw.size(), 16)))});
 }
@@ -66,7 +66,7 @@ std::optional<Finding> stuck_data(const Case& one, const All& all) {
     });
     const bool is_stuck = most(all, [](const Attempted& attempt) { return attempt.error == Error::line_stuck; });
     if (stuck || (is_stuck && level == 0xFF))
-      return finding(Ailment::miso_stuck, {fmt::format("{}", all.size()), level == 0 ? "0" : "1"});
+      return finding(FindingKind::miso_stuck, {fmt::format("{}", all.size()), level == 0 ? "0" : "1"});
   }
   return {};
 }
@@ -77,7 +77,7 @@ std::optional<Finding> own_echo(const Case& one, const All& all) {
     return !attempt.raw.empty() && attempt.raw == attempt.exchange.request.bytes;
   };
   if (!most(all, echoes)) return {};
-  return finding(Ailment::only_echo, {fmt::format("{}", all.size()), to_hex(all.front()->exchange.request.bytes)});
+  return finding(FindingKind::only_echo, {fmt::format("{}", all.size()), to_hex(all.front()->exchange.request.bytes)});
 }
 
 bool holds_two(const Case& one, const Attempted& attempt) {
@@ -96,31 +96,31 @@ std::optional<Finding> two_frames(const Case& one, const All& all) {
   const auto two = static_cast<std::size_t>(std::count_if(all.begin(), all.end(), is_double));
   if (two * 2 < all.size() || two == 0) return {};
   const auto first = std::find_if(all.begin(), all.end(), is_double);
-  return finding(Ailment::two_answer, {fmt::format("{}", two), fmt::format("{}", all.size()), shown(**first)});
+  return finding(FindingKind::two_answer, {fmt::format("{}", two), fmt::format("{}", all.size()), shown(**first)});
 }
 
 // If two encoders reply at once, flipping a single bit does not make the replies good.
 std::optional<Finding> same_address(const Case& one, const All&) {
   if (one.seen.clash.empty()) return {};
-  return finding(Ailment::same_address, {one.seen.clash});
+  return finding(FindingKind::same_address, {one.seen.clash});
 }
 
 std::optional<Finding> extra_bytes(const Case& one, const All& all) {
   const All those = chosen(all, [&](const Attempted& attempt) { return has_good_part(one, attempt); });
   if (those.empty() || those.size() * 2 < all.size()) return {};
-  return counted(Ailment::extra_bytes, one, those);
+  return counted(FindingKind::extra_bytes, one, those);
 }
 
 std::optional<Finding> bytes_missing(const Case& one, const All& all) {
   const All those = chosen(all, [&](const Attempted& attempt) { return is_cut(one, attempt); });
   if (those.empty() || those.size() * 2 < all.size()) return {};
-  return counted(Ailment::bytes_missing, one, those);
+  return counted(FindingKind::bytes_missing, one, those);
 }
 
 std::optional<Finding> single_bits(const Case& one, const All& all) {
   const std::size_t mended = mended_by_one_bit(one, all);
   if (mended == 0) return {};
-  return finding(Ailment::damaged_bits,
+  return finding(FindingKind::damaged_bits,
                  {fmt::format("{}", all.size()), fmt::format("{}", one.seen.readings.size()),
                   errors_of(one.seen.readings), fmt::format("{} would be good with one bit changed", mended)});
 }
@@ -146,7 +146,7 @@ Finding contradiction(const Case& one, const All& all) {
     last = attempt;
   }
   const ErrorText& text = text_of(last->error);
-  return finding(Ailment::contradictory,
+  return finding(FindingKind::contradictory,
                  {fmt::format("{}", count), fmt::format("{}", one.seen.readings.size()), std::string(text.name),
                   last->detail.empty() ? "" : fmt::format(": {}", last->detail),
                   last->advice.empty() ? std::string(text.advice) : last->advice});
@@ -165,8 +165,8 @@ std::optional<Finding> refusal(const Case&, const All& all) {
   if (!most(all, is_refusal)) return {};
   const Attempted& last = *all.back();
   const ErrorText& text = text_of(last.error);
-  return finding(Ailment::refused, {last.detail.empty() ? std::string(text.description) : last.detail,
-                                    last.advice.empty() ? std::string(text.advice) : last.advice});
+  return finding(FindingKind::refused, {last.detail.empty() ? std::string(text.description) : last.detail,
+                                        last.advice.empty() ? std::string(text.advice) : last.advice});
 }
 
 // A sender that is several times slower than the receiver produces long runs of equal bits: no byte has more than one
@@ -174,7 +174,7 @@ std::optional<Finding> refusal(const Case&, const All& all) {
 std::optional<Finding> stretched(const Case& one, const All& all) {
   if (one.unit.link != LinkKind::half_duplex && one.unit.link != LinkKind::full_duplex) return {};
   if (const auto& damage = one.seen.damage; damage && damage->framing > 0) {
-    return finding(Ailment::baud_pattern,
+    return finding(FindingKind::baud_pattern,
                    {fmt::format("the UART counted {} characters without a stop bit", damage->framing)});
   }
   ByteList bytes;
@@ -189,7 +189,7 @@ std::optional<Finding> stretched(const Case& one, const All& all) {
   for (const std::uint8_t byte : bytes) ++distinct[byte];
   constexpr std::size_t enough = 16;
   if (bytes.size() < enough || distinct.size() < 3 || !std::all_of(bytes.begin(), bytes.end(), is_run)) return {};
-  return finding(Ailment::baud_pattern, {fmt::format("long runs of equal bits, such as {}", shown(*all.front()))});
+  return finding(FindingKind::baud_pattern, {fmt::format("long runs of equal bits, such as {}", shown(*all.front()))});
 }
 
 // ---- Some replies are good
@@ -243,7 +243,7 @@ Finding some_damage(const Case& one, const All& all) {
   std::vector<std::string> values{fmt::format("{}", all.size() + more),
                                   fmt::format("{}", one.seen.readings.size() + more), errors_of(one.seen.readings)};
   const ByteList usual = usual_reply(one.seen.readings);
-  if (usual.empty()) return finding(Ailment::sometimes_damaged, values);
+  if (usual.empty()) return finding(FindingKind::sometimes_damaged, values);
   constexpr std::size_t few = 3;  // greatest number of bits that a disturbance of one bit's length changes
   std::size_t single = 0;
   std::size_t compared = 0;
@@ -261,7 +261,7 @@ Finding some_damage(const Case& one, const All& all) {
   values.push_back(compared == 0 ? "bytes are missing or too many"
                                  : fmt::format("{} in all, in bytes {} to {} of {}", sum.flips, sum.first + 1,
                                                sum.last + 1, usual.size()));
-  return finding(bits ? Ailment::damaged_bits : Ailment::damaged_bursts, values);
+  return finding(bits ? FindingKind::damaged_bits : FindingKind::damaged_bursts, values);
 }
 
 }  // namespace
@@ -270,7 +270,7 @@ Finding silence_of(const Case& one, std::size_t silent) {
   const std::vector<Attempted>& readings = one.seen.readings;
   const bool sends_by_itself = one.unit.streams != nullptr && one.unit.streams(one.options) && !readings.empty() &&
                                readings.front().exchange.request.frame().empty();
-  return finding(Ailment::sometimes_silent,
+  return finding(FindingKind::sometimes_silent,
                  {fmt::format("{}", silent), fmt::format("{}", readings.size()),
                   sends_by_itself ? "frames did not come when they were due" : "requests were not answered"});
 }
@@ -288,7 +288,7 @@ void judge_bad_frames(const Case& one, std::vector<Finding>& findings) {
     }
   }
   if (all.size() * 10 < one.seen.readings.size()) return;  // silence is the main fault, which other judges explain
-  findings.push_back(finding(Ailment::always_damaged,
+  findings.push_back(finding(FindingKind::always_damaged,
                              {fmt::format("{}", all.size()), errors_of(one.seen.readings), shown(*all.front())}));
 }
 
@@ -298,22 +298,22 @@ Finding finding_of(const Unit& unit, const Options& options, PortKind place, con
     suit(found, place);
     return found;
   };
-  if (late && last.error == Error::timeout) return suited(finding(Ailment::reply_late, {"", "", "", ""}));
+  if (late && last.error == Error::timeout) return suited(finding(FindingKind::reply_late, {"", "", "", ""}));
   if (usually_good) {
-    return suited(last.heard ? finding(Ailment::sometimes_damaged, {"", "", ""})
-                             : finding(Ailment::sometimes_silent, {"", "", ""}));
+    return suited(last.heard ? finding(FindingKind::sometimes_damaged, {"", "", ""})
+                             : finding(FindingKind::sometimes_silent, {"", "", ""}));
   }
   // A single frame can show another model, as many frames do in an examination.
   const auto& [request, reply] = last.exchange;
   if (last.error != Error::none && !reply.frame().empty()) {
     const std::string setting = diagnose(unit, options, request.frame(), reply.frame()).setting;
-    if (!setting.empty()) return finding(Ailment::wrong_settings, {"", setting, "", "", "", ""});
+    if (!setting.empty()) return finding(FindingKind::wrong_settings, {"", setting, "", "", "", ""});
   }
   Observations seen;
   seen.place = place;
   seen.readings.push_back(last);
   const Examination one = judge(unit, options, seen);
-  return one.findings.empty() ? finding(Ailment::always_damaged, {"", "", ""}) : one.findings.front();
+  return one.findings.empty() ? finding(FindingKind::always_damaged, {"", "", ""}) : one.findings.front();
 }
 
 void judge_mixed_frames(const Case& one, std::vector<Finding>& findings) {
@@ -341,8 +341,8 @@ void judge_mixed_frames(const Case& one, std::vector<Finding>& findings) {
   const std::size_t late =
       one.unit.link == LinkKind::can ? 0 : std::max<std::size_t>(one.seen.late, belated.requests.size());
   // A late reply can make the next readings fail, too.
-  const bool is_lateness_found =
-      std::ranges::any_of(findings, [](const Finding& found) { return found.ailment == Ailment::sometimes_late; });
+  const bool is_lateness_found = std::ranges::any_of(
+      findings, [](const Finding& found) { return found.finding_kind == FindingKind::sometimes_late; });
   if (is_lateness_found && all.size() <= 2 * late) all.clear();
   // On a clocked line, a data line that never changes counts as silence.
   const All stuck = take([](const Attempted& attempt) { return attempt.error == Error::line_stuck; });
@@ -350,7 +350,7 @@ void judge_mixed_frames(const Case& one, std::vector<Finding>& findings) {
     return is_refusal(attempt) || (!has_good_part(one, attempt) && answers_another(one, attempt));
   };
   if (const All refused = take(is_misheard); !refused.empty()) {
-    findings.push_back(finding(Ailment::requests_damaged,
+    findings.push_back(finding(FindingKind::requests_damaged,
                                {fmt::format("{}", refused.size()), fmt::format("{}", one.seen.readings.size()),
                                 refused.back()->detail.empty() ? std::string(text_of(refused.back()->error).description)
                                                                : refused.back()->detail}));
@@ -365,9 +365,9 @@ void judge_mixed_frames(const Case& one, std::vector<Finding>& findings) {
   } else if (one.seen.overfull * 4 > one.seen.readings.size()) {
     constexpr std::size_t most_shown = 32;
     const Bytes example = one.seen.overfull_example;
-    findings.push_back(
-        finding(Ailment::two_answer, {fmt::format("{}", one.seen.overfull), fmt::format("{}", one.seen.readings.size()),
-                                      to_hex(example.first(std::min(example.size(), most_shown)))}));
+    findings.push_back(finding(FindingKind::two_answer,
+                               {fmt::format("{}", one.seen.overfull), fmt::format("{}", one.seen.readings.size()),
+                                to_hex(example.first(std::min(example.size(), most_shown)))}));
   } else if (std::optional<Finding> extra = extra_bytes(one, all)) {
     // A complete reply after a reply may be the next one, if the first was late.
     const bool may_be_late = std::ranges::all_of(all, [&](const Attempted* one_of) { return holds_two(one, *one_of); });

@@ -115,7 +115,7 @@ std::optional<Finding> text_of_others(const Case& one, Bytes bytes) {
   const std::string text(bytes.begin(), bytes.end());
   for (const std::string_view word : words) {
     const std::size_t at = text.find(word);
-    if (at != std::string::npos) return finding(Ailment::modem_answers, {quoted(bytes, at)});
+    if (at != std::string::npos) return finding(FindingKind::modem_answers, {quoted(bytes, at)});
   }
   constexpr std::size_t enough_kinds =
       6;  // number of different characters; a frame that repeats may contain letters, too
@@ -124,7 +124,7 @@ std::optional<Finding> text_of_others(const Case& one, Bytes bytes) {
   if (printed(bytes) * 20 < bytes.size() * 19 || speaks_text(one.unit)) return {};
   const auto begin =
       std::find_if(bytes.begin(), bytes.end(), [](std::uint8_t byte) { return std::isgraph(byte) != 0; });
-  return finding(Ailment::modem_answers, {quoted(bytes, static_cast<std::size_t>(begin - bytes.begin()))});
+  return finding(FindingKind::modem_answers, {quoted(bytes, static_cast<std::size_t>(begin - bytes.begin()))});
 }
 
 // Searches options as `identify` does, limited to this unit and this encoder.
@@ -151,7 +151,7 @@ std::optional<Finding> other_settings(const Case& one, const All& all) {
   if (!mostly || best.evidence.frames > capture::frames_suffice) return {};
   const std::vector<std::string> settings = settings_to_set(one.unit, best.options, one.options);
   if (settings.empty()) return {};
-  return finding(Ailment::wrong_settings,
+  return finding(FindingKind::wrong_settings,
                  {said_settings(one.unit, one.options), fmt::format("{}", fmt::join(settings, ", ")),
                   fmt::format("{}", best.evidence.explained), fmt::format("{}", exchanges.size()), "no good reply"});
 }
@@ -173,7 +173,7 @@ std::optional<Finding> other_checksum(const Case& one, const All& all) {
                                ? std::string(check.name)
                                : fmt::format("a CRC of {} bits with polynomial {:#x} and init {:#x}",
                                              check.parameters.width, check.parameters.poly, check.parameters.init);
-  return finding(Ailment::other_checksum, {fmt::format("{}", frames.size()), name});
+  return finding(FindingKind::other_checksum, {fmt::format("{}", frames.size()), name});
 }
 
 }  // namespace absenc::client

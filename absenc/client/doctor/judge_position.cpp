@@ -88,7 +88,7 @@ void judge_noise(const Walk& walk, std::vector<Finding>& findings) {
                                ? fmt::format("{:.3g} um", micrometres(walk.span(), walk.unit_um))
                                : fmt::format("{:.3g} degrees", std::ldexp(360.0 * static_cast<double>(walk.span()),
                                                                           -static_cast<int>(walk.bits)));
-  findings.push_back(finding(Ailment::position_noise, {fmt::format("{}", walk.span()), size}));
+  findings.push_back(finding(FindingKind::position_noise, {fmt::format("{}", walk.span()), size}));
 }
 
 // Returns the counts that the shaft can pass in this time, limited to half of the range, beyond which the direction is
@@ -115,7 +115,7 @@ void judge_jumps(const Walk& walk, const host::SpeedLimit& limit, Time woken_lat
     furthest = std::max(furthest, way);
   }
   if (jumps <= damaged) return;
-  findings.push_back(finding(Ailment::position_jumps, {fmt::format("{}", jumps), fmt::format("{}", furthest)}));
+  findings.push_back(finding(FindingKind::position_jumps, {fmt::format("{}", jumps), fmt::format("{}", furthest)}));
 }
 
 // A shaft turned by hand moves its position, and its turns change within each whole turn.
@@ -123,12 +123,13 @@ void judge_turning(const Walk& walk, std::vector<Finding>& findings) {
   constexpr std::size_t enough = 20;
   if (walk.steps.size() < enough) return;
   if (walk.span() <= quiet(walk)) {
-    findings.push_back(finding(Ailment::position_frozen, {fmt::format("{}", std::max(walk.span(), std::int64_t{1})),
-                                                          fmt::format("{}", walk.places.size()), to_text(walk.time)}));
+    findings.push_back(
+        finding(FindingKind::position_frozen, {fmt::format("{}", std::max(walk.span(), std::int64_t{1})),
+                                               fmt::format("{}", walk.places.size()), to_text(walk.time)}));
   }
   const bool went_round = walk.unit_um == 0 && walk.span() >> walk.bits >= 1;
   if (went_round && walk.turns.size() == 1) {
-    findings.push_back(finding(Ailment::turns_stand,
+    findings.push_back(finding(FindingKind::turns_stand,
                                {fmt::format("{}", *walk.turns.begin()), fmt::format("{}", walk.zero_crossings)}));
   }
 }
@@ -148,7 +149,7 @@ void judge_bits(const Walk& walk, std::vector<Finding>& findings) {
     if ((changed >> bit & 1) == 0) names += fmt::format("{}{}", names.empty() ? "bit " : ", bit ", bit);
   }
   if (names.empty()) return;
-  findings.push_back(finding(Ailment::stuck_bits, {names, fmt::format("{}", walk.span())}));
+  findings.push_back(finding(FindingKind::stuck_bits, {names, fmt::format("{}", walk.span())}));
 }
 
 }  // namespace

@@ -82,7 +82,7 @@ void judge_validity(const std::vector<const Reading*>& readings, const IsDamage&
   }
   if (std::max(position, turns) == 0 || is_damage(std::max(position, turns))) return;
   const std::string upper = usable_bits != 0 ? fmt::format(", but for its upper {} bits", usable_bits) : "";
-  findings.push_back(finding(Ailment::position_invalid,
+  findings.push_back(finding(FindingKind::position_invalid,
                              {fmt::format("{}", std::max(position, turns)), fmt::format("{}", readings.size()),
                               position > 0 ? "position" : "number of turns", position > 0 ? upper : ""}));
 }
@@ -100,9 +100,9 @@ void judge_state(const Case& one, std::vector<Finding>& findings) {
   if (readings.empty()) return;
   if (ready.size() < readings.size()) {
     findings.push_back(
-        finding(Ailment::starting, {fmt::format("the encoder said in {} of {} readings that it is still starting{}",
-                                                readings.size() - ready.size(), readings.size(),
-                                                readings.back()->ready ? ", and at the end no more" : "")}));
+        finding(FindingKind::starting, {fmt::format("the encoder said in {} of {} readings that it is still starting{}",
+                                                    readings.size() - ready.size(), readings.size(),
+                                                    readings.back()->ready ? ", and at the end no more" : "")}));
   }
   std::vector<RaisedFlag> flags;
   for (const Reading* reading : ready) {
@@ -130,7 +130,7 @@ void judge_state(const Case& one, std::vector<Finding>& findings) {
         fmt::format("{}{} in {} readings", raised.flag->name, channel, share(raised.readings, ready.size()));
     if (raised.invalid > 0)
       evidence += fmt::format(", whose position is invalid in {}", share(raised.invalid, raised.readings));
-    findings.push_back(finding(raised.is_alarm ? Ailment::alarm : Ailment::status,
+    findings.push_back(finding(raised.is_alarm ? FindingKind::alarm : FindingKind::status,
                                {evidence, std::string(raised.flag->meaning), std::string(action)}));
     if (raised.invalid > 0) findings.back().severity = Severity::fault;
     is_explained = is_explained || raised.invalid > 0;
@@ -148,7 +148,7 @@ std::optional<Finding> judge_start(const Case& one) {
   // The last failures may be damaged replies, if the encoder starts during a request.
   if (silent * 2 < failed || may_be_the_computer(one.seen, failed)) return {};
   if (-log_choose(readings.size(), failed) > std::log(chance)) return {};
-  return finding(Ailment::starting,
+  return finding(FindingKind::starting,
                  {fmt::format("nothing good came for the first {}, and then all {} readings were good",
                               to_text(first->began - readings.front().began), one.good)});
 }

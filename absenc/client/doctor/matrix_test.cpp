@@ -17,7 +17,7 @@
 #include "absenc/client/doctor/examine.hpp"
 #include "absenc/client/doctor/lines_test.hpp"
 #include "absenc/client/doctor/modes_test.hpp"
-#include "absenc/client/doctor/ways_faults_test.hpp"
+#include "absenc/client/doctor/path_faults_test.hpp"
 #include "absenc/client/reading.hpp"
 #include "absenc/client/text/unit_text.hpp"
 #include "absenc/host/session.hpp"
@@ -382,7 +382,7 @@ TEST(DoctorTables, StandInTheDocumentAsTheyAreToday) {
   read << std::ifstream(path).rdbuf();
   std::string text = read.str();
   replace_between(text, "faults", fault_table());
-  replace_between(text, "ways", ways::way_table());
+  replace_between(text, "path faults", path_faults::path_fault_table());
   replace_between(text, "states", state_table());
   if (std::getenv("ABSENC_UPDATE_DOCS") != nullptr) std::ofstream(path) << text;
   EXPECT_TRUE(text == read.str()) << "write it anew: ABSENC_UPDATE_DOCS=1 ctest -R DoctorTables";

@@ -19,9 +19,9 @@ namespace absenc::client {
 
 /// A setting that was tried instead of the user's.
 struct Trial {
-  Ailment ailment{};      // the finding if this setting helps
-  std::string said{};     // the user's setting, "baud=115200"
-  std::string setting{};  // the setting tried, "baud=9600"
+  FindingKind finding_kind{};  // the finding if this setting helps
+  std::string said{};          // the user's setting, "baud=115200"
+  std::string setting{};       // the setting tried, "baud=9600"
   std::size_t good = 0;
   std::size_t tried = 0;
   std::size_t good_as_said = 0;  // good readings with the user's setting in the same turns

@@ -17,21 +17,21 @@ using testing::Not;
 /// Findings that need facts of a serial port.
 const std::set<std::string_view> of_serial_ports{"port_is_modem", "latency_timer", "direction_unswitched"};
 
-std::string advice_of(Ailment ailment, PortKind place) {
-  Finding one = finding(ailment, {"", "", "", "", "", ""});
+std::string advice_of(FindingKind finding_kind, PortKind place) {
+  Finding one = finding(finding_kind, {"", "", "", "", "", ""});
   suit(one, place);
   return one.cause + " " + one.action;
 }
 
 TEST(DoctorAdvice, NamesNothingThatThePlaceHasNot) {
   for (const PortKind place : {PortKind::tcp, PortKind::spi, PortKind::can, PortKind::sim}) {
-    for (std::size_t i = 0; i <= static_cast<std::size_t>(Ailment::stuck_bits); ++i) {
-      const auto ailment = static_cast<Ailment>(i);
-      const std::string_view id = id_of(ailment);
+    for (std::size_t i = 0; i <= static_cast<std::size_t>(FindingKind::stuck_bits); ++i) {
+      const auto finding_kind = static_cast<FindingKind>(i);
+      const std::string_view id = id_of(finding_kind);
       if (of_serial_ports.contains(id)) continue;
       if (place == PortKind::sim && (id.starts_with("port_") || id == "modem_answers"))
         continue;  // the simulated port always opens
-      const std::string advice = advice_of(ailment, place);
+      const std::string advice = advice_of(finding_kind, place);
       for (const char* word : {"USB", "latency timer", "ModemManager", "/dev/serial"}) {
         EXPECT_THAT(advice, Not(HasSubstr(word))) << id << " at " << port_kind_names[static_cast<std::size_t>(place)];
       }
@@ -41,11 +41,12 @@ TEST(DoctorAdvice, NamesNothingThatThePlaceHasNot) {
 
 /// Virtual encoders and SPI have no setting `latency`.
 TEST(DoctorAdvice, ProposesALatencyOnlyWhereItCanBeSet) {
-  for (const Ailment ailment : {Ailment::reply_late, Ailment::sometimes_late, Ailment::sometimes_silent}) {
-    EXPECT_THAT(advice_of(ailment, PortKind::serial), HasSubstr("latency="));
-    EXPECT_THAT(advice_of(ailment, PortKind::tcp), HasSubstr("latency="));
-    EXPECT_THAT(advice_of(ailment, PortKind::sim), Not(HasSubstr("latency=")));
-    EXPECT_THAT(advice_of(ailment, PortKind::spi), Not(HasSubstr("latency=")));
+  for (const FindingKind finding_kind :
+       {FindingKind::reply_late, FindingKind::sometimes_late, FindingKind::sometimes_silent}) {
+    EXPECT_THAT(advice_of(finding_kind, PortKind::serial), HasSubstr("latency="));
+    EXPECT_THAT(advice_of(finding_kind, PortKind::tcp), HasSubstr("latency="));
+    EXPECT_THAT(advice_of(finding_kind, PortKind::sim), Not(HasSubstr("latency=")));
+    EXPECT_THAT(advice_of(finding_kind, PortKind::spi), Not(HasSubstr("latency=")));
   }
 }
 

@@ -2,10 +2,10 @@
 // Checks faults of encoders that send by themselves, whose frames are separated by pauses and judged like replies.
 #include <gtest/gtest.h>
 
+#include "absenc/client/doctor/path_faults_test.hpp"
 #include "absenc/client/doctor/stream_frames.hpp"
-#include "absenc/client/doctor/ways_faults_test.hpp"
 
-namespace absenc::client::ways {
+namespace absenc::client::path_faults {
 namespace {
 
 /// Returns the units that send by themselves with their default settings.
@@ -46,7 +46,7 @@ TEST(DoctorStreams, HealthyStreamIsGood) {
 }
 
 TEST(DoctorStreams, ChangedBytesAreNamed) {
-  for (const WayFault& fault : faults_of_bytes()) {
+  for (const PathFault& fault : faults_of_bytes()) {
     for (const Unit* unit : streaming_units()) {
       SCOPED_TRACE(fmt::format("{}: {}", unit->id, fault.name));
       const std::optional<Outcome> outcome = fault.examine(*unit, "", rates_of(*unit).back());
@@ -162,4 +162,4 @@ TEST_F(StreamFrames, NoisyLineHasOtherBytes) {
 }
 
 }  // namespace
-}  // namespace absenc::client::ways
+}  // namespace absenc::client::path_faults

@@ -79,7 +79,7 @@ void add_rates(const EncoderAddress& address, std::vector<Other>& others) {
   for (const std::uint32_t rate : rates_of(*address.unit)) {
     if (rate == address.line.rate) continue;
     if (auto other = with_rate(address, rate)) {
-      others.push_back({Ailment::wrong_baud, text(address.line.rate), text(rate), std::move(*other)});
+      others.push_back({FindingKind::wrong_baud, text(address.line.rate), text(rate), std::move(*other)});
     }
   }
 }
@@ -87,16 +87,17 @@ void add_rates(const EncoderAddress& address, std::vector<Other>& others) {
 void add_spi(const EncoderAddress& address, std::vector<Other>& others) {
   const std::uint8_t mode = address.spi.mode.value_or(address.line.spi_mode);
   const std::uint32_t speed = address.spi.speed.value_or(address.line.rate);
-  const auto add = [&](Ailment ailment, std::string_view name, std::uint32_t said, std::uint32_t set) -> Other& {
+  const auto add = [&](FindingKind finding_kind, std::string_view name, std::uint32_t said,
+                       std::uint32_t set) -> Other& {
     return others.emplace_back(
-        Other{ailment, fmt::format("{}={}", name, said), fmt::format("{}={}", name, set), address});
+        Other{finding_kind, fmt::format("{}={}", name, said), fmt::format("{}={}", name, set), address});
   };
   for (std::uint8_t other = 0; other < 4; ++other) {
-    if (other != mode) add(Ailment::wrong_spi_mode, "spi_mode", mode, other).address.spi.mode = other;
+    if (other != mode) add(FindingKind::wrong_spi_mode, "spi_mode", mode, other).address.spi.mode = other;
   }
   for (const std::uint32_t divisor : {2u, 4u, 8u, 16u}) {
     if (speed / divisor == 0) break;
-    add(Ailment::clock_too_fast, "speed", speed, speed / divisor).address.spi.speed = speed / divisor;
+    add(FindingKind::clock_too_fast, "speed", speed, speed / divisor).address.spi.speed = speed / divisor;
   }
 }
 
@@ -168,7 +169,7 @@ std::vector<Other> other_lines(const EncoderAddress& address, bool has_rate) {
   if (address.port_kind == PortKind::spi) add_spi(address, others);
   if (carries_characters(*address.unit) && address.echo != host::EchoMode::automatic) {
     const bool on = address.echo == host::EchoMode::on;
-    others.push_back({Ailment::wrong_echo, on ? "echo=on" : "echo=off", on ? "echo=off" : "echo=on", address});
+    others.push_back({FindingKind::wrong_echo, on ? "echo=on" : "echo=off", on ? "echo=off" : "echo=on", address});
     others.back().address.echo = on ? host::EchoMode::off : host::EchoMode::on;
   }
   if (has_rate) add_rates(address, others);
@@ -194,8 +195,8 @@ std::vector<Other> other_models(const EncoderAddress& address) {
     }
     if (!safety.allows(options)) return;
     const std::vector<std::string> settings = settings_to_set(unit, options, address.options);
-    others.push_back(
-        {Ailment::wrong_settings, said, fmt::format("{}", fmt::join(settings, ", ")), with_options(address, options)});
+    others.push_back({FindingKind::wrong_settings, said, fmt::format("{}", fmt::join(settings, ", ")),
+                      with_options(address, options)});
   };
   for (const Model& model : unit.models) {
     Options options;
@@ -233,7 +234,7 @@ std::vector<Other> other_addresses(const EncoderAddress& address) {
     Options options = address.options;
     options.values[index] = value;
     if (!safety.allows(options)) continue;
-    others.push_back({Ailment::wrong_address, text(address.options[index]), text(value), address});
+    others.push_back({FindingKind::wrong_address, text(address.options[index]), text(value), address});
     others.back().address.options = options;
   }
   return others;

@@ -15,9 +15,9 @@ namespace absenc::client {
 
 /// A setting to try instead of the user's.
 struct Other {
-  Ailment ailment{};      // the finding if this setting helps
-  std::string said{};     // the user's setting, "baud=115200"
-  std::string setting{};  // the setting to try, "baud=9600"
+  FindingKind finding_kind{};  // the finding if this setting helps
+  std::string said{};          // the user's setting, "baud=115200"
+  std::string setting{};       // the setting to try, "baud=9600"
   EncoderAddress address{};
 };
 

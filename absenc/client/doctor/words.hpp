@@ -11,7 +11,7 @@
 namespace absenc::client {
 
 /// Returns a finding; `values` replace {0}, {1} ... in its texts.
-[[nodiscard]] Finding finding(Ailment ailment, const std::vector<std::string>& values = {});
+[[nodiscard]] Finding finding(FindingKind finding_kind, const std::vector<std::string>& values = {});
 
 /// Replaces a cause or an action that does not fit the place: no advice about USB for a network.
 void suit(Finding& finding, PortKind place);

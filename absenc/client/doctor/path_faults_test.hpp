@@ -5,10 +5,10 @@
 #include <set>
 
 #include "absenc/capture/search/evidence.hpp"
-#include "absenc/client/doctor/ways_test.hpp"
+#include "absenc/client/doctor/path_test.hpp"
 #include "absenc/sim/random.hpp"
 
-namespace absenc::client::ways {
+namespace absenc::client::path_faults {
 
 using Ids = std::set<std::string>;
 
@@ -18,7 +18,7 @@ struct Outcome {
   Ids causes{};  // the allowed first findings
 };
 
-struct WayFault {
+struct PathFault {
   std::string name;
   std::function<std::optional<Outcome>(const Unit& unit, const std::string& mode, const std::string& rate)> examine;
 };
@@ -65,8 +65,8 @@ inline bool has_weak_check(const Pair& pair) {
 
 /// Returns a small swing of the shaft about a position at which most replies are changed; nothing without such a
 /// position.
-inline WayFault of_bytes(const std::string& name, const std::vector<std::uint64_t>& values, const Change& change,
-                         Ids causes = {}) {
+inline PathFault of_bytes(const std::string& name, const std::vector<std::uint64_t>& values, const Change& change,
+                          Ids causes = {}) {
   causes.insert(name);
   return {name, [=](const Unit& unit, const std::string& mode, const std::string& rate) {
             constexpr std::size_t probed = 20;
@@ -87,8 +87,8 @@ inline WayFault of_bytes(const std::string& name, const std::vector<std::uint64_
           }};
 }
 
-inline std::vector<WayFault> faults_of_bytes() {
-  std::vector<WayFault> faults;
+inline std::vector<PathFault> faults_of_bytes() {
+  std::vector<PathFault> faults;
   faults.push_back(of_bytes("byte_before", {0x67}, [](const ByteList&, ByteList reply) {
     reply.insert(reply.begin(), 0x00);
     return reply;
@@ -125,7 +125,7 @@ inline std::vector<WayFault> faults_of_bytes() {
 
 // ---- Faults of the virtual encoder and its line
 
-inline WayFault of_encoder_fault(const std::string& name, const std::string& fault, const Ids& causes) {
+inline PathFault of_encoder_fault(const std::string& name, const std::string& fault, const Ids& causes) {
   return {name, [=](const Unit& unit, const std::string& mode, const std::string& rate) {
             std::optional<Outcome> outcome;
             Pair pair = pair_of(unit, mode, rate, {"singleturn=1383", fault});
@@ -145,7 +145,7 @@ inline WayFault of_encoder_fault(const std::string& name, const std::string& fau
           }};
 }
 
-inline WayFault of_talker(const std::string& name, const std::string& text, Time period, bool answers, Ids causes) {
+inline PathFault of_talker(const std::string& name, const std::string& text, Time period, bool answers, Ids causes) {
   return {name, [=](const Unit& unit, const std::string& mode, const std::string& rate) {
             Pair pair = pair_of(unit, mode, rate);
             // The unit takes the first bytes of the text for its reply.
@@ -158,8 +158,8 @@ inline WayFault of_talker(const std::string& name, const std::string& text, Time
           }};
 }
 
-inline std::vector<WayFault> faults_of_line() {
-  std::vector<WayFault> faults;
+inline std::vector<PathFault> faults_of_line() {
+  std::vector<PathFault> faults;
   const Ids damage{"damaged_bits", "damaged_bursts", "sometimes_damaged"};
   faults.push_back(of_encoder_fault("dead", "fault=silence=1", {"no_answer"}));
   faults.push_back(of_encoder_fault("lost 10 %", "fault=silence=0.1", {"sometimes_silent"}));
@@ -190,8 +190,8 @@ inline std::vector<std::string> models_of(const Unit& unit) {
   return models;
 }
 
-inline std::vector<WayFault> faults_of_others() {
-  std::vector<WayFault> faults;
+inline std::vector<PathFault> faults_of_others() {
+  std::vector<PathFault> faults;
   faults.push_back({"another protocol", [](const Unit& unit, const std::string& mode, const std::string& rate) {
                       std::optional<Outcome> last;
                       // Takes the first protocol that `identify` can find and that is not a variant of this one.
@@ -229,8 +229,8 @@ inline std::vector<WayFault> faults_of_others() {
 
 // ---- States of an encoder that replies
 
-inline std::vector<WayFault> faults_of_state() {
-  std::vector<WayFault> faults;
+inline std::vector<PathFault> faults_of_state() {
+  std::vector<PathFault> faults;
   faults.push_back({"frozen", [](const Unit& unit, const std::string& mode, const std::string& rate) {
                       const Pair pair = pair_of(unit, mode, rate, {"singleturn=1383"});
                       const Time turning = pair.far.rate >= 1'000'000 ? 100ms : 5s;
@@ -268,8 +268,8 @@ inline std::vector<WayFault> faults_of_state() {
   return faults;
 }
 
-inline std::vector<WayFault> way_faults() {
-  std::vector<WayFault> all = faults_of_bytes();
+inline std::vector<PathFault> all_path_faults() {
+  std::vector<PathFault> all = faults_of_bytes();
   for (const auto& more : {faults_of_line(), faults_of_others(), faults_of_state()}) {
     all.insert(all.end(), more.begin(), more.end());
   }
@@ -278,16 +278,16 @@ inline std::vector<WayFault> way_faults() {
 
 /// Returns the table with a row for each unit and a column for each fault: the first finding; "-" if the unit cannot
 /// have the fault.
-inline std::string way_table() {
-  const std::vector<WayFault> faults = way_faults();
+inline std::string path_fault_table() {
+  const std::vector<PathFault> faults = all_path_faults();
   std::string table = "| protocol |";
-  for (const WayFault& fault : faults) table += fmt::format(" {} |", fault.name);
+  for (const PathFault& fault : faults) table += fmt::format(" {} |", fault.name);
   table += "\n|---|";
   for (std::size_t i = 0; i < faults.size(); ++i) table += "---|";
   table += "\n";
   for (const Unit* unit : character_units()) {
     table += fmt::format("| {} |", unit->id);
-    for (const WayFault& fault : faults) {
+    for (const PathFault& fault : faults) {
       const std::optional<Outcome> outcome = fault.examine(*unit, asked_mode(*unit), rates_of(*unit).front());
       table += fmt::format(" {} |", outcome ? outcome->seen.first() : "-");
     }
@@ -296,4 +296,4 @@ inline std::string way_table() {
   return table;
 }
 
-}  // namespace absenc::client::ways
+}  // namespace absenc::client::path_faults

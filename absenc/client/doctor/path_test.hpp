@@ -20,7 +20,7 @@
 #include "absenc/protocol/all.hpp"
 #include "absenc/sim/sim_port.hpp"
 
-namespace absenc::client::ways {
+namespace absenc::client::path_faults {
 
 using namespace std::chrono_literals;
 using ByteList = std::vector<std::uint8_t>;
@@ -294,4 +294,4 @@ inline Pair pair_of(const Unit& unit, const std::string& mode, const std::string
   return pair;
 }
 
-}  // namespace absenc::client::ways
+}  // namespace absenc::client::path_faults

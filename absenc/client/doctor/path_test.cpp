@@ -3,10 +3,10 @@
 // rate.
 #include <gtest/gtest.h>
 
-#include "absenc/client/doctor/ways_faults_test.hpp"
+#include "absenc/client/doctor/path_faults_test.hpp"
 #include "absenc/client/error.hpp"
 
-namespace absenc::client::ways {
+namespace absenc::client::path_faults {
 namespace {
 
 class DoctorWays : public ::testing::TestWithParam<const Unit*> {
@@ -18,11 +18,11 @@ class DoctorWays : public ::testing::TestWithParam<const Unit*> {
   }
 
   /// Tests each of these faults at each rate.
-  void examine_each(const std::vector<WayFault>& faults) const {
+  void examine_each(const std::vector<PathFault>& faults) const {
     const Unit& unit = *GetParam();
     const std::string mode = asked_mode(unit);
     for (const std::string& rate : rates_of(unit)) {
-      for (const WayFault& fault : faults) {
+      for (const PathFault& fault : faults) {
         SCOPED_TRACE(fmt::format("{} {} {}: {}", unit.id, mode, rate, fault.name));
         const std::optional<Outcome> outcome = fault.examine(unit, mode, rate);
         if (!outcome) continue;
@@ -62,7 +62,7 @@ TEST_P(DoctorWays, OtherModelIsNamedInBothDirections) {
 TEST_P(DoctorWays, ReadSaysTheSameOrLeavesItOpen) {
   static const Ids open{"no_answer", "always_damaged", "extra_bytes", "bytes_missing", "sometimes_damaged"};
   const Unit& unit = *GetParam();
-  for (const WayFault& fault : way_faults()) {
+  for (const PathFault& fault : all_path_faults()) {
     const std::optional<Outcome> outcome = fault.examine(unit, asked_mode(unit), rates_of(unit).front());
     if (!outcome || outcome->seen.read_alone.empty()) continue;
     SCOPED_TRACE(fmt::format("{}: {}", unit.id, fault.name));
@@ -80,4 +80,4 @@ std::string name_of_test(const ::testing::TestParamInfo<const Unit*>& one) {
 INSTANTIATE_TEST_SUITE_P(Units, DoctorWays, ::testing::ValuesIn(character_units()), name_of_test);
 
 }  // namespace
-}  // namespace absenc::client::ways
+}  // namespace absenc::client::path_faults
