@@ -82,7 +82,7 @@ std::string inversion(const Case& one) {
                        seen.damage->breaks);
   }
   if (!seen.unsolicited.empty() && all_are(seen.unsolicited, 0)) {
-    return fmt::format("{} bytes came that nobody asked for, all of them 00", seen.unsolicited.size());
+    return fmt::format("{} unsolicited bytes arrived, all of them 00", seen.unsolicited.size());
   }
   std::size_t zeros = 0;
   for (const Attempted& attempt : seen.readings) {
