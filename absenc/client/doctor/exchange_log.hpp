@@ -3,6 +3,7 @@
 // ones, and itself stores only its last exchange.
 #pragma once
 
+#include <algorithm>
 #include <utility>
 #include <vector>
 
@@ -51,11 +52,17 @@ class ExchangeLog {
       seen_.listened = stream_.marks.back().at - stream_.marks.front().at;
     } else {
       seen_.exchanges = stream_frames(unit_, options_, stream_);
+      const bool has_damage = std::ranges::any_of(seen_.exchanges, is_damaged);
+      // If the readings lost no frame, a damaged piece was only cut at the wrong pause.
+      if (has_damage && std::ranges::none_of(seen_.readings, has_lost)) seen_.exchanges.clear();
     }
     stream_ = {};
   }
 
  private:
+  static bool is_damaged(const Attempted& one) { return one.answered && one.error != Error::none; }
+  static bool has_lost(const Attempted& one) { return one.error != Error::none || one.discarded != 0; }
+
   const Unit& unit_;
   const Options& options_;
   Observations& seen_;
