@@ -72,7 +72,7 @@ struct Fed final : Machine<std::uint8_t> {
   std::string all{};
 };
 
-TEST_F(CarrierTest, CharactersAreToldWhenAllAreThere) {
+TEST_F(CarrierTest, DeliversCharactersWhenAllExpectedOnesArrived) {
   const auto fed_by = [](const auto& play, Time gap = 1us, std::size_t due = 5) {
     Line out;
     Carrier<std::uint8_t, Line> carried{out};
@@ -131,7 +131,7 @@ TEST_F(CarrierTest, CharactersAreToldWhenAllAreThere) {
 }
 
 // The next conversation gets none of the gathered characters of an abandoned one.
-TEST_F(CarrierTest, WhatWasKeptIsForgottenWithItsConversation) {
+TEST_F(CarrierTest, DropsGatheredCharactersOfAbandonedConversation) {
   Fed fed;
   carrier.start(fed, 0us);
   carrier.sent(1us);
@@ -145,7 +145,7 @@ TEST_F(CarrierTest, WhatWasKeptIsForgottenWithItsConversation) {
   EXPECT_EQ(fed.all, "");
 }
 
-TEST_F(CarrierTest, TellsSilenceWithTheLatencyOfTheWay) {
+TEST_F(CarrierTest, ReportsSilenceWithLatencyOfThePath) {
   carrier.start(read, 5us);
   carrier.sent(10us);
   carrier.tick(carrier.due() - 1ns);
@@ -156,7 +156,7 @@ TEST_F(CarrierTest, TellsSilenceWithTheLatencyOfTheWay) {
   EXPECT_EQ(carrier.silences(), 1u);
 }
 
-TEST_F(CarrierTest, AfterABeginOfAReplyTheGapCounts) {
+TEST_F(CarrierTest, GapLimitAppliesAfterFirstCharacterOfReply) {
   carrier.start(read, 5us);
   carrier.sent(10us);
   carrier.received(std::span(reply).first(3), 30us);
@@ -165,7 +165,7 @@ TEST_F(CarrierTest, AfterABeginOfAReplyTheGapCounts) {
   EXPECT_EQ(read.error(), Error::wrong_length);
 }
 
-TEST_F(CarrierTest, WhatComesUnaskedIsNobodys) {
+TEST_F(CarrierTest, DropsItemsWithoutConversation) {
   carrier.received(reply, 1us);
   carrier.sent(2us);
   carrier.tick(3us);
@@ -184,7 +184,7 @@ struct Later final : Machine<std::uint8_t> {
   bool asked = false, over = false;
 };
 
-TEST_F(CarrierTest, HoldsATransferUntilItsTime) {
+TEST_F(CarrierTest, StartsTransferAtItsTime) {
   Later later;
   carrier.start(later, 5us);
   EXPECT_TRUE(line.sent.empty());

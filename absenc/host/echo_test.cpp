@@ -36,7 +36,7 @@ INSTANTIATE_TEST_SUITE_P(Modes, Echo,
                                            EchoRow{EchoMode::off, false, true}, EchoRow{EchoMode::off, true, false},
                                            EchoRow{EchoMode::on, false, false}));
 
-TEST(EchoFilter, FindsOutByItselfAndRemembers) {
+TEST(EchoFilter, DetectsModeAndKeepsIt) {
   for (const bool echo : {false, true}) {
     Bench bench(EchoMode::automatic);
     bench.port->set_echo(echo);
@@ -45,7 +45,7 @@ TEST(EchoFilter, FindsOutByItselfAndRemembers) {
   }
 }
 
-TEST(EchoFilter, NamesALineOnWhichOnlyTheEchoComesBack) {
+TEST(EchoFilter, ReportsLineWithOnlyTheEcho) {
   for (const EchoMode mode : {EchoMode::automatic, EchoMode::on}) {
     Bench bench(mode, always(sim::FaultKind::silence));
     bench.port->set_echo(true);
@@ -54,7 +54,7 @@ TEST(EchoFilter, NamesALineOnWhichOnlyTheEchoComesBack) {
   }
 }
 
-TEST(EchoFilter, OneByteTooManyIsNotTakenForAnEcho) {
+TEST(EchoFilter, ExtraByteIsNoEcho) {
   // The first reply has one extra byte, so that it is as long as echo and reply together.
   struct TooLong final : Machine<std::uint8_t> {
     explicit TooLong(Machine<std::uint8_t>& encoder) : device(encoder) {}
@@ -82,7 +82,7 @@ TEST(EchoFilter, OneByteTooManyIsNotTakenForAnEcho) {
   EXPECT_EQ(session.counters().bad(), 0u) << "the reply before it is good";
 }
 
-TEST(EchoFilter, ADisturbedEchoIsNoticed) {
+TEST(EchoFilter, DetectsDisturbedEcho) {
   Bench bench(EchoMode::on);
   std::vector<std::byte> storage(bench.unit.host_storage);
   for (const std::uint8_t echo : std::to_array<std::uint8_t>({0x1A, 0x1B})) {
@@ -100,7 +100,7 @@ TEST(EchoFilter, ADisturbedEchoIsNoticed) {
 }
 
 // The echo ends long before the encoder answers. That silence is no gap.
-TEST(EchoFilter, TheAnswerTimeRunsOnAfterTheEcho) {
+TEST(EchoFilter, AnswerLimitAppliesAfterEcho) {
   Bench port_like(EchoMode::on);  // on a real port the echo is received after the `sent` event
   std::vector<std::byte> storage(port_like.unit.host_storage);
   auto* read = port_like.unit.host(port_like.options, *find_command(port_like.unit, Verb::read), {}, storage).bytes;
@@ -122,7 +122,7 @@ TEST(EchoFilter, TheAnswerTimeRunsOnAfterTheEcho) {
 }
 
 // The reply to a page select equals its request, so it has as many bytes.
-TEST(EchoFilter, AReplyLikeItsRequestIsNotTakenForAnEchoAlone) {
+TEST(EchoFilter, ReplyEqualToRequestIsNoLoneEcho) {
   Bench bench(EchoMode::automatic);
   EXPECT_EQ(bench.session->run(*find_command(bench.unit, Verb::temperature))->error(), Error::none);
 }

@@ -38,7 +38,7 @@ TEST(FirstReading, AllowsNoMoreThanTheFastestShaft) {
   EXPECT_FALSE(confirmed(0, 32'768));
 }
 
-TEST(FirstReading, HasALimitEvenWhereNobodySaysOne) {
+TEST(FirstReading, HasADefaultLimit) {
   const auto confirmed = [](std::uint64_t singleturn, Time later) {
     return agree(FirstReading(0), of_bits(13, 0, {}), of_bits(13, singleturn, later));
   };
@@ -47,7 +47,7 @@ TEST(FirstReading, HasALimitEvenWhereNobodySaysOne) {
   EXPECT_FALSE(confirmed(1024, 100us));
 }
 
-TEST(FirstReading, HalfATurnIsNeverConfirmed) {
+TEST(FirstReading, RefusesHalfATurn) {
   for (const Time later : {Time(10ms), Time(1s), Time(24h), never}) {
     EXPECT_FALSE(agree(FirstReading(10'000), of_bits(13, 7, {}), of_bits(13, 7 + 4096, later)));
     EXPECT_FALSE(agree(FirstReading(10'000), of_bits(13, 7, {}), of_bits(13, 7 + 3841, later)));
@@ -56,7 +56,7 @@ TEST(FirstReading, HalfATurnIsNeverConfirmed) {
 }
 
 // 12 000 rpm are 200 turns a second: 0.2 of a turn in 1 ms.
-TEST(FirstReading, AShaftThatIsFasterIsSeenByItsThirdPosition) {
+TEST(FirstReading, ConfirmsFasterShaftAtThirdPosition) {
   FirstReading first(6000);
   EXPECT_FALSE(first.confirms(of_bits(13, 0, 0ms)));
   EXPECT_FALSE(first.confirms(of_bits(13, 1638, 1ms)));
@@ -66,7 +66,7 @@ TEST(FirstReading, AShaftThatIsFasterIsSeenByItsThirdPosition) {
   EXPECT_FALSE(first.confirms(of_bits(13, 0, 5ms)));
 }
 
-TEST(FirstReading, AShaftThatIsMuchFasterIsNotBelieved) {
+TEST(FirstReading, RefusesMuchFasterShaft) {
   for (const std::uint64_t step : {1638u, 3276u, 3500u}) {  // 819 counts in 1 ms are allowed
     FirstReading first(6000);
     EXPECT_FALSE(first.confirms(of_bits(15, 0, 0ms)));
@@ -75,7 +75,7 @@ TEST(FirstReading, AShaftThatIsMuchFasterIsNotBelieved) {
   }
 }
 
-TEST(FirstReading, TwoDamagedPositionsMakeNoSpeed) {
+TEST(FirstReading, RefusesTwoDamagedPositions) {
   FirstReading first(6000);
   EXPECT_FALSE(first.confirms(of_bits(13, 100, 0ms)));
   EXPECT_FALSE(first.confirms(of_bits(13, 100 + 2048, 1ms)));
@@ -101,7 +101,7 @@ TEST(FirstReading, TakesPositionsOf64Bits) {
   EXPECT_TRUE(agree(FirstReading(10'000), of_bits(64, 0, {}), of_bits(64, std::uint64_t{15} << 59, 3s)));
 }
 
-TEST(FirstReading, OfACarriageByItsOwnSpeed) {
+TEST(FirstReading, UsesSpeedOfCarriage) {
   // 1 m/s: 1000 counts of 1 um in a millisecond.
   const FirstReading first(Reach::of({.mm_s = 1000}, {.singleturn_bits = 26, .multiturn_bits = 0, .unit_um = 1}));
   EXPECT_TRUE(agree(first, of_bits(26, 0, {}), of_bits(26, 1004, 1ms)));

@@ -73,7 +73,7 @@ RC_GTEST_PROP(UnwrapProperty, TheLongestGapKeepsWithinThatLimit, ()) {
 }
 
 // Integer arithmetic gives the floating-point result, except for rounding up by at most 0.016 %.
-RC_GTEST_PROP(ReachProperty, IsWhatTheFastestGetsInThatTime, ()) {
+RC_GTEST_PROP(ReachProperty, EqualsDistanceAtHighestSpeed, ()) {
   const auto bits = *rc::gen::inRange(1u, 65u);
   const auto speed = *rc::gen::inRange<std::uint32_t>(1, 1'000'001);
   const auto time = *rc::gen::inRange<std::int64_t>(0, std::int64_t{1} << *rc::gen::inRange(1, 63));
@@ -87,7 +87,7 @@ RC_GTEST_PROP(ReachProperty, IsWhatTheFastestGetsInThatTime, ()) {
   RC_ASSERT(static_cast<double>(counts) <= wanted * 1.0002 + 1);
 }
 
-RC_GTEST_PROP(VelocityProperty, IsThatOfTheMiddleOfItsWindow, ()) {
+RC_GTEST_PROP(VelocityProperty, EqualsSpeedInMiddleOfWindow, ()) {
   // Speed in counts/s, acceleration in counts/s^2; readings every 0.1 to 20 ms, with a jitter of up to half of that.
   const double speed = *rc::gen::inRange(-100'000'000, 100'000'000);
   const double acceleration = *rc::gen::inRange(-100'000'000, 100'000'000);
@@ -108,7 +108,7 @@ RC_GTEST_PROP(VelocityProperty, IsThatOfTheMiddleOfItsWindow, ()) {
   }
 }
 
-RC_GTEST_PROP(VelocityProperty, OfAnUnwrappedTurnHoldsToHalfATurnAStep, ()) {
+RC_GTEST_PROP(VelocityProperty, OfUnwrappedTurnIsValidUpToHalfATurnPerStep, ()) {
   constexpr unsigned bits = 17;
   constexpr double revolution = 1 << bits;
   const auto period = *rc::gen::inRange<std::int64_t>(100'000, 20'000'000);

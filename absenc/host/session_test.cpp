@@ -22,7 +22,7 @@ TEST(Session, WithoutAConversationThereIsNoResult) {
 
 // ---- ReplyGuard
 
-TEST(ReplyGuard, ARequestWaitsAndWhatIsNoneDoesNot) {
+TEST(ReplyGuard, DelaysOnlyRequests) {
   struct Asks final : Machine<std::uint8_t> {
     void feed(const Event<std::uint8_t>&) override {}
     Step<std::uint8_t> next(Time) override { return step; }
@@ -64,7 +64,7 @@ struct Asking final : Machine<std::uint8_t> {
 };
 
 // The reply of an outstanding request may arrive first; ten seconds later it counts as lost.
-TEST(ReplyGuard, NothingIsOwedForMoreThanTenSeconds) {
+TEST(ReplyGuard, RequestsAreOutstandingForTenSeconds) {
   using Kind = Step<std::uint8_t>::Kind;
   const Bench bench(EchoMode::off);
   const Wire reply{0x02, 0x00, 0x11, 0x22, 0x01, 0x02 ^ 0x11 ^ 0x22 ^ 0x01};
@@ -93,7 +93,7 @@ TEST(ReplyGuard, NothingIsOwedForMoreThanTenSeconds) {
   EXPECT_EQ(heard(11s), reply);
 }
 
-TEST(ReplyGuard, ALineThatIsNeverQuietIsSpokenIntoAfterATenthOfASecond) {
+TEST(ReplyGuard, SendsAfterATenthOfASecondOfNoise) {
   const Bench bench(EchoMode::off);
   ReplyGuard<std::uint8_t> guard;
   Asking asking;
@@ -111,7 +111,7 @@ TEST(ReplyGuard, ALineThatIsNeverQuietIsSpokenIntoAfterATenthOfASecond) {
 
 // ---- Sessions
 
-TEST(Session, RepeatsWhatMayBeRepeated) {
+TEST(Session, RepeatsRepeatableCommands) {
   Bench bench(EchoMode::off, always(sim::FaultKind::truncate));
   EXPECT_EQ(bench.session->run(*find_command(bench.unit, Verb::read))->error(), Error::wrong_length);
   EXPECT_EQ(bench.device->answer_count(), 3u);
@@ -122,7 +122,7 @@ TEST(Session, RepeatsWhatMayBeRepeated) {
 }
 
 // The document permits 51 us for a reading: request, 3 us, 11 characters.
-TEST(Session, TellsItsStatisticsOfEveryAttempt) {
+TEST(Session, FeedsStatisticsWithEveryAttempt) {
   Bench bad(EchoMode::off, always(sim::FaultKind::corrupt));
   Statistics<std::uint8_t> statistics;
   bad.session->observe(&statistics);
@@ -167,7 +167,7 @@ TEST(Session, ShowsTheSecondOfTwoReadingsThatAgree) {
 }
 
 // Each attempt reports the frame that explains the timeout, also while a late reply may arrive.
-TEST(Session, AReplyWithTheWrongKindOfIdentifierExplainsASilence) {
+TEST(Session, ReplyWithWrongKindOfIdentifierExplainsTimeout) {
   struct Extended final : Machine<CanFrame> {
     void feed(const Event<CanFrame>& event) override {
       if (event.kind == Event<CanFrame>::Kind::received) due = true;
@@ -204,7 +204,7 @@ TEST(Session, AnInvalidPositionIsNeverConfirmed) {
 constexpr std::int64_t turn = std::int64_t{1} << 32;
 constexpr OptionText no_turns{"multiturn_bits", "0"};
 
-TEST(SessionGuard, APositionThatNoShaftReachesIsReadAgain) {
+TEST(SessionGuard, ReadsImpossiblePositionAgain) {
   Bench bench(EchoMode::off);
   Statistics<std::uint8_t> statistics;
   bench.session->observe(&statistics);
@@ -219,7 +219,7 @@ TEST(SessionGuard, APositionThatNoShaftReachesIsReadAgain) {
   EXPECT_EQ(statistics.bad(0).received.size(), 11u);
 }
 
-TEST(SessionGuard, AJumpNeedsASecondReadingOfItsOwn) {
+TEST(SessionGuard, JumpNeedsASecondReading) {
   Bench bench(EchoMode::off);
   bench.read();
   bench.shaft.position += 5 * turn;
@@ -229,7 +229,7 @@ TEST(SessionGuard, AJumpNeedsASecondReadingOfItsOwn) {
   EXPECT_EQ(bench.answers_of_a_reading(), 1u);
 }
 
-TEST(SessionGuard, TheLimitIsTheOneThatIsSet) {
+TEST(SessionGuard, UsesTheGivenLimit) {
   Bench bench(EchoMode::off);
   bench.read();
   bench.answer_wrong(turn / 1000);
@@ -242,7 +242,7 @@ TEST(SessionGuard, TheLimitIsTheOneThatIsSet) {
 }
 
 // Half a turn takes 3 ms at 10 000 rpm, so after 20 ms any position is possible.
-TEST(SessionGuard, AfterAPauseThatTellsNothingASecondReadingDoes) {
+TEST(SessionGuard, LongPauseNeedsASecondReading) {
   Bench bench(EchoMode::off, {}, 3, {no_turns});
   bench.read();
   bench.pause(2ms);
@@ -260,7 +260,7 @@ TEST(SessionGuard, AfterAPauseThatTellsNothingASecondReadingDoes) {
   EXPECT_EQ(bench.answers_of_a_reading(), 1u) << "half a turn takes 30 ms";
 }
 
-TEST(SessionGuard, TurnsTellAfterALongPause) {
+TEST(SessionGuard, TurnsConfirmAfterALongPause) {
   Bench bench(EchoMode::off);
   bench.read();
   bench.pause(60s);
@@ -271,7 +271,7 @@ TEST(SessionGuard, TurnsTellAfterALongPause) {
 }
 
 // A reading takes 55 us, in which the shaft turns nearly once, so a second reading tells no more than the first.
-TEST(SessionGuard, WhereNoSecondReadingTellsHalfATurnIsStillRefused) {
+TEST(SessionGuard, RefusesHalfATurnIfSecondReadingTakesTooLong) {
   Bench bench(EchoMode::off, {}, 3, {no_turns});
   bench.session->set_speed_limit({.rpm = 1'000'000});
   EXPECT_EQ(bench.answers_of_a_reading(), 2u);
@@ -285,7 +285,7 @@ TEST(SessionGuard, WhereNoSecondReadingTellsHalfATurnIsStillRefused) {
   EXPECT_EQ(bench.refused(), 0u) << "nobody knows which was wrong";
 }
 
-TEST(SessionGuard, NothingIsConfirmedThatAgreesWithNothing) {
+TEST(SessionGuard, ConfirmsNothingWithoutAgreement) {
   Bench bench(EchoMode::off);
   struct Wild final : Shaft {
     [[nodiscard]] ShaftState at(Time) const override {
@@ -309,7 +309,7 @@ TEST(SessionGuard, NothingIsConfirmedThatAgreesWithNothing) {
 }
 
 // An encoder that was read once needs no second reading for a position that it reports as invalid; it is not confirmed.
-TEST(SessionGuard, AnInvalidPositionOfAKnownEncoderIsShownAtOnce) {
+TEST(SessionGuard, ReturnsInvalidPositionOfKnownEncoderAtOnce) {
   Bench bench(EchoMode::off);
   bench.read();
   bench.device->raise_alarms(0x04);  // counting_error

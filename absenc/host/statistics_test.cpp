@@ -32,7 +32,7 @@ TEST(Latencies, AreAtMostA32ndTooLong) {
   }
 }
 
-TEST(Latencies, TellTheLongestExactly) {
+TEST(Latencies, LongestIsExact) {
   Latencies latencies;
   latencies.add(123'456'789ns);
   latencies.add(-1ns);
@@ -54,7 +54,7 @@ TEST(Latencies, AreCountedWithinLimits) {
   EXPECT_EQ(latencies.sum(), 2s + 2'035'300ns);
 }
 
-TEST(Latencies, AreNeverCountedWithinWhatTheyExceed) {
+TEST(Latencies, AreNeverCountedWithinLimitsTheyExceed) {
   for (std::int64_t value = 1; value < 68'000'000'000; value += value / 7 + 1) {
     Latencies latencies;
     latencies.add(Time(value));
@@ -63,7 +63,7 @@ TEST(Latencies, AreNeverCountedWithinWhatTheyExceed) {
   }
 }
 
-TEST(Rate, IsThatOfTheLastSeconds) {
+TEST(Rate, CountsTheLastSeconds) {
   Rate rate;
   EXPECT_EQ(rate.per_second(0s), 0);
   Time at{};
@@ -75,7 +75,7 @@ TEST(Rate, IsThatOfTheLastSeconds) {
   EXPECT_NEAR(rate.per_second(at), 1000, 1);
 }
 
-TEST(Rate, FallsWhenNothingComes) {
+TEST(Rate, FallsWithoutEvents) {
   Rate rate;
   for (int i = 0; i <= 100; ++i) rate.add(i * 100ms);
   EXPECT_NEAR(rate.per_second(10s + 100ms), 10, 0.1);
@@ -122,7 +122,7 @@ TEST(Statistics, KeepTheLastBadExchanges) {
   }
 }
 
-TEST(Statistics, CutsWhatIsTooLong) {
+TEST(Statistics, CutsLongExchanges) {
   Statistics<std::uint8_t> statistics;
   Ended ended;
   ended.error_ = Error::wrong_length;
@@ -131,7 +131,7 @@ TEST(Statistics, CutsWhatIsTooLong) {
   EXPECT_EQ(statistics.bad(0).received.size(), 64u);
 }
 
-TEST(Statistics, CountsWhatEndedWell) {
+TEST(Statistics, CountsGoodConversations) {
   Statistics<std::uint8_t> statistics;
   Ended ended;
   for (int i = 0; i < 5; ++i) {

@@ -21,7 +21,7 @@ Reading multiturn(std::uint64_t turns, std::uint64_t counts, Time at) {
   return reading;
 }
 
-TEST(Unwrapper, GoesOnPastTheEndOfATurn) {
+TEST(Unwrapper, ContinuesAcrossEndOfTurn) {
   Unwrapper unwrapper;
   EXPECT_EQ(unwrapper.add(singleturn(1020, 0ms)), Joined::started);
   EXPECT_EQ(unwrapper.position(), 1020);
@@ -34,7 +34,7 @@ TEST(Unwrapper, GoesOnPastTheEndOfATurn) {
   EXPECT_EQ(unwrapper.position(), -24);
 }
 
-TEST(Unwrapper, GoesOnPastTheEndOfTheTurnCounter) {
+TEST(Unwrapper, ContinuesAcrossEndOfTurnCounter) {
   Unwrapper unwrapper;
   unwrapper.add(multiturn(15, 1000, 0ms));
   EXPECT_EQ(unwrapper.position(), 15 * 1024 + 1000);
@@ -44,7 +44,7 @@ TEST(Unwrapper, GoesOnPastTheEndOfTheTurnCounter) {
   EXPECT_EQ(unwrapper.position(), 15 * 1024 + 1023);
 }
 
-TEST(Unwrapper, GoesOnThroughZeroOfTurnsWithASign) {
+TEST(Unwrapper, ContinuesThroughZeroOfSignedTurns) {
   const auto signed_turns = [](std::int64_t turns, std::uint64_t counts, Time at) {
     Reading reading = multiturn(static_cast<std::uint64_t>(turns) & 15, counts, at);
     reading.multiturn_signed = true;
@@ -63,7 +63,7 @@ TEST(Unwrapper, GoesOnThroughZeroOfTurnsWithASign) {
   EXPECT_EQ(unwrapper.position(), -9 * 1024);
 }
 
-TEST(Unwrapper, TakesTheTurnOnlyWhereTheTurnsDoNotHold) {
+TEST(Unwrapper, UsesTurnAloneIfTurnsAreInvalid) {
   Unwrapper unwrapper;
   unwrapper.add(multiturn(5, 1000, 0ms));
   Reading lost = multiturn(0, 8, 1ms);
@@ -75,7 +75,7 @@ TEST(Unwrapper, TakesTheTurnOnlyWhereTheTurnsDoNotHold) {
   EXPECT_EQ(unwrapper.position(), 6 * 1024 + 20);
 }
 
-TEST(Unwrapper, IgnoresWhatIsNotValid) {
+TEST(Unwrapper, IgnoresInvalidReadings) {
   Unwrapper unwrapper;
   Reading starting = singleturn(7, 0ms);
   starting.ready = false;
@@ -88,7 +88,7 @@ TEST(Unwrapper, IgnoresWhatIsNotValid) {
   EXPECT_EQ(unwrapper.position(), 110);
 }
 
-TEST(Unwrapper, DoesNotJoinWhatIsTooFarApart) {
+TEST(Unwrapper, RestartsAfterTooLongAPause) {
   Unwrapper unwrapper(SpeedLimit{.rpm = 6000});  // half a turn in 5 ms
   unwrapper.add(singleturn(1000, 0ms));
   EXPECT_EQ(unwrapper.add(singleturn(10, 4ms)), Joined::continued);
@@ -98,14 +98,14 @@ TEST(Unwrapper, DoesNotJoinWhatIsTooFarApart) {
   EXPECT_EQ(unwrapper.add(singleturn(30, 10ms)), Joined::continued);
 }
 
-TEST(Unwrapper, HasALimitEvenWhereNobodySaysOne) {
+TEST(Unwrapper, HasADefaultLimit) {
   Unwrapper unwrapper;
   unwrapper.add(singleturn(1000, 0ms));
   EXPECT_EQ(unwrapper.add(singleturn(10, 1ms)), Joined::continued);
   EXPECT_EQ(unwrapper.add(singleturn(1000, 101ms)), Joined::restarted);
 }
 
-TEST(Unwrapper, JoinsAsFarAsTheTurnsGoThatTheReadingsHave) {
+TEST(Unwrapper, UsesTurnsThatTheReadingsHave) {
   Unwrapper unwrapper(SpeedLimit{.rpm = 600});  // 8 turns in 800 ms, half a turn in 50 ms
   unwrapper.add(multiturn(3, 0, 0ms));
   EXPECT_EQ(unwrapper.add(multiturn(9, 0, 700ms)), Joined::continued);
@@ -116,7 +116,7 @@ TEST(Unwrapper, JoinsAsFarAsTheTurnsGoThatTheReadingsHave) {
   EXPECT_EQ(unwrapper.add(without), Joined::continued);
 }
 
-TEST(Unwrapper, OfALinearEncoderByItsOwnSpeed) {
+TEST(Unwrapper, UsesSpeedOfLinearEncoder) {
   Unwrapper unwrapper;
   Reading reading = singleturn(1000, 0ms);
   reading.unit_um = 1000;  // range 1.024 m
@@ -129,7 +129,7 @@ TEST(Unwrapper, OfALinearEncoderByItsOwnSpeed) {
   EXPECT_EQ(unwrapper.position(), 10);
 }
 
-TEST(Unwrapper, ReadingsThatCameTogetherMayHaveBeenApart) {
+TEST(Unwrapper, ReadingsThatArriveTogetherMayBeFarApart) {
   // Half a turn takes 50 ms. A host that was delayed for 100 ms receives four frames at once.
   Unwrapper unwrapper(SpeedLimit{.rpm = 600}, Times::arrived);
   unwrapper.add(singleturn(0, 0ms));
@@ -142,7 +142,7 @@ TEST(Unwrapper, ReadingsThatCameTogetherMayHaveBeenApart) {
   EXPECT_EQ(unwrapper.add(singleturn(70, 225ms)), Joined::continued);
 }
 
-TEST(Unwrapper, KnowsWhatNoShaftTurns) {
+TEST(Unwrapper, DetectsJumpOfShaft) {
   // A tenth of a turn in 1 ms, plus 1 ms because the latch times are uncertain.
   Unwrapper unwrapper(SpeedLimit{.rpm = 6000});
   EXPECT_FALSE(unwrapper.jumps(multiturn(9, 0, 0ms))) << "nothing is known yet";
@@ -158,7 +158,7 @@ TEST(Unwrapper, KnowsWhatNoShaftTurns) {
   EXPECT_FALSE(unwrapper.jumps(multiturn(13, 0, 10min))) << "nobody knows";
 }
 
-TEST(Unwrapper, KnowsWhatNoCarriageDoes) {
+TEST(Unwrapper, DetectsJumpOfCarriage) {
   Unwrapper unwrapper(SpeedLimit{.mm_s = 1000});
   Reading reading = singleturn(0, 0ms, 30);
   reading.unit_um = 1;
@@ -198,7 +198,7 @@ TEST(Unwrapper, DoesNotJoinPositionsThatMayHaveBeenLatchedTooFarApart) {
   EXPECT_EQ(unwrapper.add(late), Joined::restarted) << "the times of the reading say the same";
 }
 
-TEST(Unwrapper, SaysWhetherItsTurnsAreThoseOfTheEncoder) {
+TEST(Unwrapper, ReportsWhetherTurnsAreThoseOfTheEncoder) {
   Unwrapper single;
   single.add(singleturn(5, 0ms));
   EXPECT_FALSE(single.counts_turns());

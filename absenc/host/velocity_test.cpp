@@ -40,7 +40,7 @@ TEST(Velocity, IsTheMeanOverItsWindow) {
   EXPECT_LE(velocity.delay(), 7ms);
 }
 
-TEST(Velocity, IsAStepWhereReadingsAreRare) {
+TEST(Velocity, SpansOneStepIfReadingsAreRare) {
   Velocity velocity(10ms);
   velocity.add(0, 0s);
   velocity.add(5, 1s);
@@ -61,7 +61,7 @@ TEST(Velocity, KeepsItsWindowAtAnyRate) {
   }
 }
 
-TEST(Velocity, DoesNotTakeWhatIsNotLater) {
+TEST(Velocity, IgnoresPositionsThatAreNotLater) {
   Velocity velocity;
   velocity.add(0, 1ms);
   velocity.add(100, 2ms);
@@ -73,7 +73,7 @@ TEST(Velocity, DoesNotTakeWhatIsNotLater) {
   EXPECT_NEAR(velocity.counts_per_second(), 100'000, 1e-6);
 }
 
-TEST(Velocity, IsToldAtOnceOfAShaftThatStands) {
+TEST(Velocity, IsReportedAtOnceForAStandingShaft) {
   Velocity velocity;
   for (int i = 0; i < 50; ++i) {
     velocity.add(7, i * 1ms);
@@ -99,7 +99,7 @@ TEST(Velocity, WaitsForTwentyCountsUpToTwentyWindows) {
   EXPECT_NEAR(velocity.uncertainty(), 5, 1e-6);
 }
 
-TEST(Velocity, WaitsUntilItsWindowOutweighsTheTimes) {
+TEST(Velocity, WaitsUntilWindowExceedsTimeUncertainty) {
   Velocity velocity;
   const auto add = [&](int i, Time width) { velocity.add(i * 1000, {i * 1ms, i * 1ms + width}); };
   for (int i = 0; i < 80; ++i) {
@@ -115,7 +115,7 @@ TEST(Velocity, WaitsUntilItsWindowOutweighsTheTimes) {
   EXPECT_FALSE(velocity.valid()) << "nobody knows when the last was latched";
 }
 
-TEST(Velocity, HasNoneWhenEvenTheLongestWindowDoesNotOutweighThem) {
+TEST(Velocity, IsInvalidIfLongestWindowIsTooUncertain) {
   Velocity good;
   Velocity bad;
   for (int i = 0; i <= 1100; ++i) {
@@ -157,7 +157,7 @@ void expect_bounds(const Motion& motion, Time period, Time longest_jitter, unsig
   EXPECT_GE(valid, least_valid);
 }
 
-TEST(Velocity, IsNeverFartherOffThanItsUncertainty) {
+TEST(Velocity, ErrorIsWithinItsUncertainty) {
   constexpr double turn = 131'072;
   const auto steady = [](double rpm) { return [=](double seconds) { return rpm / 60 * turn * seconds; }; };
   const auto sine = [](double hertz) {

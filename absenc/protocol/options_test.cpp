@@ -21,7 +21,7 @@ TEST(Options, DecimalNumbers) {
   EXPECT_EQ(parse_decimal("9223372036854775807", 0).value(), INT64_MAX);
 }
 
-TEST(Options, WhatIsNoDecimalNumber) {
+TEST(Options, RefusesInvalidDecimalNumbers) {
   for (const char* text : {"", ".", "1.", ".5", "-1", "0.0005", "1.2.3", "1,5", "0x10", "1e3", "1.-5", " 1", "1.5 ",
                            "9223372036854775807"}) {
     EXPECT_EQ(parse_decimal(text, 3).error(), Error::invalid_argument) << text;
@@ -41,7 +41,7 @@ Resolved resolve(const Unit& unit, std::string_view model, const std::vector<Opt
 
 constexpr std::string_view word = "multiturn:12 position:24 battery=value:3 error:1";
 
-TEST(Options, AWordStandsInForTheOptionsThatDescribeOne) {
+TEST(Options, WordReplacesOptionsThatDescribeIt) {
   const Resolved resolved = resolve(biss::unit, {}, {{"ma_khz", "500"}, {"word", word}, {"unit_um", "0.5"}});
   ASSERT_EQ(resolved.error.kind, OptionError::Kind::none);
   EXPECT_EQ(resolved.options.model, nullptr);
@@ -58,7 +58,7 @@ TEST(Options, AWordStandsInForTheOptionsThatDescribeOne) {
   }
 }
 
-TEST(Options, AWordExcludesWhatSaysTheSame) {
+TEST(Options, WordExcludesOptionsAndModels) {
   for (const Unit* unit : {&biss::unit, &ssi::unit}) {
     ASSERT_TRUE(takes_word(*unit));
     for (const Option& option : unit->options) {
@@ -73,7 +73,7 @@ TEST(Options, AWordExcludesWhatSaysTheSame) {
   }
 }
 
-TEST(Options, WhoeverKnowsTheLineTells) {
+TEST(Options, SharedLineSetsOption) {
   const auto bus = [](std::vector<std::pair<std::string_view, std::string_view>> settings) {
     std::vector<OptionText> texts;
     for (const auto& [name, value] : settings) texts.push_back({name, value});
@@ -90,7 +90,7 @@ TEST(Options, WhoeverKnowsTheLineTells) {
   bus({{"bus", "false"}});  // an explicit value has priority
 }
 
-TEST(Options, WhatIsNoWordIsToldWithItsPlace) {
+TEST(Options, InvalidWordIsReportedWithItsPlace) {
   const Resolved wrong = resolve(ssi::unit, {}, {{"word", "position:12 eror:1"}});
   EXPECT_EQ(wrong.error.kind, OptionError::Kind::bad_word);
   EXPECT_EQ(wrong.error.word.at, 12u);

@@ -37,7 +37,7 @@ TEST(WordFormat, ReadsFieldsInTheOrderOfTheWire) {
   EXPECT_TRUE(parsed.format.gray());
 }
 
-TEST(WordFormat, ErrorsNameThePlace) {
+TEST(WordFormat, ErrorsHaveThePlace) {
   struct Case {
     std::string_view text;
     std::size_t at;
@@ -94,7 +94,7 @@ TEST(Word, DecodesWhatEachFieldMeans) {
   EXPECT_EQ(decode(format, bytes, 15).error(), Error::wrong_length);
 }
 
-TEST(Word, GrayGoesOverTurnsAndPositionInTheOrderOfTheWire) {
+TEST(Word, GrayCodeSpansTurnsAndPosition) {
   constexpr WordFormat turns_first = "multiturn:4 position:13 gray"_word;
   constexpr WordFormat position_first = "position:13 error:1 multiturn:4 gray"_word;
   BitBuffer<64> bits;
@@ -106,7 +106,7 @@ TEST(Word, GrayGoesOverTurnsAndPositionInTheOrderOfTheWire) {
   EXPECT_EQ(decode_word(position_first, bits.view())->multiturn, 5u);
 }
 
-TEST(Word, ParityIsOverAllBitsBeforeIt) {
+TEST(Word, ParityCoversAllBitsBeforeIt) {
   constexpr WordFormat even = "position:7 error:1 parity:1"_word;
   constexpr WordFormat odd = "position:7 error:1 parity:1! skip:3"_word;
   for (std::uint64_t position = 0; position < 128; ++position) {

@@ -134,14 +134,14 @@ Procedure two_questions(ToyDialog& dialog, Found& found) {
   co_return done;
 }
 
-TEST(Procedures, GoOnWithEachReply) {
+TEST(Procedures, ContinueAfterEachReply) {
   Case<two_questions> good(echo);
   EXPECT_EQ(good.host.error(), Error::none);
   EXPECT_EQ(good.host.found().sum, 0x81u + 0x82u);
   EXPECT_EQ(good.bench.sent[1] - good.bench.sent[0], 10ms + 10us);  // after the last received character
 }
 
-TEST(Procedures, EndWhereNoGoodReplyComes) {
+TEST(Procedures, EndWithoutAValidReply) {
   Case<two_questions> bad([](std::uint8_t request, unsigned n) { return request == 2 ? Wire{} : echo(request, n); });
   EXPECT_EQ(bad.host.error(), Error::timeout);
   EXPECT_EQ(bad.host.detail(), "the second");
@@ -150,7 +150,7 @@ TEST(Procedures, EndWhereNoGoodReplyComes) {
   EXPECT_EQ(bad.bench.now, bad.bench.sent[3] + 5ms);                  // after the hold time
 }
 
-TEST(Procedures, DamagedCharactersAreNoSilence) {
+TEST(Procedures, DamagedCharactersAreNoTimeout) {
   Case<two_questions> bad([](std::uint8_t, unsigned) { return Wire{damaged}; });
   EXPECT_EQ(bad.host.error(), Error::bad_framing);
   EXPECT_EQ(bad.bench.sent.size(), 3u);
@@ -158,19 +158,19 @@ TEST(Procedures, DamagedCharactersAreNoSilence) {
   EXPECT_EQ(beside.host.error(), Error::wrong_length);
 }
 
-TEST(Procedures, RepeatWhatWasDamagedWhenTheLineIsSilent) {
+TEST(Procedures, RepeatAfterDamageWhenTheLineIsSilent) {
   Case<two_questions> bad([](std::uint8_t request, unsigned n) { return n == 1 ? Wire{3, 4} : echo(request, n); });
   EXPECT_EQ(bad.host.error(), Error::none);
   EXPECT_EQ(bad.bench.sent.size(), 3u);
 }
 
-TEST(Procedures, ARefusalIsWholeAtOnce) {
+TEST(Procedures, RefusalEndsTheExchangeAtOnce) {
   Case<two_questions> refused([](std::uint8_t, unsigned) { return Wire{0xFF}; });
   EXPECT_EQ(refused.host.error(), Error::busy);
   EXPECT_EQ(refused.bench.sent[1] - refused.bench.sent[0], 10us + 2ms);  // a refusal is followed by no silence
 }
 
-TEST(Engine, AWeakCheckIsTrustedOnlyBeforeSilence) {
+TEST(Engine, WeakChecksumNeedsSilence) {
   const auto longer = [](std::uint8_t request, unsigned) { return Wire{static_cast<std::uint8_t>(request | 0x80), 0}; };
   EXPECT_EQ(Case<two_questions>(longer).host.error(), Error::none);  // bytes after a complete reply are dropped
   EXPECT_EQ(Case<two_questions>(longer, {.ends_by_silence = true}).host.error(), Error::wrong_length);
@@ -222,7 +222,7 @@ Procedure many_parts(ToyDialog& dialog, Found& found, Arguments arguments) {
   co_return done;
 }
 
-TEST(Procedures, PartsGiveTheirStorageBack) {
+TEST(Procedures, PartsReleaseTheirStorage) {
   const std::array<std::int64_t, 1> depth{3};
   Case<many_parts> good(echo, {}, depth);
   EXPECT_EQ(good.host.error(), Error::none);
@@ -239,7 +239,7 @@ TEST(Procedures, StopFromAnyDepth) {
   EXPECT_EQ(stopped.bench.sent.size(), 1u);
 }
 
-TEST(Procedures, SayWhenTheStorageIsTooSmall) {
+TEST(Procedures, ReportStorageThatIsTooSmall) {
   const std::array<std::int64_t, 1> depth{12};
   const std::size_t needed = Case<many_parts>(echo, {}, depth).host.frames_size();
   // Too many parts in each other.
@@ -260,7 +260,7 @@ Procedure endless(ToyDialog& dialog, Found& found) {
   co_return done;
 }
 
-TEST(Procedures, LeaveTheEncoderAsItWasWhenAborted) {
+TEST(Procedures, RestoreTheEncoderWhenAborted) {
   Case<endless> aborted(echo);
   EXPECT_EQ(aborted.host.found().sum, 10u);
   EXPECT_GE(aborted.bench.now, 1s);
@@ -268,7 +268,7 @@ TEST(Procedures, LeaveTheEncoderAsItWasWhenAborted) {
 
 constexpr std::uint8_t request_to(std::size_t index) { return static_cast<std::uint8_t>(index); }
 
-TEST(Scan, AsksEachAddress) {
+TEST(Scan, RequestsEachAddress) {
   using Host = author::Run<Toy, Nodes<8>, scan<Toy, 8, request_to>>;
   alignas(std::max_align_t) std::array<std::byte, 4096> arena;
   Host host({}, {}, arena);
@@ -303,7 +303,7 @@ Procedure end_as_told(ToyDialog& dialog, Found&, Arguments arguments) {
   co_return ways[static_cast<std::size_t>(arguments[0])];
 }
 
-TEST(Reported, TheDocumentExplainsWhatTheProcedureLeavesOpen) {
+TEST(Reported, DocumentExplainsIfTheProcedureDoesNot) {
   const std::array<std::string, 4> said{"/", "document; own/its advice", "own/", "own/own advice"};
   for (std::int64_t way = 0; way < 4; ++way) {
     alignas(std::max_align_t) std::array<std::byte, 4096> arena;
@@ -341,14 +341,14 @@ struct Numbers final : FieldSink {
   std::vector<std::int64_t> seen;
 };
 
-TEST(Reported, OnlyTheConversationKnows) {
+TEST(Reported, ConversationExplains) {
   alignas(std::max_align_t) std::array<std::byte, 4096> arena;
   Reported<of_host, author::Run<Toy, Found, leave_something>, finding> host({}, {}, arena);
   Bench(echo).run(host);
   EXPECT_EQ(host.detail(), "of the host");
 }
 
-TEST(Reported, WordsAndFieldsOfAProcedureThatIsBrokenOff) {
+TEST(Reported, TextsAndFieldsOfAnInterruptedProcedure) {
   alignas(std::max_align_t) std::array<std::byte, 4096> arena;
   Reported<telling, author::Run<Toy, Found, leave_something>, leaving> host({}, {}, arena);
   Bench(echo).run(host);

@@ -69,7 +69,7 @@ std::string run(Host& host, const std::vector<std::vector<std::uint8_t>>& transf
   return log + "never ends";
 }
 
-TEST(ClockedEngine, ClocksWhenTheClockHasRested) {
+TEST(ClockedEngine, ClocksAfterTheRest) {
   Host host({});
   EXPECT_EQ(host.reading(), nullptr);
   EXPECT_EQ(run(host, {{0, 7, 7, 7}}), "8 at 1030 done");  // bytes beyond the clocks are dropped
@@ -81,7 +81,7 @@ TEST(ClockedEngine, ClocksWhenTheClockHasRested) {
   EXPECT_EQ(host.exchange().sent_at, 1130us);
 }
 
-TEST(ClockedEngine, ALineThatIsLowAllTheTimeIsNoPosition) {
+TEST(ClockedEngine, LineThatStaysLowIsNoPosition) {
   const auto error_of = [](std::uint8_t byte, bool idle_low) {
     Host host({});
     (void)host.next(1ms);
@@ -95,7 +95,7 @@ TEST(ClockedEngine, ALineThatIsLowAllTheTimeIsNoPosition) {
   EXPECT_EQ(error_of(0x01, true), Error::none);  // the line is low because it was clocked early, and its bits change
 }
 
-TEST(ClockedEngine, OfAKnownRateTheEndTellsTheBegin) {
+TEST(ClockedEngine, KnownRateGivesTheBeginOfATransfer) {
   Host host({.rate = 100'000});
   EXPECT_EQ(run(host, {{0}}), "rate=100000 8 at 1030 done");
   EXPECT_EQ(host.reading()->latched, 1130us - 8 * 10us);
@@ -109,7 +109,7 @@ TEST(ClockedEngine, ATransferMayFollowAnotherWithMoreClocks) {
   EXPECT_EQ(host.exchange().received.size(), 3u);
 }
 
-TEST(ClockedEngine, EndsWhereItCannotGoOn) {
+TEST(ClockedEngine, EndsIfStorageIsTooSmall) {
   Host stuck({});
   EXPECT_EQ(run(stuck, {{0xFF}}), "8 at 1030 done");
   EXPECT_EQ(stuck.error(), Error::line_stuck);

@@ -181,7 +181,7 @@ constexpr std::array<std::uint8_t, 1> request_without_reply{0x7F};
 constexpr std::array<std::uint8_t, 1> bad_request{0x80};
 constexpr std::array<std::uint8_t, 1> reply{6};
 
-TEST(Declaration, LeavesOutWhatTheUnitDoesNotHave) {
+TEST(Declaration, LeavesOutUndeclaredMembers) {
   EXPECT_EQ(unit.is_checked, nullptr);
   EXPECT_EQ(unit.bits, nullptr);
   EXPECT_EQ(unit.probe, nullptr);
@@ -204,7 +204,7 @@ TEST(Declaration, TakesRequestsAndReportableAlarmsFromTheUnit) {
   EXPECT_EQ(unit.reportable, nullptr);
 }
 
-TEST(Declaration, ProtocolAndFormatTellWhatIsLeftOut) {
+TEST(Declaration, ProtocolAndFormatReplaceUndeclaredMembers) {
   NoFields sink;
   const Options narrow = options_with(3);
   EXPECT_EQ(unit.settings(narrow).rate, 3000u);
@@ -220,7 +220,7 @@ TEST(Declaration, ProtocolAndFormatTellWhatIsLeftOut) {
   EXPECT_NE(unit.device(narrow, shaft, storage).bytes, nullptr);
 }
 
-TEST(Declaration, GivesTheUnitEachMember) {
+TEST(Declaration, SetsEachMemberOfTheUnit) {
   EXPECT_EQ(whole_unit.id, "whole");
   EXPECT_EQ(whole_unit.link, LinkKind::full_duplex);
   EXPECT_EQ(whole_unit.host_storage, unit.host_storage + 1000);
@@ -246,7 +246,7 @@ TEST(Declaration, GivesTheUnitEachMember) {
   EXPECT_EQ(whole_unit.over_spi, &unit);
 }
 
-TEST(Declaration, ComesBeforeProtocolAndFormat) {
+TEST(Declaration, OverridesProtocolAndFormat) {
   NoFields sink;
   EXPECT_EQ(whole_unit.line.rate, 42u);
   EXPECT_EQ(whole_unit.settings(options_with(8)).rate, 42u);

@@ -31,7 +31,7 @@ struct Line8 {
   testing::HostedLine line{LinkKind::half_duplex, line_settings};
 };
 
-TEST(EslBus, EachAnswersItsOwnRequestsAtOnceBehindThoseOfOthers) {
+TEST(EslBus, EachAnswersItsOwnRequests) {
   Line8 bus({0, 1, 2, 3, 4, 5, 6, 7});
   bus.encoders[3]->power_off(Time{});
   for (unsigned round = 0; round < 100; ++round) {
@@ -46,7 +46,7 @@ TEST(EslBus, EachAnswersItsOwnRequestsAtOnceBehindThoseOfOthers) {
   for (const auto& encoder : bus.encoders) EXPECT_EQ(encoder->violation_count(), 0u);
 }
 
-TEST(EslBus, AScanFindsWhoAnswersAndWhatIsDamaged) {
+TEST(EslBus, ScanFindsEncodersAndDamagedAnswers) {
   struct Scan final : FieldSink {
     void put(const FieldValue& value) override {
       if (value.info->name == "encoder_address") nodes.push_back(static_cast<int>(value.number));
@@ -78,7 +78,7 @@ TEST(EslBus, AScanFindsWhoAnswersAndWhatIsDamaged) {
 }
 
 // A complete answer comes from one encoder, so "disconnect one" would be bad advice.
-TEST(EslBus, ARefusalIsNoClash) {
+TEST(EslBus, RefusalIsNoClash) {
   struct Scan final : FieldSink {
     void put(const FieldValue& value) override {
       if (value.info->role == Role::clash) clash = value.number != 0;

@@ -55,7 +55,7 @@ TEST(EslDevice, SequenceCounters) {
   EXPECT_EQ(bench.read(DataId::position).two.sequence, 2);
 }
 
-TEST(EslDevice, WhatIsNotForItIsNotAnswered) {
+TEST(EslDevice, AnswersOnlyItsOwnValidRequests) {
   Bench bench;
   EXPECT_TRUE(bench.raw(wire(hex<"0874">)).empty());               // wrong CRC
   EXPECT_TRUE(bench.raw(wire_of({DataId::position, 3})).empty());  // another address
@@ -68,7 +68,7 @@ TEST(EslDevice, WhatIsNotForItIsNotAnswered) {
 }
 
 // "Else, it will continue to search for the next available logic of low state."
-TEST(EslDevice, FindsARequestBehindBytesThatBeginNoneOfItsOwn) {
+TEST(EslDevice, FindsRequestAfterOtherBytes) {
   for (const Wire& before : {wire(hex<"AB7B">), wire(hex<"AB">), wire(hex<"FF">), wire(hex<"FF10">), wire(hex<"18">),
                              wire(hex<"0874">), wire(hex<"08">), wire(hex<"ABFF">), wire(hex<"70">)}) {
     Bench bench;
@@ -81,7 +81,7 @@ TEST(EslDevice, FindsARequestBehindBytesThatBeginNoneOfItsOwn) {
 }
 
 // The bytes look like a request, but are part of another encoder's reply.
-TEST(EslDevice, FindsNoRequestInAReplyToAnotherEncoder) {
+TEST(EslDevice, FindsNoRequestInAnotherEncodersReply) {
   Bench bench;
   const Wire reply = wire({.id = DataId::position_short,
                            .encoder_address = 3,
@@ -94,7 +94,7 @@ TEST(EslDevice, FindsNoRequestInAReplyToAnotherEncoder) {
   EXPECT_EQ(bench.raw(wire(hex<"0875">)).size(), 18u);
 }
 
-TEST(EslDevice, AWrongParityBitIsReportedOrNotAtEveryAddress) {
+TEST(EslDevice, ReportsWrongParityBitByProfile) {
   for (std::uint8_t address = 0; address < 8; ++address) {
     for (const ParityScope scope : {ParityScope::command, ParityScope::all}) {
       Bench bench({.parity_scope = scope, .address = address});
@@ -127,7 +127,7 @@ struct Alone {
 constexpr auto waits = Step<std::uint8_t>::Kind::wait;
 
 // The second of three characters of a request is damaged: the answer follows the end of the frame set.
-TEST(EslDevice, AWrongStopBitIsReportedWhenTheHostHasEnded) {
+TEST(EslDevice, ReportsWrongStopBitAfterTheRequest) {
   Alone alone;
   alone.feed(Alone::LinkEvent::received, 1us, {control_field({}, 0, DataId::position)});
   EXPECT_EQ(alone.feed(Alone::LinkEvent::line_error, 2us).kind, waits);
@@ -139,7 +139,7 @@ TEST(EslDevice, AWrongStopBitIsReportedWhenTheHostHasEnded) {
   EXPECT_EQ(alone.encoder.violation_count(), 0u);
 }
 
-TEST(EslDevice, AnyPauseEndsWhatAnAbsentEncoderWasAskedAndNothingIsSentWhenOff) {
+TEST(EslDevice, AnyPauseEndsReplyOfAbsentEncoder) {
   Alone alone;
   const Step<std::uint8_t> step = alone.feed(Alone::LinkEvent::received, 2us, wire_of({DataId::position, 3}));
   EXPECT_EQ(step.expect, 0u);
@@ -152,7 +152,7 @@ TEST(EslDevice, AnyPauseEndsWhatAnAbsentEncoderWasAskedAndNothingIsSentWhenOff) 
 }
 
 // The eighth reset after a bad request counts as the first of eight.
-TEST(EslDevice, ABadRequestStartsTheCountAgain) {
+TEST(EslDevice, BadRequestRestartsTheCount) {
   for (const auto kind : {Alone::LinkEvent::received, Alone::LinkEvent::line_error}) {
     Alone alone;
     alone.shaft.put(0, 1'000'000);
@@ -176,7 +176,7 @@ TEST(EslDevice, ABadRequestStartsTheCountAgain) {
   }
 }
 
-TEST(EslDevice, ARequestDuringItsTransmissionIsOneViolation) {
+TEST(EslDevice, RequestDuringTransmissionIsOneViolation) {
   Bench bench;
   Wire requests = wire_of({DataId::position});
   const Wire memory = wire_of(memory_write(0x20, 7));
@@ -200,7 +200,7 @@ TEST(EslDevice, ReadyOnlyAfterStartUp) {
 
 // ---- Memory
 
-TEST(EslDevice, RegistersAtOnceTheEepromInTwoSteps) {
+TEST(EslDevice, ReadsRegistersAtOnceAndEepromInTwoSteps) {
   Bench bench;  // page 8 is selected after power on
   bench.raw(memory_write(0x05, 0x11));
   EXPECT_EQ(bench.raw(memory_read(0x05)), memory_reply(memory_read(0x05), false, 0x11));
@@ -227,7 +227,7 @@ TEST(EslDevice, RegistersAtOnceTheEepromInTwoSteps) {
   EXPECT_EQ(bench.raw(memory_read(5)), memory_reply(memory_read(5), true, 0));  // another byte was fetched
 }
 
-TEST(EslDevice, APageChangeTakes18Milliseconds) {
+TEST(EslDevice, PageChangeTakes18Milliseconds) {
   Bench bench;
   bench.raw(memory_write(page_select_address, 4));
   bench.pass(17ms);
@@ -239,7 +239,7 @@ TEST(EslDevice, APageChangeTakes18Milliseconds) {
 }
 
 // Breaches that are no violations, but are reported to the watch.
-TEST(EslDevice, TellsWhatAHostLeavesUndone) {
+TEST(EslDevice, ReportsRulesThatAreNoViolations) {
   using Rules = std::vector<std::string>;
   const std::string once = "an EEPROM byte asked for only once";
   Bench bench;
@@ -268,7 +268,7 @@ TEST(EslDevice, TellsWhatAHostLeavesUndone) {
 }
 
 // A request that is delivered late may have arrived earlier, so its host need not wait longer.
-TEST(EslDevice, ItsTimesBeginWhenARequestMayHaveCome) {
+TEST(EslDevice, TimesCountFromEarliestArrival) {
   const auto rules = [](const Request& first, const Request& second, Time apart, Time late) {
     Alone alone;
     const Wire one = wire_of(first);
@@ -299,7 +299,7 @@ TEST(EslDevice, MemorySurvivesPowerOffAndRegistersDoNot) {
 }
 
 // Every byte of Table 11 has storage of its own.
-TEST(EslDevice, NoTwoAddressesShareAByte) {
+TEST(EslDevice, EachAddressHasItsOwnByte) {
   Bench bench;
   std::map<std::uint8_t*, int> seen;
   for (unsigned page = 0; page < 256; ++page) {
@@ -314,7 +314,7 @@ TEST(EslDevice, NoTwoAddressesShareAByte) {
 
 // ---- Alarms (Table 8)
 
-TEST(EslDevice, WhatClearsWhichAlarm) {
+TEST(EslDevice, AlarmsAreClearedAsInTable8) {
   struct Row {
     std::uint8_t alarm;
     bool by_c;
@@ -347,7 +347,7 @@ TEST(EslDevice, WhatClearsWhichAlarm) {
 }
 
 // Table 8: "perform MT counter reset and all error clear": a reset before the error does not count.
-TEST(EslDevice, CClearsAMultiturnErrorOnlyIfTheTurnsWereClearedSince) {
+TEST(EslDevice, ClearsMultiturnErrorOnlyAfterItsTurnReset) {
   Bench bench;
   reset(bench, DataId::reset_multiturn);
   bench.pass(10ms);
@@ -361,7 +361,7 @@ TEST(EslDevice, CClearsAMultiturnErrorOnlyIfTheTurnsWereClearedSince) {
   EXPECT_EQ(bench.read().one.alarms, 0);
 }
 
-TEST(EslDevice, WhatAPowerCycleLeaves) {
+TEST(EslDevice, PowerCycleLeavesTurnAlarms) {
   Bench bench;
   bench.encoder.raise_alarms(alarms::turns_wrong | alarms::overspeed | alarms::memory_error);
   for (unsigned i = 0; i < 5; ++i) bench.read();
@@ -398,7 +398,7 @@ TEST(EslDevice, SupplySpeedAndTemperature) {
 
 // ---- Resets
 
-TEST(EslDevice, AnotherRequestOrTooMuchHasteStartsTheCountAgain) {
+TEST(EslDevice, OtherOrTooFastRequestRestartsTheCount) {
   Bench bench;
   bench.shaft.put(3, 1'000'000);
   reset(bench, DataId::zero, 7);
@@ -414,7 +414,7 @@ TEST(EslDevice, AnotherRequestOrTooMuchHasteStartsTheCountAgain) {
   EXPECT_EQ(bench.read().multiturn, 3u);
 }
 
-TEST(EslDevice, AResetOnATurningShaftIsAViolation) {
+TEST(EslDevice, ResetOnATurningShaftIsAViolation) {
   Bench bench;
   bench.shaft.spin(5, Time{});
   reset(bench, DataId::reset_multiturn);
@@ -438,7 +438,7 @@ TEST(EslDevice, FaultsStayInTheirChannel) {
 }
 
 // A damaged request is answered only if it is for this encoder; one without any valid character never is.
-TEST(EslDevice, ADamagedRequestOfAnotherIsNone) {
+TEST(EslDevice, IgnoresDamagedRequestForAnotherEncoder) {
   using Kind = Event<std::uint8_t>::Kind;
   for (const auto& [begun, is_answered] :
        std::to_array<std::pair<Wire, bool>>({{{control_field({}, 0, DataId::position)}, true},

@@ -116,7 +116,7 @@ TEST(EslFrame, StatusBitsInBothOrders) {
   }
 }
 
-TEST(EslFrame, FramesComeBackInEveryProfile) {
+TEST(EslFrame, EncodedFramesDecodeInEveryProfile) {
   for (const Profile& profile : all_profiles()) {
     for (const DataId id : all_ids) {
       const Request request{id, 3, 0x55, 0xA7};
@@ -143,7 +143,7 @@ constexpr Profile known_other{.crc_bit_order = CrcBitOrder::word,
 constexpr Request known_position{DataId::position, 3};
 constexpr Request known_calibration{DataId::calibration, 3};
 
-TEST(EslFrame, WhatIsKnownIsReadAsAnyProfile) {
+TEST(EslFrame, ReadsKnownProfileLikeAnyProfile) {
   const auto frame = [](const Profile& profile, DataId id) { return wire(encode_reply(profile, sample(id, profile))); };
   author::testing::expect_known_as_any<Protocol, known_default, known_position>(frame({}, DataId::position));
   author::testing::expect_known_as_any<Protocol, known_other, known_position>(frame(known_other, DataId::position));
@@ -151,7 +151,7 @@ TEST(EslFrame, WhatIsKnownIsReadAsAnyProfile) {
 }
 
 // The Hamming distance of both CRCs is 5.
-TEST(EslFrame, UpToFourWrongBitsAreAlwaysSeen) {
+TEST(EslFrame, DetectsUpToFourWrongBits) {
   sim::Random random(5);
   for (const Profile& profile : all_profiles()) {
     Reply reply = sample(DataId::position);
@@ -228,7 +228,7 @@ TEST(EslFrame, RepliesReportTheFlagsThatTheyCarry) {
 }
 
 // A Lissajous error is a non-safety error (Table 5): the position stays valid for every id.
-TEST(EslFrame, LedAndLissajousErrorsCountAlikeInEveryId) {
+TEST(EslFrame, LedAndLissajousErrorsCountForEveryId) {
   for (const auto& [error, validity] :
        {std::pair{status::safety_error, Validity::invalid}, std::pair{status::non_safety_error, Validity::valid}}) {
     for (const DataId id : {DataId::position, DataId::singleturn, DataId::position_short, DataId::singleturn_short,
@@ -275,7 +275,7 @@ TEST(EslUnit, AnswerToAWrongParityBitIsARefusal) {
   EXPECT_EQ(unit.decode(values, {}, {.bytes = taken}, nowhere), Error::unexpected_reply);
 }
 
-TEST(EslUnit, SaysNothingOfWhatIsNoFrame) {
+TEST(EslUnit, ExplainsNothingWithoutAFrame) {
   EXPECT_EQ(decode_request({}, {}).error(), Error::wrong_length);
   const Options values = author::testing::options_of(unit, "");
   const Bytes request = hex<"0875">;

@@ -74,7 +74,7 @@ TEST(EslHost, EachRequestBeginsTwoBitsAfterTheReplyBeforeInEveryConversation) {
 
 // ---- Encoder id
 
-TEST(EslHost, AnEncoderIdThatIsNotThatOfTheOptionsIsReported) {
+TEST(EslHost, ReportsEncoderIdThatDiffersFromOptions) {
   for (const auto& [id, turns, words] :
        {std::tuple{0x98, true, "says 24 bits and no turns, the options say 24 bits and turns"},
         std::tuple{0xD4, true, "says 20 bits and turns, the options say 24 bits and turns"},
@@ -93,7 +93,7 @@ TEST(EslHost, AnEncoderIdThatIsNotThatOfTheOptionsIsReported) {
   }
 }
 
-TEST(EslHost, AnEncoderOfOneTurnHasNone) {
+TEST(EslHost, SingleTurnEncoderHasNoTurns) {
   Bench bench({.turns = false});
   bench.shaft.put(7, 0xABCDEF);
   for (const char* command : {"position", "position-short", "safe-position"}) {
@@ -113,7 +113,7 @@ TEST(EslHost, AnEncoderOfOneTurnHasNone) {
   EXPECT_EQ(bench.encoder.answer_count(), answered);
 }
 
-TEST(EslHost, TurnsFromAnEncoderOfOneTurnAreAnError) {
+TEST(EslHost, TurnsFromSingleTurnEncoderAreAnError) {
   Bench bench;
   bench.shaft.put(7, 0);
   bench.options = testing::options_of({.turns = false});
@@ -140,7 +140,7 @@ TEST(EslHost, SafePositionsFollowEachOther) {
   EXPECT_EQ(safe, 300u);
 }
 
-TEST(EslHost, ACounterThatStopsBetweenSafePositionsIsFound) {
+TEST(EslHost, DetectsStoppedSequenceCounter) {
   Bench bench;
   const testing::Talk made(unit, testing::options_of({}), "safe-position");
   unsigned safe = 0;
@@ -159,7 +159,7 @@ TEST(EslHost, ACounterThatStopsBetweenSafePositionsIsFound) {
 }
 
 // Host and encoder use each profile, also with another address.
-TEST(EslHost, EveryProfileIsSpokenOnBothSides) {
+TEST(EslHost, HostAndEncoderAgreeInEveryProfile) {
   for (std::size_t option = 0; option < open_options; ++option) {
     for (std::size_t value = 0; value < options.infos[option].choices.size(); ++value) {
       SCOPED_TRACE(std::string(options.infos[option].name) + "=" + std::string(options.infos[option].choices[value]));
@@ -192,7 +192,7 @@ TEST(EslHost, SilenceIsATimeout) {
 }
 
 // Each error has its own name and sentence.
-TEST(EslHost, WhatIsWrongWithAReplyIsSaid) {
+TEST(EslHost, ExplainsInvalidReplies) {
   struct Row {
     const char* sentence;
     Error error;
@@ -223,7 +223,7 @@ TEST(EslHost, WhatIsWrongWithAReplyIsSaid) {
 }
 
 // The content of damaged characters is unknown.
-TEST(EslHost, OfADamagedReplyNoSentenceIsMade) {
+TEST(EslHost, DoesNotExplainDamagedReplies) {
   using LinkEvent = Event<std::uint8_t>;
   const testing::Talk made(unit, testing::options_of({}), "position");
   Conversation<std::uint8_t>& host = *made;
@@ -237,7 +237,7 @@ TEST(EslHost, OfADamagedReplyNoSentenceIsMade) {
   EXPECT_EQ(host.detail(), "");
 }
 
-TEST(EslHost, AProfileThatDoesNotFitIsNamed) {
+TEST(EslHost, NamesProfileThatFits) {
   const Profile plain;
   struct Row {
     Profile host;     // profile of the host
@@ -267,7 +267,7 @@ TEST(EslHost, AProfileThatDoesNotFitIsNamed) {
   }
 }
 
-TEST(EslHost, ANodeThatNeverStopsDoesNotHoldTheHost) {
+TEST(EslHost, EndsOnEndlessNoise) {
   struct Shouting final : Machine<std::uint8_t> {
     void feed(const Event<std::uint8_t>& event) override { free = event.kind == Event<std::uint8_t>::Kind::sent; }
     Step<std::uint8_t> next(Time) override {

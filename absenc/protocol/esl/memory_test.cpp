@@ -16,7 +16,7 @@ using testing::wire;
 constexpr const char* read = "memory-read";
 constexpr const char* write = "memory-write";
 
-TEST(EslMemory, MemoryIsWrittenReadBackAndSparedWear) {
+TEST(EslMemory, WritesMemoryOnlyIfItDiffersAndReadsItBack) {
   Bench bench;
   const Told first = bench.run(write, {0x7E, 0x5A, 0});
   EXPECT_EQ(first.error, Error::none) << first.detail;
@@ -34,7 +34,7 @@ TEST(EslMemory, MemoryIsWrittenReadBackAndSparedWear) {
   EXPECT_EQ(bench.violations(), 0u);
 }
 
-TEST(EslMemory, WhatIsNotForTheUserNeedsForce) {
+TEST(EslMemory, ProtectedMemoryNeedsForce) {
   for (const MemoryArea& area : memory_map) {
     Bench bench;
     const Told closed = bench.run(write, {area.first, 0x42, area.page});
@@ -46,7 +46,7 @@ TEST(EslMemory, WhatIsNotForTheUserNeedsForce) {
   }
 }
 
-TEST(EslMemory, WhatTable11LacksIsRefusedBeforeAnythingIsSent) {
+TEST(EslMemory, RefusesUnlistedMemoryBeforeSending) {
   Bench bench;
   for (const auto& [command, arguments] :
        {std::pair{read, std::vector<std::int64_t>{0, 7}}, std::pair{read, std::vector<std::int64_t>{0x7E, 0, 2}},
@@ -60,7 +60,7 @@ TEST(EslMemory, WhatTable11LacksIsRefusedBeforeAnythingIsSent) {
   EXPECT_EQ(bench.encoder.answer_count(), 0u);
 }
 
-TEST(EslMemory, ThePageThatADriveHadSelectedIsRestored) {
+TEST(EslMemory, RestoresThePageBefore) {
   for (const std::uint8_t before : std::to_array<std::uint8_t>({0, 8, 14})) {
     Bench bench;
     ASSERT_EQ(bench.run("select-page", {before}).error, Error::none);
@@ -86,7 +86,7 @@ TEST(EslMemory, ThePageThatADriveHadSelectedIsRestored) {
   }
 }
 
-TEST(EslMemory, APageThatIsNotSelectedIsFound) {
+TEST(EslMemory, DetectsPageThatIsNotSelected) {
   Bench bench({}, [](unsigned index, Wire& reply) {
     if (index == 1) reply = wire({.id = DataId::read_memory, .memory_address = page_select_address, .value = 3});
   });
@@ -95,7 +95,7 @@ TEST(EslMemory, APageThatIsNotSelectedIsFound) {
   EXPECT_EQ(select.detail, "another page is selected");
 }
 
-TEST(EslMemory, MemoryOnABusIsRefused) {
+TEST(EslMemory, RefusesMemoryOnABus) {
   Bench bench({.bus = sharing_yes});
   for (const auto& [command, arguments] :
        {std::pair{read, std::vector<std::int64_t>{0}}, std::pair{write, std::vector<std::int64_t>{0, 1, 0}},
@@ -108,7 +108,7 @@ TEST(EslMemory, MemoryOnABusIsRefused) {
   ASSERT_EQ(bench.violations(), 1u);
 }
 
-TEST(EslMemory, AMemoryThatStaysBusyIsGivenUp) {
+TEST(EslMemory, EndsIfMemoryStaysBusy) {
   Bench bench({}, [](unsigned index, Wire& reply) {
     if (index > 0) reply = wire({.id = DataId::read_memory, .memory_address = 1, .busy = true});
   });
@@ -120,7 +120,7 @@ TEST(EslMemory, AMemoryThatStaysBusyIsGivenUp) {
 }
 
 // The temporary register may hold a byte that another host requested.
-TEST(EslMemory, AnEepromByteIsNotBelievedWithoutABusyAnswerBefore) {
+TEST(EslMemory, IgnoresEepromByteWithoutABusyReplyBefore) {
   Bench bench({}, [](unsigned index, Wire& reply) {
     if (index == 1) reply = wire({.id = DataId::read_memory, .memory_address = 5, .value = 0x77});
   });
@@ -131,7 +131,7 @@ TEST(EslMemory, AnEepromByteIsNotBelievedWithoutABusyAnswerBefore) {
 }
 
 // Replies of a write: page select, two reads, write, two reads.
-TEST(EslMemory, WhatGoesWrongWithAWrite) {
+TEST(EslMemory, WriteErrors) {
   struct Row {
     unsigned index;
     Error error;
@@ -167,7 +167,7 @@ TEST(EslMemory, WhatGoesWrongWithAWrite) {
   }
 }
 
-TEST(EslMemory, LedAndLissajousAreToldApart) {
+TEST(EslMemory, DistinguishesLedAndLissajous) {
   for (const bool lissajous : {false, true}) {
     Bench bench;
     bench.condition(condition::lissajous, lissajous ? 1 : 0);
@@ -183,7 +183,7 @@ TEST(EslMemory, LedAndLissajousAreToldApart) {
 }
 
 // SF shows the cause if no other alarm raises the same bit.
-TEST(EslMemory, LedAndLissajousAreToldApartOnABusWithoutMemory) {
+TEST(EslMemory, DistinguishesLedAndLissajousOnABusByStatus) {
   constexpr int open = -1;
   struct Row {
     unsigned alarms;

@@ -89,7 +89,7 @@ TEST(EslProbe, EveryValueIsFound) {
   }
 }
 
-TEST(EslProbe, AReplyAloneTellsTheCrcAndTheStatus) {
+TEST(EslProbe, ReplyAloneShowsCrcAndStatus) {
   const Profile profile{.crc_bit_order = CrcBitOrder::word,
                         .crc16_byte_order = CrcByteOrder::table12,
                         .rs1_sc2 = RedundantBit::b0,
@@ -105,7 +105,7 @@ TEST(EslProbe, AReplyAloneTellsTheCrcAndTheStatus) {
   }
 }
 
-TEST(EslProbe, TheWhyAndTheWhereAreGiven) {
+TEST(EslProbe, EvidenceHasReasonAndCapture) {
   Probed result(captured({.status_order = FieldOrder::tformat}, {{DataId::read_memory, 0, 0x1A}, {DataId::position}}));
   const Evidence& evidence = result.of["status_order"][0];
   EXPECT_FALSE(evidence.possible);
@@ -113,7 +113,7 @@ TEST(EslProbe, TheWhyAndTheWhereAreGiven) {
   EXPECT_EQ(evidence.why, text_of(Check::stop_reported).sentence);
 }
 
-TEST(EslProbe, AReportedParityErrorTellsTheScope) {
+TEST(EslProbe, ReportedParityErrorShowsTheScope) {
   testing::Bench bench({.address = 1});
   const Wire sent = testing::wire(encode_request({.parity_scope = ParityScope::all}, {DataId::position, 1}).view());
   Probed result({{sent, bench.raw(sent)}});
@@ -121,7 +121,7 @@ TEST(EslProbe, AReportedParityErrorTellsTheScope) {
   EXPECT_EQ(result.best.parity_scope, ParityScope::command);
 }
 
-TEST(EslProbe, OpenOptionsStandFirst) {
+TEST(EslProbe, OpenOptionsAreFirst) {
   EXPECT_EQ(open_options, 10u);  // README.md names each option
   for (const Option& option : std::span(options.infos).subspan(open_options))
     EXPECT_FALSE(option.probeable) << option.name;

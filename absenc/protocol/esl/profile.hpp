@@ -84,7 +84,7 @@ constexpr auto open_option(std::string_view name, std::string_view meaning, cons
 }
 }  // namespace detail
 
-/// Options of ESL. Those that the document leaves open come first (EslProbe.OpenOptionsStandFirst).
+/// Options of ESL. Those that the document leaves open come first (EslProbe.OpenOptionsAreFirst).
 inline constexpr auto options = author::OptionsOf{
     detail::open_option<&Profile::crc_bit_order>(
         "crc_bit_order", "which bit of a byte enters the CRC first; word: 16-bit words, MSB first",

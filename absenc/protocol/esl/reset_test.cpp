@@ -40,7 +40,7 @@ TEST(EslReset, Resets) {
 }
 
 // 10 ms between the positions, 40 us between the eight requests from start to start, then the EEPROM's write time.
-TEST(EslReset, TheTimesOfAReset) {
+TEST(EslReset, ResetKeepsItsTimes) {
   for (const auto& [command, id, last] :
        {std::tuple{"zero", DataId::zero, Time(7ms)}, std::tuple{"reset-multiturn", DataId::reset_multiturn, Time(7ms)},
         std::tuple{"clear-alarms", DataId::clear_alarms, Time(40us)}}) {
@@ -62,7 +62,7 @@ TEST(EslReset, TheTimesOfAReset) {
   }
 }
 
-TEST(EslReset, WhatCannotBeClearedIsNamed) {
+TEST(EslReset, NamesAlarmsThatRemain) {
   for (const auto& [raised, sentence] :
        {std::pair{alarms::overspeed + 0, "overspeed remains; switch the encoder off and on"},
         std::pair{alarms::multiturn_error + 0, "multiturn_error remains; multiturn_error: reset-multiturn first"},
@@ -83,7 +83,7 @@ TEST(EslReset, WhatCannotBeClearedIsNamed) {
   EXPECT_EQ(bench.run("clear-alarms").detail, "memory_error remains; switch the encoder off and on");
 }
 
-TEST(EslReset, AMultiturnErrorNeedsDThenC) {
+TEST(EslReset, MultiturnErrorNeedsDThenC) {
   Bench bench;
   bench.shaft.put(7, 100);
   bench.encoder.raise_alarms(alarms::multiturn_error);
@@ -95,7 +95,7 @@ TEST(EslReset, AMultiturnErrorNeedsDThenC) {
   EXPECT_EQ(clear.numbers.at("ch1_alarms"), 0);
 }
 
-TEST(EslReset, AnIdDThatMovesTheSingleTurnZeroIsFound) {
+TEST(EslReset, DetectsIdDThatMovesTheZero) {
   Bench bench;
   bench.shaft.put(7, 1'000'000);
   bench.condition(condition::id_d_clears_singleturn, 1);
@@ -104,7 +104,7 @@ TEST(EslReset, AnIdDThatMovesTheSingleTurnZeroIsFound) {
   EXPECT_TRUE(turns.says("single-turn zero too"));
 }
 
-TEST(EslReset, AResetOnATurningShaftOrAStartingEncoderIsNotSent) {
+TEST(EslReset, SendsNoResetToTurningOrStartingEncoder) {
   for (const std::int32_t rpm : {5, -5}) {
     Bench bench;
     bench.shaft.spin(rpm, Time{});
@@ -121,7 +121,7 @@ TEST(EslReset, AResetOnATurningShaftOrAStartingEncoderIsNotSent) {
 }
 
 // The zero would be wrong for ever, because it is in the EEPROM.
-TEST(EslReset, AZeroOfAPositionThatDoesNotHoldIsNotSent) {
+TEST(EslReset, SendsNoZeroAtInvalidPosition) {
   Bench bench;
   bench.shaft.put(7, 1'000'000);
   bench.encoder.raise_alarms(alarms::singleturn_error);
@@ -133,7 +133,7 @@ TEST(EslReset, AZeroOfAPositionThatDoesNotHoldIsNotSent) {
 }
 
 // Replies 0 and 1 are positions, 2 to 9 answer the reset, 10 is the verification, and 11 and 12 are its repetitions.
-TEST(EslReset, ALostReplyStopsAResetUnlessItIsTheLast) {
+TEST(EslReset, LostReplyStopsAResetUnlessItIsTheLast) {
   struct Row {
     unsigned first;
     unsigned last;
@@ -158,7 +158,7 @@ TEST(EslReset, ALostReplyStopsAResetUnlessItIsTheLast) {
   }
 }
 
-TEST(EslReset, AResetThatDidNotHappenIsFound) {
+TEST(EslReset, DetectsResetThatFailed) {
   for (const auto& [command, counts, turns, words] :
        {std::tuple{"zero", 933 + 1, 0, "not zero"}, std::tuple{"reset-multiturn", 0, 1, "turns are still not zero"}}) {
     Bench bench({}, [counts = counts, turns = turns](unsigned index, Wire& reply) {

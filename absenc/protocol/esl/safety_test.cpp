@@ -83,7 +83,7 @@ TEST(EslSafety, TheSecondGoodReplyToTheOtherIdIsSafe) {
   EXPECT_EQ(pair.ask(DataId::singleturn_short).failed, Check::not_a_safety_reply);
 }
 
-TEST(EslSafety, EveryCheckIsNamed) {
+TEST(EslSafety, EveryCheckHasAName) {
   struct Row {
     Faults faults;
     Check failed;

@@ -29,7 +29,7 @@ TEST(TformatDevice, OverHeatIsLatchedUntilCooledAndCleared) {
   EXPECT_EQ(bench.everything().alarms, 0);
 }
 
-TEST(TformatDevice, CounterOverflowGoesOnModulo65536) {
+TEST(TformatDevice, CounterContinuesAfterOverflow) {
   Bench bench;
   bench.shaft.put(65535, 5);
   EXPECT_EQ(bench.everything().alarms, 0);
@@ -91,7 +91,7 @@ TEST(TformatDevice, BatteryLimitsBelongToTheFlags) {
   }
 }
 
-TEST(TformatDevice, ABatteryThatWasAwayWhileThePowerWasOffIsTold) {
+TEST(TformatDevice, ReportsBatteryFailureWhileOff) {
   Bench bench;
   bench.shaft.put(9, 0);
   bench.encoder.power_off(bench.line.now());
@@ -138,7 +138,7 @@ TEST(TformatDevice, WithoutTurnsNoCounterOverflows) {
   EXPECT_EQ(encoder.everything(30s).alarms & alarms::over_speed, 0);
 }
 
-TEST(TformatDevice, OneWithoutBatteryNeverHasOne) {
+TEST(TformatDevice, BatteryFalseMeansNoBattery) {
   testing::TestShaft shaft;
   shaft.put(3, 5);
   VirtualEncoder encoder({.battery = false}, shaft);
@@ -164,7 +164,7 @@ TEST(TformatDevice, OverSpeedArisesWhileTheBatteryCounts) {
 }
 
 // 5.4.2: for the first five seconds without power the counter follows a faster jolt.
-TEST(TformatDevice, TheLimitOfAJoltFallsFiveSecondsAfterPowerOff) {
+TEST(TformatDevice, AccelerationLimitFallsFiveSecondsAfterPowerOff) {
   struct Jolt final : Shaft {
     [[nodiscard]] ShaftState at(Time time) const override {
       return {.acceleration = time >= when && time < when + 100ms ? 40'000 : 0};

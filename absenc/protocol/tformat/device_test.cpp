@@ -47,7 +47,7 @@ TEST(TformatDevice, CountsRoundTheTurnAndBelowZero) {
 
 // ---- Abnormal requests (8.4, 9.4)
 
-TEST(TformatDevice, AbnormalRequestsAreAnsweredLikeId3) {
+TEST(TformatDevice, AnswersAbnormalRequestsLikeId3) {
   Bench bench;
   const Wire plain = wire(Reply{.encoder_id = 0x11});
   const Wire parity = wire(Reply{.status = status::parity_error, .encoder_id = 0x11});
@@ -68,7 +68,7 @@ TEST(TformatDevice, AbnormalRequestsAreAnsweredLikeId3) {
 }
 
 // ID D with a wrong parity bit is refused once, when its frame has ended.
-TEST(TformatDevice, ARefusedFrameEndsBeforeItIsAnswered) {
+TEST(TformatDevice, AnswersRefusedFrameAfterItsEnd) {
   Bench bench;
   testing::RawHost host({0x6A, 0x05, 0xEF});
   bench.run(host);
@@ -82,7 +82,7 @@ TEST(TformatDevice, ARefusedFrameEndsBeforeItIsAnswered) {
   EXPECT_EQ(bench.violations(), 0u);
 }
 
-TEST(TformatDevice, ADamagedCharacterIsADelimiterError) {
+TEST(TformatDevice, DamagedCharacterIsADelimiterError) {
   Bench bench;
   LineSettings slow = line_settings;
   slow.rate = 1'000'000;
@@ -164,7 +164,7 @@ TEST(TformatDevice, TenRequestsMakeAReset) {
   EXPECT_EQ(bench.violations(), 0u);
 }
 
-TEST(TformatDevice, AnyOtherRequestStartsTheCountAgain) {
+TEST(TformatDevice, OtherRequestRestartsTheCount) {
   Bench bench;
   bench.shaft.put(7, 0);
   reset(bench, DataId::reset_multiturn, 9);
@@ -189,7 +189,7 @@ TEST(TformatDevice, ZeroLeavesTheTurns) {
   EXPECT_EQ(bench.everything().multiturn, 6u);
 }
 
-TEST(TformatDevice, AZeroThatWasNotWrittenBeforePowerOffIsLost) {
+TEST(TformatDevice, ZeroIsLostIfNotWrittenBeforePowerOff) {
   Bench bench;
   bench.shaft.put(0, 1000);
   reset(bench, DataId::zero);
@@ -245,7 +245,7 @@ TEST(TformatDevice, ResetsSentTooFastOrOnATurningShaftDoNothing) {
   EXPECT_EQ(turning.encoder.violations()[0].rule, "reset while the shaft turns");
 }
 
-TEST(TformatDevice, ARequestDuringItsTransmissionIsAViolation) {
+TEST(TformatDevice, RequestDuringTransmissionIsAViolation) {
   Bench bench;
   testing::RawHost host({0x1A, 0x1A});
   bench.run(host);
@@ -272,7 +272,7 @@ TEST(TformatDevice, ARequestDuringItsTransmissionIsAViolation) {
 }
 
 // Bytes in two writes: the second may arrive while the first is answered, or afterwards.
-TEST(TformatDevice, RequestsWithoutAPauseAreToldHoweverTheyAreCut) {
+TEST(TformatDevice, DetectsRequestsWithoutPauseInAnyPieces) {
   testing::TestShaft shaft;
   const Wire one{0x1A};
   const Wire two{0x1A, 0x1A};
@@ -290,7 +290,7 @@ TEST(TformatDevice, RequestsWithoutAPauseAreToldHoweverTheyAreCut) {
 }
 
 // However long the machine is delayed, a host that never waits differs from one that had to give up.
-TEST(TformatDevice, AHostThatNeverWaitsIsNotExcusedForEver) {
+TEST(TformatDevice, HostThatNeverWaitsIsNotExcused) {
   testing::TestShaft shaft;
   VirtualEncoder encoder({}, shaft);
   encoder.power_on(Time{}, PowerOn::skip);
@@ -314,7 +314,7 @@ TEST(TformatDevice, AHostThatNeverWaitsIsNotExcusedForEver) {
 }
 
 // Breaches that are no violations, but are reported to the watch (9.1, 10).
-TEST(TformatDevice, TellsWhatAHostLeavesUndone) {
+TEST(TformatDevice, ReportsRulesThatAreNoViolations) {
   using Rules = std::vector<std::string>;
   const std::string again = "what was refused as busy was not asked for again";
   Bench bench;

@@ -78,7 +78,7 @@ TEST(TformatFrame, TwoBitErrorsThatPassEachLevelOfChecks) {
   EXPECT_EQ(strict_passes, 102u);
 }
 
-TEST(TformatFrame, ARefusalIsToldApartFromAWrongLength) {
+TEST(TformatFrame, RefusalDiffersFromWrongLength) {
   const ReplyBytes refusal = encode_reply({.status = status::parity_error, .encoder_id = 0x11});
   EXPECT_EQ(decode_reply({}, {DataId::singleturn}, refusal).error(), Error::request_rejected);
   EXPECT_EQ(decode_reply({}, {DataId::everything}, refusal).error(), Error::request_rejected);
@@ -89,7 +89,7 @@ TEST(TformatFrame, ARefusalIsToldApartFromAWrongLength) {
 }
 
 // Table 5, 9.1.
-TEST(TformatFrame, AMemoryReplyIsThatOfItsRequest) {
+TEST(TformatFrame, MemoryReplyMatchesItsRequest) {
   const Request write{DataId::write_memory, 5, 7};
   const auto answered = [&write](std::uint8_t address, bool busy, std::uint8_t value, bool strict = true) {
     const Reply reply{.id = write.id, .address = address, .busy = busy, .value = value};
@@ -103,7 +103,7 @@ TEST(TformatFrame, AMemoryReplyIsThatOfItsRequest) {
   EXPECT_EQ(answered(5, true, 1, false), Error::none);
 }
 
-TEST(TformatFrame, WhatIsNoRequest) {
+TEST(TformatFrame, RefusesInvalidRequests) {
   EXPECT_EQ(decode_request({}).error(), Error::wrong_length);
   EXPECT_EQ(decode_request(hex<"328100B3">).error(), Error::out_of_range);  // the busy bit is set
   EXPECT_TRUE(decode_request(hex<"32010033">));
@@ -128,7 +128,7 @@ TEST(TformatFrame, ValidityOfEachPart) {
   }
 }
 
-TEST(TformatFrame, PartialRepliesPromiseNoMoreThanIsKnown) {
+TEST(TformatFrame, PartialRepliesLeaveValidityUnknown) {
   const Reply part{.id = DataId::singleturn, .singleturn = 77};
   EXPECT_EQ(to_reading({}, part).singleturn_valid_bits, 5u);
   EXPECT_EQ(to_reading({}, part).singleturn_validity(), Validity::unknown);
@@ -183,7 +183,7 @@ TEST(TformatFrame, StatusReportsPartOfTheAlarms) {
 }
 
 // 2 (1): a missing battery sets `alarm` of SF for ever.
-TEST(TformatFrame, WithoutABatteryStatusTellsNothingOfFourAlarms) {
+TEST(TformatFrame, WithoutBatteryStatusLeavesFourAlarmsUnknown) {
   constexpr Format format{.battery = false};
   const auto whole = [&](std::uint8_t more) {
     const auto almc = static_cast<std::uint8_t>(alarms::without_battery | more);

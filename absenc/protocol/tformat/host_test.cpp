@@ -46,7 +46,7 @@ constexpr Format known_23{.singleturn_bits = 23, .encoder_id = 0x17};
 constexpr Format known_loose{.strict = false};
 constexpr Request known_singleturn{DataId::singleturn};
 
-TEST(TformatHost, WhatIsKnownIsReadAsAnyFormat) {
+TEST(TformatHost, ReadsKnownFormatLikeAnyFormat) {
   const auto frame = [](const Reply& reply) { return author::testing::wire(encode_reply(reply)); };
   const Wire good = frame({.singleturn = 0x12345, .multiturn = 4660, .encoder_id = 17});
   author::testing::expect_known_as_any<Protocol, known_17, everything>(good);
@@ -57,7 +57,7 @@ TEST(TformatHost, WhatIsKnownIsReadAsAnyFormat) {
       frame({.id = DataId::singleturn, .singleturn = 0x12345}));
 }
 
-TEST(TformatHost, PartsAreReadWithWhatAlarmsSay) {
+TEST(TformatHost, ReadsPartsWithTheirAlarms) {
   Bench bench;
   bench.shaft.put(4660, 0x12345);
   ReadPosition first({}, DataId::singleturn);
@@ -78,7 +78,7 @@ TEST(TformatHost, PartsAreReadWithWhatAlarmsSay) {
   EXPECT_EQ(id.numbers.at("encoder_id"), 0x11);
 }
 
-TEST(TformatHost, TurnsHoldUnderAlarmsThatAreNotOfTheTurns) {
+TEST(TformatHost, TurnsStayValidWithOtherAlarms) {
   Bench bench;
   bench.shaft.put(12, 0);
   bench.encoder.raise_alarms(alarms::over_heat | alarms::battery_alarm);
@@ -91,7 +91,7 @@ TEST(TformatHost, TurnsHoldUnderAlarmsThatAreNotOfTheTurns) {
   EXPECT_EQ(bench.run(lost).reading()->multiturn_validity(), Validity::invalid);
 }
 
-TEST(TformatHost, SilenceIsATimeoutAndNothingIsRepeated) {
+TEST(TformatHost, TimeoutIsNotRepeated) {
   Bench bench;
   bench.encoder.power_off(Time{});
   ReadPosition read({});
@@ -102,7 +102,7 @@ TEST(TformatHost, SilenceIsATimeoutAndNothingIsRepeated) {
 // ---- Refusals (6.3.2)
 
 // The explanation names ca0 and ca1, other reasons for such an answer, and what to try.
-TEST(TformatHost, ARefusalIsExplained) {
+TEST(TformatHost, ExplainsRefusals) {
   struct Row {
     std::uint8_t alarm;
     std::string_view command;
@@ -129,7 +129,7 @@ TEST(TformatHost, ARefusalIsExplained) {
 }
 
 // Captures have replies without a request, and replies to invalid requests (8.4, 9.4).
-TEST(TformatHost, ARequestIsGuessedOrWasNone) {
+TEST(TformatHost, GuessesRequestsAndRefusesInvalidOnes) {
   const Bench bench;
   const auto error = [&bench](const Wire& request, const Wire& reply) {
     NoFields nowhere;
@@ -142,7 +142,7 @@ TEST(TformatHost, ARequestIsGuessedOrWasNone) {
   EXPECT_EQ(error({0x9A}, Wire(good.begin(), good.end() - 1)), Error::bad_checksum);
 }
 
-TEST(TformatHost, ARefusedRequestIsSentAgainInsideProcedures) {
+TEST(TformatHost, ProceduresRepeatRefusedRequests) {
   Bench bench(refuse(2, 3, status::parity_error));  // the read after the page select
   const auto read = bench.run("temperature");
   EXPECT_EQ(read.error, Error::none);

@@ -18,7 +18,7 @@ using testing::Wire;
 
 std::uint8_t selected_page(Bench& bench) { return bench.raw({0xEA, 0x7F, 0x95})[2]; }
 
-TEST(TformatProcedures, ThePageThatADriveHadSelectedIsRestored) {
+TEST(TformatProcedures, RestoresThePageBefore) {
   for (const std::uint8_t before : std::to_array<std::uint8_t>({0, 3, 7})) {
     Bench bench;
     bench.raw(wire(Request{DataId::write_memory, page_select_address, before}));
@@ -34,7 +34,7 @@ TEST(TformatProcedures, ThePageThatADriveHadSelectedIsRestored) {
   }
 }
 
-TEST(TformatProcedures, APageThatStaysSelectedIsTold) {
+TEST(TformatProcedures, ReportsPageThatStaysSelected) {
   // An encoder that refuses to report the selected page, as it does for a closed address (9.4).
   Bench refusing(refuse(0, 3, 0));
   EXPECT_EQ(refusing.run("temperature").numbers, (Numbers{{"temperature_c", 35}, {"page_left", 7}}));
@@ -69,7 +69,7 @@ TEST(TformatProcedures, APageThatStaysSelectedIsTold) {
   }
 }
 
-TEST(TformatProcedures, WhatIsLeftByOneThatIsBrokenOff) {
+TEST(TformatProcedures, ReportsWhatAnInterruptedProcedureLeaves) {
   for (const auto& [name, time, left] :
        {std::tuple{"temperature", 10us, false}, {"temperature", 200us, true}, {"zero", 200us, false}}) {
     Bench bench;
@@ -97,7 +97,7 @@ TEST(TformatProcedures, TemperatureAndItsThreshold) {
   EXPECT_EQ(bench.violations(), 0u);
 }
 
-TEST(TformatProcedures, MemoryIsWrittenReadBackAndSparedWear) {
+TEST(TformatProcedures, WritesMemoryOnlyIfItDiffersAndReadsItBack) {
   Bench bench;
   EXPECT_EQ(bench.run("memory-write", {126, 0x5A, 3}).numbers,
             (Numbers{{"page", 3}, {"address", 126}, {"value", 0x5A}, {"written", 1}}));
@@ -111,7 +111,7 @@ TEST(TformatProcedures, MemoryIsWrittenReadBackAndSparedWear) {
 }
 
 // 7.2.4 and 7.4: bit 7 enables the threshold, from 1 degC on; every byte with bit 7 clear is "off".
-TEST(TformatProcedures, AnOverHeatThresholdOfZeroDegreesIsNotWritten) {
+TEST(TformatProcedures, RefusesOverHeatThresholdOfZeroDegrees) {
   Bench bench;
   const auto zero = bench.run("memory-write", {overheat_address, 0x80, service_page});
   EXPECT_EQ(zero.error, Error::invalid_argument);
@@ -123,7 +123,7 @@ TEST(TformatProcedures, AnOverHeatThresholdOfZeroDegreesIsNotWritten) {
   EXPECT_EQ(bench.run("memory-write", {overheat_address, 0x80, 0}).error, Error::none);  // a byte of the user's pages
 }
 
-TEST(TformatProcedures, ClosedMemoryIsRefusedBeforeAnythingIsSent) {
+TEST(TformatProcedures, RefusesClosedMemoryBeforeSending) {
   Bench bench;
   for (const auto& [name, arguments] : {std::pair<const char*, std::vector<std::int64_t>>{"memory-read", {0, 6, 1}},
                                         {"memory-read", {126, 0, 2}},
@@ -139,7 +139,7 @@ TEST(TformatProcedures, ClosedMemoryIsRefusedBeforeAnythingIsSent) {
 }
 
 // Replies: page select, read, write, page select, read.
-TEST(TformatProcedures, AWriteIsJudgedByReadingBackAndNeverRepeated) {
+TEST(TformatProcedures, VerifiesWritesByReadingBackAndNeverRepeatsThem) {
   struct Row {
     const char* what;
     Tamper tamper;
@@ -184,7 +184,7 @@ TEST(TformatProcedures, AWriteIsJudgedByReadingBackAndNeverRepeated) {
 }
 
 // A busy encoder is waited for up to 36 ms: a read or write is repeated each millisecond, a page select after 18 ms.
-TEST(TformatProcedures, ABusyEncoderIsWaitedFor) {
+TEST(TformatProcedures, WaitsForABusyEncoder) {
   const auto busy = [](unsigned from, unsigned to) {
     return [=](unsigned index, Wire& reply) {
       if (index < from || index >= to) return;
@@ -238,7 +238,7 @@ TEST(TformatProcedures, Resets) {
   EXPECT_EQ(bench.violations(), 0u);
 }
 
-TEST(TformatProcedures, AResetThatMustNotBeSentIsNot) {
+TEST(TformatProcedures, SendsNoForbiddenReset) {
   struct Row {
     std::string_view name;
     std::int32_t rpm;
@@ -263,7 +263,7 @@ TEST(TformatProcedures, AResetThatMustNotBeSentIsNot) {
 }
 
 // An encoder without a battery always shows battery alarms, so clearing them loses nothing.
-TEST(TformatProcedures, AnEncoderWithoutBatteryIsDeclared) {
+TEST(TformatProcedures, EncoderWithoutBatteryIsDeclared) {
   Bench bench;
   bench.shaft.put(7, 1000);
   bench.condition(battery_voltage, 0);
@@ -289,7 +289,7 @@ TEST(TformatProcedures, AnEncoderWithoutBatteryIsDeclared) {
 }
 
 // Replies 0 and 1 are positions, 2 to 11 answer the reset, 12 is the verification.
-TEST(TformatProcedures, AResetThatDidNotHappenIsFound) {
+TEST(TformatProcedures, DetectsResetThatFailed) {
   struct Row {
     std::string_view name;
     Reply verification;
@@ -316,7 +316,7 @@ TEST(TformatProcedures, AResetThatDidNotHappenIsFound) {
   }
 }
 
-TEST(TformatProcedures, ALostReplyStopsAResetUnlessItIsTheTenth) {
+TEST(TformatProcedures, LostReplyStopsAResetUnlessItIsTheTenth) {
   const auto lose = [](unsigned from, unsigned to) {
     return [=](unsigned index, Wire& reply) {
       if (index >= from && index < to) reply.pop_back();
