@@ -29,9 +29,9 @@ class Carrier {
   void start(Machine<Item>& machine, Time now) {
     machine_ = &machine;
     expected_ = gathered_ = 0;
-    sending_ = held_ = heard_ = false;
-    quiet_told_ = true;  // until a transfer is sent
-    go_on(now);
+    sending_ = waiting_ = item_received_ = false;
+    silence_reported_ = true;  // until a transfer is sent
+    take_steps(now);
   }
   /// Returns whether a conversation runs.
   [[nodiscard]] bool is_busy() const { return machine_ != nullptr; }
@@ -39,46 +39,46 @@ class Carrier {
   /// Reports that the last bit of the transfer, or of the pulse, was sent.
   void sent(Time now) {
     if (!is_busy() || !sending_) return;
-    sending_ = heard_ = quiet_told_ = false;
-    quiet_since_ = now;
-    tell({.kind = Event<Item>::Kind::sent, .at = now});
+    sending_ = item_received_ = silence_reported_ = false;
+    silent_since_ = now;
+    deliver({.kind = Event<Item>::Kind::sent, .at = now});
   }
   /// Reports received items; they are dropped while no conversation runs. Single characters are gathered until the
   /// machine's expected number has arrived or the line is silent, as a DMA channel does: gathering one takes little
   /// time.
   void received(std::span<const Item> items, Time now) {
     if (items.size() == 1 && gathered_ + 1u < expected_) return gather(items.front(), now);
-    come(items, now);
+    take_input(items, now);
   }
   /// Reports a character with a wrong stop or parity bit.
   void line_error(Time now) {
-    tell_gathered();
-    came({.kind = Event<Item>::Kind::line_error, .at = now});
+    deliver_gathered();
+    deliver_input({.kind = Event<Item>::Kind::line_error, .at = now});
   }
 
   /// Executes what is due. Call it at `due()`; more calls do no harm. A tick slower than the encoder's limits makes
   /// silences longer, but never wrong.
   void tick(Time now) {
     if (now < due()) return;
-    tell_gathered();
+    deliver_gathered();
     if (now < due()) return;
-    if (held_) {
-      held_ = false;
+    if (waiting_) {
+      waiting_ = false;
       sending_ = true;
       return line_->begin(step_);
     }
-    if (now >= quiet_end()) {
-      quiet_told_ = true;
+    if (now >= silence_end()) {
+      silence_reported_ = true;
       ++silences_;
-      return tell({.kind = Event<Item>::Kind::silence, .at = now});
+      return deliver({.kind = Event<Item>::Kind::silence, .at = now});
     }
     at_ = never;
-    tell({.kind = Event<Item>::Kind::timer, .at = now});
+    deliver({.kind = Event<Item>::Kind::timer, .at = now});
   }
   /// Returns when `tick` has work to do; `never`: only after something is sent or received.
   [[nodiscard]] Time due() const {
     if (!is_busy()) return never;
-    return held_ ? step_.at : std::min(at_, quiet_end());
+    return waiting_ ? step_.at : std::min(at_, silence_end());
   }
   /// Returns how many replies were missing, incomplete, or followed by silence because they were invalid.
   [[nodiscard]] std::uint32_t silences() const { return silences_; }
@@ -88,43 +88,43 @@ class Carrier {
 
   void gather(Item item, Time now) {
     items_[gathered_++] = item;
-    heard_ = true;
-    quiet_told_ = false;
-    quiet_since_ = now;
+    item_received_ = true;
+    silence_reported_ = false;
+    silent_since_ = now;
   }
-  void come(std::span<const Item> items, Time now) {
+  void take_input(std::span<const Item> items, Time now) {
     if (gathered_ != 0 && items.size() == 1) {
       gather(items.front(), now);
-      return tell_gathered();
+      return deliver_gathered();
     }
-    tell_gathered();
-    came({.kind = Event<Item>::Kind::received, .at = now, .items = items});
+    deliver_gathered();
+    deliver_input({.kind = Event<Item>::Kind::received, .at = now, .items = items});
   }
-  void tell_gathered() {
+  void deliver_gathered() {
     if (gathered_ == 0) return;
     const std::span<const Item> items(items_.data(), gathered_);
     gathered_ = 0;
-    tell({.kind = Event<Item>::Kind::received, .at = quiet_since_, .items = items});
+    deliver({.kind = Event<Item>::Kind::received, .at = silent_since_, .items = items});
   }
-  void came(const Event<Item>& event) {
+  void deliver_input(const Event<Item>& event) {
     if (!is_busy()) return;
-    heard_ = true;
-    quiet_told_ = sending_;
-    quiet_since_ = event.at;
-    tell(event);
+    item_received_ = true;
+    silence_reported_ = sending_;
+    silent_since_ = event.at;
+    deliver(event);
   }
-  void tell(const Event<Item>& event) {
+  void deliver(const Event<Item>& event) {
     machine_->feed(event);
-    go_on(event.at);
+    take_steps(event.at);
   }
-  [[nodiscard]] Time quiet_end() const {
-    const Time limit = heard_ ? gap_ : answer_;
-    return quiet_told_ || limit == Time{} ? never : quiet_since_ + limit + latency_;
+  [[nodiscard]] Time silence_end() const {
+    const Time limit = item_received_ ? gap_ : answer_;
+    return silence_reported_ || limit == Time{} ? never : silent_since_ + limit + latency_;
   }
 
   // Takes the machine's steps until it waits. A transfer is stored until its time; its limits of silence are in the
   // wait step after it.
-  void go_on(Time now) {
+  void take_steps(Time now) {
     for (;;) {
       const Step<Item> step = machine_->next(now);
       switch (step.kind) {
@@ -140,11 +140,11 @@ class Carrier {
           break;
         case Kind::transfer:
         case Kind::pulse:
-          held_ = step.at > now;
-          sending_ = !held_;
-          quiet_told_ = true;
+          waiting_ = step.at > now;
+          sending_ = !waiting_;
+          silence_reported_ = true;
           expected_ = 0;
-          if (held_) {
+          if (waiting_) {
             step_ = step;
           } else {
             line_->begin(step);
@@ -167,11 +167,11 @@ class Carrier {
   // Members that every received character needs come first, for short instructions.
   std::uint8_t expected_ = 0;  // characters to gather, or one more; 0: none
   std::uint8_t gathered_ = 0;
-  bool held_ = false;
+  bool waiting_ = false;
   bool sending_ = false;
-  bool heard_ = false;  // an item arrived since the last transfer
-  bool quiet_told_ = true;
-  Time quiet_since_{};
+  bool item_received_ = false;  // an item arrived since the last transfer
+  bool silence_reported_ = true;
+  Time silent_since_{};
   std::array<Item, room> items_;  // gathered characters
   Line* line_;
   Machine<Item>* machine_ = nullptr;

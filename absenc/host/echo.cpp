@@ -14,8 +14,8 @@ bool begins_with(Bytes bytes, Bytes start) {
 }  // namespace
 
 void EchoFilter::conclude(bool good) {
-  if (mode_ == EchoMode::automatic && good) mode_ = found_;
-  found_ = EchoMode::automatic;
+  if (mode_ == EchoMode::automatic && good) mode_ = detected_;
+  detected_ = EchoMode::automatic;
 }
 
 ByteStep EchoFilter::next(Time now) {
@@ -69,10 +69,10 @@ void EchoFilter::received(const ByteEvent& event) {
 void EchoFilter::strip(const ByteEvent& event) {
   const std::size_t echoed = std::min(echo_due_, event.items.size());
   const std::size_t at = sent_.size() - echo_due_;
-  const Bytes wanted = sent_.view().subspan(at, echoed);
+  const Bytes expected = sent_.view().subspan(at, echoed);
   echo_due_ -= echoed;
   echoed_ += echoed;
-  if (!std::equal(wanted.begin(), wanted.end(), event.items.begin())) {
+  if (!std::equal(expected.begin(), expected.end(), event.items.begin())) {
     inner_->feed({.kind = ByteEvent::Kind::line_error, .at = event.at});
   }
   pass(event.at, event.items.subspan(echoed));
@@ -80,7 +80,7 @@ void EchoFilter::strip(const ByteEvent& event) {
 
 void EchoFilter::hold(const ByteEvent& event) {
   if (!held_.append(event.items) || !begins_with(held_, sent_)) {
-    found_ = EchoMode::off;
+    detected_ = EchoMode::off;
     const ByteBuffer<capacity> held = held_;
     held_.clear();
     return pass(event.at, held);
@@ -104,12 +104,12 @@ void EchoFilter::decide(Time at) {
   const std::size_t reply = reply_due_ != 0 ? std::min(reply_due_, bytes.size()) : bytes.size();
   const bool has_no_echo = echo_and_reply && is_reply(bytes.first(reply)) && !is_reply(bytes.subspan(echo));
   if ((echo_and_reply || echo_alone) && !has_no_echo) {
-    found_ = EchoMode::on;
+    detected_ = EchoMode::on;
     echo_due_ = 0;
     echoed_ = echo;
     return pass(at, bytes.subspan(echo));
   }
-  found_ = EchoMode::off;
+  detected_ = EchoMode::off;
   if (!has_no_echo) return pass(at, bytes);
   pass(at, bytes.first(reply));  // the bytes after the reply are not part of it
   pass(at, bytes.subspan(reply));

@@ -28,7 +28,7 @@ class EchoFilter final : public Machine<std::uint8_t> {
 
   /// Sets the unit that decides whether a reply is valid; both arguments must outlive the filter's use. Without a unit
   /// the number of bytes alone decides.
-  void judge_by(const Unit& unit, const Options& options) {
+  void use_unit(const Unit& unit, const Options& options) {
     unit_ = &unit;
     options_ = &options;
   }
@@ -63,12 +63,12 @@ class EchoFilter final : public Machine<std::uint8_t> {
   void decide(Time at);
   void pass(Time at, Bytes bytes);
   [[nodiscard]] bool is_reply(Bytes bytes) const;
-  [[nodiscard]] EchoMode working_mode() const { return mode_ == EchoMode::automatic ? found_ : mode_; }
+  [[nodiscard]] EchoMode working_mode() const { return mode_ == EchoMode::automatic ? detected_ : mode_; }
 
   EchoMode mode_;
   const Unit* unit_ = nullptr;
   const Options* options_ = nullptr;
-  EchoMode found_ = EchoMode::automatic;  // mode detected in this conversation
+  EchoMode detected_ = EchoMode::automatic;  // mode detected in this conversation
   Machine<std::uint8_t>* inner_ = nullptr;
   ByteBuffer<capacity> sent_;
   ByteBuffer<capacity> held_;  // automatic: received bytes that may be echo

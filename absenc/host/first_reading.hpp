@@ -51,11 +51,11 @@ class FirstReading {
     if (!is_like_last(place)) return false;
     const std::uint64_t step = place.counts - last_.counts;
     const std::uint64_t reached = reach(place, between);
-    const std::uint64_t allowed = least(reached, most_told(place.bits));
+    const std::uint64_t allowed = least(reached, most_judged(place.bits));
     const std::uint64_t moved = distance(step, place.bits);
     if (moved <= allowed) return true;
     if (!has_step_ || moved / most_excess > reached || distance(step_, place.bits) <= allowed) return false;
-    return distance(step - step_, place.bits) <= least(allowed, most_told(place.bits) / 8);
+    return distance(step - step_, place.bits) <= least(allowed, most_judged(place.bits) / 8);
   }
   /// Returns whether the shaft can have moved to `reading` since the one before.
   [[nodiscard]] constexpr bool is_near(const Reading& reading) const {
@@ -63,9 +63,9 @@ class FirstReading {
   }
 
   /// Returns whether the speed limit excludes any position nearer than half the range after this time.
-  [[nodiscard]] constexpr bool tells(const Reading& reading, Time between) const {
+  [[nodiscard]] constexpr bool can_judge(const Reading& reading, Time between) const {
     const Place place = place_of(reading);
-    return place.bits != 0 && reach(place, between) < most_told(place.bits);
+    return place.bits != 0 && reach(place, between) < most_judged(place.bits);
   }
 
   /// Stores `reading` for the next comparison. One without a position clears the stored position.
@@ -114,7 +114,7 @@ class FirstReading {
     return counts < ~noise ? counts + noise : counts;
   }
   // Largest distance that can be judged: 15/32 of the range, as in longest_gap.
-  [[nodiscard]] static constexpr std::uint64_t most_told(unsigned bits) {
+  [[nodiscard]] static constexpr std::uint64_t most_judged(unsigned bits) {
     constexpr std::uint64_t share = 15;
     return bits >= 5 ? share << (bits - 5) : (share << bits) >> 5;
   }

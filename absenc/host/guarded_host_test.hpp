@@ -22,13 +22,13 @@ class GuardedHost {
   /// Returns whether the conversation ended within this time, or gave its first result if it streams. `may_repeat`:
   /// whether its requests may be repeated because they only read.
   [[nodiscard]] bool run(Conversation<Item>& conversation, Time limit, bool may_repeat = true) {
-    asks_ = conversation.asks();
+    streams_ = conversation.asks();
     emitted_ = false;
     guard_.attach(conversation, *unit_, options_, may_repeat);
     if (node_ == none) {
       node_ = line_->attach(sim::NodeRole::host, guard_, [this] {
-        emitted_ = asks_;
-        return !asks_;
+        emitted_ = streams_;
+        return !streams_;
       });
     } else {
       line_->replace(node_, guard_);
@@ -46,7 +46,7 @@ class GuardedHost {
   bool valid_ = false;
   ReplyGuard<Item> guard_;
   std::size_t node_ = none;
-  bool asks_ = false;
+  bool streams_ = false;
   bool emitted_ = false;
 };
 

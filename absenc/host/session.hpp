@@ -113,7 +113,7 @@ class Session {
       const Reading* reading = conversation->reading();
       if (reading == nullptr) return conversation;
       on_reading(*reading);
-      if (number == 1 && refutes(*reading)) suspect.emplace(Error::cross_check_failed, conversation->exchange());
+      if (number == 1 && contradicts(*reading)) suspect.emplace(Error::cross_check_failed, conversation->exchange());
       confirmed_ = confirms(*reading, number > 1);
       if (confirmed_) {
         if (suspect && before.is_near(*reading)) count_damaged(*suspect);
@@ -170,7 +170,7 @@ class Session {
     confirmed_ = false;
     known_ = false;
     streaming_ = false;
-    pair_ = never;
+    shortest_interval_ = never;
     first_.start_again();
   }
   /// Counts the last command as failed although it ended well: its caller knows that the reading is wrong.
@@ -195,9 +195,9 @@ class Session {
   [[nodiscard]] Times times() const { return sends_unsolicited(*unit_, options_) ? Times::arrived : Times::latched; }
 
   // Returns whether this position and the one before contradict each other.
-  [[nodiscard]] bool refutes(const Reading& reading) const {
+  [[nodiscard]] bool contradicts(const Reading& reading) const {
     const Time between = apart_.since_last(reading.latched);
-    return first_.has_last() && first_.tells(reading, between) && !first_.is_near(reading, between);
+    return first_.has_last() && first_.can_judge(reading, between) && !first_.is_near(reading, between);
   }
 
   // After a pause that is too long to judge, a second reading of its own (`follows`) confirms the position. If that
@@ -205,8 +205,8 @@ class Session {
   bool confirms(const Reading& reading, bool follows) {
     const Time between = apart_.since_last(reading.latched);
     bool near = first_.is_near(reading, between);
-    if (follows && first_.has_last()) pair_ = between < pair_ ? between : pair_;
-    if (near && !follows && !first_.tells(reading, between)) near = !first_.tells(reading, pair_);
+    if (follows && first_.has_last()) shortest_interval_ = between < shortest_interval_ ? between : shortest_interval_;
+    if (near && !follows && !first_.can_judge(reading, between)) near = !first_.can_judge(reading, shortest_interval_);
     first_.keep(reading);
     apart_.add(reading.latched);
     return near;
@@ -276,9 +276,9 @@ class Session {
     if constexpr (std::is_same_v<Item, std::uint8_t>) {
       if (echo_.mode() != EchoMode::off) return echo_;
     }
-    return behind_echo();
+    return inside_echo();
   }
-  Machine<Item>& behind_echo() {
+  Machine<Item>& inside_echo() {
     if (filter_ != nullptr) return *filter_;
     return inner();
   }
@@ -300,8 +300,8 @@ class Session {
       if (guarded_) guard_->attach(conversation, *unit_, options_, !command.changes_encoder);
       if (filter_ != nullptr) filter_->attach(inner());
       if constexpr (std::is_same_v<Item, std::uint8_t>) {
-        echo_.judge_by(*unit_, options_);
-        echo_.attach(behind_echo());
+        echo_.use_unit(*unit_, options_);
+        echo_.attach(inside_echo());
       }
     }
     const bool ended = drive(machine(), *port_, [&] { return !conversation.streams() && on_emit(conversation); });
@@ -329,7 +329,7 @@ class Session {
   SpeedLimit limit_;
   FirstReading first_;
   Apart apart_;
-  Time pair_ = never;                   // shortest time between two readings, the second read at once
+  Time shortest_interval_ = never;      // shortest time between two readings, the second read at once
   bool confirmed_ = false;              // the last reading was confirmed
   bool known_ = false;                  // a reading was confirmed since the last doubt
   bool streaming_ = false;              // `current_` has stopped at a result and can continue

@@ -23,7 +23,7 @@ TEST(Session, WithoutAConversationThereIsNoResult) {
 // ---- ReplyGuard
 
 TEST(ReplyGuard, DelaysOnlyRequests) {
-  struct Asks final : Machine<std::uint8_t> {
+  struct OneStep final : Machine<std::uint8_t> {
     void feed(const Event<std::uint8_t>&) override {}
     Step<std::uint8_t> next(Time) override { return step; }
     Step<std::uint8_t> step;
@@ -32,7 +32,7 @@ TEST(ReplyGuard, DelaysOnlyRequests) {
   const Bench bench(EchoMode::off);
   const Wire bytes(17, 0x02);
   const auto first = [&](std::size_t size, Time at) {
-    Asks asks;
+    OneStep asks;
     asks.step = {.kind = Kind::transfer, .out = Bytes(bytes).first(size), .at = at};
     ReplyGuard<std::uint8_t> guard;
     guard.attach(asks, bench.unit, bench.options, true);
@@ -47,7 +47,7 @@ TEST(ReplyGuard, DelaysOnlyRequests) {
 }
 
 /// A machine that sends one request and stores the items that it is fed.
-struct Asking final : Machine<std::uint8_t> {
+struct OneRequest final : Machine<std::uint8_t> {
   using Kind = Step<std::uint8_t>::Kind;
   void feed(const Event<std::uint8_t>& event) override {
     sent = sent || event.kind == Event<std::uint8_t>::Kind::sent;
@@ -71,19 +71,19 @@ TEST(ReplyGuard, RequestsAreOutstandingForTenSeconds) {
   const auto heard = [&](Time pause) {
     ReplyGuard<std::uint8_t> guard;
     Time now = 1s;
-    const auto send = [&](Asking& asking) {
+    const auto send = [&](OneRequest& asking) {
       guard.attach(asking, bench.unit, bench.options, true);
       Step<std::uint8_t> step = guard.next(now);
       while (step.kind == Kind::wait) step = guard.next(now = step.at);
       EXPECT_EQ(step.kind, Kind::transfer);
       guard.feed({.kind = Event<std::uint8_t>::Kind::sent, .at = now});
     };
-    Asking unanswered;
+    OneRequest unanswered;
     send(unanswered);
     guard.feed({.kind = Event<std::uint8_t>::Kind::silence, .at = now + 3ms});
     guard.conclude();
     now += pause;
-    Asking again;
+    OneRequest again;
     send(again);
     guard.feed({.kind = Event<std::uint8_t>::Kind::received, .at = now + 100us, .items = reply});
     static_cast<void>(guard.next(now + 100us));
@@ -96,7 +96,7 @@ TEST(ReplyGuard, RequestsAreOutstandingForTenSeconds) {
 TEST(ReplyGuard, SendsAfterATenthOfASecondOfNoise) {
   const Bench bench(EchoMode::off);
   ReplyGuard<std::uint8_t> guard;
-  Asking asking;
+  OneRequest asking;
   guard.attach(asking, bench.unit, bench.options, true);
   constexpr Time begin = 1s;
   Time now = begin;

@@ -139,7 +139,7 @@ struct BadExchange {
 template <class Item>
 class Statistics {
  public:
-  static constexpr std::size_t most_kept = 8;  ///< Number of failed exchanges that are stored, the last ones.
+  static constexpr std::size_t most_stored = 8;  ///< Number of failed exchanges that are stored, the last ones.
 
   /// Adds a conversation that ended.
   void add(const Conversation<Item>& conversation) {
@@ -151,20 +151,20 @@ class Statistics {
     }
   }
   /// Adds a failed exchange; it replaces the oldest.
-  void add(const BadExchange<Item>& bad) { bad_[bad_count_++ % most_kept] = bad; }
+  void add(const BadExchange<Item>& bad) { bad_[bad_count_++ % most_stored] = bad; }
 
   /// Returns the times from the end of the request to the end of the reply, of good exchanges.
   [[nodiscard]] const Latencies& latencies() const { return latencies_; }
   /// Returns how many of the last bad exchanges are stored.
-  [[nodiscard]] std::size_t kept() const { return std::min<std::size_t>(bad_count_, most_kept); }
+  [[nodiscard]] std::size_t kept() const { return std::min<std::size_t>(bad_count_, most_stored); }
   /// Returns a bad exchange; 0 is the last one, 1 the one before it.
   [[nodiscard]] const BadExchange<Item>& bad(std::size_t number) const {
-    return bad_[(bad_count_ - 1 - number) % most_kept];
+    return bad_[(bad_count_ - 1 - number) % most_stored];
   }
 
  private:
   Latencies latencies_;
-  std::array<BadExchange<Item>, most_kept> bad_{};
+  std::array<BadExchange<Item>, most_stored> bad_{};
   std::size_t bad_count_ = 0;
 };
 

@@ -14,15 +14,15 @@ class Interruption {
  public:
   /// The encoder begins to send.
   void begin() {
-    heard_at_.reset();
+    received_at_.reset();
     due_ = 0;
   }
   /// Returns whether the byte received at `at` begins a request. `length`: length of a request that begins with this
   /// byte, 0 if none does (a collision on a half-duplex line garbles bytes). A byte after a pause of two characters
   /// always begins one.
   bool begins_request(std::size_t length, Time at, Time character) {
-    const bool begins_run = !heard_at_ || at - *heard_at_ > 2 * character;
-    heard_at_ = at;
+    const bool begins_run = !received_at_ || at - *received_at_ > 2 * character;
+    received_at_ = at;
     if (!begins_run && due_ > 0) {
       --due_;
       return false;
@@ -32,7 +32,7 @@ class Interruption {
   }
 
  private:
-  std::optional<Time> heard_at_{};
+  std::optional<Time> received_at_{};
   std::size_t due_ = 0;
 };
 

@@ -62,21 +62,21 @@ void CanEngine::feed(const FrameEvent& event) {
       sent_at_ = since_ = event.at;
       if (!has_relevant_) relevant_at_ = event.at;
       until_ = event.at + duration_;
-      state_ = State::hearing;
+      state_ = State::receiving;
       break;
     case Kind::received:
       for (const CanFrame& frame : event.items) {
         // A frame that was complete before the request was sent cannot answer it, although it may be delivered late
         // from a queue.
-        early_ = state_ < State::hearing || event.at < since_;
-        if (state_ <= State::hearing && (overhears_ || !early_)) heard(frame, event.at);
+        early_ = state_ < State::receiving || event.at < since_;
+        if (state_ <= State::receiving && (receives_early_ || !early_)) heard(frame, event.at);
       }
       break;
     case Kind::line_error:
       disturbed_ = true;
       break;
     case Kind::silence:
-      if (state_ == State::hearing && silence_ != Time{}) end();
+      if (state_ == State::receiving && silence_ != Time{}) end();
       break;
     default:
       break;
@@ -84,7 +84,7 @@ void CanEngine::feed(const FrameEvent& event) {
 }
 
 FrameStep CanEngine::next(Time now) {
-  if (state_ == State::hearing && now >= until_) end();
+  if (state_ == State::receiving && now >= until_) end();
   FrameStep step{.at = never};
   switch (state_) {
     case State::ready:
@@ -100,12 +100,12 @@ FrameStep CanEngine::next(Time now) {
     case State::beginning:
       since_ = now;
       until_ = now + duration_;
-      state_ = State::hearing;
+      state_ = State::receiving;
       [[fallthrough]];
     case State::sending:
-    case State::hearing:
+    case State::receiving:
       step.answer = step.gap = silence_;
-      if (state_ == State::hearing) step.at = until_;
+      if (state_ == State::receiving) step.at = until_;
       break;
     case State::configuring:
       listen(duration_);

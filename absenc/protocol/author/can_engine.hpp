@@ -54,7 +54,7 @@ class CanEngine : public Conversation<CanFrame> {
   /// Sends `frame` and receives for exactly `duration`.
   void ask_for(const CanFrame& frame, Time duration);
   /// Delivers frames, from now on, that were received before the request was sent: they may answer earlier requests.
-  void overhear(bool yes = true) { overhears_ = yes; }
+  void overhear(bool yes = true) { receives_early_ = yes; }
   /// Returns whether the delivered frame was received before the request was sent.
   [[nodiscard]] bool came_early() const { return early_; }
   /// Receives unsolicited frames for `duration`.
@@ -74,14 +74,14 @@ class CanEngine : public Conversation<CanFrame> {
   virtual void over() = 0;
 
  private:
-  enum class State : std::uint8_t { ready, sending, beginning, hearing, configuring, over };
+  enum class State : std::uint8_t { ready, sending, beginning, receiving, configuring, over };
   void end();
 
   State state_ = State::over;
   bool has_request_ = false;
   bool has_relevant_ = false;
   bool disturbed_ = false;
-  bool overhears_ = false;
+  bool receives_early_ = false;
   bool early_ = false;
   std::uint32_t rate_ = 0;
   CanFrame request_{};

@@ -17,7 +17,7 @@ constexpr unsigned most_excuses = 2;
 void Responder::power_off(Time now) {
   EncoderOn::power_off(now);
   forget();
-  kept_.clear();
+  stored_.clear();
   refusing_ = reply_pending_ = transmitting_ = false;
 }
 
@@ -42,13 +42,13 @@ void Responder::feed(const ByteEvent& event) {
   switch (event.kind) {
     case ByteEvent::Kind::received:
       late_ = event.late;
-      for (const std::uint8_t byte : event.items) hear(byte, event.at);
+      for (const std::uint8_t byte : event.items) receive_byte(byte, event.at);
       break;
     case ByteEvent::Kind::sent: {
       transmitting_ = false;
-      const ByteBuffer<64> kept = kept_;
-      kept_.clear();
-      for (const std::uint8_t byte : kept.view()) hear(byte, event.at);
+      const ByteBuffer<64> kept = stored_;
+      stored_.clear();
+      for (const std::uint8_t byte : kept.view()) receive_byte(byte, event.at);
       break;
     }
     case ByteEvent::Kind::line_error:
@@ -71,7 +71,7 @@ void Responder::forget() {
 // The rest of a damaged request is ignored until the line is silent.
 void Responder::damage(Time at) {
   if (!is_on(at) || transmitting_) return forget();
-  heard_at_ = at;
+  received_at_ = at;
   damaged_ = true;
   refusing_ = is_refused(Flaw::damaged, request_) || refusing_;
 }
@@ -83,20 +83,20 @@ void Responder::end_run(Time at) {
     if (!damaged_ && !request_.empty()) refusing_ = is_refused(Flaw::cut_short, request_) || refusing_;
     if (std::exchange(refusing_, false)) {
       refuse(at, reply_);
-      begin_reply(heard_at_ + times_.answer_time);
+      begin_reply(received_at_ + times_.answer_time);
     }
   }
   forget();
 }
 
-void Responder::hear(std::uint8_t byte, Time at) {
+void Responder::receive_byte(std::uint8_t byte, Time at) {
   if (!is_on(at)) return;
   if (transmitting_ && times_.keeps_requests) {
-    kept_.push_back(byte);
+    stored_.push_back(byte);
     return;
   }
-  if (transmitting_) return hear_while_transmitting(byte, at);
-  heard_at_ = at;
+  if (transmitting_) return receive_while_transmitting(byte, at);
+  received_at_ = at;
   if (damaged_ || refusing_) return;
   if (std::exchange(skip_begins_, false) && !begins_others_reply(byte)) skipping_ = 0;
   if (skipping_ != 0) {
@@ -105,7 +105,7 @@ void Responder::hear(std::uint8_t byte, Time at) {
   }
   request_.push_back(byte);
   const std::size_t size = request_size(request_);
-  if (size == 0) return search_on(at);
+  if (size == 0) return search_again(at);
   if (request_.size() < size) return;
   if (answer_count() > 0) expect(true, turn_rule, at);
   reply_.clear();
@@ -115,17 +115,17 @@ void Responder::hear(std::uint8_t byte, Time at) {
 }
 
 // No request begins with the first byte, but one may begin at a later byte.
-void Responder::search_on(Time at) {
+void Responder::search_again(Time at) {
   refusing_ = is_refused(Flaw::unknown, request_);
   const ByteBuffer<32> heard = request_;
   request_.clear();
   if (refusing_) return;
-  for (const std::uint8_t byte : heard.view().subspan(1)) hear(byte, at);
+  for (const std::uint8_t byte : heard.view().subspan(1)) receive_byte(byte, at);
 }
 
 // If this program was delayed, the host may have sent the request after its timeout, before the reply was sent. That
 // explains it only if the delay is longer than the host waits for each request.
-void Responder::hear_while_transmitting(std::uint8_t byte, Time at) {
+void Responder::receive_while_transmitting(std::uint8_t byte, Time at) {
   if (!interruption_.begins_request(request_size({&byte, 1}), at, times_.character)) return;
   ++interrupted_;
   const Time reply_time = times_.answer_time + static_cast<int>(reply_.size()) * times_.character;

@@ -83,9 +83,9 @@ class Responder : public EncoderOn<std::uint8_t> {
   virtual void refuse(Time, ByteBuffer<64>& /*reply*/) {}
 
  private:
-  void hear(std::uint8_t byte, Time at);
-  void search_on(Time at);
-  void hear_while_transmitting(std::uint8_t byte, Time at);
+  void receive_byte(std::uint8_t byte, Time at);
+  void search_again(Time at);
+  void receive_while_transmitting(std::uint8_t byte, Time at);
   void begin_reply(Time at);
   void ended(Answer answer, Time at);
   void damage(Time at);
@@ -95,7 +95,7 @@ class Responder : public EncoderOn<std::uint8_t> {
   DeviceTimes times_;
   ByteBuffer<32> request_;
   bool damaged_ = false;  // a character of the request was damaged: the rest is ignored until the line is silent
-  Time heard_at_{};
+  Time received_at_{};
   Time late_{};               // longest delay with which the last bytes were delivered
   std::size_t skipping_ = 0;  // characters left of another encoder's reply
   bool skip_begins_ = false;  // the first of these characters is still to be received
@@ -103,7 +103,7 @@ class Responder : public EncoderOn<std::uint8_t> {
   ByteBuffer<64> reply_;
   Time reply_at_{};
   Time longer_{};
-  ByteBuffer<64> kept_;                  // bytes received during the transmission
+  ByteBuffer<64> stored_;                // bytes received during the transmission
   unsigned interrupted_ = 0;             // requests received during the transmission
   unsigned interruptions_in_a_row_ = 0;  // consecutive transmissions during which requests were received
   bool reply_pending_ = false;

@@ -16,7 +16,7 @@ void Engine::send(Bytes request, const Manner& manner, Time earliest) {
 }
 
 void Engine::start(Time earliest) {
-  heard_ = noisy_ = false;
+  item_received_ = noisy_ = false;
   earliest_ = earliest;
   state_ = State::ready;
 }
@@ -50,8 +50,8 @@ ByteStep Engine::next(Time now) {
   if (state_ == State::receiving) return step;  // at once: between two characters there is little time
   step.expect = 0;
   // Traffic before this conversation is unknown, so pauses count from now.
-  if (!begun_) received_at_ = now;
-  begun_ = true;
+  if (!started_) received_at_ = now;
+  started_ = true;
   wake(now);
   if (rate_ != 0) {
     step.kind = ByteStep::Kind::configure;
@@ -62,7 +62,7 @@ ByteStep Engine::next(Time now) {
     step.at = rest;
     step.answer = step.gap = {};
   } else {
-    go_on(step, now);
+    begin_or_end(step, now);
   }
   return step;
 }
@@ -84,10 +84,10 @@ Time Engine::rest_end() const {
   return state_ >= State::sleeping && state_ != State::over ? earliest_ : Time::min();
 }
 
-void Engine::go_on(ByteStep& step, Time now) {
+void Engine::begin_or_end(ByteStep& step, Time now) {
   if (state_ == State::ready) {
     state_ = State::sending;
-    disturbed_ = heard_ = noisy_ = false;
+    disturbed_ = item_received_ = noisy_ = false;
     size_ = 0;
     step.at = begun_at_ = std::max({now, earliest_, received_at_ + times_.pause});
     step.kind = manner_.pulse != Time{} ? ByteStep::Kind::pulse : ByteStep::Kind::transfer;
@@ -120,18 +120,18 @@ void Engine::feed(const ByteEvent& event) {
     received_at_ = event.at;
     keep(event.items);
   }
-  if (!is_awaited() && came_unasked(event)) return;
-  if (!heard_) {
-    heard_ = true;
+  if (!is_awaited() && handle_unawaited(event)) return;
+  if (!item_received_) {
+    item_received_ = true;
     noise_end_ = event.at + times_.patience;
   }
   noisy_ = event.at >= noise_end_;
-  look();
+  check_reply();
   if (noisy_) end_noise(before);
 }
 
 // Handles items that arrive while no reply is awaited. Returns whether they need no further handling.
-bool Engine::came_unasked(const ByteEvent& event) {
+bool Engine::handle_unawaited(const ByteEvent& event) {
   const bool damaged = event.kind == ByteEvent::Kind::line_error;
   if (state_ == State::listening) {
     heard(damaged ? Bytes{} : event.items);
@@ -147,7 +147,7 @@ void Engine::end_noise(State before) {
   if (is_awaited() || (before == State::ready && state_ == State::ready)) {
     conclude();
   } else if (state_ != State::sending) {
-    heard_ = noisy_ = false;  // the reply was accepted
+    item_received_ = noisy_ = false;  // the reply was accepted
   }
 }
 
@@ -157,11 +157,11 @@ void Engine::sent(Time at) {
   if (state_ != State::sending) return;
   if (!manner_.expects_reply) return conclude_with(Error::none);
   state_ = disturbed_ ? State::settling : State::receiving;
-  look();  // checks items received during a pulse
+  check_reply();  // checks items received during a pulse
 }
 
 // Ends the exchange if the reply is complete.
-void Engine::look() {
+void Engine::check_reply() {
   if (state_ != State::receiving) return;
   const std::size_t whole = expected();
   due_ = whole > size_ ? whole - size_ : 0;

@@ -121,7 +121,7 @@ class Engine : public Conversation<std::uint8_t> {
 
   void wake(Time now);
   [[nodiscard]] Time rest_end() const;
-  void go_on(Step<std::uint8_t>& step, Time now);
+  void begin_or_end(Step<std::uint8_t>& step, Time now);
   // Bytes that do not fit are dropped: the reply is too long already.
   void keep(Bytes bytes) {
     const MutableBytes room = storage_.subspan(size_);
@@ -129,9 +129,9 @@ class Engine : public Conversation<std::uint8_t> {
     for (std::size_t i = 0; i < fitting; ++i) room[i] = bytes[i];
     size_ += fitting;
   }
-  [[nodiscard]] bool came_unasked(const Event<std::uint8_t>& event);
+  [[nodiscard]] bool handle_unawaited(const Event<std::uint8_t>& event);
   void end_noise(State before);
-  void look();
+  void check_reply();
   void sent(Time at);
   [[nodiscard]] bool is_awaited() const { return state_ <= State::settling; }
   void conclude();
@@ -142,9 +142,9 @@ class Engine : public Conversation<std::uint8_t> {
   // instruction.
   State state_ = State::over;
   bool disturbed_ = false;
-  bool heard_ = false;  // an item was received in this exchange
-  bool noisy_ = false;  // items still arrive long after the first one
-  bool begun_ = false;
+  bool item_received_ = false;  // an item was received in this exchange
+  bool noisy_ = false;          // items still arrive long after the first one
+  bool started_ = false;
   bool emitting_ = false;
   Error error_ = Error::none;
   std::size_t size_ = 0;

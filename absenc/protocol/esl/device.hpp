@@ -154,7 +154,7 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
     return request.size() > 1 && !has_checksum8(profile_, request);
   }
   // Returns whether a request for this encoder ends here.
-  [[nodiscard]] bool holds_own_request(Bytes heard) const {
+  [[nodiscard]] bool contains_own_request(Bytes heard) const {
     for (std::size_t begin = 1; begin < heard.size(); ++begin) {
       const Bytes rest = heard.subspan(begin);
       const std::optional<DataId> id = data_id(rest[0]);
@@ -171,7 +171,7 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
     const std::size_t size = request_length(profile_, *id);
     if (begin.size() >= size) return has_wrong_checksum(begin.first(size)) ? 0 : size;
     if (is_own(begin)) return size;
-    return holds_own_request(begin) ? 0 : begin.size() + 1;
+    return contains_own_request(begin) ? 0 : begin.size() + 1;
   }
   [[nodiscard]] std::size_t others_reply_size(Bytes request) const override {
     return is_own(request) ? 0 : reply_length(*data_id(request[0]));

@@ -94,7 +94,7 @@ std::string_view what_remains(Sentence& words, unsigned remaining) {
 }
 
 // Returns which part of the reset failed; no detail: none did.
-Explanation missed(Sentence& words, DataId id, const Reply& before, const Reply& now) {
+Explanation failed_part(Sentence& words, DataId id, const Reply& before, const Reply& now) {
   const unsigned remaining = now.one.alarms | now.two.alarms;
   if (id == DataId::clear_alarms) {
     if (remaining == 0) return {};
@@ -139,7 +139,7 @@ Procedure reset(Dialog& dialog, Found& found, DataId id) {
   const Reply now = co_await dialog.ask(look).repeated(attempts).after(pause).or_say(
       "all eight requests were sent, but whether the encoder obeyed could not be read");
   show_last(dialog, found);
-  const Explanation what = missed(found.words, id, before, now);
+  const Explanation what = failed_part(found.words, id, before, now);
   if (!what.detail.empty()) co_return {Error::cross_check_failed, what.detail, what.advice};
   co_return done;
 }
@@ -154,7 +154,7 @@ constexpr std::string_view unknown_area = "Table 11 lists no such page and addre
 
 // Repeats a request until the memory is ready. `after_busy`: the temporary register may hold a byte that another host
 // requested, which only a busy reply excludes.
-author::Part<Result<Reply>> settled(Dialog& dialog, const Request& request, bool after_busy = false) {
+author::Part<Result<Reply>> when_ready(Dialog& dialog, const Request& request, bool after_busy = false) {
   const bool writes = request.id == DataId::write_memory && !selects_page(request);
   return author::until_ready<Protocol>(dialog, request,
                                        {.limit = busy_limit,
@@ -172,7 +172,7 @@ author::Outcome failure(Error error, std::string_view words, Time hold) {
 // Selects a page and waits until it is ready. `words`: detail of the error if the procedure ends here.
 author::Part<std::uint8_t> turn_to(Dialog& dialog, std::uint8_t page, std::string_view words) {
   const Request request{DataId::write_memory, dialog.format().address, page_select_address, page};
-  const Result<Reply> reply = co_await settled(dialog, request);
+  const Result<Reply> reply = co_await when_ready(dialog, request);
   if (!reply) co_await dialog.stop(failure(reply.error(), words, page_time));
   co_await dialog.rest(page_time);
   co_return page;
@@ -180,7 +180,7 @@ author::Part<std::uint8_t> turn_to(Dialog& dialog, std::uint8_t page, std::strin
 
 author::Part<std::uint8_t> read_byte(Dialog& dialog, std::uint8_t page, std::uint8_t address, std::string_view words) {
   const Request request{DataId::read_memory, dialog.format().address, address};
-  const Result<Reply> reply = co_await settled(dialog, request, !is_immediate(page, address));
+  const Result<Reply> reply = co_await when_ready(dialog, request, !is_immediate(page, address));
   if (!reply) co_await dialog.stop(failure(reply.error(), words, eeprom_read_pause));
   co_return reply->value;
 }
@@ -228,7 +228,7 @@ Procedure write_memory(Dialog& dialog, Found& found, Arguments arguments) {
   // A lost reply does not show whether the byte was written, but reading it back does.
   const Request write{DataId::write_memory, dialog.format().address, address, value};
   dialog.changes();
-  const Result<Reply> written = co_await settled(dialog, write);
+  const Result<Reply> written = co_await when_ready(dialog, write);
   if (written.error() == Error::busy) co_return failure(Error::busy, {}, eeprom_read_pause);
   if (!is_immediate(page, address)) co_await dialog.rest(eeprom_write_pause);
   const std::uint8_t now =
@@ -253,7 +253,7 @@ Procedure select_page(Dialog& dialog, Found& found, Arguments arguments) {
 namespace {
 
 // Finds the cause in SF. A bit that another raised alarm sets as well is ambiguous, unless the other bit is clear.
-bool tell_by_status(Found& found, const Reply& reply) {
+bool find_cause_in_status(Found& found, const Reply& reply) {
   constexpr unsigned other_safety = alarms::unsafe & ~unsigned{alarms::led_or_lissajous_error};
   constexpr unsigned other_non_safety = alarms::turns_wrong | alarms::overspeed;
   const unsigned raised = reply.one.alarms | reply.two.alarms;
@@ -272,7 +272,7 @@ Procedure read_error_info(Dialog& dialog, Found& found) {
   if (dialog.format().bus == sharing_yes) {
     const Reply reply = co_await dialog.ask(request_of(dialog, DataId::alarms));
     found.show(reply);
-    if (tell_by_status(found, reply)) co_return done;
+    if (find_cause_in_status(found, reply)) co_return done;
     co_return {Error::unsupported,
                "other alarms raise the same bits of SF, and memory cannot be reached with several encoders on the line "
                "(Figure 18)",
@@ -280,7 +280,7 @@ Procedure read_error_info(Dialog& dialog, Found& found) {
   }
   constexpr std::string_view page_may_be_left = "page 8 may be left selected, where it was another before";
   const Request which{DataId::read_memory, dialog.format().address, page_select_address};
-  const Result<Reply> before = co_await settled(dialog, which);
+  const Result<Reply> before = co_await when_ready(dialog, which);
   if (before.error() == Error::busy) co_return failure(Error::busy, {}, eeprom_read_pause);
   const bool known = before && is_page(before->value);
   co_await turn_to(dialog, register_page, page_may_be_left);
@@ -292,10 +292,10 @@ Procedure read_error_info(Dialog& dialog, Found& found) {
   if (!known) co_return done;
   // The result is known by now. Reading the page back shows what the next user of the encoder finds.
   const Request restore{DataId::write_memory, dialog.format().address, page_select_address, before->value};
-  const Result<Reply> restored = co_await settled(dialog, restore);
+  const Result<Reply> restored = co_await when_ready(dialog, restore);
   if (restored.error() == Error::busy) co_return failure(Error::busy, {}, page_time);
   co_await dialog.rest(page_time);
-  const Result<Reply> after = co_await settled(dialog, which);
+  const Result<Reply> after = co_await when_ready(dialog, which);
   if (after.error() == Error::busy) co_return failure(Error::busy, {}, eeprom_read_pause);
   if (after && after->value == before->value) found.page_left.reset();
   co_return done;

@@ -42,13 +42,13 @@ Profile with_other_parity(Profile profile) {
 }
 
 // The request of a capture, as far as its bytes show it under this profile.
-struct Asked {
+struct SentRequest {
   Request request{};
   bool parity_wrong = false;
   bool accepted = false;
 };
 
-Asked asked_in(const Profile& profile, const Capture& capture) {
+SentRequest request_in(const Profile& profile, const Capture& capture) {
   const Bytes bytes = capture.request.empty() ? capture.reply : capture.request;
   const std::optional<DataId> id = data_id(bytes[0]);
   if (!id) return {};
@@ -66,7 +66,7 @@ Asked asked_in(const Profile& profile, const Capture& capture) {
 // wrong parity bit only if there is one.
 Check explain(const Profile& profile, const Capture& capture) {
   if (capture.reply.empty()) return Check::passed;
-  const Asked asked = asked_in(profile, capture);
+  const SentRequest asked = request_in(profile, capture);
   if (!asked.accepted) return capture.request.empty() ? Check::other_command : Check::request_not_accepted;
   const Profile as_sent = asked.parity_wrong ? with_other_parity(profile) : profile;
   Reply reply;
@@ -121,7 +121,7 @@ void judge_sequence(Profile& best, std::span<const Capture> captures, ReachedByV
       known = false;
       continue;
     }
-    const Asked asked = asked_in(best, captures[i]);
+    const SentRequest asked = request_in(best, captures[i]);
     if (!has_sequence(asked.request.id)) continue;
     ++safety;
     Reply reply;
@@ -188,10 +188,10 @@ namespace {
 
 // Returns whether the request's parity bit alone is wrong: the other scope must give another one.
 bool parity_is_it(const Profile& profile, const Capture& capture) {
-  const Asked asked = asked_in(profile, capture);
+  const SentRequest asked = request_in(profile, capture);
   Reply reply;
   return asked.accepted && check_reply(profile, asked.request, capture.reply, reply) == Check::parity_reported &&
-         asked_in(with_other_parity(profile), capture).parity_wrong;
+         request_in(with_other_parity(profile), capture).parity_wrong;
 }
 
 // The values of all options that change replies.

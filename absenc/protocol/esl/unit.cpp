@@ -61,7 +61,7 @@ constexpr std::string_view no_turns(const Profile& profile) {
 // ---- Errors
 
 // Without the request the reply's own control field gives it; the address of a memory access is that of the reply.
-constexpr Result<Request> asked_by(const Profile& profile, Bytes request, Bytes reply) {
+constexpr Result<Request> request_behind(const Profile& profile, Bytes request, Bytes reply) {
   if (!request.empty()) return decode_request(profile, request);
   const auto id = data_id(reply[0]);
   if (!id) return Error::unexpected_reply;
@@ -70,10 +70,10 @@ constexpr Result<Request> asked_by(const Profile& profile, Bytes request, Bytes 
 }
 
 // Returns the check behind `error`; `passed` if the error is not one of the frame.
-Check check_behind(const Profile& profile, Error error, Bytes request, Bytes reply) {
+Check check_of(const Profile& profile, Error error, Bytes request, Bytes reply) {
   if (reply.empty()) return Check::passed;
   if (const Check refusal = check_refusal(profile, request, reply); refusal != Check::passed) return refusal;
-  const Result<Request> asked = asked_by(profile, request, reply);
+  const Result<Request> asked = request_behind(profile, request, reply);
   if (!asked) return Check::passed;
   Reply ignored;
   const Check check = check_reply(profile, *asked, reply, ignored);
@@ -121,7 +121,7 @@ void tell(Sentence& words, const HostOf<Protocol>& host) {
     return;
   }
   if (host.is_disturbed()) return;
-  const Check check = check_behind(profile, host.error(), request, host.reply());
+  const Check check = check_of(profile, host.error(), request, host.reply());
   if (check == Check::passed) return;
   words.add(text_of(check).sentence);
   std::string_view before = "; the reply is good with the profile ";
@@ -133,7 +133,7 @@ void tell(Sentence& words, const HostOf<Protocol>& host) {
   }
 }
 Explanation explain_reply(const Profile& profile, Error error, Bytes request, Bytes reply) {
-  const Check check = check_behind(profile, error, request, reply);
+  const Check check = check_of(profile, error, request, reply);
   if (check == Check::length) return {};  // the error's own text is enough
   return {.detail = text_of(check).sentence};
 }
@@ -221,7 +221,7 @@ constexpr Error answer_to_bad(const Profile& profile, Bytes request, Error error
 }
 constexpr Result<Request> guess_request(const Profile& profile, Bytes reply) {
   const Error refused = answer_to_bad(profile, {}, Error::none, reply);
-  return refused == Error::none ? asked_by(profile, {}, reply) : Result<Request>(refused);
+  return refused == Error::none ? request_behind(profile, {}, reply) : Result<Request>(refused);
 }
 
 constexpr auto known_as = std::array<std::string_view, 1>{"QS35"};

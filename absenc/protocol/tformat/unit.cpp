@@ -53,7 +53,7 @@ Outcome objection(const Format& format, DataId id, const Reply& first, const Rep
 }
 
 // Returns which part of the reset failed; no detail: none did.
-Explanation missed(DataId id, const Reply& now, unsigned bits) {
+Explanation failed_part(DataId id, const Reply& now, unsigned bits) {
   if (id == DataId::zero) {
     if (is_near(now.singleturn, 0, bits, zero_tolerance_millidegrees)) return {};
     return {"the position is still not zero", "hold the shaft still, then `absenc zero` again"};
@@ -94,7 +94,7 @@ Procedure reset(Dialog& dialog, Found& found, DataId id) {
                         .or_say("all ten requests were sent, but whether the encoder obeyed could not be read");
   static_cast<Values&>(found) = values_of(dialog.format(), now);
   found.reading = dialog.last_reading();
-  const Explanation what = missed(id, now, dialog.format().singleturn_bits);
+  const Explanation what = failed_part(id, now, dialog.format().singleturn_bits);
   if (!what.detail.empty()) co_return {Error::cross_check_failed, what.detail, what.advice};
   co_return done;
 }
@@ -107,7 +107,7 @@ constexpr Time busy_pause = 1ms;              // between two requests to a busy 
 constexpr std::uint8_t byte(std::int64_t argument) { return static_cast<std::uint8_t>(argument); }
 
 // Repeats a request until the encoder is ready. A page change must not be disturbed by asking whether it is over.
-Part<Result<Reply>> persist(Dialog& dialog, const Request& request) {
+Part<Result<Reply>> when_ready(Dialog& dialog, const Request& request) {
   return until_ready<Protocol>(dialog, request,
                                {.limit = busy_limit,
                                 .pause = selects_page(request) ? memory_time : busy_pause,
@@ -122,8 +122,8 @@ Outcome failure(const Dialog& dialog, Error error, std::string_view step) {
 }
 
 // Executes a memory request; ends the procedure at this step if the encoder does not execute it.
-Part<std::uint8_t> insist(Dialog& dialog, Request request, std::string_view step) {
-  const Result<Reply> reply = co_await persist(dialog, request);
+Part<std::uint8_t> execute(Dialog& dialog, Request request, std::string_view step) {
+  const Result<Reply> reply = co_await when_ready(dialog, request);
   if (!reply) co_await dialog.stop(failure(dialog, reply.error(), step));
   if (selects_page(request)) co_await dialog.rest(memory_time);
   co_return reply->value;
@@ -131,7 +131,7 @@ Part<std::uint8_t> insist(Dialog& dialog, Request request, std::string_view step
 
 Part<std::uint8_t> select_page(Dialog& dialog, Found& found, std::uint8_t page, std::string_view step) {
   found.selected = page;
-  const std::uint8_t selected = co_await insist(dialog, {DataId::write_memory, page_select_address, page}, step);
+  const std::uint8_t selected = co_await execute(dialog, {DataId::write_memory, page_select_address, page}, step);
   co_return selected;
 }
 
@@ -146,7 +146,7 @@ Procedure read_memory(Dialog& dialog, Found& found, Arguments arguments) {
   }
   co_await select_page(dialog, found, page, "");
   for (std::int64_t i = 0; i < arguments[2]; ++i) {
-    const std::uint8_t value = co_await insist(dialog, {DataId::read_memory, byte(address + i)}, "");
+    const std::uint8_t value = co_await execute(dialog, {DataId::read_memory, byte(address + i)}, "");
     found.bytes.push_back(value);
   }
   found.page = page;
@@ -160,11 +160,11 @@ Procedure read_memory(Dialog& dialog, Found& found, Arguments arguments) {
 // selects the page again so that the EEPROM itself is read, and compares.
 Part<bool> write_byte(Dialog& dialog, Found& found, std::uint8_t address, std::uint8_t value) {
   const Request look{DataId::read_memory, address};
-  const std::uint8_t before = co_await insist(dialog, look, "nothing was written");
+  const std::uint8_t before = co_await execute(dialog, look, "nothing was written");
   found.written = before != value;
   if (before == value) co_return false;
   dialog.changes();
-  const Result<Reply> reply = co_await persist(dialog, {DataId::write_memory, address, value});
+  const Result<Reply> reply = co_await when_ready(dialog, {DataId::write_memory, address, value});
   if (reply.error() == Error::busy) {
     dialog.refused();
     co_await dialog.stop(failure(dialog, Error::busy, ""));
@@ -173,7 +173,7 @@ Part<bool> write_byte(Dialog& dialog, Found& found, std::uint8_t address, std::u
   co_await dialog.rest(memory_time);
   constexpr std::string_view lost = "the byte was written, but could not be read back";
   co_await select_page(dialog, found, *found.selected, lost);
-  const std::uint8_t now = co_await insist(dialog, look, lost);
+  const std::uint8_t now = co_await execute(dialog, look, lost);
   if (now != value) {
     if (now == before) dialog.refused();
     co_await dialog.stop({Error::cross_check_failed, "reading back gave another value: the write has failed",
@@ -210,7 +210,7 @@ Procedure write_memory(Dialog& dialog, Found& found, Arguments arguments) {
 // The document shows the page as the content of address 127, but does not state that it can be read. If the encoder
 // refuses, the page before is unknown.
 Part<std::optional<std::uint8_t>> open_service_page(Dialog& dialog, Found& found, std::string_view step) {
-  const Result<Reply> before = co_await persist(dialog, {DataId::read_memory, page_select_address});
+  const Result<Reply> before = co_await when_ready(dialog, {DataId::read_memory, page_select_address});
   found.page_left = service_page;
   co_await select_page(dialog, found, service_page, step);
   co_return before&& is_page(before->value) ? std::optional(before->value) : std::nullopt;
@@ -221,10 +221,10 @@ Part<std::optional<std::uint8_t>> open_service_page(Dialog& dialog, Found& found
 Part<bool> restore(Dialog& dialog, Found& found, std::optional<std::uint8_t> before) {
   if (!before) co_return false;
   if (*before != service_page) {
-    const Result<Reply> selected = co_await persist(dialog, {DataId::write_memory, page_select_address, *before});
+    const Result<Reply> selected = co_await when_ready(dialog, {DataId::write_memory, page_select_address, *before});
     co_await dialog.rest(memory_time);  // without a valid reply the page change may still be going on
     if (!selected) co_return false;
-    const Result<Reply> now = co_await persist(dialog, {DataId::read_memory, page_select_address});
+    const Result<Reply> now = co_await when_ready(dialog, {DataId::read_memory, page_select_address});
     if (!now || now->value != *before) co_return false;
   }
   found.page_left.reset();
@@ -233,7 +233,7 @@ Part<bool> restore(Dialog& dialog, Found& found, std::optional<std::uint8_t> bef
 
 Procedure read_temperature(Dialog& dialog, Found& found) {
   const std::optional<std::uint8_t> before = co_await open_service_page(dialog, found, "");
-  const std::uint8_t value = co_await insist(dialog, {DataId::read_memory, temperature_address}, "");
+  const std::uint8_t value = co_await execute(dialog, {DataId::read_memory, temperature_address}, "");
   found.temperature = static_cast<std::int8_t>(value);
   co_await restore(dialog, found, before);
   co_return done;
@@ -249,7 +249,7 @@ void show_threshold(Found& found, std::uint8_t value) {
 
 Procedure read_threshold(Dialog& dialog, Found& found) {
   const std::optional<std::uint8_t> before = co_await open_service_page(dialog, found, "");
-  const std::uint8_t value = co_await insist(dialog, {DataId::read_memory, overheat_address}, "");
+  const std::uint8_t value = co_await execute(dialog, {DataId::read_memory, overheat_address}, "");
   show_threshold(found, value);
   co_await restore(dialog, found, before);
   co_return done;
