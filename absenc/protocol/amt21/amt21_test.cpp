@@ -40,7 +40,7 @@ TEST(Amt21, ZeroNeedsShaftAtRestAndIsVerified) {
   EXPECT_EQ(bench.run("zero").detail, "the position is still not zero");
   bench.tampered.replies({});
   bench.shaft.spin(60, bench.line.now());
-  const author::testing::Told refused = bench.run("zero");
+  const author::testing::RunResult refused = bench.run("zero");
   EXPECT_EQ(refused.error, Error::not_still);
   EXPECT_EQ(refused.frames, 2u);
 }
@@ -71,7 +71,7 @@ TEST(Amt21, ReadsTurnsThatMatchThePositionAtZeroCrossing) {
 
 TEST(Amt21, ScanFindsSingleEncoder) {
   Bench bench(unit, "address=0x58");
-  const author::testing::Told found = bench.run("scan");
+  const author::testing::RunResult found = bench.run("scan");
   EXPECT_EQ(found.error, Error::none);
   EXPECT_EQ(found.numbers.at("encoder_address"), 0x58);
 }

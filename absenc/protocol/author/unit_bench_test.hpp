@@ -27,7 +27,7 @@ using Numbers = std::map<std::string, std::int64_t>;
 inline Wire wire(Bytes bytes) { return {bytes.begin(), bytes.end()}; }
 
 /// Result and fields of a command. Real numbers are rounded and stored with the numbers.
-struct Told : FieldSink {
+struct RunResult : FieldSink {
   void put(const FieldValue& value) override {
     const std::string name(value.info->name);
     const bool is_real = value.info->kind == FieldInfo::Kind::real;
@@ -189,12 +189,12 @@ struct UnitBench {
 
   /// Runs a command of the unit to its end with these `options`, one that streams to its first result. `on_emit` is
   /// called at every emit.
-  Told run(std::string_view name, const std::vector<std::int64_t>& arguments = {}, const OnEmit& on_emit = {}) {
+  RunResult run(std::string_view name, const std::vector<std::int64_t>& arguments = {}, const OnEmit& on_emit = {}) {
     const Talk<std::uint8_t> talk(unit, options, name, arguments);
     return run(*talk, on_emit);
   }
-  Told run(Conversation<std::uint8_t>& conversation, const OnEmit& on_emit = {}) {
-    Told told;
+  RunResult run(Conversation<std::uint8_t>& conversation, const OnEmit& on_emit = {}) {
+    RunResult told;
     const Time begin = line.now();
     const std::uint64_t before = device.answer_count();
     line.on_emit = [&] {

@@ -10,7 +10,7 @@
 
 namespace absenc::e201::testing {
 
-using author::testing::Told;
+using author::testing::RunResult;
 using Fields = std::map<std::string, std::int64_t>;
 
 constexpr std::int64_t turn = std::int64_t{1} << 32;
@@ -90,9 +90,9 @@ class TamperedInterface final : public Machine<std::uint8_t> {
 };
 
 /// Result of a command with the name of its error.
-struct CommandResult : Told {
-  CommandResult(const Told& told)
-      : Told(told), error(told.finished ? text_of(told.error).name : "hangs"), fields(told.numbers) {}
+struct CommandResult : RunResult {
+  CommandResult(const RunResult& told)
+      : RunResult(told), error(told.finished ? text_of(told.error).name : "hangs"), fields(told.numbers) {}
   std::string error;
   Fields fields;
 };

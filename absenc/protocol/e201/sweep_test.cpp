@@ -11,10 +11,10 @@ namespace {
 using testing::Bench;
 using testing::CommandResult;
 using testing::Fields;
+using testing::RunResult;
 using testing::says;
 using testing::Tamper;
 using testing::TextReply;
-using testing::Told;
 
 /// 10 us of latency, 32 + 8 bits: up to 20 bits of ACK fit, so M8 (45 bits) and M7 (22) are too fast.
 TEST(E201Sweep, CountsRecommendsAndRestores) {
@@ -23,7 +23,7 @@ TEST(E201Sweep, CountsRecommendsAndRestores) {
   std::vector<Fields> progress;
   const CommandResult sweep =
       bench.run("clock-sweep", {5}, [&progress](const Conversation<std::uint8_t>& conversation) {
-        Told now;
+        RunResult now;
         now.take(conversation);
         progress.push_back(now.numbers);
       });
@@ -80,7 +80,7 @@ TEST(E201Sweep, AbortRestoresTheClockAtAnyStep) {
     EXPECT_EQ(sweep.error(), Error::none);
     EXPECT_TRUE(steps != 0 || bench.answering.asked() == "MvmMm") << bench.answering.asked();
     EXPECT_EQ(bench.raw("m"), "6\r") << steps;
-    Told told;
+    RunResult told;
     told.take(sweep);
     EXPECT_EQ(told.numbers["aborted"], 1);
     EXPECT_EQ(told.numbers["restored_clock"], 6);
@@ -112,7 +112,7 @@ TEST(E201Sweep, ReportLeftNamesClockThatWasSetLast) {
   std::string left;
   while (!bench.line.done(host)) {
     bench.line.step();
-    Told told;
+    RunResult told;
     sweep.report_left(told);
     if (told.numbers.empty()) {
       EXPECT_FALSE(says(bench.answering.asked(), "M6M")) << "another clock is set";

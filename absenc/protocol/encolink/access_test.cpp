@@ -10,8 +10,8 @@ namespace {
 
 using testing::Bench;
 using testing::RawBytes;
+using testing::RunResult;
 using testing::says;
-using testing::Told;
 using PowerOn = Bench::PowerOn;
 class EncolinkRegister : public testing::OnBothInterfaces {};
 INSTANTIATE_TEST_SUITE_P(Interfaces, EncolinkRegister, ::testing::Values(Interface::uart, Interface::spi));
@@ -41,8 +41,8 @@ TEST_P(EncolinkRegister, ReadsRegisterWithoutLosingPositions) {
     std::uint64_t last = 0;
     unsigned wrong = 0;
     Time begun{};  // time after the identity, which every register access reads first
-    const Told read = bench.run("memory-read", {registers[part_number].address}, [&](const auto& emitted) {
-      Told now;
+    const RunResult read = bench.run("memory-read", {registers[part_number].address}, [&](const auto& emitted) {
+      RunResult now;
       now.take(emitted);
       if (last == 0) begun = bench.line.now();
       if (!now.reading || now.reading->singleturn <= last || now.numbers.at("singleturn") == 0) ++wrong;
@@ -69,7 +69,7 @@ TEST_P(EncolinkRegister, ReadsEveryRegisterOfTheTable) {
   bench.condition(condition_temperature, -12);
   bench.shaft.spin(-60, bench.line.now());
   for (const Register& one : registers) {
-    const Told read = bench.run("memory-read", {one.address});
+    const RunResult read = bench.run("memory-read", {one.address});
     EXPECT_EQ(read.error, one.access == Access::write_only ? Error::request_rejected : Error::none) << one.name;
     if (read.error != Error::none) continue;
     EXPECT_EQ(read.numbers.at("length"), one.size);
@@ -83,7 +83,7 @@ TEST_P(EncolinkRegister, ReadsEveryRegisterOfTheTable) {
 TEST_P(EncolinkRegister, InfoReportsIdentityAndRegisters) {
   Bench bench(testing::multi, interface);
   bench.tell("");
-  const Told info = bench.run("info");
+  const RunResult info = bench.run("info");
   ASSERT_EQ(info.error, Error::none) << info.detail;
   for (const auto& [name, number] : std::to_array<std::pair<std::string, std::int64_t>>({{"resolution", 20},
                                                                                          {"frame_bytes", 7},
@@ -99,7 +99,7 @@ TEST_P(EncolinkRegister, InfoReportsIdentityAndRegisters) {
 
 TEST_P(EncolinkRegister, ReadsWritesBackAndKeepsSavedOnes) {
   Bench bench(testing::multi, interface);
-  const Told write = bench.run("memory-write", {0, 0x10000});
+  const RunResult write = bench.run("memory-write", {0, 0x10000});
   ASSERT_EQ(write.error, Error::none) << write.detail;
   EXPECT_EQ(write.numbers.at("position_offset"), 0x10000);
   EXPECT_EQ(bench.run("position").reading->singleturn, 0x12345u + (1u << 16));
@@ -112,7 +112,7 @@ TEST_P(EncolinkRegister, ReadsWritesBackAndKeepsSavedOnes) {
   ASSERT_EQ(bench.run("save").error, Error::none);
   bench.restart(PowerOn::skip);
   for (const RegisterIndex index : parameters) {
-    const Told read = bench.run("memory-read", {registers[index].address});
+    const RunResult read = bench.run("memory-read", {registers[index].address});
     EXPECT_EQ(read.numbers.at(std::string(registers[index].name)), value(index));
   }
 }
@@ -120,7 +120,7 @@ TEST_P(EncolinkRegister, ReadsWritesBackAndKeepsSavedOnes) {
 TEST_P(EncolinkRegister, ExplainsEachRefusal) {
   Bench bench(testing::multi, interface);
   const auto refusal = [&](std::int64_t address, std::int64_t size, std::int64_t value) {
-    const Told write = bench.run("memory-write", {address, value, size});
+    const RunResult write = bench.run("memory-write", {address, value, size});
     EXPECT_EQ(write.error, Error::request_rejected);
     return write.detail;
   };
@@ -148,7 +148,7 @@ TEST_P(EncolinkRegister, RefusesInvalidArgumentsWithoutRequest) {
 TEST_P(EncolinkRegister, StopsAfterTwoSecondsOfBusy) {
   Bench bench(testing::single, interface);
   bench.condition(condition_busy, 1);
-  const Told read = bench.run("memory-read", {0x4C});
+  const RunResult read = bench.run("memory-read", {0x4C});
   EXPECT_EQ(read.error, Error::busy);
   EXPECT_TRUE(says(read.detail, "busy for more than 2 s")) << read.detail;
   EXPECT_GT(read.emits, 20'000u);
@@ -165,7 +165,7 @@ TEST_P(EncolinkRegister, RepeatsAccessThatArrivedDamaged) {
     for (const auto& [times, good] : std::to_array<std::pair<int, bool>>({{4, true}, {5, false}})) {
       Bench bench(testing::single, interface);
       bench.tampered.requests(replacing(right, wrong, times));
-      const Told read = bench.run("memory-read", {0x4C});
+      const RunResult read = bench.run("memory-read", {0x4C});
       EXPECT_EQ(read.error, good ? Error::none : error) << times;
       EXPECT_EQ(read.detail, good ? "" : words);
     }
@@ -180,7 +180,7 @@ TEST_P(EncolinkRegister, RestartsAccessAfterDamagedFrame) {
            {{9, 10, 11}, Error::bad_checksum}}) {        // the third damaged frame in a row
     Bench bench(testing::single, interface);
     bench.tampered.replies(damaging(frames));
-    const Told read = bench.run("memory-read", {0x4C});
+    const RunResult read = bench.run("memory-read", {0x4C});
     EXPECT_EQ(read.error, error) << read.detail;
     EXPECT_EQ(read.numbers.count("temperature_c"), error == Error::none ? 1u : 0u);
   }
@@ -201,7 +201,7 @@ TEST_P(EncolinkRegister, ReportsUnpluggedEncoder) {
            {"save", {}, 5, interface == Interface::uart ? "during a register access" : "MISO"}}) {
     Bench bench(testing::single, interface);
     unsigned emits = 0;
-    const Told told = bench.run(one.command, one.arguments, [&](const auto&) {
+    const RunResult told = bench.run(one.command, one.arguments, [&](const auto&) {
       if (++emits == one.after) bench.device.power_off(bench.line.now());
     });
     EXPECT_EQ(told.error, gone);
@@ -212,7 +212,7 @@ TEST_P(EncolinkRegister, ReportsUnpluggedEncoder) {
   // Not even the identity was received, so nothing was written.
   Bench bench(testing::multi, interface);
   bench.tampered.replies([](unsigned, RawBytes& reply) { reply.clear(); });
-  const Told save = bench.run("save");
+  const RunResult save = bench.run("save");
   EXPECT_NE(save.error, Error::none);
   EXPECT_FALSE(says(save.detail, "may have been executed")) << save.detail;
 }
@@ -225,7 +225,7 @@ TEST_P(EncolinkRegister, ReadsBackBeforeRepeatingWrite) {
   bench.tampered.requests([&](unsigned, RawBytes& request) {
     for (const std::uint8_t byte : request) written += byte == 0x58 ? 1 : 0;
   });
-  const Told write = bench.run("memory-write", {0, 0x10000});
+  const RunResult write = bench.run("memory-write", {0, 0x10000});
   EXPECT_EQ(write.error, Error::none) << write.detail;
   EXPECT_EQ(bench.encoder.offset(), 0x10000u);
   EXPECT_EQ(written, 1u);
@@ -299,7 +299,7 @@ struct OnChannel3 {
 TEST(EncolinkAccess, RejectsAnswerWithoutReady) {
   Bench bench(testing::single);
   const OnChannel3 strange(bench, [](std::uint8_t told) { return told == channel3::read_ready ? 0x77 : told; });
-  const Told read = bench.run("memory-read", {0x4C});
+  const RunResult read = bench.run("memory-read", {0x4C});
   EXPECT_EQ(read.error, Error::unexpected_reply);
   EXPECT_EQ(read.detail, "channel 3 says neither idle nor busy nor ready");
 }
@@ -321,7 +321,7 @@ TEST(EncolinkAccess, ReportsFailedAndEndlessSelfCalibration) {
         return step = 0, reads++ == 0 ? std::uint8_t{0} : status;
       return told;
     });
-    const Told told = bench.run("self-calibrate");
+    const RunResult told = bench.run("self-calibrate");
     EXPECT_EQ(told.error, error);
     EXPECT_TRUE(testing::says(told.detail, words)) << told.detail;
     EXPECT_EQ(told.took > 10s, error == Error::timeout);  // the vendor allows the shaft 10 s
@@ -334,18 +334,18 @@ TEST(EncolinkAccess, RefusesImpossibleWritesWithoutRequest) {
       std::find_if(registers.begin(), registers.end(), [](const Register& one) { return one.size > 8; });
   ASSERT_NE(text, registers.end());
   for (const std::int64_t address : {std::int64_t{0x1234}, std::int64_t{text->address}}) {
-    const Told written = bench.run("memory-write", {address, 0});
+    const RunResult written = bench.run("memory-write", {address, 0});
     EXPECT_EQ(written.error, Error::invalid_argument);
     EXPECT_TRUE(says(written.detail, "how many bytes")) << written.detail;
   }
-  const Told preset = bench.run("preset-multiturn", {4096});
+  const RunResult preset = bench.run("preset-multiturn", {4096});
   EXPECT_EQ(preset.error, Error::invalid_argument);
   EXPECT_TRUE(says(preset.detail, "not so many bits")) << preset.detail;
 }
 
 TEST_P(EncolinkRegister, CommandReportsPositionWithoutStatus) {
   Bench bench(testing::single, interface);
-  const Told save = bench.run("save");
+  const RunResult save = bench.run("save");
   EXPECT_EQ(save.numbers.count("singleturn"), 1u);
   EXPECT_EQ(save.numbers.count("status"), 0u);
 }
@@ -353,7 +353,7 @@ TEST_P(EncolinkRegister, CommandReportsPositionWithoutStatus) {
 TEST_P(EncolinkRegister, PresetFailsWhileShaftTurns) {
   Bench bench(testing::multi, interface);
   bench.shaft.spin(30'000, bench.line.now());
-  const Told preset = bench.run("preset-multiturn", {1234});
+  const RunResult preset = bench.run("preset-multiturn", {1234});
   EXPECT_EQ(preset.error, Error::cross_check_failed);
   EXPECT_TRUE(says(preset.advice, "hold the shaft still")) << preset.advice;
 }
@@ -361,7 +361,7 @@ TEST_P(EncolinkRegister, PresetFailsWhileShaftTurns) {
 TEST_P(EncolinkRegister, NeverRepeatsCommand) {
   Bench bench(testing::single, interface);
   bench.tampered.replies(damaging({100}));  // frame 100 arrives while the encoder is busy
-  const Told save = bench.run("save");
+  const RunResult save = bench.run("save");
   EXPECT_EQ(save.error, Error::bad_checksum);
   EXPECT_EQ(save.detail, "the answer to the command was lost: it may have been executed");
   bench.pass(1s);

@@ -10,7 +10,7 @@
 
 namespace absenc::encolink::testing {
 
-using author::testing::Told;
+using author::testing::RunResult;
 using RawBytes = std::vector<std::uint8_t>;
 
 inline constexpr std::string_view single = "resolution=20 multiturn_bits=0";

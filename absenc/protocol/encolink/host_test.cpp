@@ -12,15 +12,15 @@ namespace {
 
 using testing::Bench;
 using testing::RawBytes;
+using testing::RunResult;
 using testing::says;
-using testing::Told;
 using PowerOn = Bench::PowerOn;
 class EncolinkHost : public testing::OnBothInterfaces {};
 INSTANTIATE_TEST_SUITE_P(Interfaces, EncolinkHost, ::testing::Values(Interface::uart, Interface::spi));
 
 TEST(EncolinkHostUart, ReadsPositionWithoutExtraTime) {
   Bench bench;
-  const Told read = bench.run("position");
+  const RunResult read = bench.run("position");
   EXPECT_EQ(read.took, (2 + 7) * 10us + answer_time);
   ASSERT_TRUE(read.reading);
   EXPECT_EQ(read.reading->singleturn, 0x12345u);
@@ -32,7 +32,7 @@ TEST(EncolinkHostUart, ReadsPositionWithoutExtraTime) {
 TEST(EncolinkHostSpi, LatchesPositionWhenNcsFalls) {
   Bench bench(testing::single, Interface::spi);
   bench.pass(1ms);
-  const Told read = bench.run("position");
+  const RunResult read = bench.run("position");
   ASSERT_TRUE(read.reading);
   // The line was idle for an unknown time, so the host waits for `spi_pause` first.
   EXPECT_EQ(read.reading->latched, 1ms + spi_pause);
@@ -68,7 +68,7 @@ TEST_P(EncolinkHost, ExplainsEachError) {
     Bench bench(testing::multi, interface);
     bench.tampered.replies(one.tamper);
     bench.tell(one.told);
-    const Told read = bench.run("position");
+    const RunResult read = bench.run("position");
     EXPECT_EQ(read.error, one.error) << one.words;
     EXPECT_TRUE(says(read.detail, one.words)) << read.detail;
     EXPECT_FALSE(read.reading);
@@ -87,7 +87,7 @@ TEST_P(EncolinkHost, ReadsIdentityWhenFormatIsUnknown) {
   for (const std::string_view real : {testing::single, testing::multi, std::string_view("resolution=17")}) {
     Bench bench(real, interface);
     bench.tell("");
-    const Told read = bench.run("position");
+    const RunResult read = bench.run("position");
     ASSERT_EQ(read.error, Error::none) << read.detail;
     const Format& format = bench.encoder.format();
     EXPECT_EQ(read.reading->singleturn_bits, format.resolution);
@@ -100,18 +100,18 @@ TEST_P(EncolinkHost, ReadsIdentityWhenFormatIsUnknown) {
 TEST_P(EncolinkHost, IdentityOverridesOptionsInInfoAndIdentify) {
   Bench bench("resolution=17 multiturn_bits=0", interface);
   bench.tell("resolution=20 multiturn_bits=0");
-  const Told info = bench.run("info");
+  const RunResult info = bench.run("info");
   ASSERT_TRUE(info.reading) << info.detail;
   EXPECT_EQ(info.numbers.at("resolution"), 17);
   EXPECT_EQ(info.reading->singleturn_bits, 17u);
   EXPECT_EQ(info.reading->multiturn_bits, 0u);
-  const Told identify = bench.run("identify");
+  const RunResult identify = bench.run("identify");
   EXPECT_EQ(identify.numbers.at("resolution"), 17);
   EXPECT_EQ(identify.numbers.at("frame_bytes"), 5);
   EXPECT_EQ(identify.texts.at("part_number"), "MB080SLA17MENT00");
 
   Bench coarse("resolution=20 multiturn_bits=12", interface);  // the identity does not report the number of turn bits
-  const Told turns = coarse.run("info");
+  const RunResult turns = coarse.run("info");
   ASSERT_TRUE(turns.reading);
   EXPECT_EQ(turns.reading->multiturn_bits, 12u);
   EXPECT_EQ(turns.reading->multiturn, 7u);
@@ -130,7 +130,7 @@ TEST_P(EncolinkHost, DoesNotBlameOptionsForUnknownIdentity) {
     reply[0] = 3;
     reply[identity_bytes - 1] = checksum(Bytes(reply).first(identity_bytes - 1));
   });
-  const Told identify = bench.run("identify");
+  const RunResult identify = bench.run("identify");
   EXPECT_EQ(identify.error, Error::unexpected_reply);
   EXPECT_FALSE(says(identify.detail, "resolution")) << identify.detail;
 }
@@ -140,7 +140,7 @@ TEST_P(EncolinkHost, AcceptsByteAfterIdentity) {
     Bench bench("resolution=20 multiturn_bits=16 identity_bytes=20", interface);
     bench.tell(told);
     for (int i = 0; i < 3; ++i) {
-      const Told position = bench.run("position");
+      const RunResult position = bench.run("position");
       ASSERT_TRUE(position.reading) << position.detail;
       EXPECT_EQ(position.reading->singleturn, 0x12345u);
       bench.pass(1ms);
@@ -160,7 +160,7 @@ TEST_P(EncolinkHost, ReadsIdentityUpToThreeTimes) {
     bench.tampered.replies([&](unsigned, RawBytes& reply) {
       if (reply.size() == identity_bytes && left > 0) --left, reply[3] ^= 0x01;
     });
-    const Told identify = bench.run("identify");
+    const RunResult identify = bench.run("identify");
     EXPECT_EQ(identify.error, error);
     EXPECT_EQ(identify.frames, 6u);
   }
@@ -179,11 +179,11 @@ TEST_P(EncolinkHost, AccessesNoRegistersOfVersion4) {
                                                                              {"preset-multiturn", {}},
                                                                              {"save", {}},
                                                                              {"self-calibrate", {}}}) {
-      const Told refused = bench.run(command, arguments);
+      const RunResult refused = bench.run(command, arguments);
       EXPECT_EQ(refused.error, Error::unsupported);
       EXPECT_EQ(refused.detail, not_described);
     }
-    const Told info = bench.run("info");
+    const RunResult info = bench.run("info");
     ASSERT_EQ(info.error, Error::none) << info.detail;
     EXPECT_EQ(info.numbers.at("protocol_version"), 4);
     EXPECT_EQ(info.texts.at("registers"), not_described);
@@ -203,7 +203,7 @@ TEST_P(EncolinkHost, ReadsDetailedStatusInOneCycle) {
     Bench bench(settings, interface);
     bench.shaft.spin(3000, bench.line.now());  // each frame has another position; the first frame of the cycle counts
     bench.device.raise_alarms(raised);
-    const Told read = bench.run("alarms");
+    const RunResult read = bench.run("alarms");
     ASSERT_EQ(read.error, Error::none) << read.detail;
     EXPECT_EQ(read.numbers.at("status"), raised);
     EXPECT_EQ(read.numbers.at("alarms"), raised);
@@ -219,7 +219,7 @@ TEST_P(EncolinkHost, ReadsAlarmsWhenStatusBitIsSet) {
            {{status::temperature, general::warning, true}, {status::signal_lost, general::error, false}})) {
     bench.device.lower_alarms(0xFFFF);
     bench.device.raise_alarms(alarm);
-    const Told read = bench.run("position");
+    const RunResult read = bench.run("position");
     ASSERT_TRUE(read.reading);
     EXPECT_EQ(read.reading->status, general);
     EXPECT_EQ(read.reading->alarms, std::uint32_t{alarm});
@@ -231,12 +231,12 @@ TEST_P(EncolinkHost, ReadsAlarmsWhenStatusBitIsSet) {
 TEST_P(EncolinkHost, ReportsChannel2ThatDisagrees) {
   Bench bench(testing::multi, interface);
   bench.condition(condition_channels_disagree, 1);
-  const Told status = bench.run("alarms");
+  const RunResult status = bench.run("alarms");
   EXPECT_EQ(status.error, Error::cross_check_failed);
   EXPECT_TRUE(says(status.detail, "channel 2 has another position")) << status.detail;
   bench.pass(spi_pause);
   EXPECT_EQ(bench.run("position").error, Error::none);  // positions stay readable
-  const Told read = bench.run("memory-read", {0x4C});
+  const RunResult read = bench.run("memory-read", {0x4C});
   EXPECT_EQ(read.error, Error::cross_check_failed);
   EXPECT_TRUE(says(read.detail, "channel 2 has another position")) << read.detail;
   EXPECT_GT(read.emits, 20u);
@@ -264,7 +264,7 @@ TEST_P(EncolinkHost, RepeatsInvalidCycle) {
                                            {damaged, Error::bad_checksum, 3 * 10}}) {
     Bench bench(testing::multi, interface);
     bench.tampered.replies(one.tamper);
-    const Told read = bench.run("alarms");
+    const RunResult read = bench.run("alarms");
     EXPECT_EQ(read.error, one.error);
     EXPECT_EQ(read.frames, one.frames);
   }
@@ -274,12 +274,12 @@ TEST_P(EncolinkHost, ZerosWithoutChannel2AreNotReady) {
   Bench bench(testing::single, interface);
   bench.restart(PowerOn::real);
   bench.line.wake(0);
-  const Told early = bench.run("position");
+  const RunResult early = bench.run("position");
   ASSERT_TRUE(early.reading);  // the zeros are a well-formed position
   EXPECT_FALSE(early.reading->ready);
   bench.pass(start_up);
   bench.shaft.put(0, 0);
-  const Told late = bench.run("position");
+  const RunResult late = bench.run("position");
   ASSERT_TRUE(late.reading);
   EXPECT_TRUE(late.reading->ready);
 }
@@ -293,7 +293,7 @@ TEST_P(EncolinkHost, ZerosWithWrongChannel2AreReady) {
     bench.shaft.put(0, 0);
     bench.condition(condition_channels_disagree, disagrees ? 1 : 0);
     bench.tampered.replies(disagrees ? author::testing::Tamper(none) : author::testing::Tamper(damaged));
-    const Told read = bench.run("position");
+    const RunResult read = bench.run("position");
     ASSERT_TRUE(read.reading) << read.detail;
     EXPECT_TRUE(read.reading->ready) << disagrees;
     bench.pass(spi_pause);
@@ -309,7 +309,7 @@ TEST_P(EncolinkHost, LatchedIsTimeOfPosition) {
     bench.tell(told);
     bench.shaft.spin(10'000, bench.line.now());
     for (int i = 0; i < 3; ++i) {
-      const Told read = bench.run("position");
+      const RunResult read = bench.run("position");
       ASSERT_TRUE(read.reading) << read.detail;
       EXPECT_EQ(read.reading->singleturn, bench.encoder.measure(read.reading->latched).singleturn);
       bench.pass(1ms);
@@ -325,7 +325,7 @@ TEST_P(EncolinkHost, ReadsOnlyPositionsWithoutChannel2) {
     EXPECT_EQ(bench.run(command, arguments).error, Error::unsupported);
   }
   bench.pass(spi_pause);
-  const Told info = bench.run("info");
+  const RunResult info = bench.run("info");
   EXPECT_EQ(info.error, Error::none);
   EXPECT_EQ(info.numbers.count("firmware_major"), 0u);
 }
@@ -374,7 +374,7 @@ TEST(EncolinkListen, SendsNothingToStreamingEncoder) {
     if (command.verb == Verb::read || command.name == "listen") continue;
     std::vector<std::int64_t> arguments;
     for (const Argument& argument : command.arguments) arguments.push_back(argument.default_value);
-    const Told refused = bench.run(command.name, arguments);
+    const RunResult refused = bench.run(command.name, arguments);
     EXPECT_EQ(refused.error, Error::unsupported) << command.name;
     EXPECT_TRUE(says(refused.detail, "stream_rate=0")) << command.name << ": " << refused.detail;
   }
@@ -447,10 +447,10 @@ TEST(EncolinkListen, ExplainsWhyNoFrameIsValid) {
     Listen listen(told);
     return bench.run(listen);
   };
-  const Told nothing = heard(testing::multi, testing::multi_format);
+  const RunResult nothing = heard(testing::multi, testing::multi_format);
   EXPECT_EQ(nothing.error, Error::timeout);
   EXPECT_EQ(nothing.took, listen_limit);
-  const Told other = heard(streaming, testing::single_format);
+  const RunResult other = heard(streaming, testing::single_format);
   EXPECT_NE(other.error, Error::none);
   EXPECT_TRUE(says(other.detail, "no two frames")) << other.detail;
   EXPECT_EQ(heard(streaming, {.resolution = 18, .multiturn_bits = 16}).error, Error::out_of_range);

@@ -8,15 +8,15 @@ namespace absenc::encolink {
 namespace {
 
 using testing::Bench;
+using testing::RunResult;
 using testing::says;
-using testing::Told;
 using PowerOn = Bench::PowerOn;
 class EncolinkProcedure : public testing::OnBothInterfaces {};
 INSTANTIATE_TEST_SUITE_P(Interfaces, EncolinkProcedure, ::testing::Values(Interface::uart, Interface::spi));
 
 TEST_P(EncolinkProcedure, ZeroSurvivesPowerOffWhenSaved) {
   Bench bench(testing::multi, interface);
-  const Told zero = bench.run("zero");
+  const RunResult zero = bench.run("zero");
   ASSERT_EQ(zero.error, Error::none) << zero.detail;
   EXPECT_EQ(zero.reading->singleturn, 0u);
   EXPECT_EQ(zero.numbers.at("position_offset"), (1 << 20) - 0x12345);
@@ -54,7 +54,7 @@ TEST_P(EncolinkProcedure, ZeroWithWrongSignRestoresOldOffset) {
   Bench bench("resolution=20 multiturn_bits=0 offset_sign=subtract", interface);
   bench.tell(testing::single);
   ASSERT_EQ(bench.run("memory-write", {0, 0x10000}).error, Error::none);
-  const Told wrong = bench.run("zero");
+  const RunResult wrong = bench.run("zero");
   EXPECT_EQ(wrong.error, Error::cross_check_failed);
   EXPECT_TRUE(says(wrong.advice, "offset_sign")) << wrong.advice;
   EXPECT_EQ(bench.encoder.offset(), 0x10000u);
@@ -74,7 +74,7 @@ TEST_P(EncolinkProcedure, ZeroNeedsShaftAtRestAndValidPosition) {
 
 TEST_P(EncolinkProcedure, PresetsTurns) {
   Bench bench(testing::multi, interface);
-  const Told preset = bench.run("preset-multiturn", {1234});
+  const RunResult preset = bench.run("preset-multiturn", {1234});
   ASSERT_EQ(preset.error, Error::none) << preset.detail;
   EXPECT_EQ(preset.reading->multiturn, 1234u);
   EXPECT_EQ(preset.reading->singleturn, 0x12345u);
@@ -90,15 +90,15 @@ TEST_P(EncolinkProcedure, PresetsTurns) {
 
 TEST_P(EncolinkProcedure, SelfCalibrationEmitsProgress) {
   Bench bench(testing::single, interface);
-  const Told still = bench.run("self-calibrate");
+  const RunResult still = bench.run("self-calibrate");
   EXPECT_EQ(still.error, Error::cross_check_failed);
   EXPECT_TRUE(says(still.detail, "did not turn far enough")) << still.detail;
   EXPECT_TRUE(says(still.advice, "turn it evenly")) << still.advice;
   bench.shaft.spin(120, bench.line.now());
   for (const unsigned count : {1u, 2u, 3u, 0u}) {
     unsigned running = 0;
-    const Told told = bench.run("self-calibrate", {}, [&](const auto& emitted) {
-      Told now;
+    const RunResult told = bench.run("self-calibrate", {}, [&](const auto& emitted) {
+      RunResult now;
       now.take(emitted);
       running += now.numbers.at("running") != 0 ? 1 : 0;
     });

@@ -10,8 +10,8 @@ namespace absenc::esl::testing {
 
 using author::testing::HostedLine;
 using author::testing::PowerOn;
+using author::testing::RunResult;
 using author::testing::Tamper;
-using author::testing::Told;
 using author::testing::wire;
 using author::testing::Wire;
 using Talk = author::testing::Talk<std::uint8_t>;

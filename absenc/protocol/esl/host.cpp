@@ -18,7 +18,7 @@ constexpr unsigned safe_attempts = 6;
 Request request_of(const Dialog& dialog, DataId id) { return {id, dialog.format().address}; }
 
 // Stores the reply of the last exchange, with its times.
-void show_last(const Dialog& dialog, Found& found) {
+void show_last(const Dialog& dialog, ProcedureResult& found) {
   found.show(dialog.last());
   found.reading = dialog.last_reading();
 }
@@ -32,7 +32,7 @@ void describe(Sentence& words, std::uint8_t id) {
 
 }  // namespace
 
-Procedure read_encoder_id(Dialog& dialog, Found& found) {
+Procedure read_encoder_id(Dialog& dialog, ProcedureResult& found) {
   co_await dialog.ask(request_of(dialog, DataId::singleturn_short));
   const Reply reply = co_await dialog.ask(request_of(dialog, DataId::encoder_id));
   found.show(reply);
@@ -47,7 +47,7 @@ Procedure read_encoder_id(Dialog& dialog, Found& found) {
              "bits stand in ABS"};
 }
 
-Procedure read_safely(Dialog& dialog, FoundSafe& found) {
+Procedure read_safely(Dialog& dialog, SafePositionResult& found) {
   SafetyMonitor monitor(dialog.format());
   found.has_turns = false;  // a safe position has none
   for (;;) {
@@ -114,7 +114,7 @@ Explanation failed_part(Sentence& words, DataId id, const Reply& before, const R
 
 }  // namespace
 
-Procedure reset(Dialog& dialog, Found& found, DataId id) {
+Procedure reset(Dialog& dialog, ProcedureResult& found, DataId id) {
   const Request look = request_of(dialog, position_id(dialog.format()));
   const Reply first = co_await dialog.ask(look).repeated(attempts);
   const Reply before = co_await dialog.ask(look).repeated(attempts).after(author::between_looks);
@@ -187,7 +187,7 @@ author::Part<std::uint8_t> read_byte(Dialog& dialog, std::uint8_t page, std::uin
 
 }  // namespace
 
-Procedure read_memory(Dialog& dialog, Found& found, Arguments arguments) {
+Procedure read_memory(Dialog& dialog, ProcedureResult& found, Arguments arguments) {
   const auto page = static_cast<std::uint8_t>(arguments[1]);
   const auto begin = static_cast<std::uint8_t>(arguments[0]);
   const auto end = static_cast<unsigned>(begin + arguments[2]);
@@ -206,7 +206,7 @@ Procedure read_memory(Dialog& dialog, Found& found, Arguments arguments) {
   co_return done;
 }
 
-Procedure write_memory(Dialog& dialog, Found& found, Arguments arguments) {
+Procedure write_memory(Dialog& dialog, ProcedureResult& found, Arguments arguments) {
   const auto address = static_cast<std::uint8_t>(arguments[0]);
   const auto value = static_cast<std::uint8_t>(arguments[1]);
   const auto page = static_cast<std::uint8_t>(arguments[2]);
@@ -239,7 +239,7 @@ Procedure write_memory(Dialog& dialog, Found& found, Arguments arguments) {
              "look at what is there with `absenc memory read` before you write it again", eeprom_read_pause};
 }
 
-Procedure select_page(Dialog& dialog, Found& found, Arguments arguments) {
+Procedure select_page(Dialog& dialog, ProcedureResult& found, Arguments arguments) {
   const auto page = static_cast<std::uint8_t>(arguments[0]);
   if (!is_page(page)) co_return {Error::invalid_argument, "Table 11 lists no such page; nothing was sent"};
   dialog.changes();
@@ -253,7 +253,7 @@ Procedure select_page(Dialog& dialog, Found& found, Arguments arguments) {
 namespace {
 
 // Finds the cause in SF. A bit that another raised alarm sets as well is ambiguous, unless the other bit is clear.
-bool find_cause_in_status(Found& found, const Reply& reply) {
+bool find_cause_in_status(ProcedureResult& found, const Reply& reply) {
   constexpr unsigned other_safety = alarms::unsafe & ~unsigned{alarms::led_or_lissajous_error};
   constexpr unsigned other_non_safety = alarms::turns_wrong | alarms::overspeed;
   const unsigned raised = reply.one.alarms | reply.two.alarms;
@@ -268,7 +268,7 @@ bool find_cause_in_status(Found& found, const Reply& reply) {
 
 }  // namespace
 
-Procedure read_error_info(Dialog& dialog, Found& found) {
+Procedure read_error_info(Dialog& dialog, ProcedureResult& found) {
   if (dialog.format().bus == sharing_yes) {
     const Reply reply = co_await dialog.ask(request_of(dialog, DataId::alarms));
     found.show(reply);

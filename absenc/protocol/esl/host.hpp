@@ -15,7 +15,7 @@ namespace absenc::esl {
 using Dialog = author::DialogOf<Protocol>;
 
 /// Result of a procedure.
-struct Found : Shown {
+struct ProcedureResult : Shown {
   Reading reading{};                     ///< The position.
   ByteBuffer<last_address + 1> bytes{};  ///< bytes of `data`
   Sentence words{};                      ///< detail of the error
@@ -23,39 +23,39 @@ struct Found : Shown {
 
 /// Reads ID 8 after an ID 5, so that eight of these procedures in a row do not send eight IDs 8 in a row. Error:
 /// unexpected_reply (another encoder than the options state).
-author::Procedure read_encoder_id(Dialog& dialog, Found& found);
+author::Procedure read_encoder_id(Dialog& dialog, ProcedureResult& found);
 
 /// Result of a safety reading: each emit is one.
-struct FoundSafe : Found {
+struct SafePositionResult : ProcedureResult {
   static constexpr bool streams = true;  ///< The command streams.
 };
 /// Reads safe positions without end: IDs 1 and 2 until the monitor trusts the line, which takes two exchanges without
 /// errors, then one exchange each, so that the sequence counter is compared from reading to reading. Errors: those of
 /// the check that failed.
-author::Procedure read_safely(Dialog& dialog, FoundSafe& found);
+author::Procedure read_safely(Dialog& dialog, SafePositionResult& found);
 
 /// Sends IDs B (single-turn zero here), C (clear alarms) and D (turns): makes sure that the shaft stands still, sends
 /// eight requests, and verifies the result. Errors: invalid_argument (the shaft turns, the encoder is not ready),
 /// cross_check_failed (the encoder did not execute it; the detail names what remains), or that of an exchange.
-author::Procedure reset(Dialog& dialog, Found& found, DataId id);
+author::Procedure reset(Dialog& dialog, ProcedureResult& found, DataId id);
 
 // ---- Memory (Tables 9 to 11, Figures 14 and 15); only with one encoder on the line
 
 /// Reads bytes. Arguments: address, page, count. Errors: invalid_argument (not in Table 11), busy.
-author::Procedure read_memory(Dialog& dialog, Found& found, Arguments arguments);
+author::Procedure read_memory(Dialog& dialog, ProcedureResult& found, Arguments arguments);
 
 /// Reads a byte, writes it if it differs, waits, and reads it back. Arguments: address, value, page, force. Errors:
 /// invalid_argument (not in Table 11, or protected and without force), busy, cross_check_failed (another value was read
 /// back).
-author::Procedure write_memory(Dialog& dialog, Found& found, Arguments arguments);
+author::Procedure write_memory(Dialog& dialog, ProcedureResult& found, Arguments arguments);
 
 /// Selects a page, for users who send memory requests themselves. Arguments: page.
-author::Procedure select_page(Dialog& dialog, Found& found, Arguments arguments);
+author::Procedure select_page(Dialog& dialog, ProcedureResult& found, Arguments arguments);
 
 /// Finds whether the LED or the Lissajous signals raise led_or_lissajous_error: reads page 8 address 1A, then selects
 /// the page before again; with several encoders on the line, reads SF (Table 5). Error: unsupported (other alarms raise
 /// the same bits of SF).
-author::Procedure read_error_info(Dialog& dialog, Found& found);
+author::Procedure read_error_info(Dialog& dialog, ProcedureResult& found);
 
 // ---- Several encoders on one line
 

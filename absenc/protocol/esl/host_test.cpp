@@ -13,14 +13,14 @@ namespace absenc::esl {
 namespace {
 
 using testing::Bench;
-using testing::Told;
+using testing::RunResult;
 using testing::Wire;
 using testing::wire;
 
 TEST(EslHost, ReadsTheSafetyPositionInTheTimeOfTheWire) {
   Bench bench;
   bench.shaft.put(4660, 0xABCDEF);
-  const Told read = bench.run("position");
+  const RunResult read = bench.run("position");
   ASSERT_EQ(read.error, Error::none);
   EXPECT_EQ(bench.line.now(), request_pause + 2us + answer_time + 18us);
   ASSERT_TRUE(read.reading.has_value());
@@ -86,7 +86,7 @@ TEST(EslHost, ReportsEncoderIdThatDiffersFromOptions) {
       sent->one.encoder_id = sent->two.encoder_id = id;
       reply = wire(*sent);
     });
-    const Told told = bench.run("encoder-id");
+    const RunResult told = bench.run("encoder-id");
     EXPECT_EQ(text_of(told.error).name, "unexpected_reply");
     EXPECT_TRUE(told.says(words)) << told.detail;
     EXPECT_NE(told.advice.find("model"), std::string::npos) << told.advice;
@@ -97,7 +97,7 @@ TEST(EslHost, SingleTurnEncoderHasNoTurns) {
   Bench bench({.turns = false});
   bench.shaft.put(7, 0xABCDEF);
   for (const char* command : {"position", "position-short", "safe-position"}) {
-    const Told read = bench.run(command);
+    const RunResult read = bench.run(command);
     ASSERT_EQ(read.error, Error::none) << command;
     EXPECT_EQ(read.reading->singleturn, 0xABCDEFu) << command;
     EXPECT_EQ(read.reading->multiturn_validity(), Validity::absent) << command;
@@ -107,7 +107,7 @@ TEST(EslHost, SingleTurnEncoderHasNoTurns) {
   EXPECT_EQ(bench.run("zero").error, Error::none);
   EXPECT_EQ(bench.read().singleturn, 0u);
   const std::uint64_t answered = bench.encoder.answer_count();
-  const Told reset = bench.run("reset-multiturn");
+  const RunResult reset = bench.run("reset-multiturn");
   EXPECT_EQ(reset.error, Error::unsupported);
   EXPECT_TRUE(reset.says("one turn")) << reset.detail;
   EXPECT_EQ(bench.encoder.answer_count(), answered);
@@ -117,7 +117,7 @@ TEST(EslHost, TurnsFromSingleTurnEncoderAreAnError) {
   Bench bench;
   bench.shaft.put(7, 0);
   bench.options = testing::options_of({.turns = false});
-  const Told read = bench.run("position-short");
+  const RunResult read = bench.run("position-short");
   EXPECT_EQ(read.error, Error::out_of_range);
   EXPECT_TRUE(read.says("turns=false")) << read.detail;
 }
@@ -167,7 +167,7 @@ TEST(EslHost, HostAndEncoderAgreeInEveryProfile) {
       options.put(profile, option, static_cast<std::int64_t>(value));
       Bench bench(profile);
       bench.shaft.put(-1, 0xABCDEF);
-      const Told safe = bench.run("safe-position");
+      const RunResult safe = bench.run("safe-position");
       ASSERT_EQ(safe.error, Error::none) << safe.detail;
       EXPECT_EQ(safe.numbers.at("safe_singleturn"), 0xABCDEF);
       EXPECT_EQ(safe.numbers.at("encoder_address"), 5);
@@ -183,7 +183,7 @@ TEST(EslHost, HostAndEncoderAgreeInEveryProfile) {
 TEST(EslHost, SilenceIsATimeout) {
   Bench bench;
   bench.encoder.power_off(Time{});
-  const Told read = bench.run("position");
+  const RunResult read = bench.run("position");
   EXPECT_EQ(read.error, Error::timeout);
   EXPECT_EQ(bench.line.now(), request_pause + 2us + answer_limit);
   EXPECT_EQ(read.detail, "it is also silent when request_crc, crc_bit_order or address is another");
@@ -213,7 +213,7 @@ TEST(EslHost, ExplainsInvalidReplies) {
   };
   for (const Row& row : rows) {
     Bench bench({}, row.tamper);
-    const Told read = bench.run("position");
+    const RunResult read = bench.run("position");
     EXPECT_EQ(text_of(read.error).name, text_of(row.error).name) << row.sentence;
     EXPECT_TRUE(read.says(row.sentence)) << read.detail;
     EXPECT_FALSE(read.reading.has_value());
@@ -261,7 +261,7 @@ TEST(EslHost, NamesProfileThatFits) {
     Bench bench(row.encoder);
     bench.shaft.put(0, 0xABCDEF);
     bench.options = testing::options_of(row.host);
-    const Told read = bench.run(row.command);
+    const RunResult read = bench.run(row.command);
     EXPECT_NE(read.error, Error::none) << row.sentence;
     EXPECT_TRUE(read.says(row.sentence)) << row.sentence << ": " << read.detail;
   }
@@ -282,7 +282,7 @@ TEST(EslHost, EndsOnEndlessNoise) {
     Shouting shouting;
     Bench bench;
     bench.line.attach(sim::NodeRole::device, shouting);
-    const Told read = bench.run(command);
+    const RunResult read = bench.run(command);
     EXPECT_EQ(read.error, Error::wrong_length);
     EXPECT_TRUE(read.finished);
     EXPECT_TRUE(read.says("without a pause")) << read.detail;

@@ -8,7 +8,7 @@ namespace absenc::esl {
 namespace {
 
 using testing::Bench;
-using testing::Told;
+using testing::RunResult;
 using testing::Wire;
 using testing::wire;
 
@@ -18,16 +18,16 @@ constexpr const char* write = "memory-write";
 
 TEST(EslMemory, WritesMemoryOnlyIfItDiffersAndReadsItBack) {
   Bench bench;
-  const Told first = bench.run(write, {0x7E, 0x5A, 0});
+  const RunResult first = bench.run(write, {0x7E, 0x5A, 0});
   EXPECT_EQ(first.error, Error::none) << first.detail;
   EXPECT_EQ(first.numbers.at("written"), 1);
   EXPECT_EQ(bench.encoder.answer_count(), 6u);  // page select, two reads, the write, and two reads after it
   EXPECT_EQ(*bench.encoder.stored(0, 0x7E), 0x5A);
-  const Told same = bench.run(write, {0x7E, 0x5A, 0});
+  const RunResult same = bench.run(write, {0x7E, 0x5A, 0});
   EXPECT_EQ(same.error, Error::none);
   EXPECT_EQ(same.numbers.at("written"), 0);
   EXPECT_EQ(bench.encoder.memory_version(), 1u);
-  const Told bytes = bench.run(read, {0x78, 0, 7});
+  const RunResult bytes = bench.run(read, {0x78, 0, 7});
   EXPECT_EQ(bytes.error, Error::none) << bytes.detail;
   EXPECT_EQ(bytes.texts.at("data"), std::string("\0\0\0\0\0\0\x5A", 7));
   EXPECT_EQ(bytes.numbers.at("memory_address"), 0x78);
@@ -37,7 +37,7 @@ TEST(EslMemory, WritesMemoryOnlyIfItDiffersAndReadsItBack) {
 TEST(EslMemory, ProtectedMemoryNeedsForce) {
   for (const MemoryArea& area : memory_map) {
     Bench bench;
-    const Told closed = bench.run(write, {area.first, 0x42, area.page});
+    const RunResult closed = bench.run(write, {area.first, 0x42, area.page});
     EXPECT_EQ(closed.error, area.page <= 3 ? Error::none : Error::invalid_argument);
     EXPECT_EQ(closed.says("needs force") && closed.says(std::string(area.meaning)), area.page > 3) << closed.detail;
     EXPECT_EQ(bench.encoder.answer_count() > 0, area.page <= 3);
@@ -53,7 +53,7 @@ TEST(EslMemory, RefusesUnlistedMemoryBeforeSending) {
         std::pair{write, std::vector<std::int64_t>{page_select_address, 1, 0, 1}},
         std::pair{write, std::vector<std::int64_t>{0, 1, 7, 1}},
         std::pair{"select-page", std::vector<std::int64_t>{9}}}) {
-    const Told refused = bench.run(command, arguments);
+    const RunResult refused = bench.run(command, arguments);
     EXPECT_EQ(refused.error, Error::invalid_argument);
     EXPECT_TRUE(refused.says("nothing was sent"));
   }
@@ -64,7 +64,7 @@ TEST(EslMemory, RestoresThePageBefore) {
   for (const std::uint8_t before : std::to_array<std::uint8_t>({0, 8, 14})) {
     Bench bench;
     ASSERT_EQ(bench.run("select-page", {before}).error, Error::none);
-    const Told info = bench.run("led-or-lissajous");
+    const RunResult info = bench.run("led-or-lissajous");
     EXPECT_EQ(info.error, Error::none);
     EXPECT_FALSE(info.numbers.contains("page_left"));
     EXPECT_EQ(bench.raw(Request{DataId::read_memory, 0, page_select_address})[2], before);
@@ -79,7 +79,7 @@ TEST(EslMemory, RestoresThePageBefore) {
     });
     bench.raw(Request{DataId::write_memory, 0, page_select_address, 0});
     bench.pass(page_time);
-    const Told info = bench.run("led-or-lissajous");
+    const RunResult info = bench.run("led-or-lissajous");
     EXPECT_EQ(info.error, Error::none);
     ASSERT_TRUE(info.numbers.contains("page_left")) << first;
     EXPECT_EQ(info.numbers.at("page_left"), 8);
@@ -90,7 +90,7 @@ TEST(EslMemory, DetectsPageThatIsNotSelected) {
   Bench bench({}, [](unsigned index, Wire& reply) {
     if (index == 1) reply = wire({.id = DataId::read_memory, .memory_address = page_select_address, .value = 3});
   });
-  const Told select = bench.run("select-page", {4});
+  const RunResult select = bench.run("select-page", {4});
   EXPECT_EQ(select.error, Error::cross_check_failed);
   EXPECT_EQ(select.detail, "another page is selected");
 }
@@ -100,7 +100,7 @@ TEST(EslMemory, RefusesMemoryOnABus) {
   for (const auto& [command, arguments] :
        {std::pair{read, std::vector<std::int64_t>{0}}, std::pair{write, std::vector<std::int64_t>{0, 1, 0}},
         std::pair{"select-page", std::vector<std::int64_t>{0}}}) {
-    const Told refused = bench.run(command, arguments);
+    const RunResult refused = bench.run(command, arguments);
     EXPECT_EQ(refused.error, Error::unsupported);
     EXPECT_TRUE(refused.says("several encoders on the line")) << refused.detail;
   }
@@ -112,7 +112,7 @@ TEST(EslMemory, EndsIfMemoryStaysBusy) {
   Bench bench({}, [](unsigned index, Wire& reply) {
     if (index > 0) reply = wire({.id = DataId::read_memory, .memory_address = 1, .busy = true});
   });
-  const Told bytes = bench.run(read, {1, 0});
+  const RunResult bytes = bench.run(read, {1, 0});
   EXPECT_EQ(bytes.error, Error::busy);
   EXPECT_TRUE(bytes.says("stays busy"));
   EXPECT_GT(bench.line.now(), page_time + 2 * page_time);
@@ -125,7 +125,7 @@ TEST(EslMemory, IgnoresEepromByteWithoutABusyReplyBefore) {
     if (index == 1) reply = wire({.id = DataId::read_memory, .memory_address = 5, .value = 0x77});
   });
   *bench.encoder.stored(0, 5) = 0x78;
-  const Told bytes = bench.run(read, {5, 0});
+  const RunResult bytes = bench.run(read, {5, 0});
   EXPECT_EQ(bytes.error, Error::none);
   EXPECT_EQ(bytes.numbers.at("value"), 0x78);
 }
@@ -149,7 +149,7 @@ TEST(EslMemory, WriteErrors) {
     Bench bench({}, [&row](unsigned index, Wire& reply) {
       if (index == row.index) row.tamper(index, reply);
     });
-    const Told outcome = bench.run(write, {10, 0x33, 1});
+    const RunResult outcome = bench.run(write, {10, 0x33, 1});
     EXPECT_EQ(outcome.error, row.error) << row.index << outcome.detail;
     EXPECT_TRUE(outcome.says(row.words)) << outcome.detail;
     EXPECT_EQ(bench.encoder.memory_version(), row.writes) << row.index;
@@ -160,7 +160,7 @@ TEST(EslMemory, WriteErrors) {
     Bench bench({}, [from = from](unsigned index, Wire& reply) {
       if (index >= from) reply[2] ^= 1;
     });
-    const Told outcome = bench.run(write, {10, 0x33, 1});
+    const RunResult outcome = bench.run(write, {10, 0x33, 1});
     EXPECT_EQ(outcome.error, Error::bad_checksum) << from;
     EXPECT_TRUE(outcome.says(words)) << outcome.detail;
     EXPECT_GE(bench.line.now(), outcome.received_at + (from == 0 ? page_time : eeprom_read_time));
@@ -175,7 +175,7 @@ TEST(EslMemory, DistinguishesLedAndLissajous) {
     const std::uint8_t sf = bench.read().one.status;
     EXPECT_EQ(sf & (status::safety_error | status::non_safety_error),
               lissajous ? status::non_safety_error : status::safety_error);
-    const Told info = bench.run("led-or-lissajous");
+    const RunResult info = bench.run("led-or-lissajous");
     EXPECT_EQ(info.error, Error::none);
     EXPECT_EQ(info.numbers.at("led_error"), lissajous ? 0 : 1);
     EXPECT_EQ(info.numbers.at("lissajous_error"), lissajous ? 1 : 0);
@@ -201,7 +201,7 @@ TEST(EslMemory, DistinguishesLedAndLissajousOnABusByStatus) {
     Bench bench({.bus = sharing_yes});
     bench.condition(condition::lissajous, row.lissajous ? 1 : 0);
     bench.encoder.raise_alarms(row.alarms);
-    const Told info = bench.run("led-or-lissajous");
+    const RunResult info = bench.run("led-or-lissajous");
     ASSERT_EQ(info.error, Error::none) << row.alarms;
     const auto told = [&info](const char* name) {
       return info.numbers.count(name) != 0 ? static_cast<int>(info.numbers.at(name)) : open;
@@ -212,7 +212,7 @@ TEST(EslMemory, DistinguishesLedAndLissajousOnABusByStatus) {
   }
   Bench bench({.bus = sharing_yes});
   bench.encoder.raise_alarms(led_or_lissajous_error | alarms::memory_error | alarms::overspeed);
-  const Told info = bench.run("led-or-lissajous");
+  const RunResult info = bench.run("led-or-lissajous");
   EXPECT_EQ(info.error, Error::unsupported);
   EXPECT_TRUE(info.says("other alarms")) << info.detail;
 }

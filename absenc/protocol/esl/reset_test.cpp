@@ -11,7 +11,7 @@ namespace absenc::esl {
 namespace {
 
 using testing::Bench;
-using testing::Told;
+using testing::RunResult;
 using testing::Wire;
 using testing::wire;
 
@@ -19,7 +19,7 @@ TEST(EslReset, Resets) {
   Bench bench;
   bench.shaft.put(12, 4'000'000);
   bench.encoder.raise_alarms(alarms::xc_error);
-  Told after = bench.run("clear-alarms");
+  RunResult after = bench.run("clear-alarms");
   EXPECT_EQ(after.error, Error::none) << after.detail;
   EXPECT_EQ(after.reading->alarms, 0u);
   EXPECT_EQ(after.reading->multiturn, 12u);
@@ -74,7 +74,7 @@ TEST(EslReset, NamesAlarmsThatRemain) {
                   "memory_error, singleturn_error remain; switch the encoder off and on"}}) {
     Bench bench;
     bench.encoder.raise_alarms(static_cast<std::uint32_t>(raised));
-    const Told clear = bench.run("clear-alarms");
+    const RunResult clear = bench.run("clear-alarms");
     EXPECT_EQ(clear.error, Error::cross_check_failed);
     EXPECT_EQ(clear.detail, sentence);
   }
@@ -87,10 +87,10 @@ TEST(EslReset, MultiturnErrorNeedsDThenC) {
   Bench bench;
   bench.shaft.put(7, 100);
   bench.encoder.raise_alarms(alarms::multiturn_error);
-  const Told turns = bench.run("reset-multiturn");
+  const RunResult turns = bench.run("reset-multiturn");
   EXPECT_EQ(turns.error, Error::none);
   EXPECT_EQ(turns.numbers.at("ch1_alarms"), alarms::multiturn_error);
-  const Told clear = bench.run("clear-alarms");
+  const RunResult clear = bench.run("clear-alarms");
   EXPECT_EQ(clear.error, Error::none);
   EXPECT_EQ(clear.numbers.at("ch1_alarms"), 0);
 }
@@ -99,7 +99,7 @@ TEST(EslReset, DetectsIdDThatMovesTheZero) {
   Bench bench;
   bench.shaft.put(7, 1'000'000);
   bench.condition(condition::id_d_clears_singleturn, 1);
-  const Told turns = bench.run("reset-multiturn");
+  const RunResult turns = bench.run("reset-multiturn");
   EXPECT_EQ(turns.error, Error::cross_check_failed);
   EXPECT_TRUE(turns.says("single-turn zero too"));
 }
@@ -108,14 +108,14 @@ TEST(EslReset, SendsNoResetToTurningOrStartingEncoder) {
   for (const std::int32_t rpm : {5, -5}) {
     Bench bench;
     bench.shaft.spin(rpm, Time{});
-    const Told zero = bench.run("zero");
+    const RunResult zero = bench.run("zero");
     EXPECT_EQ(zero.error, Error::not_still);
     EXPECT_TRUE(zero.says("nothing was changed"));
     EXPECT_EQ(bench.encoder.answer_count(), 2u);  // only two positions were read
   }
   Bench starting;
   starting.restart(testing::PowerOn::real);
-  const Told zero = starting.run("zero");
+  const RunResult zero = starting.run("zero");
   EXPECT_EQ(zero.error, Error::invalid_argument);
   EXPECT_TRUE(zero.says("not ready"));
 }
@@ -125,7 +125,7 @@ TEST(EslReset, SendsNoZeroAtInvalidPosition) {
   Bench bench;
   bench.shaft.put(7, 1'000'000);
   bench.encoder.raise_alarms(alarms::singleturn_error);
-  const Told zero = bench.run("zero");
+  const RunResult zero = bench.run("zero");
   EXPECT_EQ(zero.error, Error::invalid_argument);
   EXPECT_TRUE(zero.says("does not hold")) << zero.detail;
   EXPECT_EQ(bench.encoder.answer_count(), 2u);
@@ -150,7 +150,7 @@ TEST(EslReset, LostReplyStopsAResetUnlessItIsTheLast) {
       if (index >= row.first && index <= row.last) reply.pop_back();
     });
     bench.shaft.put(5, 0);
-    const Told reset = bench.run("reset-multiturn");
+    const RunResult reset = bench.run("reset-multiturn");
     EXPECT_EQ(reset.error, row.error) << row.first;
     EXPECT_TRUE(reset.says(row.words)) << reset.detail;
     EXPECT_EQ(bench.encoder.answer_count(), row.sent) << row.first;
@@ -168,7 +168,7 @@ TEST(EslReset, DetectsResetThatFailed) {
                     .singleturn = static_cast<std::uint32_t>(counts),
                     .multiturn = static_cast<std::uint16_t>(turns)});
     });
-    const Told reset = bench.run(command);
+    const RunResult reset = bench.run(command);
     EXPECT_EQ(reset.error, Error::cross_check_failed);
     EXPECT_TRUE(reset.says(words)) << reset.detail;
     EXPECT_FALSE(reset.reading.has_value());

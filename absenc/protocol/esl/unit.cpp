@@ -88,12 +88,14 @@ constexpr Shown values_of_reply(const Profile& profile, const Request&, const Re
   shown.has_turns = profile.turns;
   return shown;
 }
-void put_found(FieldSink& sink, const Profile& profile, const Found& found) {
+void put_found(FieldSink& sink, const Profile& profile, const ProcedureResult& found) {
   Shown shown = found;
   shown.has_turns = found.has_turns && profile.turns;
   fields.put(sink, shown);
 }
-void put_safe(FieldSink& sink, const Profile& profile, const FoundSafe& found) { put_found(sink, profile, found); }
+void put_safe(FieldSink& sink, const Profile& profile, const SafePositionResult& found) {
+  put_found(sink, profile, found);
+}
 void put_nodes(FieldSink& sink, const Profile&, const Nodes& nodes) {
   for (std::uint8_t node = 0; node < most_encoders; ++node) {
     const std::optional<Reply>& reply = nodes.answers[node];
@@ -144,8 +146,8 @@ constexpr Report<Protocol, HostOf<Protocol>> report{
     .explain = explain_reply,
     .tell = tell,
 };
-constexpr Finding<Profile, Found> found{.put = put_found};
-constexpr Finding<Profile, FoundSafe> found_safe{.put = put_safe};
+constexpr Finding<Profile, ProcedureResult> found{.put = put_found};
+constexpr Finding<Profile, SafePositionResult> found_safe{.put = put_safe};
 constexpr Finding<Profile, Nodes> nodes{.put = put_nodes};
 
 template <DataId data>

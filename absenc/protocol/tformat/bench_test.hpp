@@ -15,8 +15,8 @@ namespace absenc::tformat::testing {
 
 using author::testing::Numbers;
 using author::testing::PowerOn;
+using author::testing::RunResult;
 using author::testing::Tamper;
-using author::testing::Told;
 using author::testing::wire;
 using author::testing::Wire;
 using Talk = author::testing::Talk<std::uint8_t>;

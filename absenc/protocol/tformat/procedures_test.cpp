@@ -76,7 +76,7 @@ TEST(TformatProcedures, ReportsWhatAnInterruptedProcedureLeaves) {
     const testing::Talk made(unit, bench.options, name);
     bench.line.put_on(*made);
     bench.pass(time);
-    testing::Told told;
+    testing::RunResult told;
     made->report_left(told);
     EXPECT_EQ(told.numbers, left ? (Numbers{{"page_left", 7}}) : Numbers{}) << name << time.count();
   }

@@ -22,7 +22,7 @@ using namespace author;
 using Dialog = DialogOf<Protocol>;
 
 // Result of a procedure.
-struct Found : Values {
+struct ProcedureResult : Values {
   Reading reading{};
   ByteBuffer<page_addresses> bytes{};  // bytes of `data`
   std::optional<std::uint8_t> selected{};
@@ -72,7 +72,7 @@ Explanation failed_part(DataId id, const Reply& now, unsigned bits) {
 
 // Sends data ID 7 (latched alarms), 8 (single-turn zero here) or C (turns and latched alarms): makes sure that the
 // shaft stands still, sends ten requests, and verifies the result.
-Procedure reset(Dialog& dialog, Found& found, DataId id) {
+Procedure reset(Dialog& dialog, ProcedureResult& found, DataId id) {
   const Reply first = co_await dialog.ask({DataId::everything});
   const Reply second = co_await dialog.ask({DataId::everything}).after(between_looks);
   const Outcome why_not = objection(dialog.format(), id, first, second);
@@ -129,13 +129,13 @@ Part<std::uint8_t> execute(Dialog& dialog, Request request, std::string_view ste
   co_return reply->value;
 }
 
-Part<std::uint8_t> select_page(Dialog& dialog, Found& found, std::uint8_t page, std::string_view step) {
+Part<std::uint8_t> select_page(Dialog& dialog, ProcedureResult& found, std::uint8_t page, std::string_view step) {
   found.selected = page;
   const std::uint8_t selected = co_await execute(dialog, {DataId::write_memory, page_select_address, page}, step);
   co_return selected;
 }
 
-Procedure read_memory(Dialog& dialog, Found& found, Arguments arguments) {
+Procedure read_memory(Dialog& dialog, ProcedureResult& found, Arguments arguments) {
   const auto address = byte(arguments[0]);
   const auto page = byte(arguments[1]);
   for (std::int64_t i = 0; i < arguments[2]; ++i) {
@@ -158,7 +158,7 @@ Procedure read_memory(Dialog& dialog, Found& found, Arguments arguments) {
 
 // Writes a byte on the selected page: reads it, writes it if it differs (100 000 writes are permitted in total), waits,
 // selects the page again so that the EEPROM itself is read, and compares.
-Part<bool> write_byte(Dialog& dialog, Found& found, std::uint8_t address, std::uint8_t value) {
+Part<bool> write_byte(Dialog& dialog, ProcedureResult& found, std::uint8_t address, std::uint8_t value) {
   const Request look{DataId::read_memory, address};
   const std::uint8_t before = co_await execute(dialog, look, "nothing was written");
   found.written = before != value;
@@ -182,7 +182,7 @@ Part<bool> write_byte(Dialog& dialog, Found& found, std::uint8_t address, std::u
   co_return true;
 }
 
-Procedure write_memory(Dialog& dialog, Found& found, Arguments arguments) {
+Procedure write_memory(Dialog& dialog, ProcedureResult& found, Arguments arguments) {
   const auto address = byte(arguments[0]);
   const auto page = byte(arguments[2]);
   const MemoryArea* const area = find_area(page, address);
@@ -209,7 +209,7 @@ Procedure write_memory(Dialog& dialog, Found& found, Arguments arguments) {
 
 // The document shows the page as the content of address 127, but does not state that it can be read. If the encoder
 // refuses, the page before is unknown.
-Part<std::optional<std::uint8_t>> open_service_page(Dialog& dialog, Found& found, std::string_view step) {
+Part<std::optional<std::uint8_t>> open_service_page(Dialog& dialog, ProcedureResult& found, std::string_view step) {
   const Result<Reply> before = co_await when_ready(dialog, {DataId::read_memory, page_select_address});
   found.page_left = service_page;
   co_await select_page(dialog, found, service_page, step);
@@ -218,7 +218,7 @@ Part<std::optional<std::uint8_t>> open_service_page(Dialog& dialog, Found& found
 
 // Selects the page before again. If that fails, the result of the procedure is still valid. Reading the page back shows
 // what the next user of the encoder finds.
-Part<bool> restore(Dialog& dialog, Found& found, std::optional<std::uint8_t> before) {
+Part<bool> restore(Dialog& dialog, ProcedureResult& found, std::optional<std::uint8_t> before) {
   if (!before) co_return false;
   if (*before != service_page) {
     const Result<Reply> selected = co_await when_ready(dialog, {DataId::write_memory, page_select_address, *before});
@@ -231,7 +231,7 @@ Part<bool> restore(Dialog& dialog, Found& found, std::optional<std::uint8_t> bef
   co_return true;
 }
 
-Procedure read_temperature(Dialog& dialog, Found& found) {
+Procedure read_temperature(Dialog& dialog, ProcedureResult& found) {
   const std::optional<std::uint8_t> before = co_await open_service_page(dialog, found, "");
   const std::uint8_t value = co_await execute(dialog, {DataId::read_memory, temperature_address}, "");
   found.temperature = static_cast<std::int8_t>(value);
@@ -242,12 +242,12 @@ Procedure read_temperature(Dialog& dialog, Found& found) {
 // Returns the byte that stores this threshold.
 constexpr std::uint8_t threshold_of(std::int64_t degrees) { return degrees == 0 ? 0 : byte(0x80 | degrees); }
 
-void show_threshold(Found& found, std::uint8_t value) {
+void show_threshold(ProcedureResult& found, std::uint8_t value) {
   found.overheat_enabled = (value & 0x80) != 0;
   if (*found.overheat_enabled) found.overheat_threshold = value & 0x7F;
 }
 
-Procedure read_threshold(Dialog& dialog, Found& found) {
+Procedure read_threshold(Dialog& dialog, ProcedureResult& found) {
   const std::optional<std::uint8_t> before = co_await open_service_page(dialog, found, "");
   const std::uint8_t value = co_await execute(dialog, {DataId::read_memory, overheat_address}, "");
   show_threshold(found, value);
@@ -255,7 +255,7 @@ Procedure read_threshold(Dialog& dialog, Found& found) {
   co_return done;
 }
 
-Procedure write_threshold(Dialog& dialog, Found& found, Arguments arguments) {
+Procedure write_threshold(Dialog& dialog, ProcedureResult& found, Arguments arguments) {
   const std::optional<std::uint8_t> before = co_await open_service_page(dialog, found, "nothing was written");
   co_await write_byte(dialog, found, overheat_address, threshold_of(arguments[0]));
   show_threshold(found, threshold_of(arguments[0]));
@@ -288,11 +288,11 @@ constexpr Values values_of_request(const Format&, const Request& request) { retu
 constexpr Values values_of_reply(const Format& format, const Request&, const Reply& reply) {
   return values_of(format, reply);
 }
-constexpr void put_found(FieldSink& sink, const Format&, const Found& found) { fields.put(sink, found); }
-constexpr void put_left(FieldSink& sink, const Format&, const Found& found) {
+constexpr void put_found(FieldSink& sink, const Format&, const ProcedureResult& found) { fields.put(sink, found); }
+constexpr void put_left(FieldSink& sink, const Format&, const ProcedureResult& found) {
   fields.put(sink, {.page_left = found.selected});
 }
-constexpr std::string_view left(const Found& found) {
+constexpr std::string_view left(const ProcedureResult& found) {
   return found.page_left ? "page 7 may be left selected, where it was another before" : "";
 }
 constexpr Explanation explain(const Format&, Error error, Bytes, Bytes reply) {
@@ -304,7 +304,7 @@ constexpr Report<Protocol> report{
     .put_reply = put_values<fields, values_of_reply>,
     .explain = explain,
 };
-constexpr Finding<Format, Found> found{.put = put_found, .put_left = put_left, .left = left};
+constexpr Finding<Format, ProcedureResult> found{.put = put_found, .put_left = put_left, .left = left};
 
 // ---- Commands
 
