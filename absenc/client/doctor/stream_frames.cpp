@@ -19,17 +19,17 @@ using ByteList = std::vector<std::uint8_t>;
 constexpr std::size_t enough = 8;  // least number of frames
 
 /// A piece of the stream: bytes without a pause between them.
-struct Piece {
+struct StreamPiece {
   Time at{};  // arrival time of the first byte
   ByteList bytes{};
 };
 
 // Leaves out the first and the last piece, which may be parts of frames because the port was opened and closed.
-std::vector<Piece> pieces_of(const StreamBytes& stream, Time pause) {
-  std::vector<Piece> pieces;
+std::vector<StreamPiece> pieces_of(const StreamBytes& stream, Time pause) {
+  std::vector<StreamPiece> pieces;
   std::size_t begin = 0;
   Time before{};
-  for (const StreamBytes::Mark& mark : stream.marks) {
+  for (const StreamBytes::Arrival& mark : stream.marks) {
     if (pieces.empty() || mark.at - before >= pause) pieces.push_back({.at = mark.at});
     ByteList& bytes = pieces.back().bytes;
     bytes.insert(bytes.end(), stream.bytes.begin() + static_cast<std::ptrdiff_t>(begin),
@@ -44,14 +44,14 @@ std::vector<Piece> pieces_of(const StreamBytes& stream, Time pause) {
 }
 
 // Returns the most frequent size of pieces, and the number of pieces with it.
-std::pair<std::size_t, std::size_t> usual_size(const std::vector<Piece>& pieces) {
+std::pair<std::size_t, std::size_t> usual_size(const std::vector<StreamPiece>& pieces) {
   std::map<std::size_t, std::size_t> sizes;
-  for (const Piece& piece : pieces) ++sizes[piece.bytes.size()];
+  for (const StreamPiece& piece : pieces) ++sizes[piece.bytes.size()];
   return *std::ranges::max_element(sizes, {}, [](const auto& one) { return one.second; });
 }
 
 // Returns the fraction of pieces with the most frequent size; 0 if such pieces are not frames.
-double evenness(const std::vector<Piece>& pieces) {
+double evenness(const std::vector<StreamPiece>& pieces) {
   constexpr std::size_t shortest = 2;
   if (pieces.size() < enough) return 0;
   const auto [size, count] = usual_size(pieces);
@@ -60,7 +60,7 @@ double evenness(const std::vector<Piece>& pieces) {
 
 // The pause that ends a frame is unknown. Tries each length and takes the middle of those that give the most equal
 // pieces, far from the pauses within a frame and from those between frames.
-std::vector<Piece> most_even_pieces(const StreamBytes& stream) {
+std::vector<StreamPiece> most_even_pieces(const StreamBytes& stream) {
   constexpr Time shortest = 100us;
   constexpr Time longest = 200ms;
   constexpr double least = 0.5;
@@ -102,7 +102,7 @@ bool is_twice_the_same(const ByteList& bytes) {
 
 // Returns whether each frame arrived twice while the shaft moved. An adapter with latency also makes pieces of two
 // frames, but those differ.
-bool are_doubled(const std::vector<Piece>& pieces) {
+bool are_doubled(const std::vector<StreamPiece>& pieces) {
   std::size_t doubled = 0;
   std::size_t moved = 0;
   for (std::size_t i = 0; i < pieces.size(); ++i) {
@@ -132,12 +132,12 @@ std::vector<std::size_t> joined_frames(const Unit& unit, const Options& options,
   return ends;
 }
 
-std::vector<Group> groups_of(const Unit& unit, const Options& options, const std::vector<Piece>& pieces) {
+std::vector<Group> groups_of(const Unit& unit, const Options& options, const std::vector<StreamPiece>& pieces) {
   if (pieces.empty()) return {};
   const bool doubled = are_doubled(pieces);
   const std::size_t usual = usual_size(pieces).first;
   std::vector<Group> groups;
-  for (const Piece& piece : pieces) {
+  for (const StreamPiece& piece : pieces) {
     Group group{.at = piece.at};
     std::vector<std::size_t> ends;
     if (!doubled) ends = good_frames(unit, options, piece.bytes);

@@ -13,12 +13,12 @@ namespace absenc::client {
 /// The bytes of a stream with their arrival times.
 struct StreamBytes {
   /// The time at which all bytes up to index `end` had arrived.
-  struct Mark {
+  struct Arrival {
     Time at{};
     std::size_t end = 0;
   };
   std::vector<std::uint8_t> bytes{};
-  std::vector<Mark> marks{};
+  std::vector<Arrival> marks{};
 };
 
 /// Returns each frame, good or damaged, in order. If the frames are periodic, a missing one is included with
