@@ -42,8 +42,17 @@ add_library(test_headers OBJECT "${CMAKE_CURRENT_BINARY_DIR}/test_headers.cpp")
 absenc_test_settings(test_headers)
 target_precompile_headers(test_headers PRIVATE <gtest/gtest.h>)
 
+# The programs of tests that are not long; ./dev test builds nothing else.
+add_custom_target(change-tests)
+foreach(target IN ITEMS absenc-command absenc-manual absenc-python)
+  if(TARGET ${target})
+    add_dependencies(change-tests ${target})
+  endif()
+endforeach()
+
 function(absenc_test name)
   add_executable(${name}_test ${ARGN})
+  add_dependencies(change-tests ${name}_test)
   absenc_test_settings(${name}_test)
   set_target_properties(${name}_test PROPERTIES RUNTIME_OUTPUT_DIRECTORY "${CMAKE_CURRENT_BINARY_DIR}/tests")
   if(name STREQUAL "command" OR name STREQUAL "manual")  # compiled with other settings than the precompiled headers
@@ -188,6 +197,7 @@ foreach(source IN LISTS examples)
   set_target_properties(example_${name} PROPERTIES OUTPUT_NAME ${name}
                         RUNTIME_OUTPUT_DIRECTORY "${CMAKE_CURRENT_BINARY_DIR}/examples")
   target_link_libraries(example_${name} PRIVATE absenc::client)
+  add_dependencies(change-tests example_${name})
   set(example_arguments)
   if(name STREQUAL "decode_capture")
     set(example_arguments "${PROJECT_SOURCE_DIR}/examples/tformat.txt" tformat)
