@@ -62,7 +62,7 @@ TEST_P(Confirmed, IsNotWrongMoreOftenThanChecksAndLimitLetThrough) {
       EXPECT_GE(result.damaged, static_cast<std::uint64_t>(damaged * static_cast<double>(result.exchanges) / 4));
       if (damaged == 1.0) continue;
       EXPECT_GE(wrong, guarded.let_through - chance(guarded)) << "what is computed is too much";
-      EXPECT_GT(guarded.confirmed.rate(), 0.97) << "and the right ones are confirmed";
+      EXPECT_GT(guarded.confirmed.high(), 0.97) << "and the right ones are confirmed";
     }
   }
 }
@@ -73,7 +73,7 @@ TEST_P(Confirmed, IsWrongLessOftenWithALowerLimit) {
   const Guarded lower = *read(0.1, 60, 100).guarded;
   EXPECT_LE(static_cast<double>(lower.wrong.count), lower.let_through + chance(lower));
   EXPECT_LE(lower.let_through, usual.let_through + chance(usual));
-  EXPECT_GT(lower.confirmed.rate(), 0.97);
+  EXPECT_GT(lower.confirmed.high(), 0.97);
 }
 
 INSTANTIATE_TEST_SUITE_P(Models, Confirmed, ::testing::ValuesIn(encoders()), name_of);
