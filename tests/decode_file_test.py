@@ -233,7 +233,7 @@ class Text(Case):
         self.assert_good(result)
         plain, echoed = json_lines(result.stdout)
         self.assertAlmostEqual(plain["turnaround_us"], 150)
-        self.assertIn("the request came back", echoed["message"])
+        self.assertIn("the request was received again", echoed["message"])
         self.assertEqual(echoed["reply"], bytes(reply).hex())
 
     def test_slow_log_is_no_timeout(self):

@@ -11,7 +11,7 @@ import threading
 import unittest
 
 import fault_proxy as faults
-from command_support import PATIENCE, Case, Emulator, absenc, character_units
+from command_support import Case, Emulator, absenc, character_units
 
 ALL = "--all" in sys.argv
 PATIENT = "latency=40"  # milliseconds that a busy machine may add to a reply
@@ -48,6 +48,7 @@ PROXIED = [
     ("telnet", faults.ParityMarks, "telnet_doubled"),
 ]
 
+SECONDS = {"loose contact": "3"}  # of more than one period
 OF_REQUESTS = {"line low", "only the echo", "login console", "modem", "requests lost 10 %",
                "starting", "always late", "randomly late", "own echo"}
 
@@ -60,8 +61,7 @@ def first_of(found):
 
 class DoctorFaults(Case):
     def examine(self, address, *more):
-        # Where nothing is good it tries other settings, addresses and protocols, each of which a busy machine holds up.
-        result = absenc("doctor", address, "--json", *(more or ["--for", "1"]), timeout=3 * PATIENCE)
+        result = absenc("doctor", address, "--json", *(more or ["--for", "1"]))
         self.assertTrue(result.stdout, f"{address}: {result.stderr}")
         return json.loads(result.stdout)
 
@@ -108,7 +108,7 @@ class DoctorFaults(Case):
         name = f"{unit}-{what.replace(' ', '-').replace('%', '')}"
         with Emulator(self.directory, "--motion", "rpm=20", protocol=unit, name=name) as emulator, \
              faults.FaultProxy(make(), emulator.path) as proxy:
-            found = self.examine(f"{unit}:{proxy.path}?{PATIENT}", "--for", "3")  # the default
+            found = self.examine(f"{unit}:{proxy.path}?{PATIENT}", "--for", SECONDS.get(what, "1"))
             # A fault that changed no byte, because no reply had one that it changes, is not to be found; of a few replies
             # nobody can say more than that they are damaged.
             also = "good" if proxy.changed == 0 else "sometimes_damaged" if proxy.changed < 10 else ""

@@ -40,8 +40,6 @@ bool has_good_part(const Case& one, const Attempted& attempt) {
     return end.kind == FrameEnd::Kind::complete && end.size == bytes.size() && decodes(one, request, {.bytes = bytes});
   };
   const Bytes raw = attempt.raw;
-  if (attempt.exchange.reply.bytes.size() < attempt.expected)
-    return false;                   // a shorter frame inside the reply occurs by chance
   if (is_frame(raw)) return false;  // the whole reply is one frame, without other bytes
   const Bytes sent = request.bytes;
   if (!sent.empty() && raw.size() > sent.size() && std::equal(sent.begin(), sent.end(), raw.begin()) &&
@@ -63,67 +61,7 @@ bool is_cut(const Case& one, const Attempted& attempt) {
   const Bytes reply = attempt.exchange.reply.bytes;
   if (!has_characters(one) || reply.empty()) return false;
   const FrameEnd end = one.unit.frame_end(one.options, Direction::reply, reply);
-  if (end.kind == FrameEnd::Kind::no_frame) return false;
-  return reply.size() < attempt.expected || (end.kind == FrameEnd::Kind::incomplete && end.size > reply.size());
-}
-
-namespace {
-
-// Returns whether these bytes are a good reply to the request whose checksum would refuse random bytes.
-bool is_surely_reply(const Case& one, const Attempted& asked, Bytes reply) {
-  constexpr int others = 8;
-  const Frame request = asked.exchange.request.frame();
-  if (!decodes(one, request, {.bytes = reply})) return false;
-  sim::Random random(1);
-  std::vector<std::uint8_t> noise(reply.size());
-  for (int i = 0; i < others; ++i) {
-    for (std::uint8_t& byte : noise) byte = static_cast<std::uint8_t>(random.below(256));
-    if (decodes(one, request, {.bytes = noise})) return false;
-  }
-  return true;
-}
-
-// Returns whether the bytes are replies to these requests, one after the other in any order.
-bool are_replies(const Case& one, const All& requests, Bytes bytes) {
-  constexpr std::size_t shortest = 2;
-  std::vector<bool> is_end(bytes.size() + 1, false);
-  is_end[0] = true;
-  for (std::size_t begin = 0; begin < bytes.size(); ++begin) {
-    for (std::size_t size = shortest; is_end[begin] && begin + size <= bytes.size(); ++size) {
-      const Bytes part = bytes.subspan(begin, size);
-      const auto answers = [&](const Attempted* asked) { return is_surely_reply(one, *asked, part); };
-      if (!is_end[begin + size] && std::ranges::any_of(requests, answers)) is_end[begin + size] = true;
-    }
-  }
-  return is_end[bytes.size()];
-}
-
-}  // namespace
-
-Belated belated_replies(const Case& one) {
-  constexpr std::size_t most_owed = 4;
-  constexpr std::size_t most_bytes = 128;
-  Belated belated;
-  if (!has_characters(one)) return belated;
-  All owed;  // requests without a reply since the last reply
-  for (const Attempted& attempt : one.seen.readings) {
-    const Bytes bytes = attempt.exchange.reply.bytes;
-    const bool asked = !attempt.exchange.request.frame().empty();
-    if (attempt.error == Error::none || !asked) {
-      owed.clear();
-    } else if (is_silent(attempt)) {
-      if (owed.size() < most_owed) owed.push_back(&attempt);
-    } else if (!owed.empty() && bytes.size() <= most_bytes) {
-      All requests = owed;
-      requests.push_back(&attempt);
-      const bool is_own = decodes(one, attempt.exchange.request.frame(), attempt.exchange.reply.frame());
-      if (is_own || !are_replies(one, requests, bytes)) continue;
-      belated.requests.push_back(&attempt);
-      belated.lateness = std::max(belated.lateness, attempt.began + attempt.after - owed.front()->began);
-      owed.clear();
-    }
-  }
-  return belated;
+  return end.kind == FrameEnd::Kind::incomplete && end.size > reply.size();
 }
 
 std::size_t mended_by_one_bit(const Case& one, const All& all) {

@@ -28,19 +28,8 @@ template <class Is>
 /// the same reply again. Only for lines of characters.
 [[nodiscard]] bool has_good_part(const Case& one, const Attempted& attempt);
 
-/// Returns whether fewer bytes arrived than the beginning of the frame, or the protocol, requires. Only for lines of
-/// characters.
+/// Returns whether fewer bytes arrived than the beginning of the frame requires. Only for lines of characters.
 [[nodiscard]] bool is_cut(const Case& one, const Attempted& attempt);
-
-/// Replies that arrived after a later request than their own.
-struct Belated {
-  All requests{};   // the requests after which they arrived
-  Time lateness{};  // delay of the latest of them
-};
-
-/// Finds good replies to an unanswered request that arrived after, before or instead of the reply to a later one. Only
-/// for lines of characters.
-[[nodiscard]] Belated belated_replies(const Case& one);
 
 /// Returns how many of the replies become good if one bit is flipped; 0 if random replies of the same length become
 /// good as often, because a short checksum accepts many by chance.

@@ -127,7 +127,7 @@ class Doctor {
       try {
         std::optional<os::WakeupWatch> watch;
         if (surroundings_.on_the_clock && address_.port_kind != PortKind::sim) watch.emplace();
-        examiner.observe(*read_, choices_.readings, choices_.limit, seen_);
+        examiner.read(*read_, choices_.readings, choices_.limit, seen_.readings);
         if (watch) seen_.woken_late = watch->latest();
         if (any_good() && choices_.turning > Time{}) {
           tell("turn the shaft by hand now");
@@ -236,7 +236,7 @@ class Doctor {
   void read_again() {
     tell("reading");
     Examiner<Item> examiner(address_, surroundings_.open(address_), choices_.over);
-    examiner.observe(*read_, choices_.readings, choices_.limit, seen_);
+    examiner.read(*read_, choices_.readings, choices_.limit, seen_.readings);
     examiner.conclude(seen_);
   }
 

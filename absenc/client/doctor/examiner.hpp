@@ -6,7 +6,6 @@
 #include <functional>
 #include <utility>
 
-#include "absenc/client/doctor/exchange_log.hpp"
 #include "absenc/client/doctor/observations.hpp"
 #include "absenc/client/port/link.hpp"
 #include "absenc/client/port/runner.hpp"
@@ -20,8 +19,6 @@ class Examiner {
   Examiner(const EncoderAddress& address, Link link, std::function<bool()> over)
       : link_(std::move(link)),
         runner_(address),
-        unit_(*address.unit),
-        options_(address.options),
         streams_(address.unit->streams != nullptr && address.unit->streams(address.options)) {
     if constexpr (std::is_same_v<Item, CanFrame>) {
       runner_.attach(*link_.frames, link_.latency);
@@ -53,27 +50,10 @@ class Examiner {
   /// Records bytes that arrive after the last timeout, from an encoder that is later than every timeout.
   void listen_for_late() { runner_.listen(pieces * piece_time); }
 
-  /// Takes readings as `read` does, and records the exchanges of each.
-  void observe(const Command& command, std::size_t count, Time limit, Observations& seen) {
-    if constexpr (std::is_same_v<Item, CanFrame>) {
-      read(command, count, limit, seen.readings);
-    } else if (runner_.character() == Time{}) {
-      read(command, count, limit, seen.readings);
-    } else {
-      ExchangeLog log(unit_, options_, seen);
-      const Watch watch(runner_, log, streams_);
-      read(command, count, limit, seen.readings, &log);
-      // A pulse is a request, too.
-      if (streams_ && runner_.port().requests == 0) log.conclude_stream();
-    }
-  }
-
   /// Takes up to `count` readings within `limit`; ends early without any reply. Throws as the port.
-  void read(const Command& command, std::size_t count, Time limit, std::vector<Attempted>& into,
-            ExchangeLog* log = nullptr) {
+  void read(const Command& command, std::size_t count, Time limit, std::vector<Attempted>& into) {
     const auto attempt = [&] {
       Attempted one = runner_.once(command);
-      if (log != nullptr) log->add_reading(one);
       // A second encoder's reply follows the first one at once, or collides with the next request.
       const Time behind = 3 * runner_.character();
       if (one.error == Error::none && behind != Time{} && !streams_) runner_.settle(behind, longest_reply);
@@ -104,34 +84,6 @@ class Examiner {
   }
 
  private:
-  /// Passes received bytes to the log during its lifetime.
-  class Watch {
-   public:
-    Watch(Runner<Item>& runner, ExchangeLog& log, bool streams) : runner_(runner) {
-      runner.on_exchange = [&runner, &log](const LineExchange<Item>& line) {
-        Attempted one;
-        runner.keep_exchange(one);
-        one.began = line.sent_at;
-        log.add_exchange(std::move(one));
-      };
-      if (!streams) return;
-      runner.on_event = [&log](const Event<Item>& event) {
-        if constexpr (!std::is_same_v<Item, CanFrame>) {
-          if (event.kind == Event<Item>::Kind::received) log.add_bytes(event.items, event.at);
-        }
-      };
-    }
-    Watch(const Watch&) = delete;
-    Watch& operator=(const Watch&) = delete;
-    ~Watch() {
-      runner_.on_exchange = nullptr;
-      runner_.on_event = nullptr;
-    }
-
-   private:
-    Runner<Item>& runner_;
-  };
-
   static constexpr unsigned pieces = 5;
   static constexpr Time piece_time = std::chrono::milliseconds(20);
   static constexpr std::size_t most_heard = 4096;
@@ -140,8 +92,6 @@ class Examiner {
 
   Link link_;
   Runner<Item> runner_;
-  const Unit& unit_;
-  Options options_;
   bool streams_;
 };
 

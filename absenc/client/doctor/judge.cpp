@@ -117,24 +117,21 @@ void judge_silence(const Case& one, std::vector<Finding>& findings) {
 void judge_lateness(const Case& one, std::vector<Finding>& findings) {
   const Observations& seen = one.seen;
   const std::size_t tried = seen.readings.size();
-  const Belated belated = belated_replies(one);
-  const std::size_t late = std::max<std::size_t>(seen.late, belated.requests.size());
-  const Time lateness = std::max(seen.lateness, belated.lateness);
   // On a CAN bus encoders send unsolicited frames, so a frame after an unanswered request is not a late reply to it.
-  if (late == 0 || one.unit.link == LinkKind::can) return;
+  if (seen.late == 0 || one.unit.link == LinkKind::can) return;
   // A single late reply may be due to this busy computer. The verdict counts it nevertheless.
   const bool nothing_else = one.good == 0 && count(seen.readings, was_heard) * 10 < tried;
-  const bool often = late * 10 >= tried || nothing_else;
-  if (!often && (late < 2 || may_be_the_computer(seen, late))) return;
+  const bool often = seen.late * 10 >= tried || nothing_else;
+  if (!often && (seen.late < 2 || may_be_the_computer(seen, seen.late))) return;
   Time limit{};
   for (const Attempted& attempt : seen.readings) limit = std::max(limit, attempt.limit);
-  const bool is_ours = seen.woken_late > Time{} && lateness - limit <= seen.woken_late;
-  const bool is_one_of_few = late < 2 && !nothing_else;
+  const bool is_ours = seen.woken_late > Time{} && seen.lateness - limit <= seen.woken_late;
+  const bool is_one_of_few = seen.late < 2 && !nothing_else;
   if ((!often || is_one_of_few) && is_ours) return;  // no later than this computer's own delay
-  const auto allowance = std::chrono::ceil<std::chrono::milliseconds>(lateness * 3 / 2).count();
+  const auto allowance = std::chrono::ceil<std::chrono::milliseconds>(seen.lateness * 3 / 2).count();
   findings.push_back(finding(often ? FindingKind::reply_late : FindingKind::sometimes_late,
-                             {fmt::format("{}", std::min(late, tried)), fmt::format("{}", tried), to_text(lateness),
-                              fmt::format("{}", allowance)}));
+                             {fmt::format("{}", std::min<std::size_t>(seen.late, tried)), fmt::format("{}", tried),
+                              to_text(seen.lateness), fmt::format("{}", allowance)}));
 }
 
 void judge_slowness(const Case& one, std::vector<Finding>& findings) {
@@ -202,11 +199,8 @@ void judge_line(const Case& one, std::vector<Finding>& findings) {
   if (!inverted.empty()) {
     findings.push_back(finding(FindingKind::line_inverted, {inverted}));
   } else if (seen.never_silent && one.good * 10 < seen.readings.size() * 9 + 1) {
-    const std::string how = seen.within_frames == 0
-                                ? "before anything was asked, without a pause"
-                                : fmt::format("of which {} belong to good frames", seen.within_frames);
     findings.push_back(finding(FindingKind::never_silent, {fmt::format("{}", seen.unsolicited.size()),
-                                                           to_text(seen.listened), hex(seen.unsolicited, 8), how}));
+                                                           to_text(seen.listened), hex(seen.unsolicited, 8)}));
   }
   if (findings.empty() || findings.back().finding_kind != FindingKind::line_inverted) judge_silence(one, findings);
   judge_lateness(one, findings);
@@ -287,40 +281,28 @@ Reported reported_by(const Unit& unit, const Observations& seen) {
   return reported;
 }
 
-// Returns the observations with the exchanges on the line instead of the readings; nothing if both are the same. If no
-// reading is good, good exchanges before its last one are no evidence; frames of a stream always are.
-std::optional<Observations> line_of(const Observations& seen, std::size_t good) {
-  const bool asked = !seen.readings.empty() && !seen.readings.front().exchange.request.frame().empty();
-  if (seen.exchanges.empty() || (asked && good == 0)) return {};
-  std::optional<Observations> line(seen);
-  line->readings = seen.exchanges;
-  return line;
-}
-
 }  // namespace
 
 Examination judge(const Unit& unit, const Options& options, const Observations& seen) {
   Examination result{.tried = seen.readings.size(), .complete = seen.complete};
-  result.good = count(seen.readings, is_good);
+  result.good = count(seen.readings, [](const Attempted& one) { return one.error == Error::none; });
   result.measured = measured_of(unit, seen, result.good);
   const Case one{unit, options, seen, result.good};
   judge_port(one, result.findings);
-  const std::optional<Observations> on_the_line = line_of(seen, result.good);
-  const Case line = on_the_line ? Case{unit, options, *on_the_line, count(on_the_line->readings, is_good)} : one;
-  judge_line(line, result.findings);
+  judge_line(one, result.findings);
   // A fault of the line explains bad frames, which then give no finding of their own.
   const bool explained = std::any_of(result.findings.begin(), result.findings.end(), [](const Finding& found) {
     return found.severity == Severity::fault && found.finding_kind != FindingKind::can_errors;
   });
   // One of 256 damaged frames passes a checksum of 8 bits, so a few good frames do not make a good line.
-  if (line.good * 20 < line.seen.readings.size() || line.good == 0) {
-    if (!explained) judge_bad_frames(line, result.findings);
-  } else if (std::optional<Finding> start = judge_start(line)) {
-    result.findings.push_back(std::move(*start));
-  } else if (!explained) {
-    judge_mixed_frames(line, result.findings);
-  }
-  if (result.good * 20 >= result.tried && result.good != 0) {
+  if (result.good * 20 < result.tried || result.good == 0) {
+    if (!explained) judge_bad_frames(one, result.findings);
+  } else {
+    if (std::optional<Finding> start = judge_start(one)) {
+      result.findings.push_back(std::move(*start));
+    } else if (!explained) {
+      judge_mixed_frames(one, result.findings);
+    }
     judge_state(one, result.findings);
     judge_counter(one, result.findings);
     result.reported = reported_by(unit, seen);
@@ -337,7 +319,8 @@ Examination judge(const Unit& unit, const Options& options, const Observations& 
       result.findings.push_back(finding(FindingKind::always_damaged, {all, "none was taken for a reply", last}));
     } else {
       const bool is_nobody = silent == result.tried;
-      result.findings.push_back(is_nobody ? finding(FindingKind::no_answer, {all, ""}) : silence_of(one, failed));
+      result.findings.push_back(is_nobody ? finding(FindingKind::no_answer, {all, ""})
+                                          : finding(FindingKind::sometimes_silent, {fmt::format("{}", failed), all}));
     }
   }
   for (Finding& found : result.findings) suit(found, seen.place);

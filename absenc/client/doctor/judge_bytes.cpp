@@ -11,7 +11,6 @@
 #include <string>
 #include <vector>
 
-#include "absenc/client/doctor/chance.hpp"
 #include "absenc/client/doctor/damage.hpp"
 #include "absenc/client/doctor/judges.hpp"
 #include "absenc/client/doctor/words.hpp"
@@ -37,11 +36,7 @@ class Mender {
   /// `random`: undoes random changes instead, which measures how often chance makes the reply good; null: undoes the
   /// change.
   Mender(const Case& one, const Attempted& attempt, sim::Random* random)
-      : one_(one),
-        request_(attempt.exchange.request.frame()),
-        raw_(attempt.raw),
-        expected_(attempt.expected),
-        random_(random) {}
+      : one_(one), request_(attempt.exchange.request.frame()), raw_(attempt.raw), random_(random) {}
 
   [[nodiscard]] const ByteList& raw() const { return raw_; }
   [[nodiscard]] sim::Random* random() const { return random_; }
@@ -85,15 +80,10 @@ class Mender {
       for (std::uint8_t& value : used) value = static_cast<std::uint8_t>(0x20 + random_->below(0xE0));
     }
     std::size_t tries = most_tries;
-    // Inserts as many bytes as the protocol expects, or else at least as many as the frame lacks.
+    // As many at least as the frame lacks.
     const FrameEnd end = one_.unit.frame_end(one_.options, Direction::reply, raw_);
     const bool is_cut = end.kind == FrameEnd::Kind::incomplete && end.size > raw_.size();
-    put = is_cut ? std::min(end.size - raw_.size(), most) : 1;
-    if (expected_ != 0) {
-      if (expected_ <= raw_.size() || expected_ - raw_.size() > most) return false;
-      put = most = expected_ - raw_.size();
-    }
-    for (; put <= most && tries > 0; ++put) {
+    for (put = is_cut ? std::min(end.size - raw_.size(), most) : 1; put <= most && tries > 0; ++put) {
       ByteList bytes = raw_;
       if (insert(bytes, used, 0, put, tries)) return true;
     }
@@ -154,7 +144,6 @@ class Mender {
   const Case& one_;
   Frame request_;
   const ByteList& raw_;
-  std::size_t expected_;
   sim::Random* random_;
 };
 
@@ -244,7 +233,7 @@ bool fits_seven_bits(const ByteList& raw) {
 bool undo_seven_bits(const Mender& mender, std::size_t& count) { return mender.with_eighth_bits(count); }
 
 constexpr std::size_t cheap = 24;  // number of replies that are tried
-constexpr std::size_t dear = 16;   // number of replies if each is decoded thousands of times
+constexpr std::size_t dear = 10;   // number of replies if each is decoded thousands of times
 
 // Changes at any index are tried before changes at one end.
 constexpr auto suspicions = std::to_array<Suspicion>({
@@ -286,7 +275,6 @@ std::optional<Finding> suspected(const Case& one, const All& all, const Suspicio
   const bool fits = std::all_of(one.seen.readings.begin(), one.seen.readings.end(),
                                 [&](const Attempted& attempt) { return suspicion.fits(attempt.raw); });
   if (!fits) return {};
-  constexpr std::size_t others = 2;  // random changes tried for each reply
   sim::Random random(1);
   std::size_t tried = 0;
   std::size_t mended = 0;
@@ -303,8 +291,7 @@ std::optional<Finding> suspected(const Case& one, const All& all, const Suspicio
       concerned = std::max(concerned, count);
       example = attempt;
     }
-    for (std::size_t i = 0; i < others; ++i)
-      by_chance += suspicion.undo(Mender(one, *attempt, &random), ignored) ? 1 : 0;
+    by_chance += suspicion.undo(Mender(one, *attempt, &random), ignored) ? 1 : 0;
     // A change that explains none of the first replies cannot explain nearly all.
     if (tried >= enough && mended == 0) return {};
   }
@@ -312,8 +299,7 @@ std::optional<Finding> suspected(const Case& one, const All& all, const Suspicio
   if (tried < enough || mended * 10 < tried * 8) return {};
   constexpr std::size_t varied = 24;
   const bool is_seen = suspicion.finding_kind == FindingKind::seven_bits && variety(all) >= varied;
-  const double share = static_cast<double>(by_chance + 1) / static_cast<double>(tried * others + 2);
-  if (!is_seen && chance_of(mended, tried, share) > 1e-3) return {};
+  if (!is_seen && mended < by_chance + tried / 2) return {};
   return finding(suspicion.finding_kind,
                  {fmt::format("{}", mended), fmt::format("{}", tried), bytes_of(concerned),
                   to_hex(Bytes(example->raw).first(std::min<std::size_t>(example->raw.size(), 24)))});
@@ -330,9 +316,7 @@ std::optional<Finding> seven_bits_of_good(const Case& one) {
   std::size_t good = 0;
   for (const Attempted& attempt : one.seen.readings) {
     if (!fits_seven_bits(attempt.raw)) return {};
-    // Replies without a position may have any bytes.
-    const bool is_position = attempt.reading || attempt.exchange.request.frame().empty();
-    if (attempt.error != Error::none || !is_position) continue;
+    if (attempt.error != Error::none) continue;
     ++good;
     const bool is_alike = before != nullptr && before->raw.size() == attempt.raw.size();
     wraps.resize(std::max(wraps.size(), attempt.raw.size()));

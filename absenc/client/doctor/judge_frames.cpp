@@ -34,6 +34,8 @@ std::string errors_of(const std::vector<Attempted>& readings) {
   return fmt::format("{}", fmt::join(names, ", "));
 }
 
+bool is_good(const Case& one, const Frame& request, Bytes reply) { return decodes(one, request, {.bytes = reply}); }
+
 // ---- No reply is good
 
 All damaged(const Case& one) {
@@ -84,8 +86,7 @@ bool holds_two(const Case& one, const Attempted& attempt) {
   const Frame request = attempt.exchange.request.frame();
   const Bytes bytes = attempt.exchange.reply.bytes;
   for (std::size_t size = 2; size + 1 < bytes.size(); ++size) {
-    if (decodes(one, request, {.bytes = bytes.first(size)}) && decodes(one, request, {.bytes = bytes.subspan(size)}))
-      return true;
+    if (is_good(one, request, bytes.first(size)) && is_good(one, request, bytes.subspan(size))) return true;
   }
   return false;
 }
@@ -266,15 +267,6 @@ Finding some_damage(const Case& one, const All& all) {
 
 }  // namespace
 
-Finding silence_of(const Case& one, std::size_t silent) {
-  const std::vector<Attempted>& readings = one.seen.readings;
-  const bool sends_by_itself = one.unit.streams != nullptr && one.unit.streams(one.options) && !readings.empty() &&
-                               readings.front().exchange.request.frame().empty();
-  return finding(FindingKind::sometimes_silent,
-                 {fmt::format("{}", silent), fmt::format("{}", readings.size()),
-                  sends_by_itself ? "frames did not come when they were due" : "requests were not answered"});
-}
-
 void judge_bad_frames(const Case& one, std::vector<Finding>& findings) {
   const All all = damaged(one);
   if (all.empty()) return;
@@ -301,7 +293,7 @@ Finding finding_of(const Unit& unit, const Options& options, PortKind place, con
   if (late && last.error == Error::timeout) return suited(finding(FindingKind::reply_late, {"", "", "", ""}));
   if (usually_good) {
     return suited(last.heard ? finding(FindingKind::sometimes_damaged, {"", "", ""})
-                             : finding(FindingKind::sometimes_silent, {"", "", ""}));
+                             : finding(FindingKind::sometimes_silent, {"", ""}));
   }
   // A single frame can show another model, as many frames do in an examination.
   const auto& [request, reply] = last.exchange;
@@ -317,7 +309,7 @@ Finding finding_of(const Unit& unit, const Options& options, PortKind place, con
 }
 
 void judge_mixed_frames(const Case& one, std::vector<Finding>& findings) {
-  All all = chosen(damaged(one), [](const Attempted& attempt) { return !is_silent(attempt); });
+  All all = damaged(one);
   if (std::optional<Finding> adapter = damage_by_adapter(one, all)) {
     findings.push_back(std::move(*adapter));
     return;
@@ -334,16 +326,6 @@ void judge_mixed_frames(const Case& one, std::vector<Finding>& findings) {
     });
     return taken;
   };
-  const Belated belated = belated_replies(one);
-  static_cast<void>(take([&](const Attempted& attempt) {
-    return std::ranges::find(belated.requests, &attempt) != belated.requests.end();
-  }));
-  const std::size_t late =
-      one.unit.link == LinkKind::can ? 0 : std::max<std::size_t>(one.seen.late, belated.requests.size());
-  // A late reply can make the next readings fail, too.
-  const bool is_lateness_found = std::ranges::any_of(
-      findings, [](const Finding& found) { return found.finding_kind == FindingKind::sometimes_late; });
-  if (is_lateness_found && all.size() <= 2 * late) all.clear();
   // On a clocked line, a data line that never changes counts as silence.
   const All stuck = take([](const Attempted& attempt) { return attempt.error == Error::line_stuck; });
   const auto is_misheard = [&](const Attempted& attempt) {
@@ -375,10 +357,15 @@ void judge_mixed_frames(const Case& one, std::vector<Finding>& findings) {
   } else if (!all.empty()) {
     findings.push_back(some_damage(one, all));
   }
-  const std::size_t silent =
-      stuck.size() + static_cast<std::size_t>(std::ranges::count_if(one.seen.readings, is_silent));
+  const auto silent =
+      stuck.size() + static_cast<std::size_t>(std::count_if(
+                         one.seen.readings.begin(), one.seen.readings.end(),
+                         [](const Attempted& attempt) { return attempt.error != Error::none && !attempt.heard; }));
+  const std::size_t late = one.unit.link == LinkKind::can ? 0 : one.seen.late;
+  // A late reply can cost the next reading, too.
   if (silent > 2 * late && !may_be_the_computer(one.seen, silent)) {
-    findings.push_back(silence_of(one, silent));
+    findings.push_back(finding(FindingKind::sometimes_silent,
+                               {fmt::format("{}", silent), fmt::format("{}", one.seen.readings.size())}));
   }
 }
 

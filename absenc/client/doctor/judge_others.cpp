@@ -132,13 +132,7 @@ std::optional<Finding> other_settings(const Case& one, const All& all) {
   constexpr std::size_t enough = 4;  // number of frames; fewer are weak evidence
   if (all.size() < enough) return {};
   std::vector<capture::ObservedExchange> exchanges;
-  // Earlier exchanges of a reading may identify the encoder, too.
-  for (const Attempted& attempt : one.seen.exchanges) {
-    if (attempt.answered) exchanges.push_back(attempt.exchange);
-  }
-  if (exchanges.empty()) {
-    for (const Attempted* attempt : all) exchanges.push_back(attempt->exchange);
-  }
+  for (const Attempted* attempt : all) exchanges.push_back(attempt->exchange);
   constexpr std::size_t most_tried = 32;  // number of frames, because each is decoded with many sets of options
   exchanges.resize(std::min(exchanges.size(), most_tried));
   const std::vector<std::string> address = address_settings(one.unit, one.options);

@@ -3,14 +3,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 #include <optional>
 #include <set>
 #include <string>
 #include <utility>
 #include <vector>
 
-#include "absenc/client/doctor/chance.hpp"
 #include "absenc/client/doctor/judges.hpp"
 #include "absenc/client/doctor/words.hpp"
 #include "absenc/client/reading.hpp"
@@ -139,17 +137,15 @@ void judge_state(const Case& one, std::vector<Finding>& findings) {
 }
 
 std::optional<Finding> judge_start(const Case& one) {
-  constexpr double chance = 1e-3;  // greatest probability that all failures come first by chance
+  constexpr std::size_t enough = 20;  // good ones
   const std::vector<Attempted>& readings = one.seen.readings;
-  const auto first = std::ranges::find_if(readings, is_good);
-  const auto failed = static_cast<std::size_t>(first - readings.begin());
-  if (failed < 2 || failed + one.good != readings.size()) return {};
-  const auto silent = static_cast<std::size_t>(std::count_if(readings.begin(), first, is_silent));
-  // The last failures may be damaged replies, if the encoder starts during a request.
-  if (silent * 2 < failed || may_be_the_computer(one.seen, failed)) return {};
-  if (-log_choose(readings.size(), failed) > std::log(chance)) return {};
+  const auto first =
+      std::ranges::find_if(readings, [](const Attempted& attempt) { return attempt.error == Error::none; });
+  const auto silent = static_cast<std::size_t>(first - readings.begin());
+  const bool was_silent = std::all_of(readings.begin(), first, [](const Attempted& attempt) { return !attempt.heard; });
+  if (silent < 4 || !was_silent || one.good < enough || silent + one.good != readings.size()) return {};
   return finding(FindingKind::starting,
-                 {fmt::format("nothing good came for the first {}, and then all {} readings were good",
+                 {fmt::format("nothing came for the first {}, and then all {} readings were good",
                               to_text(first->began - readings.front().began), one.good)});
 }
 

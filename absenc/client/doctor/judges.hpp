@@ -18,14 +18,6 @@ struct Case {
   std::size_t good = 0;
 };
 
-[[nodiscard]] inline bool is_good(const Attempted& one) { return one.error == Error::none; }
-
-/// Returns whether no reply arrived; an adapter's echo of the request is not a reply.
-[[nodiscard]] inline bool is_silent(const Attempted& one) {
-  const bool is_echo = !one.answered && one.raw == one.exchange.request.bytes;
-  return one.error != Error::none && (!one.heard || is_echo);
-}
-
 /// Returns whether this number of late or missing replies may be due to this busy computer; an emulator or an adapter's
 /// driver on it is delayed, too. That may be a single one among many readings, or one of a hundred if the computer
 /// stood still for as long as the timeout.
@@ -44,8 +36,6 @@ void judge_port(const Case& one, std::vector<Finding>& findings);
 void judge_line(const Case& one, std::vector<Finding>& findings);
 /// Judges replies of which none is good.
 void judge_bad_frames(const Case& one, std::vector<Finding>& findings);
-/// Returns the finding for this number of missing replies, or of missing frames of an encoder that sends by itself.
-[[nodiscard]] Finding silence_of(const Case& one, std::size_t silent);
 /// Judges bursts of failures with good readings between them.
 [[nodiscard]] std::optional<Finding> coming_and_going(const Case& one);
 /// Judges replies of which some are good.

@@ -46,12 +46,7 @@ struct Observations {
   std::vector<std::uint8_t> unsolicited{};  // bytes received before the first request
   Time listened{};
   bool never_silent = false;  // the line was never silent while listening
-  std::size_t within_frames =
-      0;  // encoders that send by themselves: number of unsolicited bytes that are good frames, if most are not
   std::vector<Attempted> readings{};
-  /// Each request with its reply, if a reading has several; for an encoder that sends by itself each frame, and the
-  /// missing ones. Empty if `readings` has all of them.
-  std::vector<Attempted> exchanges{};
   std::vector<Attempted> turned{};  // readings while the shaft was turned by hand
   std::uint64_t line_errors = 0;    // number of error frames of a CAN bus
   std::uint64_t late = 0;           // number of replies after their timeout

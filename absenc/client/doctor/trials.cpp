@@ -10,7 +10,6 @@
 #include <cmath>
 #include <optional>
 
-#include "absenc/client/doctor/chance.hpp"
 #include "absenc/client/doctor/damage.hpp"
 #include "absenc/client/identify/probe_settings.hpp"
 #include "absenc/client/text/unit_text.hpp"
@@ -243,6 +242,10 @@ std::vector<Other> other_addresses(const EncoderAddress& address) {
 bool is_far_better(std::size_t good, std::size_t tried, std::size_t good_as_said, std::size_t tried_as_said) {
   constexpr double chance = 1e-3;
   if (tried == 0 || good * 10 < tried * 8) return false;
+  const auto log_choose = [](std::size_t all, std::size_t some) {
+    return std::lgamma(static_cast<double>(all + 1)) - std::lgamma(static_cast<double>(some + 1)) -
+           std::lgamma(static_cast<double>(all - some + 1));
+  };
   const std::size_t all_good = good + good_as_said;
   double sum = 0;  // probability that as many or more good readings have this setting
   for (std::size_t more = good; more <= std::min(tried, all_good); ++more) {

@@ -63,7 +63,8 @@ constexpr auto table = std::to_array<Words>({
      "no node acknowledges, or nodes have different bit rates",
      "check the encoder's supply, CANH and CANL, 120 ohms at both ends, and the bit rate"},
 
-    {FindingKind::never_silent, "never_silent", fault, "{0} bytes arrived in {1} {3}, such as {2}",
+    {FindingKind::never_silent, "never_silent", fault,
+     "{0} bytes arrived in {1} before anything was sent, without a pause, such as {2}",
      "another host or an encoder that sends by itself uses the line, or the line is open and picks up noise",
      "disconnect other senders; set the mode in which the encoder sends by itself; bias the idle line"},
     {FindingKind::line_inverted, "line_inverted", fault, "the idle line is low: {0}",
@@ -99,7 +100,7 @@ constexpr auto table = std::to_array<Words>({
      "set the rate of the encoder with baud=RATE"},
 
     {FindingKind::byte_before, "byte_before", fault,
-     "{0} of {1} replies are good without {2} before each of them, such as {3}",
+     "{0} of {1} replies are good without the {2} before each of them, such as {3}",
      "the adapter switches its direction too late, or receives while it still sends",
      "use an adapter that switches its direction by itself, or rs485=on; bias the idle line"},
     {FindingKind::byte_after, "byte_after", fault,
@@ -162,7 +163,7 @@ constexpr auto table = std::to_array<Words>({
     {FindingKind::sometimes_damaged, "sometimes_damaged", warning, "{0} of {1} replies are damaged ({2})",
      "noise, reflections or a loose contact",
      "check termination, shielding and plugs; run doctor again at standstill to see which bits"},
-    {FindingKind::sometimes_silent, "sometimes_silent", warning, "{0} of {1} {2}",
+    {FindingKind::sometimes_silent, "sometimes_silent", warning, "{0} of {1} requests were not answered",
      "some requests do not arrive, or a contact is loose",
      "check plugs, supply and termination; a busy computer needs latency=MS behind the encoder"},
     {FindingKind::comes_and_goes, "comes_and_goes", warning, "{0} of {1} readings failed, in {2} bursts{3}",
@@ -192,8 +193,7 @@ constexpr auto table = std::to_array<Words>({
      "for more readings per second connect the adapter directly"},
 
     {FindingKind::starting, "starting", warning, "{0}",
-     "it was powered on just now, or its supply is too weak to start",
-     "wait, then run doctor again; measure the supply"},
+     "it was switched on just now, or its supply is too weak to come up", "wait, then look again; measure the supply"},
     // The text is from the encoder's document
     {FindingKind::alarm, "alarm", warning, "the encoder reports {0}", "{1}", "{2}"},
     {FindingKind::status, "status", warning, "the status of the encoder has {0}", "{1}", "{2}"},

@@ -32,7 +32,6 @@ struct Attempted {
   bool heard = false;                    // anything was received, even only an echo
   bool answered = false;                 // something other than an echo was received
   std::uint64_t unanswered = 0;          // number of requests without reply, not counting the last request
-  std::size_t expected = 0;              // items of the reply to the last request; 0: the protocol does not say
   std::uint64_t discarded = 0;  // damaged frames of a stream since the previous result; `error` may report one of them
   Time answered_after{};        // time from the end of the request to the beginning of the reply
   Time limit{};                 // limit of `answered_after`, from protocol and connection; 0: none
@@ -290,7 +289,6 @@ class Runner {
     one.answered = !reply.empty();
     one.unanswered = unanswered_;
     if (asked) {
-      one.expected = expected_;
       one.answered_after = line.answered_after(character_);
       one.limit = line.answer != Time{} ? line.answer + latency_ : Time{};
       one.after = line.received_at - line.sent_at;
@@ -321,10 +319,7 @@ class Runner {
       using Kind = typename Step<Item>::Kind;
       Step<Item> step = inner_->next(now);
       const bool asks = step.kind == Kind::transfer || step.kind == Kind::pulse;
-      if (asks) {
-        runner_.begin_exchange();
-        runner_.expected_ = step.expect;
-      }
+      if (asks) runner_.begin_exchange();
       if (runner_.on_step) runner_.on_step(step, now);
       if (step.kind == Kind::transfer && runner_.edit) {
         request_.assign(step.out.begin(), step.out.end());
@@ -395,7 +390,6 @@ class Runner {
   std::uint64_t requests_before_ = 0;  // number of requests before the present run
   std::size_t received_before_ = 0;    // items received before the present run, for an older request
   std::uint64_t unanswered_ = 0;       // requests without reply in the present run
-  std::size_t expected_ = 0;           // items of the reply to the last request; 0: not known
   std::uint64_t late_ = 0;             // late replies before the last exchange
   std::uint64_t late_before_ = 0;      // late replies that earlier sessions discarded
   Time lateness_{};
