@@ -352,7 +352,7 @@ class ManPage(Case):
     def test_has_standard_sections(self):
         sections = [line for line in self.shown().stdout.splitlines() if re.match(r"[A-Z]", line)][1:]
         self.assertEqual(sections, ["NAME", "SYNOPSIS", "DESCRIPTION", "ENCODERS", "VERBS", "EXAMPLES", "FILES",
-                                    "ENVIRONMENT", "EXIT STATUS"])
+                                    "ENVIRONMENT", "EXIT STATUS", "SEE ALSO"])
 
 
 class Completion(Case):
