@@ -36,7 +36,7 @@ constexpr std::uint64_t megabyte = 1'000'000;
 
 struct Cost {
   double time;       // elapsed, seconds
-  double processor;  // of all threads and children, seconds: independent of other load
+  double processor;  // seconds of processor time of all threads and children, independent of other load
 };
 
 double processor_seconds() {

@@ -83,7 +83,7 @@ AMBIGUOUS = set("""
 """.split())
 
 KEYS = ("struct", "class", "union", "enum")
-# What may follow `struct NAME` before its body: everything else is a use of the name, or a forward declaration.
+# Tokens that may follow `struct NAME` before its body: everything else is a use of the name, or a forward declaration.
 NO_BODY = set(";(),>=&*")
 
 

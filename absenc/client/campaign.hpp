@@ -25,7 +25,7 @@ struct LineFault {
 /// talker, late.
 [[nodiscard]] std::span<const LineFault> line_faults();
 
-/// Which encoder a campaign runs, how long, and with which faults.
+/// The encoder of a campaign, its length, and its faults.
 struct CampaignChoices {
   std::string model{};                 ///< Name of a model of the unit; empty: its first.
   std::vector<std::string> options{};  ///< Options of the unit, as "address=3".

@@ -50,7 +50,7 @@ struct Conformance {
   [[nodiscard]] std::string report() const;
 };
 
-/// What a conformance test of an encoder may change and how long it lasts.
+/// Limits of a conformance test of an encoder: its length, and the changes it may make.
 struct ConformChoices {
   std::size_t readings = 100;  ///< Number of readings, at least 1.
   bool changes = false;        ///< Also test clauses that change the encoder, and restore it afterwards.

@@ -40,7 +40,7 @@ enum class PositionState : std::uint8_t {
 
 /// Result of one attempt to read. Times are those of os::now.
 struct Sample {
-  /// What a sample holds.
+  /// The kind of a sample.
   enum class Kind : std::uint8_t {
     reading,
     failed,  ///< the attempt failed because of the encoder or the line

@@ -38,7 +38,7 @@ struct Identified {
   bool is_complete = true;            ///< False if the time limit ended the search early.
 };
 
-/// What `identify` may send, and how long it listens.
+/// Limits of `identify`: the requests it may send, and how long it listens.
 struct IdentifyChoices {
   Time limit = std::chrono::seconds(60);                    ///< Time limit of the whole search.
   std::function<void(const std::string& what)> progress{};  ///< Called with the step that is tried next.

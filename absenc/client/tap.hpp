@@ -14,7 +14,7 @@
 
 namespace absenc::client {
 
-/// What `tap` decodes, and how.
+/// The protocol and the options with which `tap` decodes.
 struct TapChoices {
   std::string protocol{};              ///< Identifier of the unit; "": detected from the received bytes.
   std::string model{};                 ///< Name of a model of the unit; empty: none.

@@ -48,7 +48,7 @@ struct Filter : Machine<Item> {
   ~Filter() = default;
 };
 
-/// Which reading of an encoder that transmits unsolicited is taken. A caller with a rate of its own wants the newest,
+/// Selects the reading to take of an encoder that sends by itself. A caller with a rate of its own wants the newest,
 /// because a reading that waited in the port would count as current.
 enum class Take : std::uint8_t {
   newest,  ///< the first one that is received from now on

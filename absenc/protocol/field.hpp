@@ -16,7 +16,7 @@ namespace absenc {
 struct FlagInfo {
   std::string_view name;     ///< "": the bit has no meaning
   std::string_view meaning;  ///< what happened
-  /// What the operator must do, with commands as "`absenc clear-alarms`"; "": nothing, it is no fault.
+  /// Action for the operator, with commands as "`absenc clear-alarms`"; "": none, the flag is no fault.
   std::string_view action;
   bool optional = false;   ///< some encoders lack this flag: those that report the others and never this one
   std::uint32_t sums = 0;  ///< for a status flag: bits of the unit's alarms that it sums up; 0: none

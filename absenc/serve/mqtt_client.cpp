@@ -21,7 +21,7 @@ using namespace std::chrono_literals;
 
 constexpr std::size_t most_in_frame = 4096;  // bytes; the process sends only numbers and short texts
 constexpr Time time_to_start = 10s;
-constexpr Time longest_silence = 10s;  // of a connected process, which sends a sign of life each second
+constexpr Time longest_silence = 10s;  // longest silence of a connected process, which sends a sign of life each second
 constexpr Time time_to_end = 500ms;    // to disconnect from the broker, or to write a core dump
 
 // Replaces characters that are not printable ASCII: the text may come from the broker.

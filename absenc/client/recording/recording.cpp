@@ -57,19 +57,19 @@ struct Recording::Parts {
 
   RecordingSettings settings_;
   Encoder& encoder_;
-  Time start_;  // of os::now
+  Time start_;  // start of the recording, by os::now
   SampleRows rows_;
   std::string started_;  // `start_` as date and time
   std::unique_ptr<RecordFile> file_;
   unsigned part_ = 0;
   Time part_start_{};
   std::uint64_t finished_bytes_ = 0;  // in the files before `file_`
-  RecordCounts finished_;             // of the files before `file_`
+  RecordCounts finished_;             // counts of the files before `file_`
   std::uint64_t offered_ = 0;         // readings, of which `RecordingSettings::every` leaves some out
   std::uint64_t taken_ = 0;           // readings that were written
   std::uint64_t gap_ = 0;             // missed readings that are not written yet
   Time gap_at_{};
-  std::uint32_t alarms_ = 0;  // of the reading before
+  std::uint32_t alarms_ = 0;  // alarms of the previous reading
   std::uint32_t alarms_reported_ = 0;
 };
 

@@ -42,7 +42,7 @@ struct SafetyWordValues {
   std::optional<unsigned> crc{};
 };
 struct SafetyAlarms {
-  std::uint32_t alarms;  // of the reading: declared for its flags, and never put
+  std::uint32_t alarms;  // alarms of the reading; the field is declared for its flags and never put
 };
 
 constexpr auto cpw_fields = fields_of<SafetyWordValues>(

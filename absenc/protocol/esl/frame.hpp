@@ -176,7 +176,7 @@ constexpr std::size_t walk_parts(unsigned parts, std::size_t control_field, cons
   return detail::WireOrder::walk(parts, control_field + 1, visit);
 }
 
-/// Which parts the reply of a request has, and in which order.
+/// The parts of a reply, in their order on the line.
 struct Layout {
   constexpr Layout() = default;
   /// Sets length of the checksum and parts of each channel.

@@ -179,7 +179,7 @@ TEST(EslFrame, EveryCheckHasItsSentence) {
   }
 }
 
-// Which status and alarm bits make which part of a reading invalid.
+// Checks which part of a reading each status and alarm bit makes invalid.
 TEST(EslFrame, ValidityOfEachPart) {
   Reply reply = sample(DataId::position);
   reply.one = {.status = status::ready};

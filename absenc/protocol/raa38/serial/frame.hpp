@@ -19,7 +19,7 @@ namespace absenc::raa38::serial {
 
 using namespace std::chrono_literals;
 
-/// What starts a frame.
+/// The event that starts a frame.
 enum class Mode : std::uint8_t {
   timing,     ///< the encoder itself, at its refresh rate
   handshake,  ///< a falling edge on CLK
