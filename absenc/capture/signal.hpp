@@ -12,7 +12,7 @@
 
 namespace absenc::capture {
 
-/// A time in samples, or in units of the file's time scale, from the beginning of the capture.
+/// A time in ticks from the beginning of the capture: a tick is a sample, or the unit of the file's time scale.
 using Tick = std::uint64_t;
 
 /// Kind of data in a capture file.
@@ -25,12 +25,12 @@ enum class Content : std::uint8_t {
 
 struct Layout {
   Content content = Content::samples;
-  std::vector<std::string> channels;   // names by index; for bytes and frames: the directions or lines on which they
-                                       // were recorded
+  std::vector<std::string>
+      channels;  // names by index; of bytes and frames, the directions or lines on which they were recorded
   std::uint64_t ticks_per_second = 0;  // 0: the file has no times
-  std::uint64_t ticks = 0;             // length of the capture; 0: not known before its end
-  // Set if the times of bytes are those of their arrival at a program: see Annotator::Settings::gap. 0: times on the
-  // line.
+  std::uint64_t ticks = 0;  // length of the capture in ticks; 0: not known before the capture was read to its end
+  // By-arrival gap: not 0 if the times of bytes are those of their arrival at a program, see Annotator::Settings::gap.
+  // 0: times on the line.
   Tick arrival_gap = 0;
 };
 
@@ -42,45 +42,46 @@ struct Changes {
 
 /// A character of an asynchronous line.
 struct Character {
-  Tick begin = 0;  // falling edge of the start bit
-  Tick end = 0;    // end of the stop bit
+  Tick begin = 0;  // time of the falling edge of the start bit
+  Tick end = 0;    // time of the end of the stop bit
   std::uint8_t value = 0;
-  std::uint8_t channel = 0;  // index into the decoded channels, not the file's channels
+  std::uint8_t channel = 0;  // index among the decoded channels, not among the file's channels
   bool bad_parity = false;
   bool bad_stop = false;  // framing error; with value 0 and a line that stays low it is a break
   bool is_break = false;
 };
 
 /// A sequence of clocks: an SPI transfer between two edges of chip select, or a clocked word between two pauses. An
-/// incomplete burst is marked, because a word without its first bits looks like a valid wrong position.
+/// incomplete burst is marked as `cut`, because a word without its first bits looks like a valid wrong position.
 struct Burst {
   Tick begin = 0;
   Tick end = 0;
   std::size_t bits = 0;           // number of clocks in the burst
   std::vector<std::uint8_t> in;   // bits sent by the encoder, packed MSB first, the last byte left-aligned
   std::vector<std::uint8_t> out;  // SPI: bits sent by the host, packed like `in`
-  bool cut = false;               // its beginning or its end is not in the capture: bits may be missing there
-  // The members below apply to clocked words without chip select.
+  bool cut = false;  // the burst's beginning or end is not in the capture: bits may be missing at that place
+  // The following members apply to clocked words without chip select.
   bool low_before = false;   // the clock rested at its low level before the burst
   bool low_after = false;    // the clock rests at its low level after the burst
   bool fell_before = false;  // the clock, high behind the previous word, fell during the rest between the two words
-  bool has_last = false;     // the level of `in` behind the last clock change is known
-  bool last = false;         // that level: a host that gives n clocks for n bits takes its last bit there
+  bool has_last = false;     // `last` is known: the level of the encoder's data line behind the last clock change
+  bool last = false;  // level of the encoder's data line behind the last clock change: a host that gives n clocks for n
+                      // bits takes its last bit there
 };
 
 struct CanRecord {
   Tick at = 0;
   CanFrame frame{};
-  bool error_frame = false;  // error reported by the controller: `frame` holds the kernel's error class and data
+  bool error_frame = false;  // the controller reported an error: `frame` holds the kernel's error class and data
   std::uint8_t channel = 0;  // index into the layout's channels
 };
 
-/// A problem in a capture file, with its place.
+/// A problem in a capture file, with the place in the file.
 struct Damage {
   std::uint64_t offset = 0;  // bytes from the beginning of the file
-  Tick tick = 0;             // data before this tick was decoded
+  Tick tick = 0;             // tick up to which data was decoded before the damage
   std::string what;          // description of the problem as a sentence; "": none
-  bool note = false;         // no data is missing, but the user should know this
+  bool note = false;         // true: no data is missing, but the user should know of the problem
 };
 
 /// A part of a capture that is decoded on its own. It owns its storage, which is used again for the next part.
@@ -88,13 +89,14 @@ struct Block {
   std::uint64_t index = 0;  // 0, 1, 2 ... in the order of time
   Tick first = 0;  // tick of the first sample, or time from which the changes are valid; after damage it may be later
                    // than the end of the previous block, because the data between them is missing
-  Tick end = 0;    // tick behind the last one
-  std::vector<std::uint8_t> samples;  // samples: `bytes_per_sample` bytes each, little endian, channel 0 in bit 0
-  unsigned bytes_per_sample = 1;      // 1, 2, 4 or 8
-  std::vector<Changes> changes;       // changes: one entry for each channel
-  std::vector<Character> bytes;       // the characters of a capture of kind bytes
-  std::vector<CanRecord> frames;      // the CAN frames of a capture of kind frames
-  std::uint64_t file_offset = 0;      // private to the reader, between `claim` and `fill`
+  Tick end = 0;    // tick behind the last tick of the block
+  std::vector<std::uint8_t>
+      samples;  // for captures of kind samples: `bytes_per_sample` bytes each, little endian, channel 0 in bit 0
+  unsigned bytes_per_sample = 1;  // 1, 2, 4 or 8
+  std::vector<Changes> changes;   // for captures of kind changes: one entry for each channel
+  std::vector<Character> bytes;   // for captures of kind bytes: the characters
+  std::vector<CanRecord> frames;  // for captures of kind frames: the CAN frames
+  std::uint64_t file_offset = 0;  // offset in the file, used only by the reader between `claim` and `fill`
   std::uint64_t file_size = 0;
 };
 
@@ -102,13 +104,13 @@ struct Block {
 struct Reader {
   virtual ~Reader() = default;
   [[nodiscard]] virtual const Layout& layout() const = 0;
-  /// Claims the next part of the file, in order, by one caller at a time. Returns false at the end or if the file is
-  /// damaged from here on.
+  /// Claims the next part of the file, in the order of the file; only one thread may call it at a time. Returns false
+  /// at the end of the file or if the rest of the file cannot be read.
   [[nodiscard]] virtual bool claim(Block& block) = 0;
-  /// Reads or decompresses the claimed part. Several threads may call it at once, each with its own block. A damaged
-  /// block is cut short.
+  /// Reads or decompresses the part that `claim` put into `block`. Several threads may call it at once, each with its
+  /// own block. A damaged block is cut short.
   virtual void fill(Block& block) = 0;
-  /// Returns the problems found in the file, in the order of the file; complete after the last block.
+  /// Returns the problems found in the file, in the order of the file; complete after the last block was filled.
   [[nodiscard]] virtual const std::vector<Damage>& damages() const = 0;
 };
 

@@ -38,7 +38,8 @@ def test_decodes_like_the_command(wave):
     rows = list(csv.DictReader(io.StringIO(printed.stdout)))
     capture = absenc.decode(wave, "tformat")
     assert len(rows) == len(capture) >= 300
-    # An encoder that is switched on at 6000 rpm has no valid position: masked in NumPy, empty in CSV.
+    # With the parameter 6000 the encoder is switched on at 6000 rpm and has no valid position, with 60 it has: a
+    # position that is not valid is masked in NumPy and empty in CSV.
     absent = [row["angle_deg"] == "" for row in rows]
     assert absent == list(np.ma.getmaskarray(capture["angle_deg"]))
     assert absent == [row["singleturn_valid"] == "false" for row in rows] == list(np.ma.getmaskarray(capture["singleturn"]))

@@ -10,7 +10,7 @@ namespace absenc::capture {
 
 namespace {
 
-// number of characters after which the requests' channel is decided
+// number of characters of both channels after which the channel of the requests is decided
 constexpr std::size_t enough_characters = 2000;
 
 struct Score final : AnnotationSink {
@@ -74,7 +74,8 @@ void Annotator::store_undecided(const Character& character) {
   if (undecided_.size() == enough_characters) find_roles();
 }
 
-// Tries both assignments of the channels on the characters so far, and takes the one that explains more of them.
+// Decodes the stored characters once for each assignment of requests and replies to the channels, and takes the
+// assignment that explains more of the characters.
 void Annotator::find_roles() {
   constexpr std::array<std::array<Carries, 2>, 2> assignments{
       {{Carries::requests, Carries::replies}, {Carries::replies, Carries::requests}}};
@@ -136,8 +137,8 @@ void Annotator::parse(Channel& channel, bool whole, bool cut) {
   at_ = last_reply_size_ = 0;
   whole_ = whole;
   cut_ = cut;
-  // If the capture begins within this complete run, its frame boundaries are unknown: it is reported as cut. A run that
-  // never pauses must be parsed all the same.
+  // The frame boundaries of a run without a pause before it are unknown: a complete run is then reported as cut. A run
+  // that never pauses is parsed in spite of that.
   if (whole && !channel.synchronised && !settings_.by_arrival) {
     const Run& run = channel.run;
     const Piece all{run.bytes(), run.begin(0), run.end()};

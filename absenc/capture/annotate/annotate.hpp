@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Finds the frames of a protocol among the characters of a line, pairs requests with their replies and decodes them,
-// with the same functions of the unit as live readings.
+// with the same functions of the protocol's unit as live readings.
 #pragma once
 
 #include <array>
@@ -21,7 +21,7 @@ enum class Carries : std::uint8_t {
   both,
   requests,
   replies,
-  detect,  // unknown: of two channels, one carries requests and the other replies; detected from their content
+  detect,  // unknown which of two channels carries the requests and which the replies; detected from the characters
 };
 
 /// Returns the times of the unit's line in ticks of a capture. `ticks_per_bit` 0: the characters have no lengths, and
@@ -34,10 +34,10 @@ enum class Carries : std::uint8_t {
 /// A pause on the line ends a frame. The first characters of a capture, up to the first pause, may be the end of a
 /// frame or no characters at all: they are reported as cut. On a line that never pauses, a frame is accepted only if
 /// another good frame follows, because a weak checksum finds frames everywhere. On a line with both directions a frame
-/// is classified as request or reply by the frames before it, never by its bytes alone: some replies equal their
+/// is classified as request or reply by the preceding frames, never by its bytes alone: some replies equal their
 /// requests.
 ///
-/// With arrival times (`by_arrival`) a pause may lie within a frame and be missing between two. Frames are then
+/// With arrival times (`by_arrival`) a pause may lie within a frame and be missing between two frames. Frames are then
 /// separated by length and content alone, and pauses only help to judge bytes that are no good frame: see
 /// annotate_arrival.cpp.
 class Annotator {
@@ -48,9 +48,10 @@ class Annotator {
     LineTicks ticks{};
     Tick begin = 0;              // first tick of the capture
     bool begins_silent = false;  // the line was silent before the capture
-    bool by_arrival = false;     // characters have the time of their arrival at a program; only for one channel
-    Tick gap = 1;  // by_arrival: shortest pause that must come from the line, because transport to the program does not
-                   // cause it
+    bool by_arrival = false;  // a character's times are those of its arrival at a program, not those on the line; only
+                              // for one channel
+    Tick gap = 1;  // by_arrival: shortest pause that must come from the line, because the transport from line to
+                   // program does not cause such pauses
   };
 
   /// `unit` and `sink` must outlive the annotator.
@@ -58,22 +59,23 @@ class Annotator {
   Annotator(const Annotator&) = delete;
   Annotator& operator=(const Annotator&) = delete;
 
-  /// Adds a character; characters must be in the order of their begin times.
+  /// Adds a character; characters must be added in the order of their begin times.
   void put(const Character& character);
   /// Ends the capture at `end`.
   void finish(Tick end);
-  /// by_arrival: reports all complete good frames so far, without waiting for further characters.
+  /// by_arrival: reports all complete good frames among the added characters, without waiting for further characters.
   void report_complete();
-  /// by_arrival: the line was silent for so long that no frame continues and no reply can follow.
+  /// by_arrival: reports everything received so far. Call it when the line was silent for so long that no frame
+  /// continues and no reply can follow.
   void report_after_silence();
-  /// Returns what a channel carries; `detect` while it is not known.
+  /// Returns which frames `channel` carries; `detect` while they are not known.
   [[nodiscard]] Carries carries(std::size_t channel) const { return channels_[channel].carries; }
 
  private:
   struct Channel {
     Carries carries = Carries::both;
     Run run;
-    bool synchronised = false;    // a pause was found, so the beginnings of frames are known
+    bool synchronised = false;    // a pause was found on this channel, so the beginnings of its frames are known
     bool at_frame_start = false;  // a frame is known to begin at the first character of the run
     std::size_t last_size = 0;    // size of the last good unsolicited frame in this run; 0: none
     std::size_t stream_size = 0;  // size of the last good unsolicited frame in any run
@@ -89,7 +91,8 @@ class Annotator {
   void close(Channel& channel, bool cut);
   void parse(Channel& channel, bool whole, bool cut);
 
-  // Parsing of the run from `at_` on. Each function returns the number of characters that it consumed, 0 for none.
+  // Parsing of the run from `at_` on. Functions that return a number return how many characters they consumed or would
+  // consume, 0 for none.
   std::size_t next_frame();
   std::size_t whole_frame();
   std::size_t match_reply();
@@ -119,16 +122,17 @@ class Annotator {
   Exchanges exchanges_;
   Options options_;
   std::array<Channel, 2> channels_{};
-  std::array<std::size_t, 256> reply_sizes_{};  // size of the last good reply, indexed by the first byte of its request
-  std::vector<Character> undecided_;            // characters stored until the channels' directions are known
+  std::array<std::size_t, 256>
+      reply_sizes_{};                 // size of the last good reply in bytes, indexed by the first byte of its request
+  std::vector<Character> undecided_;  // characters stored until the channels' directions are known
 
-  bool is_first_ = true;  // the rest of the first frame may lie before the capture
+  bool is_first_ = true;  // no frame was parsed yet: the first part of the first frame may lie before the capture
 
   // State while a run is parsed.
   Channel* channel_ = nullptr;
   std::size_t at_ = 0;
   bool whole_ = true;  // no characters will be added to the run
-  bool cut_ = false;   // the capture ends with this run
+  bool cut_ = false;   // the capture ends with this run, perhaps within its last frame
   std::size_t last_reply_at_ = 0;
   std::size_t last_reply_size_ = 0;  // size of the reply that ended at `at_`; 0: no reply ended there
 };

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Parsing of characters with arrival times at a program. Adapters, the kernel and other programs pass on several frames
-// at once, and parts of one frame with pauses between them. So a good frame is found by its length and content. For
-// other bytes the following characters decide, or a silence that cannot occur within a frame; they are then cut at
-// pauses.
+// at once, and parts of one frame with pauses between them. So a good frame is found by its length and content. Where
+// bytes form no good frame, the characters after them decide, or a silence that cannot occur within a frame; the bytes
+// are then cut at pauses.
 #include <algorithm>
 
 #include "absenc/capture/annotate/annotate.hpp"
@@ -27,14 +27,13 @@ bool Annotator::has_gap(std::size_t before) const {
   return before == 0 || (before < run.size() && run.begin(before) - run.begin(before - 1) >= settings_.gap);
 }
 
-// Returns whether pauses are on both sides of the `size` bytes at `at_`.
+// Returns whether the `size` bytes at `at_` have a pause before them, and behind them a pause or the end of the run.
 bool Annotator::stands_alone(std::size_t size) const {
   const bool is_end = whole_ && size == rest(at_).size();
   return has_gap(at_) && (is_end || has_gap(at_ + size));
 }
 
-// Returns the size of the frame at `at_` if it is complete and good whatever follows, or 0: the next characters may
-// belong to it.
+// Returns the size of the good frame at `at_`, or 0 if the next characters may belong to it.
 std::size_t Annotator::whole_frame() {
   if (!channel_->at_frame_start) return 0;
   const auto answered = [&](std::size_t size) {
@@ -42,7 +41,7 @@ std::size_t Annotator::whole_frame() {
     return reply_at(request, at_ + size, reply_sizes_[request[0]]) != 0;
   };
   const std::size_t size = request_at(at_);
-  // The host had a timeout and repeats its request.
+  // Returns whether the request at `at_` is sent again: its host had a timeout.
   const auto repeats = [&] {
     if (size == 0 || !stands_alone(size) || rest(at_ + size).size() < size) return false;
     const Bytes behind = rest(at_ + size);

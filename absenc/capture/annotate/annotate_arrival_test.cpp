@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests characters with arrival times: frames in parts and several at once, beginning anywhere, damaged, without
-// replies.
+// Tests annotation by arrival times: frames that arrive in parts or several at once, captures that begin anywhere,
+// damaged frames, requests without replies.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -58,7 +58,7 @@ std::string hex(const Wire& wire) {
   return text;
 }
 
-// Returns the first difference only: the whole lists have hundreds of exchanges.
+// Returns the first difference between found and expected exchanges, "" if there is none; both lists have hundreds.
 std::string difference(const std::vector<Exchange>& found, const std::vector<Exchange>& exchanges) {
   const auto text = [](const std::vector<Exchange>& all, std::size_t i) {
     return i < all.size() ? hex(all[i].request) + " > " + hex(all[i].reply) : std::string("nothing");
@@ -82,8 +82,8 @@ class Arrival : public ::testing::TestWithParam<const Unit*> {
     annotator = std::make_unique<Annotator>(unit, options, settings, collector);
   }
 
-  // Returns exchanges of one request and one reply between host and encoder; none if the encoder only sends unsolicited
-  // frames.
+  // Returns `count` exchanges of one request and one reply between host and virtual encoder; none if the encoder only
+  // sends unsolicited frames.
   std::vector<Exchange> talk(std::size_t count, std::uint64_t seed) {
     Talker talker(unit, options, {}, seed);
     std::vector<Exchange> exchanges;
@@ -187,7 +187,7 @@ TEST_P(Arrival, CaptureBeginsWithinAnExchange) {
     annotator->report_after_silence();
     const std::vector<Exchange> found = good();
     ASSERT_GE(found.size() + 3, exchanges.size()) << from << " " << hex(collector.found[0].reply) << " " << hex(all);
-    // Each exchange found was really sent, and the last ones are in their order.
+    // Each found exchange was really sent, and the last found exchanges are in the order in which they were sent.
     for (std::size_t i = 1; i <= found.size(); ++i) {
       ASSERT_EQ(found[found.size() - i], exchanges[exchanges.size() - i]) << from;
     }
@@ -197,7 +197,7 @@ TEST_P(Arrival, CaptureBeginsWithinAnExchange) {
   }
 }
 
-// A line with one pair of wires, as a tap receives it.
+// Tests one channel with both directions, as a tap on one pair of wires receives it.
 TEST_P(Arrival, ADamagedReplyCostsNoOtherExchange) {
   if (unit.link != LinkKind::half_duplex) return;
   const std::vector<Exchange> exchanges = talk(400, 5);
@@ -246,7 +246,7 @@ TEST_P(Arrival, ReportsUnansweredRequests) {
     EXPECT_EQ(collector.found[i].request, exchanges[0].request);
     EXPECT_EQ(collector.found[i].remark, Remark::unanswered);
   }
-  // Afterwards the encoder answers again.
+  // From here on the encoder replies to every request again.
   for (const Exchange& one : exchanges) {
     receive(one.request);
     receive(one.reply);

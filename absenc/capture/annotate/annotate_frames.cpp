@@ -9,8 +9,8 @@ namespace absenc::capture {
 // ---- Bursts
 
 // Returns the word in a burst without the clocks that show the idle line before the first bit, and without the edge
-// with which a clock that was held low rises again. With `with_last` it includes the bit on the line behind the last
-// clock.
+// with which a clock that was held low rises again. With `with_last` the word includes the level of the data line
+// behind the last clock.
 Frame BurstAnnotator::word_of(const Burst& burst, bool with_last) {
   const bool rises = burst.low_before && judge_.unit().control_bit != nullptr;
   const std::size_t idle = judge_.unit().line.idle_clocks + (rises ? 1u : 0u);
@@ -43,8 +43,8 @@ void BurstAnnotator::put(const Burst& burst) {
   sink_.put(annotation);
 }
 
-// Decodes a word; the decoded bits are returned in `word`, without the encoder's control communication bit, which is
-// returned in `answered`.
+// Decodes the word in `burst`; returns its error. `word` receives the decoded bits without the encoder's control
+// communication bit, and `answered` receives that bit.
 Error BurstAnnotator::decode_as(const Burst& burst, bool with_last, Frame& word, bool& answered) {
   word = word_of(burst, with_last);
   const std::optional<std::size_t> place = judge_.control_bit(word);
@@ -60,7 +60,7 @@ Error BurstAnnotator::decode_as(const Burst& burst, bool with_last, Frame& word,
 void BurstAnnotator::decode_word(const Burst& burst, Annotation& annotation) {
   bool answered = false;
   annotation.error = decode_as(burst, false, annotation.reply, answered);
-  // A host that gives only one clock per bit takes the last bit behind the last clock.
+  // A host that gives only one clock per bit samples the word's last bit behind the last clock.
   if (annotation.error != Error::none && burst.has_last && !burst.cut) {
     const bool good = decode_as(burst, true, annotation.reply, answered) == Error::none;
     annotation.error = good ? Error::none : decode_as(burst, false, annotation.reply, answered);
@@ -112,7 +112,8 @@ bool ControlFrames::settle(bool fell) {
   return !open_;
 }
 
-// If a word was lost, a bit of the control frame is missing, so the host discards the control frame.
+// Returns the control frame decoded, or with the error of its first bad word: a lost word is a missing bit, so the host
+// discards the control frame.
 Annotation ControlFrames::annotation(Judge& judge) const {
   Annotation annotation{.kind = Annotation::Kind::exchange,
                         .error = error_,
@@ -134,7 +135,7 @@ void BurstAnnotator::decode_exchange(const Burst& burst, Annotation& annotation)
     annotation.request.bytes = size != 0 ? Bytes(burst.out).first(size) : Bytes(burst.out);
   }
   annotation.error = judge_.decode(annotation.request, annotation.reply);
-  // A host may clock on behind the frame.
+  // A host may send more clocks than the reply needs, so the reply may be shorter than the burst.
   const std::size_t size = judge_.frame_size(Direction::reply, burst.in);
   const Frame shorter{.bytes = Bytes(burst.in).first(size)};
   if (annotation.error != Error::none && size != 0 && judge_.decode(annotation.request, shorter) == Error::none) {
@@ -168,7 +169,7 @@ void CanAnnotator::finish(Tick end) {
     report_unanswered(0, end > requests_[0].at + ticks_.limit ? Remark::unanswered : Remark::cut);
 }
 
-// Pairs the frame with the oldest outstanding request that it answers. Returns false if there is none.
+// Pairs the frame with the oldest outstanding request that it answers. Returns false if it answers none.
 bool CanAnnotator::pair_reply(const CanRecord& record) {
   const Frame reply{.bytes = record.frame.bytes(), .can = &record.frame};
   for (std::size_t i = 0; i < request_count_; ++i) {
@@ -180,7 +181,8 @@ bool CanAnnotator::pair_reply(const CanRecord& record) {
   return false;
 }
 
-// Pairs a bad frame with the newest request that it would answer if it were good. Returns false if there is none.
+// Pairs a bad frame with the newest outstanding request that the frame would answer if its content were good. Returns
+// false if no request fits.
 bool CanAnnotator::pair_bad_reply(const CanRecord& record) {
   const Frame reply{.bytes = record.frame.bytes(), .can = &record.frame};
   for (std::size_t i = request_count_; i-- > 0;) {
@@ -192,8 +194,8 @@ bool CanAnnotator::pair_bad_reply(const CanRecord& record) {
   return false;
 }
 
-// A host that repeats a request to the same encoder no longer expects the earlier reply: the next reply answers the new
-// request.
+// Reports earlier requests to the same encoder as unanswered: a host that sends a new request no longer expects their
+// replies.
 void CanAnnotator::end_earlier_requests(const CanFrame& request) {
   for (std::size_t i = 0; i < request_count_;) {
     const CanFrame& sent = requests_[i].frame;

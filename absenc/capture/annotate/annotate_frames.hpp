@@ -16,19 +16,21 @@
 namespace absenc::capture {
 
 /// Collects control frames of clocked links: the host's bits are the level of its clock in each pause, the encoder's
-/// bits are in the following words. A control frame begins with a 1 behind `zeros` zeros, and ends with `zeros` zeros.
+/// bits are in the words that follow the pauses. A control frame begins with a 1 behind `zeros` zeros, and ends with
+/// `zeros` zeros.
 class ControlFrames {
  public:
   static constexpr unsigned zeros = 14;
 
-  /// Returns whether the encoder's bit may be 1, because a control frame is in progress.
+  /// Returns whether a control frame is in progress, so that the encoder's control bit may be 1.
   [[nodiscard]] bool may_answer() const { return open_; }
-  /// Adds the next word with the encoder's bit and the word's error. Call `settle` before the next word.
+  /// Adds the next word: `answered` is the encoder's control bit, `error` the word's error. Call `settle` before the
+  /// next word.
   void put(const Burst& burst, bool answered, Error error);
   /// Completes the last added word at the beginning of the next word or at the end; `fell` is whether the clock fell
   /// between the two. Returns true if that word is the last of a control frame.
   bool settle(bool fell);
-  /// Ends the capture. Returns true if a control frame is incomplete.
+  /// Ends the capture. Returns true if a control frame was in progress, which stays incomplete.
   bool finish() { return std::exchange(open_, false); }
   /// Returns the completed control frame, decoded; valid until the next word and until `judge` decodes again.
   [[nodiscard]] Annotation annotation(Judge& judge) const;
@@ -78,19 +80,19 @@ class BurstAnnotator {
 
   Judge judge_;
   AnnotationSink& sink_;
-  std::vector<std::uint8_t> shifted_;   // the word without the clocks that show the idle line
-  std::vector<std::uint8_t> silenced_;  // the word without the encoder's control communication bit
+  std::vector<std::uint8_t> shifted_;   // last word without the clocks that show the idle line
+  std::vector<std::uint8_t> silenced_;  // last word without the encoder's control communication bit
   ControlFrames control_;
 };
 
-/// Annotates CAN frames of any number of nodes, which answer in any order or send unsolicited frames.
+/// Annotates CAN frames of any number of encoders, which answer in any order or send unsolicited frames.
 class CanAnnotator {
  public:
   CanAnnotator(const Unit& unit, const Options& options, const LineTicks& ticks, AnnotationSink& sink)
       : judge_(unit, options), ticks_(ticks), sink_(sink) {}
 
   void put(const CanRecord& record);
-  /// Ends the capture at `end`.
+  /// Ends the capture at `end`; requests without a reply are reported.
   void finish(Tick end);
 
  private:

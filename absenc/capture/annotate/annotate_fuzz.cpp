@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Feeds any bytes with any pauses as characters of any line: each must belong to exactly one annotation, and a frame
-// annotated as good must be good.
+// Feeds any bytes with any pauses as characters of any line: each byte must belong to exactly one annotation, and a
+// frame that is annotated as good must pass the unit's checks.
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -39,7 +39,7 @@ struct Check final : AnnotationSink {
   const Unit& unit;
   const Options& options;
   std::size_t bytes = 0;
-  std::size_t hidden = 0;  // upper limit of the bytes missing in annotations
+  std::size_t hidden = 0;  // upper limit of the number of bytes that no annotation contains
 };
 
 void annotate(const Unit& unit, const Options& options, Annotator::Settings settings, Bytes data, bool pauses,
@@ -80,7 +80,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
       settings.channel_count = 2;
     }
     annotate(*unit, options, settings, bytes, true, 1);
-    // A line that never pauses; tested for few inputs, because it takes long.
+    // Tests a line that never pauses; only for a sixteenth of the sizes, because it takes long.
     if (carries == Carries::both && size % 16 == 5) {
       annotate(*unit, options, settings, bytes, false, 1 + 2 * Run::capacity / size);
     }

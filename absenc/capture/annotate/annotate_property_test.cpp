@@ -102,7 +102,7 @@ class Truth {
     const bool bit_is_one = place && (bits[*place / 8] >> (7 - *place % 8) & 1) != 0;
     if (bit_is_one && control_.may_answer()) bits[*place / 8] &= static_cast<std::uint8_t>(~(0x80u >> *place % 8));
     Error error = judge_.decode(request, {.bytes = bits, .bits = clocked ? burst.bits - idle : 0});
-    // A host may clock on behind a frame.
+    // A host may send more clocks than the frame needs.
     const std::size_t size = clocked ? 0 : judge_.frame_size(Direction::reply, bits);
     if (error != Error::none && size != 0 &&
         judge_.decode(request, {.bytes = Bytes(bits).first(size)}) == Error::none) {
@@ -125,7 +125,7 @@ class Truth {
 
  private:
   ControlFrames control_;
-  std::size_t stream_size_ = 0;  // size of the last good unsolicited frame
+  std::size_t stream_size_ = 0;  // size of the last good unsolicited frame in bytes; 0: none yet
   std::optional<Reading> reading(Error error) {
     return error == Error::none && judge_.contents().reading != nullptr ? std::optional(*judge_.contents().reading)
                                                                         : std::nullopt;
@@ -224,8 +224,8 @@ class Truth {
 
 // ---- Comparison of found and expected annotations
 
-// Requires every good exchange as expected, and an error at each expected error. Several faults together may look like
-// another error, so only a `share` of the bad ones must match exactly.
+// Requires every good exchange to be found as expected, and an error at the place of each expected error. Several
+// faults together may look like another error, so only a `share` of the bad exchanges must match exactly.
 void expect_same(const std::vector<OwnedAnnotation>& found, const std::vector<OwnedAnnotation>& expected,
                  double share = 1) {
   std::size_t next = 0;
@@ -249,8 +249,8 @@ void expect_same(const std::vector<OwnedAnnotation>& found, const std::vector<Ow
     if (share == 1) ADD_FAILURE() << context << "\nfound " << to_text(found[next]);
     const std::size_t first = next;
     bool has_error = false;
-    // A host may repeat its request during a doubled reply: an annotation that matches the next expected one is not
-    // part of this one.
+    // A host may repeat its request during a doubled reply: an annotation that matches the next expected exchange is
+    // not part of the present one.
     const std::string following = i + 1 < expected.size() ? to_text(expected[i + 1]) : "";
     for (; next < found.size() && found[next].begin >= one.begin && found[next].end <= one.end; ++next) {
       if (to_text(found[next]) == following) break;
@@ -304,7 +304,7 @@ class Characters : public ::testing::TestWithParam<const Unit*> {
   const Unit& unit = *GetParam();
   Options options = testing::options_of(unit);
 
-  /// Runs commands until `exchanges` exchanges are recorded; those with collisions are left out.
+  /// Runs commands until `exchanges` exchanges are recorded; conversations with collisions are left out.
   void talk(const sim::FaultRates& rates, std::size_t exchanges, std::uint64_t seed) {
     Talker talker(unit, options, rates, seed);
     while (truth.expected.size() < exchanges) {
@@ -363,7 +363,7 @@ TEST_P(Characters, FindsEveryErrorAtItsPlace) {
   EXPECT_GT(errors[Error::none], 2000);
 }
 
-// A recording of the adapter's transmit wire only, or of only one of two pairs.
+// Annotates a recording of the encoder's side only, for example of one of two pairs of wires.
 TEST_P(Characters, FindsRepliesWithoutRequests) {
   talk({}, 500, 3);
   if (unit.link != LinkKind::full_duplex) return;
@@ -402,7 +402,7 @@ TEST_P(Characters, DamagedCharacters) {
   expect_same(annotate(settings_of(unit)), expected);
 }
 
-// Wherever a capture begins, no false frame is found, and soon all frames are.
+// Begins the capture at any character: no false frame may be found, and soon all frames must be found.
 TEST_P(Characters, BeginsAnywhere) {
   talk({}, 300, 5);
   const std::vector<Character> all = characters;

@@ -8,7 +8,7 @@ namespace absenc::capture {
 
 namespace {
 
-// Number of characters that must follow on a line that does not pause: two of the longest frames.
+// Number of characters to examine behind a frame on a line that does not pause: two of the longest frames.
 constexpr std::size_t lookahead = 160;
 
 }  // namespace
@@ -20,8 +20,9 @@ Piece Annotator::piece(std::size_t size) const {
   return {rest(at_).first(size), run.begin(at_), run.end(at_ + size - 1)};
 }
 
-// Returns the size of a good reply, or 0. The end at a pause is preferred, then the usual size (0: not known): where
-// only a checksum gives the size, a shorter match may be an accident.
+// Returns the size of a good reply to `request` that begins at `from`, or 0. A reply that ends at a pause is preferred,
+// then one of the size `usual` (0: not known): where only a checksum gives the size, a shorter match may be an
+// accident.
 std::size_t Annotator::reply_at(Bytes request, std::size_t from, std::size_t usual) {
   const Bytes bytes = rest(from);
   const auto is_good = [&](std::size_t size) {
@@ -31,7 +32,7 @@ std::size_t Annotator::reply_at(Bytes request, std::size_t from, std::size_t usu
   if (bytes.empty()) return 0;
   if (whole_ && bytes.size() <= lookahead && is_good(bytes.size())) return bytes.size();
   if (usual != 0 && usual <= bytes.size() && is_good(usual)) return usual;
-  // The rest of the reply may still arrive.
+  // The missing characters of the reply may still arrive.
   if (settings_.by_arrival && !whole_ && usual > bytes.size()) return 0;
   const std::size_t size = judge_.frame_size(Direction::reply, bytes);
   return size != 0 && size <= bytes.size() && is_good(size) ? size : 0;
@@ -44,8 +45,8 @@ std::size_t Annotator::request_at(std::size_t from) {
   return size != 0 && channel_->run.clean(from, size) ? size : 0;
 }
 
-// Returns whether plausible consecutive good frames begin there: three, or two at the end of the run. One frame, or two
-// with weak checksums, may be an accident.
+// Returns whether plausible consecutive good frames begin at `from`: three frames, or two if they end with the run. One
+// frame, or two with weak checksums, may be an accident.
 bool Annotator::good_from(std::size_t from) {
   const std::size_t end = channel_->run.size();
   const auto is_end = [&](std::size_t at) { return whole_ && at == end; };
@@ -67,7 +68,8 @@ bool Annotator::good_from(std::size_t from) {
   return second != 0 && (is_end(third) || reply_at({}, third) != 0);
 }
 
-// Returns whether another sender may begin there: it needs a part of the turnaround time in the document.
+// Returns whether another sender may begin at `at`: at least a quarter of the document's turnaround time must be silent
+// before it.
 bool Annotator::may_turn(std::size_t at) const {
   const Run& run = channel_->run;
   return at < run.size() && run.begin(at) - std::min(run.begin(at), run.end(at - 1)) >= settings_.ticks.turnaround / 4;
@@ -91,7 +93,8 @@ std::size_t Annotator::next_frame() {
   return taken != 0 ? taken : take_bad();
 }
 
-// Returns the newest request that was complete: a host that sends another request no longer expects earlier replies.
+// Returns the index of the newest outstanding request that ended before `begin`, or nothing: a host that sends another
+// request no longer expects earlier replies.
 std::optional<std::size_t> Annotator::request_before(Tick begin) const {
   const auto waiting = exchanges_.waiting();
   for (std::size_t i = waiting.size(); i-- > 0;) {
@@ -119,15 +122,16 @@ std::size_t Annotator::match_reply() {
     // A reply that leaves a rest may match by accident; an echo of the request with a reply that leaves no rest is no
     // accident. Some replies equal their requests, and a reply may be sent twice.
     const bool may_be_accident = size == 0 || size > pending.bytes().size();
-    // Later than the turnaround limit, the host has repeated its request.
+    // The reply begins later than twice the turnaround limit after the request, so equal bytes are the repeated
+    // request.
     const bool is_late = settings_.ticks.turnaround != 0 && begin > pending.end + 2 * settings_.ticks.turnaround;
-    // Between host and encoder no echo occurs: equal bytes are a repeated request.
+    // A tap between host and encoder receives no echo: equal bytes are a repeated request.
     const bool may_be_echo = !is_late && !settings_.by_arrival;
     const std::size_t echoed = may_be_accident && may_be_echo ? echoed_reply_size(pending.bytes(), at_) : 0;
     if (echoed != 0 && (size == 0 || echoed == rest(at_).size())) return match_echoed_reply(*which, echoed);
     if (size == 0) return 0;
   }
-  // Some replies equal their requests: overdue, these bytes are the repeated request.
+  // Some replies equal their requests. If the reply is overdue, such bytes are the repeated request.
   if (overdue && channel_->carries == Carries::both && request_at(at_) == size) return 0;
   if (leaves_rest && usual != 0 && size != usual && !is_followed_by_frame(size)) return 0;
   last_reply_at_ = at_;
@@ -136,7 +140,7 @@ std::size_t Annotator::match_reply() {
     channel_->at_frame_start = true;
     channel_->last_size = 0;  // a request was sent, so the stream of unsolicited frames has ended
   }
-  // Lookahead has changed the judge's contents: decode this reply again.
+  // A look-ahead has changed the content stored in `judge_`: decode this reply again.
   if (leaves_rest || overdue) {
     static_cast<void>(judge_.decode({.bytes = pending.bytes()}, {.bytes = rest(at_).first(size)}));
   }
@@ -144,7 +148,8 @@ std::size_t Annotator::match_reply() {
   return size;
 }
 
-// Returns whether a good frame follows the good reply: then its unusual size is no accident.
+// Returns whether a good frame follows the reply of `size` bytes at `at_`: then the reply's unusual size is no
+// accident.
 bool Annotator::is_followed_by_frame(std::size_t size) {
   const Bytes behind = rest(at_ + size);
   const Bytes reply = rest(at_).first(size);
@@ -152,8 +157,8 @@ bool Annotator::is_followed_by_frame(std::size_t size) {
          (behind.size() >= size && std::equal(reply.begin(), reply.end(), behind.begin()));
 }
 
-// Returns the size of an echo of the request together with the good reply behind it, or 0. Adapters and some encoders
-// send echoes.
+// Returns the size of an echo of `request` at `from` together with the good reply behind the echo, or 0. Adapters and
+// some encoders send echoes.
 std::size_t Annotator::echoed_reply_size(Bytes request, std::size_t from) {
   const Bytes bytes = rest(from);
   if (bytes.size() <= request.size() || !std::equal(request.begin(), request.end(), bytes.begin())) return 0;
@@ -175,7 +180,7 @@ std::size_t Annotator::match_repeated() {
   const Bytes before = channel_->run.bytes().subspan(last_reply_at_, size);
   if (!std::equal(before.begin(), before.end(), rest(at_).begin())) return 0;
   if (judge_.streams()) return 0;
-  // A request that equals its own echo may follow directly behind its reply.
+  // A request that equals the reply before it may follow directly; a good reply behind it shows that it is a request.
   if (channel_->carries == Carries::both && may_turn(at_ + size) && reply_at(rest(at_).first(size), at_ + size) != 0) {
     return 0;
   }
@@ -187,15 +192,16 @@ std::size_t Annotator::match_request() {
   const std::size_t size = request_at(at_);
   if (size == 0 || !is_request(size)) return 0;
   if (channel_->carries == Carries::both) exchanges_.report_unanswered(exchanges_.waiting().size());
-  // Some replies equal their requests, and the request of this reply may lie before the capture.
+  // Some replies equal their requests. The first frame of the capture may be such a reply, whose request lies before
+  // the capture.
   const bool may_be_reply = is_first_ && channel_->carries == Carries::both && reply_at({}, at_) == size;
   exchanges_.add_request(piece(size), Error::none, may_be_reply ? Remark::cut : Remark::none, true);
   last_reply_size_ = 0;
   return size;
 }
 
-// Returns whether the good request of this size at `at_` is a request. On a line with both directions it may also be
-// the beginning of a reply.
+// Returns whether the bytes at `at_`, which have the form of a good request of `size` bytes, are a request. On a line
+// with both directions they may also be the beginning of a reply.
 bool Annotator::is_request(std::size_t size) {
   const Channel& channel = *channel_;
   const bool is_rest = whole_ && size == rest(at_).size();
@@ -203,11 +209,11 @@ bool Annotator::is_request(std::size_t size) {
   if (is_rest) {
     const auto waiting = exchanges_.waiting();
     if (waiting.empty() || at_ != 0) return channel.at_frame_start;
-    // No host repeats a request so soon: this is the rest of the reply.
+    // No host repeats a request within twice the turnaround time: bytes after a shorter silence are part of the reply.
     const Tick silence = channel.run.begin(at_) - std::min(channel.run.begin(at_), waiting.back().end);
     return settings_.ticks.turnaround == 0 || silence > 2 * settings_.ticks.turnaround;
   }
-  // After an exchange the host sends next, whatever else the frame could be.
+  // After a complete exchange the host is the next sender, even if the frame could also be a reply.
   const bool is_turn_of_host = settings_.by_arrival && channel.at_frame_start && channel.last_size == 0 &&
                                exchanges_.has_request() && exchanges_.waiting().empty() && !judge_.streams();
   if (is_turn_of_host) return true;
@@ -226,7 +232,7 @@ bool Annotator::is_request(std::size_t size) {
 
 std::size_t Annotator::match_unsolicited() {
   const bool streams = judge_.streams();
-  // A good reply, but to another request.
+  // A request is outstanding and was not matched: the good reply at `at_` belongs to another request.
   if (!streams && request_before(channel_->run.begin(at_))) return 0;
   const std::size_t size = reply_at({}, at_, channel_->last_size);
   if (size == 0) return 0;
@@ -236,7 +242,8 @@ std::size_t Annotator::match_unsolicited() {
   channel_->last_size = channel_->stream_size = size;
   last_reply_size_ = 0;
   const bool good = streams || !exchanges_.has_request();
-  static_cast<void>(judge_.decode({}, {.bytes = rest(at_).first(size)}));  // lookahead has changed the judge's contents
+  static_cast<void>(
+      judge_.decode({}, {.bytes = rest(at_).first(size)}));  // a look-ahead has changed the judge's contents
   exchanges_.report_unpaired(Annotation::Kind::reply, piece(size), good ? Error::none : Error::unexpected_reply,
                              good ? Remark::none : Remark::unsolicited, good ? judge_.contents() : Contents{});
   return size;
@@ -246,24 +253,24 @@ std::size_t Annotator::take_bad() {
   const std::size_t size = bad_size();
   report_bad(size);
   last_reply_size_ = 0;
-  channel_->at_frame_start = true;  // the following bytes were found to be good
+  channel_->at_frame_start = true;  // the bytes behind the bad bytes were found to be good
   if (!whole_ && !good_from(at_ + size)) channel_->at_frame_start = false;
   return size;
 }
 
-// Returns the size of the bad bytes at `at_`: up to the next good frames, or to the end of the run. The rest of a run
-// is bad as a whole unless a frame of the usual size and a good frame behind it are found: garbage before a good reply
+// Returns the number of bad bytes at `at_`, up to the next good frames, or to the end of the run. The rest of a run is
+// bad as a whole unless a frame of the usual size and a good frame behind it are found: garbage before a good reply
 // makes the exchange bad, like in live reading.
 std::size_t Annotator::bad_size() {
   const std::size_t left = rest(at_).size();
-  // In a stream the next frame is one frame size ahead.
+  // In a stream of unsolicited frames, the next frame begins one frame size behind the bad frame.
   const std::size_t period = channel_->last_size;
   if (channel_->at_frame_start && period != 0 && period < left && reply_at({}, at_ + period) != 0) return period;
-  // An unsolicited frame may end with the run: the disturbance is before it.
+  // A good unsolicited frame may end with the run: the bytes before it are the bad ones.
   const std::size_t last = channel_->stream_size;
   if (judge_.streams() && whole_ && last != 0 && last < left && reply_at({}, at_ + left - last) == last)
     return left - last;
-  // The next request may follow directly.
+  // Returns whether exactly one good request follows `size` bad bytes and ends with the run.
   const auto ends_before_request = [&](std::size_t size) {
     return size != 0 && size < left && request_at(at_ + size) == left - size;
   };
@@ -274,7 +281,7 @@ std::size_t Annotator::bad_size() {
     const std::size_t size = judge_.frame_size(Direction::reply, rest(at_));
     if (ends_before_request(size)) return size;
   }
-  // The reply is damaged but has its usual length.
+  // A damaged reply may have its usual length, with a pause behind it.
   if (const auto pending = request_before(channel_->run.begin(at_)); settings_.by_arrival && pending) {
     const std::size_t usual = reply_sizes_[exchanges_.waiting()[*pending].storage[0]];
     for (const std::size_t size : {usual, judge_.frame_size(Direction::reply, rest(at_))}) {

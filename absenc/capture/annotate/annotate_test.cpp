@@ -91,7 +91,7 @@ std::vector<const Unit*> units_of_characters() {
 
 constexpr Tick length = 100;  // duration of a character in ticks
 
-// An encoder that sends positions without a pause; the capture begins anywhere.
+// Tests an encoder that sends positions without a pause; the capture begins anywhere.
 TEST_P(OfUnit, ALineThatNeverPauses) {
   std::vector<Character> characters;
   std::vector<Tick> begins;
@@ -117,7 +117,7 @@ TEST_P(OfUnit, ALineThatNeverPauses) {
   settings.ticks = {.pause = length / 2, .character = length};
   for (std::size_t from = 0; from < 2 * sizes[0]; ++from) {
     std::vector<Character> seen(characters.begin() + static_cast<std::ptrdiff_t>(from), characters.end());
-    while (seen.size() <= Run::capacity) {  // a line that ends sooner has not shown that it never pauses
+    while (seen.size() <= Run::capacity) {  // a line that ends before a run is full has not shown that it never pauses
       const Tick behind = seen.back().end - characters.front().begin;
       for (Character character : characters) {
         character.begin += behind;
@@ -144,7 +144,7 @@ TEST_P(OfUnit, ALineThatNeverPauses) {
   }
 }
 
-// Bytes without times, as from a terminal program or a dump: both directions in one sequence.
+// Tests bytes without times, as from a terminal program or a dump: both directions in one sequence.
 TEST_P(OfUnit, BytesWithoutTimes) {
   std::vector<Character> characters;
   std::vector<Transmission> transmissions = talk(1200, 2);
@@ -201,7 +201,7 @@ TEST_P(OfUnit, FindsWireOfRequests) {
   }
 }
 
-// Noise from a plug or a motor between two exchanges is reported and affects neither of them.
+// Noise from a plug or a motor between two exchanges is reported and affects neither exchange.
 TEST_P(OfUnit, NoiseBetweenExchanges) {
   const auto begins_nothing = [&](std::uint8_t byte) {
     for (const Direction direction : {Direction::request, Direction::reply}) {
@@ -330,8 +330,8 @@ TEST(Can, NodesAnswerInAnyOrder) {
   EXPECT_EQ(collector.ids, (std::vector<std::uint32_t>{0x102, 0x202, 0x102, 0x201, 0x101, 0x333, 4, 0x203, 0x204}));
 }
 
-// A toy whose replies with bit 0 report its only alarm and are valid then; replies without it depend on an earlier one
-// of the same node.
+// A toy encoder with one alarm. Replies with bit 0 report the alarm and their position is valid; the validity of other
+// replies depends on an earlier reply of the same node.
 TEST(CompletedReadings, CompletesAReadingByWhatTheSameEncoderReported) {
   static constexpr std::array<FieldInfo, 1> fields{
       {{.name = "node", .kind = FieldInfo::Kind::number, .unit = "", .meaning = "", .role = Role::encoder}}};
@@ -366,8 +366,8 @@ TEST(CompletedReadings, CompletesAReadingByWhatTheSameEncoderReported) {
   EXPECT_TRUE(is_known_after(1, 0));
 }
 
-// The capture has an ID 3 reply with counter_overflow, resets of all errors, and an ID 0 reply, which does not carry
-// that alarm.
+// The capture has a T-format ID 3 reply with counter_overflow, resets of all errors, and an ID 0 reply, which does not
+// carry that alarm.
 TEST(CompletedReadings, ForgetsAlarmsThatWereCleared) {
   const Unit& unit = *find_unit("tformat");
   const Options options = testing::options_of(unit);

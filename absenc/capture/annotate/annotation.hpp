@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// An annotation: a request with its reply, or one of them alone, decoded by the protocol's unit.
+// An annotation: a request with its reply, or a request or reply alone, decoded by the protocol's unit.
 #pragma once
 
 #include <cstddef>
@@ -19,22 +19,22 @@ namespace absenc::capture {
 enum class Remark : std::uint8_t {
   none,
   unanswered,    // no reply followed the request
-  unsolicited,   // the reply had no request
-  repeated,      // the previous reply was sent once more
-  echo,          // the request was received again before the reply
-  late,          // the reply arrived after the timeout of every host
+  unsolicited,   // the reply was sent without a request
+  repeated,      // the reply was sent a second time
+  echo,          // the request's echo was received between the request and the reply
+  late,          // the reply arrived after the time in which a host expects it
   damaged,       // a character had a wrong parity or stop bit
   undocumented,  // no document states the reply to this request
-  cut,           // incomplete, because the capture begins or ends here
+  cut,           // the frame is incomplete, because the capture begins or ends within it
 };
 
-/// Returns the remark as a clause without a full stop; "" for none.
+/// Returns the remark as a clause without a full stop; "" for Remark::none.
 [[nodiscard]] std::string_view text_of(Remark remark);
 
 /// Decoded content of a good frame.
 struct Contents {
-  std::span<const FieldValue> fields{};  // decoded fields, in the order of the unit
-  const Reading* reading = nullptr;      // the position, if the frame carries one
+  std::span<const FieldValue> fields{};  // decoded fields, in the order in which the unit reports them
+  const Reading* reading = nullptr;      // position in the frame; null if the frame carries none
 };
 
 struct Annotation {
@@ -42,20 +42,21 @@ struct Annotation {
     exchange,  // a request and its reply
     request,   // a request without its reply
     reply,     // a reply without its request
-    noise,     // neither; its bytes are in `reply`
+    noise,     // bytes that are neither request nor reply; they are in `reply`
   };
 
   Kind kind = Kind::noise;
   Remark remark = Remark::none;
-  Error error = Error::none;  // error of the whole annotation; with an error no value in it may be used
-  bool composed = false;      // a frame of which several exchanges carried one byte each
+  Error error = Error::none;  // error of the whole exchange; if it is not none, no value in `contents` may be used
+  bool composed = false;      // the frame was composed of several exchanges that carried one byte of it each
   Tick begin = 0;
   Tick end = 0;
-  // The members below are valid during the call only.
+  // The members below are valid only during the call of AnnotationSink::put.
   Frame request{};
   Frame reply{};
-  Contents contents{};               // decoded content of good frames
-  std::optional<Tick> turnaround{};  // time from the end of the request to the beginning of its reply
+  Contents contents{};  // decoded content of request and reply; empty for bad frames
+  std::optional<Tick>
+      turnaround{};  // time from the end of the request to the beginning of its reply, in ticks; empty without a reply
 };
 
 /// Receives annotations in the order of their end times.

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Completes each reading of a capture with the alarms that earlier replies of the same encoder reported, like a host
-// that reads live.
+// Completes each reading of a capture with the alarms that earlier replies of the same encoder reported, as a host that
+// reads live does.
 #pragma once
 
 #include <algorithm>
@@ -14,12 +14,12 @@
 
 namespace absenc::capture {
 
-/// Passes annotations on with completed readings. It comes behind the annotators, so that replies are in order
-/// whichever annotator decoded them.
+/// Passes annotations on to a sink and completes their readings with alarms of earlier replies. It stands behind the
+/// annotators, so that it sees all replies in the order of time.
 ///
-/// No frame reports that an encoder was switched off and on, but it sends no replies meanwhile: an unanswered request
-/// clears the stored alarms. A request that clears alarms does the same for its encoder, after its reply. Otherwise the
-/// encoder is assumed to have stayed on.
+/// No frame reports that an encoder was switched off and on, but the encoder sends no replies while it is off: an
+/// unanswered request clears the stored alarms. The reply to a request that clears alarms also clears the stored alarms
+/// of its encoder. Otherwise the encoder is assumed to have stayed on.
 class CompletedReadings final : public AnnotationSink {
  public:
   /// `unit` and `sink` must outlive this object.
@@ -64,8 +64,8 @@ class CompletedReadings final : public AnnotationSink {
 
   const Unit* unit_;
   AnnotationSink* sink_;
-  std::vector<std::vector<std::uint8_t>> clearing_;  // bytes of the requests that clear alarms
-  std::map<std::int64_t, Reading> last_;             // last completed reading by the encoder's address
+  std::vector<std::vector<std::uint8_t>> clearing_;  // requests that clear alarms, as bytes
+  std::map<std::int64_t, Reading> last_;             // last completed reading of each encoder, by the encoder's address
 };
 
 }  // namespace absenc::capture

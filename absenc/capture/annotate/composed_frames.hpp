@@ -12,8 +12,8 @@
 
 namespace absenc::capture {
 
-/// Passes annotations on. Before the annotation with which a composed frame ends, it inserts an annotation of that
-/// frame, whose content is known from then on.
+/// Passes annotations on to a sink. Before the annotation whose byte completes a composed frame, it inserts an
+/// annotation of the composed frame.
 class ComposedFrames final : public AnnotationSink {
  public:
   /// `unit` and `sink` must outlive this object.
@@ -28,7 +28,7 @@ class ComposedFrames final : public AnnotationSink {
   }
 
  private:
-  // More exchanges than any composed frame spans.
+  // Limit of stored begin times: more exchanges than any composed frame consists of.
   static constexpr std::size_t most_begins = 4096;
 
   void follow(const Annotation& annotation) {
@@ -61,7 +61,7 @@ class ComposedFrames final : public AnnotationSink {
   AnnotationSink& sink_;
   std::unique_ptr<std::byte[]> storage_;
   Follower* follower_ = nullptr;
-  std::deque<Tick> begins_;  // begin times of the last exchanges
+  std::deque<Tick> begins_;  // begin times of the last exchanges, the newest last
   std::uint64_t count_ = 0;
 };
 

@@ -27,10 +27,10 @@ inline Options options_of(const Unit& unit, const std::vector<OptionText>& setti
   return options;
 }
 
-/// Returns the unit's line settings; with a default rate if its document states none.
+/// Returns the line settings of `unit`, with a default rate if the unit's document states none.
 inline LineSettings line_of(const Unit& unit) { return unit.line.with_some_rate(); }
 
-/// Bytes that one side sent without a pause.
+/// Bytes that host or encoder sent without a pause, with the times in ticks.
 struct Transmission {
   sim::NodeRole by;
   std::vector<std::uint8_t> bytes;
@@ -72,7 +72,7 @@ class Talker {
     }
   }
 
-  /// Runs one command to its end, with a pause behind it.
+  /// Runs one random command to its end, waits for late replies and 1 ms, and returns the traffic.
   TalkRecord talk() {
     record_ = {};
     shaft_.put(static_cast<std::int64_t>(random_.below(60'000)), static_cast<std::int64_t>(random_.below(4096)));
@@ -100,7 +100,7 @@ class Talker {
     return std::move(record_);
   }
 
-  /// Draws all further traffic to `waveform` too.
+  /// Draws all further traffic to `waveform` too, which must outlive this object.
   void draw(sim::Waveform& waveform) { waveform_ = &waveform; }
 
   [[nodiscard]] Tick now() const { return static_cast<Tick>(line_.now().count()); }

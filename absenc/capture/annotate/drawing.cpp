@@ -17,7 +17,7 @@ namespace absenc::capture {
 
 namespace {
 
-// Writes a number in 7-bit groups with as few bytes as possible: most changes follow the previous one closely.
+// Writes `number` to `file` in 7-bit groups, with as few bytes as possible: most stored times are small differences.
 void put_number(std::FILE* file, std::uint64_t number) {
   for (; number > 0x7F; number >>= 7) std::putc(static_cast<int>(number & 0x7F) | 0x80, file);
   std::putc(static_cast<int>(number), file);
@@ -46,7 +46,7 @@ void begin_reading(std::FILE* file) {
   if (std::fflush(file) != 0 || std::fseek(file, 0, SEEK_SET) != 0) fail_scratch(std::strerror(errno));
 }
 
-/// The levels of all wires while going through the changes of a drawing.
+/// The levels of all wires of a drawing at one time, which moves forward through the drawing's changes.
 class WireLevels {
  public:
   explicit WireLevels(Drawing& drawing) : drawing_(drawing) {
@@ -58,7 +58,7 @@ class WireLevels {
 
   /// Returns the time of the next change, or the end of the drawing.
   [[nodiscard]] Tick next_change() const { return std::min(next_, drawing_.end()); }
-  /// Applies all changes up to and including `time`.
+  /// Applies all level changes up to and including `time`.
   void advance(Tick time) {
     constexpr unsigned changes_per_report = 4096;
     for (; next_ <= time && next_ != none; take()) {
@@ -82,7 +82,8 @@ class WireLevels {
   std::uint64_t taken_ = 0;
 };
 
-// Returns an identifier of printable characters from '!' on; more than one character for large numbers of traces.
+// Returns a wire's identifier for the value change dump: printable characters from '!' on, more than one for large
+// numbers.
 std::string identifier(std::size_t trace) {
   constexpr std::size_t digits = 94;
   std::string text(1, static_cast<char>('!' + trace % digits));
@@ -97,7 +98,8 @@ std::string seconds(Tick time) {
   return std::to_string(time / nanoseconds_a_second) + '.' + fraction;
 }
 
-/// The samples of a drawing, computed while the archive requests them, in parts of the size that sigrok itself uses.
+/// The samples of a drawing, computed when libzip requests them, and split into parts of the size that sigrok itself
+/// uses.
 class Samples {
  public:
   Samples(Drawing& drawing, std::uint64_t rate)
@@ -107,7 +109,7 @@ class Samples {
         levels_(drawing),
         rate_(rate) {}
 
-  /// Writes as many whole samples as fit. Returns the number of bytes.
+  /// Writes as many whole samples as fit into `room` bytes. Returns the number of written bytes.
   std::size_t fill(std::uint8_t* bytes, std::size_t room) {
     drawing_.report_progress();
     const std::size_t wanted = room / size;
@@ -128,7 +130,7 @@ class Samples {
 
   const std::size_t size;  // number of bytes per sample
   const std::uint64_t count;
-  std::exception_ptr exception{};  // exception that ended the computation
+  std::exception_ptr exception{};  // exception that ended the computation of samples; null: none
 
  private:
   // Returns the index of the first sample that is not before `time`.
@@ -136,7 +138,7 @@ class Samples {
     const std::uint64_t whole = time / nanoseconds_a_second * rate;
     return whole + (time % nanoseconds_a_second * rate + nanoseconds_a_second - 1) / nanoseconds_a_second;
   }
-  // Applies all changes before the present sample, and finds the sample at which the next change shows.
+  // Applies all changes before the present sample, and finds the sample in which the next change becomes visible.
   void take_change() {
     while (true) {
       const Tick next = levels_.next_change();
@@ -158,14 +160,14 @@ class Samples {
   std::uint8_t packed_[8]{};
 };
 
-/// One part of the samples, which is a file of the archive.
+/// One part of the samples, which is one file in the sigrok archive.
 struct SamplesPart {
   Samples* samples;
   std::uint64_t size;  // number of bytes in the part
   std::uint64_t given = 0;
 };
 
-// Callback of libzip that provides the content of a file during compression.
+// Callback of libzip that provides the bytes of a file in the archive.
 zip_int64_t provide(void* state, void* data, zip_uint64_t size, zip_source_cmd_t command) {
   SamplesPart& part = *static_cast<SamplesPart*>(state);
   switch (command) {
@@ -273,7 +275,8 @@ bool Drawing::next_label(Tick& at, std::string& words) {
 
 void write_vcd(std::ostream& out, Drawing& drawing) {
   out << "$version absenc $end\n$timescale 1 ns $end\n";
-  // Comments come before the changes: the standard allows them among the changes too, but sigrok's reader stops there.
+  // All comments are written before the changes: the standard allows comments among the changes too, but sigrok's
+  // reader stops at such a comment.
   drawing.rewind_labels();
   Tick labelled = 0;
   for (std::string words; drawing.next_label(labelled, words);) {
@@ -334,7 +337,7 @@ void write_sigrok(const std::string& path, Drawing& drawing, std::uint64_t rate)
     add(archive.get(), path, ("logic-1-" + std::to_string(parts.size())).c_str(),
         zip_source_function(archive.get(), provide, parts.back().get()));
   }
-  // Compresses all files, in their order.
+  // Compresses all files of the archive, in the order in which they were added.
   if (zip_close(archive.get()) != 0) {
     if (samples.exception != nullptr) std::rethrow_exception(samples.exception);
     fail(path, zip_strerror(archive.get()));

@@ -21,14 +21,15 @@ namespace absenc::capture {
 struct CloseFile {
   void operator()(std::FILE* file) const { std::fclose(file); }
 };
-/// An empty file, open for writing and reading.
+/// A file handle that closes its file.
 using ScratchFile = std::unique_ptr<std::FILE, CloseFile>;
 
 /// Creates a temporary file, which disappears with the process. Returns null on failure.
 [[nodiscard]] inline ScratchFile temporary_file() { return ScratchFile(std::tmpfile()); }
 
-/// Level changes of wires and labels for them, of any length. They are stored on disk, with a few bytes per change,
-/// until all wires and the end are known, so memory does not grow with the length. Ticks are nanoseconds.
+/// Level changes of wires and labels for them, of any length. Changes and labels are stored on disk, with a few bytes
+/// per change, until all wires and the end time are known, so memory does not grow with the length. Ticks are
+/// nanoseconds.
 class Drawing {
  public:
   struct Wire {
@@ -40,13 +41,14 @@ class Drawing {
   explicit Drawing(std::string title, ScratchFile changes = temporary_file(), ScratchFile labels = temporary_file());
 
   void add_wire(std::string name, bool before) { wires_.push_back({std::move(name), before}); }
-  /// Inverts the level of a wire, which may be added later. Times must not decrease. Throws std::runtime_error if the
-  /// disk is full.
+  /// Inverts the level of the wire with index `wire` at the time `at`; the wire may be added later. Times must not
+  /// decrease. Throws std::runtime_error if the disk is full.
   void change(Tick at, std::size_t wire);
-  /// Adds a text about the levels. Times must not decrease. Throws as `change` does.
+  /// Adds the label `words` at the time `at`. Times must not decrease. Throws std::runtime_error if the disk is full.
   void label(Tick at, std::string_view words);
   void set_end(Tick end) { end_ = end; }
-  /// Sets a function that is called regularly while the drawing is written; an exception from it ends the writing.
+  /// Sets a function that is called regularly while the drawing is written to a file; an exception thrown by the
+  /// function ends the writing.
   void watch(std::function<void()> report_progress) { on_progress_ = std::move(report_progress); }
 
   [[nodiscard]] const std::string& title() const { return title_; }
@@ -56,9 +58,9 @@ class Drawing {
     if (on_progress_) on_progress_();
   }
 
-  /// Restarts the iteration over the changes at the first one.
+  /// Sets the position of `next_change` to the first level change.
   void rewind_changes();
-  /// Returns the next change; false at the end.
+  /// Reads the next level change into `at` and `wire`; returns false if no change follows.
   [[nodiscard]] bool next_change(Tick& at, std::size_t& wire);
   void rewind_labels();
   [[nodiscard]] bool next_label(Tick& at, std::string& words);
@@ -74,8 +76,8 @@ class Drawing {
   std::function<void()> on_progress_;
 };
 
-/// Stores the changes and comments of a sim::Waveform, or of a class with the same interface, in a drawing, shifted by
-/// `lead`: the time for which the line is idle before its first item.
+/// Stores the changes and comments of a sim::Waveform, or of a class with the same members, in a drawing. All times are
+/// increased by `lead`, which leaves the line idle before the first change.
 template <class Waveform>
 class WaveformSink final : public Waveform::Sink {
  public:
@@ -84,8 +86,8 @@ class WaveformSink final : public Waveform::Sink {
   void change(Time at, std::size_t wire) override { drawing_->change(tick(at), wire); }
   void comment(Time at, std::string_view words) override { drawing_->label(tick(at), words); }
 
-  /// Ends the drawing `margin` after the last item, for decoders that wait for an idle line, but not before `least`,
-  /// the end of a host's wait without a reply.
+  /// Ends the drawing `margin` after the waveform's end, for decoders that wait for an idle line, but not before
+  /// `least`: the end of a host's wait without a reply.
   void finish(Waveform& waveform, Time margin, Time least = {}) {
     waveform.finish();
     for (const auto& wire : waveform.wires()) drawing_->add_wire(std::string(wire.name), wire.idle);
@@ -99,16 +101,16 @@ class WaveformSink final : public Waveform::Sink {
   Time lead_;
 };
 
-/// Writes a value change dump (IEEE 1364, clause 18), exact to the nanosecond; the labels are comments before the
-/// changes.
+/// Writes `drawing` as a value change dump (IEEE 1364, clause 18), exact to the nanosecond; labels become comments
+/// before the changes.
 void write_vcd(std::ostream& out, Drawing& drawing);
 
-/// Writes digital channels like the CSV export of Saleae Logic 2: one line per time with changes, exact to the
-/// nanosecond.
+/// Writes `drawing` as digital channels like the CSV export of Saleae Logic 2: one line per time with changes, exact to
+/// the nanosecond.
 void write_saleae_csv(std::ostream& out, Drawing& drawing);
 
-/// Writes a sigrok session with `rate` samples per second (at most 1 GHz). Replaces the file. Throws std::runtime_error
-/// with a sentence if it cannot be written.
+/// Writes `drawing` as a sigrok session with `rate` samples per second (at most 1 GHz). Replaces the file at `path`.
+/// Throws std::runtime_error with a sentence if the file cannot be written.
 void write_sigrok(const std::string& path, Drawing& drawing, std::uint64_t rate);
 
 }  // namespace absenc::capture

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests the written files as text, and as sigrok-cli reads them.
+// Tests the files that drawings are written to, as text and as sigrok-cli reads them.
 #include "absenc/capture/annotate/drawing.hpp"
 
 #include <gmock/gmock-matchers.h>

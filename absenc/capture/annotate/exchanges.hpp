@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Outstanding requests, and the annotations that they form together with their replies.
+// Outstanding requests of a capture, and the annotations that are made of requests and their replies.
 #pragma once
 
 #include <array>
@@ -13,14 +13,15 @@
 
 namespace absenc::capture {
 
-/// Times of a line, in ticks of its capture.
+/// Time limits of a line, in ticks of the capture.
 struct LineTicks {
-  static constexpr Tick never = UINT64_MAX / 4;  // small enough that times can be added without overflow
+  static constexpr Tick never =
+      UINT64_MAX / 4;  // a time that is never reached; small enough that times can be added without overflow
 
   Tick pause = 1;       // a silence of this length ends a frame
-  Tick character = 1;   // no silence within a character is that long
-  Tick turnaround = 0;  // longest turnaround by the document; 0: not known
-  Tick limit = never;   // after this time no host expects a reply
+  Tick character = 1;   // duration of a character; a silence within a character is shorter
+  Tick turnaround = 0;  // longest turnaround time in the unit's document; 0: not known
+  Tick limit = never;   // longest time from request to reply, after which no host expects the reply
 };
 
 /// Bytes and the time during which they were on the line.
@@ -34,40 +35,42 @@ class Exchanges {
  public:
   /// A request whose reply has not been found yet.
   struct PendingRequest {
-    static constexpr std::size_t capacity = 272;  // longer requests are cut: they are bad in any case
+    static constexpr std::size_t capacity =
+        272;  // capacity in bytes; a longer request is cut to it, because it is bad in any case
     std::array<std::uint8_t, capacity> storage{};
     std::size_t size = 0;
     Tick begin = 0;
     Tick end = 0;
     Error error = Error::none;
     Remark remark = Remark::none;
-    bool is_request = true;  // false: bytes on a line with both directions that are no frame
+    bool is_request = true;  // false: bytes that are no frame, on a line with both directions; a reply may follow
 
     [[nodiscard]] Bytes bytes() const { return {storage.data(), size}; }
   };
 
-  /// `judge` is a separate one: another judge holds the contents of the reply.
+  /// `judge` must not be the judge that holds the contents of the reply, because this object decodes requests with it.
+  /// `sink` must outlive this object.
   Exchanges(Judge judge, const LineTicks& ticks, AnnotationSink& sink)
       : judge_(std::move(judge)), ticks_(ticks), sink_(sink) {}
 
   [[nodiscard]] std::span<const PendingRequest> waiting() const { return {pending_.data(), count_}; }
-  /// Returns whether a good request was found so far.
+  /// Returns whether a good request was added so far.
   [[nodiscard]] bool has_request() const { return has_request_; }
-  /// Returns whether the request has had no reply for so long that none will follow.
+  /// Returns whether `pending` has had no reply for so long, at the time `now`, that none will follow.
   [[nodiscard]] bool overdue(const PendingRequest& pending, Tick now) const { return now > pending.end + ticks_.limit; }
 
-  /// Adds a request. If the list is full, the oldest is reported as unanswered.
+  /// Adds an outstanding request. If four are outstanding, the oldest of them is reported as unanswered.
   void add_request(const Piece& request, Error error, Remark remark, bool is_request);
-  /// Reports the reply to `waiting()[which]`, and the requests before it as unanswered. `contents` must be empty with
-  /// an error. A damaged reply counts as a reply. A reply after the limit is paired too, but with the error timeout: no
-  /// host would accept it.
+  /// Reports `reply` as the reply to `waiting()[which]`, and all older outstanding requests as unanswered. `contents`
+  /// must be empty with an error. A damaged reply counts as a reply. A reply after the limit is paired too, but with
+  /// the error timeout: no host would accept it.
   void report_reply(std::size_t which, const Piece& reply, Error error, Remark remark, const Contents& contents);
-  /// Reports the first `count` requests as unanswered.
+  /// Reports the `count` oldest outstanding requests as unanswered.
   void report_unanswered(std::size_t count);
-  /// Reports bytes that belong to no request.
+  /// Reports bytes that belong to no outstanding request.
   void report_unpaired(Annotation::Kind kind, const Piece& piece, Error error, Remark remark,
                        const Contents& contents = {});
-  /// Ends the capture: outstanding requests may have been answered after it.
+  /// Ends the capture at `end`. Reports outstanding requests, as cut if their reply may follow after the capture.
   void finish(Tick end);
 
  private:

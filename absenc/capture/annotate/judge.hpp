@@ -23,7 +23,7 @@ class Judge {
 
   [[nodiscard]] const Unit& unit() const { return *unit_; }
 
-  /// Decodes a frame with the unit; `contents` returns its content.
+  /// Decodes a request and its reply with the unit, and returns the error. `contents` then returns the decoded content.
   Error decode(const Frame& request, const Frame& reply) {
     decoded_.clear();
     const Error error = unit_->decode(options_, request, reply, decoded_);
@@ -35,22 +35,22 @@ class Judge {
     return {decoded_.fields, decoded_.has_reading ? &decoded_.reading : nullptr};
   }
 
-  /// Returns the size of the frame that begins with the first byte, or 0.
+  /// Returns the size of the frame that begins with the first of `bytes`, or 0 if none does.
   [[nodiscard]] std::size_t frame_size(Direction direction, Bytes bytes) const {
     const FrameEnd end = unit_->frame_end(options_, direction, bytes);
     return end.kind == FrameEnd::Kind::complete && end.size <= bytes.size() ? end.size : 0;
   }
-  /// Returns whether the bytes are an incomplete frame.
+  /// Returns whether `bytes` are the beginning of a frame that is not complete yet.
   [[nodiscard]] bool is_incomplete(Direction direction, Bytes bytes) const {
     return unit_->frame_end(options_, direction, bytes).kind == FrameEnd::Kind::incomplete;
   }
-  /// Returns the size of the good request that begins with the first byte, or 0.
+  /// Returns the size of the good request that begins with the first of `bytes`, or 0 if none does.
   [[nodiscard]] std::size_t request_size(Bytes bytes) {
     const std::size_t size = frame_size(Direction::request, bytes);
     return size != 0 && decode({.bytes = bytes.first(size)}, {}) == Error::none ? size : 0;
   }
 
-  /// Returns the place of the encoder's control communication bit in a reply; see Unit::control_bit.
+  /// Returns the index of the encoder's control communication bit in a reply, or nothing; see Unit::control_bit.
   [[nodiscard]] std::optional<std::size_t> control_bit(const Frame& reply) const {
     return unit_->control_bit != nullptr ? unit_->control_bit(options_, reply) : std::nullopt;
   }
@@ -79,8 +79,8 @@ class Judge {
       reading = one;
       has_reading = true;
     }
-    // Copies the bytes of the newest field, which are valid during the call only. All views are set again, because the
-    // storage may have moved.
+    // Copies the bytes of the newest field, because the unit's bytes are valid only during its call of the sink. All
+    // views are set again, because the storage may have moved.
     void store_bytes() {
       const Bytes added = fields.back().bytes;
       bytes.insert(bytes.end(), added.begin(), added.end());
@@ -90,7 +90,8 @@ class Judge {
         at += field.bytes.size();
       }
     }
-    // Copies the description of the newest field, which for a word described by the user is valid during the call only.
+    // Copies the description of the newest field, because that of a word described by the user is valid only during the
+    // unit's call of the sink.
     void store_info() {
       described.push_back({std::string(fields.back().info->name), *fields.back().info});
       described.back().info.name = described.back().name;
@@ -101,7 +102,7 @@ class Judge {
       std::string name;
       FieldInfo info;
     };
-    bool is_described;  // the word was described by the user
+    bool is_described;  // the unit's word is described by the user, so its field descriptions must be copied
     std::vector<FieldValue> fields;
     std::vector<std::uint8_t> bytes;
     std::deque<DescribedField> described;

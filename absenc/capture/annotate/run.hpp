@@ -14,7 +14,7 @@ namespace absenc::capture {
 
 class Run {
  public:
-  /// Much longer than any frame: only a line that is never silent fills the run.
+  /// Largest number of characters, much longer than any frame: only a line that is never silent fills the run.
   static constexpr std::size_t capacity = 512;
 
   void push(const Character& character) {
@@ -53,7 +53,7 @@ class Run {
   [[nodiscard]] Tick end(std::size_t index) const { return ends_[index]; }
   [[nodiscard]] Tick end() const { return ends_[size_ - 1]; }
 
-  /// Returns whether none of these characters had a wrong parity or stop bit.
+  /// Returns whether none of the `count` characters from `first` on had a wrong parity or stop bit.
   [[nodiscard]] bool clean(std::size_t first, std::size_t count) const {
     if (damages_ == 0) return true;
     const auto from = damaged_.begin() + static_cast<std::ptrdiff_t>(first);

@@ -25,7 +25,7 @@ namespace {
 using testing::Talker;
 using testing::TalkRecord;
 
-/// Annotations as text lines. Their times are separate, because a waveform rounds them.
+/// Annotations as lines of text. Their times are stored separately, because a waveform rounds times.
 struct Lines final : AnnotationSink {
   void put(const Annotation& one) override {
     std::string line = std::to_string(static_cast<int>(one.kind)) + " " + std::string(text_of(one.error).name) + " ";
@@ -110,7 +110,7 @@ class WholeWay : public ::testing::TestWithParam<const Unit*> {
     return memory_source({written.begin(), written.end()});
   }
 
-  // Requires every frame with its fields and errors, at its time.
+  // Requires `reader` to give every expected frame with its fields and errors, at its time.
   void expect_same(Reader& reader, const Lines& expected) {
     const double ticks_per_ns = static_cast<double>(reader.layout().ticks_per_second) / 1e9;
     const LineTicks in_ns = settings.ticks;
