@@ -25,7 +25,8 @@ namespace absenc {
 
 namespace {
 
-// A unit and its clauses, which are not in the descriptor, because firmware uses the descriptor and tests nothing.
+// A unit with the clauses of its document. The clauses are not in the unit's descriptor, because firmware links the
+// descriptor and tests nothing.
 struct Listed {
   const Unit* unit;
   std::span<const Clause> clauses{};

@@ -9,10 +9,10 @@
 
 namespace absenc {
 
-/// Returns all units, in the order of `protocol/all.cpp`.
+/// Returns all protocol units, in the order of `protocol/all.cpp`.
 [[nodiscard]] std::span<const Unit* const> all_units();
 
-/// Returns the unit of this id, or null.
+/// Returns the protocol unit with the identifier `id`, or null if there is none.
 [[nodiscard]] const Unit* find_unit(std::string_view id);
 
 }  // namespace absenc

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Clauses of a unit's document that encoders and hosts must satisfy, as data. One engine tests the clauses of all
-// units.
+// Types for the clauses of a protocol document that encoders and hosts must satisfy, as data. One engine
+// (client/conform) tests the clauses of all units.
 #pragma once
 
 #include <array>
@@ -13,115 +13,127 @@
 
 namespace absenc {
 
-/// Kind of a clause.
+/// Kind of a clause for encoders: the behaviour that the document demands. Names in backquotes are members of Clause.
 enum class Demand : std::uint8_t {
-  // Clauses about readings, whose requests any host sends
-  answered,  ///< each request, pulse or transfer is answered
-  streamed,  ///< frames arrive unsolicited
-  in_time,   ///< the reply begins within the unit's time limit: documents give typical times, no limits
+  // Demands about readings, tested with the requests that every host sends
+  answered,  ///< the encoder answers each request, pulse or transfer
+  streamed,  ///< the encoder sends frames unsolicited
+  in_time,   ///< each reply begins before a host's timeout, because documents give typical times and no limits
   whole,     ///< replies have the length that the document states
   checked,   ///< replies have a correct checksum
-  as_drawn,  ///< fixed bits, echoes and ranges are as the document draws them, and values agree
-  does,      ///< `command` ends without an error each time, with all its checks
-  // Clauses about requests that no host sends
-  foreign_silent,  ///< a request to another address is not answered
-  reacts,          ///< the encoder reacts to `ask` as `reaction` states
-  // Clauses about changes, which are undone
+  as_drawn,  ///< fixed bits, echoes and ranges are as the document draws them, and redundant values are equal
+  does,      ///< the command `command`, which makes checks of its own, ends without an error each time
+  // Demands about requests that no host sends
+  foreign_silent,  ///< the encoder does not answer a request to another address
+  reacts,          ///< the encoder reacts to the request `ask` as `reaction` states
+  // Demands about changes of the encoder, which the test undoes
   byte_written,  ///< the byte at `page` and `address` can be written and read back
-  byte_alone,    ///< the bytes beside it do not change then
-  page_alone,    ///< the byte of page `other` at the same address does not change then
-  byte_busy,     ///< while the byte is written, a request to read it is answered as busy; it can be read later
-  page_closed,   ///< `page` has no byte at `address`; `ask` requests it
-  set,           ///< `setting` has the value that it was set to: `value`, or `other` if it had `value` before
-  /// The position is 0 after the zero command with the argument `value`; `setting` has the value that it changes.
+  byte_alone,    ///< writing the byte at `page` and `address` leaves the bytes beside it unchanged
+  page_alone,    ///< writing the byte at `page` and `address` leaves the byte at `address` of page `other` unchanged
+  /// While the byte at `page` and `address` is written, a request to read it gets a busy reply; later it can be read.
+  byte_busy,
+  /// With `page` selected, the request `ask` for a byte that does not exist gets a reply to the command `as`; the byte
+  /// at `page` and `address` exists.
+  page_closed,
+  set,  ///< the setting `setting` reads back as the value written: `value`, or `other` if it was `value` before
+  /// The position is 0 after the zero command with the argument `value`. That command changes the setting `setting`.
   zeroed,
-  mirrored,  ///< one of the directions 0 and 1 of `setting`, which cannot be read, mirrors the position
-  paced,     ///< after `command` with `value`, that many frames per second arrive unsolicited; `stop` ends them
-  // Clauses about values that cannot be restored
-  zero,     ///< the position is 0 after the zero command, and was not before
-  reset,    ///< `verb` resets its value, which was not reset before
-  restarts  ///< after `command` the encoder is silent at first, and has the same position `value` ms later
+  /// One of the values `value` and `other` of the setting `setting`, which cannot be read, mirrors the position.
+  mirrored,
+  /// After `command` with the argument `value`, the encoder sends `value` frames per second unsolicited; `stop` ends
+  /// them.
+  paced,
+  // Demands about values that the test cannot restore
+  zero,     ///< the position, which was not 0 before, is 0 after the zero command
+  reset,    ///< the command of `verb` resets the alarms in the mask `value`, or the turns, and nothing else
+  restarts  ///< after `command` the encoder is silent at first; `value` ms later it reports the position from before
 };
 
 /// Returns whether a demand is about a change of the encoder.
 [[nodiscard]] constexpr bool changes_encoder(Demand demand) { return demand >= Demand::byte_written; }
-/// Returns whether testing the clause may lose a value: a position, turns, an alarm.
+/// Returns whether testing a clause of this kind may lose a value of the encoder for good: a position, turns, an alarm.
 [[nodiscard]] constexpr bool loses(Demand demand) { return demand >= Demand::zero; }
 
-/// A set of Errors, one bit for each.
+/// A set of errors: bit n is set if the enumerator of Error with the value n is in the set.
 using Errors = std::uint32_t;
-/// Returns a set of errors.
+/// Returns the set of the errors given as arguments.
 template <class... Some>
 [[nodiscard]] constexpr Errors any_of(Some... errors) {
   return ((Errors{1} << static_cast<unsigned>(errors)) | ...);
 }
-/// Errors of replies that differ from the document's drawing.
+/// Errors of replies whose fixed bits, echoes, ranges or redundant values differ from the document's drawing.
 inline constexpr Errors form_errors = any_of(Error::bad_framing, Error::unexpected_reply, Error::out_of_range,
                                              Error::sequence_mismatch, Error::cross_check_failed, Error::line_stuck);
 
-/// A request that a clause sends, which reading never sends.
+/// A request that the test of a clause sends, and that reading a position never sends.
 struct Ask {
-  std::string_view wire{};  ///< bytes of the request: "a2"
-  /// Writes the request, where it depends on the options; null: `wire`.
+  std::string_view wire{};  ///< bytes of the request in hexadecimal: "a2"
+  /// Writes the request into `request` and returns its length, for requests that depend on the options. Null: `wire` is
+  /// sent.
   Result<std::size_t> (*make)(const Options& options, MutableBytes request) = nullptr;
-  bool wrong_end = false;  ///< the request for a position, with a wrong bit in its last byte
-  /// Rate of the request in 1/1000 of the line's, so that its last bit is where the stop bit should be.
+  bool wrong_end = false;  ///< true: the request is that for a position, with a wrong bit in its last byte
+  /// Bit rate of the request in 1/1000 of the line's rate: a slower request has its last bit where the receiver expects
+  /// the stop bit. 0: the line's rate.
   std::uint32_t permille = 0;
 };
 
-/// Reaction to a bad request.
+/// Reaction of an encoder to a request that it cannot accept.
 enum class Reaction : std::uint8_t {
   silent,
-  reply,              ///< a valid reply to the request of the command `as`
-  refusal,            ///< a valid reply that reports the request as wrong
-  refusal_or_silent,  ///< the document permits both
+  reply,              ///< the encoder sends a valid reply to the request of the command `as` of the clause
+  refusal,            ///< the encoder sends a valid reply that reports the request as wrong
+  refusal_or_silent,  ///< the document permits a refusal and silence
 };
 
-/// A demand of the document on an encoder. It passes only if the test saw its case: its requests were sent, valid
-/// replies were received, a wrong bit in them would have been detected, a value was different before. The engine
-/// (client/conform) decides that by the demand alone.
+/// A demand of the document on an encoder. Its test passes only if the case occurred: the requests were sent, valid
+/// replies were received, a wrong bit in them would have been detected, and a value that must change was different
+/// before. The engine (client/conform) derives these conditions from `demand` alone.
 struct Clause {
-  std::string_view id;                   ///< unique in its unit: "crc"
-  std::string_view paragraph;            ///< paragraph of the unit's document
-  std::string_view words;                ///< Demand of the document, in words.
-  Demand demand;                         ///< Kind of the demand.
-  std::string_view needs{};              ///< options for which the document demands it: "carries=biss", "crc_width!=0"
-  Errors errors = 0;                     ///< as_drawn: errors that break the clause; 0: form_errors
-  Ask ask{};                             ///< Request that it is about.
-  Reaction reaction = Reaction::silent;  ///< Required reaction of the encoder.
-  std::string_view as{};                 ///< command whose reply is demanded; "": a reply to the sent request
-  std::string_view option{};             ///< option that reading uses for this clause; "": the user's options
-  std::int64_t value = 0;                ///< value of this option, or as the demand states
-  std::uint32_t page = 0;                ///< Page of the byte that it is about.
-  std::uint32_t address = 0;             ///< Address of the byte that it is about.
-  std::string_view setting{};            ///< name of the setting that `config set` writes and reads
-  std::string_view field{};              ///< field of the setting: the number that is its argument
-  std::int64_t other = 0;                ///< Second value, for demands that need two.
-  Verb verb = Verb::run;                 ///< Verb of the command that it is about.
-  std::string_view command{};            ///< Command that it is about.
-  std::string_view stop{};               ///< Command that ends the stream of `command`; empty: none.
-  std::string_view shown_with{};         ///< options of a virtual encoder that shows the case, if its defaults do not
+  std::string_view id;         ///< identifier, unique in its unit: "crc"
+  std::string_view paragraph;  ///< paragraph of the unit's document
+  std::string_view words;      ///< Demand of the document, in words.
+  Demand demand;               ///< Kind of the demand.
+  /// Options of encoders to which the clause applies: "carries=biss", "crc_width!=0"; empty: all.
+  std::string_view needs{};
+  Errors errors = 0;  ///< demand as_drawn: errors of replies that break the clause; 0: form_errors
+  Ask ask{};          ///< Request that the test sends, for demands about requests that no host sends.
+  Reaction reaction = Reaction::silent;  ///< demand reacts: required reaction of the encoder to `ask`
+  std::string_view as{};       ///< command whose reply is demanded as reaction to `ask`; "": a reply to `ask` itself
+  std::string_view option{};   ///< option that the test sets to `value` before it reads; "": the user's options stay
+  std::int64_t value = 0;      ///< value of `option`, or the number that the demand names `value`
+  std::uint32_t page = 0;      ///< Page of the memory byte that the clause is about.
+  std::uint32_t address = 0;   ///< Address of the memory byte that the clause is about.
+  std::string_view setting{};  ///< name of the setting that `config set` writes and reads
+  std::string_view field{};    ///< field that reports the value of `setting`, which is also the argument that sets it
+  std::int64_t other = 0;      ///< Second page, or second value of `setting`, for demands that name `other`.
+  Verb verb = Verb::run;       ///< Demand reset: verb of the command that resets.
+  std::string_view command{};  ///< Name of the command that demands name `command`.
+  std::string_view stop{};     ///< Command that ends the unsolicited frames of `command`; empty: none.
+  std::string_view shown_with{};  ///< options of a virtual encoder that shows the case, if its defaults do not
 };
 
 /// Kind of a clause for hosts.
 enum class HostDemand : std::uint8_t {
   asks,           ///< the encoder answers the host's requests
-  after_silence,  ///< the host repeats its request after a missing reply
+  after_silence,  ///< the host repeats its request if the encoder sends no reply
   after_damage,   ///< the host repeats its request after a damaged reply
   after_refusal,  ///< the host repeats its request after the encoder refused a damaged request
   rule,           ///< the host never breaks `rule`
-  /// The host keeps `rule`, about consecutive requests; tested while replies are valid, because a host may give up.
+  /// The host keeps `rule`, which is about consecutive requests. It is tested only while replies are valid, because a
+  /// host may give up after an error.
   row
 };
 
-/// A step of a host that ignores replies: tests build hosts from it that break a clause.
+/// One kind of request of a host that ignores replies. Tests build hosts that break a clause from such steps.
 struct HostStep {
-  Time pause{};             ///< pause after the last sent character
-  std::string_view what{};  ///< command whose own request alone is sent, or the bytes of a request: "1a 1a"
-  std::span<const std::int64_t> arguments{};  ///< arguments of the command; empty: the least ones
-  unsigned times = 1;                         ///< how often it is sent, each time after the pause
+  Time pause{};  ///< pause before the request, after the last sent character
+  /// Name of the command whose one request is sent, without the other steps of its procedure; or bytes to send: "1a
+  /// 1a".
+  std::string_view what{};
+  std::span<const std::int64_t> arguments{};  ///< arguments of the command; empty: each argument has its minimum
+  unsigned times = 1;                         ///< how often the request is sent, each time after `pause`
 };
-/// Requests of a host, with pauses.
+/// The steps of such a host, in order: requests with the pauses before them.
 using HostScript = std::span<const HostStep>;
 
 /// A demand of a document on the host.
@@ -130,21 +142,24 @@ struct HostClause {
   std::string_view paragraph;  ///< Paragraph of the document.
   std::string_view words;      ///< Demand of the document, in words.
   HostDemand demand;           ///< Kind of the demand.
-  std::string_view rule{};     ///< name of the rule in the virtual encoder; untested until the encoder has checked it
-  // Hosts that break the clause, if the steps of every test do not (two commands in a row, pauses left out, a
-  // controller that is too fast, too early or in another mode):
+  /// Name of the rule that the virtual encoder checks; the clause is untested until the encoder has checked this rule.
+  std::string_view rule{};
+  // Test hosts for this clause. The common test steps do not break it (two commands in a row, pauses left out, a
+  // controller that is too fast, too early or in another mode), so it has hosts of its own.
   std::array<HostScript, 2> breaks{};  ///< two hosts that break this clause and no other
-  HostScript keeps{};                  ///< a host in the same situation that keeps the clause
-  std::string_view options{};          ///< options of the virtual encoder for these hosts: "acquisition_us=20000"
+  HostScript keeps{};                  ///< a host that does the same as `breaks` and keeps this clause
+  /// Options of the virtual encoder for the hosts `breaks` and `keeps`: "acquisition_us=20000".
+  std::string_view options{};
 };
 
-/// The rule about the edges at which a controller clocks and samples. The virtual encoder cannot see them, so the
-/// test's controller checks it.
+/// Name of the rule that an SPI controller clocks and samples at the right edges. The virtual encoder cannot see the
+/// edges, so the test's controller checks the rule.
 inline constexpr std::string_view spi_mode_rule = "clock or sampling in another SPI mode than the encoder's";
 
-/// Returns the clauses of this unit in the order of the tests; empty: none. Defined with the list of units.
+/// Returns the clauses of this unit for encoders, in the order in which they are tested; empty if the unit has none.
+/// Defined in all.cpp, with the list of units.
 [[nodiscard]] std::span<const Clause> clauses_of(const Unit& unit);
-/// Returns the clauses of the document for the host; none: it has none.
+/// Returns the clauses of this unit for hosts; empty if the unit has none.
 [[nodiscard]] std::span<const HostClause> host_clauses_of(const Unit& unit);
 
 }  // namespace absenc

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The two roles of a unit: conversations (host side) and virtual encoders (device side). Both are machines.
+// The two machines that each protocol unit provides: conversations (host side) and virtual encoders (device side).
 #pragma once
 
 #include <cstddef>
@@ -14,64 +14,70 @@
 
 namespace absenc {
 
-/// The last request and the bytes received after it, stored so that a damaged frame can be shown without reproducing
-/// it.
+/// The last request of a conversation and the items received after it. They are stored so that a damaged frame can be
+/// shown to the user without reproducing it.
 template <class Item>
 struct Exchange {
-  std::span<const Item> sent{};      ///< Items that were sent.
-  std::span<const Item> received{};  ///< Items that were received.
-  Time sent_at{};                    ///< end of the last sent bit
-  Time received_at{};                ///< end of the last received bit; `sent_at` if none was received
+  std::span<const Item> sent{};      ///< Bytes or CAN frames of the request.
+  std::span<const Item> received{};  ///< Bytes or CAN frames that were received after the request, valid or not.
+  Time sent_at{};                    ///< time at which the last bit of the request ended
+  Time received_at{};  ///< time at which the last received bit ended; equal to `sent_at` if nothing was received
 };
 
-/// Texts that explain an error better than its general text. Either may be empty.
+/// Two texts for people that explain an error better than the error's general text. Either may be empty.
 struct Explanation {
-  std::string_view detail{};  ///< which step failed, and the evidence
+  std::string_view detail{};  ///< the step that failed, and the evidence for it
   std::string_view advice{};  ///< what to try, instead of the error's own advice
 };
 
 /// Counts of a conversation with an encoder that transmits unsolicited.
 struct StreamCounts {
-  /// Frames that were damaged, or cannot be told from damaged ones, whether an error reported them or not.
+  /// Number of received frames that were damaged or cannot be distinguished from damaged ones, whether an error
+  /// reported them or not.
   std::uint64_t discarded = 0;
 };
 
 /// Whether a conversation has sent a request that changes the encoder.
 enum class ChangeSent : std::uint8_t {
   no,
-  yes,      ///< sent, or possibly sent
-  refused,  ///< sent, but the encoder refused it, or reading back shows no change
+  yes,      ///< the request was sent, or possibly sent
+  refused,  ///< the request was sent, but the encoder refused it, or reading back shows no change
 };
 
-/// Host side of one command. At `emit` and `done` its functions return the result, which is valid until the next feed.
+/// Host side of one command: a machine that sends requests and receives replies. When it returns the step `emit` or
+/// `done`, the functions below return the result, which is valid until the next call of `feed`.
 template <class Item>
 struct Conversation : Machine<Item> {
-  /// Returns `none`, or why there is no result. After `done` it is the error of the whole procedure.
+  /// Returns why there is no result; `Error::none` if there is one. After the step `done` it is the error of the whole
+  /// command.
   [[nodiscard]] virtual Error error() const = 0;
-  /// Returns the evidence for people, beyond the error's own text: the step that failed. May be empty.
+  /// Returns a text for people that adds to the error's own text: the step that failed, and the evidence. May be empty.
   [[nodiscard]] virtual std::string_view detail() const { return {}; }
-  /// Returns what to try, if there is something better than the error's own advice. May be empty.
+  /// Returns a text for people: what to try instead of the error's general advice. Empty: the general advice stands.
   [[nodiscard]] virtual std::string_view advice() const { return {}; }
-  /// Returns the position if the result is one; null after an error.
+  /// Returns the position that is the result; null after an error, or if the command does not read a position.
   [[nodiscard]] virtual const Reading* reading() const { return nullptr; }
-  /// Returns the counts of a conversation that streams: each `emit` is a result like that of `done`, and the next one
-  /// follows while it is driven. Null: it ends by itself.
+  /// Returns the counts of a conversation that streams. Such a conversation never ends by itself: each `emit` is a
+  /// result, and the next one follows when it is run further. Null: the conversation ends with `done`.
   [[nodiscard]] virtual const StreamCounts* stream() const { return nullptr; }
-  /// Returns whether the encoder sends without requests.
+  /// Returns whether the conversation delivers one result after the other without end, as `stream` describes.
   [[nodiscard]] bool streams() const { return stream() != nullptr; }
-  /// Returns whether a conversation that streams sends a request for each result. Nothing is received then while it is
-  /// not driven.
+  /// Returns whether a conversation that streams sends a request for each result. If so, the encoder sends nothing
+  /// while the conversation is not run.
   [[nodiscard]] virtual bool asks() const { return false; }
-  /// Puts every named value of the result; nothing after an error.
+  /// Puts every named value of the result into `sink`; nothing after an error.
   virtual void report(FieldSink& sink) const = 0;
-  /// Returns the items of the last exchange.
+  /// Returns the last request and the items received after it.
   [[nodiscard]] virtual Exchange<Item> exchange() const = 0;
-  /// Asks the conversation to end early, from the next step on. One that changes the encoder for its own use restores
-  /// it, ends by itself and returns true. Others ignore it, because they may be abandoned at any step.
+  /// Asks the conversation to end early. A conversation that changes the encoder for its own use restores the encoder
+  /// first, ends by itself, and returns true here. Any other returns false and ignores the call: it may be abandoned at
+  /// any step.
   virtual bool abort() { return false; }
-  /// Returns whether the encoder may have changed. Valid at every step, also after an exception of the port.
+  /// Returns whether a request that changes the encoder was sent. Valid at every step, also after an exception of the
+  /// port.
   [[nodiscard]] virtual ChangeSent change_sent() const { return ChangeSent::no; }
-  /// Puts the changes that such a conversation leaves behind if it cannot continue after this step.
+  /// Puts into `sink` the changes that the conversation leaves in the encoder if it cannot continue after the present
+  /// step. By default nothing.
   virtual void report_left(FieldSink&) const {}
 
  protected:
@@ -80,13 +86,13 @@ struct Conversation : Machine<Item> {
 
 /// A timing or access rule that the host broke.
 struct Violation {
-  std::string_view rule;  ///< The rule, in words.
-  Time at;                ///< Time at which the host broke it.
+  std::string_view rule;  ///< The broken rule, in words.
+  Time at;                ///< Time at which the host broke the rule.
 };
 
-/// Is notified each time a virtual encoder checks a rule, because the host did what the rule is about.
+/// An observer that a virtual encoder notifies each time it checks a rule, because the host did what the rule is about.
 struct RuleWatch {
-  /// Called for each check of a rule, with whether the host kept it.
+  /// Is called for each check of `rule`. `kept`: whether the host kept the rule.
   virtual void looked(std::string_view rule, bool kept) = 0;
 
  protected:
@@ -96,33 +102,35 @@ struct RuleWatch {
 /// Device side: a virtual encoder with its own memory, alarms and timing rules.
 template <class Item>
 struct Device : Machine<Item> {
-  /// Whether the encoder runs its start-up, or is ready at once.
+  /// How long the encoder takes to be ready after it is switched on.
   enum class PowerOn : std::uint8_t {
-    real,  ///< takes the start-up time of the document
-    skip,  ///< is ready at once
+    real,  ///< the encoder takes the start-up time of its document
+    skip,  ///< the encoder is ready at once
   };
-  /// Switches the encoder on.
+  /// Switches the encoder on at `now`.
   virtual void power_on(Time now, PowerOn kind) = 0;
-  /// Switches the encoder off.
+  /// Switches the encoder off at `now`.
   virtual void power_off(Time now) = 0;
-  /// Raises these alarms of the unit's alarm field. Latched alarms stay until the host clears them, others until
-  /// `lower_alarms`.
+  /// Raises the alarms `bits`, bits of the unit's alarm field. Latched alarms stay until a host clears them, others
+  /// until `lower_alarms`.
   virtual void raise_alarms(std::uint32_t bits) = 0;
-  /// Ends the cause of alarms; latched alarms stay until a host clears them.
+  /// Ends the cause of the alarms `bits` that `raise_alarms` raised.
   virtual void lower_alarms(std::uint32_t bits) = 0;
-  /// Sets the unit's condition of this index to `value`, within its range.
+  /// Sets the condition Unit::conditions[index] to `value`, which is within the condition's range. By default does
+  /// nothing.
   virtual void set_condition(std::size_t /*index*/, std::int64_t /*value*/, Time /*now*/) {}
-  /// Returns the bytes that survive power off. Write them only while the encoder is off.
+  /// Returns the bytes of the encoder that survive power off. The caller may write them only while the encoder is off.
   [[nodiscard]] virtual MutableBytes memory() = 0;
   /// Returns a number that every change of `memory` increments.
   [[nodiscard]] virtual std::uint32_t memory_version() const = 0;
-  /// Returns the first broken rules in order; `violation_count` also counts those that do not fit.
+  /// Returns the first rule breaches of the host, in order of time. `violation_count` also counts those for which there
+  /// is no room.
   [[nodiscard]] virtual std::span<const Violation> violations() const = 0;
   /// Returns how often the host broke a rule.
   [[nodiscard]] virtual std::uint32_t violation_count() const = 0;
-  /// Sets the watch of rule checks; null: none. It must outlive the encoder.
+  /// Sets the observer of rule checks, which must outlive the encoder; null: none. By default does nothing.
   virtual void watch_rules(RuleWatch* /*watch*/) {}
-  /// Returns how many requests were answered.
+  /// Returns how many requests the encoder has answered.
   [[nodiscard]] virtual std::uint64_t answer_count() const = 0;
 
  protected:

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Number of discarded frames of a stream, from the bytes in which no valid frame was found.
+// Counts the discarded frames of a stream, from the number of bytes that belong to no valid frame.
 #pragma once
 
 #include <cstddef>
@@ -7,29 +7,29 @@
 
 namespace absenc {
 
-/// Counts as many frames as fit between two valid ones. Less than one frame before the first valid one does not count:
-/// it may have begun before the host listened.
+/// Number of discarded frames: as many as fit into the bytes between two valid frames, rounded up. Before the first
+/// valid frame it is rounded down, because an incomplete frame there may have begun before the host listened.
 class DiscardedFrames {
  public:
-  /// Counts frames of this length.
+  /// Counts frames with a length of `frame_bytes` bytes.
   explicit constexpr DiscardedFrames(std::size_t frame_bytes) : frame_bytes_(frame_bytes) {}
 
-  /// Notes bytes that belong to no frame.
+  /// Notes that `bytes` received bytes belong to no valid frame.
   constexpr void skip(std::size_t bytes) {
     skipped_ += bytes;
     gap_ += bytes;
   }
-  /// A valid frame begins here.
+  /// Notes that a valid frame begins after the bytes noted so far.
   constexpr void found() {
     before_ = count();
     begun_ = true;
     gap_ = 0;
   }
-  /// Returns the number of frames that were damaged.
+  /// Returns the number of discarded frames so far.
   [[nodiscard]] constexpr std::uint64_t count() const {
     return before_ + (gap_ + (begun_ ? frame_bytes_ - 1 : 0)) / frame_bytes_;
   }
-  /// Returns the number of skipped bytes.
+  /// Returns the number of bytes that belong to no valid frame.
   [[nodiscard]] constexpr std::uint64_t skipped() const { return skipped_; }
 
  private:

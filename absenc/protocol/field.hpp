@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Named values of a decoded frame: the unit describes them once as data and puts them as numbers.
+// Types for the named values (fields) of a decoded frame. A unit describes each field once as data, and delivers each
+// value as a number, text or bytes.
 #pragma once
 
 #include <cstdint>
@@ -14,61 +15,63 @@ namespace absenc {
 
 /// One bit of a status or alarm field.
 struct FlagInfo {
-  std::string_view name;     ///< "": the bit has no meaning
-  std::string_view meaning;  ///< what happened
+  std::string_view name;     ///< name of the flag; "": the bit has no meaning
+  std::string_view meaning;  ///< what happened in the encoder if the bit is set, as a phrase
   /// Action for the operator, with commands as "`absenc clear-alarms`"; "": none, the flag is no fault.
   std::string_view action;
-  bool optional = false;   ///< some encoders lack this flag: those that report the others and never this one
-  std::uint32_t sums = 0;  ///< for a status flag: bits of the unit's alarms that it sums up; 0: none
+  bool optional = false;  ///< true: some encoders that report the other flags never report this one
+  /// For a status flag: bits of the unit's alarms whose occurrence this one bit reports; 0: none.
+  std::uint32_t sums = 0;
 };
 
-/// The action of a status flag that only sums up alarms. Left out where the alarms are shown, too.
+/// The action of a status flag that only sums up alarms. Programs leave this text out where they also show the alarms.
 inline constexpr std::string_view read_the_alarms = "`absenc alarms` names the cause";
 
-/// Description of a value in replies.
+/// Description of a field, which is a named value in requests, replies or results.
 struct FieldInfo {
   /// Type of the value.
   enum class Kind : std::uint8_t {
     number,
-    counts,  ///< number of up to 64 bits without sign, in the bits of `number`
+    counts,  ///< unsigned number of up to 64 bits, stored in the 64 bits of FieldValue::number
     boolean,
-    flags,  ///< bit n is flags[n]
+    flags,  ///< number whose bit n is described by `flags[n]`
     real,
     text,   ///< ASCII text
     bytes,  ///< bytes, shown in hexadecimal
   };
   std::string_view name;              ///< Name of the field, in `snake_case`.
   Kind kind;                          ///< Type of the value.
-  std::string_view unit;              ///< "" for a plain number; "counts", "revolutions", "degC" ...
+  std::string_view unit;              ///< unit of the value: "counts", "revolutions", "degC" ...; "" for a plain number
   std::string_view meaning;           ///< Meaning of the value, as a phrase.
-  std::span<const FlagInfo> flags{};  ///< Names of the bits, if they are flags.
-  Role role = Role::other;            ///< Role by which generic programs find it.
-  bool in_hex = false;  ///< texts show the number in hexadecimal, as documents do; JSON and CSV have decimal numbers
+  std::span<const FlagInfo> flags{};  ///< kind flags: descriptions of the bits, from bit 0 on
+  Role role = Role::other;            ///< Role by which programs that do not know the unit find the field.
+  /// True: texts show the number in hexadecimal, as documents do; JSON and CSV have decimal numbers.
+  bool in_hex = false;
 };
 
-/// Value of a field.
+/// A field together with its value.
 struct FieldValue {
-  const FieldInfo* info;    ///< The field.
+  const FieldInfo* info;    ///< Description of the field.
   std::int64_t number = 0;  ///< value of kinds number, counts, boolean and flags
-  double real = 0;          ///< Value of a field with a fraction.
+  double real = 0;          ///< value of kind real
   Bytes bytes{};            ///< value of kinds text and bytes; valid during the call of `put`
 };
 
-/// Takes the values of fields, one by one.
+/// Receiver to which decoders deliver the values of fields, one by one.
 struct FieldSink {
-  /// Takes a value.
+  /// Takes the value of one field.
   constexpr virtual void put(const FieldValue& value) = 0;
-  /// Puts the position of a valid reply, or only its turns, with its validity. Called after the fields that show it;
-  /// the same reading may come twice.
+  /// Takes the reading of a valid reply: position and turns, or one of them, with their validity. It follows the fields
+  /// that show it; the same reading may be delivered twice. By default ignored.
   constexpr virtual void put_reading(const Reading&) {}
 
  protected:
   constexpr ~FieldSink() = default;
 };
 
-/// A sink that drops all fields, to check a frame only.
+/// A sink that ignores all fields, for callers that only check a frame.
 struct NoFields final : FieldSink {
-  /// Ignores the value.
+  /// Ignores the value of a field.
   constexpr void put(const FieldValue&) override {}
 };
 

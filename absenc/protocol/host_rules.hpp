@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Rules of the document that the host of a virtual encoder must keep: the violations, and a watch that is notified of
-// each check.
+// Keeps account of the rules of a document that the host of a virtual encoder must keep: stores the breaches, and
+// notifies an observer of each check.
 #pragma once
 
 #include <cstdint>
@@ -12,20 +12,22 @@
 
 namespace absenc {
 
-/// Rules that a virtual encoder watches, with those that the host broke.
+/// The rule breaches of a virtual encoder's host, and the observer of rule checks.
 class HostRules {
  public:
-  /// Records that the host did what the rule is about. Returns `kept`.
+  /// Records that the host did at `at` what `rule` is about. `kept`: whether it kept the rule; false is stored as a
+  /// breach. Returns `kept`.
   bool expect(bool kept, std::string_view rule, Time at);
 
-  /// Notifies only the watch: breaking the rule is no violation, because a host may do so or may have given up.
+  /// Notifies only the observer: breaking this rule is no violation, because the document permits a host to do so, or
+  /// the host may have given up after an error.
   void note(bool kept, std::string_view rule) const;
 
-  /// Returns the first rules that the host broke.
+  /// Returns the first 16 rule breaches of the host, in order of time.
   [[nodiscard]] std::span<const Violation> violations() const { return violations_; }
   /// Returns how often the host broke a rule.
   [[nodiscard]] std::uint32_t violation_count() const { return count_; }
-  /// Sets the watch of rule checks; null: none.
+  /// Sets the observer of rule checks; null: none.
   void watch(RuleWatch* watch) { watch_ = watch; }
 
  private:

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Requests received while a virtual encoder sends: each request counts once, not each of its bytes.
+// Finds where requests begin among the bytes that a virtual encoder receives while it sends, so that each request is
+// counted once, not each of its bytes.
 #pragma once
 
 #include <cstddef>
@@ -9,17 +10,17 @@
 
 namespace absenc {
 
-/// A bus that is held by another sender while a request runs.
+/// Splits the bytes received during one transmission of a virtual encoder into requests.
 class Interruption {
  public:
-  /// The encoder begins to send.
+  /// Notes that the encoder begins to send.
   void begin() {
     received_at_.reset();
     due_ = 0;
   }
   /// Returns whether the byte received at `at` begins a request. `length`: length of a request that begins with this
-  /// byte, 0 if none does (a collision on a half-duplex line garbles bytes). A byte after a pause of two characters
-  /// always begins one.
+  /// byte; 0 if no request does, because a collision on a half-duplex line garbles bytes. `character`: time of one
+  /// character. A byte after a pause of two characters always begins a request.
   bool begins_request(std::size_t length, Time at, Time character) {
     const bool begins_run = !received_at_ || at - *received_at_ > 2 * character;
     received_at_ = at;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Constructs a unit's machines in storage of the caller.
+// Constructs a unit's machines (conversations and virtual encoders) in storage of the caller.
 #pragma once
 
 #include <cstddef>
@@ -17,7 +17,7 @@ Machine* make_in(std::span<std::byte> storage, const Parameters&... parameters) 
   return storage.size() < sizeof(Machine) ? nullptr : new (storage.data()) Machine(parameters...);
 }
 
-// Returns the machine as Any, by its item.
+// Returns `machine` as Any: among CAN frames or bytes, by the item that the machine handles.
 template <template <class> class Role, class Made>
 Any<Role> any_of(Made* machine) {
   if constexpr (std::is_base_of_v<Machine<CanFrame>, Made>) {
@@ -28,13 +28,15 @@ Any<Role> any_of(Made* machine) {
 }
 }  // namespace detail
 
-/// Constructs a host machine; returns none if the storage is too small.
+/// Constructs the conversation `Machine` from `parameters` in `storage`; returns an empty Any if the storage is too
+/// small.
 template <class Machine, class... Parameters>
 [[nodiscard]] Any<Conversation> make_host(std::span<std::byte> storage, const Parameters&... parameters) {
   return detail::any_of<Conversation>(detail::make_in<Machine>(storage, parameters...));
 }
 
-/// Constructs a virtual encoder; returns none if the storage is too small.
+/// Constructs the virtual encoder `Machine` from `parameters` in `storage`; returns an empty Any if the storage is too
+/// small.
 template <class Machine, class... Parameters>
 [[nodiscard]] Any<Device> make_device(std::span<std::byte> storage, const Parameters&... parameters) {
   return detail::any_of<Device>(detail::make_in<Machine>(storage, parameters...));

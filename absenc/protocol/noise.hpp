@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A line that is never silent, which is another fault than received noise.
+// Limit and explanation for a line that is never silent. That is another fault than noise in a reply.
 #pragma once
 
 #include "absenc/core/time.hpp"
@@ -9,11 +9,11 @@ namespace absenc {
 
 using namespace std::chrono_literals;
 
-/// Traffic of this duration makes a line count as never silent: long enough for a reply that a carrier delivers in
-/// pieces. Slow characters need more.
+/// A line without silence for this long is treated as never silent. It is long enough for a reply that a carrier
+/// delivers in pieces; slow characters need a longer limit.
 inline constexpr Time noise_limit = 100ms;
 
-/// Explanation of such a line.
+/// Texts that explain the error of a conversation on a line that is never silent.
 inline constexpr Explanation endless_noise{"something sends without a pause", "find the node that does not stop"};
 
 }  // namespace absenc

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Settings of a unit as data: bits, checks, profiles. A model is a named set of option values.
+// Options of a unit as data (numbers of bits, checks, profiles), models, which are named sets of option values, and the
+// functions that parse both.
 #pragma once
 
 #include <array>
@@ -15,48 +16,51 @@
 
 namespace absenc {
 
-/// Words of options that are yes or no.
+/// Choices of an option that is true or false; the value is the index.
 inline constexpr std::array<std::string_view, 2> boolean_choices{"false", "true"};
 
-/// Choices of an option that states whether other encoders share the line. `auto` becomes true if the caller knows it
-/// (`tell_shared`): from absenc.toml, an open link with several users, or a virtual line with several encoders.
+/// Choices of an option that states whether other encoders share the line. `auto` becomes true if the caller knows that
+/// others do (`tell_shared`): from absenc.toml, an open link with several users, or a virtual line with several
+/// encoders.
 inline constexpr std::array<std::string_view, 3> sharing_choices{"auto", "true", "false"};
-/// Whether several encoders share the line.
+/// Values of such an option, in the order of `sharing_choices`: unknown, other encoders share the line, the encoder is
+/// alone.
 enum Sharing : std::int64_t { sharing_automatic, sharing_yes, sharing_no };
 
-/// A number in a range, or one of `choices` (the value is the index into it). With `decimals`, the user writes up to
-/// that many decimal digits, and all values are in units of the last digit.
+/// Description of an option of a unit: a number in a range, or one of `choices` (the value is the index into it). With
+/// `decimals`, the user writes up to that many decimal digits, and all values are in units of the last digit.
 struct Option {
   std::string_view name;                        ///< Name of the option.
   std::string_view meaning;                     ///< Meaning of the option, with its unit.
-  std::int64_t default_value;                   ///< Value if the address does not set it.
-  std::int64_t minimum = 0;                     ///< Lowest value.
-  std::int64_t maximum = 0;                     ///< Highest value.
-  std::span<const std::string_view> choices{};  ///< Words for the values from 0; none: it is a number.
-  bool probeable = false;                       ///< captured frames can show its value
-  unsigned decimals = 0;                        ///< Number of decimal digits of the value.
-  bool describes_word = false;  ///< a word format replaces this option: the two cannot be given together
+  std::int64_t default_value;                   ///< Value if the user does not set the option.
+  std::int64_t minimum = 0;                     ///< Lowest value, if the option is a number.
+  std::int64_t maximum = 0;                     ///< Highest value, if the option is a number.
+  std::span<const std::string_view> choices{};  ///< Words for the values from 0 on; empty: the option is a number.
+  bool probeable = false;                       ///< true: captured frames can show the value of the option
+  unsigned decimals = 0;                        ///< Number of decimal digits that the user may write.
+  bool describes_word = false;  ///< true: a word format replaces this option, so the two cannot be given together
   std::uint32_t step = 1;       ///< values are `minimum` and multiples of this step above it
-  Role role = Role::other;      ///< Role by which generic programs find it.
-  bool in_hex = false;          ///< texts show it in hexadecimal, as FieldInfo::in_hex
-  bool or_zero = false;         ///< 0 is a value too, below the range
+  Role role = Role::other;      ///< Role by which programs that do not know the unit find the option.
+  bool in_hex = false;          ///< true: texts show the value in hexadecimal, as with FieldInfo::in_hex
+  bool or_zero = false;         ///< true: 0 is permitted too, although it is below `minimum`
 };
 
-/// An option with its value.
+/// An option together with a value of it.
 struct OptionValue {
   std::size_t option;  ///< index into the unit's options
-  std::int64_t value;  ///< The value.
+  std::int64_t value;  ///< The value of the option.
 };
 
-/// A model of encoder: a name for values of options.
+/// A model of encoder: a name for a set of option values.
 struct Model {
   std::string_view name;                ///< Name of the model.
-  std::string_view meaning;             ///< The model, as a phrase.
+  std::string_view meaning;             ///< Description of the model, as a phrase.
   std::uint32_t maximum_rpm;            ///< fastest shaft for which a position is specified, in rpm
-  std::span<const OptionValue> values;  ///< Options that it sets.
+  std::span<const OptionValue> values;  ///< Options that the model sets, with their values.
 };
 
-inline constexpr std::size_t maximum_options = 68;  ///< twelve of biss-chain, and seven for each of its eight words
+/// Most options of a unit: biss-chain has twelve, and seven for each of its eight words.
+inline constexpr std::size_t maximum_options = 68;
 
 /// Name of the option that gives a word format, for units that take one.
 inline constexpr std::string_view word_option_name = "word";
@@ -64,10 +68,10 @@ inline constexpr std::string_view word_option_name = "word";
 /// The values of all options of a unit, by the index of the option.
 struct Options {
   std::array<std::int64_t, maximum_options> values{};  ///< Values in the order of the unit's options.
-  const Model* model = nullptr;                        ///< model with these values; null: none
-  WordFormat word{};                                   ///< replaces the options that describe a word; empty: they apply
+  const Model* model = nullptr;                        ///< model that the user named or whose values match; null: none
+  WordFormat word{};  ///< word format, which replaces the options that describe a word; empty: those options apply
 
-  /// Returns whether the user described the position word.
+  /// Returns whether the user gave a word format.
   [[nodiscard]] constexpr bool has_word() const { return word.bits() != 0; }
   /// Returns the value of an option, by its index.
   [[nodiscard]] constexpr std::int64_t operator[](std::size_t option) const { return values[option]; }
@@ -76,37 +80,39 @@ struct Options {
 /// An option as the user wrote it.
 struct OptionText {
   std::string_view name;   ///< Name of the option.
-  std::string_view value;  ///< Its value, as written.
+  std::string_view value;  ///< Value of the option, as the user wrote it.
 };
 
-/// Why options were refused. `text`: the wrong name or value; `option`: the option that it was meant for.
+/// Why options were refused, with the part of the user's text that is wrong.
 struct OptionError {
-  /// Error in a text of options.
+  /// Kind of the error; `none`: the options were accepted.
   enum class Kind : std::uint8_t {
     none,
     unknown_model,
     unknown_option,
     bad_value,
-    bad_word,                      ///< `word` has the reason and the place
-    beside_word,                   ///< the option or model `text` cannot be given together with a word
+    bad_word,                      ///< the word format is invalid: the member `word` has the reason and the place
+    beside_word,                   ///< the option or model `text` cannot be given together with a word format
   } kind = Kind::none;             ///< Kind of the error.
-  std::string_view text{};         ///< The part of the text that is wrong.
-  const Option* option = nullptr;  ///< The option; null: it is unknown.
-  WordFormatError word{};          ///< Error of the position word.
+  std::string_view text{};         ///< The name or the value that is wrong, as the user wrote it.
+  const Option* option = nullptr;  ///< bad_value: the option for which `text` was given; else null.
+  WordFormatError word{};          ///< bad_word: reason and place of the error in the word format.
 };
 
 struct Unit;
 
-/// Resolves options from a model and single settings, which override it. Without a model name the first model that
-/// agrees with all settings is used, so that the length of a position also selects its id; if none agrees, the unit's
-/// defaults apply. With a word no model is used.
+/// Computes the values of all options from a model and single settings, which override the model, and stores them in
+/// `resolved`. Returns why it is impossible, or an error of kind `none`. Without a model name the first model whose
+/// values match all settings is used, so that the length of a position also selects its id; if no model matches, the
+/// unit's defaults apply. With a word format no model is used.
 [[nodiscard]] OptionError resolve_options(const Unit& unit, std::string_view model,
                                           std::span<const OptionText> settings, Options& resolved);
 
-/// States that other encoders share the line, for options that leave it open.
+/// Sets the options that state whether other encoders share the line to true, if their value is `auto`.
 void tell_shared(const Unit& unit, Options& options);
 
-/// Parses an integer, decimal or 0x hexadecimal, with an optional minus sign. Error: invalid_argument.
+/// Parses an integer, decimal or 0x hexadecimal, with an optional minus sign. Error: invalid_argument (any other text,
+/// or too large for 64 bits).
 [[nodiscard]] constexpr Result<std::int64_t> parse_number(std::string_view text) {
   const bool negative = text.starts_with('-');
   if (negative) text.remove_prefix(1);
@@ -151,7 +157,7 @@ void tell_shared(const Unit& unit, Options& options);
   return value;
 }
 
-/// Parses the value of an option: a number, or one of its choices. Error: invalid_argument.
+/// Parses the value of an option: a number in its range, or one of its choices. Error: invalid_argument.
 [[nodiscard]] constexpr Result<std::int64_t> parse_value(const Option& option, std::string_view text) {
   for (std::size_t i = 0; i < option.choices.size(); ++i) {
     if (option.choices[i] == text) return static_cast<std::int64_t>(i);

@@ -8,43 +8,45 @@
 
 namespace absenc {
 
-/// A role. The kit finds commands whose fields or arguments lack the roles that they need.
+/// Meaning of a field, option or argument for programs that do not know the unit. The kit (tests of every unit) finds
+/// commands whose fields or arguments lack the roles that they need.
 enum class Role : std::uint8_t {
-  other,  ///< only its unit uses it
+  other,  ///< no generic meaning: only the unit uses the value
   // Roles in a reading
-  position,      ///< field: counts of the position, or the place of a linear encoder
-  turns,         ///< field: turns
-  of_position,   ///< field: valid as long as the position is: the position in degrees, or of a second channel
+  position,  ///< field: counts of the position, or the place of a linear encoder
+  turns,     ///< field: turns
+  /// Field: another form of the position, valid only while the position is: in degrees, or of a second channel.
+  of_position,
   sequence,      ///< field: counts the replies, so that a repeated reply can be detected
   life_counter,  ///< field: counts the frames, 0 to 63 and again from 0, by one for each frame
   // Roles on a line
-  encoder,   ///< option, field: which encoder on the line; in a scan it begins a new record
+  encoder,   ///< option, field: address of the encoder on the line; in a scan this field begins a new record
   identity,  ///< field: identifies the encoder: its type, its serial number
   clash,     ///< field of a scan: not 0: every answer at this address is damaged
   trouble,   ///< field of a scan: what is wrong with an answer that was complete
   rate,      ///< option: bits per second
   // Roles of the options of a checksum at the end of a word, which `crc find` finds
-  check_width,       ///< bits
-  check_polynomial,  ///< polynomial without its highest power
-  check_init,        ///< start value
-  check_inverted,    ///< whether it is sent inverted
+  check_width,       ///< option: width of the checksum in bits
+  check_polynomial,  ///< option: polynomial of the checksum without its highest power
+  check_init,        ///< option: start value of the checksum
+  check_inverted,    ///< option: whether the checksum is sent inverted
   // Roles in memory, registers and settings
   address,   ///< argument: address of the byte or register
-  page,      ///< argument, if there are pages
-  count,     ///< argument: bytes to read; without it one byte is read
-  force,     ///< argument: 1: also writes a protected byte, or a value that is set already
+  page,      ///< argument: page of the byte, if the memory has pages
+  count,     ///< argument: number of bytes to read; commands without it read one byte
+  force,     ///< argument: 1 also writes a protected byte, or a value that the encoder has already
   value,     ///< argument, field: the byte, or the content of a register, most significant byte first
-  data,      ///< field: several bytes, or those of a register
-  written,   ///< field: 0: nothing was sent, because the value is set already
-  exchange,  ///< field: what was requested and how it was sent; nothing about the encoder
+  data,      ///< field: several bytes of memory, or the bytes of a register
+  written,   ///< field: 0 if nothing was written, because the encoder has the value already
+  exchange,  ///< field: a part of the request or of its encoding, which says nothing about the encoder's state
 };
 
-/// Returns whether a field of this role is valid only as long as the reading, or a part of it, is.
+/// Returns whether a field of this role is a part of a reading, and so valid only while that part is.
 [[nodiscard]] constexpr bool is_of_reading(Role role) {
   return role == Role::position || role == Role::turns || role == Role::of_position;
 }
 
-/// Returns the first of these fields, options or arguments with this role, or null.
+/// Returns the first element of `all` (fields, options or arguments) with the role `role`, or null.
 template <class Named>
 [[nodiscard]] constexpr const Named* find_role(std::span<const Named> all, Role role) {
   for (const Named& one : all) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A sentence made from fixed texts, without a heap.
+// Builds an error text for people from parts, without a heap.
 #pragma once
 
 #include <algorithm>
@@ -10,10 +10,10 @@
 
 namespace absenc {
 
-/// A sentence that is put together without heap.
+/// A text of up to 400 characters that is put together from parts, without a heap.
 class Sentence {
  public:
-  /// Adds a text; what does not fit is left out.
+  /// Appends `text`. A text that does not fit completely is left out.
   Sentence& add(std::string_view text) {
     if (text.size() <= text_.size() - size_) {
       std::copy(text.begin(), text.end(), text_.begin() + size_);
@@ -21,7 +21,7 @@ class Sentence {
     }
     return *this;
   }
-  /// Appends a number.
+  /// Appends a number in decimal.
   Sentence& add_number(std::uint32_t number) {
     std::array<char, 10> digits{};
     std::size_t first = digits.size();
@@ -31,16 +31,16 @@ class Sentence {
     } while (number != 0);
     return add({digits.data() + first, digits.size() - first});
   }
-  /// Adds a part after the present text, separated by "; ".
+  /// Appends `part`, separated by "; " from the text before it. An empty part changes nothing.
   Sentence& add_part(std::string_view part) {
     if (!part.empty() && !empty()) add("; ");
     return add(part);
   }
   /// Removes all text.
   void clear() { size_ = 0; }
-  /// Returns whether the sentence is empty.
+  /// Returns whether the sentence has no text.
   [[nodiscard]] bool empty() const { return size_ == 0; }
-  /// Returns the text.
+  /// Returns the text, which is valid until the sentence changes.
   [[nodiscard]] std::string_view view() const { return {text_.data(), size_}; }
 
  private:
