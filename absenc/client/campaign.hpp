@@ -18,14 +18,14 @@ namespace absenc::client {
 struct LineFault {
   std::string_view name;     ///< Name of the fault, as `--fault` takes it.
   std::string_view meaning;  ///< What the fault does to the line, as a phrase.
-  double usual;              ///< Default rate, 0 to 1.
+  double usual;              ///< Default rate of the fault, 0 to 1.
 };
 
-/// Returns the faults of `emulate --fault`, under the same names, and those of the line only: bit, burst, double,
-/// talker, late.
+/// Returns all faults that a campaign can inject: those of `emulate --fault`, under the same names, and faults of the
+/// line itself: bit, burst, double, talker, late.
 [[nodiscard]] std::span<const LineFault> line_faults();
 
-/// The encoder of a campaign, its length, and its faults.
+/// Settings of a campaign: the virtual encoder, the number of exchanges, and the faults with their rates.
 struct CampaignChoices {
   std::string model{};                 ///< Name of a model of the unit; empty: its first.
   std::vector<std::string> options{};  ///< Options of the unit, as "address=3".
@@ -41,48 +41,49 @@ struct CampaignChoices {
 };
 
 /// Computed strength of the frame check, for replies whose bits are damaged independently at the rate of the fault
-/// `bit`. All rates are per reply.
+/// `bit`. The rates are shares of all replies.
 struct CheckWorth {
   unsigned check_bits = 0;     ///< Width of the check in bits; 0: none.
   std::size_t frame_bits = 0;  ///< Length of a reply, in bits.
-  unsigned distance = 0;       ///< Hamming distance: all errors of fewer bits are detected; 0: more than 8 bits.
-  double words = 0;            ///< Number of undetected error patterns of `distance` bits.
-  double unseen = 0;           ///< Rate of damaged replies with a correct checksum.
-  double taken = 0;            ///< Rate of damaged replies that pass all checks with a wrong position.
+  unsigned distance = 0;  ///< Hamming distance of the code: errors of fewer bits are all detected; 0: more than 8 bits.
+  double words = 0;       ///< Number of undetected error patterns of `distance` bits.
+  double unseen = 0;      ///< Rate of replies that are damaged although their checksum is correct.
+  double taken = 0;       ///< Rate of damaged replies that the decoder accepts with a wrong position.
   double taken_deviation = 0;  ///< Standard deviation of `taken`, which is estimated from random samples.
 };
 
-/// Counts of confirmed positions, right and wrong.
+/// Shares of confirmed and of wrong positions, in a campaign with a turning shaft.
 struct Guarded {
   Share confirmed{};  ///< Share of readings that were confirmed.
-  /// Share of confirmed readings with a position that the shaft did not have when it was sampled.
+  /// Share of confirmed readings whose position the shaft did not have when the encoder measured it.
   Share wrong{};
-  Share alone{};           ///< Share of wrong positions, confirmed or not, among those that passed every frame check.
+  Share alone{};  ///< Share of wrong positions, confirmed or not, among the readings that passed every frame check.
   double let_through = 0;  ///< Computed number of wrong positions that pass both frame checks and confirmation.
 };
 
 /// Result of a campaign: numbers of exchanges and shares of errors.
 struct CampaignResult {
   std::string protocol{};       ///< Identifier of the unit.
-  std::string model{};          ///< Model of the encoder; "" if the unit has none.
+  std::string model{};          ///< Name of the encoder's model; "" if the unit has none.
   std::uint64_t readings = 0;   ///< Number of readings, failed ones included.
-  std::uint64_t exchanges = 0;  ///< Number of requests, or of frames where the encoder sends unsolicited.
+  std::uint64_t exchanges = 0;  ///< Number of requests, or of frames if the encoder sends unsolicited frames.
   std::uint64_t damaged = 0;    ///< Number of replies that a fault damaged.
   Share failed{};               ///< Share of exchanges that ended with an error.
   Share given_up{};             ///< Share of readings that ended with an error after all attempts.
   Share recovered{};            ///< Share of readings that succeeded after a failed attempt.
-  Share wrong{};                ///< Share of exchanges that returned a position which is not the encoder's.
+  Share wrong{};                ///< Share of exchanges that returned a position which the shaft did not have.
   /// Share of exchanges in which a damaged request changed the encoder; a fresh encoder replaced it afterwards.
   Share changed{};
-  Share older{};  ///< Share of exchanges that returned an earlier position, from a frame sent before the request.
-  std::optional<Guarded> guarded{};  ///< Confirmed positions; only with `rpm`.
-  /// Computed strength of the check; without a value if the check has more than 16 bits, is not linear, or is that of
+  /// Share of exchanges that returned an earlier position of the shaft, from a frame sent before the request.
+  Share older{};
+  std::optional<Guarded> guarded{};  ///< Shares of confirmed and wrong positions; without a value unless `rpm` was set.
+  /// Computed strength of the frame check; without a value if the check has more than 16 bits or is not linear, and on
   /// CAN.
   std::optional<CheckWorth> worth{};
-  double seconds = 0;  ///< Processor time of all exchanges, in seconds.
+  double seconds = 0;  ///< Processor time that the whole campaign used, in seconds.
 };
 
-/// Runs a campaign on one core. Throws UsageError.
+/// Runs a campaign on one core. Throws UsageError for an unknown protocol, model, option or fault.
 [[nodiscard]] CampaignResult campaign(std::string_view protocol, const CampaignChoices& choices = {});
 
 }  // namespace absenc::client

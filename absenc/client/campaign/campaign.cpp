@@ -71,7 +71,7 @@ struct PlacedShaft final : Shaft {
   std::int64_t position = 0;
 };
 
-/// Counts results of readings for which the shaft is at a different position each time.
+/// Reads again and again, each time with the shaft at another position, and counts the results.
 template <class Item>
 class Campaign {
  public:
@@ -88,7 +88,7 @@ class Campaign {
     result.wrong.of = result.older.of = result.changed.of = result.exchanges;
   }
 
-  /// Collects good replies with a position, from an undamaged line.
+  /// Collects up to `count` good replies with a position, over a line without faults; none on CAN.
   std::vector<GoodReply> good_replies(unsigned count) {
     std::vector<GoodReply> replies;
     if constexpr (!std::is_same_v<Item, CanFrame>) {
@@ -115,10 +115,11 @@ class Campaign {
   // Moves the shaft to a position that it never had before, so that an older position is recognised.
   void move() {
     shaft_.position = static_cast<std::int64_t>(bench_.random.next());
-    constexpr Time longest = 30s;  // no reply is later than this
+    constexpr Time longest = 30s;  // limit of a reply's delay
     if (places_.size() > 1 && places_[1].since + longest < line_.now()) places_.pop_front();
     places_.push_back({line_.now(), shaft_.position});
-    // Waits until unsolicited frames with the old position have passed, and as long as a chip select must be released.
+    // Waits until unsolicited frames with the old position have passed. On SPI also waits as long as chip select must
+    // be released.
     if (bench_.unsolicited) {
       line_.rest(line_.now() + 5ms);
       line_.drop();
@@ -173,7 +174,7 @@ class Campaign {
 std::optional<CheckWorth> worth_of(const Unit& unit, const Options& options, double bit_errors) {
   if (unit.link == LinkKind::can) return {};
   constexpr unsigned frames =
-      20'000;  // number of frames: a shifted frame passes in some positions and not in others, so many are needed
+      20'000;  // number of sample frames: a shifted frame passes the check in some positions only, so many are needed
   constexpr unsigned samples = 500'000;
   const std::vector<GoodReply> replies = Campaign<std::uint8_t>(unit, options, {}, 7).good_replies(frames);
   if (replies.empty()) return {};

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Checks campaigns on a bad line: the counts agree with the computed rates, and each fault has its known effect.
+// Checks campaigns on a bad line: the counts match the computed rates, and each fault has its known effect.
 #include "absenc/client/campaign.hpp"
 
 #include <gtest/gtest.h>
@@ -30,7 +30,7 @@ void PrintTo(const Named& named, std::ostream* out) { *out << named.protocol << 
 
 class Computed : public ::testing::TestWithParam<Named> {};
 
-// Counts and computed rates both vary by chance: allows five standard deviations of the difference.
+// Both the count and the computed rate vary by chance, so their difference may be up to five standard deviations.
 TEST_P(Computed, IsWhatIsCounted) {
   const Named& named = GetParam();
   const CampaignResult result = run(named.protocol, {named.fault}, 200'000);
@@ -64,7 +64,7 @@ TEST(CheckCodeTest, ExclusiveOrHasTheWeightsOfItsColumns) {
   EXPECT_EQ(code->bits(), 88u);
   const std::vector<double> words = code->weights(4);
   EXPECT_EQ(words, (std::vector<double>{1, 0, 8 * 55, 0, 8 * 330 + 28 * 55 * 55}));
-  // Counts all code words by their number of even columns, at an error rate for which the formula is simple.
+  // Counts all code words by their number of even columns, at a bit error rate for which the formula is simple.
   const double even = (1 + std::pow(1 - 2 * 0.02, 11)) / 2;
   EXPECT_NEAR(code->unseen(0.02), std::pow(even, 8) - std::pow(0.98, 88), 1e-12);
 }
@@ -91,7 +91,7 @@ TEST(CampaignTest, AGoodLineFailsNowhere) {
   }
 }
 
-// Tries each fault alone: it makes exchanges fail or is harmless, and no unit with a checksum accepts an old position.
+// Tries each fault alone: it makes exchanges fail or is harmless. No unit with a checksum accepts an old position.
 TEST(CampaignTest, EveryFaultIsThere) {
   for (const LineFault& fault : line_faults()) {
     const CampaignResult result = run("tformat", {std::string(fault.name) + "=0.1"}, 20'000);
@@ -102,14 +102,14 @@ TEST(CampaignTest, EveryFaultIsThere) {
   }
 }
 
-// Delayed frames of an encoder that sends by itself: the frames do not show when they were sent.
+// Delayed frames are accepted from an encoder that sends unsolicited: its frames do not show when they were sent.
 TEST(CampaignTest, OldFramesAreCounted) {
   const CampaignResult result = run("raa38", {"late=0.1"}, 20'000);
   EXPECT_GT(result.older.count, 0u);
   EXPECT_LE(result.older.count, result.wrong.count);
 }
 
-// A damaged request may set the zero: that reading is right, and every later one would be wrong.
+// A damaged request may set the zero: the present reading is still right, and every later one would be wrong.
 TEST(CampaignTest, EncodersThatWereChangedAreReplaced) {
   const CampaignResult result = run("raa38-can", {"request_corrupt=0.05"}, 100'000);
   EXPECT_GT(result.changed.count, 0u);

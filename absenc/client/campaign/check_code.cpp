@@ -12,7 +12,7 @@ namespace absenc::client {
 
 namespace {
 
-constexpr unsigned most_check_bits = 16;  // limit, because the dual code has 2^bits words
+constexpr unsigned most_check_bits = 16;  // greatest width of a check: its dual code has 2^bits words
 
 struct ReadingSink final : FieldSink {
   void put(const FieldValue&) override {}
@@ -31,7 +31,7 @@ bool has_position(const Unit& unit, const Options& options, const GoodReply& rep
   return unit.decode(options, {.bytes = reply.request}, frame, seen) == Error::none && seen.reading.has_value();
 }
 
-/// Applies errors to a reply and returns the decoder's judgement.
+/// A copy of a good reply in which bits can be flipped. `decode` and `error` return the decoder's judgement of it.
 class CheckCode::AlteredReply {
  public:
   AlteredReply(const Unit& unit, const Options& options, const GoodReply& good)
@@ -75,8 +75,8 @@ std::optional<CheckCode> CheckCode::learn(const Unit& unit, const Options& optio
   return code;
 }
 
-// Searches from the last bit, because most checks are at the end; otherwise any independent bits serve. Bits before the
-// covered ones belong to other frames, or mark the beginning of the frame.
+// Searches check bits from the last bit of the frame, because most checks are at the end; otherwise any independent
+// bits serve. Bits before the covered ones belong to other frames, or mark the beginning of the frame.
 bool CheckCode::find_check(AlteredReply& asked) {
   bool complete = false;
   bool before = false;
@@ -100,13 +100,13 @@ bool CheckCode::find_check(AlteredReply& asked) {
   return true;
 }
 
-// Returns the check bits that compensate an error of this bit; nothing if none do.
+// Returns the check bits that compensate an error of the bit `bit`; nothing if no combination does.
 std::optional<std::uint32_t> CheckCode::syndrome_of(AlteredReply& asked, std::size_t bit) const {
   asked.restore();
   asked.flip(bit);
   std::uint32_t pattern = 0;
   if (asked.passes()) return pattern;
-  // Iterates in Gray code, which changes one bit at a time.
+  // Iterates over the combinations in Gray code, which changes one bit at a time.
   for (std::uint32_t i = 1; i < std::uint32_t{1} << check_.size(); ++i) {
     const auto changed = static_cast<unsigned>(std::countr_zero(i));
     asked.flip(check_[changed]);
@@ -127,7 +127,7 @@ bool CheckCode::is_linear(const Unit& unit, const Options& options, std::span<co
       asked.flip(bit);
       syndrome ^= syndromes_[bit];
     }
-    // Another check may reject the error first.
+    // Accepts any other error code, because another check of the decoder may reject the reply before the checksum.
     const Error error = asked.error();
     if (error == (syndrome == 0 ? Error::bad_checksum : Error::none)) return false;
     for (unsigned one = 0; one < check_.size(); ++one) {
@@ -157,7 +157,7 @@ std::vector<double> CheckCode::weights(unsigned most) const {
   std::vector<double> words(most + 1);
   for (std::size_t weight = 0; weight < dual.size(); ++weight) {
     if (dual[weight] == 0) continue;
-    // Computes the Krawtchouk polynomials of this weight, each from the two before it.
+    // Computes the Krawtchouk polynomials of this weight, each from the two polynomials before it.
     double before = 0;
     double now = 1;
     for (unsigned k = 0; k <= most; ++k) {
@@ -187,10 +187,10 @@ bool CheckCode::is_check(std::size_t bit) const {
   return std::has_single_bit(syndrome) && check_[static_cast<unsigned>(std::countr_zero(syndrome))] == bit;
 }
 
-// Draws errors of all bits but the check bits at random and sets the check bits so that the checksum is right. The
-// weight of such an error is the probability of these errors of the check bits. An error of fixed bits may shift the
-// frame; then the check bits are drawn at random too. A shifted frame passes in some frames and not in others, so the
-// difference between frames is part of the deviation.
+// Draws errors of all bits but the check bits at random, then sets the check bits so that the checksum is right. The
+// weight of a drawn error is the probability of its errors of check bits. An error of fixed bits may shift the frame;
+// then the check bits are drawn at random too. A shifted frame passes the check in some replies only, so the difference
+// between replies is part of the deviation.
 Estimated CheckCode::taken(const Unit& unit, const Options& options, std::span<const GoodReply> replies,
                            double bit_errors, unsigned samples) const {
   sim::Random random(2);

@@ -15,22 +15,22 @@ namespace absenc::client {
 struct GoodReply {
   std::vector<std::uint8_t> request;
   std::vector<std::uint8_t> reply;
-  std::size_t bits = 0;  // number of bits of the reply on clocked lines
+  std::size_t bits = 0;  // number of bits of `reply` on a clocked link; 0: whole bytes
 
   [[nodiscard]] std::size_t bit_count() const { return bits != 0 ? bits : reply.size() * 8; }
 };
 
-/// Returns whether the reply is good and has a position.
+/// Returns whether `reply` decodes without an error and contains a position.
 [[nodiscard]] bool has_position(const Unit& unit, const Options& options, const GoodReply& reply);
 
-/// A value and its standard deviation.
+/// An estimated value and its standard deviation.
 struct Estimated {
   double value = 0;
   double deviation = 0;
 };
 
 /// The linear code of all errors that the checksum misses. An error is a code word if the exclusive OR of the syndromes
-/// of its bits is 0. Bits are numbered in the order of the bytes, from the most significant.
+/// of its bits is 0. Bits of a frame are numbered in the order of the bytes, from the most significant bit.
 class CheckCode {
  public:
   /// Derives the code from the decoder. The last independent bits of the frame are the check bits; for every other bit,
@@ -42,16 +42,16 @@ class CheckCode {
 
   [[nodiscard]] std::size_t bits() const { return syndromes_.size(); }
   [[nodiscard]] unsigned check_bits() const { return static_cast<unsigned>(check_.size()); }
-  /// Returns the bits that the checksum does not cover: those before the frame, and constant ones.
+  /// Returns the number of bits of a reply that the checksum does not cover: bits before the frame, and constant bits.
   [[nodiscard]] std::size_t fixed_bits() const { return fixed_; }
   /// Returns the number of code words of weight 0 to `most`, by MacWilliams' identity from the 2^check_bits words of
   /// the dual code.
   [[nodiscard]] std::vector<double> weights(unsigned most) const;
-  /// Returns the probability that independent bit errors damage a reply, none at a fixed bit, and the checksum is
-  /// right.
+  /// Returns the probability that independent bit errors damage a reply, leave its fixed bits intact, and leave the
+  /// checksum right.
   [[nodiscard]] double unseen(double bit_errors) const;
-  /// Returns the probability that the decoder, with all its checks, accepts a damaged reply with another position. It
-  /// is estimated from random code words, weighted by their probability, and errors of fixed bits.
+  /// Returns the probability that the decoder, with all its checks, accepts a damaged reply with another position. The
+  /// probability is estimated from random code words, weighted by their probability, and from errors of fixed bits.
   [[nodiscard]] Estimated taken(const Unit& unit, const Options& options, std::span<const GoodReply> replies,
                                 double bit_errors, unsigned samples) const;
 
@@ -65,9 +65,10 @@ class CheckCode {
   [[nodiscard]] std::vector<std::uint32_t> dual_weights() const;
   [[nodiscard]] std::size_t free_bits() const { return syndromes_.size() - fixed_; }
 
-  std::vector<std::uint32_t> syndromes_;  // syndrome of each bit of the frame; bit n stands for check_[n]
+  // syndrome of each bit of the frame; bit n of a syndrome is the check bit `check_[n]`
+  std::vector<std::uint32_t> syndromes_;
   std::vector<bool> is_fixed_;
-  std::vector<std::size_t> check_;  // the check bits
+  std::vector<std::size_t> check_;  // indexes of the check bits in the frame
   std::size_t fixed_ = 0;
 };
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Compares each confirmed position on a bad line with the true shaft, for every model, at rest and turning. There are
-// no more wrong positions than frame checks and speed limit let through together.
+// Compares each confirmed position on a bad line with the true position of the shaft, for every model, at rest and
+// turning. The number of wrong confirmed positions must not exceed the number computed from frame checks and speed
+// limit.
 #include <gtest/gtest.h>
 
 #include <cctype>
@@ -47,7 +48,8 @@ class Confirmed : public ::testing::TestWithParam<Encoder> {
     return campaign(GetParam().unit, choices);
   }
 
-  // Wrong positions agree by chance: allows four standard deviations, and two more for very small counts.
+  // The number of wrong positions varies by chance: allows four standard deviations, and two more positions for very
+  // small counts.
   static double chance(const Guarded& guarded) { return 4 * std::sqrt(guarded.let_through) + 2; }
 };
 
@@ -67,7 +69,7 @@ TEST_P(Confirmed, IsNotWrongMoreOftenThanChecksAndLimitLetThrough) {
   }
 }
 
-// A speed limit near the speed of the shaft.
+// The speed limit of this host is near the speed of the shaft.
 TEST_P(Confirmed, IsWrongLessOftenWithALowerLimit) {
   const Guarded usual = *read(0.1, 60).guarded;
   const Guarded lower = *read(0.1, 60, 100).guarded;
@@ -78,8 +80,8 @@ TEST_P(Confirmed, IsWrongLessOftenWithALowerLimit) {
 
 INSTANTIATE_TEST_SUITE_P(Models, Confirmed, ::testing::ValuesIn(encoders()), name_of);
 
-// Words of 12 bits without a check: 4 counts of noise and the 3 counts that the fastest shaft moves meanwhile hide only
-// damage of the lowest bits; other damage passes only if the next word has the same.
+// The words have 12 bits and no check: 4 counts of noise and the 3 counts that the fastest shaft moves between two
+// readings hide only damage of the lowest bits. Other damage passes only if the next word has the same damage.
 TEST(ConfirmedWords, WithoutACheckOnlyTheLimitTells) {
   CampaignChoices choices{.faults = {"corrupt=0.1"}, .exchanges = 20'000};
   choices.rpm = 0;

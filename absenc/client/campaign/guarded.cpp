@@ -18,13 +18,14 @@ namespace {
 
 using namespace std::chrono_literals;
 
-// Positions of `bits` bits on a circle, whose distance wraps.
+// Returns the difference of two positions of `bits` bits, which lie on a circle, as a signed number.
 std::int64_t wrapped(std::uint64_t difference, unsigned bits) {
   const unsigned unused = 64 - bits;
   return static_cast<std::int64_t>(difference << unused) >> unused;
 }
 
-/// A shaft that turns steadily, after a millisecond for power-on, and records the positions that encoders measured.
+/// A shaft that starts one millisecond after power-on and then turns steadily. It stores the time and position of each
+/// measurement of the encoder.
 class MeasuredShaft final : public Shaft {
  public:
   MeasuredShaft(std::int64_t start, double turns_a_second) : start_(start), speed_(turns_a_second) {}
@@ -36,9 +37,10 @@ class MeasuredShaft final : public Shaft {
     return {.position = position, .speed_millirpm = seconds > 0 ? static_cast<std::int32_t>(60'000 * speed_) : 0};
   }
 
-  /// Returns whether the reading is the position of the shaft when the encoder measured it.
+  /// Returns whether the reading has a position that the shaft had when the encoder measured it.
   [[nodiscard]] bool was_at(const Reading& reading) const { return find(reading) != nullptr; }
-  /// Returns that position; for a wrong reading, the last measured one.
+  /// Returns the position of the shaft that belongs to the reading; for a wrong reading, the last position measured
+  /// before the reading was received.
   [[nodiscard]] std::int64_t place_of(const Reading& reading) const {
     const ShaftSample* found = find(reading);
     for (std::size_t i = 0; found == nullptr && i < count(); ++i) {
@@ -53,7 +55,7 @@ class MeasuredShaft final : public Shaft {
     std::int64_t position = 0;
   };
 
-  // Index 0 is the last measurement.
+  // Returns a stored measurement; `number` 0 is the last one.
   [[nodiscard]] const ShaftSample& last(std::size_t number) const {
     return samples_[(count_ - 1 - number) % samples_.size()];
   }
@@ -74,23 +76,25 @@ class MeasuredShaft final : public Shaft {
   mutable std::size_t count_ = 0;
 };
 
-/// Computes how many of the wrong positions that passed the checks of their frames agree with the position before.
+/// Computes how many wrong positions pass both the frame checks and the comparison with the position before.
 class LetThrough {
  public:
   LetThrough(const Resolution& resolution, const host::SpeedLimit& limit, unsigned bits)
       : counts_per_second_(host::counts_per_second(resolution, limit)), bits_(bits) {}
 
   void add_position() { ++positions_; }
-  /// Distances of the wrong positions from the true one.
+  /// Adds a wrong position, by its distance in counts from the true position.
   void add_wrong(std::int64_t away) { away_.push_back(away); }
-  /// `moved` is the movement of the true shaft, also between the two positions before.
+  /// Adds a comparison of two positions. `moved` is the movement of the true shaft between them, `before` its movement
+  /// between the two positions before; both in counts.
   void add_comparison(Time between, std::int64_t moved, std::int64_t before) {
     comparisons_.push_back({between, moved, before});
   }
 
   [[nodiscard]] Share wrong() const { return {away_.size(), positions_}; }
 
-  /// Assumes that positions are wrong independently, with the rate and the distances of all wrong positions.
+  /// Returns the expected number of wrong positions that are confirmed. Assumes that positions are wrong independently,
+  /// with the rate and the distances of all added wrong positions.
   [[nodiscard]] double expected() const {
     if (away_.empty()) return 0;
     constexpr unsigned draws = 16;
@@ -119,7 +123,7 @@ class LetThrough {
     std::int64_t before;
   };
 
-  // The reach of the fastest shaft, computed in floating point.
+  // Returns whether the fastest shaft can have made the step, computed in floating point.
   [[nodiscard]] bool agrees(Time between, std::uint64_t step, std::uint64_t before) const {
     const double most = std::ldexp(15.0 / 32, static_cast<int>(bits_));
     const double reached = 4 + counts_per_second_ * std::chrono::duration<double>(between).count();
@@ -178,7 +182,7 @@ class GuardedCampaign {
     return limit;
   }
 
-  // Includes turns, as the comparison does.
+  // The true movement includes turns, as the host's comparison of positions does.
   static unsigned bits_of(const Reading& reading) {
     return reading.singleturn_bits + (reading.multiturn_valid ? reading.multiturn_bits : 0);
   }

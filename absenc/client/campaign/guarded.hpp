@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Runs a campaign with confirmed positions and computes how many wrong ones frame checks and speed limit let through.
+// Runs a campaign with confirmed positions and computes how many wrong ones pass frame checks and speed limit.
 #pragma once
 
 #include "absenc/client/campaign.hpp"
@@ -7,7 +7,8 @@
 
 namespace absenc::client {
 
-/// Reads a turning shaft, one reading after the other. Counts readings, exchanges and failures in `result`.
+/// Reads a turning shaft until `exchanges` are done. Counts readings, exchanges and failures in `result`, and returns
+/// the shares of confirmed and wrong positions.
 [[nodiscard]] Guarded read_guarded(const Unit& unit, const Options& options, const Rates& rates,
                                    const CampaignChoices& choices, CampaignResult& result);
 

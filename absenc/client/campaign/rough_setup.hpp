@@ -18,11 +18,11 @@
 
 namespace absenc::client {
 
-/// The rate of each fault.
+/// The rate of each fault, 0 to 1, of the line and of the virtual encoder.
 struct Rates {
   sim::RoughRates line;
   sim::FaultRates device;
-  bool by_device = false;  // one of the faults of `device` has a rate
+  bool by_device = false;  // whether any fault of `device` has a rate above 0
 
   void set(std::string_view name, double rate) {
     if (double* const own = of_line(name)) {
@@ -47,7 +47,7 @@ struct Rates {
 
 template <class Item>
 struct RoughBench {
-  /// All arguments must outlive the object.
+  /// Connects host and virtual encoder. All arguments must outlive the object.
   RoughBench(const Unit& what, const Options& how, const Shaft& measured, const Rates& often, std::uint64_t seed)
       : unit(what),
         options(how),
@@ -75,13 +75,13 @@ struct RoughBench {
     return *one;
   }
 
-  /// Switches all faults off, or to the given rates.
+  /// Sets the rates of all faults to those of the constructor; with `on` false, to 0.
   void set_faults(bool on) {
     line.set_rates(on ? rates.line : sim::RoughRates{});
     faulty.set_rates(on ? rates.device : sim::FaultRates{});
   }
 
-  /// Counts the frames of a stream, because there are no requests.
+  /// Returns the number of exchanges since `before`: requests, or frames of a stream, which has no requests.
   [[nodiscard]] std::uint64_t exchanges_since(const sim::RoughCounts& before) const {
     const std::uint64_t asked = line.counts().requests - before.requests;
     return asked != 0 ? asked : std::max<std::uint64_t>(1, line.counts().replies - before.replies);
@@ -95,18 +95,18 @@ struct RoughBench {
     }
   }
 
-  // A damaged request may have changed the encoder for good. Checks that over a good line; if it has, replaces the
-  // encoder by a new one.
+  // Returns whether a damaged request has changed the encoder permanently. Reads over a line without faults to find
+  // out; if so, replaces the encoder by a new one.
   template <class IsRight>
   bool was_changed(const Command& read, const IsRight& is_right) {
     using namespace std::chrono_literals;
     if (rates.device[sim::FaultKind::request_corrupt] <= 0) return false;
     set_faults(false);
-    line.rest(line.now() + (unsolicited ? 11s : 20s));  // no late reply is outstanding any more
+    line.rest(line.now() + (unsolicited ? 11s : 20s));  // after this wait no late reply is outstanding
     line.drop();
     const Conversation<Item>* now = session.run(read);
     const bool changed = now->error() != Error::none || (now->reading() != nullptr && !is_right(*now->reading()));
-    if (changed) (void)make_device(line.now());  // at the same position
+    if (changed) (void)make_device(line.now());  // the new encoder has the shaft position of the old one
     set_faults(true);
     return changed;
   }

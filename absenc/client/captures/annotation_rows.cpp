@@ -11,7 +11,7 @@ namespace {
 
 using capture::Annotation;
 
-/// Indexes of the columns that stand before those of the unit's fields.
+/// Indexes of the row columns that precede the columns of the unit's fields.
 enum At : std::size_t { at_begin, at_end, at_kind, at_request, at_reply, at_turnaround, at_position, first_field };
 
 std::vector<Column> columns_of(const Unit& unit, const Options& options, bool has_time) {
@@ -70,7 +70,7 @@ void AnnotationRows::fill(const Annotation& annotation, const Options& options, 
                                                 : degrees(reading.singleturn, reading.singleturn_bits);
 }
 
-// The column of this field: the unit's own, or one with the same name.
+// Finds the column of a field: the column made for it, or one with the same name.
 std::size_t AnnotationRows::place_of(const FieldInfo& info) const {
   const std::span<const FieldInfo> fields = unit_.fields;
   std::size_t place = 0;
@@ -94,7 +94,7 @@ void AnnotationRows::fill_fields(const capture::Contents& contents, std::vector<
   if (contents.reading != nullptr) fill_alarms(*contents.reading, values);
 }
 
-// Includes alarms that this reply does not carry if an earlier reply has reported them.
+// Shows the alarms known for the encoder: alarms that this reply does not carry come from an earlier reply.
 void AnnotationRows::fill_alarms(const Reading& reading, std::vector<Value>& values) const {
   for (const Flags& flags : alarms_of(unit_, reading)) {
     const std::size_t place = place_of(*flags.field);

@@ -15,7 +15,7 @@ namespace absenc::client {
 /// Converts annotations to rows with the columns that decode.hpp describes.
 class AnnotationRows {
  public:
-  /// `unit` must outlive the object.
+  /// Makes the columns of the unit. `unit` must outlive the object.
   AnnotationRows(const Unit& unit, const Options& options, const TickClock& clock);
 
   [[nodiscard]] std::span<const Column> columns() const { return columns_; }

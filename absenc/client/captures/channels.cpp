@@ -15,7 +15,7 @@ namespace absenc::client {
 
 namespace {
 
-// For each wire: its name, then other names under which captures record it.
+// Names of each wire: first the wire's own name, then other names under which captures record the wire.
 struct WireName {
   std::string_view wire;
   std::string_view name;
@@ -57,7 +57,8 @@ std::vector<std::string_view> split(std::span<const std::string> wanted) {
 bool is_clocked(LinkKind link) { return link == LinkKind::clocked || link == LinkKind::spi; }
 
 bool is_needed(LinkKind link, std::string_view wire) {
-  if (link == LinkKind::full_duplex) return false;  // a capture of the host's or the device's wire alone suffices
+  // one channel suffices: a capture may contain the host's or the device's wire alone
+  if (link == LinkKind::full_duplex) return false;
   return wire != "cs" && wire != "mosi";
 }
 
@@ -128,7 +129,7 @@ WireChannels find_wires(LinkKind link, std::span<const std::string> channels, st
         if (!found.wires[wire] && is_called(wires[wire], channels[i])) found.wires[wire] = i;
       }
     }
-    // If there are as many channels as wires, their names do not matter.
+    // A capture with as many channels as wires needs no channel names: channels are assigned in order.
     const bool any =
         std::any_of(found.wires.begin(), found.wires.end(), [](const auto& one) { return one.has_value(); });
     if (!any && !is_clocked(link) && channels.size() <= wires.size()) {

@@ -13,21 +13,21 @@
 
 namespace absenc::client {
 
-/// Returns the wires of a link by their names in --channel.
+/// Returns the wires of a link, by the names that --channel accepts.
 [[nodiscard]] std::span<const std::string_view> wires_of(LinkKind link);
 
 /// The channel of each wire of the link, in the order of `wires_of`; nothing for a wire that was not recorded.
 struct WireChannels {
   std::vector<std::optional<unsigned>> wires;
-  bool found = false;  // full duplex: false if neither --channel nor the names tell the host's wire from the device's
+  bool found = false;  // full duplex: false if neither --channel nor channel names show which wire is the host's
 };
 
-/// Assigns channels by --channel ("D0", "clock=D0"), otherwise by their names and their number. Throws UsageError,
-/// which lists the channels.
+/// Assigns channels by --channel ("D0", "clock=D0"), otherwise by the channels' names and their number. Throws
+/// UsageError, which lists the channels of the capture.
 [[nodiscard]] WireChannels find_wires(LinkKind link, std::span<const std::string> channels,
                                       std::span<const std::string> wanted);
 
-/// Returns a channel by its name, in upper or lower case, or by its number. Throws UsageError.
+/// Returns the channel that `text` gives by name, in upper or lower case, or by number. Throws UsageError.
 [[nodiscard]] unsigned find_channel(std::span<const std::string> channels, std::string_view name);
 
 }  // namespace absenc::client

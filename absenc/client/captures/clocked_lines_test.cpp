@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Decodes clocked lines as real masters clock them. The test draws them edge by edge from the documents, without the
-// virtual encoder, and decodes them as `absenc decode` does.
+// Decodes clocked lines with the timing of real masters. The test draws the lines edge by edge from the documents,
+// without the virtual encoder, and decodes them as `absenc decode` does.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -26,10 +26,10 @@ class Wires {
  public:
   void wait(std::int64_t ns) { now_ += ns; }
   void clock(bool level) { changes_[{now_, 'c'}] = level; }
-  // Data changes shortly after the clock edge that outputs it.
+  // Draws a change of the data line, `behind` nanoseconds after the clock edge that causes it.
   void data(bool level, std::int64_t behind = 5) { changes_[{now_ + behind, 'd'}] = level; }
 
-  /// Draws `count` clocks; the line has `bit(i)` before the rising edge of clock i.
+  /// Draws `count` clock periods; the data line has the value `bit(i)` before the rising edge of clock i.
   template <class Bit>
   void burst(std::int64_t period, std::size_t count, Bit&& bit) {
     for (std::size_t i = 0; i < count; ++i) {
@@ -56,7 +56,7 @@ class Wires {
 
 // ---- BiSS
 
-// From TI's table: the host reads register 44 of slave 0, whose reply is 0A.
+// Example of TI's table: the host reads register 44 of slave 0; the slave replies 0A.
 constexpr std::string_view read_44 = "0000000000000011000100010011011010000000000000000";
 constexpr std::string_view read_44_answer = "0000000000000001000000000000000101000010100010000";
 
@@ -64,12 +64,13 @@ struct Master {
   std::int64_t period;
   std::int64_t timeout;
   std::int64_t falls = 0;  // time from the last rising edge to the falling edge that sends CDM 1; 0: half a period
-  bool releases = false;   // MA rises when the timeout has elapsed; otherwise it is held until the next frame
-  int clocks = 0;          // clocks in addition to the frame's bits and the idle bit
-  std::int64_t pause = 0;  // pause after the timeout, and after MA was released
+  // whether MA rises when the timeout has elapsed; otherwise MA is held low until the next frame
+  bool releases = false;
+  int clocks = 0;          // number of clocks beyond the bits of the frame and the idle bit
+  std::int64_t pause = 0;  // pause between the release of MA after the timeout and the next frame
 };
 
-constexpr int biss_bits = 32;  // bits of the frame, including the idle bit before it
+constexpr int biss_bits = 32;  // number of bits of a frame, including the idle bit before it
 
 // Computes the frame bit by bit: idle, one ACK bit, start, CDS, 19 bits, nError, nWarning and the CRC.
 std::string biss_frame(std::uint32_t position, bool cds) {
@@ -159,7 +160,7 @@ TEST_F(ClockedLines, BissOfAnyClockTimeoutAndMaster) {
     const std::int64_t period = 1'000'000 / khz;
     for (const std::int64_t timeout :
          {3 * period / 2, std::int64_t{12'500}, std::int64_t{20'000}, std::int64_t{40'000}}) {
-      if (timeout < 6 * period / 10) continue;  // the timeout would elapse between two edges of the clock
+      if (timeout < 6 * period / 10) continue;  // skips this timeout, which would elapse between two edges of the clock
       for (const bool releases : {false, true}) {
         for (const int more : {-1, 0, biss_bits - 1}) {
           for (const std::int64_t pause : {0, 300'000}) {
@@ -182,14 +183,14 @@ TEST_F(ClockedLines, BissOfAnyClockTimeoutAndMaster) {
   EXPECT_GT(cells, 300u);
 }
 
-// The encoder samples MA when its timeout elapses, so MA may fall at any time before.
+// MA may fall at any time before the timeout elapses, because the encoder samples MA only then.
 TEST_F(ClockedLines, AControlBitMayComeLateInTheTimeout) {
   for (const std::int64_t khz : {100, 250, 1000, 10'000}) {
     const std::int64_t period = 1'000'000 / khz;
     for (const std::int64_t timeout : {3 * period / 2, std::int64_t{20'000}, std::int64_t{40'000}}) {
       for (const std::int64_t falls : {5 * timeout / 10, 6 * timeout / 10}) {
         for (const bool releases : {false, true}) {
-          if (falls < 6 * period / 10) continue;  // the falling edge would be one more clock
+          if (falls < 6 * period / 10) continue;  // skips this time: the falling edge would be one more clock
           SCOPED_TRACE(std::to_string(khz) + " kHz, timeout " + std::to_string(timeout) + " ns, CDM behind " +
                        std::to_string(falls) + " ns, " + (releases ? "released" : "held"));
           Wires wires;
@@ -205,8 +206,8 @@ TEST_F(ClockedLines, AControlBitMayComeLateInTheTimeout) {
   }
 }
 
-// A host that is interrupted: its clock pauses inside a word for nearly the timeout, and between words hardly longer.
-// Only SLO shows where the timeout has elapsed.
+// An interrupted host: its clock pauses inside a word for nearly the timeout, and between words hardly longer. Only the
+// data line SLO shows where the timeout has elapsed.
 TEST_F(ClockedLines, ATimeoutThatIsOverEndsAWordWhoseClockRestsAsLong) {
   constexpr std::int64_t timeout = 12'500;
   const std::string frame = biss_frame(17, false);
@@ -247,7 +248,7 @@ TEST_F(ClockedLines, AControlFrameThatTheFileCutsIsCut) {
 
 constexpr unsigned ssi_bits = 13;
 
-// Draws `copies` words with a zero between them; the monoflop time starts at the last clock edge.
+// Draws the same word `copies` times, with a zero between the copies; the monoflop time starts at the last clock edge.
 void draw_ssi(Wires& wires, std::int64_t period, std::int64_t monoflop, std::int64_t pause, std::size_t clocks,
               unsigned words) {
   for (unsigned word = 0; word < words; ++word) {
@@ -267,7 +268,8 @@ TEST_F(ClockedLines, SsiOfAnyClockMonoflopAndNumberOfClocks) {
   for (const std::int64_t khz : {30, 50, 80, 100, 250, 1000, 2000, 10'000}) {
     const std::int64_t period = 1'000'000 / khz;
     for (const std::int64_t monoflop : {9'000, 12'500, 20'000, 25'000, 41'000, 500'000}) {
-      if (monoflop < 6 * period / 10) continue;  // the timeout would elapse between two edges of the clock
+      // skips this monoflop time, which would elapse between two edges of the clock
+      if (monoflop < 6 * period / 10) continue;
       for (const std::size_t clocks : {ssi_bits, ssi_bits + 1, 2 * ssi_bits + 1, 2 * ssi_bits + 2}) {
         for (const std::int64_t pause : {0, 30'000}) {
           ++cells;
@@ -288,7 +290,7 @@ TEST_F(ClockedLines, SsiOfAnyClockMonoflopAndNumberOfClocks) {
   EXPECT_GT(cells, 300u);
 }
 
-// The monoflop time elapses only after the second copy, so the first pause ends no word.
+// The monoflop time elapses only after the second copy, so the pause after the first copy does not end the word.
 TEST_F(ClockedLines, AMonoflopThatIsOverEndsAWord) {
   Wires wires;
   for (unsigned word = 0; word < 12; ++word) {
@@ -305,7 +307,7 @@ TEST_F(ClockedLines, AMonoflopThatIsOverEndsAWord) {
   EXPECT_EQ(rows.words, 12u);
 }
 
-// Two words with a shorter pause between them are either two words or one word read twice.
+// With a shorter pause between them, two drawn words may be two readings, or one reading that was repeated.
 TEST_F(ClockedLines, TwoWaysToCutAreSaid) {
   Wires wires;
   for (unsigned word = 0; word < 12; ++word) {

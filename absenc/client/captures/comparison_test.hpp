@@ -37,16 +37,16 @@ inline std::string to_text(const Said& said) {
   return text;
 }
 
-/// Compares one result with the rows of the same time.
+/// Compares the result of one live command with the rows that the capture has for the same time.
 class Comparison {
  public:
   Comparison(const Unit& unit, const LineSettings& line, bool faulty, const std::vector<Said>& rows)
       : rows_(rows), faulty_(faulty) {
-    // The row of a CAN frame ends where the frame in the waveform ends; the live receiver waits until the bus is idle.
+    // The row of a CAN frame ends with the frame in the waveform, but the live receiver waits until the bus is idle.
     tolerance_ = unit.link == LinkKind::can ? line.bits(160) : 2 * line.character();
   }
 
-  /// Returns the contradiction in words; "" if there is none.
+  /// Returns a sentence about the first difference between result and rows; "" if they match.
   std::string operator()(const Said& live) {
     within_.clear();
     for (const Said& row : rows_) {
@@ -70,13 +70,13 @@ class Comparison {
     if (told) return {};
     const bool any =
         std::any_of(within_.begin(), within_.end(), [](const Said* row) { return row->error != Error::none; });
-    // A live host may reject a reply to a repeated request, because it may belong to the request before.
+    // A live host may reject a reply to a repeated request, because the reply may belong to the request before.
     return (any || faulty_) && live.exchanges != 1 ? "" : "no row has the error";
   }
 
   std::string compare_good(const Said& live) const {
     for (const Said* row : within_) {
-      // A procedure may send requests to a missing encoder, or wake one that does not reply at first.
+      // A search or wake-up command may send requests to a missing encoder, or to one that does not reply at first.
       const bool silent = row->error == Error::timeout || row->error == Error::line_stuck;
       const bool is_silence = silent && live.exchanges > 1;
       if (row->error != Error::none && !is_silence && !faulty_ && !live.is_special) return "a row has an error";
@@ -106,7 +106,7 @@ class Comparison {
     return row.end > reading.received - tolerance_ && row.end < reading.received + tolerance_;
   }
 
-  // The value is in the last row, or its parts are in several rows.
+  // Looks for the value in the last row, or for its parts in several rows.
   std::string compare_position(const Said& live) const {
     const Said* row = nullptr;
     for (const Said* one : within_) {
@@ -127,13 +127,13 @@ class Comparison {
       }
     }
     const Reading& known = *live.reading;
-    // A special command may omit turns that the reply carries: a safe position has none.
+    // A unit-specific command may omit turns that the reply carries: a safe position has none.
     if (live.is_special && known.multiturn_bits == 0) {
       all.multiturn = known.multiturn;
       all.multiturn_bits = known.multiturn_bits;
       all.multiturn_valid = known.multiturn_valid;
     }
-    // A capture knows alarms from earlier conversations; a host that reads once does not.
+    // A capture uses alarms from earlier conversations; a host that reads once has none.
     all.alarms &= known.alarms_reported;
     all.alarms_reported &= known.alarms_reported;
     all.status &= known.status_reported;

@@ -18,7 +18,7 @@
 namespace absenc::client {
 
 struct Decoded::Parts {
-  /// A batch of rows, which one thread passes to the other.
+  /// A batch of rows, which the decoding thread passes to the thread of the caller.
   using Batch = std::vector<Row>;
   struct Stopped {};
 
@@ -38,7 +38,7 @@ struct Decoded::Parts {
     changed.notify_all();
   }
 
-  // ---- In the thread that decodes
+  // ---- Functions of the decoding thread
 
   struct Sink final : capture::AnnotationSink {
     Sink(Parts& decoded, const Options& of_capture) : parts(decoded), options(of_capture) {}
@@ -90,9 +90,9 @@ struct Decoded::Parts {
     changed.notify_all();
   }
 
-  // ---- In the thread that takes the rows
+  // ---- Functions of the caller's thread
 
-  /// Returns the next row, null at the end. Throws an exception of the decoding thread after the rows before it.
+  /// Returns the next row; null at the end. Throws an exception of the decoding thread after all rows that precede it.
   const Row* take() {
     if (++at < taken.size()) return &taken[at];
     std::unique_lock lock(mutex);
@@ -118,24 +118,24 @@ struct Decoded::Parts {
   CaptureRun run;
   TickClock clock;
   AnnotationRows rows;
-  std::vector<std::string> notes;  // set when decoding has ended
+  std::vector<std::string> notes;  // sentences about the file; complete when decoding has ended
 
-  // Used by the decoding thread:
+  // Members used by the decoding thread only:
   Batch batch;
   std::size_t filled = 0;
-  // Used by the thread that takes rows:
+  // Members used by the caller's thread only:
   Batch taken;
   std::size_t at = 0;
 
-  std::mutex mutex;  // guards the members down to the thread
+  std::mutex mutex;  // guards all following members except the thread
   std::condition_variable changed;
   std::deque<Batch> ready;
-  std::vector<Batch> used;  // empty batches to be filled again
+  std::vector<Batch> used;  // batches that the caller has read, to be filled again
   std::exception_ptr thrown;
   bool ended = false;
   bool stopped = false;
 
-  std::jthread thread;  // last member: the thread uses all others
+  std::jthread thread;  // last member, because the thread uses all other members
 };
 
 Decoded::Decoded(const std::string& path, std::string_view protocol, const DecodeChoices& choices)

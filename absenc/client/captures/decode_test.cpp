@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Decodes captures to rows, and finds the sender of each frame.
+// Checks that captures are decoded to rows, and that the sender of each frame is found.
 #include <gmock/gmock-more-matchers.h>
 #include <gtest/gtest.h>
 
@@ -18,7 +18,7 @@ using testing::HasSubstr;
 
 namespace {
 
-/// A file with a name unique to the test.
+/// A temporary file with a name that no other test uses.
 class TestFile {
  public:
   explicit TestFile(const std::string& text) { std::ofstream(path_) << text; }
@@ -55,7 +55,7 @@ TEST(ClientDecode, RowsHaveTypedColumns) {
 TEST(ClientIdentify, SaysHowToOpenWhatItFound) {
   const Emulation emulation = emulate("tformat?motion=rpm=60");
   Identified all;
-  // Every request without a reply takes several times the latency, so the latency is long only on a slow machine.
+  // Each request without a reply delays the end by several latencies, so the latency is long only on a slow machine.
   for (const char* const latency : {"20", "200", "1000"}) {
     all = identify(emulation.path() + "?latency=" + latency, {.limit = std::chrono::minutes(5)});
     if (!all.found.empty() && all.found[0].sure) break;

@@ -30,14 +30,14 @@ struct FrameCounts final : capture::AnnotationSink {
   std::uint64_t damaged = 0;
 };
 
-// Returns whether the document's rate decodes requests of a host without replies while the other rate decodes almost
-// nothing. The few level changes of such requests fit many rates.
+// Returns whether the unit's own baud rate decodes requests of a host without replies while the other rate decodes
+// almost nothing. The few level changes of such requests fit many rates.
 bool reads_silence(const FrameCounts& at_own, const FrameCounts& at_other) {
   return at_own.damaged == 0 && at_own.unanswered > at_other.unanswered &&
          at_other.good <= std::min(at_other.damaged, at_own.unanswered);
 }
 
-/// Collects good replies with their requests and ends when there are enough.
+/// Collects good replies with their requests, and stops the decoding when it has enough.
 struct GoodReplies final : capture::AnnotationSink {
   struct Enough {};
 
@@ -57,7 +57,7 @@ struct GoodReplies final : capture::AnnotationSink {
   std::vector<std::pair<std::vector<std::uint8_t>, std::vector<std::uint8_t>>> frames;
 };
 
-/// The values of each option that the frames allow.
+/// For each option, the values that the collected frames allow.
 struct Possible final : EvidenceSink {
   void put(const OptionEvidence& evidence) override { values.insert({evidence.option, evidence.value}); }
   [[nodiscard]] bool is_open(std::size_t option, std::int64_t value) const {
@@ -69,9 +69,9 @@ struct Possible final : EvidenceSink {
 
 }  // namespace
 
-// Selects the rate with more good frames at the beginning: the unit's own, or the one that the level changes suggest.
-// Few changes fit many rates, but only one rate gives right checksums. If characters are damaged, selects the parity
-// likewise: a parity bit taken for a stop bit is wrong half of the time.
+// Selects the baud rate with more good frames at the beginning of the capture: the unit's own rate, or the rate that
+// the level changes suggest. Few level changes fit many rates, but only one rate gives right checksums. If characters
+// are damaged, selects the parity with more good frames: a parity bit taken for a stop bit is wrong half of the time.
 CaptureRun::Speed CaptureRun::likely_speed(const Lines& lines) const {
   constexpr std::size_t enough_characters = 20'000;
   Speed best{choices_.how.baud, choices_.how.parity.value_or(line_.parity)};
@@ -104,8 +104,8 @@ CaptureRun::Speed CaptureRun::likely_speed(const Lines& lines) const {
 }
 
 // A clock has pauses of several lengths: between words, and between the bytes of a host that sends eight clocks at a
-// time. Only one division makes frames of all words. Pause lengths are tried first, because the data line may also
-// change in a long pause inside a word.
+// time. Only one pause length divides the clocks into the right words. Lengths of pauses are tried first, because the
+// data line may also change in a long pause inside a word.
 std::size_t CaptureRun::likely_pause(std::span<const capture::PauseReading> readings,
                                      std::vector<std::string>& notes) const {
   struct Words final : capture::AnnotationSink {
@@ -123,7 +123,7 @@ std::size_t CaptureRun::likely_pause(std::span<const capture::PauseReading> read
     const Options& options;
     std::uint64_t good = 0;
     std::uint64_t bad = 0;
-    bool is_proved = false;  // a checksum confirms the frames
+    bool is_proved = false;  // whether a checksum confirms the frames
 
     Words(const Unit& unit_of, const Options& with) : unit(unit_of), options(with) {}
   };
@@ -138,7 +138,8 @@ std::size_t CaptureRun::likely_pause(std::span<const capture::PauseReading> read
     annotator.finish();
     is_proved = is_proved || words.is_proved;
     if (words.bad == 0 && words.good > 1) faultless.push_back(i);
-    // Fewer bad frames are no reason to prefer a division: a longer pause merges a silent word into the next.
+    // The number of bad frames does not decide between pause lengths: a longer pause merges a silent word into the
+    // next.
     if (i > 0 && words.good <= most) continue;
     best = i;
     most = words.good;
@@ -146,8 +147,8 @@ std::size_t CaptureRun::likely_pause(std::span<const capture::PauseReading> read
   const auto differs = [&](std::size_t i) { return readings[i].bursts.size() != readings[best].bursts.size(); };
   const auto other = std::find_if(faultless.begin(), faultless.end(), differs);
   if (other == faultless.end() || is_proved) return best;
-  // Takes the shortest pause in which the data line shows the end of the timeout: in a shorter pause the old word would
-  // continue.
+  // Takes the shortest pause in which the data line shows the end of the timeout: after a shorter pause the encoder
+  // would continue the old word.
   const auto shown =
       std::find_if(faultless.begin(), faultless.end(), [&](std::size_t i) { return readings[i].timed_out; });
   if (shown != faultless.end()) return *shown;

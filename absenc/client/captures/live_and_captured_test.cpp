@@ -71,7 +71,7 @@ std::vector<Said> decode(const Stage& stage, const std::string& path) {
   return std::move(captured.rows);
 }
 
-/// A virtual encoder, and whether it differs from another one of the list only in a detail.
+/// The address of a virtual encoder, and whether it differs from another encoder of the list only in a detail.
 struct Encoder {
   std::string address;
   bool is_detail = false;
@@ -100,7 +100,7 @@ std::vector<Encoder> encoders_of(const Unit& unit) {
     if (!is_first) continue;
     for (const std::string_view fault : sim::fault_names) {
       if (fault == "echo" && unit.link != LinkKind::half_duplex)
-        continue;  // echo occurs only with an adapter on one pair of wires
+        continue;  // an adapter can echo only on a line with a single pair of wires
       const std::string rate = fault == "request_corrupt" ? "0.1" : fault == "echo" ? "1" : "0.4";
       for (const char seed : {'1', '2'}) {
         all.push_back({moved + "&fault=" + std::string(fault) + "=" + rate + "&seed=" + seed, seed != '1'});
@@ -117,12 +117,13 @@ std::vector<Encoder> encoders_of(const Unit& unit) {
   return all;
 }
 
-constexpr std::uintmax_t long_file = 300'000;  // size of a capture in bytes
+constexpr std::uintmax_t long_file = 300'000;  // size in bytes from which a capture is long
 
-/// The commands of one capture: all that change nothing, or one that does.
+/// The commands of one capture: all commands that change nothing, or one that changes the encoder.
 struct Together {
   std::vector<const Command*> commands;
-  bool is_long = false;  // not repeated for encoders that differ only in a detail
+  // whether the capture is long, so that it is not repeated for encoders that differ only in a detail
+  bool is_long = false;
 };
 
 std::vector<Together> commands_of(const Unit& unit) {
@@ -145,7 +146,7 @@ class LiveAndCaptured : public ::testing::TestWithParam<const Unit*> {
     try {
       stage.emplace(address);
     } catch (const UsageError&) {
-      return;  // the options exclude each other
+      return;  // no virtual encoder has these options together
     }
     stage->run(together.commands);
     if (stage->live.empty()) return;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Plots a position over the time of a capture of any length, in the columns of a terminal.
+// Plots positions over time in the columns of a terminal, for a capture of any length.
 #pragma once
 
 #include <algorithm>
@@ -17,7 +17,8 @@ class PositionTrace {
  public:
   static constexpr std::size_t columns = 64;
 
-  /// Adds a position. `tick` must not be before the first. An invalid position leaves a gap.
+  /// Adds a position. `tick` must not be before the tick of the first position. An invalid position leaves a gap in the
+  /// plot.
   void add(std::uint64_t tick, const Reading& reading) {
     if (!reading.singleturn_valid() || !reading.ready) return;
     if (count_ == 0) {
@@ -42,7 +43,7 @@ class PositionTrace {
   [[nodiscard]] std::uint64_t count() const { return count_; }
   /// Returns a small plot with its scale; "" if no position was valid.
   [[nodiscard]] std::string plot() const;
-  /// The ticks of the first and the last valid position.
+  /// Return the tick of the first and of the last valid position.
   [[nodiscard]] std::uint64_t first() const { return first_; }
   [[nodiscard]] std::uint64_t last() const { return last_; }
 
@@ -54,7 +55,7 @@ class PositionTrace {
   };
 
   void halve();
-  // Offset that makes negative turns smaller than positive ones.
+  // Offset that makes negative turns sort before positive ones.
   [[nodiscard]] std::uint64_t offset() const { return turns_ && signed_ ? std::uint64_t{1} << 63 : 0; }
   [[nodiscard]] double value(std::uint64_t counts) const;
   [[nodiscard]] std::string_view unit() const;

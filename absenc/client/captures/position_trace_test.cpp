@@ -45,7 +45,7 @@ TEST(PositionTrace, TurnsBelowZeroAreBelowThoseAbove) {
   EXPECT_NE(line_of(plot, 9).find("-4.000 turns |*"), std::string::npos) << plot;
 }
 
-// The plot covers the whole capture, however long.
+// The plot must cover the whole capture, however long the capture is.
 TEST(PositionTrace, ARampFillsTheDiagonal) {
   PositionTrace trace;
   for (std::uint64_t i = 0; i < 4096; ++i) trace.add(1000 + i * 1'000'000'000, position(i));
@@ -63,7 +63,7 @@ TEST(PositionTrace, ARampFillsTheDiagonal) {
 TEST(PositionTrace, TurnsGoOn) {
   PositionTrace trace;
   for (std::uint64_t i = 0; i < 200; ++i) trace.add(i, position(i % 2 * 2048, i / 2, true));
-  trace.add(200, position(4095));  // a position without turns leaves a gap
+  trace.add(200, position(4095));  // a position without turns must leave a gap
   EXPECT_EQ(trace.count(), 200u);
   EXPECT_NE(line_of(trace.plot(), 0).find("99.50 turns"), std::string::npos) << trace.plot();
 }

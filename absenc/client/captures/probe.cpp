@@ -19,7 +19,7 @@ struct EvidenceList final : EvidenceSink {
   std::vector<OptionEvidence> all;
 };
 
-/// Frames from the command line; requests and replies correspond by their order.
+/// Frames from the command line: the first request belongs to the first reply, and so on.
 class Captures {
  public:
   Captures(const Unit& unit, std::span<const std::string> requests, std::span<const std::string> replies) {
@@ -50,7 +50,8 @@ class Captures {
   std::vector<WireFrame> frames_;
 };
 
-// Returns the settings to continue with: values that the frames determine, and given ones that are not the default.
+// Returns the options to be given to later commands, as settings: values that the frames determine, and the user's
+// values that differ from the defaults.
 std::vector<std::string> settled(const Unit& unit, const Options& options, std::span<const OptionEvidence> evidence) {
   std::vector<std::string> settings;
   for (std::size_t i = 0; i < unit.options.size(); ++i) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Finds the options that the document of a protocol leaves open from captured frames.
+// From captured frames, finds the values of options that the document of a protocol leaves open.
 #pragma once
 
 #include <span>
@@ -14,18 +14,19 @@ namespace absenc::client {
 
 struct Probed {
   const Unit* unit = nullptr;
-  bool explained = false;                  // at least one set of options explains all frames
+  bool explained = false;                  // whether at least one set of options explains all frames
   std::vector<OptionEvidence> evidence{};  // evidence for each value of each open option
-  std::vector<std::string> settled{};      // "name=value": options that must be given; none: the defaults suffice
+  std::vector<std::string> settled{};  // options that later commands need, as "name=value"; empty: the defaults suffice
 };
 
-/// Judges captured frames. `replies` are as for `absenc decode`, "" for a missing reply; `requests` are as many in the
-/// same order, "" if unknown, or none at all. Throws UsageError, also for a protocol without open options.
+/// Judges captured frames. `replies` have the form of `absenc decode`, "" for a missing reply. `requests` are as many,
+/// in the same order, "" for an unknown request; or the list is empty. Throws UsageError, also for a protocol without
+/// open options.
 [[nodiscard]] Probed probe(std::string_view protocol, std::string_view model, std::span<const std::string> settings,
                            std::span<const std::string> replies, std::span<const std::string> requests);
 
-/// Returns {"protocol","ok","evidence":[{"option","value","possible","why","frame"}],"settled"}; "frame" is the number
-/// of the frame, from 1, that excludes the value.
+/// Converts the result to {"protocol","ok","evidence":[{"option","value","possible","why","frame"}],"settled"}; "frame"
+/// is the number, from 1, of the frame that excludes the value.
 [[nodiscard]] Json to_json(const Probed& probed);
 
 }  // namespace absenc::client

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Live received characters as a capture.
+// A capture made of characters that this computer received live.
 #pragma once
 
 #include <cstdint>
@@ -13,7 +13,7 @@
 
 namespace absenc::client {
 
-/// The ticks are finer than arrival times can be measured.
+/// Ticks per second: finer than arrival times can be measured.
 inline constexpr std::uint64_t arrival_ticks_per_second = 1'000'000;
 
 [[nodiscard]] constexpr capture::Tick arrival_tick(Time time) {
@@ -22,7 +22,7 @@ inline constexpr std::uint64_t arrival_ticks_per_second = 1'000'000;
 
 struct ReceivedCharacters {
   std::vector<capture::Character> characters{};  // characters with times in arrival ticks
-  capture::Tick gap = 1;                         // the pause that ends a frame, as Annotator::Settings::gap
+  capture::Tick gap = 1;  // length of the pause that ends a frame, as in Annotator::Settings::gap
 };
 
 class ReceivedReader final : public capture::ParsedReader {

@@ -32,7 +32,7 @@ using capture::Content;
 using capture::DecodedPart;
 using capture::Tick;
 
-// Stores an exception of the sink, because it must not pass through a decoder with threads.
+// Stores an exception of the sink until decoding has ended, because it must not pass through a decoder with threads.
 class Guard {
  public:
   template <class Work>
@@ -71,7 +71,7 @@ void require_link(const Unit& unit, Content content) {
   if (content == Content::bytes && !uart) refuse(unit, "bytes", "record the levels of its wires, or CAN frames");
 }
 
-// If the file is damaged, that is the problem, whatever is missing before the damage.
+// A damaged file is reported as the problem, even if something else is missing before the damage.
 std::string why_nothing(const CaptureOutcome& outcome, const TickClock& clock) {
   for (const capture::Damage& damage : outcome.damages) {
     if (!damage.note) return to_text(damage, clock);
@@ -79,8 +79,8 @@ std::string why_nothing(const CaptureOutcome& outcome, const TickClock& clock) {
   return outcome.problem;
 }
 
-// The levels of a bus, for capture::BlockRun. A frame depends on those before it, so only reading and expanding run
-// ahead in threads.
+// Decodes the levels of a bus for capture::BlockRun. A frame depends on the frames before it, so only reading and
+// expanding run ahead in threads.
 struct BusDecoding {
   struct Guess {};
 
@@ -124,8 +124,8 @@ std::unique_ptr<capture::Reader> open_capture(const CaptureChoices& choices) {
   try {
     if (choices.path != "-") return capture::open_capture(choices.path, how);
     auto source = std::make_unique<StdinSource>();
-    // Refuses binary data: some of these formats are read from the end of their file, which standard input does not
-    // know.
+    // Refuses binary data from standard input: some binary formats are read from the end of the file, which is not
+    // known there.
     std::array<std::uint8_t, 64> head{};
     const std::size_t size = source->read(0, head);
     if (how.channels != 0 || std::count(head.begin(), head.begin() + static_cast<std::ptrdiff_t>(size), 0) != 0) {
@@ -261,13 +261,14 @@ CaptureOutcome CaptureRun::run_bytes(capture::AnnotationSink& sink, const std::f
   if (settings.channel_count == 2) settings.channels = {Carries::requests, Carries::replies};
   settings.gap = reader_->layout().arrival_gap;
   settings.by_arrival = settings.gap != 0;
-  settings.begins_silent = !settings.by_arrival;  // the program that logged the bytes had received complete frames
+  // a log by arrival times begins with a complete frame, because a program received it
+  settings.begins_silent = !settings.by_arrival;
   CaptureOutcome outcome;
   std::unique_ptr<capture::Annotator> annotator;
   read_all(*reader_, [&](const capture::Block& block) {
     for (const capture::Character& character : block.bytes) {
       if (annotator == nullptr) {
-        // For a decoder of the line: from the first data bit to the last.
+        // In captures of a line decoder a character lasts from its first data bit to its last.
         const double data_bits = static_cast<double>(character.end - character.begin);
         if (data_bits > 1) settings.ticks = capture::line_ticks(unit_, data_bits / 8, ticks_per_second());
         if (data_bits > 1) settings.ticks.pause += static_cast<Tick>(data_bits / 4);
@@ -283,7 +284,7 @@ CaptureOutcome CaptureRun::run_bytes(capture::AnnotationSink& sink, const std::f
   return outcome;
 }
 
-// Decodes the levels of a bus.
+// Decodes the levels of a CAN bus from its waveform.
 CaptureOutcome CaptureRun::run_bus(capture::AnnotationSink& sink, const std::function<void(Tick)>& progress) {
   const WireChannels wires = find_wires(unit_.link, reader_->layout().channels, choices_.how.channels);
   const double rate = choices_.how.baud > 0 ? choices_.how.baud : static_cast<double>(line_.rate);

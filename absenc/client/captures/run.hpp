@@ -23,43 +23,44 @@ namespace absenc::client {
 
 /// A capture and its description by the user.
 struct CaptureChoices {
-  std::string path;  // "-": standard input
-  DecodeChoices
-      how{};  // description of the capture; its model and options are ignored, because they are given as Options
-  std::shared_ptr<const ReceivedCharacters> received{};  // received characters, instead of a file
+  std::string path;  // path of the file; "-": standard input
+  // the user's description of the capture; its model and options are ignored, because they are passed as Options
+  DecodeChoices how{};
+  // characters to decode instead of a file; null: decode the file `path`
+  std::shared_ptr<const ReceivedCharacters> received{};
 };
 
 struct CaptureOutcome {
   std::string problem;               // why nothing could be decoded; "": no problem
-  capture::Tick end = 0;             // tick of the end of the decoded part
+  capture::Tick end = 0;             // tick at which the decoded part of the capture ends
   std::vector<double> baud;          // measured baud rate of each asynchronous line
   std::vector<std::string> carries;  // "D0 carries requests", for each channel whose sender was found
-  std::vector<std::string> notes;    // further results, one sentence each
+  std::vector<std::string> notes;    // sentences about other results, such as detected properties
   std::vector<capture::Damage> damages;
 };
 
-/// Throws UsageError, Failure.
+/// Opens the capture and returns its reader. Throws UsageError, Failure.
 [[nodiscard]] std::unique_ptr<capture::Reader> open_capture(const CaptureChoices& choices);
 
 class CaptureRun {
  public:
-  /// Opens the capture. Throws UsageError, Failure.
+  /// Opens the capture and assigns its channels. Throws UsageError, Failure.
   CaptureRun(const Unit& unit, const Options& options, const CaptureChoices& choices);
   ~CaptureRun();
 
   [[nodiscard]] const Options& options() const { return options_; }
-  /// Returns the ticks per second; 0: the capture has no times.
+  /// Returns the number of ticks per second of the capture; 0: the capture has no times.
   [[nodiscard]] std::uint64_t ticks_per_second() const;
-  /// Returns `options` completed by values that a live host would read from the encoder and that the frames of the
-  /// capture report. Runs before decoding: where only a checksum determines a length, the first that fits may be
-  /// chance. Does nothing for standard input, which can be read only once.
+  /// Returns the options, completed by values that a live host would read from the encoder and that the frames of the
+  /// capture report. Runs before decoding: where only a checksum determines a length, the first length that fits may be
+  /// chance. For standard input, which can be read only once, returns the options unchanged.
   const Options& settle_options();
-  /// Decodes the whole capture into `all`; calls `progress` now and then with the tick reached. Throws UsageError,
-  /// Failure and the exceptions of `all`.
+  /// Decodes the whole capture into `all` and returns the outcome. Calls `progress` from time to time with the tick
+  /// that is reached. Throws UsageError, Failure and the exceptions of `all`.
   CaptureOutcome run(capture::AnnotationSink& all, const std::function<void(capture::Tick)>& progress);
 
  private:
-  // The asynchronous lines of the capture and the sender on each.
+  // The asynchronous lines of the capture, and the sender on each line.
   struct Lines {
     std::vector<unsigned> channels;
     capture::Annotator::Settings settings;
@@ -67,11 +68,11 @@ class CaptureRun {
 
   [[nodiscard]] Lines find_lines() const;
   struct Speed {
-    double baud = 0;  // baud rate; 0: the one that the level changes suggest
+    double baud = 0;  // baud rate of the line; 0: the rate that the level changes suggest
     Parity parity = Parity::none;
   };
   [[nodiscard]] Speed likely_speed(const Lines& lines) const;
-  /// Decodes at most `characters` characters.
+  /// Decodes at most `characters` characters of the lines.
   CaptureOutcome decode_lines(capture::Reader& reader, Lines lines, Speed speed, std::size_t characters,
                               capture::AnnotationSink& sink, const std::function<void(capture::Tick)>& progress) const;
   /// Returns the index of the pause with which the beginning of the capture decodes best.

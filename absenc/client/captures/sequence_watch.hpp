@@ -10,13 +10,13 @@
 
 namespace absenc::client {
 
-/// Forwards annotations. A reply becomes `sequence_mismatch`, as for a live host, in two cases: the first field with
-/// the role sequence equals that of the encoder's last reply, or a field with the role life_counter is not one more
-/// than in the frame before. After damaged frames a life counter may have advanced by any number, but must have
-/// advanced.
+/// Forwards annotations to a sink. A reply becomes `sequence_mismatch`, as for a live host, in two cases: its first
+/// field with the role sequence equals that of the encoder's last reply, or a field with the role life_counter is not
+/// one more than in the frame before. After damaged frames a life counter may have advanced by any number, but must
+/// have advanced.
 class SequenceWatch final : public capture::AnnotationSink {
  public:
-  /// `sink` must outlive the object.
+  /// Forwards to `sink`, which must outlive the object.
   explicit SequenceWatch(capture::AnnotationSink& sink) : sink_(sink) {}
 
   void put(const capture::Annotation& annotation) override {
@@ -32,7 +32,7 @@ class SequenceWatch final : public capture::AnnotationSink {
   }
 
  private:
-  // After more frames than this, a counter of 7 bits may have wrapped.
+  // Distance in frames from which an equal counter may be right: a counter of 7 bits may have wrapped.
   static constexpr std::uint64_t most_between = 100;
   static constexpr std::int64_t life_counter_end = 64;
 
@@ -63,7 +63,7 @@ class SequenceWatch final : public capture::AnnotationSink {
   }
 
   capture::AnnotationSink& sink_;
-  // Last values by the encoder's address; those of life counters also by their field.
+  // Last counter values, by the encoder's address; those of life counters also by their field.
   std::map<std::pair<std::int64_t, const FieldInfo*>, LastCounter> last_;
   std::uint64_t count_ = 0;
   std::uint64_t damaged_at_ = 0;

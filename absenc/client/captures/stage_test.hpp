@@ -23,22 +23,23 @@
 
 namespace absenc::client {
 
-/// The values of one result of a conversation, or of one exchange of a capture.
+/// The field values of one command of a host, or of one exchange of a capture.
 struct Said {
-  std::string what;  // the command, or the kind of exchange and its frames
+  std::string what;  // description: the command, or the kind of the exchange with its frames
   Time begin{};
   Time end{};
   Error error = Error::none;
   std::string words{};
   Answer answer{};
   std::optional<Reading> reading{};
-  bool reads = false;       // the result holds only values of the encoder's replies
-  bool is_special = false;  // a command that only this unit has; it may try requests that fail
+  bool reads = false;       // whether all values come from replies of the encoder
+  bool is_special = false;  // whether only this unit has the command; such a command may try requests that fail
   unsigned exchanges = 0;   // number of requests, pulses or transfers of the conversation
-  bool is_verdict = false;  // the error is a verdict of the procedure, not of the last reply
+  // whether the error is a verdict of the procedure over several replies, not an error of the last reply
+  bool is_verdict = false;
 };
 
-/// Records the steps of a host.
+/// Forwards the steps of a host to the port and counts its transfers.
 template <class Item>
 class HostEnd final : public Port<Item> {
  public:
@@ -56,7 +57,7 @@ class HostEnd final : public Port<Item> {
 
   std::uint32_t rate;
   unsigned transfers = 0;
-  bool moved = false;  // the host has set another rate, which a capture cannot follow
+  bool moved = false;  // whether the host has set another rate, which a capture cannot follow
 
  private:
   Port<Item>& port_;
@@ -76,7 +77,7 @@ class Stage {
 
   [[nodiscard]] LineSettings line() const { return address.line.with_some_rate(); }
 
-  /// Runs the commands one after the other, with pauses long enough for every reply.
+  /// Runs the commands one after the other, with pauses long enough for every reply. Stores the results in `live`.
   void run(const std::vector<const Command*>& commands) {
     if (device_.bytes() != nullptr) {
       run_on(*device_.bytes(), commands);
@@ -91,7 +92,7 @@ class Stage {
     capture::write_vcd(out, drawing_);
   }
 
-  /// The silence before the first and after the last character, which decoders need.
+  /// Returns the length of silence that decoders need before the first and after the last character.
   [[nodiscard]] Time idle() const { return std::max<Time>(std::chrono::milliseconds(1), 5 * line().character()); }
   EncoderAddress address;
   std::vector<Said> live;
@@ -121,7 +122,7 @@ class Stage {
     }
   }
 
-  // Uses the smallest or the greatest values, because the encoder may lack numbers in between.
+  // Takes the smallest or the greatest value of each argument, because the encoder may not accept numbers in between.
   static std::vector<std::vector<std::int64_t>> arguments_of(const Command& command) {
     std::vector<std::vector<std::int64_t>> all(2);
     for (const Argument& argument : command.arguments) {
@@ -131,7 +132,7 @@ class Stage {
     return all;
   }
 
-  // Returns false if the command cannot be run with these arguments.
+  // Runs a command with these arguments; returns false if the command cannot be run.
   template <class Item>
   bool converse(host::Session<Item>& session, HostEnd<Item>& port, const Command& command,
                 const std::vector<std::int64_t>& arguments) {
@@ -154,14 +155,15 @@ class Stage {
     if constexpr (std::is_same_v<Item, CanFrame>) {
       said.is_verdict = said.error == Error::cross_check_failed;
     } else {
-      // Compares only the last reply, because a procedure adds a verdict of its own.
+      // Compares only the last reply with the capture, because a procedure adds a verdict of its own.
       const Exchange<Item> last = conversation->exchange();
       const bool has_bytes = address.unit->link != LinkKind::clocked && !last.received.empty();
       said.is_verdict = has_bytes && address.unit->check(address.options, {.bytes = last.sent},
                                                          {.bytes = last.received}) == Error::none;
     }
-    said.is_verdict = said.is_verdict || said.error == Error::not_still;  // a verdict about two good replies
-    // A clocked reading appears in the capture even if it failed.
+    // the error is a verdict about two good replies
+    said.is_verdict = said.is_verdict || said.error == Error::not_still;
+    // A clocked reading appears in the capture even if the reading failed.
     const bool can_follow = !port.moved || address.unit->link == LinkKind::clocked;
     if (can_follow && said.error != Error::unsupported) live.push_back(std::move(said));
     return true;

@@ -27,7 +27,7 @@ std::size_t StdinSource::read(std::uint64_t offset, std::span<std::uint8_t> into
   return done;
 }
 
-// Reads until `end` bytes have arrived; returns false if the input ends before.
+// Reads until `end` bytes of the input are buffered; returns false if the input ends before.
 bool StdinSource::pull(std::uint64_t until) {
   while (!ended_ && end_ < until) {
     const std::size_t place = static_cast<std::size_t>(end_ % capacity);

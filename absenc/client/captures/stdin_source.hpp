@@ -10,14 +10,15 @@
 
 namespace absenc::client {
 
-/// Buffers the last 2 MiB, so that the beginning can be read several times. Earlier bytes are no longer available.
+/// Standard input as a source of bytes. Buffers the last 2 MiB, so that the beginning can be read several times.
+/// Earlier bytes are no longer available.
 class StdinSource final : public capture::Source {
  public:
   StdinSource() : window_(capacity) {}
 
-  /// Returns the greatest number, because the size is unknown.
+  /// Returns the greatest number as the size, because the size of standard input is unknown.
   [[nodiscard]] std::uint64_t size() const override { return UINT64_MAX; }
-  /// Waits until the requested bytes have arrived, or the end. Throws Failure.
+  /// Copies bytes of the input. Waits until the requested bytes have arrived or the input has ended. Throws Failure.
   [[nodiscard]] std::size_t read(std::uint64_t offset, std::span<std::uint8_t> into) override;
 
  private:
@@ -25,8 +26,8 @@ class StdinSource final : public capture::Source {
 
   bool pull(std::uint64_t until);
 
-  std::vector<std::uint8_t> window_;  // ring buffer: byte n of the input is at n modulo capacity
-  std::uint64_t end_ = 0;             // bytes read so far
+  std::vector<std::uint8_t> window_;  // ring buffer: byte n of the input is at index n modulo the capacity
+  std::uint64_t end_ = 0;             // number of bytes read so far
   bool ended_ = false;
 };
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Describes a capture in words: times, damage, errors of an exchange.
+// Describes a capture in words: its times, its damage, and the errors of its exchanges.
 #pragma once
 
 #include <cstdint>
@@ -14,15 +14,16 @@ namespace absenc::client {
 /// Converts ticks of a capture to seconds and to text.
 class TickClock {
  public:
-  /// `ticks_per_second` is 0 for a capture without times; then `text` prints the number of the tick.
+  /// Takes the tick rate. `ticks_per_second` is 0 for a capture without times; then `text` prints the number of the
+  /// tick.
   explicit TickClock(std::uint64_t ticks_per_second);
 
   [[nodiscard]] bool has_time() const { return ticks_per_second_ != 0; }
   [[nodiscard]] double seconds(capture::Tick tick) const;
   [[nodiscard]] Time time(capture::Tick ticks) const;
-  /// Returns seconds with the digits that a tick needs, or the number of the tick.
+  /// Returns the time of a tick in seconds, with the digits that a tick needs; without times, the number of the tick.
   [[nodiscard]] std::string text(capture::Tick tick) const;
-  /// Returns the format of seconds, for `Column::Presentation`.
+  /// Returns the format of seconds for `Column::Presentation`, with the digits that a tick needs.
   [[nodiscard]] std::string format() const;
 
  private:
@@ -30,16 +31,17 @@ class TickClock {
   int digits_ = 0;
 };
 
-/// Returns "the capture is damaged at byte 600, second 0.005: the file is cut off", or "note: byte 600, ...".
+/// Returns a sentence about damage: "the capture is damaged at byte 600, second 0.005: the file is cut off", or "note:
+/// byte 600, ...".
 [[nodiscard]] std::string to_text(const capture::Damage& damage, const TickClock& clock);
 
-/// Returns the kind as in rows: "exchange".
+/// Returns the kind of an annotation as rows name it: "exchange".
 [[nodiscard]] std::string_view name_of(capture::Annotation::Kind kind);
 
 /// Returns whether the fields of an annotation may be shown.
 [[nodiscard]] bool has_fields(const capture::Annotation& annotation);
 
-/// Returns the error of an annotation and what to try; "" for a good one.
+/// Returns the error of an annotation in words, with advice; "" for an annotation without an error.
 [[nodiscard]] std::string message_of(const Unit& unit, const Options& options, const capture::Annotation& annotation);
 
 }  // namespace absenc::client
