@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Checks that every command of absenc which a text in the sources names exists and is written in the same form.
-tests/kit/advice.cpp follows the advice for alarms and errors; this test covers all other texts: doctor, the page, help
-and notes."""
+"""Checks that every absenc command named in a text of the sources exists and is written in backquotes. This test covers
+texts of doctor, the page, help and notes; tests/kit/advice.cpp follows the advice for alarms and errors."""
 
 import os
 import re
@@ -16,7 +15,7 @@ TWO_WORDS = {"config", "memory", "crc"}
 
 
 def literals(source):
-    """Returns the string literals of a source; adjacent literals are joined as by the compiler."""
+    """Returns the string literals of a C++ source file, with adjacent literals joined as by the compiler."""
     text = source.read_text(encoding="utf-8")
     text = re.sub(r"(?m)^\s*//.*$", "", text)
     text = re.sub(r'"\s*\n\s*"', "", text)
@@ -30,7 +29,7 @@ def sources():
 
 
 def named_commands():
-    """Yields (source, "absenc scan") for each command in backquotes."""
+    """Yields (source file, text in backquotes, such as "absenc scan") for each text in backquotes."""
     for source in sources():
         for text in literals(source):
             for quoted in re.findall(r"`([^`]*)`", text):
@@ -46,7 +45,7 @@ class NamedCommands(unittest.TestCase):
                 continue
             verb = tuple(words[1:3] if words[1] in TWO_WORDS else words[1:2])
             if not re.fullmatch(r"[a-z-]+", verb[0]) or verb[0].startswith("-"):
-                continue  # a placeholder for a verb, or an option
+                continue  # the word after `absenc` is a placeholder for a verb, or an option
             verbs.setdefault(verb, f"{source}: `{quoted}`")
         self.assertGreater(len(verbs), 15)
         for verb, where in verbs.items():
@@ -63,12 +62,12 @@ class NamedCommands(unittest.TestCase):
                 self.assertNotIn(quoted.split(" ")[0], verbs)
 
     def test_shell_commands_stand_in_backquotes(self):
-        """Covers `sudo ...` and similar commands, which users copy."""
+        """Commands such as `sudo ...`, which users copy, must stand in backquotes too."""
         for source in sources():
             for text in literals(source):
                 rest = re.sub(r"`[^`]*(`|$)", "", text)
                 if text.startswith("sudo "):
-                    continue  # an example, alone on its line
+                    continue  # the text is only an example command
                 with self.subTest(f"{source.relative_to(ROOT)}: {text}"):
                     self.assertNotRegex(rest, r"\bsudo \w")
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tests amt21: turns have a sign in every output, and a scan finds the encoder."""
+"""Tests `absenc` with AMT21 encoders: turns have a sign in every output, and a scan finds the encoder."""
 import csv
 import io
 import unittest
@@ -31,7 +31,8 @@ class Turns(Case):
         absenc("record", BACKWARDS, "--output", file, "--count", "2")
         with open(file, encoding="utf-8") as lines:
             rows = list(csv.DictReader(line for line in lines if not line.startswith("#")))
-        readings = [row for row in rows if row["event"] != "gap"]  # a busy machine may cause gaps
+        # Rows without those for gaps, which a busy machine may cause.
+        readings = [row for row in rows if row["event"] != "gap"]
         self.assertEqual([row["multiturn"] for row in readings], ["-3", "-3"])
         self.assertEqual(int(rows[0]["position"]), -3 * 16384 + int(rows[0]["singleturn"]))
 

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tests BiSS with the command: frames of several encoders, safety words, chains, control frames and registers."""
+"""Tests BiSS with the absenc command: frames of several encoders, safety words, chains, control frames and
+registers."""
 import bisect
 import json
 import os
@@ -28,7 +29,7 @@ def numbers(text):
 
 
 class Vectors(Case):
-    """Compares every vector with `decode`. The command prints a vector's lists as text, and prefixes the fields of a
+    """Compares every BiSS vector with the output of `decode`, which prints lists as text and prefixes the fields of a
     channel or of a safety word."""
 
     def check(self, vector, answer, fields):
@@ -84,7 +85,7 @@ class Vectors(Case):
 
 
 def crc6(bits):
-    """Returns the CRC of polynomial x^6 + x + 1, inverted."""
+    """Returns the inverted CRC of the polynomial x^6 + x + 1."""
     rest = 0
     for bit in bits + "000000":
         rest = rest << 1 | int(bit)
@@ -154,7 +155,7 @@ class Registers(Case):
             self.assertEqual((info["slave_id"], info["serial_number"], info["slaves"]), (slave, slave + 1, 3))
 
     def test_reads_emulates_and_decodes_eight_encoders(self):
-        """Eight is the maximum in a frame. Each encoder has a different word length."""
+        """A BiSS frame carries data of eight encoders at most. Each of the eight has a different word length."""
         bits = {index: 12 + index for index in range(8)}
         chain = "slaves=8&" + "&".join(f"channel{index}_singleturn_bits={count}" for index, count in bits.items())
         for slave in (0, 4, 7):
@@ -199,14 +200,14 @@ class Registers(Case):
 
 
     def test_sigrok_decodes_same_positions(self):
-        """sigrok's SPI decoder reads the bits. The frame is split as by a motor controller that only knows position
-        frames."""
+        """sigrok's SPI decoder reads the bits of a waveform with a register access. This test then splits the bits into
+        frames, as a motor controller that knows only position frames."""
         with tempfile.TemporaryDirectory() as directory:
             path = os.path.join(directory, "drive.vcd")
             self.assert_good(absenc("wave", "biss?motion=rpm=600", path, "--command", "memory-read 68 0 4"))
             rows = json_lines(absenc("decode", "biss", path, "--json").stdout)
-            # A line such as "146500-146500 spi-1: 01" is one bit with its time. The clock pauses for 40 us after each
-            # frame.
+            # A line of sigrok's output, such as "146500-146500 spi-1: 01", is one bit with its time. The clock pauses
+            # for 40 us after each frame.
             seen = subprocess.run(["sigrok-cli", "-I", "vcd", "-i", path, "--protocol-decoder-samplenum", "-P",
                                    "spi:clk=clock:miso=data:cpol=1:cpha=1:wordsize=1", "-A", "spi=miso-data"],
                                   capture_output=True, text=True, timeout=60, check=True).stdout.splitlines()
@@ -265,7 +266,7 @@ class Settings(Case):
 
 
 def crc(bits, polynomial, width):
-    """Returns the inverted CRC of a text of bits, implemented from the BiSS document alone."""
+    """Returns the inverted CRC of a text of bits "0" and "1", implemented from the BiSS document alone."""
     remainder = 0
     for bit in bits:
         top = (remainder >> (width - 1) & 1) != int(bit)
@@ -274,7 +275,7 @@ def crc(bits, polynomial, width):
 
 
 def safety_words(position, counter):
-    """Returns the CPW (24 bits) and SPW (16 bits) of one position."""
+    """Returns a position's control position word (CPW, 24 bits) and safety position word (SPW, 16 bits)."""
     cpw = format(position, "024b") + "11"
     spw = format(position >> 8, "016b") + "11" + format(counter, "06b")
     return cpw + crc(cpw, 0x03, 6) + spw + crc(spw, 0x90D9, 16)
@@ -290,8 +291,8 @@ def control_crc(bits):
 
 
 def register_frame(slave, address, data, write=False, delays=None):
-    """Returns the CDM and CDS bits of one control frame, one bit per frame, as in drawing D2. `delays`: frames before
-    each start bit."""
+    """Returns the CDM and CDS bits of the control frame of one register access, one bit per position frame, as in
+    drawing D2. `delays`: number of position frames before each start bit."""
     delays = delays or [0] * len(data)
     header = "1" + format(slave, "03b") + format(address, "07b")
     cdm = "0" * 14 + "1" + header + control_crc(header) + ("011" if write else "101")
@@ -304,7 +305,7 @@ def register_frame(slave, address, data, write=False, delays=None):
 
 
 def command_frame(slaves, command):
-    """Returns the CDM and CDS bits of a command, which every addressed encoder acknowledges."""
+    """Returns the CDM and CDS bits of the control frame of a command, which every addressed encoder acknowledges."""
     header = "0" + "".join("1" if slaves >> i & 1 else "0" for i in range(8)) + format(command, "02b")
     there = max(slaves.bit_length(), 1)
     cdm = "0" * 14 + "1" + header + control_crc(header) + "1"
@@ -325,8 +326,8 @@ def plain_word(position):
 
 
 def draw_frames(words, cdm="", cds=""):
-    """Returns a VCD of frames at 1 MHz with a timeout of 20 us. `cdm` and `cds` are the bits of control frames, one per
-    frame."""
+    """Returns a VCD of position frames at 1 MHz with a timeout of 20 us. `cdm` and `cds` are bits of control frames,
+    one per position frame."""
     lines = ["$timescale 1 ns $end", "$var wire 1 c clock $end", "$var wire 1 d data $end", "$enddefinitions $end",
              "#0", "1c", "1d"]
     now = 100_000
@@ -357,14 +358,14 @@ def wires_of(path):
 
 
 def level_at(wire, time):
-    """Returns the level of a wire just before `time`."""
+    """Returns the level of a wire just before the time `time` in nanoseconds."""
     return wire[bisect.bisect_left(wire, (time, "")) - 1][1]
 
 
 def read_frames(path):
-    """Decodes the frames on the two wires as the document describes them: position, CDM and CDS of each. SLO is sampled
-    at the rising edges of MA. A frame ends where SLO rises without an edge of MA; the inverted level of MA there is the
-    CDM bit."""
+    """Decodes the position frames of a VCD's two wires as the document describes them, and returns position, CDM and
+    CDS of each. SLO is sampled at the rising edges of MA. A frame ends where SLO rises without an edge of MA; the
+    inverted level of MA there is the CDM bit."""
     clock, data = wires_of(path)
     ends = [at for at, level in data[1:] if level == "1"]
     edges = [at for at, level in clock[1:] if level == "1"]
@@ -385,7 +386,8 @@ def read_frames(path):
 
 
 def registers_in(frames):
-    """Returns the register accesses: (slave, address, bytes, whether they were written)."""
+    """Returns the register accesses in the control bits of position frames: (slave, address, bytes, whether they were
+    written)."""
     cdm, cds = ("".join(frame[which] for frame in frames) for which in (1, 2))
     found, at = [], cdm.find("0" * 14 + "1")
     while at >= 0:
@@ -425,7 +427,7 @@ class LifeCounter(Case):
                 self.assertEqual(self.errors(unit, of([62, 63, 0, 1])), [None] * 4)
                 self.assertEqual(self.errors(unit, of([7] * 24)), [None] + [wrong] * 23)
                 self.assertEqual(self.errors(unit, of([1, 2, 5, 6, 6, 7])), [None, None, wrong, None, wrong, None])
-                # After a damaged frame the counter may have any value except the last one.
+                # After a damaged frame the next counter may have any value except that of the last good frame.
                 damaged = of([1, 2, 3, 5])
                 damaged[2] = damaged[2][:3] + ("0" if damaged[2][3] == "1" else "1") + damaged[2][4:]
                 self.assertEqual(self.errors(unit, damaged), [None, None, "bad_checksum", None])
@@ -455,7 +457,8 @@ class Waveforms(Case):
                 self.assertEqual((clock[-1][1], data[-1]), ("1", (last_edge + low, "1")))
 
     def test_slo_is_low_after_crc(self):
-        """Uses a line delay that needs many clocks more than the frame has."""
+        """SLO must be low after the CRC until the timeout. The line delay of this test needs many more clocks than the
+        frame has."""
         path = self.file("wires.vcd")
         self.assert_good(absenc("wave", "biss?line_delay_ns=4300&singleturn=275087", path))
         rows = json_lines(absenc("decode", "biss", path, "--json").stdout)
@@ -490,7 +493,8 @@ class StartSequence(Case):
             rows = json_lines(absenc("decode", "biss", path, "--json").stdout)
         self.assertEqual([(len(row["reply"]), row["ok"]) for row in rows],
                          [(41, False), (2, False), (41, True), (41, True)])
-        # The gap before and after the pulses is 40 us. SLO is sampled half a clock later.
+        # The waveform's idle time before and after the pulses is 40 us. SLO is sampled half a clock after the rising
+        # edge.
         for before, after in zip(rows[:2], rows[1:]):
             self.assertAlmostEqual(after["time_s"] - before["end_s"], 40.5e-6, delta=0.1e-6)
 
@@ -559,7 +563,8 @@ class Requests(Case):
 
 
 class ControlFrames(Case):
-    """Compares the command with control frames that this test builds from the document alone."""
+    """Compares the absenc command's decoding of control frames with frames that this test builds from the document
+    alone."""
 
     def control(self, cdm, cds):
         return decode("biss", "--request", cdm, "--hex", cds)

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The first line of `absenc doctor` is the cause: faults between the command and an encoder, in real time, on a
-pseudo-terminal. Each fault once, with one unit after the other; with --all each with every unit that can have it."""
+"""Tests that the verdict of `absenc doctor` names the cause of a fault between the command and an encoder, in real time
+on pseudo-terminals. Each fault is tested with one unit; with --all, with every unit that can have it."""
 import concurrent.futures
 import contextlib
 import json
@@ -16,11 +16,12 @@ from command_support import Case, Emulator, absenc, character_units
 ALL = "--all" in sys.argv
 PATIENT = "latency=40"  # milliseconds that a busy machine may add to a reply
 
-# Name, fault, findings of which one must be the first. "good": nothing is wrong with it.
+# Each row: name, fault, ids of the findings of which the verdict must name one. "good" means that doctor finds no
+# fault.
 PROXIED = [
     ("healthy", faults.Fault, "good"),
     ("split in packets", faults.Split, "good"),
-    ("own echo", faults.Echo, "good wrong_echo"),  # wrong_echo: of four wires, where nobody expects an echo
+    ("own echo", faults.Echo, "good wrong_echo"),  # wrong_echo: on four wires, where no echo is expected
     ("dead", faults.Dead, "no_answer"),
     ("line low", faults.LineLow, "line_inverted"),
     ("only the echo", faults.OnlyEcho, "only_echo"),
@@ -48,13 +49,14 @@ PROXIED = [
     ("telnet", faults.ParityMarks, "telnet_doubled"),
 ]
 
-SECONDS = {"loose contact": "3"}  # of more than one period
+# Doctor's duration for a fault, longer than the fault's period of 0.5 s; 1 s for all others.
+SECONDS = {"loose contact": "3"}
 OF_REQUESTS = {"line low", "only the echo", "login console", "modem", "requests lost 10 %",
                "starting", "always late", "randomly late", "own echo"}
 
 
 def first_of(found):
-    """The id of the finding that the verdict names, or "good"."""
+    """Returns the id of the finding that the verdict of doctor names, or "good"."""
     verdict = found["verdict"]
     return verdict.split(":")[1].strip() if verdict.startswith("first:") else verdict.split(":")[0]
 
@@ -74,8 +76,9 @@ class DoctorFaults(Case):
         return names if ALL else [names[number % len(names)]]
 
     def side_by_side(self, examine, cases):
-        """Examines all cases, four at a time: most of it is waiting for replies that do not come. A busy machine holds up
-        the proxy and the emulator, too, which is a fault of its own: what has failed is examined once more, alone."""
+        """Calls `examine` for all cases, four at a time, because most of the time is waiting for missing replies.
+        Failed cases run once more, alone: a busy machine delays the proxy and the emulator, which is a fault of its
+        own."""
         def one(case):
             try:
                 print(examine(*case), flush=True)
@@ -90,7 +93,7 @@ class DoctorFaults(Case):
         self.assertEqual(failures, [], "\n\n".join(text for _, text in failures))
 
     def is_asked(self, unit):
-        """Whether it answers, and does not send by itself."""
+        """Returns whether the unit's encoder answers requests, rather than sending frames unsolicited."""
         with Emulator(self.directory, "--motion", "rpm=20", protocol=unit, name=f"asked-{unit}") as emulator, \
              faults.FaultProxy(faults.Fault(), emulator.path) as proxy:
             self.assert_good(absenc("read", f"{unit}:{proxy.path}?{PATIENT}", "--count", "3"))
@@ -109,14 +112,15 @@ class DoctorFaults(Case):
         with Emulator(self.directory, "--motion", "rpm=20", protocol=unit, name=name) as emulator, \
              faults.FaultProxy(make(), emulator.path) as proxy:
             found = self.examine(f"{unit}:{proxy.path}?{PATIENT}", "--for", SECONDS.get(what, "1"))
-            # A fault that changed no byte, because no reply had one that it changes, is not to be found; of a few replies
-            # nobody can say more than that they are damaged.
+            # A fault that changed no byte (because no reply contained the byte) cannot be found. Fewer than ten changed
+            # replies only prove that replies are damaged, not how.
             also = "good" if proxy.changed == 0 else "sometimes_damaged" if proxy.changed < 10 else ""
             self.assert_first(found, f"{wanted} {also}", f"{unit}: {what}")
             return f"{unit:14} {what:24} {first_of(found)} ({proxy.changed} changed)"
 
     def test_another_model(self):
-        """Read as another model than it is, both ways: wrong_settings names one that fits, or nothing tells them apart."""
+        """Reads an encoder with the wrong model selected, in both directions. The verdict must be wrong_settings with a
+        model that fits, or good if the replies of both models are equal."""
         cases = []
         for unit, about in character_units().items():
             models = [model["name"] for model in about["models"]]
@@ -145,7 +149,7 @@ class DoctorFaults(Case):
             return f"{unit:14} at address={address}: {found['verdict'][:100]}"
 
     def test_another_protocol(self):
-        """One that is asked, read as another that is asked."""
+        """Reads a polled encoder with the protocol of another polled encoder."""
         names = [unit for unit in character_units() if self.is_asked(unit)]
         self.side_by_side(self.examine_protocol,
                           [(unit, other) for number, unit in enumerate(names)
@@ -154,7 +158,7 @@ class DoctorFaults(Case):
     def examine_protocol(self, unit, other):
         with Emulator(self.directory, "--motion", "rpm=20", protocol=unit, name=f"{unit}-as-{other}") as emulator:
             found = self.examine(f"{other}:{emulator.path}?{PATIENT}")
-            # A check of two bits proves too little in the time that the search for others may take.
+            # The two-bit check of AMT21 proves too little in the time that doctor may search for other protocols.
             self.assert_first(found, "no_answer" if unit == "amt21" else "other_protocol", f"{unit} read as {other}")
             self.assertIn("absenc identify" if unit == "amt21" else f"{unit}:", found["verdict"])
             return f"{unit:14} read as {other}: {found['verdict'][:100]}"
@@ -162,7 +166,7 @@ class DoctorFaults(Case):
     def test_tcp(self):
         with socket.create_server(("127.0.0.1", 0)) as server:
             port = server.getsockname()[1]
-            # Somebody listens, and says nothing.
+            # The server accepts the connection and sends nothing.
             self.assert_first(self.examine(f"tformat:tcp:127.0.0.1:{port}"), "no_answer", "a silent server")
         self.assert_first(self.examine(f"tformat:tcp:127.0.0.1:{port}"), "port_missing", "nobody listens")
         with socket.create_server(("127.0.0.1", 0)) as server:

@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""`absenc doctor` calls no healthy encoder ill, in real time: each model of each serial unit once, with --all twenty times
-beside four busy processes. In virtual time: absenc/client/doctor/healthy_test.cpp."""
+"""Tests that `absenc doctor` reports no fault of a healthy encoder, in real time: each model of each serial unit once;
+with --all, twenty times beside four busy processes. absenc/client/doctor/healthy_test.cpp is the same test in virtual
+time."""
 import concurrent.futures
 import json
 import sys
@@ -12,7 +13,7 @@ from command_support import Busy, Case, Emulator, absenc, character_units
 ALL = "--all" in sys.argv
 RUNS, BUSY = (20, 4) if ALL else (1, 0)
 USUAL = {"name": "", "maximum_rpm": None}
-# The emulator waits for its turn, too, as no encoder does.
+# Latency in milliseconds. The emulator may wait for the processor, which a real encoder never does.
 PATIENT = "latency=300"
 
 
@@ -26,9 +27,9 @@ class Healthy(Case):
         self.assertEqual(ill, [], "\n".join(ill))
 
     def examine(self, unit, model, number):
-        """What is said to be wrong with it, or ""."""
+        """Returns doctor's verdict and findings for a healthy encoder, or an empty text if the verdict is "good"."""
         name = model["name"]
-        motion = "still" if model["maximum_rpm"] == 0 else "rpm=20"  # linear encoders have no turns
+        motion = "still" if model["maximum_rpm"] == 0 else "rpm=20"  # a linear encoder has no speed in rpm
         with Emulator(self.directory, *(["--model", name] if name else []), "--motion", motion, protocol=unit,
                       name=f"{unit}-{name}-{number}") as emulator:
             address = f"{unit}:{emulator.path}?{PATIENT}" + (f"&model={name}" if name else "")

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tests `absenc doctor`: it names each fault that a pseudo-terminal or the system can have, and passes healthy
-encoders."""
+"""Tests `absenc doctor` on pseudo-terminals and failing ports: each fault must be named, and a healthy encoder must be
+reported as good."""
 import fcntl
 import json
 import os
@@ -12,10 +12,10 @@ import unittest
 
 from command_support import ABSENC, BabblingLine, Emulator, EncoderCase, FakeEncoder, FakeLine, absenc, json_lines
 
-PATIENT = "latency=300"  # latency for a machine that is busy with other tests
+PATIENT = "latency=300"  # latency in milliseconds, for a machine that is busy with other tests
 
 
-# Reply to 1A: 17 bits of position, 16 bits of turns, both 0, no alarm.
+# Reply to the request 1A: 17 bits of position and 16 bits of turns, both 0, without an alarm.
 GOOD_REPLY = bytes.fromhex("1a 00000000 11 000000 00 0b")
 
 
@@ -29,7 +29,7 @@ def ids(found):
 
 
 class TurnedRate(FakeLine):
-    """Replies correctly at one baud rate of the port, and with random bytes at any other."""
+    """A fake encoder that replies correctly at one baud rate of the port, and with random bytes at any other."""
 
     def __init__(self, rate, reply):
         super().__init__()
@@ -37,7 +37,7 @@ class TurnedRate(FakeLine):
         self.reply = reply
 
     def rate_of_port(self):
-        """Reads struct termios2, which holds arbitrary rates."""
+        """Returns the baud rate of the port from struct termios2, which holds arbitrary rates."""
         tcgets2 = 0x802C542A
         state = fcntl.ioctl(self.slave, tcgets2, bytes(44))
         return int.from_bytes(state[40:44], sys.byteorder)
@@ -131,7 +131,7 @@ class Named(EncoderCase):
                 return
             setpriv = ["setpriv", "--reuid=65534", "--regid=65534", "--clear-groups"]
             command = [ABSENC, "doctor", f"tformat:{line.path}", "--json"]
-            # Users without access to this directory cannot run the command either.
+            # Users without access to this directory cannot run the command in it either.
             probe = subprocess.run([*setpriv, ABSENC, "list"], capture_output=True, check=False)
             if probe.returncode != 0:
                 self.skipTest("another user cannot run the command here")
@@ -217,8 +217,8 @@ class Named(EncoderCase):
         self.assertIn("replace the battery", found["findings"][0]["action"])
 
     def test_encoder_without_battery_is_healthy(self):
-        """Without a battery, battery_error and battery_alarm are always set (paragraph 2 (1)); other alarms are still
-        reported."""
+        """Without a battery, battery_error and battery_alarm are always set (paragraph 2 (1)). Doctor must ignore these
+        two, and report other alarms."""
         result, found = doctor("sim:tformat?battery=false")
         self.assert_good(result)
         self.assertEqual((found["ok"], found["findings"]), (True, []))
@@ -234,8 +234,8 @@ class Named(EncoderCase):
         self.assertEqual(ids(found), ["reply_late"])
 
     def test_sends_no_changing_request(self):
-        """Doctor also tries requests of other protocols. None may begin like a request that changes a T-format
-        encoder."""
+        """Doctor also tries requests of other protocols. None may begin with the first byte of a request that changes a
+        T-format encoder."""
         requests = set()
 
         class Listening(FakeEncoder):
@@ -257,7 +257,7 @@ class Named(EncoderCase):
 
 
 class OneLineFinding(EncoderCase):
-    """`read` and `monitor` name the same finding as doctor, and refer to doctor."""
+    """Tests that `read` and `monitor` name the same finding as doctor, and refer to doctor."""
 
     def test_read_and_monitor_name_finding(self):
         class Echo(FakeEncoder):

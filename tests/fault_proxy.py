@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A proxy between a host and an encoder, each on a pseudo-terminal of its own, that does what adapters, cables, drivers
-and other people's devices do."""
+"""A proxy between a host and an encoder, each on a pseudo-terminal of its own. It causes the faults of adapters,
+cables, drivers and foreign devices, for tests of doctor."""
 import heapq
 import os
 import random
@@ -9,39 +9,42 @@ import time
 
 from command_support import FakeLine
 
-GAP = 0.003  # seconds of silence after which a reply is whole; longer than a pause that a busy emulator makes within one
+GAP = 0.003  # seconds of silence that end a reply; a busy emulator pauses for less within a reply
 
 
 class Fault:
-    """Passes everything on. A fault overrides what it changes; times are in seconds, of time.monotonic()."""
+    """Forwards all bytes unchanged. Each derived class is one fault and overrides the methods that it needs. Times are
+    in seconds of time.monotonic()."""
 
-    whole = False  # True: `reply` gets whole replies, gathered until a pause; otherwise pieces as they come
-    chatter = None  # (period, bytes) of somebody who sends unasked
+    whole = False  # True: `reply` gets whole replies, collected until a pause of GAP; False: pieces as they arrive
+    chatter = None  # (period in seconds, bytes) of unsolicited bytes sent to the host; None: no such bytes
 
     def request(self, data, now):  # pylint: disable=unused-argument
-        """Returns the bytes that go on to the encoder."""
+        """Returns the bytes to forward to the encoder for the host's bytes `data`."""
         return data
 
     def returned(self, data, now):  # pylint: disable=unused-argument
-        """Returns the bytes that the host gets back at once, before any reply."""
+        """Returns the bytes to send to the host at once when it sends `data`, such as an echo."""
         return b""
 
     def reply(self, data, now):  # pylint: disable=unused-argument
-        """Yields what the host gets in place of the encoder's bytes: (delay, bytes), any number of them."""
+        """Yields (delay in seconds, bytes) for each piece that the host receives instead of the encoder's bytes
+        `data`."""
         yield 0, data
 
 
 class FaultProxy(FakeLine):
-    """`path` leads through the fault to the encoder; without an encoder nobody is at the far end."""
+    """A pseudo-terminal for the host. Bytes pass through `fault` to and from the encoder at the path `encoder`; None:
+    the line has no encoder."""
 
     def __init__(self, fault, encoder=None):
         super().__init__()
         self.fault = fault
         self.encoder = os.open(encoder, os.O_RDWR | os.O_NOCTTY) if encoder else None
         os.set_blocking(self.master, False)
-        self.requests = 0  # pieces that came from the host
-        self.unread = 0  # bytes that the host did not take
-        self.changed = 0  # requests and replies that the fault altered, held up, or added
+        self.requests = 0  # number of pieces received from the host
+        self.unread = 0  # number of bytes for the host that did not fit into the pseudo-terminal and were dropped
+        self.changed = 0  # number of requests and replies that the fault altered, delayed or added
 
     def __exit__(self, *_):
         super().__exit__(*_)
@@ -60,7 +63,7 @@ class FaultProxy(FakeLine):
             os.write(self.encoder, data)
 
     def serve(self):
-        due = []  # (time, number, bytes) for the host
+        due = []  # heap of (time, number, bytes) to send to the host
         number = 0
         gathered = b""
         gathered_at = None
@@ -107,11 +110,11 @@ class FaultProxy(FakeLine):
                 self.to_host(data)
 
 
-# ---- Nobody, or somebody else
+# ---- No encoder, or another device in its place
 
 
 class Dead(Fault):
-    """Requests do not arrive: no supply, a broken wire."""
+    """No request reaches the encoder, as with no supply or a broken wire."""
 
     def request(self, data, now):
         return b""
@@ -121,50 +124,50 @@ class Dead(Fault):
 
 
 class LineLow(Dead):
-    """A and B are exchanged: the idle line is low, which a UART reads as 00."""
+    """A and B are exchanged: the idle line is low, which a UART receives as bytes 00."""
 
     def returned(self, data, now):
         return bytes(9)
 
 
 class OnlyEcho(Dead):
-    """The adapter hears itself; no encoder answers."""
+    """The adapter returns its own bytes as an echo; no encoder answers."""
 
     def returned(self, data, now):
         return data
 
 
 class Console(Dead):
-    """A computer's login behind the port."""
+    """The port leads to a computer's login prompt instead of an encoder."""
 
     def returned(self, data, now):
         return b"\r\nDebian GNU/Linux 12 drive ttyS1\r\n\r\ndrive login: "
 
 
 class Modem(Dead):
-    """A modem, which returns what it was sent and complains."""
+    """A modem in place of the encoder returns the received bytes and then "ERROR"."""
 
     def returned(self, data, now):
         return data + b"\r\nERROR\r\n"
 
 
 class Nmea(Dead):
-    """A receiver of satellite navigation, which sends its sentences whoever asks what."""
+    """A satellite navigation receiver in place of the encoder sends NMEA sentences, whatever the host requests."""
 
     chatter = (0.02, b"$GPGGA,092750.000,5321.6802,N,00630.3372,W,1,8,1.03,61.7,M,55.2,M,,*76\r\n")
 
 
 class Chatter(Fault):
-    """Noise of an open line, or another host: bytes all the time."""
+    """Noise of an open line, or another host, adds two bytes every 2 ms."""
 
     chatter = (0.002, b"\x55\x12")
 
 
-# ---- In time
+# ---- Timing
 
 
 class AlwaysLate(Fault):
-    """Every reply is held up for longer than a host waits, as by a network."""
+    """Every reply is delayed by longer than a host waits, as by a network."""
 
     whole = True
 
@@ -176,7 +179,7 @@ class AlwaysLate(Fault):
 
 
 class SometimesLate(Fault):
-    """One reply of ten is held up."""
+    """One reply of ten is delayed by 0.12 s."""
 
     whole = True
 
@@ -188,7 +191,7 @@ class SometimesLate(Fault):
 
 
 class LooseContact(Fault):
-    """Nothing passes for 0.15 s of every 0.5 s."""
+    """The line is open for 0.15 s of every 0.5 s, in both directions."""
 
     def __init__(self):
         self.start = time.monotonic()
@@ -205,7 +208,7 @@ class LooseContact(Fault):
 
 
 class Starting(Fault):
-    """The encoder needs a moment before it answers at all."""
+    """The encoder ignores requests for `seconds` after the first one, because it is starting."""
 
     def __init__(self, seconds=0.4):
         self.ready = None
@@ -216,11 +219,11 @@ class Starting(Fault):
         return data if now >= self.ready else b""
 
 
-# ---- Some of the bytes
+# ---- Lost or damaged bytes
 
 
 class Lost(Fault):
-    """One reply of ten does not arrive."""
+    """One reply of ten does not reach the host."""
 
     whole = True
 
@@ -234,7 +237,7 @@ class Lost(Fault):
 
 
 class LostRequests(Lost):
-    """One request of ten does not arrive."""
+    """One request of ten does not reach the encoder."""
 
     whole = False
 
@@ -246,7 +249,7 @@ class LostRequests(Lost):
 
 
 class Corrupt(Lost):
-    """One bit of one reply of fifty is wrong."""
+    """One bit of one reply of fifty is flipped."""
 
     def __init__(self, share=0.02, seed=1):
         super().__init__(share, seed)
@@ -259,7 +262,7 @@ class Corrupt(Lost):
 
 
 class Bursts(Lost):
-    """Half of the bytes of one reply of ten are random: a motor's bridge switches nearby."""
+    """Half of the bytes of one reply of ten are random, as from a motor's bridge that switches nearby."""
 
     def reply(self, data, now):
         changed = bytearray(data)
@@ -270,7 +273,7 @@ class Bursts(Lost):
 
 
 class BytesLost(Lost):
-    """One byte of one reply of ten is lost: a receiver that overran."""
+    """One byte of one reply of ten is missing, as after an overrun of the receiver."""
 
     def reply(self, data, now):
         if self.random.random() < self.share:
@@ -280,7 +283,7 @@ class BytesLost(Lost):
 
 
 class Cut(Fault):
-    """The end of every reply is missing: the direction is switched too early."""
+    """The last byte of every reply is missing, because the direction is switched too early."""
 
     whole = True
 
@@ -289,7 +292,7 @@ class Cut(Fault):
 
 
 class Twice(Fault):
-    """Every reply comes twice."""
+    """Every reply arrives twice."""
 
     whole = True
 
@@ -298,7 +301,7 @@ class Twice(Fault):
 
 
 class Split(Fault):
-    """A reply comes in two parts, 2 ms apart, as USB packets cut it: that is no fault."""
+    """Every reply arrives in two parts, 2 ms apart, as USB packets split it. Doctor must not report this as a fault."""
 
     whole = True
 
@@ -308,7 +311,7 @@ class Split(Fault):
 
 
 class Repeats(Fault):
-    """Every reply is that to the first request: a gateway with a cache."""
+    """Every reply is a copy of the first one, as from a gateway with a cache."""
 
     whole = True
 
@@ -321,7 +324,7 @@ class Repeats(Fault):
 
 
 class OneBehind(Fault):
-    """Every reply is that to the request before."""
+    """Every reply answers the previous request; the first one is empty."""
 
     whole = True
 
@@ -333,18 +336,18 @@ class OneBehind(Fault):
         self.last = data
 
 
-# ---- What adapters and drivers do to bytes
+# ---- Changes of bytes by adapters and drivers
 
 
 class Echo(Fault):
-    """The adapter hears what it sends: usual on two wires."""
+    """The adapter returns each request as an echo, as is usual on two wires."""
 
     def returned(self, data, now):
         return data
 
 
 class ByteBefore(Fault):
-    """The direction is switched late: one byte that nobody sent stands before each reply."""
+    """The direction is switched late: an extra byte 00 precedes each reply."""
 
     whole = True
 
@@ -353,7 +356,7 @@ class ByteBefore(Fault):
 
 
 class ByteAfter(Fault):
-    """The same behind each reply."""
+    """The direction is switched late: an extra byte 00 follows each reply."""
 
     whole = True
 
@@ -362,7 +365,7 @@ class ByteAfter(Fault):
 
 
 class Translated(Fault):
-    """A driver replaces bytes, in replies alone."""
+    """A driver replaces the bytes `old` by `new` in replies, not in requests."""
 
     def __init__(self, old, new):
         self.old, self.new = old, new
@@ -372,21 +375,21 @@ class Translated(Fault):
 
 
 class FlowControl(Fault):
-    """Software flow control takes 11 and 13 out of replies."""
+    """Software flow control removes the bytes 11 and 13 (XON, XOFF) from replies."""
 
     def reply(self, data, now):
         yield 0, data.replace(b"\x11", b"").replace(b"\x13", b"")
 
 
 class SevenBits(Fault):
-    """The port takes seven bits of each byte."""
+    """The port clears the highest bit of each byte of a reply, because it is set to seven data bits."""
 
     def reply(self, data, now):
         yield 0, bytes(byte & 0x7F for byte in data)
 
 
 class ParityMarks(Fault):
-    """The driver marks FF as FF FF (termios PARMRK), and telnet does the same."""
+    """The driver replaces FF by FF FF in replies (termios PARMRK), as telnet does too."""
 
     def reply(self, data, now):
         yield 0, data.replace(b"\xff", b"\xff\xff")

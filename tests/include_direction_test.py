@@ -13,7 +13,7 @@ from pathlib import Path
 
 SOURCE = Path(os.environ.get("ABSENC_SOURCE_DIR", Path(__file__).resolve().parent.parent))
 
-# Layers that a layer may include, besides itself.
+# Maps each layer to the layers that its files may include, besides its own.
 BELOW = {
     "core": set(),
     "link": {"core"},
@@ -30,9 +30,9 @@ FREESTANDING_HEADERS = set(
     """algorithm array bit bits/chrono.h cfloat chrono climits compare concepts coroutine cstddef cstdint cstring initializer_list iterator
     limits new numbers numeric optional ratio span string_view tuple type_traits utility version""".split()
 )
-# Layers whose headers are all public.
+# Layers all of whose headers are public.
 WHOLLY_PUBLIC = {"core", "link", "protocol", "host", "sim"}
-# Each of these costs seconds of compile time in every file that includes it.
+# Standard headers that cost seconds of compile time in every file that includes them.
 HEAVY = ("CLI/", "toml++/", "nlohmann/", "microhttpd.h", "sqlite3.h", "mosquitto.h")
 LIGHT = {"nlohmann/json_fwd.hpp"}
 OS_HEADER = re.compile(
@@ -40,8 +40,8 @@ OS_HEADER = re.compile(
     r"^(unistd|fcntl|termios|poll|pty|utmp|pwd|grp|netdb|dirent|gpiod|spawn|sched|pthread|signal)\.h(pp)?$"
 )
 INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]', re.MULTILINE)
-# Of a type, at the scope of a namespace: clang-format puts it at the beginning of the line. Those inside of a class are
-# its own, and `friend` may introduce a name too.
+# Matches a declaration or definition of a type at namespace scope, which clang-format puts at the beginning of a line.
+# A type inside a class is found as a part of that class, and a `friend` declaration may introduce a name too.
 NAMESPACE = re.compile(r"^namespace ([\w:]+) \{", re.MULTILINE)
 DECLARED = re.compile(r"^(?: +friend )?(?:class|struct|union|enum class|enum) (\w+)(?: : [\w:]+)?;", re.MULTILINE)
 DEFINED = re.compile(r"^(?:class|struct|union|enum class|enum) (\w+)[^;{()]*\{", re.MULTILINE)
@@ -53,8 +53,8 @@ def is_test(path):
 
 
 def unit_of(path):
-    """Returns "tformat" for protocol/tformat/frame.hpp, and None for headers shared by the units, such as
-    protocol/unit.hpp."""
+    """Returns the protocol unit of a file, such as "tformat" for protocol/tformat/frame.hpp, or None for headers shared
+    by the units, such as protocol/unit.hpp."""
     is_unit = path.parts[:2] == ("absenc", "protocol") and len(path.parts) > 3 and path.parts[2] != "author"
     return path.parts[2] if is_unit else None
 
@@ -107,7 +107,8 @@ def system_fault(path, header):
 
 
 def client_circles(root):
-    """Returns circles of folders in client, direct or indirect, as "captures -> identify -> captures"."""
+    """Returns the circles in which folders of client include each other, directly or indirectly, as "captures ->
+    identify -> captures"."""
     client = Path("absenc/client")
     included = {}
     for file in sorted((root / client).rglob("*.[ch]pp")):
@@ -126,7 +127,8 @@ def client_circles(root):
 
 
 def names_with_namespace(pattern, text):
-    """"absenc::client::Encoder" for each type that the pattern finds."""
+    """Returns the qualified name, such as "absenc::client::Encoder", of each type that the pattern finds in the
+    text."""
     namespaces = [(match.start(), match[1]) for match in NAMESPACE.finditer(text)]
     for match in pattern.finditer(text):
         before = [name for start, name in namespaces if start < match.start()]
@@ -134,7 +136,8 @@ def names_with_namespace(pattern, text):
 
 
 def hidden_types(root):
-    """Types that a public header declares and no public header defines: a user of the library cannot use them."""
+    """Returns the types that a public header declares but no public header defines. A user of the library could not use
+    such a type."""
     headers = [path for path in sorted((root / "absenc").rglob("*.hpp")) if is_public(path.relative_to(root))]
     texts = {path.relative_to(root): path.read_text(encoding="utf-8") for path in headers}
     defined = {name for text in texts.values() for name in names_with_namespace(DEFINED, text)}
@@ -173,7 +176,8 @@ class IncludeDirection(unittest.TestCase):
 
 
 class SelfTest(unittest.TestCase):
-    """Runs the check on a small correct tree, and with one wrong line added at a time."""
+    """Tests this file's check of include lines: on a small correct tree, and on that tree with one wrong line added at
+    a time."""
 
     GOOD = {
         "absenc/core/bits.hpp": "#include <cstdint>\n",

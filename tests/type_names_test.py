@@ -17,7 +17,7 @@ from cpp_source import Source
 
 SOURCE = Path(os.environ.get("ABSENC_SOURCE_DIR", Path(__file__).resolve().parent.parent))
 
-# Names that several types share on purpose, with the meaning that all of them have.
+# Type names that several types share on purpose, each with the meaning common to all of these types.
 SHARED = {
     "Candidate": "a guess that is to be tested further",
     "CheckedFrame": "a whole frame with its check; client's is installed, capture's is not",
@@ -75,7 +75,7 @@ SHARED = {
     "value_type": "a name that C++ prescribes",
 }
 
-# Names that still have several meanings. To rename one of these types, remove its name here; add none.
+# Type names that still have several meanings. After renaming such a type, remove its name from this list; add no name.
 AMBIGUOUS = set("""
     Access Answer Ask BadRequest Burst Bus Carries Channel Check Condition Content Damage Descriptor Encoder Errors
     Finding Frames Known Layout Meaning Mode Open Order Part Place Rate Refusal Report Reported Run
@@ -83,7 +83,7 @@ AMBIGUOUS = set("""
 """.split())
 
 KEYS = ("struct", "class", "union", "enum")
-# Tokens that may follow `struct NAME` before its body: everything else is a use of the name, or a forward declaration.
+# Tokens that show that `struct NAME` before them is only a use of the name or a forward declaration, without a body.
 NO_BODY = set(";(),>=&*")
 
 
@@ -92,18 +92,19 @@ def is_test(path):
 
 
 def type_name(source, index):
-    """Returns the name after `struct` at `index` and where its body begins; None if this is no definition."""
+    """Returns (type name, index of its body) of the definition whose keyword, such as `struct`, is at `index`; None if
+    the keyword begins no definition."""
     i = index + 1
-    while source[i] in ("class", "struct"):  # enum class
+    while source[i] in ("class", "struct"):  # second keyword of `enum class`
         i += 1
-    while source[i] == "[":  # an attribute
+    while source[i] == "[":  # an attribute such as [[nodiscard]]
         i = source.partner[i] + 1
     name = []
     while source.tokens[i : i + 1] and (source.tokens[i].kind == "word" or source[i] == "::"):
         if source[i] != "final":
             name.append(source[i])
         i += 1
-    if source[i] == "<":  # a specialisation is another form of a type that is defined elsewhere
+    if source[i] == "<":  # a template specialisation: its primary template is defined elsewhere
         return None
     while i < len(source.tokens) and source[i] != "{":
         if source[i] in NO_BODY:
@@ -113,7 +114,8 @@ def type_name(source, index):
 
 
 def namespace_body(source, index):
-    """Returns where the body of the namespace at `index` begins; None if no namespace begins there."""
+    """Returns the index of the opening brace of the namespace that begins at `index`; None if no namespace with a body
+    begins there."""
     if source[index] == "namespace":
         i = index + 1
         while source[i] not in ("{", ";", "="):
@@ -123,7 +125,8 @@ def namespace_body(source, index):
 
 
 def types_of(text):
-    """Yields (name with its classes, definition of an alias or "") of each type of a source."""
+    """Yields (name, alias) of each type of a source. The name includes the enclosing classes; `alias` is the definition
+    of an alias, or "" for other types."""
     source = Source(text)
     yield from types_between(source, 0, len(source.tokens), "")
 
@@ -151,14 +154,15 @@ def types_between(source, first, last, scope):
             end = source.right(i, {";"})
             yield (f"{scope}::{source[i + 1]}" if scope else source[i + 1]), source.span(i + 3, end)
             i = end + 1
-        elif word == "{":  # a function, or a value
+        elif word == "{":  # body of a function, or a braced value
             i = source.partner.get(i, i) + 1
         else:
             i += 1
 
 
 def definitions(root):
-    """Name of a type without its class -> its meanings: (qualified name, alias) -> files."""
+    """Returns a dictionary: unqualified type name -> meaning -> list of "qualified name in file". The meaning is the
+    definition of an alias, or the folder and qualified name of any other type."""
     found = defaultdict(lambda: defaultdict(list))
     for top in ("absenc", "tools"):
         for path in sorted((root / top).rglob("*.[ch]pp")):
@@ -172,7 +176,8 @@ def definitions(root):
 
 
 def shared_names(root):
-    """"Kind: Sample::Kind in encoder.hpp, Order::Kind in order.hpp" for each name with several meanings."""
+    """Returns a line such as "Kind: Sample::Kind in encoder.hpp, Order::Kind in order.hpp" for each type name with
+    several meanings that is not listed in SHARED or AMBIGUOUS."""
     lines = []
     for name, meanings in sorted(definitions(root).items()):
         places = sorted({place for files in meanings.values() for place in files[:1]})

@@ -1,15 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Shared by the abuse tests: the import path of tests/, and the choice between the short and the full test."""
+"""Helpers of the abuse tests: makes the modules of tests/ importable, and selects the short or the full test."""
 import os
 import pathlib
 import sys
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent))
-ALL = bool(os.environ.get("ABSENC_ABUSE_ALL"))  # set by run.py --all
+ALL = bool(os.environ.get("ABSENC_ABUSE_ALL"))  # full test, requested by run.py --all
 
 
 def often(short, everything):
-    """Returns the number of repetitions: `short` as a part of the normal tests, `everything` with --all."""
+    """Returns the number of repetitions of a test: `short` in the normal test run, `everything` with run.py --all."""
     return everything if ALL else short
 
 

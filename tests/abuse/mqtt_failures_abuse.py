@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""MQTT brokers that close connections, stop replying, are unreachable or restart, and servers that are killed with
+"""MQTT brokers that close connections, stop replying, are unreachable or restart, and `absenc serve` killed with
 SIGKILL: no reading may be lost, and none may arrive twice with different ids."""
 from abuse_support import often
 
@@ -63,7 +63,7 @@ class Failures(MqttCase):
         os.mkdir(folder)
         os.chmod(folder, 0o777)
         broker = self.broker("allow_anonymous true", "persistence true", f"persistence_location {folder}/")
-        # an MQTT 5 session would end with its connection
+        # The receiver speaks MQTT 3.1.1, because its MQTT 5 session would end with its connection.
         receiver = self.receiver(broker, version=paho.MQTTv311, client_id="keeps")
         server = self.sender(broker.url, ONE, "--rate", "200")
         for round_ in range(ROUNDS):

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Conversations in which a broker violates MQTT: no server may end, and no reading may be lost. ABSENC_ABUSE_SEED=N
-sets the first seed; conversation I of a run uses the seed N + I."""
+"""Conversations in which a broker violates MQTT: no `absenc serve` may end, and no reading may be lost.
+ABSENC_ABUSE_SEED=N sets the first seed; conversation I of a run uses the seed N + I."""
 from abuse_support import often
 
 import os
@@ -17,10 +17,11 @@ from serve_support import BUSY, ServeCase
 ONE = "sim:tformat?motion=rpm=60"
 SEED = int(os.environ.get("ABSENC_ABUSE_SEED", "1"))
 CONVERSATIONS = often(150, 10_000)
-SERVERS = often(20, 60)  # each pauses for up to 5 s between two conversations
-NOBODYS = 60_000  # a number that no message has: they count from 1 in each conversation
+SERVERS = often(20, 60)  # number of `absenc serve`; each pauses for up to 5 s between two conversations
+NOBODYS = 60_000  # a packet number that no message has, because packet numbers count from 1 in each conversation
 KNOWN = [bytes.fromhex(one) for one in ("20050000027f00", "4006000100027f00", "e00487027f00", "30050001615859")]
-KINDS = (CONNACK, PUBACK, 9, PUBLISH, DISCONNECT, PINGRESP, 15)  # packet types: 9 is SUBACK, 15 is AUTH
+# Types of packets that a broker sends: 9 is SUBACK, 15 is AUTH.
+KINDS = (CONNACK, PUBACK, 9, PUBLISH, DISCONNECT, PINGRESP, 15)
 
 
 def properties(random_):
@@ -51,13 +52,13 @@ def bad_packet(random_, kind, number):
     if way == 2:  # random properties
         start = {CONNACK: b"\0\0", PUBACK: number.to_bytes(2, "big") + b"\0", PUBLISH: b"\0\1a", 9: b"\0\1"}
         return packet(kind, start.get(kind, b"\0") + properties(random_))
-    if way == 3:  # a truncated packet, so that the next one is taken for its rest
+    if way == 3:  # a truncated packet: the receiver takes the next packet for its rest
         whole = packet(kind, good + properties(random_))
         return whole[:random_.randrange(1, len(whole))]
-    if way == 4:  # a packet with a wrong size: too large, 256 MB, or five bytes long
+    if way == 4:  # a packet with a wrong size field: too large, 256 MB, five bytes long, or 0
         size = random_.choice((b"\x7f", b"\xff\xff\xff\x7f", b"\xff\xff\xff\xff\x7f", b"\0"))
         return bytes((kind << 4,)) + size + good
-    if way == 5:  # wrong flags
+    if way == 5:  # a packet with random flags, mostly wrong
         return packet(kind, good, random_.randrange(16))
     if way == 6:  # a packet repeated many times
         return packet(kind, good) * random_.randrange(2, 2000)
@@ -68,12 +69,12 @@ def bad_packet(random_, kind, number):
 
 
 def acknowledged(stream):
-    """Returns the numbers of the messages that `stream` acknowledges to a client, and the incomplete packet at its
-    end."""
+    """Returns the numbers of the messages that `stream`, the bytes sent by a broker, acknowledges, and the incomplete
+    packet at the end of `stream`."""
     found = []
     while True:
         sizes = next((stream[1:end] for end in range(2, 6) if end <= len(stream) and stream[end - 1] < 128), None)
-        if sizes is None:  # no client accepts a size of five bytes
+        if sizes is None:  # a client refuses a packet whose size field has five bytes
             return found, stream if len(stream) < 5 else b""
         body_at = 1 + len(sizes)
         end = body_at + sum((byte & 127) << 7 * place for place, byte in enumerate(sizes))
@@ -87,19 +88,19 @@ def acknowledged(stream):
 class Conversation:
     def __init__(self, seed):
         self.random = random.Random(seed)
-        # In half of the conversations the bad packet replaces the CONNACK, or follows it directly.
+        # With 0 good packets, in half of the conversations, the bad packet replaces the CONNACK or follows it directly.
         self.good_packets = self.random.choice((0, 0, 0, 1, 2, 3, 5, 8))
         self.seen = 0
         self.ends = None
-        self.received = set()  # numbers of received messages
-        self.rest = b""  # incomplete packet at the end of the sent bytes
+        self.received = set()  # packet numbers of the messages received from the client
+        self.rest = b""  # incomplete packet at the end of the bytes sent to the client
 
     def numbers(self):
         return [*sorted(self.received), NOBODYS]
 
     def truthful(self, data):
-        """Returns `data`. Closes the connection if `data` acknowledges a message that was not received, because no
-        client could detect that loss."""
+        """Returns `data`, which is sent to the client. Raises Closed to close the connection if `data` acknowledges a
+        message that was not received, because no client could detect that loss."""
         found, self.rest = acknowledged(self.rest + data)
         if any(number != NOBODYS and number not in self.received for number in found):
             raise Closed
@@ -118,7 +119,7 @@ class Packets(ServeCase):
             return usual
         if not hasattr(connection, "conversation"):
             connection.conversation = Conversation(SEED + connection.index)
-            connection.socket.settimeout(1)  # an idle client ends the conversation
+            connection.socket.settimeout(1)  # a client that sends nothing for 1 s ends the conversation
         conversation = connection.conversation
         if kind == PUBLISH and (number := published(flags, body_)[1]) is not None:
             conversation.received.add(number)
@@ -148,7 +149,7 @@ class Packets(ServeCase):
             self.assertLess(time.monotonic(), deadline, f"{self.broker.connections} conversations")
             for server in servers:
                 self.assertIsNone(server.process.poll(), f"a server ended; seeds {SEED} to {SEED + self.broker.connections}")
-            time.sleep(0.1)  # polling interval; the test depends on no time
+            time.sleep(0.1)  # polling interval in seconds; the test's result depends on no time
         self.good = True
         conversations = self.broker.connections
         deaths = sum(server.json("/api/mqtt")["client_deaths"] for server in servers)
@@ -168,11 +169,11 @@ class Packets(ServeCase):
         print(f"{conversations} conversations, {deaths} ended a client, no server", flush=True)
 
     def wait_for(self, topic, goal, server):
-        """Returns all messages of the topic as soon as the reading with this number is among them."""
+        """Returns all messages of the topic as soon as they include the reading with the number `goal`."""
         messages = []
         last = 0
         while last < goal:
-            # While messages arrive, the deadline moves. A client retries a refused topic after a minute.
+            # Each new message extends the deadline. After a refusal of a topic, a client retries it after a minute.
             late = time.monotonic() + 90 + PATIENCE
             while not (new := self.broker.after(topic, len(messages))):
                 self.assertLess(time.monotonic(), late, f"reading {goal} comes after {last}: {server.json('/api/mqtt')}")

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Spool files that are changed, truncated, overwritten, removed or replaced, while a server has them open and between
-two runs. Each server must run and publish readings. Every missing reading must be counted by the server or set aside in
-a file."""
+"""Spool files of `absenc serve` that are changed, truncated, overwritten, removed or replaced, while the server has
+them open and between two runs. The server must run and publish readings. The server must count every missing reading,
+or set it aside in a file."""
 from abuse_support import often
 
 import os
@@ -21,7 +21,7 @@ SEED = int(os.environ.get("ABSENC_ABUSE_SEED", "1"))
 
 
 def harm(random_, path):
-    """Damages one file in a random manner."""
+    """Damages the spool file at `path` in a random manner, or removes it."""
     data = bytearray(path.read_bytes())
     way = random_.randrange(7)
     at = random_.randrange(max(1, len(data)))
@@ -79,7 +79,8 @@ class Spool(MqttCase):
         wait_until(lambda: (numbers(broker.all("/readings"), ONE) or [0])[-1] > first, "what is read comes")
         wait_until(lambda: self.mqtt(server)["waiting"] < 50, "the spool empties")
         found = numbers(broker.all("/readings"), ONE)
-        # A reading's number may repeat only if its spool file was damaged: the numbers then restart with other ids.
+        # A reading's number may repeat only if its spool file was damaged: the numbers then restart, but each message
+        # has a new id.
         ids = [one["id"] for one in broker.all("/readings")]
         self.assertEqual(len(set(ids)), len(ids), "no id comes twice")
         self.assertGreater(len(found), 0)

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The history file of a running server is moved, removed, replaced, truncated or overwritten, and the server is killed.
-Readings must continue, the history must be recorded again within seconds, and no acknowledged command may be lost after
-SIGKILL."""
+"""The history file of a running `absenc serve` is moved, removed, replaced, truncated or overwritten, and the server is
+killed with SIGKILL. Readings must continue, the history must be recorded again within seconds, and no acknowledged
+command may be lost from it."""
 from abuse_support import often
 
 import contextlib
@@ -20,7 +20,7 @@ SEED = int(os.environ.get("ABSENC_ABUSE_SEED", "1"))
 
 
 def harm(random_, path):
-    """Damages the history file and returns the kind of damage."""
+    """Damages the history file and returns a text that names the kind of damage."""
     way = random_.choice(("move", "move all", "remove", "remove all", "replace", "cut off", "overwrite"))
     size = os.path.getsize(path)
     if way.startswith("move"):

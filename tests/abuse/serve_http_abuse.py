@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Idle connections, streams that are never read, requests sent byte by byte, and mutated requests, from one address and
-from several. Clients of another address must still be served, and the server must survive."""
+"""Attacks `absenc serve` from one address and from several: idle connections, streams that are never read, requests
+sent byte by byte, and mutated requests. Clients of another address must still be served, and the server must not
+end."""
 from abuse_support import often
 
 import contextlib
