@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Requirements of the document on the encoder and on the host, each with its paragraph.
+// Requirements of the protocol's document on encoder and host, each with its paragraph, for conformance tests.
 #pragma once
 
 #include <array>
@@ -8,7 +8,7 @@
 
 namespace absenc::amt21 {
 
-/// Clauses of the document for the encoder.
+/// Requirements of the document that an encoder must fulfil.
 inline constexpr std::array<Clause, 7> clauses{{
     {"answer", "serial interface", "a request is answered", Demand::answered},
     {"answer-time", "serial interface",
@@ -29,7 +29,7 @@ inline constexpr std::array<Clause, 7> clauses{{
      .command = "reset"},
 }};
 
-/// Clauses of the document for the host.
+/// Requirements of the document that a host must fulfil.
 inline constexpr std::array<HostClause, 4> host_clauses{{
     {"asks", "serial interface", "requests are as drawn", HostDemand::asks},
     {"silence", "serial interface", "after no reply it asks again", HostDemand::after_silence},

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// CUI AMT21: a request of one byte, a reply of two. README.md draws them.
+// Frames, checks and times of the CUI AMT21: a request of one or two bytes, a reply of two. README.md draws them.
 #pragma once
 
 #include <array>
@@ -14,61 +14,61 @@ namespace absenc::amt21 {
 
 using namespace std::chrono_literals;
 
-/// Rates of the line in bits per second.
+/// Baud rates of the line in bits per second.
 inline constexpr std::array<std::uint32_t, 5> rates{2'000'000, 115'200, 38'400, 19'200, 9'600};
-/// Time from the end of a request to its reply, at each rate.
+/// Time from the end of a request to its reply, for each rate in `rates`.
 inline constexpr std::array<Time, 5> turn_around{3us, 10'800ns, 30us, 56us, 110us};
-inline constexpr Time restart_time = 200ms;  ///< Time that the encoder takes to restart.
-inline constexpr unsigned turns_bits = 14;   ///< Bits of the turns.
+inline constexpr Time restart_time = 200ms;  ///< Time that the encoder takes to restart after a zero or reset request.
+inline constexpr unsigned turns_bits = 14;   ///< Number of bits of the turns counter.
 
-/// Format of the encoder: the values of its options.
+/// Frame layout and settings of one encoder, as the unit's options select them.
 struct Format {
-  std::uint8_t singleturn_bits = 14;  ///< Bits of the position, 12 or 14.
-  std::uint8_t multiturn_bits = 0;    ///< Bits of the turns, 14; 0: single-turn encoder.
+  std::uint8_t singleturn_bits = 14;  ///< Number of bits of the position, 12 or 14.
+  std::uint8_t multiturn_bits = 0;    ///< Number of bits of the turns: 14, or 0 for a single-turn encoder.
   std::uint8_t address = 0x54;        ///< Address of the encoder, a multiple of 4.
-  std::uint8_t rate = 0;              ///< index into `rates`
-  bool drops_low_bits = false;        ///< reads an encoder of 14 bits as one of 12
+  std::uint8_t rate = 0;              ///< Index of the baud rate in `rates`.
+  bool drops_low_bits = false;        ///< Whether the host drops the two low bits of a 14-bit encoder.
 
-  /// Returns the settings of the line.
+  /// Returns the line settings with the baud rate of the format.
   [[nodiscard]] constexpr LineSettings line() const { return {.rate = rates[rate]}; }
-  /// Returns the bits of position and turns.
+  /// Returns the number of bits of position and turns.
   [[nodiscard]] constexpr Resolution resolution() const { return {singleturn_bits, multiturn_bits, 0, true}; }
 };
 
 /// Kind of request: the number that is added to the address. For zero and reset, which add 2, it is the second byte.
 enum class Ask : std::uint8_t { position, turns, zero = 0x5E, reset = 0x75 };
 
-/// A request of the protocol.
+/// A request to the encoder.
 struct Request {
-  Ask ask = Ask::position;      ///< Kind of the request.
+  Ask ask = Ask::position;      ///< Purpose of the request.
   std::uint8_t address = 0x54;  ///< Address of the encoder, a multiple of 4.
 
   /// Returns whether the request has a reply. The encoder executes the other two without a reply, and restarts.
   [[nodiscard]] constexpr bool is_answered() const { return ask == Ask::position || ask == Ask::turns; }
 };
 
-/// Value of a reply: position in counts, or turns from -8192 to 8191.
+/// A reply: the position in counts, or the turns from -8192 to 8191.
 struct Reply {
-  std::int32_t value = 0;  ///< Position in counts, or turns.
+  std::int32_t value = 0;  ///< Position in counts, or turns, depending on the request.
 };
 
-/// Returns whether the parity bits are right: K1 and K0 make the number of ones odd among the odd and among the even
-/// bits.
+/// Returns whether the two check bits are right: K1 makes the number of ones among the odd bits odd, K0 the number
+/// among the even bits.
 [[nodiscard]] constexpr bool parity_is_right(std::uint16_t word) {
   return odd_parity(word & 0xAAAA) && odd_parity(word & 0x5555);
 }
 
 /// The protocol, as author layers use it: frames, lengths and times.
 struct Protocol {
-  /// Format of the encoder: the values of its options.
+  /// Frame layout and settings of one encoder, as the unit's options select them.
   using Format = amt21::Format;
-  /// A request of the protocol.
+  /// Type of requests to the encoder.
   using Request = amt21::Request;
-  /// A reply of the protocol.
+  /// Type of the encoder's replies.
   using Reply = amt21::Reply;
   static constexpr std::size_t longest_reply = 2;  ///< Greatest length of a reply in bytes.
 
-  /// Returns how long a host waits for replies.
+  /// Returns the host's timeouts: for a reply, and between two of its characters.
   static constexpr author::HostTimes host_times(const Format& format) {
     const Time character = format.line().character();
     return {.answer_limit = 2 * turn_around[format.rate] + 2 * character, .gap_limit = 2 * character};
@@ -82,7 +82,7 @@ struct Protocol {
   static constexpr std::size_t request_size(const Format&, Bytes begin) {
     return std::array<std::size_t, 4>{1, 1, 2, 0}[begin[0] & 3];
   }
-  /// Returns the request as it is sent.
+  /// Returns the bytes of `request` as they are sent.
   static constexpr ByteBuffer<2> encode(const Format&, const Request& request) {
     ByteBuffer<2> bytes;
     const auto ask = static_cast<std::uint8_t>(request.ask);
@@ -90,10 +90,10 @@ struct Protocol {
     if (!request.is_answered()) bytes.push_back(ask);
     return bytes;
   }
-  /// Returns the request, or the error of an invalid one.
+  /// Decodes a request; returns an error if its bytes are invalid.
   static constexpr Result<Request> decode_request(const Format& format, Bytes bytes) {
     if (bytes.empty()) return Error::wrong_length;
-    if ((bytes[0] & 3) == 3) return Error::unexpected_reply;  // reserved code
+    if ((bytes[0] & 3) == 3) return Error::unexpected_reply;  // low bits 11 are a reserved request code
     if (bytes.size() != request_size(format, bytes)) return Error::wrong_length;
     const Request request{static_cast<Ask>(bytes.size() == 1 ? bytes[0] & 3 : bytes[1]),
                           static_cast<std::uint8_t>(bytes[0] & 0xFC)};
@@ -104,13 +104,13 @@ struct Protocol {
   static constexpr std::size_t reply_size(const Format&, const Request& request) {
     return request.is_answered() ? 2 : 0;
   }
-  /// Returns the length of the reply, as far as its first bytes say, in bytes; 0 if it is not known.
+  /// Returns the length of a reply in bytes, judged by its first bytes; 0 if they do not determine it.
   static constexpr std::size_t expected(const Format& format, const Request& request, Bytes) {
     return reply_size(format, request);
   }
-  /// Returns whether a reply with this error is complete, so that no more bytes are awaited.
+  /// Returns whether a reply that has this error is complete, so that the host awaits no more bytes.
   static constexpr bool is_whole(const Format&, Error) { return false; }
-  /// Returns the reply as it is sent.
+  /// Returns the bytes of `reply` as they are sent.
   static constexpr ByteBuffer<2> encode_reply(const Format& format, const Request& request, const Reply& reply) {
     const unsigned shift = request.ask == Ask::position ? 14u - format.singleturn_bits : 0u;
     auto word = static_cast<std::uint16_t>(static_cast<unsigned>(reply.value) << shift & 0x3FFF);
@@ -121,7 +121,7 @@ struct Protocol {
     bytes.push_back(static_cast<std::uint8_t>(word >> 8));
     return bytes;
   }
-  /// Returns the reply with all checks done, or the first error.
+  /// Decodes a reply with all checks; returns the first error if one fails.
   static constexpr Result<Reply> decode(const Format& format, const Request& request, Bytes bytes) {
     if (bytes.empty() && request.is_answered()) return Error::timeout;
     if (bytes.size() != reply_size(format, request)) return Error::wrong_length;
@@ -133,19 +133,19 @@ struct Protocol {
     if ((value & ((1 << padding) - 1)) != 0 && !format.drops_low_bits) return Error::out_of_range;
     return Reply{value >> padding};
   }
-  /// Returns the position of a reply.
+  /// Converts a reply to a reading.
   static constexpr Reading reading(const Format& format, const Request& request, const Reply& reply) {
     if (request.ask == Ask::turns) return author::turns_reading(reply.value, {0, turns_bits, 0, true});
     return author::position_reading(static_cast<std::uint64_t>(reply.value), format.singleturn_bits);
   }
-  /// Returns when the encoder latched the position of a reply to a request that was sent at `sent_at`.
+  /// Returns when the encoder latched the position that answers a request sent at `sent_at`.
   static constexpr Time latched(const Format&, Time sent_at) { return sent_at; }
-  /// Returns the times of a virtual encoder.
+  /// Returns the times of the virtual encoder: duration of a character, time until a reply, time to start.
   static constexpr author::DeviceTimes device_times(const Format& format) {
     return {format.line().character(), turn_around[format.rate], restart_time};
   }
 };
 
-extern const Unit unit;  ///< The unit.
+extern const Unit unit;  ///< The protocol as a unit, for the list of units.
 
 }  // namespace absenc::amt21

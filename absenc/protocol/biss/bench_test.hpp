@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// For tests: a virtual encoder and a host on one clocked line in virtual time.
+// For tests: a virtual BiSS encoder and a host on one clocked line in virtual time.
 #pragma once
 
 #include <string>
@@ -46,7 +46,7 @@ class RawHost final : public Machine<std::uint8_t> {
   int step_ = 0;
 };
 
-/// A virtual encoder of type `Device` on a line, with one host after the other.
+/// A bench: a virtual encoder of type `Device` on a line, which several hosts use one after the other.
 template <class Device>
 struct ClockedBench {
   template <class Format, class... More>
@@ -66,7 +66,7 @@ struct ClockedBench {
     finished = line.run(node, line.now() + std::chrono::seconds(10));
     return host;
   }
-  /// Returns the samples of `bits` clocks that begin after a pause.
+  /// Clocks `bits` clocks after a pause and returns the samples of SLO.
   std::string clock(std::size_t bits, Time pause = std::chrono::milliseconds(1), std::uint32_t rate = 200'000) {
     RawHost host(bits, line.now() + pause, rate);
     return run(host).text;

@@ -9,32 +9,35 @@
 
 namespace absenc::biss {
 
-/// Format of a chain's frames. Slave 0 is the farthest from the host and its word comes last: channel i belongs to
-/// slave `count - 1 - i`.
+/// Format of the frames of a chain of encoders. Slave 0 is the farthest from the host and its word comes last: channel
+/// i belongs to slave `count - 1 - i`.
 struct ChainFormat {
-  static constexpr unsigned most = 8;    ///< the most data channels of a frame
-  std::array<Channel, most> channels{};  ///< Channels in the order of the line.
-  std::uint8_t count = 2;                ///< Number of channels in use.
-  std::uint8_t slave = 0;                ///< the slave whose position a reading shows and whose registers are accessed
-  RegisterOrder register_order = RegisterOrder::big;  ///< Byte order of registers that together are one number.
+  static constexpr unsigned most = 8;    ///< Greatest number of data channels of a frame.
+  std::array<Channel, most> channels{};  ///< Word format and check of each channel, in the order of the line.
+  std::uint8_t count = 2;                ///< Number of used entries of `channels`.
+  /// Slave, counted from the end of the chain, whose position a reading shows and whose registers are accessed.
+  std::uint8_t slave = 0;
+  RegisterOrder register_order = RegisterOrder::big;  ///< Byte order of a number that several registers hold.
   std::uint16_t register_delay_us = 0;  ///< Time until a virtual encoder has a requested register ready, in us.
-  bool start_sequence = false;          ///< Whether SLO of a virtual encoder stays idle until the start sequence.
-  Timeout timeout{};                    ///< Timeout of the encoder.
-  StopBit stop_bit = StopBit::next;     ///< The bit P that a virtual encoder sends after each register.
+  /// Whether SLO of a virtual encoder stays idle after power on until it receives the start sequence.
+  bool start_sequence = false;
+  Timeout timeout{};                 ///< BiSS timeout: how long the encoder holds SLO low after the last clock.
+  StopBit stop_bit = StopBit::next;  ///< The bit P that a virtual encoder sends after each register.
   // ---- The following members mean the same as in Format.
   std::uint32_t ma_khz = 1000;  ///< Clock MA in kHz.
-  Time latency = 10us;          ///< Time that the encoder takes before its start bit.
-  Time ready{};                 ///< Time that a virtual encoder needs for a position; 0: as `latency`, at most 10 us.
-  std::uint32_t line_delay_ns = 0;  ///< Delay of the line in nanoseconds.
-  Scale scale{};                    ///< scale of all linear encoders in the chain
+  /// Longest time that the encoder needs for a position; it decides the number of clocks.
+  Time latency = 10us;
+  Time ready{};  ///< Time that a virtual encoder needs for a position; 0: as `latency`, at most 10 us.
+  std::uint32_t line_delay_ns = 0;  ///< Delay of a virtual encoder's line, there and back, in nanoseconds.
+  Scale scale{};                    ///< Whether the encoders are linear, and the length of a count.
 
-  /// Returns the period of the clock.
+  /// Returns the period of MA.
   [[nodiscard]] constexpr Time period() const { return Time((1'000'000 + ma_khz / 2) / ma_khz); }
-  /// Returns the channel of the slave whose position a reading shows.
+  /// Returns the index of the channel that carries the word of `slave`.
   [[nodiscard]] constexpr unsigned shown() const { return slave < count ? count - 1u - slave : 0u; }
 };
 
-/// Returns whether the options of the chain go together.
+/// Returns whether the options of the chain are consistent.
 [[nodiscard]] constexpr bool is_usable(const ChainFormat& format) {
   if (format.count > ChainFormat::most || format.slave >= format.count) return false;
   for (unsigned i = 0; i < format.count; ++i) {
@@ -44,25 +47,25 @@ struct ChainFormat {
   return true;
 }
 
-/// Returns the number of data bits.
+/// Returns the number of bits after the CDS bit: all words with their checks.
 [[nodiscard]] constexpr unsigned data_bits(const ChainFormat& format) {
   unsigned bits = 0;
   for (unsigned i = 0; i < format.count; ++i) bits += data_bits(format.channels[i]);
   return bits;
 }
 
-/// Returns the number of bits by which the data passes through the other slaves.
+/// Returns the number of clocks that the slaves add to the ACK: each but the first passes it on one clock later.
 [[nodiscard]] constexpr unsigned relay_bits(const ChainFormat& format) { return format.count - 1u; }
 
-/// A reply of several encoders in a chain.
+/// A decoded frame of several encoders in a chain.
 struct ChainReply {
   unsigned ack_bits = 1;  ///< Number of ACK bits: zeros between the idle samples and the start bit.
-  std::array<ChannelData, ChainFormat::most> channels{};  ///< Data of each channel.
+  std::array<ChannelData, ChainFormat::most> channels{};  ///< Word, life counter and CRC of each channel.
   unsigned delay_bits = 0;                                ///< Extra idle samples: the delay of the line in clocks.
-  bool cds = false;                                       ///< Bit of control data that the encoder sent.
+  bool cds = false;                                       ///< CDS: the encoder's bit of control communication.
 };
 
-/// Decodes a frame of a chain; see decode of one word. If one word has an error, the whole frame is rejected.
+/// Decodes a frame of a chain, with the errors of `decode` for one word. An error in one word rejects the whole frame.
 [[nodiscard]] constexpr Result<ChainReply> decode(const ChainFormat& format, BitView samples, Cds cds = Cds::zero) {
   if (!is_usable(format)) return Error::invalid_argument;
   ChainReply reply;
@@ -75,7 +78,8 @@ struct ChainReply {
   return error == Error::none ? Result(reply) : error;
 }
 
-/// Writes the frame that carries a reply; returns whether it has room.
+/// Appends the frame of `reply` to `out`. `silent`: bit n is set if slave n sends no word. Returns false if `out` is
+/// too small.
 template <std::size_t Capacity>
 constexpr bool encode(const ChainFormat& format, const ChainReply& reply, BitBuffer<Capacity>& out,
                       std::uint8_t silent = 0) {
@@ -87,7 +91,7 @@ constexpr bool encode(const ChainFormat& format, const ChainReply& reply, BitBuf
   return true;
 }
 
-/// Fills `reply` as if one shaft turned all encoders.
+/// Fills `reply` with the words of a chain whose encoders are all on one shaft.
 constexpr void show(const ChainFormat& format, const ShaftState& state, std::uint32_t alarms, std::uint8_t life_counter,
                     ChainReply& reply) {
   for (unsigned i = 0; i < format.count; ++i) {
@@ -95,13 +99,13 @@ constexpr void show(const ChainFormat& format, const ShaftState& state, std::uin
   }
 }
 
-/// Returns the life counter of a reply, or -1 if it has none.
+/// Returns the life counter of the shown slave, or -1 if its check has none.
 [[nodiscard]] constexpr int life_counter_of(const ChainFormat& format, const ChainReply& reply) {
   const unsigned shown = format.shown();
   return format.channels[shown].check.life_counter ? reply.channels[shown].life_counter : -1;
 }
 
-/// Returns the reading of a reply.
+/// Converts the word of the shown slave to a reading.
 [[nodiscard]] constexpr Reading reading_of(const ChainFormat& format, const ChainReply& reply) {
   const unsigned shown = format.shown();
   return to_reading(format.channels[shown].word, reply.channels[shown].word, format.scale);

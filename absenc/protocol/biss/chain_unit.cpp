@@ -19,7 +19,7 @@ using namespace author;
 
 constexpr unsigned most = ChainFormat::most;
 
-// Options of one word; the words are numbered in the order of the line.
+// Options of one word of the chain; options of several words are numbered in the order of the line.
 template <unsigned>
 struct ChannelSettings {
   std::uint8_t singleturn_bits = 19;
@@ -47,7 +47,7 @@ struct ChainSettingsOf<std::index_sequence<channel...>> : ChainFormat, TimeoutSe
 using EveryChannel = std::make_index_sequence<most>;
 using ChainSettings = ChainSettingsOf<EveryChannel>;
 
-// ---- Names with the channel number, as channel0_crc_width
+// ---- Names with the channel number, such as channel0_crc_width
 
 template <std::size_t size>
 struct Text {

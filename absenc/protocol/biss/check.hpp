@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Life counter and CRC after a BiSS word; their sizes and parameters are the maker's choice. Sources: BiSS C Protocol
-// Description rev D2; application note 21 (the start value is that of the register in normal notation).
+// Life counter and CRC after a BiSS word; the encoder's maker chooses their sizes and parameters. Sources: BiSS C
+// Protocol Description rev D2; application note 21 (its start value is the content of the CRC register in normal
+// notation).
 #pragma once
 
 #include <cstddef>
@@ -11,31 +12,33 @@
 
 namespace absenc::biss {
 
-/// Bits of the life counter: before the CRC and covered by it, counts 0 to 63, then 0 again.
+/// Number of bits of the life counter. It is sent before the CRC and covered by it, and counts from 0 to 63, then 0
+/// again.
 inline constexpr unsigned life_counter_bits = 6;
 
-/// Check after a word. The default is used by nearly all encoders: x^6 + x + 1, inverted.
+/// Parameters of the CRC and the life counter after a word. The default is used by nearly all encoders: x^6 + x + 1,
+/// inverted.
 struct Check {
-  std::uint8_t width = 6;     ///< bits of the CRC, 0 to 16; 0: no CRC
-  std::uint16_t poly = 0x03;  ///< polynomial without its highest power
+  std::uint8_t width = 6;     ///< Number of bits of the CRC, 0 to 16; 0: no CRC.
+  std::uint16_t poly = 0x03;  ///< Polynomial of the CRC without its highest power.
   std::uint16_t init = 0;     ///< Value of the CRC register before the first bit.
   bool inverted = true;       ///< Whether the CRC is sent inverted.
   bool life_counter = false;  ///< Whether a life counter precedes the CRC.
 
-  /// Returns the bits that the check adds to the word.
+  /// Returns the number of bits after the word: life counter and CRC.
   [[nodiscard]] constexpr unsigned bits() const { return width + (life_counter ? life_counter_bits : 0); }
-  /// Compares all members.
+  /// Returns whether all members are equal.
   friend constexpr bool operator==(const Check&, const Check&) = default;
 };
 
-/// Returns whether the polynomial ends in 1; an even one does not detect every single bit error.
+/// Returns whether the polynomial of the CRC ends in 1; an even one does not detect every single bit error.
 [[nodiscard]] constexpr bool is_usable(const Check& check) { return check.width == 0 || (check.poly & 1) != 0; }
 
 inline constexpr Check crc6{};  ///< The usual CRC of 6 bits.
 /// Check of the safety position word: polynomial 0x190D9, with a life counter.
 inline constexpr Check crc16{16, 0x90D9, 0, true, true};
 
-/// Returns the parameters of a CRC.
+/// Returns the CRC of `check` in the form that the functions of crc.hpp use.
 [[nodiscard]] constexpr CrcParameters parameters_of(const Check& check) {
   const auto mask = static_cast<std::uint16_t>(low_mask(check.width));
   return {check.width, check.poly, check.init, false, false, check.inverted ? mask : std::uint16_t{0}};
@@ -43,7 +46,7 @@ inline constexpr Check crc16{16, 0x90D9, 0, true, true};
 
 namespace detail {
 
-/// Computes a CRC of any parameters, bit by bit.
+/// Computes the CRC of `check` over `count` bits from `first` on, bit by bit.
 template <class Bits>
 [[nodiscard]] constexpr std::uint16_t crc_bit_by_bit(const Check& check, const Bits& bits, std::size_t first,
                                                      std::size_t count) {
@@ -62,8 +65,8 @@ template <class Bits>
   return static_cast<std::uint16_t>(remainder ^ (check.inverted ? mask : 0));
 }
 
-/// Returns the CRC as sent. `Source` as in word.hpp: a check that is known at compile time costs no more than code
-/// written for it by hand.
+/// Returns the CRC of `count` bits from `first` on, as the encoder sends it. `Source` as in word.hpp: a check that is
+/// known at compile time costs no more than code written for it by hand.
 template <class Source, class Bits>
 [[nodiscard]] constexpr std::uint16_t crc_as_sent(const Source& source, const Bits& bits, std::size_t first,
                                                   std::size_t count) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Requirements of the document on the encoder and on the host, each with its paragraph.
+// Requirements of the protocol's document on encoder and host, each with its paragraph, for conformance tests.
 #pragma once
 
 #include <array>
@@ -8,10 +8,10 @@
 
 namespace absenc::biss {
 
-/// Errors of what frames the data.
+/// Errors of the bits before the data: idle bits, ACK, start bit and CDS.
 inline constexpr Errors header_errors = any_of(Error::bad_framing, Error::line_stuck);
 
-/// Clauses of the registers that every encoder has.
+/// Requirements of the document on the registers that every encoder has.
 inline constexpr std::array<Clause, 3> register_clauses{{
     {.id = "bank",
      .paragraph = "BiSS C Protocol Description rev D2, register 40",
@@ -37,7 +37,7 @@ inline constexpr std::array<Clause, 3> register_clauses{{
      .field = "bank"},
 }};
 
-/// Returns the clauses with those of the registers behind them.
+/// Returns the clauses `own`, followed by `register_clauses`.
 template <std::size_t count>
 constexpr std::array<Clause, count + register_clauses.size()> with_registers(const std::array<Clause, count>& own) {
   std::array<Clause, count + register_clauses.size()> all{};
@@ -46,7 +46,7 @@ constexpr std::array<Clause, count + register_clauses.size()> with_registers(con
   return all;
 }
 
-/// Clauses of BiSS-C.
+/// Requirements of the document on a BiSS-C encoder with one word.
 inline constexpr auto clauses = with_registers(std::array<Clause, 3>{{
     {"crc", "BiSS C timing diagram, CRC", "six bits of CRC, inverted, over position and status", Demand::checked},
     {.id = "header",
@@ -63,7 +63,7 @@ inline constexpr auto clauses = with_registers(std::array<Clause, 3>{{
      .shown_with = "life_counter=true"},
 }});
 
-/// Clauses of BiSS Safety: a control word and a safety word, each with its own check.
+/// Requirements on a BiSS Safety encoder: a control word and a safety word, each with its own check.
 inline constexpr auto safety_clauses = with_registers(std::array<Clause, 4>{{
     {"crc", "BiSS Safety, CPW and SPW", "CRC-6 over the control word, CRC-16 over the safety word, both inverted",
      Demand::checked},
@@ -86,7 +86,7 @@ inline constexpr auto safety_clauses = with_registers(std::array<Clause, 4>{{
      .shown_with = "motion=rpm=60"},
 }});
 
-/// Clauses of chains.
+/// Requirements on encoders in a chain.
 inline constexpr auto chain_clauses = with_registers(std::array<Clause, 2>{{
     {"crc", "BiSS C timing diagram, CRC", "each encoder's CRC, inverted, over its own position and status",
      Demand::checked},
@@ -97,7 +97,7 @@ inline constexpr auto chain_clauses = with_registers(std::array<Clause, 2>{{
      .errors = header_errors},
 }});
 
-/// Clauses for the host of all BiSS units: they share the line's timing.
+/// Requirements on the host of every BiSS unit: the timing of the line is the same for all.
 inline constexpr std::array<HostClause, 7> host_clauses{{
     {"silence", "BiSS C timing diagram", "after SLO that stayed as it was it clocks again", HostDemand::after_silence},
     {"damage", "BiSS C timing diagram, CRC", "after a frame with a wrong CRC it clocks again",

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Options, commands and explanations that all BiSS units share.
+// Options, commands and explanations that the three BiSS units (one word, Safety, chain) share.
 #pragma once
 
 #include <array>
@@ -14,7 +14,7 @@ namespace absenc::biss {
 
 /// Argument: address of a register.
 inline constexpr Argument address_argument{"address", "of the register", 0, registers::end - 1, 0, true, Role::address};
-/// Argument: bank of registers.
+/// Argument: bank that addresses 0 to 63 belong to.
 inline constexpr Argument bank_argument{"bank", "of addresses 0 to 63", 0, 255, 0, false, Role::page};
 /// Arguments of commands that read registers.
 inline constexpr std::array<Argument, 3> read_arguments{
@@ -29,17 +29,17 @@ inline constexpr std::array<Argument, 4> write_arguments{
      {"force", "1: also registers that are defined by the maker", 0, 1, 0, false, Role::force}}};
 /// Arguments of the command that selects a bank.
 inline constexpr std::array<Argument, 1> select_arguments{{{"bank", "that addresses 0 to 63 mean", 0, 255}}};
-/// Arguments of BiSS commands.
+/// Arguments of the command that sends a BiSS command to slaves.
 inline constexpr std::array<Argument, 2> command_arguments{
     {{"slaves", "bit n is slave n; 0: all, without acknowledgement", 0, 255}, {"command", "its number", 0, 3}}};
 
-/// A register with a name and with a command that reads it.
+/// A register that a command of its own reads by name.
 struct NamedRegister {
   std::string_view name;     ///< Name of the register.
   unsigned address;          ///< Address of the register.
   std::string_view meaning;  ///< Content of the register, in words.
 };
-/// Registers with names.
+/// All registers that can be read by name.
 inline constexpr std::array<NamedRegister, 6> named_registers{{
     {"bank", registers::bank_select, "bank of addresses 0 to 63"},
     {"eds-bank", registers::eds_bank, "the bank of its electronic data sheet; 0: none"},
@@ -49,70 +49,70 @@ inline constexpr std::array<NamedRegister, 6> named_registers{{
     {"manufacturer", registers::manufacturer, "manufacturer of the encoder"},
 }};
 
-/// Returns the empty request of clocked links.
+/// Returns the request of a clocked link, which is empty.
 template <class F>
 constexpr author::NoRequest no_request(const F&, Arguments) {
   return {};
 }
 
-/// Options of all BiSS units.
+/// Option of all BiSS units: the clock.
 template <auto member>
 inline constexpr auto clock_option = author::option<member>("ma_khz", "clock, kHz", 10, 10'000);
-/// The BiSS timeout in the form of its options.
+/// Values of the two options from which the BiSS timeout is made.
 struct TimeoutSettings {
-  std::uint16_t timeout_tenths = 0;  ///< fixed timeout in 0.1 us; 0: unknown
+  std::uint16_t timeout_tenths = 0;  ///< Fixed BiSS timeout in 0.1 us; 0: unknown.
   bool adaptive_timeout = false;     ///< Whether the encoder adapts its timeout to the clock.
 
-  /// Returns the timeout that the options set.
+  /// Returns the BiSS timeout that the two options select.
   [[nodiscard]] constexpr Timeout timeout_given() const {
     if (adaptive_timeout) return Timeout::adaptive();
     return timeout_tenths == 0 ? Timeout{} : Timeout::fixed(Time(timeout_tenths * 100));
   }
 };
-/// Option: timeout in microseconds.
+/// Option: fixed BiSS timeout in microseconds.
 inline constexpr auto timeout_option = author::or_zero(author::decimal<
                                                        1>(author::option<&TimeoutSettings::timeout_tenths>(
     "timeout_us",
     "how long SLO stays low behind the last clock, us; 0: not known: the host leaves 40, the virtual encoder takes 20",
     125, 400, 5)));
-/// Option: whether the timeout adapts to the clock.
+/// Option: whether the BiSS timeout adapts to the clock.
 inline constexpr auto adaptive_timeout_option = author::option<&TimeoutSettings::adaptive_timeout>(
     "adaptive_timeout", "it is one and a half periods of the clock instead, however fast that is");
-/// Option of the virtual encoder: stop bit.
+/// Option of the virtual encoder: the bit P that it sends after a register.
 template <auto member>
 inline constexpr auto stop_bit_option = author::option<member>(
     "stop_bit",
     "virtual encoder: the bit P behind a register: next is 1 where the one behind it would be refused, as the document "
     "has it",
     stop_bit_choices);
-/// Option of the virtual encoder: delay of the line.
+/// Option of the virtual encoder: delay of the line, there and back.
 template <auto member>
 inline constexpr auto line_delay_option = author::option<member>("line_delay_ns",
                                                                  "virtual encoder: delay of the line, there and back",
                                                                  0, 100'000);
-/// Option: order of the bytes of registers.
+/// Option: byte order of a number that several registers hold.
 template <auto member>
 inline constexpr auto register_order_option = author::option<member>(
     "register_byte_order", "of profile and serial number: some makers have the low byte first", register_order_choices);
-/// Option of the virtual encoder: delay of registers.
+/// Option of the virtual encoder: time until a requested register is ready.
 template <auto member>
 inline constexpr auto register_delay_option = author::option<member>(
     "register_delay_us", "virtual encoder: the time until a register that is asked for is there, us", 0, 65'535);
-/// Option of the virtual encoder: start sequence.
+/// Option of the virtual encoder: whether it stays idle until the start sequence.
 template <auto member>
 inline constexpr auto start_sequence_option = author::option<member>(
     "start_sequence", "virtual encoder: after power on it shows nothing before the start sequence");
 
-/// Puts the fields of register access.
+/// Puts the results of a register command into `sink`.
 template <class F>
 constexpr void put_registers(FieldSink& sink, const F&, const ControlResults& found) {
   register_fields.put(sink, found);
 }
-/// Finding of register access.
+/// Describes how the results of register commands are reported.
 template <class F>
 inline constexpr author::Finding<F, ControlResults> control_results{.put = put_registers<F>};
 
-/// Returns the commands of a unit: read a position, access registers.
+/// Returns the commands of a BiSS unit: read a position, access registers, send commands.
 template <const auto& report, class F>
 [[nodiscard]] constexpr auto commands_of(bool (*is_readable)(const F&)) {
   constexpr auto request = no_request<F>;
@@ -151,7 +151,7 @@ template <const auto& report, class F>
   };
 }
 
-/// Returns what the document says about an error.
+/// Returns cause and advice for `error` of a frame; empty if the document gives none.
 template <class F>
 [[nodiscard]] Explanation explain_frame(const F& format, Error error, Bytes = {}, Bytes reply = {}) {
   switch (error) {
@@ -180,7 +180,7 @@ template <class F>
   return bit + 1 < idle || bit > samples.end_of_run(idle);
 }
 
-/// Returns the index of the CDS sample, which follows the start bit; nothing if the reply ends before it.
+/// Returns the index of the CDS sample, which follows the start bit; no value if the reply ends before it.
 [[nodiscard]] inline std::optional<std::size_t> place_of_cds(Frame reply) {
   const BitView samples = author::to_bits(reply);
   if (samples.size == 0) return std::nullopt;
@@ -190,8 +190,8 @@ template <class F>
 
 // ---- Parts of the declaration that all BiSS units share
 
-/// Writes the CDM bits of the command's control frame, as '0' and '1'. If a command sends several control frames, it
-/// writes the one that reads or changes the register.
+/// Writes the CDM bits of the command's control frame to `out` as '0' and '1' and returns their number, 0 for a command
+/// without one. If a command sends several control frames, writes the one that reads or changes the register.
 template <class F>
 Result<std::size_t> encode_control(const F& format, const Command& command, Arguments arguments, MutableBytes out) {
   ControlMaster master;
@@ -226,14 +226,14 @@ Result<std::size_t> encode_control(const F& format, const Command& command, Argu
   return bits.size();
 }
 
-/// Returns the settings of the line for a format.
+/// Returns the line settings of BiSS, which are the same for all formats.
 template <class F>
 constexpr LineSettings line_of(const F&) {
   return line_settings;  // the conversation sets the clock rate itself
 }
 
-/// Decodes a position frame; if `asked` is not empty, a control frame: `asked` has the CDM bits, `answered` the CDS
-/// bits.
+/// Decodes a position frame into `sink` and returns its error. If `asked` is not empty, decodes a control frame
+/// instead: `asked` has its CDM bits, `answered` its CDS bits.
 template <const auto& report, auto is_usable, class F>
 constexpr Error decode_frame(const F& format, Frame asked, Frame answered, FieldSink& sink) {
   if (!asked.empty()) {
@@ -249,7 +249,7 @@ constexpr Error decode_frame(const F& format, Frame asked, Frame answered, Field
   sink.put_reading(reading_of(format, *reply));
   return Error::none;
 }
-/// Returns the index of the bit by which the encoder answers in each frame.
+/// Returns the index of the CDS bit in a frame; no value if the frame ends before it.
 inline std::optional<std::size_t> control_bit(const Options&, Frame reply) { return place_of_cds(reply); }
 
 }  // namespace absenc::biss

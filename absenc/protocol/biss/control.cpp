@@ -53,7 +53,7 @@ bool ControlMaster::next(bool cds) {
 }
 
 void ControlMaster::fail(Error error) {
-  zeros_ = 0;  // slaves that missed this frame begin to count zeros with the next one
+  zeros_ = 0;  // Slaves that missed this frame begin to count zeros with the next one.
   end(error);
 }
 
@@ -111,7 +111,7 @@ bool ControlMaster::direction(bool cds) {
         state_ = State::start;
         return true;
       }
-      // If a write is not answered, the number of lock bits shows whether a slave with this ID exists and refuses.
+      // If a write is not answered, the lock bits show whether a slave with this ID exists and refuses the write.
       return end(frame_.request.slave < frame_.slaves ? Error::request_rejected : Error::timeout);
   }
 }
@@ -157,7 +157,7 @@ bool ControlMaster::end_byte(bool is_last) {
 
 bool ControlMaster::acknowledge(bool cds) {
   const unsigned at = at_++;
-  if (at == direction_at) return true;  // start bit S
+  if (at == direction_at) return true;  // start bit S of the encoder
   if (frame_.request.slaves == 0) {
     frame_.executed = true;
     end(Error::none);
@@ -251,8 +251,8 @@ bool ControlSlaves::direction(bool cdm, ControlTarget& target) {
   }
 }
 
-// Begins a byte at the host's start bit, which the host repeats while the encoder is not ready. For a read, `bits_` are
-// the bits to send.
+// Begins a data byte at the host's start bit, which the host repeats while the encoder is not ready. For a read,
+// `bits_` are the bits to send.
 bool ControlSlaves::begin_byte(ControlTarget& target) {
   const bool write = request_.operation == Operation::write;
   const bool may_wait = !write || bytes_ > 0;
@@ -276,7 +276,7 @@ bool ControlSlaves::next_allowed(const ControlTarget& target) const {
          target.allows(request_.slave, next, request_.operation == Operation::write);
 }
 
-// Sends a byte to the host. CDM is examined only in the frame of P.
+// Sends a data byte to the host. The host's CDM is examined only in the frame of P.
 bool ControlSlaves::read(bool cdm, ControlTarget& target) {
   const unsigned at = at_++;
   if (at < byte_bits) return (bits_ >> (byte_bits - 1 - at) & 1) != 0;
@@ -287,7 +287,7 @@ bool ControlSlaves::read(bool cdm, ControlTarget& target) {
   return begin_byte(target);
 }
 
-// Receives a byte. If its CRC is wrong it is still returned as received, but not stored.
+// Receives a data byte. A byte with a wrong CRC is returned to the host as received, but not stored.
 bool ControlSlaves::write(bool cdm, ControlTarget& target) {
   const unsigned at = at_++;
   if (at < byte_bits) {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// BiSS control communication. Each frame carries one bit of the host (CDM, after the frame) and one of the encoders
-// (CDS, in the next frame). This file has the content of a control frame and both sides of it. README.md draws it.
-// Source: BiSS C Protocol Description rev D2.
+// BiSS control communication: the content of a control frame, and both sides of it. Each position frame carries one bit
+// of the host (CDM, after the frame) and one of the encoders (CDS, in the next frame). README.md draws it. Source: BiSS
+// C Protocol Description rev D2.
 #pragma once
 
 #include <array>
@@ -17,37 +17,38 @@
 namespace absenc::biss {
 
 inline constexpr unsigned control_pause =
-    14;  ///< zeros before a start bit; within a control frame, as many zeros end it
-inline constexpr unsigned control_slaves = 8;    ///< the most slaves that can have an ID
-inline constexpr std::size_t control_most = 64;  ///< the most bytes of one control frame
+    14;  ///< Zeros of CDM before a start bit; within a control frame, this many zeros end it.
+inline constexpr unsigned control_slaves = 8;    ///< Greatest number of slaves that can have an ID.
+inline constexpr std::size_t control_most = 64;  ///< Greatest number of data bytes of one control frame.
 
 /// CRC of control frames: x^4 + x + 1, inverted; over CTS and the ten bits after it, and over each byte.
 inline constexpr Check crc4{4, 0x3};
 
-/// Returns the CRC of 4 bits.
+/// Returns the CRC of 4 bits over the lowest `count` bits of a number.
 [[nodiscard]] constexpr std::uint8_t crc4_of(std::uint64_t bits, unsigned count) {
   return static_cast<std::uint8_t>(detail::crc_bit_by_bit(crc4, BitNumber{bits, count}, 0, count));
 }
 
-/// The request of a control frame.
+/// The request of a control frame: access registers of one slave, or send a command.
 struct ControlRequest {
-  /// Kind of the request.
+  /// Kinds of requests.
   enum class Operation : std::uint8_t { read, write, command };
-  Operation operation = Operation::read;  ///< Kind of the request.
-  std::uint8_t slave = 0;                 ///< slave whose register is accessed, 0 to 7
-  std::uint8_t address = 0;               ///< address of the first register, 0 to 127
-  std::uint8_t slaves = 0;  ///< slaves that receive a command: bit n is slave n; 0: all slaves, without acknowledgement
-  std::uint8_t command = 0;  ///< number of a command, 0 to 3
+  Operation operation = Operation::read;  ///< Whether registers are read or written, or a command is sent.
+  std::uint8_t slave = 0;                 ///< ID of the slave whose registers are accessed, 0 to 7.
+  std::uint8_t address = 0;               ///< Address of the first register, 0 to 127.
+  /// Slaves that receive a command: bit n is slave n; 0: all slaves, without acknowledgement.
+  std::uint8_t slaves = 0;
+  std::uint8_t command = 0;  ///< Number of the command, 0 to 3.
 
   /// Returns whether the request is a command.
   [[nodiscard]] constexpr bool is_command() const { return operation == Operation::command; }
-  /// Compares all members.
+  /// Returns whether all members are equal.
   friend constexpr bool operator==(const ControlRequest&, const ControlRequest&) = default;
 };
 
-inline constexpr unsigned header_bits = 15;  ///< bits after the start bit: CTS, ten bits, CRC
+inline constexpr unsigned header_bits = 15;  ///< Number of header bits after the start bit: CTS, ten bits, CRC.
 
-/// Returns the header of a control frame.
+/// Returns the header bits of a control frame with this request.
 [[nodiscard]] constexpr std::uint16_t header_of(const ControlRequest& request) {
   std::uint32_t bits = 0;
   if (request.is_command()) {
@@ -59,7 +60,7 @@ inline constexpr unsigned header_bits = 15;  ///< bits after the start bit: CTS,
   return static_cast<std::uint16_t>(bits << 4 | crc4_of(bits, 11));
 }
 
-/// Decodes a header. Whether a register is read or written is sent after the header. Error: bad_checksum.
+/// Decodes a header. Error: bad_checksum. The header does not contain whether a register is read or written.
 [[nodiscard]] constexpr Result<ControlRequest> request_of_header(std::uint16_t header) {
   const std::uint32_t bits = header >> 4;
   if (crc4_of(bits, 11) != (header & 0xF)) return Error::bad_checksum;
@@ -75,53 +76,56 @@ inline constexpr unsigned header_bits = 15;  ///< bits after the start bit: CTS,
   return request;
 }
 
-/// A control frame with the answer of the encoders.
+/// A control frame: the request of the host and the answer of the encoders.
 struct ControlFrame {
-  ControlRequest request{};                         ///< Request of the frame.
-  std::uint8_t slaves = 0;                          ///< number of slaves with an ID, from the lock bits
-  bool more_slaves = false;                         ///< there are slaves without an ID
-  ByteBuffer<control_most> data;                    ///< Data bytes of the frame.
-  Buffer<std::uint16_t, control_most> start_delay;  ///< number of frames by which each byte was delayed
-  bool next_address_accepted = false;               ///< Whether the next register may be accessed too (P = 0).
-  std::uint8_t acknowledged = 0;                    ///< slaves that acknowledged a command: bit n is slave n
-  bool executed = false;                            ///< Whether the host had the command executed.
+  ControlRequest request{};       ///< Request of the host.
+  std::uint8_t slaves = 0;        ///< Number of slaves with an ID, from the lock bits.
+  bool more_slaves = false;       ///< Whether more slaves without an ID are on the line.
+  ByteBuffer<control_most> data;  ///< Values of the registers that were read or written.
+  /// For each byte of `data`, the number of frames by which the encoder delayed it.
+  Buffer<std::uint16_t, control_most> start_delay;
+  /// Whether the register after the last one may be accessed too (P = 0).
+  bool next_address_accepted = false;
+  std::uint8_t acknowledged = 0;  ///< Slaves that acknowledged a command: bit n is slave n.
+  bool executed = false;          ///< Whether the host had the command executed.
 };
 
-/// Decodes a control frame from the bits of CDM and CDS, one of each per frame. Before the start bit may be zeros or
-/// nothing. Without CDS bits only the request is decoded: written data is taken from CDM, and repeated start bits are
-/// separated from data by the CRC. Errors: wrong_length (no bits), bad_framing (no start bit, too few zeros before it,
-/// or neither read nor write), truncated, bad_checksum (header or a byte), timeout (no slave has this ID, or it does
-/// not answer), unexpected_reply (written data is returned with another value), request_rejected.
+/// Decodes a control frame from the bits of CDM and CDS, one of each per position frame. The start bit may be the first
+/// bit, or follow zeros. Without CDS bits only the request is decoded: written data is taken from CDM, and repeated
+/// start bits are separated from data by the CRC. Errors: wrong_length (no bits), bad_framing (no start bit, too few
+/// zeros before it, or neither read nor write), truncated, bad_checksum (header or a byte), timeout (no slave has this
+/// ID, or the slave does not answer), unexpected_reply (written data is returned with another value), request_rejected.
 [[nodiscard]] Result<ControlFrame> decode_control(BitView cdm, BitView cds);
 
-/// The host's side of one control frame. It owns no line: the caller passes the CDS of each frame and sends the CDM
-/// that it returns.
+/// The host's side of control frames. It owns no line: the caller passes the CDS of each position frame to `next` and
+/// sends the CDM that `next` returns.
 class ControlMaster {
  public:
-  /// Construct once and use for several control frames: it counts the zeros before the next start bit across them.
+  /// Construct once and use for several control frames: the object counts the zeros before the next start bit across
+  /// them.
   ControlMaster() = default;
 
-  /// Begins to read `count` registers, 1 to 64.
+  /// Begins to read `count` registers of `slave` from `address` on, 1 to 64.
   void read(unsigned slave, unsigned address, std::size_t count);
-  /// Begins to write `bytes`.
+  /// Begins to write `bytes` to the registers of `slave` from `address` on.
   void write(unsigned slave, unsigned address, Bytes bytes);
-  /// Begins a command to the slaves in the mask `slaves`; 0: to all.
+  /// Begins to send a command to the slaves in the mask `slaves`; 0: to all slaves.
   void command(std::uint8_t slaves, unsigned command);
-  /// Begins to count the slaves on the line; the result is `frame().slaves`.
+  /// Begins to count the slaves on the line; the result will be `frame().slaves`.
   void count_slaves();
 
-  /// Takes the CDS of a received frame and returns the CDM to send after it.
+  /// Processes the CDS of a received frame and returns the CDM to send after that frame.
   bool next(bool cds);
-  /// Ends the control frame with `error` because a frame, and with it a CDS, was lost.
+  /// Ends the control frame with `error`, because a position frame and its CDS were lost.
   void fail(Error error);
 
   /// Returns whether the control frame has ended.
   [[nodiscard]] bool is_over() const { return over_; }
   /// Returns whether the host waits for a start bit of the encoder, which may take 20 ms.
   [[nodiscard]] bool is_waiting() const { return !over_ && state_ == State::start; }
-  /// Returns the error that ended the control frame, or none.
+  /// Returns the error that ended the control frame; `none` while it runs or after success.
   [[nodiscard]] Error error() const { return error_; }
-  /// Returns the control frame; after an error, with the bytes before it.
+  /// Returns the control frame as received so far; after an error, with the bytes before the error.
   [[nodiscard]] const ControlFrame& frame() const { return frame_; }
 
  private:
@@ -139,59 +143,61 @@ class ControlMaster {
   ControlFrame frame_{};
   ByteBuffer<control_most> written_;
   std::uint16_t header_ = 0;
-  std::uint16_t in_ = 0;  // received bits of the present byte and its CRC
+  std::uint16_t in_ = 0;  // Bits of the present data byte and its CRC that were received so far.
   std::uint16_t out_ = 0;
-  std::size_t count_ = 0;  // number of bytes to transfer
-  // Index of the next frame: counted from the start bit of the control frame, or from that of the byte.
+  std::size_t count_ = 0;  // Number of data bytes to transfer.
+  // Number of frames since the start bit of the control frame, or since that of the present data byte.
   unsigned at_ = 0;
   unsigned zeros_ = 0;
   unsigned delay_ = 0;
   State state_ = State::header;
   bool only_counts_slaves_ = false;
   bool over_ = true;
-  bool answered_ = false;  // first of the two direction bits in CDS
+  bool answered_ = false;  // First of the two direction bits in CDS.
   Error error_ = Error::none;
 };
 
-/// Appends the CDM bits of the control frame that `master` has begun, one per frame, including the zeros before the
-/// start bit and after the end. Assumes encoders that obey at once; `slaves`: number of slaves with an ID.
+/// Appends the CDM bits of the control frame that `master` has begun, one per position frame, including the zeros
+/// before the start bit and after the end. Assumes `slaves` encoders with an ID that answer at once.
 void append_cdm(ControlMaster master, unsigned slaves, BitBuffer<1024>& out);
 
-/// The encoders as ControlSlaves uses them. `slave` is always the ID of an existing slave.
+/// Registers and commands of virtual encoders, as ControlSlaves accesses them. `slave` is always the ID of an existing
+/// slave.
 struct ControlTarget {
-  /// Returns whether the register may be read, or written.
+  /// Returns whether the register of `slave` at `address` may be read, or written if `write`.
   [[nodiscard]] virtual bool allows(unsigned slave, unsigned address, bool write) const = 0;
-  /// Returns a register.
+  /// Returns the value of the register of `slave` at `address`.
   [[nodiscard]] virtual std::uint8_t read(unsigned slave, unsigned address) = 0;
-  /// Writes a register.
+  /// Writes `value` to the register of `slave` at `address`.
   virtual void write(unsigned slave, unsigned address, std::uint8_t value) = 0;
-  /// Returns the bit P after a register. `next_allowed`: whether the next register may be accessed too.
+  /// Returns the bit P that is sent after a register. `next_allowed`: whether the next register may be accessed too.
   [[nodiscard]] virtual bool stop_bit(bool next_allowed) const { return !next_allowed; }
-  /// Returns whether the byte can begin now: the encoder has its value, or can take a new one.
+  /// Returns whether the next data byte can begin now: its value is available, or the encoder can accept a new one.
   [[nodiscard]] virtual bool is_ready() const = 0;
-  /// Returns whether the slave takes part in register accesses. One command switches that off, another on; all slaves
-  /// receive both.
+  /// Returns whether `slave` takes part in register accesses. One command switches its participation off, another on;
+  /// all slaves receive both commands.
   [[nodiscard]] virtual bool listens(unsigned) const { return true; }
-  /// Returns whether the slave executes this command.
+  /// Returns whether `slave` executes the command with number `command`.
   [[nodiscard]] virtual bool obeys(unsigned slave, unsigned command) const = 0;
-  /// Executes a command on the slaves whose bits are set.
+  /// Executes a command on all slaves whose bit is set in `slaves`.
   virtual void execute(std::uint8_t slaves, unsigned command) = 0;
 
  protected:
   ~ControlTarget() = default;
 };
 
-/// The encoders' side of control frames, for all slaves on the line.
+/// The encoders' side of control frames, for all slaves on one line.
 class ControlSlaves {
  public:
-  /// `count`: number of slaves on the line.
+  /// Creates the side of `count` slaves.
   explicit ControlSlaves(unsigned count) : count_(count) {}
 
-  /// Takes the CDM after the last frame; sets the CDS of the next frame, see `cds`.
+  /// Processes the CDM that the host sent after the last frame, and sets the CDS of the next frame, which `cds`
+  /// returns.
   void take(bool cdm, ControlTarget& target);
-  /// Returns the bit that the slaves send next.
+  /// Returns the CDS that the slaves send in the next frame.
   [[nodiscard]] bool cds() const { return cds_; }
-  /// Restarts as after power on.
+  /// Returns to the state after power on.
   void reset() { *this = ControlSlaves(count_); }
 
  private:
@@ -214,7 +220,7 @@ class ControlSlaves {
   ControlRequest request_{};
   std::uint16_t bits_ = 0;
   unsigned at_ = 0;
-  unsigned bytes_ = 0;  // number of bytes transferred in this control frame
+  unsigned bytes_ = 0;  // Number of data bytes transferred in this control frame.
   unsigned zeros_ = 0;
   bool cds_ = false;
 };

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Bit positions in a control frame, shared by host, encoders and decoder.
+// Bit positions in a BiSS control frame, shared by host, encoders and decoder.
 #pragma once
 
 #include <cstdint>
@@ -13,12 +13,13 @@ using Operation = ControlRequest::Operation;
 
 /// Positions of CDM and CDS bits, as frames counted from the start bit.
 inline constexpr unsigned lock_bits_at = 1;
-inline constexpr unsigned more_slaves_at = 9;   ///< Position of the bit that announces more slaves.
-inline constexpr unsigned direction_at = 16;    ///< CDM: the bits R, W, then S; CDS: one frame later
-inline constexpr unsigned acknowledge_at = 17;  ///< CDS: the first of the acknowledge bits IDA0 to IDA7
-inline constexpr unsigned byte_bits = 12;       ///< bits of a byte and its CRC
+inline constexpr unsigned more_slaves_at = 9;  ///< Position of the bit that announces slaves without an ID.
+/// Position of the CDM bits R, W and S; in CDS they are one frame later.
+inline constexpr unsigned direction_at = 16;
+inline constexpr unsigned acknowledge_at = 17;  ///< Position of the first of the acknowledge bits IDA0 to IDA7 in CDS.
+inline constexpr unsigned byte_bits = 12;       ///< Number of bits of a data byte and its CRC.
 
-/// Returns whether a byte and its CRC, 12 bits, agree.
+/// Returns whether the CRC in the lowest 4 of these 12 bits is that of the data byte above it.
 [[nodiscard]] constexpr bool is_good_byte(std::uint16_t bits) { return crc4_of(bits >> 4, 8) == (bits & 0xF); }
 
 }  // namespace absenc::biss::control_bits

@@ -10,7 +10,7 @@ using namespace control_bits;
 
 namespace {
 
-// The bits of one control frame, from its start bit on.
+// A view of the bits of one control frame: index 0 is its start bit, and bits beyond the end are 0.
 struct ControlBits {
   BitView bits;
   std::size_t start;
@@ -30,7 +30,7 @@ void decode_lock_bits(ControlFrame& frame, const ControlBits& cds) {
 
 // Decodes the bytes of a register access. For a read, `cdm` only shows how many bytes there are.
 Error decode_bytes(const ControlBits& cdm, const ControlBits& cds, bool write, ControlFrame& frame) {
-  bool refused = false;  // p refused the next register; some encoders continue all the same
+  bool refused = false;  // P refused the next register; some encoders send it all the same
   for (unsigned due = direction_at + 3;; due += byte_bits + 2) {
     unsigned at = due;
     for (unsigned zeros = 0; !cds[at]; ++at) {
@@ -38,7 +38,7 @@ Error decode_bytes(const ControlBits& cdm, const ControlBits& cds, bool write, C
       if (zeros == control_pause) return refused ? Error::request_rejected : Error::timeout;
     }
     const bool first = due == direction_at + 3;
-    if (first && write && at != due) return Error::bad_framing;  // the first written byte is never delayed
+    if (first && write && at != due) return Error::bad_framing;  // an encoder never delays the first written byte
     if (!cds.has(at + byte_bits + 1) || !cdm.has(at + byte_bits)) return Error::truncated;
     const std::uint16_t cds_bits = cds.load(at + 1, byte_bits);
     const std::uint16_t sent = write ? cdm.load(at, byte_bits) : cds_bits;
@@ -53,7 +53,7 @@ Error decode_bytes(const ControlBits& cdm, const ControlBits& cds, bool write, C
   }
 }
 
-// Decodes the data that the host writes from CDM alone. While an encoder is not ready the host repeats its start bit.
+// Decodes the data that the host writes, from CDM alone. The host repeats its start bit while an encoder is not ready.
 Error decode_written(const ControlBits& cdm, ControlFrame& frame) {
   for (unsigned at = direction_at + 3;; at += byte_bits + 2) {
     while (!frame.data.empty() && cdm.has(at + byte_bits) && cdm[at] && !is_good_byte(cdm.load(at, byte_bits))) ++at;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Results of control communication and their fields, for captured control frames and for procedures.
+// Results of BiSS control communication and their fields, for captured control frames and for procedures.
 #pragma once
 
 #include <algorithm>
@@ -14,10 +14,10 @@
 
 namespace absenc::biss {
 
-/// Text of numbers, separated by spaces.
+/// A list of numbers as text, separated by spaces.
 class NumberList {
  public:
-  /// Appends a number.
+  /// Appends a number to the list.
   constexpr void add(unsigned number) {
     if (!empty()) text_.push_back(' ');
     std::array<char, 5> digits{};
@@ -26,19 +26,19 @@ class NumberList {
     while ((number /= 10) != 0 && size < digits.size());
     while (size > 0) text_.push_back(digits[--size]);
   }
-  /// Returns whether the text is empty.
+  /// Returns whether the list has no number.
   [[nodiscard]] constexpr bool empty() const { return text_.empty(); }
-  /// Returns the text.
+  /// Returns the list as text.
   [[nodiscard]] constexpr std::string_view view() const { return {text_.view().data(), text_.size()}; }
 
  private:
-  Buffer<char, 96> text_;  // numbers that do not fit are dropped
+  Buffer<char, 96> text_;  // Text of the list; numbers that do not fit are dropped.
 };
 
-/// Text of a manufacturer: two characters; bytes that are not printable as "\\x00".
+/// The two characters of a manufacturer as text; bytes that are not printable as "\\x00".
 class MakerName {
  public:
-  /// Appends characters.
+  /// Appends these bytes of the manufacturer registers.
   constexpr void append(Bytes bytes) {
     constexpr std::string_view hex = "0123456789ABCDEF";
     for (const std::uint8_t byte : bytes) {
@@ -49,43 +49,47 @@ class MakerName {
       for (const char c : {'\\', 'x', hex[byte >> 4], hex[byte & 15]}) text_.push_back(c);
     }
   }
-  /// Returns whether the text is empty.
+  /// Returns whether no byte was appended.
   [[nodiscard]] constexpr bool empty() const { return text_.empty(); }
-  /// Returns the text.
+  /// Returns the manufacturer's characters as text.
   [[nodiscard]] constexpr std::string_view view() const { return {text_.view().data(), text_.size()}; }
 
  private:
   Buffer<char, 8> text_;
 };
 
-/// Results of a captured control frame, or of a procedure; empty members are not reported.
+/// Results of a captured control frame, or of a register procedure. Only members with a value are reported.
 struct ControlResults {
   // ---- Results of a control frame
-  std::optional<std::uint8_t> slaves{};         ///< Number of slaves with an ID, if known.
-  std::optional<bool> more_slaves{};            ///< Value of the field `more_slaves`, if there is one.
-  std::optional<std::string_view> operation{};  ///< Value of the field `operation`, if there is one.
-  std::optional<std::uint8_t> slave_id{};       ///< Slave whose register was accessed.
-  std::optional<std::uint8_t> bank{};           ///< Value of the field `bank`, if there is one.
-  std::optional<std::uint8_t> address{};        ///< Address of the first register.
-  std::optional<std::uint8_t> value{};          ///< Value of the field `value`, if there is one.
-  ByteBuffer<control_most> bytes;               ///< Bytes of the registers.
-  bool has_data = false;                        ///< Whether `bytes` holds data.
-  NumberList start_delay;                       ///< Frames by which each byte was delayed.
-  std::optional<bool> next_address_accepted{};  ///< Value of the field `next_address_accepted`, if there is one.
-  std::optional<std::uint8_t> command{};        ///< Value of the field `command`, if there is one.
-  std::optional<bool> broadcast{};              ///< Value of the field `broadcast`, if there is one.
-  NumberList slave_ids;                         ///< Identifiers of the slaves.
-  NumberList acknowledged;                      ///< Slaves that acknowledged.
-  std::optional<bool> executed{};               ///< Value of the field `executed`, if there is one.
+  std::optional<std::uint8_t> slaves{};         ///< Number of slaves with an ID.
+  std::optional<bool> more_slaves{};            ///< Whether slaves without an ID are on the line.
+  std::optional<std::string_view> operation{};  ///< Operation of the request: read, write or command.
+  /// ID of the slave whose register was accessed, 0 to 7; 0 is the farthest from the host.
+  std::optional<std::uint8_t> slave_id{};
+  std::optional<std::uint8_t> bank{};     ///< Selected bank of registers, 0 to 255.
+  std::optional<std::uint8_t> address{};  ///< Address of the first register that was accessed, 0 to 127.
+  std::optional<std::uint8_t> value{};    ///< Value of the only or first register that was accessed.
+  ByteBuffer<control_most> bytes;         ///< Values of successive registers.
+  bool has_data = false;                  ///< Whether `bytes` is reported.
+  /// For each byte, the number of frames by which the encoder delayed it.
+  NumberList start_delay;
+  std::optional<bool> next_address_accepted{};  ///< Whether the next register could be accessed too (P = 0).
+  std::optional<std::uint8_t> command{};        ///< Number of the command, 0 to 3.
+  std::optional<bool> broadcast{};              ///< Whether the command is for all slaves, without acknowledgement.
+  NumberList slave_ids;                         ///< IDs of the slaves to which a command is addressed.
+  NumberList acknowledged;                      ///< IDs of the slaves that acknowledged a command.
+  std::optional<bool> executed{};               ///< Whether the host had the command executed.
   // ---- Results of procedures
-  std::optional<bool> written{};                 ///< false: the register had this value already, so nothing was written
-  std::optional<bool> missing{};                 ///< true: the encoder refused the register; otherwise not set
-  std::optional<std::uint8_t> eds_bank{};        ///< Value of the field `eds_bank`, if there is one.
-  std::optional<std::uint16_t> profile{};        ///< Value of the field `profile`, if there is one.
-  std::optional<std::uint64_t> serial_number{};  ///< Value of the field `serial_number`, if there is one.
-  ByteBuffer<6> device_id;                       ///< Device identifier.
-  MakerName manufacturer;                        ///< Name of the maker.
-  Reading reading{};                             ///< stays empty: these procedures do not report a position
+  /// False: the register had this value already, so nothing was written.
+  std::optional<bool> written{};
+  /// True: the encoder refused to read the register; otherwise no value.
+  std::optional<bool> missing{};
+  std::optional<std::uint8_t> eds_bank{};        ///< Bank of the electronic data sheet; 0: the encoder has none.
+  std::optional<std::uint16_t> profile{};        ///< Profile of the encoder.
+  std::optional<std::uint64_t> serial_number{};  ///< Serial number of the encoder.
+  ByteBuffer<6> device_id;                       ///< Device ID of the encoder, six bytes; empty if it was not read.
+  MakerName manufacturer;                        ///< Manufacturer's two characters; empty if they were not read.
+  Reading reading{};                             ///< Stays empty, because these procedures do not report a position.
 };
 
 namespace shown {
@@ -104,7 +108,7 @@ constexpr std::optional<Bytes> device_id(const ControlResults& found) {
 constexpr std::optional<std::string_view> manufacturer(const ControlResults& found) { return some(found.manufacturer); }
 }  // namespace shown
 
-/// Fields of register access.
+/// Fields in which register accesses and commands are reported.
 inline constexpr auto register_fields = author::fields_of<ControlResults>(
     author::field<&ControlResults::slaves>("slaves", "", "number of encoders with an ID"),
     author::field<&ControlResults::more_slaves>("more_slaves", "", "whether there are encoders without an ID"),
@@ -135,7 +139,7 @@ inline constexpr auto register_fields = author::fields_of<ControlResults>(
     author::field<shown::manufacturer>("manufacturer", "", "two letters, which the BiSS Association gives",
                                        Role::identity));
 
-/// Stores the value of the named register at `address`.
+/// Stores the value `bytes` of the named register at `address` in its member of `found`.
 constexpr void store_register(ControlResults& found, RegisterOrder order, unsigned address, Bytes bytes) {
   const std::uint64_t number = order == RegisterOrder::big ? load_big_endian(bytes) : load_little_endian(bytes);
   switch (address) {
@@ -159,7 +163,7 @@ constexpr void store_register(ControlResults& found, RegisterOrder order, unsign
   }
 }
 
-/// Returns the fields of a control frame; without an answer, those of its request.
+/// Returns the results of a control frame; if `answered` is false, only those of its request.
 [[nodiscard]] constexpr ControlResults results_of(const ControlFrame& frame, bool answered) {
   constexpr std::array<std::string_view, 3> names{"read", "write", "command"};
   const ControlRequest& request = frame.request;

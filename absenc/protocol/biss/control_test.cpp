@@ -48,7 +48,7 @@ std::string cdm_of(const ControlMaster& master) {
   return text;
 }
 
-// Compares with the frames of the protocol description and of TI's table. Only zeros may follow.
+// Compares CDM bits with those of the protocol description and of TI's table. Only zeros may follow.
 TEST(BissControl, EncodesRequestsOfTheDocument) {
   const auto expect = [](const ControlMaster& master, std::string_view drawn) {
     const std::string cdm = cdm_of(master);
@@ -88,7 +88,7 @@ TEST(BissControl, DecodesWrittenDataFromCdmAlone) {
 }
 
 TEST(BissControl, DetectsEachFlippedBitOfAnAnswer) {
-  // Lock bits of other slaves and the bits after P have no meaning here.
+  // The lock bits of other slaves and the bits after P do not affect decoding.
   for (std::size_t i = 14 + 17; i < 14 + 32; ++i) {
     std::string cds(read_44_answer);
     cds[i] = cds[i] == '1' ? '0' : '1';
@@ -143,8 +143,8 @@ struct Transcript {
   std::string cds;
 };
 
-/// Runs both sides to the end. `flip`: index of a CDS bit that is received wrong; the position's checks do not detect
-/// it.
+/// Runs host and encoders until the control frame ends. `flip`: index of a CDS bit that is received wrong; the checks
+/// of the position do not detect that.
 Transcript run(ControlMaster& master, ControlSlaves& slaves, Target& target, std::size_t flip = ~std::size_t{0}) {
   Transcript transcript;
   for (unsigned i = 0; !master.is_over() && i < 2'000; ++i) {
@@ -171,7 +171,7 @@ TEST(BissControl, HostAndSlavesSendBitsOfTheTable) {
   EXPECT_EQ(transcript.cdm.size(), 14u + 33u);
 }
 
-/// Sends P = 1 after each register, and continues all the same.
+/// Encoders that send P = 1 after each register, and send the next register all the same.
 struct Stopping final : Target {
   [[nodiscard]] bool stop_bit(bool) const override { return true; }
 };
@@ -196,7 +196,7 @@ TEST(BissControl, DecodesHostThatContinuesAfterStopBit) {
     slaves.take(c == '1', target);
   }
   for (unsigned i = 0; i < 44; ++i) {
-    const bool goes_on = i == 13;  // the host continues, in the frame of P
+    const bool goes_on = i == 13;  // the host continues in the frame of P
     cdm.append(goes_on ? 1 : 0, 1);
     cds.append(slaves.cds() ? 1 : 0, 1);
     slaves.take(goes_on, target);
@@ -341,10 +341,12 @@ TEST(BissControl, DecoderChecksEachRuleOfAControlFrame) {
   EXPECT_EQ(error(read.cdm, begin(read.cds, 18)), Error::truncated);
   EXPECT_EQ(error(begin(read.cdm, 20), read.cds), Error::truncated);
   EXPECT_EQ(error(flipped(read.cdm, {18}), read.cds), Error::timeout);       // no S of the host
-  EXPECT_EQ(error(late(read.cdm, 13), late(read.cds, 13)), Error::none);     // s of the encoder is late
+  EXPECT_EQ(error(late(read.cdm, 13), late(read.cds, 13)), Error::none);     // start bit S of the encoder is late
   EXPECT_EQ(error(late(read.cdm, 14), late(read.cds, 14)), Error::timeout);  // 14 zeros end the frame
-  EXPECT_EQ(error(flipped(read.cdm, {32}), flipped(read.cds, {32})), Error::request_rejected);  // p refuses
-  EXPECT_EQ(error(write.cdm, late(write.cds, 1)), Error::bad_framing);  // no delay is allowed here
+  // P refuses the next register
+  EXPECT_EQ(error(flipped(read.cdm, {32}), flipped(read.cds, {32})), Error::request_rejected);
+  // a delay is not allowed for the first written byte
+  EXPECT_EQ(error(write.cdm, late(write.cds, 1)), Error::bad_framing);
   EXPECT_EQ(error(write.cdm, flipped(write.cds, {20})), Error::bad_checksum);
   EXPECT_EQ(error(flipped(write.cdm, {19}), write.cds), Error::bad_checksum);
   EXPECT_EQ(error(transcript_of(written(0xA5)).cdm, write.cds), Error::unexpected_reply);

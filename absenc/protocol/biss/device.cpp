@@ -31,10 +31,12 @@ void LineDelay::apply(const Behaviour& behaviour, Time period, Samples& samples)
 // ---- Registers
 
 namespace {
-// Memory of each slave: the banks, then the registers after them without bank select, which is lost at power off.
+// Layout of the memory of each slave: its banks, then the registers outside the banks. Bank select is lost at power
+// off.
 constexpr std::size_t direct = VirtualRegisters::banks * registers::bank_size;
 
-constexpr std::array<std::uint8_t, 8> identity{'A', 'b', 's', 'e', 'n', 'c', 'v', 'e'};  // device id, then manufacturer
+// device ID (6 bytes), then manufacturer (2 bytes)
+constexpr std::array<std::uint8_t, 8> identity{'A', 'b', 's', 'e', 'n', 'c', 'v', 'e'};
 }  // namespace
 
 VirtualRegisters::VirtualRegisters(unsigned slaves, RegisterOrder order, StopBit stop_bit)
@@ -102,7 +104,7 @@ bool VirtualRegisters::is_ready() const {
   return now_ - requested_at_ >= delay_;
 }
 
-// Accepts the commands of the standard; 2 and 3 are defined by the maker.
+// Accepts commands 0 and 1, which the standard defines; the maker defines 2 and 3.
 bool VirtualRegisters::obeys(unsigned, unsigned command) const { return command < 2; }
 
 void VirtualRegisters::execute(std::uint8_t slaves, unsigned command) {

@@ -11,40 +11,42 @@
 
 namespace absenc::biss {
 
-/// Times of a virtual encoder and of the line to it.
+/// Times of a virtual encoder and of the line between it and the host.
 struct Behaviour {
-  Time latency = 10us;  ///< Time that the encoder takes before its start bit.
-  Time line_delay{};    ///< Delay there and back. The host samples SLO one period of MA after the edge that drives it.
-  Time edge_noise = 20ns;       ///< a sample this close to a delayed edge reads the old bit or the new bit, at random
-  Time register_delay{};        ///< time from the request for a register to its start bit
-  bool start_sequence = false;  ///< after power on, SLO stays idle until the start sequence
+  Time latency = 10us;  ///< Time that the encoder needs for a position, from the second rising edge of MA.
+  /// Delay of the line, there and back. The host samples SLO one period of MA after the edge that drives it.
+  Time line_delay{};
+  Time edge_noise = 20ns;       ///< A sample this close to a delayed edge reads the old bit or the new bit, at random.
+  Time register_delay{};        ///< Time from the request for a register to the encoder's start bit.
+  bool start_sequence = false;  ///< Whether SLO stays idle after power on until the start sequence.
 };
 
-/// Bits that the encoder drives.
+/// Samples of SLO, one per clock of MA.
 using Samples = author::DrivenBits;
 
-/// Delays the samples by the line's delay: by whole clocks, and at random where an edge falls on a sample.
+/// Delays samples as a line does: by whole clocks, and by one more at random where an edge falls on a sample.
 class LineDelay {
  public:
-  /// Delays samples as a long line does.
+  /// Delays `samples`, which were taken at this period of MA, by `behaviour.line_delay`.
   void apply(const Behaviour& behaviour, Time period, Samples& samples);
 
  private:
   std::uint32_t noise_ = 1;
 };
 
-/// A virtual encoder without its line; also used behind an adapter.
+/// A virtual encoder without its line: makes the samples of SLO. Also used behind a virtual adapter.
 template <class F>
 class EncoderOf {
  public:
-  /// Follows `shaft`, which must outlive it.
+  /// Creates an encoder that follows `shaft`, which must outlive it.
   EncoderOf(const F& format, const Shaft& shaft, const Behaviour& behaviour)
       : format_(format), shaft_(&shaft), behaviour_(behaviour) {}
 
-  /// Fills `samples` for a frame whose first falling edge of MA is `at`: the whole frame, then zeros up to a full byte.
+  /// Fills `samples` with SLO for a frame whose first falling edge of MA is at `at`: the whole frame, then zeros up to
+  /// a full byte.
   void sample(Time at, Time period, Samples& samples, bool cds = false) {
     samples.clear();
-    // Half a period longer than the timeout ends the frame: SLO is idle again.
+    // If half a period is longer than the timeout, the frame ends at once and SLO is idle.
     if (period / 2 >= format_.timeout.of_encoder(period)) {
       samples.append(~std::uint64_t{0}, 64);
       return;
@@ -53,14 +55,14 @@ class EncoderOf {
     reply.ack_bits = head_bits(format_, behaviour_.latency, period);
     reply.cds = cds;
     show(format_, shaft_->at(at), alarms_, life_counter_, reply);
-    if (!encode(format_, reply, samples, data_off_)) {  // the position is not ready within the most clocks of a frame
+    if (!encode(format_, reply, samples, data_off_)) {  // the ACK would need more clocks than a frame can have
       samples.clear();
       samples.append(low_mask(idle_bits), idle_bits);
       while (samples.size() < Samples::capacity()) samples.append(0, 1);
     }
     life_counter_ = static_cast<std::uint8_t>((life_counter_ + 1u) & low_mask(life_counter_bits));
     const std::size_t whole = std::min<std::size_t>(clocks(format_, behaviour_.latency, period), Samples::capacity());
-    // Zeros in place of the words of slaves whose process data are switched off.
+    // The words of slaves whose process data are switched off are sent as zeros.
     while (samples.size() < whole) samples.append(0, 1);
     delay_.apply(behaviour_, period, samples);
     while (samples.size() % 8 != 0) samples.append(0, 1);
@@ -68,17 +70,17 @@ class EncoderOf {
 
   /// Returns the format of the encoder.
   [[nodiscard]] const F& format() const { return format_; }
-  /// Returns how the virtual encoder behaves.
+  /// Returns the times of the encoder and of its line.
   [[nodiscard]] const Behaviour& behaviour() const { return behaviour_; }
-  /// Returns the position word at this time.
+  /// Returns the position word at the time `at`.
   [[nodiscard]] Word word(Time at) const { return word_of(format_.word, shaft_->at(at), alarms_); }
   /// Returns whether the encoder is switched on.
   [[nodiscard]] bool is_powered() const { return powered_; }
   /// Switches the encoder on or off.
   void set_power(bool on) { powered_ = on; }
-  /// Sets the raised alarms.
+  /// Sets which alarms are raised, one bit each.
   void set_alarms(std::uint32_t alarms) { alarms_ = alarms; }
-  /// Sets the slaves whose process data are switched off: bit n is slave n.
+  /// Switches off the process data of the slaves whose bit is set in `slaves`.
   void set_silent(std::uint8_t slaves) { data_off_ = slaves; }
 
  private:
@@ -91,40 +93,40 @@ class EncoderOf {
   std::uint8_t life_counter_ = 0;
   LineDelay delay_;
 };
-/// An encoder of one word.
+/// A virtual encoder with one position word.
 using Encoder = EncoderOf<Format>;
 
-/// The registers of all slaves on a line. `memory` is what survives power off.
+/// The registers of all virtual slaves on a line. `memory` returns the part that is not lost at power off.
 class VirtualRegisters final : public ControlTarget {
  public:
-  static constexpr unsigned banks = 4;  ///< Number of banks of each slave.
+  static constexpr unsigned banks = 4;  ///< Number of register banks of each slave.
   /// Bytes of memory of each slave.
   static constexpr unsigned slave_size = banks * registers::bank_size + (registers::end - registers::bank_size);
   static constexpr unsigned most_slaves = ChainFormat::most;  ///< Greatest number of slaves.
 
-  /// `slaves`: number of slaves, 1 to `most_slaves`.
+  /// Creates the registers of `slaves` slaves, 1 to `most_slaves`.
   VirtualRegisters(unsigned slaves, RegisterOrder order, StopBit stop_bit);
-  /// Switches the encoder on.
+  /// Restores the values that registers and switches have after power on.
   void power_on();
-  /// Sets the present time; a register that is requested now is ready `delay` later.
+  /// Sets the present time to `at`; a register that is requested now is ready `delay` later.
   void set_time(Time at, Time delay);
-  /// Returns the memory of all slaves.
+  /// Returns the memory of all slaves, one after the other.
   [[nodiscard]] MutableBytes memory() { return MutableBytes(memory_).first(std::size_t{slaves_} * slave_size); }
-  /// Returns the number of writes.
+  /// Returns the number of register writes since construction.
   [[nodiscard]] std::uint32_t written() const { return written_; }
-  /// Returns the slaves whose process data are switched off.
+  /// Returns the slaves whose process data are switched off: bit n is slave n.
   [[nodiscard]] std::uint8_t silent() const { return data_off_; }
 
   [[nodiscard]] bool allows(unsigned slave, unsigned address, bool write) const override;
-  /// Returns a register.
+  /// Returns the value of the register of `slave` at `address`.
   [[nodiscard]] std::uint8_t read(unsigned slave, unsigned address) override;
-  /// Writes a register.
+  /// Writes `value` to the register of `slave` at `address`.
   void write(unsigned slave, unsigned address, std::uint8_t value) override;
   [[nodiscard]] bool stop_bit(bool next_allowed) const override;
   [[nodiscard]] bool is_ready() const override;
   [[nodiscard]] bool listens(unsigned slave) const override { return (control_off_ >> slave & 1) == 0; }
   [[nodiscard]] bool obeys(unsigned slave, unsigned command) const override;
-  /// Executes a command on the slaves whose bits are set.
+  /// Executes a command on all slaves whose bit is set in `slaves`.
   void execute(std::uint8_t slaves, unsigned command) override;
 
  private:
@@ -145,23 +147,23 @@ class VirtualRegisters final : public ControlTarget {
 
 /// Returns the number of slaves whose words the frames carry.
 [[nodiscard]] constexpr unsigned slaves_of(const Format&) { return 1; }
-/// Returns the number of slaves.
+/// Returns the number of slaves: one for each word of BiSS Safety.
 [[nodiscard]] constexpr unsigned slaves_of(const SafetyFormat&) { return 2; }
-/// Returns the number of slaves.
+/// Returns the number of slaves in the chain.
 [[nodiscard]] constexpr unsigned slaves_of(const ChainFormat& format) { return format.count; }
 
-/// A virtual encoder, or a chain of them.
+/// A virtual encoder, or a chain of virtual encoders, with registers and checks of the host's timing.
 template <class F>
 class VirtualEncoderOf final : public author::ClockedDevice {
  public:
-  /// Creates an encoder that is off until `power_on`. `shaft` must outlive it.
+  /// Creates an encoder with the times of `format` that is off until `power_on`. `shaft` must outlive it.
   VirtualEncoderOf(const F& format, const Shaft& shaft)
       : VirtualEncoderOf(format, shaft,
                          {.latency = format.ready > 0ns ? format.ready : std::min(format.latency, Behaviour{}.latency),
                           .line_delay = Time(format.line_delay_ns),
                           .register_delay = std::chrono::microseconds(format.register_delay_us),
                           .start_sequence = format.start_sequence}) {}
-  /// Follows `shaft`, which must outlive it.
+  /// Creates an encoder with the times of `behaviour` that is off until `power_on`. `shaft` must outlive it.
   VirtualEncoderOf(const F& format, const Shaft& shaft, const Behaviour& behaviour)
       : encoder_(format, shaft, behaviour),
         slaves_(slaves_of(format)),
@@ -178,7 +180,7 @@ class VirtualEncoderOf final : public author::ClockedDevice {
     timeout_ = encoder_.format().timeout.of_encoder(period);
     period_ = period;
     if (period / 2 < timeout_) hold_low(timeout_);
-    // SLO is still low from the frame before.
+    // SLO is still low after the previous frame.
     if (!expect(at >= free_at_, "clocked before the BiSS timeout has passed", at)) {
       samples.append(0, 64);
       return;
@@ -203,7 +205,7 @@ class VirtualEncoderOf final : public author::ClockedDevice {
       count_answer();
     }
     clocked_before_ = true;
-    free_at_ = at - period_ / 2 + timeout_;  // the timeout begins at the last rising edge
+    free_at_ = at - period_ / 2 + timeout_;  // the BiSS timeout begins at the last rising edge
   }
   void started(Time) override {
     registers_.power_on();
@@ -211,20 +213,21 @@ class VirtualEncoderOf final : public author::ClockedDevice {
     clocked_before_ = false;
     start_sequence_received_ = false;
   }
-  // Returns whether the clocks are a start sequence. An SPI controller can only clock whole bytes.
+  // Returns whether `clocks` clocks are a start sequence: two, or eight, as an SPI controller can only clock whole
+  // bytes.
   static bool is_start_sequence(std::size_t clocks) { return clocks == start_pulses || clocks == 8; }
 
   EncoderOf<F> encoder_;
   ControlSlaves slaves_;
   VirtualRegisters registers_;
-  unsigned needed_ = 0;  // clocks that this frame needs; 0: no frame was sent
-  Time timeout_{};       // timeout of this frame
+  unsigned needed_ = 0;  // clocks that the present frame needs; 0: no frame was sent
+  Time timeout_{};       // BiSS timeout after the present frame
   Time period_{};        // period of MA
-  Time free_at_{};       // earliest time of the next frame: the timeout after the last clock
+  Time free_at_{};       // earliest time of the next frame: the BiSS timeout after the last clock
   bool clocked_before_ = false;
-  bool start_sequence_received_ = false;  // the start sequence was received
+  bool start_sequence_received_ = false;  // whether the host has sent the start sequence since power on
 };
-/// A virtual encoder of one word.
+/// A virtual BiSS-C encoder with one position word.
 using VirtualEncoder = VirtualEncoderOf<Format>;
 
 }  // namespace absenc::biss

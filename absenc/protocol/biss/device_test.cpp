@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The virtual encoder and its line, sampled directly.
+// Tests of the virtual encoder and its line by their samples, without the host code.
 #include "absenc/protocol/biss/device.hpp"
 
 #include <gtest/gtest.h>
@@ -13,7 +13,7 @@ using testing::Bench;
 
 const Format bits_19{};
 
-// Assigns the members one by one: clang 14 leaves some of them uninitialised with Format{.ready = ready}.
+// Assigns the members separately: clang 14 leaves some members uninitialised with Format{.ready = ready}.
 Format format_with(Time latency, Time ready, Time line_delay = {}) {
   Format format = bits_19;
   format.latency = latency;
@@ -36,7 +36,7 @@ TEST(BissDevice, HoldsSloLowAfterCrc) {
   const std::string samples = bench.clock(200, 1ms, 1'000'000);
   EXPECT_EQ(samples.substr(0, 35), "11110010100001100101000111111110011");
   EXPECT_EQ(samples.find('1', 35), std::string::npos);
-  // SLO stays low within the timeout too.
+  // During the BiSS timeout SLO stays low too.
   EXPECT_EQ(bench.clock(200, 10us, 1'000'000), std::string(200, '0'));
 }
 
@@ -57,7 +57,7 @@ TEST(BissDevice, ReportsBrokenTimingRules) {
   EXPECT_EQ(soon.last_rule(), "clocked before the BiSS timeout has passed");
   EXPECT_EQ(soon.encoder.answer_count(), 1u);
   EXPECT_EQ(soon.clock(16, 20us, 1'000'000), "1100000000001000");
-  // The frame with the early clock and that with 16 clocks were both too short.
+  // Two frames were too short: the one with the early clock and the one with 16 clocks.
   EXPECT_EQ(soon.encoder.violation_count(), 2u);
 }
 
@@ -93,7 +93,7 @@ TEST(BissDevice, ReadyTimeIsThatOfOptionsOrAtMostTenMicroseconds) {
   EXPECT_EQ(ack(4us, 7us), 7u);
 }
 
-/// Returns how many of 100 frames are valid at this clock.
+/// Returns how many of 100 frames are valid with this period of MA and this delay of the line.
 unsigned good_frames(Time line_delay, Time period) {
   testing::TestShaft shaft;
   shaft.state.position = 0x1234'5678'9ABC;
@@ -113,7 +113,7 @@ unsigned good_frames(Time line_delay, Time period) {
 TEST(BissDevice, LineDelayCorruptsFramesAtHighClocks) {
   EXPECT_EQ(good_frames(300ns, 1us), 100u);
   EXPECT_EQ(good_frames(300ns, 330ns), 100u);
-  EXPECT_LT(good_frames(300ns, 315ns), 20u);  // an edge falls on the sample, which reads the old bit or the new one
+  EXPECT_LT(good_frames(300ns, 315ns), 20u);  // an edge falls on the sample, which reads the old bit or the new bit
   EXPECT_LT(good_frames(300ns, 290ns), 20u);
   EXPECT_EQ(good_frames(300ns, 227ns), 0u);  // a whole bit late: SLO goes low one sample late
 }

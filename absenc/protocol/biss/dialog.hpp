@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Connects a procedure of BiSS registers with the line, frame by frame. Each frame carries a position, which is decoded
-// and checked, and the encoder's bit (CDS). The host's bit (CDM) is the level of MA between two frames.
+// Connects a procedure that accesses BiSS registers with the line, frame by frame. Each frame carries a position, which
+// is decoded and checked, and the encoder's bit (CDS). The host's bit (CDM) is the level of MA between two frames.
 #pragma once
 
 #include "absenc/protocol/author/dialog.hpp"
@@ -9,13 +9,13 @@
 
 namespace absenc::biss {
 
-/// A dialog that reads positions and meanwhile carries control frames.
+/// A conversation that reads positions while a procedure sends and receives control frames bit by bit.
 template <class F>
 class ControlDialog : public author::ClockedHostOf<ProtocolOf<F>>, public author::Routine {
   using Base = author::ClockedHostOf<ProtocolOf<F>>;
 
  public:
-  /// A reply of the protocol.
+  /// Type of a decoded position frame.
   using Reply = typename ProtocolOf<F>::Reply;
 
   /// Clocks the next frame: `const Result<Reply> reply = co_await dialog.frame()`.
@@ -28,38 +28,38 @@ class ControlDialog : public author::ClockedHostOf<ProtocolOf<F>>, public author
     };
     return Frame{*this};
   }
-  /// Sets the CDM bit after the last frame.
+  /// Sets the CDM bit that is sent after the last frame.
   void set_cdm(bool cdm) { cdm_ = cdm; }
-  /// Number of clocked frames, and of those with an error.
+  /// Returns the number of frames that were clocked.
   [[nodiscard]] std::uint32_t frames() const { return frames_; }
   /// Returns the number of frames that failed a check.
   [[nodiscard]] std::uint32_t bad_frames() const { return bad_frames_; }
-  /// Returns the time of the last frame.
+  /// Returns the time at which the last frame was received.
   [[nodiscard]] Time now() const { return this->received_at(); }
   [[nodiscard]] std::string_view detail() const override { return outcome_.detail; }
   [[nodiscard]] std::string_view advice() const override { return outcome_.advice; }
-  /// Returns whether the texts of the outcome are complete, so that the last reply is not explained too.
+  /// Returns whether the texts of the outcome suffice, so that no explanation of the last reply is added.
   [[nodiscard]] bool is_alone() const { return outcome_.alone; }
   [[nodiscard]] ChangeSent change_sent() const final { return this->change(); }
-  /// Accepts frames without process data, which a command may have switched off: their CDS is valid.
+  /// Accepts frames whose process data a command may have switched off: their CDS is valid.
   void accept_empty_frames() { accepts_empty_ = true; }
-  /// Emits each valid position before the next frame begins.
+  /// Makes the conversation emit each valid position before the next frame begins.
   void emit_positions() { emits_ = true; }
 
-  /// Returns the next step of the port.
+  /// Returns what the port must do next, such as send or wait.
   Step<std::uint8_t> next(Time now) final {
     if (std::exchange(emitting_, false)) return {.kind = Step<std::uint8_t>::Kind::emit};
     return Base::next(now);
   }
 
  protected:
-  /// `arena`: storage of the coroutines.
+  /// Creates the conversation; the coroutines of the procedure are stored in `arena`.
   ControlDialog(const F& format, std::span<std::byte> arena) : Base(format, author::later), Routine(arena) {}
   ~ControlDialog() = default;
 
  private:
-  // Returns sequence_mismatch if the life counter did not advance by one since the last frame. It can be checked
-  // because this dialog reads every frame.
+  // Returns sequence_mismatch if the life counter did not advance by one since the last frame. This check is possible
+  // because the dialog reads every frame.
   [[nodiscard]] Error check_life_counter(const Reply& reply) {
     const int now = life_counter_of(this->format(), reply);
     const int before = std::exchange(life_counter_, now);
@@ -81,7 +81,7 @@ class ControlDialog : public author::ClockedHostOf<ProtocolOf<F>>, public author
     if (last_) {
       const unsigned head = last_->delay_bits + last_->ack_bits;
       const unsigned expected = head_bits(this->format(), this->format().latency, this->format().period());
-      // Called for every frame: a late frame must be confirmed by the frame right before it.
+      // Called for every frame, because a late frame must be confirmed by the frame right before it.
       const bool again = late_.is_again(head);
       if (head > expected && !again) last_ = Error::truncated;
     }

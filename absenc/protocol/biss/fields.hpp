@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Names and meanings of the fields of a BiSS frame outside its word.
+// Names and meanings of the fields of a BiSS frame that are not in its position word.
 #pragma once
 
 #include "absenc/protocol/author/field.hpp"
@@ -7,16 +7,16 @@
 
 namespace absenc::biss {
 
-/// Values of a BiSS frame outside its word.
+/// Values of a BiSS frame that are not in its position word.
 struct FrameValues {
-  unsigned ack_bits;           ///< Clocks until the encoder was ready.
-  unsigned crc;                ///< CRC as sent, inverted.
-  unsigned life_counter;       ///< Life counter (BiSS Safety).
+  unsigned ack_bits;           ///< Number of ACK bits: clocks until the encoder was ready.
+  unsigned crc;                ///< CRC as the encoder sends it.
+  unsigned life_counter;       ///< Life counter, 0 to 63.
   unsigned line_delay_clocks;  ///< Delay of the line there and back, in whole clocks.
   double line_delay_us;        ///< Delay of the line there and back, in microseconds.
 };
 
-/// Fields of these values.
+/// Fields in which FrameValues are reported.
 inline constexpr auto frame_fields = author::fields_of<FrameValues>(
     author::field<&FrameValues::ack_bits>("ack_bits", "", "clocks until the encoder was ready"),
     author::field<&FrameValues::crc>("crc", "", "as sent: inverted"),
@@ -27,8 +27,8 @@ inline constexpr auto frame_fields = author::fields_of<FrameValues>(
     author::field<&FrameValues::line_delay_us>("line_delay_us", "us",
                                                "the same at the clock of ma_khz: 100 m of cable make 1 us"));
 
-/// Reports the delay of the line. It is known only if the samples begin with the clock; others may begin anywhere in
-/// the idle line.
+/// Puts the delay of the line into `sink`. The delay is known only if the samples begin with the clock; other captures
+/// may begin anywhere in the idle line.
 template <class F, class ReplyType>
 constexpr void put_line_delay(FieldSink& sink, const F& format, const ReplyType& reply) {
   if (reply.delay_bits == 0) return;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// BiSS-C frames of one encoder as samples of SLO, one for each clock of MA: encode, decode, every check a frame allows,
-// and its times. README.md draws the frame. Sources: RLS "E201-9S Decoding the BiSS information"; BiSS C rev D2.
+// BiSS-C frames of one encoder as samples of SLO, one for each clock of MA: layout, encoding, decoding with all checks,
+// and times. README.md draws the frame. Sources: RLS "E201-9S Decoding the BiSS information"; BiSS C rev D2.
 #pragma once
 
 #include <algorithm>
@@ -20,37 +20,40 @@ namespace absenc::biss {
 
 using namespace std::chrono_literals;
 
-inline constexpr unsigned idle_bits = 2;  ///< idle samples before the ACK: SLO goes low on the second rising edge of MA
+/// Number of idle samples before the ACK: SLO goes low on the second rising edge of MA.
+inline constexpr unsigned idle_bits = 2;
 
-inline constexpr LineSettings line_settings{.rate = 1'000'000, .spi_mode = 3};  ///< Settings of the line.
-inline constexpr Time shortest_period = 100ns;                                  ///< shortest period of MA: 10 MHz
-/// Longest BiSS timeout: SLO stays low for 12.5 to 40 us after the last clock.
+/// Settings of a BiSS line: 1 MHz, and MA idles high.
+inline constexpr LineSettings line_settings{.rate = 1'000'000, .spi_mode = 3};
+/// Shortest period of MA that the document allows: 10 MHz.
+inline constexpr Time shortest_period = 100ns;
+/// Longest BiSS timeout. After the last clock, SLO stays low for 12.5 to 40 us.
 inline constexpr Time timeout_maximum = 40us;
-/// Start sequence: pulses of MA after power on, with 40 us before and after them.
+/// Number of pulses of MA in the start sequence after power on, with 40 us before and after them.
 inline constexpr unsigned start_pulses = 2;
 
 /// BiSS timeout, the time for which SLO stays low after the last clock: fixed, or one and a half periods of MA
 /// (adaptive). Takes one byte.
 class Timeout {
  public:
-  constexpr Timeout() = default;  // unknown timeout
-  /// Returns a fixed timeout of 12.5 us to 40 us, in steps of 0.5 us.
+  constexpr Timeout() = default;  // An unknown timeout: the host waits 40 us, the virtual encoder takes 20 us.
+  /// Returns a timeout of fixed length, 12.5 to 40 us in steps of 0.5 us.
   static constexpr Timeout fixed(Time length) { return Timeout(static_cast<std::uint8_t>(length / 500ns)); }
-  /// Returns the timeout that adapts to the clock.
+  /// Returns the timeout that adapts to the clock: one and a half periods of MA.
   static constexpr Timeout adaptive() { return Timeout(is_adaptive); }
 
-  /// Returns the pause that the host leaves between frames. An encoder that measures the period may be late by three of
-  /// its own samples (iC-PVS, table 50); 1 us is more than that for all known encoders.
+  /// Returns the pause that the host leaves between frames with this period of MA. An encoder that measures the period
+  /// may be late by three of its own samples (iC-PVS, table 50); 1 us is more than that for all known encoders.
   [[nodiscard]] constexpr Time of_host(Time period) const {
     if (code_ == is_adaptive) return Time(static_cast<std::int32_t>(one_and_a_half(period) + 1000));
     return Time(static_cast<std::int32_t>((code_ != 0 ? code_ : 80u) * 500u));
   }
-  /// Returns the timeout that the virtual encoder uses.
+  /// Returns the timeout that the virtual encoder uses with this period of MA.
   [[nodiscard]] constexpr Time of_encoder(Time period) const {
     if (code_ == is_adaptive) return Time(one_and_a_half(period));
     return Time((code_ != 0 ? code_ : 40u) * 500u);
   }
-  /// Compares all members.
+  /// Returns whether all members are equal.
   friend constexpr bool operator==(const Timeout&, const Timeout&) = default;
 
  private:
@@ -62,43 +65,46 @@ class Timeout {
   }
   explicit constexpr Timeout(std::uint8_t code) : code_(code) {}
 
-  std::uint8_t code_ = 0;  // timeout in 0.5 us; 0: unknown, 1: adaptive
+  std::uint8_t code_ = 0;  // unit 0.5 us; 0: unknown timeout, 1: adaptive
 };
 
-/// The bit P that the virtual encoder sends after each register.
+/// The bit P that the virtual encoder sends after each register: 0 if the next register may be accessed, or always 0,
+/// or always 1.
 enum class StopBit : std::uint8_t { next, zero, one };
-/// Words of the option `stop_bit`.
+/// Values of the option `stop_bit`, in the order of StopBit.
 inline constexpr std::array<std::string_view, 3> stop_bit_choices{"next", "zero", "one"};
 
-/// Byte order of registers that together are one number.
+/// Byte order of a number that several registers hold.
 enum class RegisterOrder : std::uint8_t { big, little };
-/// Words of the option `register_order`.
+/// Values of the option `register_order`, in the order of RegisterOrder.
 inline constexpr std::array<std::string_view, 2> register_order_choices{"big", "little"};
 
-/// Format of the encoder: the values of its options.
+/// Frame layout and settings of one encoder, as the unit's options select them.
 struct Format {
-  WordFormat word = "position:19 error:1! warning:1!"_word;  ///< Fields of the position word.
-  Check check{};                                             ///< Checksum of the word.
-  Scale scale{};                                             ///< Length of a count of a linear encoder.
-  std::uint16_t ma_khz = 1000;                               ///< clock MA in kHz, 10 to 10 000
+  WordFormat word = "position:19 error:1! warning:1!"_word;  ///< Layout of the position word.
+  Check check{};                                             ///< Life counter and CRC that follow the position word.
+  /// Whether the encoder is linear, and the length of a count.
+  Scale scale{};
+  std::uint16_t ma_khz = 1000;  ///< Clock MA in kHz, 10 to 10 000.
   // The members for registers and start sequence fit into padding, so that a reader of positions needs no more memory.
-  std::uint8_t slave = 0;  ///< slave whose registers are accessed: 0 to 7, counted from the end of the chain
-  RegisterOrder register_order = RegisterOrder::big;  ///< Order of the bytes of registers.
-  std::uint16_t register_delay_us = 0;  ///< virtual encoder: time in us until a requested register is ready
-  bool start_sequence = false;          ///< virtual encoder: SLO stays idle until the start sequence
-  Timeout timeout{};                    ///< Timeout of the encoder.
+  std::uint8_t slave = 0;  ///< Slave whose registers are accessed: 0 to 7, counted from the end of the chain.
+  RegisterOrder register_order = RegisterOrder::big;  ///< Byte order of a number that several registers hold.
+  std::uint16_t register_delay_us = 0;  ///< Virtual encoder: time in us until a requested register is ready.
+  /// Virtual encoder: whether SLO stays idle after power on until the start sequence.
+  bool start_sequence = false;
+  Timeout timeout{};  ///< BiSS timeout: how long the encoder holds SLO low after the last clock.
   /// The longest time that the encoder needs for a position, up to 1 ms; it decides the number of clocks.
   Time latency = 10us;
   // ---- Members for the virtual encoder
-  StopBit stop_bit = StopBit::next;  ///< The bit P of the virtual encoder.
-  std::uint32_t line_delay_ns = 0;   ///< Delay of the line in nanoseconds.
-  Time ready{};  ///< time that the virtual encoder needs for a position; 0: as `latency`, but at most 10 us
+  StopBit stop_bit = StopBit::next;  ///< The bit P that the virtual encoder sends after each register.
+  std::uint32_t line_delay_ns = 0;   ///< Virtual encoder: delay of the line there and back, in nanoseconds.
+  Time ready{};  ///< Virtual encoder: time that it needs for a position; 0: as `latency`, but at most 10 us.
 
   /// Returns the period of MA.
   [[nodiscard]] constexpr Time period() const { return Time((1'000'000u + ma_khz / 2u) / ma_khz); }
 };
 
-/// Returns the word format with turns, position, nError and nWarning.
+/// Returns a word format with the fields turns, position, nError and nWarning.
 [[nodiscard]] constexpr WordFormat word_with_status(const PositionBits& bits) {
   WordFormat word = word_format(bits);
   word.add({"error", Meaning::error, 1, true});
@@ -106,58 +112,58 @@ struct Format {
   return word;
 }
 
-/// Returns the bits after the CDS bit: word, life counter and CRC.
+/// Returns the number of bits after the CDS bit: word, life counter and CRC.
 [[nodiscard]] constexpr unsigned data_bits(const Format& format) { return format.word.bits() + format.check.bits(); }
 
-/// Returns the ACK bits of an encoder whose position is ready `latency` after the second rising edge of MA. Both
-/// arguments are at most a second, so that a small processor divides 32 bits.
+/// Returns the number of ACK bits of an encoder whose position is ready `latency` after the second rising edge of MA.
+/// Both arguments are at most a second, so that a small processor divides 32 bits.
 [[nodiscard]] constexpr unsigned ack_bits(Time latency, Time period) {
   const auto needed = static_cast<std::uint32_t>(latency.count());
   const auto clock = static_cast<std::uint32_t>(period.count());
   return std::max(1u, static_cast<unsigned>((needed + clock - 1) / clock));
 }
 
-/// Returns the clocks that the slaves between an encoder and the host add to the ACK: each passes the start bit on one
-/// clock later.
+/// Returns the number of clocks that the slaves between an encoder and the host add to the ACK: each passes the start
+/// bit on one clock later. 0 for a single encoder.
 template <class AnyFormat>
 [[nodiscard]] constexpr unsigned relay_bits(const AnyFormat&) {
   return 0;
 }
 
-/// Returns the clocks between the idle samples and the start bit.
+/// Returns the number of clocks between the idle samples and the start bit: ACK bits and delay by other slaves.
 template <class AnyFormat>
 [[nodiscard]] constexpr unsigned head_bits(const AnyFormat& format, Time latency, Time period) {
   return ack_bits(latency, period) + relay_bits(format);
 }
 
-/// Returns the clocks that a whole frame needs.
+/// Returns the number of clocks that a whole frame needs, from the idle samples to the CRC.
 template <class AnyFormat>
 [[nodiscard]] constexpr unsigned clocks(const AnyFormat& format, Time latency, Time period) {
   return idle_bits + head_bits(format, latency, period) + 2 + data_bits(format);
 }
 
-/// A reply: position word, checksum and what frames the data.
+/// A decoded frame: position word, life counter, CRC and the bits before them.
 template <class WordType>
 struct ReplyWith {
   unsigned ack_bits = 1;          ///< Number of ACK bits: zeros between the idle samples and the start bit.
-  WordType word{};                ///< The position word.
-  std::uint8_t life_counter = 0;  ///< life counter, if the check has one
-  bool cds = false;               ///< the encoder's bit of control communication
-  std::uint16_t crc = 0;          ///< CRC as sent
-  unsigned delay_bits = 0;        ///< extra idle samples: the line's delay in clocks
+  WordType word{};                ///< Decoded fields of the position word.
+  std::uint8_t life_counter = 0;  ///< Life counter, 0 to 63; 0 if the check has none.
+  bool cds = false;               ///< CDS: the encoder's bit of control communication.
+  std::uint16_t crc = 0;          ///< CRC as the encoder sent it.
+  unsigned delay_bits = 0;        ///< Extra idle samples: the delay of the line in clocks.
 };
-/// A reply with one word.
+/// A decoded frame whose word format is known at run time.
 using Reply = ReplyWith<Word>;
-/// A reply to a host that knows the format at compile time.
+/// A decoded frame whose format is known at compile time.
 template <const Format& format>
 using ReplyTo = ReplyWith<typename Known<format>::Word>;
 
-/// Whether a CDS of 1 is valid: only during control communication.
+/// Values of CDS that decoding accepts: a CDS of 1 is valid only during control communication.
 enum class Cds : std::uint8_t { zero, any };
 
 namespace detail {
 
-// Decodes a word and its check from `bits`, beginning at `first`.
+// Decodes a word and its check from `bits`, beginning at index `first`. Returns the first error.
 template <class Source, class Bits, class Data>
 constexpr Error take_data(const Source& source, const Bits& bits, std::size_t first, Data& data) {
   const Check& check = source.format.check;
@@ -173,7 +179,7 @@ constexpr Error take_data(const Source& source, const Bits& bits, std::size_t fi
   return absenc::detail::take_word(source, bits, first, data.word);
 }
 
-// Finds the index `first` of the `size` bits after the CDS bit. Stores ACK, delay and CDS in `head`.
+// Decodes the bits before the data: sets `first` to the index after the CDS bit, and ACK, delay and CDS in `head`.
 template <class ReplyType>
 constexpr Error take_head(BitView samples, std::size_t size, Cds cds, ReplyType& head, std::size_t& first) {
   if (samples.size == 0) return Error::wrong_length;
@@ -213,7 +219,7 @@ constexpr auto decode_by(const Source& source, BitView samples, Cds cds) {
   return result;
 }
 
-// Appends word, life counter and CRC.
+// Appends word, life counter and CRC to `out`.
 template <class Format, class Data, std::size_t Capacity>
 constexpr void append_data(const Format& format, const Data& data, BitBuffer<Capacity>& out) {
   const std::size_t first = out.size();
@@ -224,7 +230,7 @@ constexpr void append_data(const Format& format, const Data& data, BitBuffer<Cap
   out.append(crc_as_sent(source, out.view(), first, out.size() - first), format.check.width);
 }
 
-// Appends idle bits, ACK, start bit and CDS. Returns false if `size` more bits do not fit.
+// Appends idle bits, ACK, start bit and CDS to `out`. Returns false if `size` more bits do not fit.
 template <class ReplyType, std::size_t Capacity>
 constexpr bool append_head(const ReplyType& head, std::size_t size, BitBuffer<Capacity>& out) {
   if (out.capacity() - out.size() < idle_bits + head.delay_bits + head.ack_bits + 2 + size) return false;
@@ -243,15 +249,15 @@ constexpr bool append_head(const ReplyType& head, std::size_t size, BitBuffer<Ca
   return detail::decode_by(Given<Format>{format, format.word}, samples, cds);
 }
 
-/// Decodes a frame whose format is known at compile time, as fast as code written for it by hand. The result has
-/// `values` only if the format has some.
+/// Decodes a frame whose format is known at compile time, as fast as code written for this format by hand. Errors as
+/// above. The word in the result has the member `values` only if the format has further fields.
 template <const Format& format>
 [[nodiscard]] constexpr Result<ReplyTo<format>> decode(BitView samples, Cds cds = Cds::zero) {
   return detail::decode_by(Known<format>{}, samples, cds);
 }
 
-/// Appends idle bits, ACK, start bit, CDS, word and check; `reply.crc` is ignored. `silent`: bit n is set if the
-/// process data of slave n are switched off. Returns false if `out` is too small.
+/// Appends idle bits, ACK, start bit, CDS, word and check to `out`; `reply.crc` is ignored. `silent`: bit n is set if
+/// the process data of slave n are switched off. Returns false if `out` is too small.
 template <std::size_t Capacity>
 constexpr bool encode(const Format& format, const Reply& reply, BitBuffer<Capacity>& out, std::uint8_t silent = 0) {
   if (!detail::append_head(reply, data_bits(format), out)) return false;
@@ -259,46 +265,47 @@ constexpr bool encode(const Format& format, const Reply& reply, BitBuffer<Capaci
   return true;
 }
 
-/// Fills the reply of a virtual encoder.
+/// Sets word and life counter of a virtual encoder's reply from the state of its shaft and its alarms.
 constexpr void show(const Format& format, const ShaftState& state, std::uint32_t alarms, std::uint8_t life_counter,
                     Reply& reply) {
   reply.word = word_of(format.word, state, alarms);
   reply.life_counter = life_counter;
 }
 
-/// Returns the reading of a reply.
+/// Converts a reply to a reading.
 [[nodiscard]] constexpr Reading reading_of(const Format& format, const Reply& reply) {
   return to_reading(format.word, reply.word, format.scale);
 }
 
-/// A format that is known at compile time, in the form that hosts of any format use.
+/// The format `known` as a type with the members that hosts of any format use.
 template <const Format& known>
 struct KnownFormat {
-  static constexpr std::uint16_t ma_khz = known.ma_khz;  ///< Clock in kHz.
-  static constexpr Time latency = known.latency;         ///< Time that the encoder takes before its start bit.
-  static constexpr Timeout timeout = known.timeout;      ///< Timeout of the encoder.
-  /// Returns the period of the clock.
+  static constexpr std::uint16_t ma_khz = known.ma_khz;  ///< Clock MA in kHz.
+  static constexpr Time latency = known.latency;         ///< Longest time that the encoder needs for a position.
+  static constexpr Timeout timeout = known.timeout;      ///< BiSS timeout after the last clock.
+  /// Returns the period of MA.
   [[nodiscard]] static constexpr Time period() { return known.period(); }
 };
-/// Returns the number of data bits.
+/// Returns the number of bits after the CDS bit: word, life counter and CRC.
 template <const Format& format>
 [[nodiscard]] constexpr unsigned data_bits(const KnownFormat<format>&) {
   constexpr unsigned bits = data_bits(format);
   return bits;
 }
-/// Decodes a frame whose format is known at compile time.
+/// Decodes a frame whose format is known at compile time; errors as for any format.
 template <const Format& format>
 [[nodiscard]] constexpr Result<ReplyTo<format>> decode(const KnownFormat<format>&, BitView samples, Cds cds) {
   return decode<format>(samples, cds);
 }
-/// Returns the reading of a reply.
+/// Converts a reply to a reading.
 template <const Format& format>
 [[nodiscard]] constexpr Reading reading_of(const KnownFormat<format>&, const ReplyTo<format>& reply) {
   constexpr WordContents contents = contents_of(format.word);
   return to_reading(contents, reply.word, format.scale);
 }
 
-/// Returns whether only zeros follow the CDS: process data are switched off. `head` gets the bits before them.
+/// Returns whether only zeros follow the CDS bit, because process data are switched off. Stores ACK, delay and CDS in
+/// `head`.
 template <class ReplyType>
 [[nodiscard]] constexpr bool is_empty_frame(BitView samples, ReplyType& head) {
   std::size_t first = 0;
@@ -306,7 +313,7 @@ template <class ReplyType>
   return first < samples.size && !samples[first] && samples.end_of_run(first) == samples.size;
 }
 
-/// Returns whether the samples ended before the frame did, because encoder or line need longer than expected.
+/// Returns whether the samples ended before the frame did, because encoder or line needed longer than expected.
 [[nodiscard]] constexpr bool ended_early(Error error, BitView samples) {
   if (error == Error::truncated) return true;
   return error == Error::bad_framing && samples.end_of_run(samples.end_of_run(0)) == samples.size;

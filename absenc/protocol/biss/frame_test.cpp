@@ -68,8 +68,8 @@ TEST(BissFrame, DecodesAtEveryOffsetInSixtyFourSamples) {
 
 bool skips(const Format& format) { return format.word.find(Meaning::skip) != nullptr; }
 
-// Decodes noise, cut frames and frames with flipped bits: a format known at compile time must give the same results as
-// one known at run time.
+// Decodes noise, cut frames and frames with flipped bits. The decoder of a format known at compile time must give the
+// same results as that of a format known at run time.
 template <const Format& format>
 void agree(std::uint64_t seed) {
   sim::Random random(seed);
@@ -94,8 +94,8 @@ void agree(std::uint64_t seed) {
     ASSERT_EQ(known.error(), given.error());
     if (!given) continue;
     ++good;
-    // An accepted frame must equal the frame that its fields encode. Skipped bits are not stored, so they are not
-    // compared.
+    // Encoding the fields of an accepted frame must give the same frame. Skipped bits of the word are not stored, so
+    // they are not compared.
     Reply at_hand = *given;
     at_hand.delay_bits = 0;
     BitBuffer<512> again;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Host side of BiSS-C: the host drives MA and samples SLO.
+// Host side of BiSS-C: the host drives the clock MA, samples SLO and decodes the position.
 #pragma once
 
 #include <algorithm>
@@ -11,68 +11,69 @@
 
 namespace absenc::biss {
 
-/// Longest extra delay of encoder and line, beyond the expected one, for which a host still searches the frame.
+/// Longest extra delay of encoder and line, beyond the expected delay, with which a host still finds the frame.
 inline constexpr Time longest_delay = 80us;
 
-/// A dialog that reads positions and meanwhile carries control frames.
+/// A conversation that reads positions and meanwhile carries control frames: dialog.hpp.
 template <class F>
 class ControlDialog;
 
 namespace detail {
-// Decodes a frame of any format. The call is found by argument-dependent lookup, so that formats can be declared later.
+// Decodes a frame of any format. Argument-dependent lookup finds `decode`, so that formats can be declared later.
 template <class F>
 constexpr auto decoded(const F& format, BitView samples, Cds cds = Cds::zero) {
   return decode(format, samples, cds);
 }
 }  // namespace detail
 
-/// BiSS-C for the engine and the virtual encoder. F: Format, or a format with several words per frame.
+/// BiSS-C as the classes of author/ use it: types, times and decoding. F: Format, or a format with several words per
+/// frame.
 template <class F>
 struct ProtocolOf {
-  /// Format of the encoder: the values of its options.
+  /// Frame layout and settings of one encoder, as the unit's options select them.
   using Format = F;
-  /// The link has no requests.
+  /// Empty type: on a clocked link the host sends no requests.
   using Request = author::NoRequest;
-  /// A reply of the protocol.
+  /// Type of a decoded frame.
   using Reply = std::remove_cvref_t<decltype(*detail::decoded(F{}, BitView{}))>;
-  /// Dialog of procedures.
+  /// Interface by which procedures clock frames.
   using Dialog = ControlDialog<F>;
-  static constexpr unsigned most_clocks = 512;  ///< Greatest number of clocks of a transfer.
+  static constexpr unsigned most_clocks = 512;  ///< Greatest number of clocks in one transfer.
 
-  /// Returns how long a host waits for replies.
+  /// Returns the rate of MA and the pause before each frame.
   static constexpr author::ClockedHostTimes host_times(const F& format) {
     return {std::uint32_t{format.ma_khz} * 1000, format.timeout.of_host(format.period())};
   }
-  /// Returns the number of clocks of a transfer.
+  /// Returns the number of clocks of a frame with the expected delay.
   static constexpr unsigned clocks(const F& format) { return biss::clocks(format, format.latency, format.period()); }
-  /// Returns the clocks for a frame whose delay is unknown.
+  /// Returns the number of clocks of a frame with the longest delay that is searched, at most `most_clocks`.
   static constexpr unsigned all_clocks(const F& format) {
     return std::min(most_clocks, biss::clocks(format, format.latency + longest_delay, format.period()));
   }
-  /// Returns the reply with all checks done, or the first error.
+  /// Decodes a frame with all checks; returns the first error if one fails.
   static constexpr Result<Reply> decode(const F& format, BitView samples) { return detail::decoded(format, samples); }
-  /// Returns the position of a reply.
+  /// Converts a reply to a reading.
   static constexpr Reading reading(const F& format, const Reply& reply) { return reading_of(format, reply); }
 };
-/// The protocol of one word.
+/// BiSS-C with one position word.
 using Protocol = ProtocolOf<Format>;
 
-/// Returns the life counter, which must advance with each frame; -1 if the frames have none.
+/// Returns the life counter of a reply, which must advance by one with each frame; -1 if the check has none.
 [[nodiscard]] constexpr int life_counter_of(const Format& format, const Reply& reply) {
   return format.check.life_counter ? reply.life_counter : -1;
 }
-/// Returns the life counter of a reply, or -1 if it has none.
+/// Returns the life counter of a reply, or -1 if the check has none.
 template <const Format& format>
 [[nodiscard]] constexpr int life_counter_of(const KnownFormat<format>&, const ReplyTo<format>& reply) {
   return format.check.life_counter ? reply.life_counter : -1;
 }
 
-/// Confirms frames that begin later than expected: accepts a delay that occurs twice in a row. A lost start bit also
-/// makes a frame look late, and its CRC is valid once in 64 times.
+/// Confirms frames that begin later than expected, by accepting a delay that occurs twice in a row. A single late frame
+/// may have lost its start bit: its CRC is then still valid once in 64 times.
 class LateFrames {
  public:
-  /// Returns whether the last frame had the same delay. `head`: clocks before the start bit beyond the idle ones; a
-  /// difference of one is accepted, because the delay may be near a whole clock.
+  /// Returns whether the frame before had the same delay. `head`: clocks between the idle samples and the start bit. A
+  /// difference of one clock is accepted, because the delay may be near a whole clock.
   [[nodiscard]] bool is_again(unsigned head) {
     const unsigned before = std::exchange(seen_, head);
     return before != 0 && head + 1 - before <= 2;
@@ -83,16 +84,17 @@ class LateFrames {
 };
 
 /// Decides when to send the start sequence. After power on, an encoder may stay idle until it receives two pulses of
-/// MA, with 40 us before and after them. A host does not know when that was: it sends them once, if the first frame is
-/// stuck.
+/// MA, with 40 us before and after them. A host does not know when the encoder was powered on, so it sends the pulses
+/// once, if its first frame is stuck.
 class StartSequence {
  public:
-  /// Takes the result of a frame and returns whether the start sequence must follow.
+  /// Processes the error of a frame and returns whether the start sequence must be sent next.
   [[nodiscard]] bool is_due(Error error) {
     given_ = std::exchange(first_, false) && error == Error::line_stuck;
     return given_;
   }
-  /// Returns whether the last transfer was the start sequence, so that the frame must be clocked again.
+  /// Returns whether the last transfer was the start sequence, so that the frame must be clocked again. Resets this
+  /// state.
   [[nodiscard]] bool was_given() { return std::exchange(given_, false); }
 
  private:
@@ -100,16 +102,18 @@ class StartSequence {
   bool given_ = false;
 };
 
-/// Reads one frame; with life counters two, which must follow each other (sequence_mismatch). If `finds`, also searches
-/// a frame that is later than expected, and sends the start sequence if needed.
+/// Reads one frame; if the frames have life counters, two frames whose counters must follow each other
+/// (sequence_mismatch). If `finds`, also searches a frame that is later than expected, and sends the start sequence if
+/// needed.
 template <class F, bool finds>
 class PositionReader : public author::ClockedHostOf<ProtocolOf<F>> {
   using Base = author::ClockedHostOf<ProtocolOf<F>>;
   using P = ProtocolOf<F>;
-  static constexpr unsigned most_late = 4;  // late frames that are read until two of them agree
+  // greatest number of late frames that are read until two in a row have the same delay
+  static constexpr unsigned most_late = 4;
 
  public:
-  /// Reads positions from an encoder of this format.
+  /// Creates a conversation that reads an encoder of this format.
   explicit PositionReader(const F& format) : Base(format) {}
 
  private:
@@ -149,7 +153,7 @@ class PositionReader : public author::ClockedHostOf<ProtocolOf<F>> {
   [[no_unique_address]] std::conditional_t<finds, LateFrames, author::Later> late_{};
   [[no_unique_address]] std::conditional_t<finds, StartSequence, author::NoRequest> start_{};
 };
-/// Reads the position of a known line; a drive polls with it.
+/// Reads the position from a line with a known delay; a drive polls with this conversation.
 using ReadPosition = PositionReader<Format, false>;
 /// Reads the position with a format that is known at compile time: `static constexpr Format format{...};`.
 template <const Format& format>
@@ -157,7 +161,7 @@ class ReadKnownPosition final : public PositionReader<KnownFormat<format>, false
  public:
   ReadKnownPosition() : PositionReader<KnownFormat<format>, false>({}) {}
 };
-/// Reads a frame that may be later than expected, as the first one is.
+/// Reads a frame that may be later than expected, as the first frame from an unknown line is.
 template <class F>
 using FindPosition = PositionReader<F, true>;
 

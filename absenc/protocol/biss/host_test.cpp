@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The host conversation against the virtual encoder in virtual time.
+// Tests of the host's conversations against the virtual encoder in virtual time.
 #include "absenc/protocol/biss/host.hpp"
 
 #include <gtest/gtest.h>
@@ -109,7 +109,7 @@ TEST(BissHost, AddsClocksForLineDelay) {
   }
 }
 
-// Feeds these frames to the reader, one after the other, and returns its error.
+// Feeds these frames to a reader, one after the other, and returns the error of the reader.
 template <class Reader>
 Error clock_out(Reader& read, std::span<const BitBuffer<128>> frames) {
   Time now{};
@@ -126,7 +126,8 @@ Error clock_out(Reader& read, std::span<const BitBuffer<128>> frames) {
   return read.error();
 }
 
-// Compares both readers on valid frames, and on frames with each single bit wrong.
+// Compares the reader of a known format with that of any format, on valid frames and on frames with each single bit
+// wrong.
 template <const Format& format>
 void reads_as_any_format() {
   std::array<BitBuffer<128>, 2> good;
@@ -246,8 +247,9 @@ TEST(BissHost, SendsStartSequenceWhenFirstFrameIsStuck) {
   clocks.clear();
   FindPosition<Format> nobody(format);
   EXPECT_EQ(bench.run(nobody).error(), Error::line_stuck);
-  const std::size_t longest = ProtocolOf<Format>::all_clocks(format);                  // the line's delay may be long
-  EXPECT_EQ(clocks, (std::vector<std::size_t>{frame, start_pulses, frame, longest}));  // each of them once
+  // the delay of the line may be long
+  const std::size_t longest = ProtocolOf<Format>::all_clocks(format);
+  EXPECT_EQ(clocks, (std::vector<std::size_t>{frame, start_pulses, frame, longest}));  // each transfer occurs once
 }
 
 TEST(BissHost, ClocksLongerBeforeReportingStuckLine) {

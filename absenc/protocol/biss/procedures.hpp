@@ -15,18 +15,19 @@ using author::Outcome;
 using author::Part;
 using author::Procedure;
 
-/// Longest time of an encoder until its start bit; the host waits twice as long.
+/// Longest time that the document allows an encoder until its start bit; the host waits twice as long.
 inline constexpr Time start_limit = 20ms;
-inline constexpr unsigned control_attempts = 4;  ///< attempts of a control frame that may be repeated
+/// Greatest number of attempts of a control frame that may be repeated.
+inline constexpr unsigned control_attempts = 4;
 
-/// Advice where an encoder has no registers.
+/// Detail of an error that means that the encoder has no registers.
 inline constexpr std::string_view no_registers =
     "no encoder answers: it has no registers (or a line that only goes one way), or another ID (slave)";
-/// Advice where an encoder refuses a control frame.
+/// Detail of an error that means that the encoder refused a control frame.
 inline constexpr std::string_view refused =
     "the encoder refuses this register: it does not have it, or it is read only";
 
-/// Runs one control frame to its end.
+/// Exchanges one control frame to its end and returns its error; busy if the encoder's start bit is too late.
 template <class F>
 Part<Error> run_control_frame(ControlDialog<F>& dialog, ControlMaster& master) {
   Time waits_since{};
@@ -48,7 +49,7 @@ Part<Error> run_control_frame(ControlDialog<F>& dialog, ControlMaster& master) {
   co_return master.error();
 }
 
-/// Returns the outcome of an error.
+/// Returns detail and advice for the error of a control frame.
 [[nodiscard]] constexpr Outcome failure_of(Error error) {
   if (error == Error::timeout) return only(error, no_registers, "read positions without them, or say slave=N");
   if (error == Error::request_rejected) return only(error, refused);
@@ -56,21 +57,22 @@ Part<Error> run_control_frame(ControlDialog<F>& dialog, ControlMaster& master) {
   return {.error = error, .detail = "the registers were not read"};
 }
 
-/// Returns whether a repetition may help: after a damaged frame, or a header that the encoder did not receive.
+/// Returns whether repeating a control frame with this error may help: not after a refusal, a late start bit or a wrong
+/// argument.
 [[nodiscard]] constexpr bool is_repeatable(Error error) {
   return error != Error::request_rejected && error != Error::busy && error != Error::invalid_argument;
 }
 
-/// Returns whether a byte was late: the encoder delayed it, or a start bit was lost. No CRC covers CDS; the bits after
-/// a lost start bit are shifted, which the four bits of a byte's CRC may miss.
+/// Returns whether a data byte of the control frame was late: the encoder delayed it, or a start bit was lost. No CRC
+/// covers CDS; the bits after a lost start bit are shifted, which the four bits of a byte's CRC may miss.
 [[nodiscard]] constexpr bool was_late(const ControlFrame& frame) {
   const auto delays = frame.start_delay.view();
   return std::any_of(delays.begin(), delays.end(), [](std::uint16_t delay) { return delay != 0; });
 }
 
-/// Appends `count` registers to `bytes`, 64 at most. Late bytes are read until the same data is received twice. If P
-/// refuses the next register, it is read with a control frame of its own: some encoders send P = 1 after every
-/// register.
+/// Reads `count` registers, 64 at most, appends their values to `bytes` and returns the error. Late bytes are read
+/// until the same data is received twice. If P refuses the next register, a separate control frame reads it: some
+/// encoders send P = 1 after every register.
 template <class F>
 Part<Error> read_registers(ControlDialog<F>& dialog, ControlMaster& master, ByteBuffer<control_most>& bytes,
                            unsigned first, std::size_t count) {
@@ -100,7 +102,8 @@ Part<Error> read_registers(ControlDialog<F>& dialog, ControlMaster& master, Byte
   co_return error;
 }
 
-/// Writes a register and compares it by reading it back, after an error too: the register decides, not the answer.
+/// Writes a register and reads it back, even after an error: the value in the register decides, not the encoder's
+/// answer. Returns cross_check_failed if the value differs.
 template <class F>
 Part<Error> write_register(ControlDialog<F>& dialog, ControlMaster& master, unsigned address, std::uint8_t value) {
   const std::array<std::uint8_t, 1> bytes{value};
@@ -114,7 +117,7 @@ Part<Error> write_register(ControlDialog<F>& dialog, ControlMaster& master, unsi
   co_return error != Error::none ? error : Error::cross_check_failed;
 }
 
-/// Writes a register that the command is meant to change.
+/// Writes a register that the user's command is meant to change, and records that the encoder was changed.
 template <class F>
 Part<Error> change_register(ControlDialog<F>& dialog, ControlMaster& master, unsigned address, std::uint8_t value) {
   dialog.changes();
@@ -123,13 +126,13 @@ Part<Error> change_register(ControlDialog<F>& dialog, ControlMaster& master, uns
   co_return error;
 }
 
-/// Selects the bank of `address`, if the address belongs to a bank.
+/// Selects the bank of `address` and returns the error; does nothing if the address belongs to no bank.
 template <class F>
 Part<Error> select_bank(ControlDialog<F>& dialog, ControlMaster& master, unsigned bank, unsigned address) {
   if (address >= registers::bank_size) co_return Error::none;
   ByteBuffer<control_most> selected;
   const Error error = co_await read_registers(dialog, master, selected, registers::bank_select, 1);
-  // An encoder with a single bank need not have a bank select register.
+  // An encoder with a single bank may lack a bank select register.
   if (error == Error::request_rejected && bank == 0) co_return Error::none;
   if (error != Error::none || selected[0] == bank) co_return error;
   const Error written =
@@ -137,7 +140,7 @@ Part<Error> select_bank(ControlDialog<F>& dialog, ControlMaster& master, unsigne
   co_return written;
 }
 
-/// Reads registers.
+/// Reads registers. Arguments: address, bank, count.
 template <class F>
 Procedure read_memory(ControlDialog<F>& dialog, ControlResults& found, Arguments arguments) {
   const auto address = static_cast<unsigned>(arguments[0]);
@@ -162,7 +165,8 @@ Procedure read_memory(ControlDialog<F>& dialog, ControlResults& found, Arguments
   co_return done;
 }
 
-/// Writes a byte unless it has this value already: a register may wear out, and only its maker knows how fast.
+/// Writes a register unless it has this value already: a register may wear out, and only its maker knows how fast.
+/// Arguments: address, value, bank, 1 to force the write.
 template <class F>
 Procedure write_memory(ControlDialog<F>& dialog, ControlResults& found, Arguments arguments) {
   const auto address = static_cast<unsigned>(arguments[0]);
@@ -196,7 +200,8 @@ Procedure write_memory(ControlDialog<F>& dialog, ControlResults& found, Argument
   co_return done;
 }
 
-/// Reads a named register. A refusal means that the encoder does not have it, which is a result too.
+/// Reads the register with a name at `address`. A refusal means that the encoder lacks it, which is reported as a
+/// result.
 template <class F>
 Procedure read_setting(ControlDialog<F>& dialog, ControlResults& found, unsigned address) {
   ControlMaster master;
@@ -212,7 +217,7 @@ Procedure read_setting(ControlDialog<F>& dialog, ControlResults& found, unsigned
   co_return done;
 }
 
-/// Selects a bank.
+/// Selects the bank that is the first argument.
 template <class F>
 Procedure write_bank(ControlDialog<F>& dialog, ControlResults& found, Arguments arguments) {
   ControlMaster master;
@@ -225,7 +230,7 @@ Procedure write_bank(ControlDialog<F>& dialog, ControlResults& found, Arguments 
   co_return done;
 }
 
-/// Reads the registers that identify the encoder. Leaves out those that it refuses.
+/// Reads the registers that identify the encoder. Leaves out registers that the encoder refuses.
 template <class F>
 Procedure read_info(ControlDialog<F>& dialog, ControlResults& found) {
   ControlMaster master;
@@ -258,8 +263,8 @@ Procedure read_info(ControlDialog<F>& dialog, ControlResults& found) {
   co_return done;
 }
 
-/// Sends a command to the slaves of a mask; 0: to all, without acknowledgement. The last bit is sent after one more
-/// frame. The frames may be without process data before or after the command.
+/// Sends a command to the slaves of a mask; 0: to all, without acknowledgement. The last bit of the control frame is
+/// sent after one more position frame. Position frames may lack process data before or after the command.
 template <class F>
 Procedure send_command(ControlDialog<F>& dialog, ControlResults& found, Arguments arguments) {
   ControlMaster master;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Register procedures: requests they refuse, delays, read back, reported fields, and accepted frames.
+// Tests of register procedures: refused requests, delays, reading back, reported fields, and accepted frames.
 #include "absenc/protocol/biss/procedures.hpp"
 
 #include <gtest/gtest.h>
@@ -195,7 +195,7 @@ TEST(BissProcedures, AcceptsLateFrameWhenTheNextIsAsLate) {
   const Error none = Error::none;
   const Error late = Error::truncated;
   EXPECT_EQ(errors({10, 10, 9, 10, 10}), (Errors{none, none, none, none, none}));
-  // The first of the late frames had too few clocks.
+  // The first late frame had too few clocks.
   EXPECT_EQ(errors({10, 12, 12, 12, 14}), (Errors{none, late, late, none, late}));
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The registers of a BiSS encoder in its standard profile. Source: BiSS C Protocol Description rev D2.
+// Addresses and memory areas of the BiSS registers in the standard profile. Source: BiSS C Protocol Description rev D2.
 #pragma once
 
 #include <array>
@@ -11,17 +11,20 @@
 
 namespace absenc::biss::registers {
 
-inline constexpr unsigned bank_size = 0x40;      ///< addresses 00 to 3F belong to the selected bank
-inline constexpr unsigned bank_select = 0x40;    ///< Register that selects the bank.
-inline constexpr unsigned eds_bank = 0x41;       ///< bank of the electronic data sheet; 0: none
-inline constexpr unsigned profile = 0x42;        ///< two registers
-inline constexpr unsigned serial_number = 0x44;  ///< four registers
-inline constexpr unsigned device = 0x48;         ///< to 77: defined by the maker
-inline constexpr unsigned device_id = 0x78;      ///< six registers
-inline constexpr unsigned manufacturer = 0x7E;   ///< Name of the maker: two registers.
-inline constexpr unsigned end = 0x80;            ///< First address that no register has.
+/// Number of registers of a bank: addresses 00 to 3F belong to the selected bank.
+inline constexpr unsigned bank_size = 0x40;
+inline constexpr unsigned bank_select = 0x40;  ///< Address of the register that selects the bank.
+/// Address of the register with the bank of the electronic data sheet; value 0: none.
+inline constexpr unsigned eds_bank = 0x41;
+inline constexpr unsigned profile = 0x42;        ///< Address of the profile of the encoder, two registers.
+inline constexpr unsigned serial_number = 0x44;  ///< Address of the serial number, four registers.
+/// Address of the first register that the maker defines; the last one is 77.
+inline constexpr unsigned device = 0x48;
+inline constexpr unsigned device_id = 0x78;     ///< Address of the device ID, six registers.
+inline constexpr unsigned manufacturer = 0x7E;  ///< Address of the manufacturer's two characters.
+inline constexpr unsigned end = 0x80;           ///< First address beyond the registers.
 
-/// Returns the size in bytes of a named register.
+/// Returns the size in bytes of the register with a name at `address`.
 [[nodiscard]] constexpr unsigned size_of(unsigned address) {
   switch (address) {
     case profile:
@@ -36,10 +39,11 @@ inline constexpr unsigned end = 0x80;            ///< First address that no regi
   }
 }
 
-inline constexpr unsigned most_banks = 256;  ///< an encoder may have fewer banks, or none
+inline constexpr unsigned most_banks = 256;  ///< Greatest number of banks; an encoder may have fewer, or none.
 
-/// Memory areas of the commands: pages are banks, and addresses outside the banks are on page 0. A memory dump has only
-/// the bank that users may write; the other areas identify the encoder and must not be copied to another one.
+/// Memory areas for the memory commands: pages are banks, and addresses outside the banks are on page 0. A memory dump
+/// has only bank 0, which users may write; the other areas identify the encoder and must not be copied to another
+/// encoder.
 inline constexpr std::array<MemoryArea, 6> areas = [] {
   return std::array<MemoryArea, 6>{{
       {.page = 0, .first = 0, .count = bank_size, .meaning = "bank"},
@@ -72,7 +76,7 @@ inline constexpr std::array<MemoryArea, 6> areas = [] {
   }};
 }();
 
-/// Returns the area of an address; null if there is none.
+/// Returns the memory area of an address in a bank; null if no area has it.
 [[nodiscard]] constexpr const MemoryArea* find_area(unsigned bank, unsigned address) {
   for (const MemoryArea& area : areas) {
     if (area.has(bank, address)) return &area;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A host that reads positions and registers from the same frames, against a virtual encoder in virtual time: with
-// faults over a million frames, and without. ABSENC_FRAMES sets the number of frames.
+// Tests a host that reads positions and registers from the same frames of a virtual encoder, in virtual time: without
+// faults, and with faults over a million frames. ABSENC_FRAMES sets the number of frames.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -41,9 +41,10 @@ std::uint32_t frames_wanted(std::uint32_t usual = some) {
   return text == nullptr ? usual : static_cast<std::uint32_t>(std::atoll(text));
 }
 
-std::uint32_t limit = 0;  // number of frames for the next host; a global, because a procedure starts in its constructor
+// number of frames for the next host; global, because a procedure starts in the constructor of its host
+std::uint32_t limit = 0;
 
-/// Counts of a host's accesses, and the register values that it relies on.
+/// Counters of a host's register accesses, and the register values that the host relies on.
 struct HostRecord {
   std::uint32_t frames = limit;
   std::uint32_t reads = 0;
@@ -89,7 +90,7 @@ Procedure work_on_a_bank(ControlDialog<F>& dialog, HostRecord& record) {
   co_return done;
 }
 
-/// A host with its storage.
+/// A host together with the storage of its coroutines.
 template <class F>
 struct Host {
   struct Machine final : author::Run<ProtocolOf<F>, HostRecord, work_on_a_bank<F>> {
@@ -104,10 +105,11 @@ struct Host {
 struct Outcome {
   std::uint64_t positions = 0;
   std::uint64_t wrong = 0;
-  std::uint64_t gaps = 0;  // frames that began later than the timeout after the frame before
+  std::uint64_t gaps = 0;  // number of frames that began later than one timeout after the previous frame
   std::uint64_t damaged = 0;
   sim::FaultCounts faults{};
-  std::uint32_t wrong_bytes = 0;  // registers whose value differs from the one that the host believes to have written
+  // number of registers whose value differs from the one that the host believes to have written
+  std::uint32_t wrong_bytes = 0;
   std::uint32_t frames = 0;
   std::uint32_t bad_frames = 0;
   std::size_t violations = 0;
@@ -155,9 +157,9 @@ void expect_all_of_the_bank(const HostRecord& record) {
   }
 }
 
-/// Returns the share of damaged frames that the decoder accepts with another position, over random positions. `damage`
-/// changes the bytes of a frame. Most accepted ones had an error in their ACK, so that they begin early, or lost their
-/// end, and the CRC of the rest is valid by chance.
+/// Returns the share of damaged frames that the decoder accepts with a wrong position, over random positions. `damage`
+/// changes the bytes of a frame. Most accepted frames had an error in their ACK, so that they begin early, or lost
+/// their end, and the CRC of the remaining bits is valid by chance.
 template <class Damage>
 double accepted_share(const Format& format, const Damage& damage) {
   constexpr unsigned frames = 400'000;
@@ -179,7 +181,7 @@ double accepted_share(const Format& format, const Damage& damage) {
   return static_cast<double>(taken) / frames;
 }
 
-// Damages as sim::FaultyDevice does: flips one to three bits, or leaves the last bytes undriven.
+// Damages frames as sim::FaultyDevice does: flips one to three bits, or leaves the last bytes undriven.
 void corrupt(sim::Random& random, std::span<std::uint8_t> bytes) {
   std::set<std::uint64_t> bits;
   for (const std::uint64_t count = 1 + random.below(3); bits.size() < count;)
@@ -260,7 +262,7 @@ TEST(BissRegisters, ReadsEachNamedRegister) {
   EXPECT_FALSE(found.missing);
 }
 
-// Registers of a bank that does not exist are refused, like registers that an encoder does not have.
+// The encoder refuses the registers of a bank that does not exist, like registers that it does not have.
 TEST(BissRegisters, ReportsRefusedRegisterAsMissing) {
   ProcedureBench one;
   one.ask<write_bank<Format>>({200});

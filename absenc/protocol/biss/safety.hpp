@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// BiSS Safety: a control position word and a safety position word of the same shaft in one frame, each with its own
-// check. README.md draws the frame. Source: BiSS Safety concept.
+// BiSS Safety frames: a control position word and a safety position word of the same shaft, each with its own check;
+// layout, encoding, decoding and comparison. README.md draws the frame. Source: BiSS Safety concept.
 #pragma once
 
 #include <algorithm>
@@ -9,58 +9,63 @@
 
 namespace absenc::biss {
 
-/// Format of one of several words in a frame.
+/// Format of one of several position words in a frame.
 struct Channel {
-  WordFormat word = "position:19 error:1! warning:1!"_word;  ///< Fields of the position word.
-  Check check{};                                             ///< Checksum of the word.
+  WordFormat word = "position:19 error:1! warning:1!"_word;  ///< Layout of the position word.
+  Check check{};                                             ///< Life counter and CRC that follow the position word.
 };
 
-/// Returns the number of data bits.
+/// Returns the number of bits of the word and its check.
 [[nodiscard]] constexpr unsigned data_bits(const Channel& channel) {
   return channel.word.bits() + channel.check.bits();
 }
 
-/// Content of a channel.
+/// Decoded content of one of several words in a frame.
 struct ChannelData {
-  Word word{};                    ///< The position word.
-  std::uint8_t life_counter = 0;  ///< Life counter, if the check has one.
-  std::uint16_t crc = 0;          ///< CRC as sent
+  Word word{};                    ///< Decoded fields of the position word.
+  std::uint8_t life_counter = 0;  ///< Life counter, 0 to 63; 0 if the check has none.
+  std::uint16_t crc = 0;          ///< CRC as the encoder sent it.
 };
 
-/// Format of BiSS Safety: two position words of one encoder.
+/// Format of BiSS Safety: two position words of one encoder in a frame.
 struct SafetyFormat {
-  Channel cpw{.word = "position:24 error:1! warning:1!"_word};                  ///< The control position word.
-  Channel spw{.word = "position:16 error:1! warning:1!"_word, .check = crc16};  ///< The safety position word.
-  std::uint8_t compare_bits = 13;          ///< upper bits of the position in which both words must agree (ACC_MIN)
-  std::int8_t previous_life_counter = -1;  ///< life counter of the frame before; -1: unknown
+  /// Format of the control position word (CPW), which is sent first.
+  Channel cpw{.word = "position:24 error:1! warning:1!"_word};
+  /// Format of the safety position word (SPW).
+  Channel spw{.word = "position:16 error:1! warning:1!"_word, .check = crc16};
+  /// Number of upper position bits that must be equal in both words, within one count (ACC_MIN).
+  std::uint8_t compare_bits = 13;
+  std::int8_t previous_life_counter = -1;  ///< Life counter of the previous frame; -1: unknown.
   // ---- The following members mean the same as in Format.
   std::uint32_t ma_khz = 1000;  ///< Clock MA in kHz.
-  Time latency = 10us;          ///< Time that the encoder takes before its start bit.
-  Time ready{};                 ///< Time that a virtual encoder needs for a position; 0: as `latency`, at most 10 us.
-  std::uint32_t line_delay_ns = 0;      ///< Delay of the line in nanoseconds.
+  /// Longest time that the encoder needs for a position; it decides the number of clocks.
+  Time latency = 10us;
+  Time ready{};  ///< Time that a virtual encoder needs for a position; 0: as `latency`, at most 10 us.
+  std::uint32_t line_delay_ns = 0;      ///< Delay of a virtual encoder's line, there and back, in nanoseconds.
   std::uint16_t register_delay_us = 0;  ///< Time until a virtual encoder has a requested register ready, in us.
-  bool start_sequence = false;          ///< Whether SLO of a virtual encoder stays idle until the start sequence.
-  Timeout timeout{};                    ///< Timeout of the encoder.
-  StopBit stop_bit = StopBit::next;     ///< The bit P that a virtual encoder sends after each register.
-  std::uint8_t slave = 0;               ///< Slave whose registers are accessed: 0 safety word, 1 control word.
-  RegisterOrder register_order = RegisterOrder::big;  ///< Order of the bytes of registers.
+  /// Whether SLO of a virtual encoder stays idle after power on until the start sequence.
+  bool start_sequence = false;
+  Timeout timeout{};                 ///< BiSS timeout: how long the encoder holds SLO low after the last clock.
+  StopBit stop_bit = StopBit::next;  ///< The bit P that a virtual encoder sends after each register.
+  std::uint8_t slave = 0;            ///< Slave whose registers are accessed: 0 safety word, 1 control word.
+  RegisterOrder register_order = RegisterOrder::big;  ///< Byte order of a number that several registers hold.
 
-  /// Returns the period of the clock.
+  /// Returns the period of MA.
   [[nodiscard]] constexpr Time period() const { return Time((1'000'000 + ma_khz / 2) / ma_khz); }
 };
 
-/// Returns the number of data bits.
+/// Returns the number of bits after the CDS bit: both words with their checks.
 [[nodiscard]] constexpr unsigned data_bits(const SafetyFormat& format) {
   return data_bits(format.cpw) + data_bits(format.spw);
 }
 
-/// A reply of BiSS Safety.
+/// A decoded frame of BiSS Safety.
 struct SafetyReply {
   unsigned ack_bits = 1;    ///< Number of ACK bits: zeros between the idle samples and the start bit.
-  ChannelData cpw{};        ///< The control position word.
-  ChannelData spw{};        ///< The safety position word.
-  unsigned delay_bits = 0;  ///< Extra idle samples: the delay of the line in clocks.
-  bool cds = false;         ///< Bit of control data that the encoder sent.
+  ChannelData cpw{};        ///< Content of the control position word.
+  ChannelData spw{};        ///< Content of the safety position word.
+  unsigned delay_bits = 0;  ///< Extra idle samples, which show the delay of the line in clocks.
+  bool cds = false;         ///< CDS: the encoder's bit of control communication.
 };
 
 namespace detail {
@@ -82,7 +87,7 @@ constexpr std::uint64_t compared_bits(const Channel& channel, const Word& word, 
 
 }  // namespace detail
 
-/// Returns whether both words have a valid check and the compared bits.
+/// Returns whether both CRC polynomials are usable and both positions have the number of compared bits.
 [[nodiscard]] constexpr bool is_usable(const SafetyFormat& format) {
   if (!is_usable(format.cpw.check) || !is_usable(format.spw.check)) return false;
   return format.compare_bits >= 1 && format.compare_bits <= format.cpw.word.bits_of(Meaning::position) &&
@@ -100,7 +105,7 @@ constexpr std::uint64_t compared_bits(const Channel& channel, const Word& word, 
   return difference <= 2;
 }
 
-/// Decodes a frame of BiSS Safety; see decode of one word. Errors also: sequence_mismatch (the life counter does not
+/// Decodes a frame of BiSS Safety. Errors: those of `decode` for one word, sequence_mismatch (the life counter does not
 /// follow `previous_life_counter`), cross_check_failed (the words differ by more than one count of the compared bits).
 [[nodiscard]] constexpr Result<SafetyReply> decode(const SafetyFormat& format, BitView samples, Cds cds = Cds::zero) {
   if (!is_usable(format)) return Error::invalid_argument;
@@ -117,7 +122,8 @@ constexpr std::uint64_t compared_bits(const Channel& channel, const Word& word, 
   return reply;
 }
 
-/// Writes the frame that carries a reply; returns whether it has room.
+/// Appends the frame of `reply` to `out`. `silent`: bits 0 and 1 are set if SPW and CPW are not sent. Returns false if
+/// `out` is too small.
 template <std::size_t Capacity>
 constexpr bool encode(const SafetyFormat& format, const SafetyReply& reply, BitBuffer<Capacity>& out,
                       std::uint8_t silent = 0) {
@@ -127,19 +133,19 @@ constexpr bool encode(const SafetyFormat& format, const SafetyReply& reply, BitB
   return true;
 }
 
-/// Puts position and alarms into a reply.
+/// Sets both words of a virtual encoder's reply from the state of its shaft and its alarms.
 constexpr void show(const SafetyFormat& format, const ShaftState& state, std::uint32_t alarms,
                     std::uint8_t life_counter, SafetyReply& reply) {
   reply.cpw = {.word = word_of(format.cpw.word, state, alarms), .life_counter = life_counter};
   reply.spw = {.word = word_of(format.spw.word, state, alarms), .life_counter = life_counter};
 }
 
-/// Returns the life counter of a reply, or -1 if it has none.
+/// Returns the life counter of the safety word, or -1 if its check has none.
 [[nodiscard]] constexpr int life_counter_of(const SafetyFormat& format, const SafetyReply& reply) {
   return format.spw.check.life_counter ? reply.spw.life_counter : -1;
 }
 
-/// Returns the position of the control word, with the errors and warnings of both words.
+/// Converts the control word to a reading, with the errors and warnings of both words.
 [[nodiscard]] constexpr Reading reading_of(const SafetyFormat& format, const SafetyReply& reply) {
   Word word = reply.cpw.word;
   word.error = word.error || reply.spw.word.error;

@@ -42,7 +42,8 @@ struct SafetyWordValues {
   std::optional<unsigned> crc{};
 };
 struct SafetyAlarms {
-  std::uint32_t alarms;  // alarms of the reading; the field is declared for its flags and never put
+  // alarms of the reading; the field is declared because of its flags, and its value is never put
+  std::uint32_t alarms;
 };
 
 constexpr auto cpw_fields = fields_of<SafetyWordValues>(

@@ -17,7 +17,7 @@ namespace {
 
 using namespace author;
 
-// Options of the unit. The members of the check are members here, because each is an option.
+// Options of the unit as members. The members of Check are repeated here, because each of them is an option.
 struct Settings : WordSettings<Format>, TimeoutSettings {
   std::uint8_t crc_width = crc6.width;
   std::uint16_t crc_poly = crc6.poly;
@@ -70,7 +70,7 @@ constexpr bool is_possible(const Format& format) {
 }
 constexpr bool is_readable(const Format& format) { return is_possible(format) && absenc::is_usable(format.scale); }
 
-// Reports the fields in the order of the line.
+// Puts the fields of a reply into `sink`, in the order of the line.
 constexpr void put_reply(FieldSink& sink, const Format& format, const NoRequest&, const Reply& reply) {
   put_line_delay(sink, format, reply);
   frame_fields.put<&FrameValues::ack_bits>(sink, reply.ack_bits);
@@ -85,7 +85,7 @@ constexpr auto commands = commands_of<report, Format>(is_readable);
 bool is_checked(const Options& values, Frame, Frame reply, std::size_t bit) {
   return format_by(values).check.width != 0 && is_behind_ack(reply, bit);
 }
-// Returns the bits of a field; the word begins after start bit and CDS.
+// Returns the bits of a field in the samples; the word begins after start bit and CDS.
 BitRanges bits_in(const Options& values, Frame, Frame reply, const FieldInfo& field) {
   const BitView samples = to_bits(reply);
   const std::size_t start = samples.end_of_run(samples[0] ? samples.end_of_run(0) : 0);

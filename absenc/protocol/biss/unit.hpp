@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
-// The BiSS-C protocols as units.
+// The three BiSS-C protocols as units for the list of units.
 #pragma once
 
 #include "absenc/protocol/unit.hpp"
 
 namespace absenc::biss {
 
-extern const Unit unit;  ///< The unit.
-/// A control position word and a safety position word in one frame.
+extern const Unit unit;  ///< BiSS-C with one encoder and one position word.
+/// BiSS Safety: a control position word and a safety position word in one frame.
 extern const Unit safety_unit;
-/// Several encoders in one frame.
+/// BiSS-C with several encoders in a chain.
 extern const Unit chain_unit;
 
 }  // namespace absenc::biss

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// BiSS test frames with their source.
+// BiSS test frames with the document that each is from.
 #pragma once
 
 #include <array>
@@ -9,7 +9,7 @@
 namespace absenc::biss {
 
 // clang-format off
-/// Frames with their meaning, from documents.
+/// Frames of BiSS-C, each with the fields or the error that decoding must give.
 inline constexpr auto vectors = std::to_array<author::VectorText>({
     {"biss-001", "example 1: linear, 32 bits of 0.05 um", "E201-9S document", "position_bits=32 unit_um=0.05", "", "1100000000000100000000000011000000110010000011111111101", "ack_bits=11 position=1579271 position_um=78963.55 position_mm=78.96355 error=0 warning=0 crc=0x3D"},
     {"biss-002", "example 2: linear, 26 bits of 1 um", "E201-9S document (its hexadecimal line)", "position_bits=26 unit_um=1", "", "11000000000000100000000000011111111011100111100100", "ack_bits=12 position=32697 position_um=32697.0 position_mm=32.697 error=0 warning=0 crc=36"},
@@ -53,7 +53,7 @@ inline constexpr auto vectors = std::to_array<author::VectorText>({
     {"biss-040", "null value: all bits 0 with a good CRC: error and warning set", "BiSS C Protocol Description rev D2, null value", "singleturn_bits=18", "", "110000001000000000000000000000111111", "ack_bits=6 singleturn=0 angle_deg=0.0 error=1 warning=1 crc=63"},
 });
 
-/// Frames of BiSS Safety with their meaning.
+/// Frames of BiSS Safety, each with the fields or the error that decoding must give.
 inline constexpr auto safety_vectors = std::to_array<author::VectorText>({
     {"biss-safety-001", "RXM, good", "derived", "cpw_singleturn_bits=16 cpw_multiturn_bits=0 spw_singleturn_bits=12 spw_multiturn_bits=0 compare_bits=9 previous_life_counter=9", "", "110000010101010111100110111100000101010111100110010100101101110001101", "ack_bits=5 cpw_singleturn=43981 angle_deg=241.5948486328125 cpw_error=0 cpw_warning=0 cpw_crc=32 spw_singleturn=2748 spw_error=0 spw_warning=0 spw_life_counter=10 spw_crc=23437"},
     {"biss-safety-002", "RXH, good", "derived", "previous_life_counter=10", "", "110000010000100100011010001010110111101010001001000110100110010110011101001111000", "ack_bits=5 cpw_singleturn=1193046 angle_deg=25.599989891052246 cpw_error=0 cpw_warning=0 cpw_crc=53 spw_singleturn=4660 spw_error=0 spw_warning=0 spw_life_counter=11 spw_crc=14968"},
@@ -77,7 +77,7 @@ inline constexpr auto safety_vectors = std::to_array<author::VectorText>({
     {"biss-safety-020", "safety word without a life counter", "derived", "spw_life_counter=false", "", "110000010000100100011010001010110111101010001001000110100111111000100111010", "ack_bits=5 cpw_singleturn=1193046 angle_deg=25.599989891052246 cpw_error=0 cpw_warning=0 cpw_crc=53 spw_singleturn=4660 spw_error=0 spw_warning=0 spw_crc=61754"},
 });
 
-/// Frames of chains with their meaning.
+/// Frames of chains, each with the fields or the error that decoding must give.
 inline constexpr auto chain_vectors = std::to_array<author::VectorText>({
     {"biss-chain-001", "three slaves, CRC of the last wrong", "derived", "slaves=3 channel0_singleturn_bits=18 channel1_singleturn_bits=12 channel1_multiturn_bits=12 channel2_singleturn_bits=8 channel2_crc_width=5 channel2_crc_poly=0x5", "", "11000000100000000000000000011111011000000000001100000000001011100101100001001101010", "bad_checksum"},
     {"biss-chain-002", "two slaves, CRC of the first wrong", "derived", "slaves=2 channel0_singleturn_bits=18 channel1_singleturn_bits=12 channel1_multiturn_bits=12", "", "11000000101000000000000000011111011000000000001100000000001011100101", "bad_checksum"},

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Frames of several words: usable formats, frames that do not fit, and the comparison of BiSS Safety.
+// Tests of frames with several words: usable formats, frames that do not fit, and the comparison of BiSS Safety.
 #include <gtest/gtest.h>
 
 #include "absenc/protocol/biss/bench_test.hpp"
@@ -80,7 +80,7 @@ TEST(BissWords, SafetyComparesPositionsAndLifeCounter) {
     EXPECT_TRUE(encode(format, reply, frame));
     return decode(format, frame.view()).error();
   };
-  // 13 bits are compared, of 24 and of 16.
+  // The highest 13 bits are compared, of 24 and of 16 bits.
   EXPECT_EQ(error(0x123456, 0x1234, 5), Error::none);
   EXPECT_EQ(error(0x123456, 0x1234 + 8, 5), Error::none);
   EXPECT_EQ(error(0x123456, 0x1234 + 16, 5), Error::cross_check_failed);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Requirements of the document on the encoder and on the host, each with its paragraph.
+// Requirements of the protocol's document on encoder and host, each with its paragraph, for conformance tests.
 #pragma once
 
 #include <array>
@@ -8,7 +8,7 @@
 
 namespace absenc::e201 {
 
-/// Clauses of the document for the encoder.
+/// Requirements of the document that an encoder must fulfil.
 inline constexpr std::array<Clause, 5> clauses{{
     {"answer", "BiSS C timing diagram, command 4", "4 is answered", Demand::answered},
     {"length", "BiSS C timing diagram, command 4", "the answer is 16 hexadecimal digits and CR", Demand::whole},
@@ -39,7 +39,7 @@ inline constexpr std::array no_number{HostStep{{}, "4d 0d"}};
 inline constexpr std::array letter{HostStep{{}, "4d 41"}};
 }  // namespace script
 
-/// Clauses of the document for the host.
+/// Requirements of the document that a host must fulfil.
 inline constexpr std::array<HostClause, 4> host_clauses{{
     {"asks", "BiSS C timing diagram, command 4", "only commands of the interface are sent", HostDemand::asks},
     {"silence", "BiSS C timing diagram, command 4", "after no reply it asks again", HostDemand::after_silence},

@@ -75,7 +75,7 @@ enum class Kind : std::uint8_t { other, resolute };
 inline constexpr unsigned resolute_slowest = 4;  ///< slowest clock recommended for a Renishaw Resolute: 280 kHz
 inline constexpr unsigned resolute_fastest = 5;  ///< fastest clock recommended for a Renishaw Resolute: 560 kHz
 
-/// Format of the encoder: the values of its options.
+/// Frame layout and settings of one encoder, as the unit's options select them.
 struct Format {
   WordFormat word = biss::Format{}.word;               ///< Fields of the position word.
   Scale scale{};                                       ///< Length of a count of a linear encoder.
@@ -104,7 +104,7 @@ struct Format {
 struct Position {
   unsigned ack_bits = 0;  ///< BiSS: clocks until the encoder was ready
   std::uint16_t crc = 0;  ///< BiSS: CRC as sent
-  Word word{};            ///< The position word.
+  Word word{};            ///< Decoded fields of the position word.
 };
 
 /// Decodes the samples. Errors: invalid_argument (the word does not fit), line_stuck (all samples alike), bad_framing
@@ -130,14 +130,14 @@ struct Position {
 
 // ---- Commands and replies
 
-/// A request of the protocol.
+/// A request to the encoder.
 struct Request {
   std::uint8_t letter = letter::samples;  ///< Letter of the command.
   unsigned clock = 0;                     ///< set_clock: the clock, 1 to 8
   unsigned width = 0;                     ///< set_width: the width in bits, 1 to 64
 };
 
-/// A reply of the protocol.
+/// A reply of the encoder.
 struct Reply {
   std::uint64_t samples = 0;  ///< The 64 samples, the first one in the highest bit.
   std::int64_t number = 0;    ///< number in the reply to ? > m b
@@ -180,11 +180,11 @@ inline constexpr unsigned widest = 64;  ///< largest width of a position in bits
 
 /// The interface's commands for the engine; author/dialog.hpp explains each member.
 struct Protocol {
-  /// Format of the encoder: the values of its options.
+  /// Frame layout and settings of one encoder, as the unit's options select them.
   using Format = e201::Format;
-  /// A request of the protocol.
+  /// Type of requests to the encoder.
   using Request = e201::Request;
-  /// A reply of the protocol.
+  /// Type of the encoder's replies.
   using Reply = e201::Reply;
   /// No document gives the longest line; the engine stores up to three times this length.
   static constexpr std::size_t longest_reply = 32;
@@ -193,7 +193,7 @@ struct Protocol {
   static constexpr author::HostTimes host_times(const Format&) {
     return {.answer_limit = answer_limit, .gap_limit = gap_limit, .patience = reply_limit};
   }
-  /// Returns how often the request may be repeated and how its reply ends.
+  /// Returns how a host sends a request (repetitions, pauses) and how the reply to it ends.
   static constexpr author::Manner manner(const Format&, const Request& request) {
     if (request.letter == letter::samples || letter::is_in(letter::answered_by_a_line, request.letter)) return {};
     return {.any_reply = true, .answer_limit = silent_limit};
@@ -234,7 +234,7 @@ struct Protocol {
     if (digits != 0 && (number < 1 || number > most)) return Error::unsupported;
     return Request{text[0], is_clock ? number : 0, is_clock ? 0 : number};
   }
-  /// Returns the length of the reply, as far as its first bytes say, in bytes; 0 if it is not known.
+  /// Returns the length of a reply in bytes, judged by its first bytes; 0 if they do not determine it.
   static constexpr std::size_t expected(const Format&, const Request& request, Bytes reply) {
     if (request.letter == letter::samples) return samples_length;
     return letter::is_in(letter::answered_by_a_line, request.letter) ? end_of_first_line(reply) : 0;
@@ -251,12 +251,12 @@ struct Protocol {
     const Error error = decode_position(format, *samples).error();
     return error == Error::none ? Result(Reply{.samples = *samples}) : error;
   }
-  /// Returns the position of a reply.
+  /// Converts a reply to a reading.
   static constexpr Reading reading(const Format& format, const Request& request, const Reply& reply) {
     if (request.letter != letter::samples) return {};
     return to_reading(format.word, decode_position(format, reply.samples)->word, format.scale);
   }
-  /// Returns when the encoder latched the position of a reply to a request that was sent at `sent_at`.
+  /// Returns when the encoder latched the position that answers a request sent at `sent_at`.
   static constexpr Time latched(const Format&, Time sent_at) { return sent_at; }
 };
 

@@ -12,7 +12,7 @@
 
 namespace absenc::e201 {
 
-/// Dialog of procedures.
+/// Interface by which procedures send requests and await replies.
 using Dialog = author::DialogOf<Protocol>;
 
 /// Results of a procedure. Values that were not requested or not answered stay empty.

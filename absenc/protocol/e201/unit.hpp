@@ -6,6 +6,6 @@
 
 namespace absenc::e201 {
 
-extern const Unit unit;  ///< The unit.
+extern const Unit unit;  ///< The protocol as a unit, for the list of units.
 
 }  // namespace absenc::e201

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Requirements of the document on the encoder and on the host, each with its paragraph.
+// Requirements of the protocol's document on encoder and host, each with its paragraph, for conformance tests.
 #pragma once
 
 #include <array>
@@ -8,7 +8,7 @@
 
 namespace absenc::encolink {
 
-/// Clauses of the document for the encoder.
+/// Requirements of the document that an encoder must fulfil.
 inline constexpr auto clauses = std::array{
     Clause{"answer", "UART, Communication parameters", "a request is answered", Demand::answered},
     Clause{.id = "stream",
@@ -114,7 +114,7 @@ inline constexpr std::array<HostClause, 8> spi_host_clauses{{
      .breaks = {script::keys_again, script::zeros_and_keys}},
 }};
 
-/// Clauses of the document for the host.
+/// Requirements of the document that a host must fulfil.
 inline constexpr std::array<HostClause, 4> host_clauses{{
     {"asks", "UART, Channel 1", "requests are two bytes, command and data", HostDemand::asks},
     {"silence", "UART, Channel 1", "after no reply it asks again", HostDemand::after_silence},

@@ -30,9 +30,9 @@ class VirtualEncoder final : public author::Responder {
   /// from virtual_format.
   VirtualEncoder(const Format& format, const Shaft& shaft);
 
-  /// Takes an event of the port.
+  /// Processes an event of the port, such as received data or silence.
   void feed(const Event<std::uint8_t>& event) override;
-  /// Returns the next step of the port.
+  /// Returns what the port must do next, such as send or wait.
   Step<std::uint8_t> next(Time now) override;
 
   /// Switches the encoder on.

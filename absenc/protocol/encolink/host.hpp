@@ -21,11 +21,11 @@ enum class Ask : std::uint8_t {
 
 /// EncoLink frames for the engine; author/dialog.hpp explains each member.
 struct Frames {
-  /// Format of the encoder: the values of its options.
+  /// Frame layout and settings of one encoder, as the unit's options select them.
   using Format = encolink::Format;
-  /// A request of the protocol.
+  /// A request to the encoder.
   struct Request {
-    Ask ask = Ask::position;  ///< Kind of the request.
+    Ask ask = Ask::position;  ///< Purpose of the request.
     std::uint8_t ra = 0;      ///< one byte of a register access
   };
   using Reply = Position;                                       ///< empty for an identity
@@ -35,11 +35,11 @@ struct Frames {
   static constexpr author::HostTimes host_times(const Format& format) {
     return {.answer_limit = answer_limit, .gap_limit = gap_limit, .silence = pause(format)};
   }
-  /// Returns how often the request may be repeated and how its reply ends.
+  /// Returns how a host sends a request (repetitions, pauses) and how the reply to it ends.
   static constexpr author::Manner manner(const Format&, const Request&) { return {}; }
-  /// Returns the request as it is sent.
+  /// Returns the bytes of `request` as they are sent.
   static std::array<std::uint8_t, request_bytes> encode(const Format&, const Request& request);
-  /// Returns the length of the reply, as far as its first bytes say, in bytes; 0 if it is not known.
+  /// Returns the length of a reply in bytes, judged by its first bytes; 0 if they do not determine it.
   static std::size_t expected(const Format& format, const Request& request, Bytes);
   /// Decodes a reply. Errors: timeout, line_stuck (SPI: all bits alike), those of decode_position or of
   /// decode_identity.

@@ -21,9 +21,9 @@ class Listen final : public Conversation<std::uint8_t> {
   /// bad_checksum.
   explicit Listen(const Format& format);
 
-  /// Takes an event of the port.
+  /// Processes an event of the port, such as received data or silence.
   void feed(const Event<std::uint8_t>& event) override;
-  /// Returns the next step of the port.
+  /// Returns what the port must do next, such as send or wait.
   Step<std::uint8_t> next(Time now) override;
   [[nodiscard]] const StreamCounts* stream() const override { return &counts_; }
   [[nodiscard]] Error error() const override { return error_; }

@@ -12,7 +12,7 @@
 
 namespace absenc::encolink {
 
-/// Dialog of procedures.
+/// Interface by which procedures send requests and await replies.
 using Dialog = author::DialogOf<Frames>;
 
 /// How a register access ended.

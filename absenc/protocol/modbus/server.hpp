@@ -16,9 +16,9 @@ namespace absenc::modbus {
 /// A virtual Modbus RTU server.
 class Server : public Device<std::uint8_t> {
  public:
-  /// Takes an event of the port.
+  /// Processes an event of the port, such as received data or silence.
   void feed(const Event<std::uint8_t>& event) final;
-  /// Returns the next step of the port.
+  /// Returns what the port must do next, such as send or wait.
   Step<std::uint8_t> next(Time now) final;
 
   /// Switches the encoder on.
@@ -26,7 +26,7 @@ class Server : public Device<std::uint8_t> {
   /// Switches the encoder off.
   void power_off(Time now) final;
   [[nodiscard]] std::span<const Violation> violations() const final { return rules_.violations(); }
-  /// Returns how often the host broke a rule.
+  /// Returns how often the host broke a rule of the document.
   [[nodiscard]] std::uint32_t violation_count() const final { return rules_.violation_count(); }
   void watch_rules(RuleWatch* watch) final { rules_.watch(watch); }
   [[nodiscard]] std::uint64_t answer_count() const final { return answer_count_; }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Requirements of the document on the encoder and on the host, each with its paragraph.
+// Requirements of the protocol's document on encoder and host, each with its paragraph, for conformance tests.
 #pragma once
 
 #include <array>

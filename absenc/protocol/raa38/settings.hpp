@@ -30,7 +30,7 @@ class Settings {
     memory_[rate_at] = rate;
   }
 
-  /// Returns the memory.
+  /// Returns the content of the memory.
   [[nodiscard]] MutableBytes memory() { return memory_; }
   /// Returns a number that changes with the memory.
   [[nodiscard]] std::uint32_t version() const { return version_; }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Requirements of the document on the encoder and on the host, each with its paragraph.
+// Requirements of the protocol's document on encoder and host, each with its paragraph, for conformance tests.
 #pragma once
 
 #include <array>
@@ -8,7 +8,7 @@
 
 namespace absenc::ssi {
 
-/// Clauses of the document for the encoder.
+/// Requirements of the document that an encoder must fulfil.
 inline constexpr std::array<Clause, 1> clauses{{
     {.id = "repeat",
      .paragraph = "3.5",
@@ -20,7 +20,7 @@ inline constexpr std::array<Clause, 1> clauses{{
      .shown_with = "singleturn=1000"},
 }};
 
-/// Clauses of the document for the host.
+/// Requirements of the document that a host must fulfil.
 inline constexpr std::array<HostClause, 5> host_clauses{{
     {"silence", "3.5", "after a data line that stayed as it was it clocks again", HostDemand::after_silence},
     {"speed", "3.5", "the clock is within the limits of the encoder", HostDemand::rule,

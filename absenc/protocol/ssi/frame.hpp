@@ -27,13 +27,13 @@ enum class AfterWord : std::uint8_t {
   separated,  ///< a zero, then the word again
 };
 
-/// Format of the encoder: the values of its options.
+/// Frame layout and settings of one encoder, as the unit's options select them.
 struct Format {
-  WordFormat word = "position:12"_word;      ///< Fields of the position word.
+  WordFormat word = "position:12"_word;      ///< Layout of the position word: its fields in the order of the line.
   AfterWord after_word = AfterWord::repeat;  ///< What the encoder sends after its word.
   /// Clocks after the word, for comparison; with as many as the word has bits, the word is read twice.
   unsigned extra_clocks = 0;
-  Scale scale{};              ///< Length of a count of a linear encoder.
+  Scale scale{};              ///< Whether the encoder is linear, and the length of a count.
   bool error_parity = false;  ///< the last bit is a parity that the encoder inverts if its position is wrong
   bool padded = false;        ///< skipped bits of the word must be zero
   /// The word is read once more, and the shaft may have moved with this speed; 0: read once.

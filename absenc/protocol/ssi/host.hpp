@@ -11,13 +11,13 @@ namespace absenc::ssi {
 
 /// SSI for the engine. The port is set to the clock rate already.
 struct Protocol {
-  /// Format of the encoder: the values of its options.
+  /// Frame layout and settings of one encoder, as the unit's options select them.
   using Format = ssi::Format;
-  /// The link has no requests.
+  /// Empty type: on a clocked link the host sends no requests.
   using Request = author::NoRequest;
-  /// A reply of the protocol.
+  /// Type of the encoder's replies.
   using Reply = Word;
-  static constexpr unsigned most_clocks = frame_capacity;  ///< Greatest number of clocks of a transfer.
+  static constexpr unsigned most_clocks = frame_capacity;  ///< Greatest number of clocks in one transfer.
 
   /// Returns how long a host waits for replies.
   static constexpr author::ClockedHostTimes host_times(const Format& format) {
@@ -25,9 +25,9 @@ struct Protocol {
   }
   /// Returns the number of clocks of a transfer.
   static constexpr unsigned clocks(const Format& format) { return ssi::clocks(format); }
-  /// Returns the reply with all checks done, or the first error.
+  /// Decodes a reply with all checks; returns the first error if one fails.
   static constexpr Result<Word> decode(const Format& format, BitView bits) { return ssi::decode(format, bits); }
-  /// Returns the position of a reply.
+  /// Converts a reply to a reading.
   static constexpr Reading reading(const Format& format, const Word& word) {
     WordContents contents = contents_of(format.word);
     if (format.error_parity) contents.reported |= word_error;

@@ -6,6 +6,6 @@
 
 namespace absenc::ssi {
 
-extern const Unit unit;  ///< The unit.
+extern const Unit unit;  ///< The protocol as a unit, for the list of units.
 
 }  // namespace absenc::ssi

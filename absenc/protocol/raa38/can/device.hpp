@@ -16,9 +16,9 @@ class VirtualNode final : public Device<CanFrame> {
   VirtualNode(const Format& format, const Shaft& shaft)
       : format_(format), settings_(format.node, rates[format.rate].index, format.bits, shaft) {}
 
-  /// Takes an event of the port.
+  /// Processes an event of the port, such as received data or silence.
   void feed(const Event<CanFrame>& event) override;
-  /// Returns the next step of the port.
+  /// Returns what the port must do next, such as send or wait.
   Step<CanFrame> next(Time now) override;
 
   /// Switches the encoder on.
@@ -26,12 +26,12 @@ class VirtualNode final : public Device<CanFrame> {
   /// Switches the encoder off.
   void power_off(Time now) override;
   void raise_alarms(std::uint32_t) override {}
-  /// Ends the cause of alarms; latched alarms stay until a host clears them.
+  /// Ends the cause of raised alarms; latched alarms stay until a host clears them.
   void lower_alarms(std::uint32_t) override {}
   [[nodiscard]] MutableBytes memory() override { return settings_.memory(); }
   [[nodiscard]] std::uint32_t memory_version() const override { return settings_.version(); }
   [[nodiscard]] std::span<const Violation> violations() const override { return rules_.violations(); }
-  /// Returns how often the host broke a rule.
+  /// Returns how often the host broke a rule of the document.
   [[nodiscard]] std::uint32_t violation_count() const override { return rules_.violation_count(); }
   void watch_rules(RuleWatch* watch) override { rules_.watch(watch); }
   [[nodiscard]] std::uint64_t answer_count() const override { return answer_count_; }

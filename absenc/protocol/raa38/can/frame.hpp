@@ -92,7 +92,7 @@ inline constexpr std::array<Rate, 3> rates{{{0, 1'000'000}, {2, 500'000}, {3, 25
   return nullptr;
 }
 
-/// Format of the encoder: the values of its options.
+/// Frame layout and settings of one encoder, as the unit's options select them.
 struct Format {
   unsigned bits = 14;         ///< bits of the position, 10 to 21
   std::uint8_t node = 0x20;   ///< number of the node, 1 to 255

@@ -22,14 +22,14 @@ inline constexpr Time listening_time = 1200ms;  ///< Time for which a survey lis
 struct Protocol {
   /// The line carries CAN frames.
   using Item = CanFrame;
-  /// Format of the encoder: the values of its options.
+  /// Frame layout and settings of one encoder, as the unit's options select them.
   using Format = can::Format;
-  /// A request of the protocol.
+  /// Type of requests to the encoder.
   using Request = CanFrame;
-  /// A reply of the protocol.
+  /// Type of the encoder's replies.
   using Reply = CanFrame;
 
-  /// Returns how often the request may be repeated and how its reply ends.
+  /// Returns how a host sends a request (repetitions, pauses) and how the reply to it ends.
   static constexpr author::Manner manner(const Format&, const CanFrame&) { return {}; }
   /// Returns how long a host waits for replies.
   static constexpr author::CanHostTimes host_times(const Format&) { return {answer_limit, busy_limit}; }
@@ -82,7 +82,7 @@ class Read : public author::CanEngine {
   return mode == Read::Mode::start ? encode(Order::start, format.node) : encode(Order::read, format.node);
 }
 
-/// Dialog of procedures.
+/// Interface by which procedures send requests and await replies.
 using Dialog = author::DialogOf<Protocol>;
 
 // ---- One node

@@ -21,7 +21,7 @@ class VirtualEncoder final : public modbus::Server {
         settings_(format.address, static_cast<std::uint8_t>(format.baud), format.bits, shaft) {}
 
   void raise_alarms(std::uint32_t) override {}
-  /// Ends the cause of alarms; latched alarms stay until a host clears them.
+  /// Ends the cause of raised alarms; latched alarms stay until a host clears them.
   void lower_alarms(std::uint32_t) override {}
   [[nodiscard]] MutableBytes memory() override { return settings_.memory(); }
   [[nodiscard]] std::uint32_t memory_version() const override { return settings_.version(); }

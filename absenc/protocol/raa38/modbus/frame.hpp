@@ -72,7 +72,7 @@ enum class Data : std::uint8_t {
   three_as_four,  ///< byte count 04, but three bytes of data
 };
 
-/// Format of the encoder: the values of its options.
+/// Frame layout and settings of one encoder, as the unit's options select them.
 struct Format {
   std::uint8_t address = 1;             ///< Address of the encoder, 1 to 247.
   unsigned bits = 14;                   ///< bits of the position, 10 to 21
@@ -90,7 +90,7 @@ struct Format {
   [[nodiscard]] constexpr Resolution resolution() const { return {.singleturn_bits = bits}; }
 };
 
-/// A request of the protocol.
+/// A request to the encoder.
 struct Request {
   std::uint8_t function = function::read;  ///< Code of the function.
   std::uint8_t address = 1;                ///< Address of the encoder.
@@ -108,7 +108,7 @@ using RequestBytes = ByteBuffer<8>;
   return code == function::read_address ? 4 : 5;
 }
 
-/// Returns the request as it is sent.
+/// Returns the bytes of `request` as they are sent.
 [[nodiscard]] constexpr RequestBytes encode_request(const Request& request) {
   RequestBytes bytes;
   bytes.push_back(request.address);
@@ -150,7 +150,7 @@ using RequestBytes = ByteBuffer<8>;
   return request;
 }
 
-/// A reply of the protocol.
+/// A reply of the encoder.
 struct Reply {
   std::uint8_t function = function::read;  ///< Code of the function.
   std::uint8_t address = 1;                ///< ask_address: the encoder's address; set_address: the new address
@@ -263,11 +263,11 @@ inline constexpr Time answer_limit = std::chrono::milliseconds(50);
 
 /// The protocol, as author layers use it: frames, lengths and times.
 struct Protocol {
-  /// Format of the encoder: the values of its options.
+  /// Frame layout and settings of one encoder, as the unit's options select them.
   using Format = rtu::Format;
-  /// A request of the protocol.
+  /// Type of requests to the encoder.
   using Request = rtu::Request;
-  /// A reply of the protocol.
+  /// Type of the encoder's replies.
   using Reply = rtu::Reply;
   static constexpr std::size_t longest_reply = 9;  ///< Greatest length of a reply in bytes.
 
@@ -279,26 +279,26 @@ struct Protocol {
   static constexpr author::HostTimes host_times(const Format& format) { return host_times(format, format.line().rate); }
   /// Settings wear the memory: the engine repeats no request.
   static constexpr author::Manner manner(const Format&, const Request&) { return {}; }
-  /// Returns the request as it is sent.
+  /// Returns the bytes of `request` as they are sent.
   static constexpr RequestBytes encode(const Format&, const Request& request) { return encode_request(request); }
-  /// Returns the request, or the error of an invalid one.
+  /// Decodes a request; returns an error if its bytes are invalid.
   static constexpr Result<Request> decode_request(const Format&, Bytes bytes) { return rtu::decode_request(bytes); }
-  /// Returns the length of the reply, as far as its first bytes say, in bytes; 0 if it is not known.
+  /// Returns the length of a reply in bytes, judged by its first bytes; 0 if they do not determine it.
   static constexpr std::size_t expected(const Format&, const Request& request, Bytes reply) {
     return reply_length(request, reply);
   }
-  /// Returns whether a reply with this error is complete, so that no more bytes are awaited.
+  /// Returns whether a reply that has this error is complete, so that the host awaits no more bytes.
   static constexpr bool is_whole(const Format&, Error) { return false; }
-  /// Returns the reply with all checks done, or the first error.
+  /// Decodes a reply with all checks; returns the first error if one fails.
   static constexpr Result<Reply> decode(const Format& format, const Request& request, Bytes bytes) {
     return decode_reply(format, request, bytes);
   }
-  /// Returns the position of a reply.
+  /// Converts a reply to a reading.
   static constexpr Reading reading(const Format& format, const Request& request, const Reply& reply) {
     if (request.function != function::read) return {};
     return author::position_reading(reply.singleturn, format.bits);
   }
-  /// Returns when the encoder latched the position of a reply to a request that was sent at `sent_at`.
+  /// Returns when the encoder latched the position that answers a request sent at `sent_at`.
   static constexpr Time latched(const Format&, Time sent_at) { return sent_at; }
   /// Returns whether a second reply must confirm this one.
   static constexpr bool needs_another(const Format&, const Reply& reply) { return reply.doubtful_size != 0; }

@@ -45,7 +45,7 @@ struct CommandValues : Values {
   Sentence words{};   ///< text of the error's detail
 };
 
-/// Dialog of procedures.
+/// Interface by which procedures send requests and await replies.
 using Dialog = author::DialogOf<Protocol>;
 
 // If no encoder answers at the address of the format, all these procedures send A0 and name the address in its reply.
@@ -72,7 +72,7 @@ struct Slaves {
   enum class Kind : std::uint8_t { none, answers, clash, refuses };
   std::array<Kind, modbus::last_address + 1> at{};  ///< Result of polling each address.
 };
-/// Finds the encoders of a line.
+/// Procedure that finds all encoders on a line.
 author::Procedure scan(Dialog& dialog, Slaves& found, Arguments arguments);
 
 /// Sets the address with A1. Refuses an address at which another slave answers (invalid_argument). Reads the position

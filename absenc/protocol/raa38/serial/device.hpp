@@ -13,9 +13,9 @@ class VirtualEncoder final : public author::BusDevice<Protocol, VirtualEncoder, 
  public:
   using BusDevice::BusDevice;
 
-  /// Takes an event of the port.
+  /// Processes an event of the port, such as received data or silence.
   void feed(const Event<std::uint8_t>& event) override;
-  /// Returns the next step of the port.
+  /// Returns what the port must do next, such as send or wait.
   Step<std::uint8_t> next(Time now) override;
   /// Switches the encoder off.
   void power_off(Time now) override;

@@ -151,7 +151,7 @@ inline constexpr int any_unit = -1;
   return Position{value, bytes[1]};
 }
 
-/// A request of the protocol.
+/// A request to the encoder.
 struct Request {
   /// Kind of the request.
   enum class Kind : std::uint8_t {
@@ -159,7 +159,7 @@ struct Request {
     zero_clear,           ///< BC AA Cx
     trigger,              ///< a pulse on CLK, without bytes
     clear,                ///< a pulse on CLR
-  } kind = Kind::read;    ///< Kind of the request.
+  } kind = Kind::read;    ///< Purpose of the request.
   std::uint8_t unit = 0;  ///< number of the unit, 0 to 15
 };
 
@@ -207,11 +207,11 @@ struct Values {
 
 /// The protocol, as author layers use it: frames, lengths and times.
 struct Protocol {
-  /// Format of the encoder: the values of its options.
+  /// Frame layout and settings of one encoder, as the unit's options select them.
   using Format = serial::Format;
-  /// A request of the protocol.
+  /// Type of requests to the encoder.
   using Request = serial::Request;
-  /// A reply of the protocol.
+  /// Type of the encoder's replies.
   using Reply = Position;
   static constexpr std::size_t longest_reply = frame_capacity;  ///< Greatest length of a reply in bytes.
 
@@ -221,7 +221,7 @@ struct Protocol {
             .gap_limit = std::max(format.transmission, gap_limit),
             .patience = patience};
   }
-  /// Returns how often the request may be repeated and how its reply ends.
+  /// Returns how a host sends a request (repetitions, pauses) and how the reply to it ends.
   static constexpr author::Manner manner(const Format&, const Request& request) {
     switch (request.kind) {
       case Request::Kind::trigger:
@@ -232,9 +232,9 @@ struct Protocol {
         return {.expects_reply = request.kind == Request::Kind::read};
     }
   }
-  /// Returns the request as it is sent.
+  /// Returns the bytes of `request` as they are sent.
   static constexpr RequestBytes encode(const Format&, const Request& request) { return encode_request(request); }
-  /// Returns the request, or the error of an invalid one.
+  /// Decodes a request; returns an error if its bytes are invalid.
   static constexpr Result<Request> decode_request(const Format&, Bytes bytes) { return serial::decode_request(bytes); }
   /// Returns the length of the request that begins with `begin`, in bytes; 0 if that is no request.
   static constexpr std::size_t request_size(const Format&, Bytes begin) {
@@ -245,27 +245,27 @@ struct Protocol {
   static constexpr std::size_t reply_size(const Format& format, const Request& request) {
     return request.kind == Request::Kind::zero_clear ? 0 : format.frame_bytes();
   }
-  /// Returns the length of the reply, as far as its first bytes say, in bytes; 0 if it is not known.
+  /// Returns the length of a reply in bytes, judged by its first bytes; 0 if they do not determine it.
   static constexpr std::size_t expected(const Format& format, const Request&, Bytes) { return format.frame_bytes(); }
-  /// Returns whether a reply with this error is complete, so that no more bytes are awaited.
+  /// Returns whether a reply that has this error is complete, so that the host awaits no more bytes.
   static constexpr bool is_whole(const Format&, Error) { return false; }
-  /// Returns the reply as it is sent.
+  /// Returns the bytes of `reply` as they are sent.
   static constexpr FrameBytes encode_reply(const Format& format, const Request&, const Position& position) {
     return encode_position(format, position);
   }
-  /// Returns the reply with all checks done, or the first error.
+  /// Decodes a reply with all checks; returns the first error if one fails.
   static constexpr Result<Position> decode(const Format& format, const Request& request, Bytes bytes) {
     // The encoder does not answer zero clearing.
     if (request.kind == Request::Kind::zero_clear) return Error::unexpected_reply;
     return decode_position(format, bytes, request.kind == Request::Kind::read ? request.unit : any_unit);
   }
-  /// Returns the position of a reply.
+  /// Converts a reply to a reading.
   static constexpr Reading reading(const Format& format, const Request&, const Position& position) {
     return author::position_reading(position.singleturn, format.bits);
   }
-  /// Returns when the encoder latched the position of a reply to a request that was sent at `sent_at`.
+  /// Returns when the encoder latched the position that answers a request sent at `sent_at`.
   static constexpr Time latched(const Format&, Time sent_at) { return sent_at; }
-  /// Returns the times of a virtual encoder.
+  /// Returns the times of the virtual encoder: duration of a character, time until a reply, time to start.
   static constexpr author::DeviceTimes device_times(const Format& format) {
     return {.answer_time = format.acquisition > Time{} ? format.acquisition : virtual_acquisition, .gap = request_gap};
   }

@@ -34,9 +34,9 @@ class Listen final : public Conversation<std::uint8_t> {
   /// Listens to an encoder of this format.
   explicit Listen(const Format& format);
 
-  /// Takes an event of the port.
+  /// Processes an event of the port, such as received data or silence.
   void feed(const Event<std::uint8_t>& event) override;
-  /// Returns the next step of the port.
+  /// Returns what the port must do next, such as send or wait.
   Step<std::uint8_t> next(Time now) override;
   [[nodiscard]] const StreamCounts* stream() const override { return &counts_; }
   [[nodiscard]] Error error() const override { return error_; }
@@ -77,7 +77,7 @@ class Listen final : public Conversation<std::uint8_t> {
   Explanation words_{};
 };
 
-/// Dialog of procedures.
+/// Interface by which procedures send requests and await replies.
 using Dialog = author::DialogOf<Protocol>;
 
 /// Reads the position, sets the zero, and reads until the position is zero. Errors: unsupported and invalid_argument
@@ -89,7 +89,7 @@ author::Procedure set_zero(Dialog& dialog, Values& found);
 /// mode. If all replies of a number are damaged, two encoders share it or the line is bad. Errors: timeout if no unit
 /// answers, unexpected_reply if an encoder transmits without a request.
 using Units = std::array<Values, unit_count>;
-/// Finds the encoders of a line.
+/// Procedure that finds all encoders on a line.
 author::Procedure scan(Dialog& dialog, Units& found);
 
 }  // namespace absenc::raa38::serial
