@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The descriptor of one protocol: all its properties for the neutral layers and the command, as data and functions.
+// The descriptor of one protocol unit: all properties of the protocol as data and functions, for the layers and
+// commands that know no protocol.
 #pragma once
 
 #include <cstddef>
@@ -18,9 +19,10 @@
 
 namespace absenc {
 
-/// The purpose of a command. The verbs of the command line find a unit's commands by it.
+/// Purpose of a unit's command. The verbs of the command line (`absenc read`, `absenc zero` ...) find the command by
+/// it.
 enum class Verb : std::uint8_t {
-  read,  ///< the position, with all alarms that the unit can report; `read` uses the first such command
+  read,  ///< reads the position, with all alarms that the unit can report; `absenc read` uses the first such command
   read_part,
   info,
   temperature,
@@ -31,61 +33,64 @@ enum class Verb : std::uint8_t {
   memory_write,
   config_get,
   config_set,
-  scan,  ///< finds the encoders on the line: for each, a record that begins with its address
-  run,   ///< a procedure that only this unit has
+  scan,  ///< finds the encoders on the line: reports a record for each, which begins with the encoder's address
+  run,   ///< a procedure that only this unit has; `absenc run` starts it by name
 };
 
 /// Description of an argument of a command.
 struct Argument {
-  std::string_view name;           ///< Name, as `NAME=VALUE` takes it.
+  std::string_view name;           ///< Name of the argument, as in `NAME=VALUE`.
   std::string_view meaning;        ///< Meaning of the value, with its unit.
-  std::int64_t minimum;            ///< Lowest value.
-  std::int64_t maximum;            ///< Highest value.
-  std::int64_t default_value = 0;  ///< Value if the argument is not given and not `required`.
-  bool required = true;            ///< Whether the argument must be given.
-  Role role = Role::other;         ///< Role by which generic programs find it.
+  std::int64_t minimum;            ///< Lowest permitted value.
+  std::int64_t maximum;            ///< Highest permitted value.
+  std::int64_t default_value = 0;  ///< Value if the user does not give an argument that is not `required`.
+  bool required = true;            ///< Whether the user must give the argument.
+  Role role = Role::other;         ///< Role by which programs that do not know the unit find the argument.
 };
 
-/// One value for each Argument of the command, with defaults filled in.
+/// Values of the arguments of a command: one for each Argument in their order, with defaults filled in.
 using Arguments = std::span<const std::int64_t>;
 
 /// Description of a command of a unit.
 struct Command {
   std::string_view name;                  ///< Name of the command.
-  Verb verb;                              ///< The verb of the command line that runs it.
-  std::uint8_t id;                        ///< the unit's own number of the command
+  Verb verb;                              ///< Purpose of the command, by which the command line finds it.
+  std::uint8_t id;                        ///< number of the command within its unit: index into Unit::commands
   std::string_view meaning;               ///< Purpose of the command, as a phrase.
-  std::span<const Argument> arguments{};  ///< Arguments in their order.
-  bool changes_encoder = false;           ///< Whether it changes anything in the encoder.
-  bool repeatable = true;                 ///< the same request may be sent again after an error
-  /// Config_set: name of the config_get command that reads the setting; "": no command reads it, the setting has the
-  /// name of this command, which checks the effect itself.
+  std::span<const Argument> arguments{};  ///< Arguments of the command, in their order.
+  bool changes_encoder = false;           ///< Whether the command changes anything in the encoder.
+  bool repeatable = true;                 ///< Whether the same command may be sent again after an error.
+  /// For verb config_set: name of the config_get command that reads the setting. "": no command reads it; then the
+  /// setting has the name of this command, which checks the effect itself.
   std::string_view reads_back{};
-  /// Config_set: option that gets the value of the first argument; later commands use the new value on the same open
-  /// port.
+  /// For verb config_set: name of the option that gets the value of the first argument, because later commands on the
+  /// same open port need the new value. "": none.
   std::string_view changes_option{};
-  /// Possible effect of its requests on other devices on the line, a sentence without its end; "": none. People are
-  /// asked before it is sent.
+  /// Possible effect of the command's requests on other devices on the line, a sentence without its full stop; "":
+  /// none. Users are asked before the command is sent.
   std::string_view disturbs{};
-  bool reads_alarms = false;  ///< read_part: its reading has all alarms by name, although that of Verb::read may not
+  /// For verb read_part: the reading of this command has all alarms, although that of Verb::read may not.
+  bool reads_alarms = false;
 };
 
 /// A range of bytes in the encoder's memory. The commands memory_read and memory_write access it by their arguments
 /// with the roles address, page, count, value and force; memory_read reports a field with the role data, or value for a
 /// single byte.
 struct MemoryArea {
-  std::uint32_t page;             ///< first page; 0 without pages
-  std::uint32_t first;            ///< First address.
-  std::uint32_t count;            ///< Number of bytes.
-  std::string_view meaning;       ///< Content of the area, as a phrase.
-  bool writable = true;           ///< Whether hosts may write it.
-  bool in_dump = true;            ///< a copy of the memory includes it
-  std::uint32_t write_life = 0;   ///< writes that the document permits; 0: unknown
-  std::string_view protection{};  ///< why memory_write needs its argument of the role force here; "": it needs none
-  bool life_in_total = false;     ///< write_life is for all bytes together; false: the document does not say
-  std::uint32_t pages = 1;        ///< number of pages from `page` on that are alike; an encoder may have fewer
+  std::uint32_t page;            ///< first page of the area; 0 if the memory has no pages
+  std::uint32_t first;           ///< First address of the area on its page.
+  std::uint32_t count;           ///< Number of bytes on each page.
+  std::string_view meaning;      ///< Content of the area, as a phrase.
+  bool writable = true;          ///< Whether hosts may write the bytes or the register.
+  bool in_dump = true;           ///< whether a copy of the memory (`absenc memory dump`) includes the area
+  std::uint32_t write_life = 0;  ///< number of writes that the document permits; 0: the document states none
+  /// Why memory_write needs its argument with the role force for this area; "": it does not need it.
+  std::string_view protection{};
+  /// True: `write_life` counts the writes of all bytes together; false: the document does not state it.
+  bool life_in_total = false;
+  std::uint32_t pages = 1;  ///< number of pages, from `page` on, with such an area; an encoder may have fewer
 
-  /// Returns whether the area has this byte.
+  /// Returns whether the area includes the byte at `address` of the page `on_page`.
   [[nodiscard]] constexpr bool has(std::uint32_t on_page, std::uint32_t address) const {
     return on_page - page < pages && address >= first && address - first < count;
   }
@@ -96,42 +101,43 @@ struct MemoryArea {
 struct RegisterInfo {
   std::string_view name;  ///< Name of the register.
   std::uint32_t address;  ///< Address of the register.
-  std::uint32_t size;     ///< size in bytes
-  bool readable = true;   ///< Whether hosts may read it.
-  bool writable = false;  ///< Whether hosts may write it.
+  std::uint32_t size;     ///< size of the register in bytes
+  bool readable = true;   ///< Whether hosts may read the register.
+  bool writable = false;  ///< Whether hosts may write the bytes or the register.
 };
 
 /// A property of a virtual encoder's environment that its document mentions: a temperature, a battery, a fault of one
 /// channel.
 struct Condition {
-  std::string_view name;     ///< Name of the condition.
-  std::string_view unit;     ///< unit as of a field; "" for yes (1) or no (0) and plain numbers
+  std::string_view name;  ///< Name of the condition.
+  /// Unit of the value, as in FieldInfo::unit; "" for a plain number, and for yes (1) or no (0).
+  std::string_view unit;
   std::string_view meaning;  ///< Meaning of the value, with its unit.
-  std::int64_t minimum;      ///< Lowest value.
-  std::int64_t maximum;      ///< Highest value.
-  std::int64_t normal;       ///< initial value, that of a healthy installation
+  std::int64_t minimum;      ///< Lowest permitted value.
+  std::int64_t maximum;      ///< Highest permitted value.
+  std::int64_t normal;       ///< initial value: that of a healthy installation
 };
 
 /// A frame in the form that its link carries.
 struct Frame {
-  Bytes bytes{};                  ///< The bytes; for a bit stream the bytes that contain it.
-  std::size_t bits = 0;           ///< clocked links: number of valid bits in `bytes`
-  const CanFrame* can = nullptr;  ///< the frame of CAN links
+  Bytes bytes{};         ///< Bytes of the frame; on clocked links the bits, packed with the most significant first.
+  std::size_t bits = 0;  ///< clocked links: number of valid bits in `bytes`
+  const CanFrame* can = nullptr;  ///< CAN links: the frame; null: none
 
   /// Returns whether the frame has neither bytes nor a CAN frame.
   [[nodiscard]] constexpr bool empty() const { return bytes.empty() && can == nullptr; }
 };
 
-/// The expected value of a field in a vector.
+/// A field of a vector with the value that decoding must give.
 struct Expected {
   std::string_view field;   ///< Name of the field.
-  std::int64_t number = 0;  ///< Wanted value of an integer field.
-  double real = 0;          ///< Wanted value of a field with a fraction.
-  std::string_view text{};  ///< text and bytes fields: the bytes themselves
+  std::int64_t number = 0;  ///< Expected value of an integer field.
+  double real = 0;          ///< Expected value of a field with a fraction.
+  std::string_view text{};  ///< Expected bytes of a text or bytes field.
 };
 
-/// A frame and its decoded fields. `options` is "name=value name=value". Clocked links: request and reply are texts of
-/// 0 and 1; CAN links: texts such as "1ff:022b000000000000".
+/// A test vector: a frame with the fields, or the error, that decoding must give. On clocked links request and reply
+/// are texts of 0 and 1; on CAN links texts such as "1ff:022b000000000000".
 struct Vector {
   std::string_view id;                 ///< Identifier of the vector, unique within the unit.
   std::string_view meaning;            ///< The case that the vector shows, as a phrase.
@@ -139,62 +145,64 @@ struct Vector {
   std::string_view options;            ///< Options of the encoder, as `name=value` separated by blanks.
   Bytes request;                       ///< Bytes of the request; empty: none.
   Bytes reply;                         ///< Bytes of the reply.
-  std::span<const Expected> fields{};  ///< Wanted values of fields.
-  Error error = Error::none;           ///< Wanted error; `Error::none`: the reply is valid.
+  std::span<const Expected> fields{};  ///< Expected values of all fields; empty if `error` is set.
+  Error error = Error::none;           ///< Expected error; `Error::none`: the frame is valid.
 };
 
-/// A captured request and reply on a link that carries bytes. Without a request the reply alone must show it; an empty
-/// reply: none was received.
+/// A captured exchange on a link that carries bytes: a request and the reply to it. Either may be missing.
 struct Capture {
   Bytes request{};  ///< Bytes of the request; empty: none was captured.
   Bytes reply{};    ///< Bytes of the reply; empty: none was captured.
 };
 
-/// Evidence of captures about one value of one option.
+/// Result of comparing captures with one value of one option: whether the captured encoder may have this value.
 struct OptionEvidence {
   std::size_t option;    ///< index into the unit's options
   std::int64_t value;    ///< Value of the option.
-  bool possible;         ///< Whether an encoder with this value may have sent the captured frames.
-  std::size_t capture;   ///< if not possible: the first capture that contradicts the value
-  std::string_view why;  ///< the reason, a sentence
+  bool possible;         ///< Whether an encoder with this value of the option may have sent the captured frames.
+  std::size_t capture;   ///< if not `possible`: index of the first capture that contradicts the value
+  std::string_view why;  ///< reason why the value is possible or not, a sentence
 };
 
-/// Receives the values of an option with their evidence.
+/// Receiver to which Unit::probe delivers the evidence about option values, one by one.
 struct EvidenceSink {
-  /// Takes one value of an option.
+  /// Takes the evidence about one value of an option.
   virtual void put(const OptionEvidence& evidence) = 0;
 
  protected:
   ~EvidenceSink() = default;
 };
 
-/// The bits of a value, or of a part of it, in a frame. Bits are numbered as for `Unit::is_checked`; the last bit of a
-/// range is the most significant on lines of characters, the first on clocked links.
+/// A range of consecutive bits of a frame that carries a value, or a part of it. Bits are numbered as for
+/// `Unit::is_checked`. The last bit of a range is the most significant on lines of characters, the first on clocked
+/// links.
 struct BitRange {
-  std::size_t first = 0;  ///< Index of the first bit.
-  std::size_t count = 0;  ///< Number of bits.
-  bool inverted = false;  ///< a 0 on the wire is a 1 of the value
+  std::size_t first = 0;  ///< Index of the first bit in the frame.
+  std::size_t count = 0;  ///< Number of bits in the range.
+  bool inverted = false;  ///< true: a 0 in the frame is a 1 of the value
 };
 
-/// The parts of one value, the least significant first.
+/// The ranges of bits that carry one value, the least significant range first.
 using BitRanges = Buffer<BitRange, 8>;
 
-/// A frame that several exchanges carried, one byte each. It is decoded as other frames are.
+/// A frame that several exchanges carried, one byte each. It is decoded like any other frame.
 struct Composed {
-  Bytes request{};            ///< Bytes of the request.
-  Bytes reply{};              ///< Bytes of the reply; empty: none.
-  std::uint64_t first = 0;    ///< number of the exchange with which it began
-  Error error = Error::none;  ///< an error that its bytes alone do not show: it contradicts the frames that carried it
+  Bytes request{};          ///< Bytes of the request of the composed frame.
+  Bytes reply{};            ///< Bytes of the reply of the composed frame; empty: none.
+  std::uint64_t first = 0;  ///< number of the exchange that carried the first byte
+  /// Error if the composed frame contradicts the exchanges that carried it, which its bytes alone do not show.
+  Error error = Error::none;
 };
 
-/// Finds composed frames in the valid exchanges of one encoder, in the order of a capture.
+/// Finds composed frames in the valid exchanges of one encoder, which it takes in the order of the capture.
 struct Follower {
-  /// Takes a valid exchange, or a reply without a request. `number` counts them.
+  /// Takes a valid exchange, or a reply without a request (`request` empty). `number`: number of the exchange in the
+  /// capture.
   virtual void follow(std::uint64_t number, Bytes request, Bytes reply) = 0;
-  /// Notes that frames were lost or damaged here.
+  /// Notes that frames were lost or damaged between the exchange before and the next one.
   virtual void lose() = 0;
-  /// Returns in `one` a composed frame that ended with the last exchange; false: there is no other. Valid until the
-  /// next exchange.
+  /// Stores in `one` the next composed frame that ended with the last exchange, and returns true; returns false if
+  /// there is no other. The frame is valid until the next exchange.
   virtual bool take(Composed& one) = 0;
 
  protected:
@@ -206,22 +214,23 @@ enum class Direction : std::uint8_t { request, reply };
 
 /// Where a frame ends in a sequence of bytes.
 struct FrameEnd {
-  /// Whether the end of a frame is known.
+  /// Whether a frame ends in a sequence of bytes.
   enum class Kind : std::uint8_t {
     complete,            ///< the first `size` bytes are one frame
-    incomplete,          ///< a frame may have begun; at least `size` bytes in all are needed
+    incomplete,          ///< a frame may have begun; at least `size` bytes in all are needed to decide
     no_frame,            ///< no frame begins with the first byte
-  } kind;                ///< Whether the end of the frame is known.
-  std::size_t size = 0;  ///< Length of the frame in bytes, if known.
+  } kind;                ///< Whether the bytes contain a complete frame.
+  std::size_t size = 0;  ///< Length in bytes, as `kind` describes it; 0 for `no_frame`.
 };
 
-/// A machine with the item that its link carries. Exactly one pointer is set; none if the machine could not be made.
+/// Pointer to a machine (conversation or virtual encoder) for bytes or for CAN frames. Exactly one member is set; none
+/// if the machine could not be made.
 template <template <class> class Role>
 struct Any {
-  Role<std::uint8_t>* bytes = nullptr;  ///< The machine, if its items are bytes; else null.
-  Role<CanFrame>* frames = nullptr;     ///< The machine, if its items are CAN frames; else null.
+  Role<std::uint8_t>* bytes = nullptr;  ///< The machine, if its link carries bytes; else null.
+  Role<CanFrame>* frames = nullptr;     ///< The machine, if its link carries CAN frames; else null.
 
-  /// Returns the machine of this item; null if there is none.
+  /// Returns the machine for links that carry `Item`; null if there is none.
   template <class Item>
   [[nodiscard]] constexpr Role<Item>* of() const {
     if constexpr (std::is_same_v<Item, CanFrame>) {
@@ -232,123 +241,140 @@ struct Any {
   }
 };
 
-inline constexpr std::size_t longest_encoded = 1024;  ///< bytes of a request that `encode` writes, at most
+/// Greatest length in bytes of a request that Unit::encode writes.
+inline constexpr std::size_t longest_encoded = 1024;
 
-/// Bits of a position; 0: it has no such part.
+/// Resolution of an encoder: the numbers of bits of its position and turns.
 struct Resolution {
   unsigned singleturn_bits = 0;   ///< Bits of the single-turn position; 0: none.
   unsigned multiturn_bits = 0;    ///< Bits of the turns; 0: none.
   double unit_um = 0;             ///< linear encoders: micrometres per count; 0: a rotary encoder
-  bool multiturn_signed = false;  ///< turns below zero are counted
+  bool multiturn_signed = false;  ///< true: the number of turns is signed, so turns below zero are possible
 };
 
-/// Wires beside the data on which a host sends requests as pulses.
+/// Wires beside the data line that a host must pulse.
 struct ExtraWires {
-  bool trigger = false;  ///< each frame needs a trigger pulse
-  bool clear = false;    ///< a pulse sets the zero
+  bool trigger = false;  ///< true: the encoder sends a frame only after a trigger pulse
+  bool clear = false;    ///< true: a pulse on the clear wire sets the zero
 };
 
 /// Times of an asynchronous line, which decoding its captures needs.
 struct LineTiming {
-  unsigned pause_bits = 15;  ///< silence in bits that ends a frame; a shorter pause does not
-  Time turnaround{};  ///< time from the end of a request to the begin of its reply, as the document has it; 0: unknown
+  unsigned pause_bits = 15;  ///< shortest silence that ends a frame, in bit times
+  /// Time from the end of a request to the begin of its reply, as the document states it; 0: unknown.
+  Time turnaround{};
   Time turnaround_limit = std::chrono::milliseconds(100);  ///< longest time that hosts wait for a reply to begin
 };
 
-/// Description of a protocol. All layers above know a protocol only by this.
+/// Descriptor of a protocol. All layers above know a protocol only by its Unit.
 struct Unit {
   std::string_view id;        ///< Identifier: the part of an address before the colon.
-  std::string_view name;      ///< maker and protocol, for people
-  std::string_view document;  ///< title of the document
-  /// Makers and families to find the unit by: "Tamagawa", "Smart-Abs". Its models are in `models`.
+  std::string_view name;      ///< names of maker and protocol, for people
+  std::string_view document;  ///< title of the protocol's document
+  /// Names of makers and encoder families by which users find the unit: "Tamagawa", "Smart-Abs". Names of models are in
+  /// `models`.
   std::span<const std::string_view> known_as{};
-  LinkKind link;                         ///< Kind of link between host and encoder.
-  LineSettings line;                     ///< rate 0: the document states none, so the user must
-  std::span<const Option> options;       ///< Options that an address may set.
-  std::span<const Model> models;         ///< Models, which set several options by one name.
-  std::span<const FieldInfo> fields;     ///< Fields that replies can have.
-  std::span<const Command> commands;     ///< Commands of the encoder.
-  std::span<const MemoryArea> memory{};  ///< areas that the commands memory_read and memory_write access, in order
-  /// Registers that these commands access, of an encoder without bytes of memory.
+  LinkKind link;      ///< Kind of link between host and encoder.
+  LineSettings line;  ///< Default settings of the line. Rate 0: the document states none, so the user must.
+  std::span<const Option> options;    ///< Options that the user may set in an address.
+  std::span<const Model> models;      ///< Models of encoders, each of which sets several options by one name.
+  std::span<const FieldInfo> fields;  ///< Fields that requests, replies and results can have.
+  std::span<const Command> commands;  ///< Commands that hosts can run.
+  /// Areas of the encoder's memory that the commands memory_read and memory_write access, in order of pages.
+  std::span<const MemoryArea> memory{};
+  /// Registers that the commands memory_read and memory_write access, for encoders that have registers instead of
+  /// memory.
   std::span<const RegisterInfo> registers{};
-  std::span<const Vector> vectors;  ///< Frames with their meaning, from documents.
-  const FieldInfo* status;          ///< flags of Reading::status; null: the unit has none
-  const FieldInfo* alarms;          ///< flags of Reading::alarms
-  /// Returns the alarms that an encoder with these options can report. Null: all.
+  /// Test vectors: frames from documents, or derived from them, with their decoded fields.
+  std::span<const Vector> vectors;
+  const FieldInfo* status;  ///< field that describes the flags of Reading::status; null: the unit has no status
+  const FieldInfo* alarms;  ///< Field that describes the flags of Reading::alarms; null: the unit has no alarms.
+  /// Returns the alarms (bits of `alarms`) that an encoder with these options can report. Null: all.
   std::uint32_t (*reportable)(const Options& options) = nullptr;
-  /// Flags of the second channel of an encoder with two. Their bits follow those of the first in one number, so
-  /// comparing alarms compares both channels; people see the names of each.
+  /// Field that describes the status flags of the second channel of an encoder with two; null: none. In a Reading their
+  /// bits follow those of the first channel in one number, so comparing alarms compares both channels; texts name the
+  /// flags of each channel.
   const FieldInfo* second_status = nullptr;
-  const FieldInfo* second_alarms = nullptr;  ///< Field of the second alarms; null: none.
-  std::size_t host_storage;                  ///< bytes that `host` needs, aligned for any type
-  std::size_t device_storage;                ///< bytes that `device` needs
+  const FieldInfo* second_alarms = nullptr;  ///< Field of the alarms of the second channel; null: none.
+  std::size_t host_storage;                  ///< bytes of storage that `host` needs, aligned for any type
+  std::size_t device_storage;                ///< bytes of storage that `device` needs, aligned for any type
 
-  /// Checks a reply against its request and puts its fields; with an empty reply, the fields of the request.
+  /// Checks a reply against its request and puts the fields of the reply into `sink`; with an empty reply, checks the
+  /// request and puts its fields. Returns the first error; `Error::none` if the frame is valid.
   Error (*decode)(const Options& options, Frame request, Frame reply, FieldSink& sink);
-  /// Returns the error of `decode`; none: the reply, or with an empty reply the request, is valid.
+  /// Returns the error that `decode` returns, without delivering fields; `Error::none`: the reply, or with an empty
+  /// reply the request, is valid.
   [[nodiscard]] Error check(const Options& values, const Frame& request, const Frame& reply) const {
     NoFields nowhere;
     return decode(values, request, reply, nowhere);
   }
-  /// Writes the request of a command, at most `longest_encoded` bytes; on CAN and clocked links its text, as in
-  /// vectors. Empty if a host only clocks. Errors: invalid_argument, buffer_too_small, unsupported.
+  /// Writes the request of a command into `request` and returns its length, at most `longest_encoded` bytes. On CAN and
+  /// clocked links it writes the text of the request, as in vectors; the text is empty if a host only clocks. Errors:
+  /// invalid_argument, buffer_too_small, unsupported.
   Result<std::size_t> (*encode)(const Options& options, const Command& command, Arguments arguments,
                                 MutableBytes request);
-  /// Returns where the frame that begins with `bytes` ends.
+  /// Returns where the frame ends that begins with the first of `bytes`.
   FrameEnd (*frame_end)(const Options& options, Direction direction, Bytes bytes);
-  /// Makes the conversation of a command in `storage`, which has `host_storage` bytes; none if the options contradict
-  /// it.
+  /// Constructs the conversation of a command in `storage`, which has `host_storage` bytes. Returns an empty Any if the
+  /// options or arguments contradict the command.
   Any<Conversation> (*host)(const Options& options, const Command& command, Arguments arguments,
                             std::span<std::byte> storage);
-  /// Makes a virtual encoder in `storage`, which has `device_storage` bytes; none if the options contradict each other.
+  /// Constructs a virtual encoder in `storage`, which has `device_storage` bytes; `shaft` must outlive it. Returns an
+  /// empty Any if the options contradict each other.
   Any<Device> (*device)(const Options& options, const Shaft& shaft, std::span<std::byte> storage);
-  /// Returns the bits of a position with these options.
+  /// Returns the numbers of bits of position and turns of an encoder with these options.
   Resolution (*resolution)(const Options& options);
-  /// Returns whether a flip of this bit in this valid reply must be detected. Null: every bit must. Bits count from the
-  /// least significant of the first byte on; on clocked links in the order of the wire.
+  /// Returns whether the checks must detect that bit number `bit` of this valid reply was flipped. Null: they must
+  /// detect every bit. Bits count from the least significant of the first byte on; on clocked links in the order of the
+  /// wire.
   bool (*is_checked)(const Options& options, Frame request, Frame reply, std::size_t bit) = nullptr;
-  /// Returns the bits of a field in this valid reply that carries it; none if the field has no fixed place, or is
-  /// computed (Gray code, decimal text). Null: unknown for all fields. The place may depend on options and request, so
-  /// it is asked for each frame; the kit cuts the bits out of valid frames and compares them with the field.
+  /// Returns the bits of this valid reply that carry `field`; none if the field has no fixed place, or is computed
+  /// (Gray code, decimal text). Null: unknown for all fields. The place may depend on options and request, so it is
+  /// determined for each frame; the kit (tests of every unit) cuts the bits out of valid frames and compares them with
+  /// the field.
   BitRanges (*bits)(const Options& options, Frame request, Frame reply, const FieldInfo& field) = nullptr;
-  /// Returns the document's explanation of a reply that `decode` refuses with `error`. Null: it has none.
+  /// Returns the document's explanation of a reply that `decode` refuses with `error`. Null: the document explains
+  /// none.
   Explanation (*explain)(const Options& options, Error error, Frame request, Frame reply) = nullptr;
-  /// Returns the line with these options. Null: always `line`. Silences measured in characters follow its rate, and a
-  /// conversation that changes the rate must know the old one.
+  /// Returns the settings of the line with these options. Null: they are always `line`. Silences measured in characters
+  /// follow the rate of these settings, and a conversation that changes the rate must know the old one.
   LineSettings (*settings)(const Options& options) = nullptr;
-  /// The unit of the same encoder behind an SPI controller, if that is another one.
+  /// The unit of the same encoder behind an SPI controller, if that is another unit; null: it is this one.
   const Unit* over_spi = nullptr;
-  /// Puts every value of the probeable options; null: frames do not show them. Captures are in the order of time.
-  /// Returns whether some values explain all captures; then `options`, which have the values of all other options, get
-  /// these values, and defaults where captures leave them open.
+  /// Puts the evidence about every value of the probeable options into `sink`. Returns whether some combination of
+  /// values explains all captures, which are in the order of time. If so, the probeable options in `options` get these
+  /// values, and defaults where the captures leave them open; all other values in `options` must be set before. Null:
+  /// frames do not show option values.
   bool (*probe)(Options& options, std::span<const Capture> captures, EvidenceSink& sink) = nullptr;
-  /// Returns the wires that these options need beside the data, before a port is opened: the user must name the wire,
-  /// and a pseudo-terminal has none. Null: none.
+  /// Returns the wires beside the data line that an encoder with these options needs. It is called before a port is
+  /// opened, because the user must name the wire, and a pseudo-terminal has none. Null: none.
   ExtraWires (*extra_wires)(const Options& options) = nullptr;
-  LineTiming timing{};  ///< Times of the line, for captures.
-  /// Returns whether the encoder sends unsolicited replies. Null: never. On clocked and CAN links it may always do so.
+  LineTiming timing{};  ///< Times of the line, which decoding captures needs.
+  /// Returns whether an encoder with these options sends unsolicited replies. Null: never. On clocked and CAN links a
+  /// reply without a request is always permitted.
   bool (*streams)(const Options& options) = nullptr;
-  /// Returns whether this valid request is answered. Null: every one is.
+  /// Returns whether the encoder answers this valid request. Null: it answers every request.
   bool (*is_answered)(const Options& options, Frame request) = nullptr;
-  /// Returns how long after the last received item this valid request must not be repeated. Null: it may be repeated at
-  /// once.
+  /// Returns how long after the last received item a host must wait before it repeats this valid request. Null: no
+  /// time.
   Time (*pause)(const Options& options, Frame request) = nullptr;
-  std::span<const Condition> conditions{};  ///< conditions of the virtual encoder, which can also be set while it runs
-  /// Clocked links whose host sends a bit by the level of its clock line in each pause, 1 when it is low: returns the
-  /// index of the bit in this reply with which the encoder sends one, too. Both together are decoded as request and
-  /// reply, one bit per frame. Nothing: this reply has none. Null: no reply of the unit has one.
+  /// Conditions of the virtual encoder's environment, which can also be set while it runs.
+  std::span<const Condition> conditions{};
+  /// For clocked links on which the level of the clock line in each pause is a bit from the host (1: low): returns the
+  /// index of the bit in this reply that the encoder sends in exchange; nothing if this reply has none. The bits of
+  /// both sides, one per frame, are decoded as request and reply. Null: no reply of the unit has such a bit.
   std::optional<std::size_t> (*control_bit)(const Options& options, Frame reply) = nullptr;
-  /// Returns `now`, the reading of one reply, completed by values that it does not carry and that earlier replies of
-  /// the same encoder have reported since power on. `before`: the completed reading before it. Null: each reply has all
-  /// values.
+  /// Returns the reading `now` of one reply, completed by values that this reply does not carry and that earlier
+  /// replies of the same encoder have reported since power on. `before`: the completed reading of the reply before.
+  /// Null: each reply carries all values.
   Reading (*remembered)(const Reading& before, Reading now) = nullptr;
-  /// Constructs a follower in storage of `follower_storage` bytes, aligned for any type. Null: no frame is carried by
-  /// several exchanges.
+  /// Constructs a Follower in `storage`, which has `follower_storage` bytes, aligned for any type. Null: no frame is
+  /// carried by several exchanges.
   Follower* (*follower)(const Options& options, std::span<std::byte> storage) = nullptr;
-  std::size_t follower_storage = 0;  ///< Bytes that a channel follower needs.
+  std::size_t follower_storage = 0;  ///< Bytes of storage that `follower` needs; 0: there is none.
 };
 
-/// Returns whether a word format may replace some of the unit's options.
+/// Returns whether the user may give a word format for `unit`, which replaces the options that describe a word.
 [[nodiscard]] constexpr bool takes_word(const Unit& unit) {
   for (const Option& option : unit.options) {
     if (option.describes_word) return true;
@@ -356,12 +382,12 @@ struct Unit {
   return false;
 }
 
-/// Returns the line with these options.
+/// Returns the settings of the line of an encoder of `unit` with these options.
 [[nodiscard]] inline LineSettings line_settings(const Unit& unit, const Options& options) {
   return unit.settings != nullptr ? unit.settings(options) : unit.line;
 }
 
-/// Returns the first command with this verb, or null.
+/// Returns the first command of `unit` with this verb, or null.
 [[nodiscard]] constexpr const Command* find_command(const Unit& unit, Verb verb) {
   for (const Command& command : unit.commands) {
     if (command.verb == verb) return &command;
@@ -369,7 +395,7 @@ struct Unit {
   return nullptr;
 }
 
-/// Returns the command with this name, or null.
+/// Returns the command of `unit` with this name, or null.
 [[nodiscard]] constexpr const Command* find_command(const Unit& unit, std::string_view name) {
   for (const Command& command : unit.commands) {
     if (command.name == name) return &command;

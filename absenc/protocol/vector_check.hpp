@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Compares the decoded fields of a frame with those that its vector expects, also at compile time.
+// Compares the decoded fields of a frame with those that its test vector expects, also at compile time.
 #pragma once
 
 #include <span>
@@ -10,11 +10,12 @@
 
 namespace absenc {
 
-/// A sink that expects every put field, in any order; real numbers to 1e-9.
+/// A sink that compares each delivered field with the expected values, in any order; real numbers to 1e-9. Unexpected
+/// fields make the comparison fail.
 struct VectorCheck final : FieldSink {
-  /// Compares with these values.
+  /// Expects exactly the fields `wanted`.
   constexpr explicit VectorCheck(std::span<const Expected> wanted) : expected(wanted) {}
-  /// Compares the value of a field, if it is expected.
+  /// Counts the delivered field, and counts it as a match if its value is expected.
   constexpr void put(const FieldValue& value) override {
     for (const Expected& one : expected) {
       const double difference = one.real - value.real;
@@ -23,7 +24,7 @@ struct VectorCheck final : FieldSink {
     }
     ++count;
   }
-  /// Returns whether `bytes` are those of the hexadecimal `text`.
+  /// Returns whether `bytes` are the characters of `text`.
   [[nodiscard]] static constexpr bool same(std::string_view text, Bytes bytes) {
     if (text.size() != bytes.size()) return false;
     for (std::size_t i = 0; i < bytes.size(); ++i) {
@@ -31,23 +32,24 @@ struct VectorCheck final : FieldSink {
     }
     return true;
   }
-  /// Returns whether each expected field was put once, with its value.
+  /// Returns whether each expected field was delivered once, with its expected value, and no other field.
   [[nodiscard]] constexpr bool all() const { return matches == expected.size() && count == expected.size(); }
 
-  std::span<const Expected> expected;  ///< The wanted values.
-  std::size_t matches = 0;             ///< Number of fields with the wanted value.
-  std::size_t count = 0;               ///< Number of expected fields that were put.
+  std::span<const Expected> expected;  ///< The expected fields with their values.
+  std::size_t matches = 0;             ///< Number of delivered fields that have their expected value.
+  std::size_t count = 0;               ///< Number of delivered fields, expected or not.
 };
 
-/// Returns the frame of a vector's text on a clocked link: at most 256 bits, every character but 1 is 0.
+/// Returns the bits of a test vector's text for a clocked link: at most 256 bits; the character 1 is a one, every other
+/// character a zero.
 [[nodiscard]] constexpr BitBuffer<256> bits_of_text(Bytes text) {
   BitBuffer<256> bits;
   for (const std::uint8_t c : text) bits.append(c == '1' ? 1 : 0, 1);
   return bits;
 }
 
-/// Returns the frame of a vector's text on a CAN link: "1ff:022b"; an identifier of more than three digits has 29 bits.
-/// Any other text gives an empty frame.
+/// Returns the CAN frame of a test vector's text such as "1ff:022b": identifier and data in hexadecimal. An identifier
+/// of more than three digits has 29 bits. Any other text gives an empty frame.
 [[nodiscard]] constexpr CanFrame can_frame_of_text(Bytes text) {
   CanFrame frame;
   std::size_t at = 0;

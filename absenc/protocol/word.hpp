@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The position word of clocked encoders: decoded and encoded by its WordFormat, and turned into a reading.
+// Decodes and encodes the position word of clocked encoders by its WordFormat, and makes a reading of it.
 #pragma once
 
 #include <array>
@@ -17,33 +17,35 @@
 
 namespace absenc {
 
-/// The values of a word; those that it does not carry are 0.
+/// The decoded values of a position word; values that the word does not carry are 0.
 template <std::size_t size>
 struct WordWith {
-  static constexpr std::size_t capacity = size;  ///< Number of values that have room.
+  static constexpr std::size_t capacity = size;  ///< Number of elements of `values`.
   std::uint64_t position = 0;                    ///< Position in counts.
   std::uint64_t multiturn = 0;                   ///< Turns.
   bool error = false;                            ///< Whether the error bit reports an error.
   bool warning = false;                          ///< Whether the warning bit reports a warning.
-  std::array<std::uint64_t, size> values{};      ///< values of Meaning::value, by the field's index
+  /// Values of fields with Meaning::value, by the index of the field in the format.
+  std::array<std::uint64_t, size> values{};
 
-  /// Compares all values.
+  /// Returns whether all values of two words are equal.
   friend constexpr bool operator==(const WordWith&, const WordWith&) = default;
 };
-/// A word with room for the values of any format.
+/// The decoded values of a position word of any format.
 using Word = WordWith<WordFormat::maximum_fields>;
 
-/// Bits of Reading::alarms.
+/// Bit of Reading::alarms: the error bit of a word.
 inline constexpr std::uint32_t word_error = 1;
 inline constexpr std::uint32_t word_warning = 2;  ///< Bit of Reading::alarms: the warning bit of a word.
 
-/// Names of the alarms of a word.
+/// Names, meanings and actions of the alarms of a word, in the order of the bits word_error and word_warning.
 inline constexpr std::array<FlagInfo, 2> word_flags{{
     {"error", "the encoder says that its position is wrong", "see the encoder's manual: its status tells the cause"},
     {"warning", "the encoder works near its limits", "check distance, dirt, temperature and supply", true},
 }};
 
-/// The fields of a word, except those of Meaning::value, which have names of their own.
+/// The values of a word that are shown as fields, except those with Meaning::value, whose names come from the word
+/// format.
 struct WordValues {
   std::uint64_t multiturn;   ///< Turns.
   std::uint64_t singleturn;  ///< Position within the turn, in counts.
@@ -51,12 +53,13 @@ struct WordValues {
   std::uint64_t position;    ///< Position of a linear encoder, in counts.
   double position_um;        ///< Position of a linear encoder, in micrometres.
   double position_mm;        ///< Position of a linear encoder, in millimetres.
-  bool error;                ///< Error bit.
-  bool warning;              ///< Warning bit.
-  std::uint32_t alarms;      ///< Declared for its flags, which a reading has; never put.
+  bool error;                ///< Whether the error bit reports an error.
+  bool warning;              ///< Whether the warning bit reports a warning.
+  /// Alarms of a reading. Declared only for the descriptions of its flags; never delivered as a field.
+  std::uint32_t alarms;
 };
 
-/// The fields of these values.
+/// The fields of WordValues: names, units and meanings.
 inline constexpr auto word_fields = author::fields_of<WordValues>(
     author::field<&WordValues::multiturn>("multiturn", "revolutions", "turns", Role::turns),
     author::field<&WordValues::singleturn>("singleturn", "counts", "position within the turn", Role::position),
@@ -68,32 +71,32 @@ inline constexpr auto word_fields = author::fields_of<WordValues>(
     author::field<&WordValues::warning>("warning", "", "the encoder works near its limits"),
     author::field<&WordValues::alarms>("alarms", "error and warning", word_flags));
 
-/// The unit of a position.
+/// Kind of encoder and scale of its position.
 struct Scale {
-  bool linear = false;  ///< Whether the encoder is linear.
-  double unit_um = 0;   ///< linear: micrometres per count; 0: unknown
+  bool linear = false;  ///< Whether the encoder is linear; false: rotary.
+  double unit_um = 0;   ///< linear encoders: micrometres per count; 0: unknown
 };
 
-/// A field with its place in the word.
+/// A field of a word format, with its place in the word.
 struct PlacedField {
   std::size_t index;  ///< Index of the field in the format.
-  unsigned first;     ///< Index of its first bit in the word.
+  unsigned first;     ///< Index of the field's first bit in the word.
   Meaning meaning;    ///< Meaning of the field.
   unsigned bits;      ///< Number of bits, 1 to 64.
   bool active_low;    ///< Whether 0 means that a flag is set.
 };
 
-/// Word format for the functions of a position word, known at run time: the format, that of the protocol around it, and
-/// `each`, which calls `use` with each field until it returns false.
+/// Gives the functions of a position word access to a format that is known at run time only. Known does the same for a
+/// format known at compile time; both have the same members.
 template <class Format>
 struct Given {
   static constexpr bool is_known = false;  ///< Whether the format is known at compile time.
-  /// Type of the word.
+  /// Type of the decoded values of the word.
   using Word = absenc::Word;
-  const Format& format;    ///< The format of the encoder.
-  const WordFormat& word;  ///< The format of its word.
+  const Format& format;    ///< Format of the encoder, of which the word format is a part.
+  const WordFormat& word;  ///< Format of the position word.
 
-  /// Calls `use` for each field, in their order, while it returns true.
+  /// Calls `use` with each field of the word in turn, until it returns false. Returns whether all calls returned true.
   template <class Use>
   constexpr bool each(Use use) const {
     unsigned first = 0;
@@ -106,27 +109,28 @@ struct Given {
   }
 };
 
-/// The same for a format that is known when the program is written, so that nothing is computed at run time.
+/// Gives the functions of a position word access to a format that is known at compile time, so that nothing of the
+/// format is computed at run time. Given does the same for other formats.
 template <const auto& known>
 struct Known {
-  static constexpr bool is_known = true;                     ///< Whether the format is known at compile time.
-  static constexpr const auto& format = known;               ///< The format of the encoder.
-  static constexpr const WordFormat& word = known.word;      ///< The format of its word.
-  static constexpr std::size_t size = word.fields().size();  ///< Number of fields.
-  /// Type of the word, without room for values that it does not have.
+  static constexpr bool is_known = true;                 ///< Whether the format is known at compile time.
+  static constexpr const auto& format = known;           ///< Format of the encoder, of which the word format is a part.
+  static constexpr const WordFormat& word = known.word;  ///< Format of the position word.
+  static constexpr std::size_t size = word.fields().size();  ///< Number of fields of the word.
+  /// Type of the decoded values of the word, without room for values of Meaning::value if the word has none.
   using Word = WordWith<word.find(Meaning::value) == nullptr ? 0 : size>;
 
-  /// One field, with its place as constants.
+  /// The field `i` of the word, with its place as constants.
   template <std::size_t i>
   struct Field {
     static constexpr std::size_t index = i;                          ///< Index of the field in the format.
-    static constexpr unsigned first = word.first_of(i);              ///< Index of its first bit in the word.
+    static constexpr unsigned first = word.first_of(i);              ///< Index of the field's first bit in the word.
     static constexpr Meaning meaning = word.fields()[i].meaning;     ///< Meaning of the field.
     static constexpr unsigned bits = word.fields()[i].bits;          ///< Number of bits, 1 to 64.
     static constexpr bool active_low = word.fields()[i].active_low;  ///< Whether 0 means that a flag is set.
   };
 
-  /// Calls `use` for each field, in their order, while it returns true.
+  /// Calls `use` with each field of the word in turn, until it returns false. Returns whether all calls returned true.
   template <class Use>
   static constexpr bool each(Use use) {
     return each(use, std::make_index_sequence<size>{});
@@ -148,7 +152,8 @@ constexpr bool parity_of(const Bits& bits, std::size_t first, std::size_t end) {
   return odd ^ odd_parity(bits.load(first, static_cast<unsigned>(end - first)));
 }
 
-// Decodes a Gray-coded number that continues from field to field: each field needs the last bit of the one before.
+// Decodes or encodes a Gray-coded number that continues from field to field: each field needs the last bit of the field
+// before.
 class GrayFields {
  public:
   constexpr std::uint64_t decode(std::uint64_t gray, unsigned bits) {
@@ -166,8 +171,8 @@ class GrayFields {
   bool odd_ = false;
 };
 
-// The bits from `first` on, for a format known at run time only. At most 64 bits are loaded as one number, which is
-// faster, and one piece of code serves all formats. All bits must exist.
+// The `count` bits of a frame from bit `first` on, for a format known at run time only. At most 64 bits are loaded as
+// one number, which is faster, and one piece of code serves all formats. All bits must exist.
 class SomeBits {
  public:
   constexpr SomeBits(BitView bits, std::size_t first, unsigned count)
@@ -190,7 +195,8 @@ class SomeBits {
   std::size_t first_;
 };
 
-// `Bits`: BitView, BitNumber or SomeBits.
+// Decodes the word that begins at bit `first` of `bits` into `word`. Returns wrong_length, bad_checksum (parity), or
+// none. `Bits` is BitView, BitNumber or SomeBits.
 template <class Source, class Bits>
 constexpr Error take_word(const Source& source, const Bits& bits, std::size_t first, typename Source::Word& word) {
   if (bits.size < first || bits.size - first < source.word.bits()) return Error::wrong_length;
@@ -214,14 +220,15 @@ constexpr Error take_word(const Source& source, const Bits& bits, std::size_t fi
 
 }  // namespace detail
 
-/// Decodes the word that begins at bit `first`. Errors: wrong_length (too few bits), bad_checksum (parity).
+/// Decodes the word that begins at bit `first` of `bits`. Errors: wrong_length (too few bits), bad_checksum (parity).
 [[nodiscard]] constexpr Result<Word> decode_word(const WordFormat& format, BitView bits, std::size_t first = 0) {
   Word word;
   const Error error = detail::take_word(Given<WordFormat>{format, format}, bits, first, word);
   return error == Error::none ? Result(word) : error;
 }
 
-/// Appends the word; values are cut to the bits of their field. Returns false if `out` is too small.
+/// Appends the encoded word to `out`; values are cut to the bits of their field. Returns false, without a change, if
+/// `out` is too small.
 template <std::size_t Capacity>
 constexpr bool encode_word(const WordFormat& format, const Word& word, BitBuffer<Capacity>& out) {
   if (out.capacity() - out.size() < format.bits()) return false;
@@ -243,7 +250,7 @@ constexpr bool encode_word(const WordFormat& format, const Word& word, BitBuffer
   return true;
 }
 
-/// Puts every field of the word, in the order of the wire.
+/// Puts every field of the word into `sink`, in the order of the wire.
 constexpr void put_word(FieldSink& sink, const WordFormat& format, const Word& word, const Scale& scale) {
   for (std::size_t i = 0; i < format.fields().size(); ++i) {
     const WordField& field = format.fields()[i];
@@ -268,19 +275,19 @@ constexpr void put_word(FieldSink& sink, const WordFormat& format, const Word& w
   }
 }
 
-/// Bits of position and turns in a word, and their order.
+/// Numbers of bits of position and turns in a word, and which of the two comes first.
 struct PositionBits {
   unsigned position;            ///< Bits of the position.
   unsigned multiturn = 0;       ///< Bits of the turns; 0: none.
   bool multiturn_first = true;  ///< Whether the turns precede the position.
 };
 
-/// Properties of a word that its reading needs.
+/// Properties of a word format that are needed to make a reading of a word.
 struct WordContents {
-  PositionBits bits{};         ///< Widths of position and turns.
-  std::uint32_t reported = 0;  ///< alarms for which the word has a bit
+  PositionBits bits{};         ///< Numbers of bits of position and turns.
+  std::uint32_t reported = 0;  ///< alarms (word_error, word_warning) for which the word has a bit
 };
-/// Returns the widths and flags of a word.
+/// Returns the numbers of bits of position and turns of a word, and the alarms that it can report.
 [[nodiscard]] constexpr WordContents contents_of(const WordFormat& format) {
   WordContents contents;
   for (const WordField& field : format.fields()) {
@@ -292,7 +299,8 @@ struct WordContents {
   return contents;
 }
 
-/// Makes the reading of a word. An error bit makes position and turns invalid; a word without one is always valid.
+/// Returns the reading of a word. A set error bit makes position and turns invalid; a word without an error bit is
+/// always valid.
 template <std::size_t size>
 [[nodiscard]] constexpr Reading to_reading(const WordContents& contents, const WordWith<size>& word,
                                            const Scale& scale) {
@@ -306,19 +314,19 @@ template <std::size_t size>
           .alarms = (word.error ? word_error : 0) | (word.warning ? word_warning : 0),
           .alarms_reported = contents.reported};
 }
-/// Returns the reading of a word.
+/// Returns the reading of a word with this format. A set error bit makes position and turns invalid.
 [[nodiscard]] constexpr Reading to_reading(const WordFormat& format, const Word& word, const Scale& scale) {
   return to_reading(contents_of(format), word, scale);
 }
 
-/// Puts every field of the word, and its reading.
+/// Puts every field of the word, and then the reading of the word, into `sink`.
 constexpr void put_position(FieldSink& sink, const WordFormat& format, const Word& word, const Scale& scale) {
   put_word(sink, format, word, scale);
   sink.put_reading(to_reading(format, word, scale));
 }
 
-/// Returns the word of a virtual encoder at this state of the shaft. A linear one moves over its whole range in one
-/// revolution.
+/// Returns the values that a virtual encoder sends in its word at this state of the shaft. A linear encoder moves over
+/// its whole range in one revolution.
 [[nodiscard]] constexpr Word word_of(const WordFormat& format, const ShaftState& state, std::uint32_t alarms) {
   const unsigned bits = format.bits_of(Meaning::position);
   const auto fraction = static_cast<std::uint64_t>(state.position);
@@ -330,12 +338,13 @@ constexpr void put_position(FieldSink& sink, const WordFormat& format, const Wor
   return word;
 }
 
-/// Returns the usual word: turns before or after the position, then nError and nWarning if wanted.
+/// Returns the format of a word that has only the position and, before or after it, the turns. It is empty where a
+/// width is 0 or more than 64 bits.
 [[nodiscard]] constexpr WordFormat word_format(const PositionBits& bits) {
   WordFormat format;
   const auto bits_of = [](unsigned count) { return static_cast<std::uint8_t>(count <= 64 ? count : 0); };
   const WordField turns{"multiturn", Meaning::multiturn, bits_of(bits.multiturn)};
-  if (bits.multiturn_first) format.add(turns);  // fields of 0 or of too many bits are refused
+  if (bits.multiturn_first) format.add(turns);  // `add` refuses a field of 0 bits
   format.add({"position", Meaning::position, bits_of(bits.position)});
   if (!bits.multiturn_first) format.add(turns);
   return format;

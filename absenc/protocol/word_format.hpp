@@ -21,23 +21,23 @@
 
 namespace absenc {
 
-/// Meaning of a field of a word.
+/// Meaning of a field of a position word.
 enum class Meaning : std::uint8_t { position, multiturn, error, warning, parity, value, skip };
 
-/// Names of the meanings, as a format writes them.
+/// Names of the meanings as a format text has them, in the order of Meaning.
 inline constexpr std::array<std::string_view, 7> meaning_names{"position", "multiturn", "error", "warning",
                                                                "parity",   "value",     "skip"};
 
-/// A short text that is stored in the object.
+/// A name of at most 15 characters, stored in the object itself, so that a format can be a constant.
 class WordFieldName {
  public:
-  static constexpr std::size_t capacity = 15;  ///< Greatest length of a name.
+  static constexpr std::size_t capacity = 15;  ///< Greatest number of characters of a name.
 
   constexpr WordFieldName() = default;
   /// Stores a text, cut to `capacity` characters.
   constexpr WordFieldName(std::string_view text)
       : text_(copied(text)), size_(static_cast<std::uint8_t>(first_of(text, capacity).size())) {}
-  /// Takes a name of at most `capacity` characters.
+  /// Stores a name, cut to `capacity` characters.
   constexpr WordFieldName(const char* text) : WordFieldName(std::string_view(text)) {}
 
   /// Returns the name.
@@ -58,29 +58,31 @@ class WordFieldName {
   std::uint8_t size_ = 0;
 };
 
-/// One field of a word.
+/// One field of a position word.
 struct WordField {
-  WordFieldName name{};             ///< name of the meaning, unless another was given
+  WordFieldName name{};             ///< name of the field: that of its meaning, unless the text gives another
   Meaning meaning = Meaning::skip;  ///< Meaning of the field.
-  std::uint8_t bits = 0;            ///< 1 to 64; error, warning and parity have 1
+  std::uint8_t bits = 0;            ///< number of bits, 1 to 64; error, warning and parity have 1
   bool active_low = false;          ///< Whether 0 means that a flag is set.
 };
 
 /// Error in the text of a word format; `reason` is empty if there is none.
 struct WordFormatError {
-  std::string_view reason{};  ///< Why the text is no format; empty: it is one.
-  std::size_t at = 0;         ///< index into the text
+  std::string_view reason{};  ///< Why the text is no word format; empty: it is one.
+  std::size_t at = 0;         ///< index of the character in the text at which the error is
 };
 
-/// A position word as data, made from options or from a text. Everything that decodes and sends words uses it.
+/// Format of a position word as data: its fields in order. It is made from options or from a text, and used by all code
+/// that decodes and sends words.
 class WordFormat {
  public:
-  static constexpr std::size_t maximum_fields = 12;  ///< Greatest number of fields.
+  static constexpr std::size_t maximum_fields = 12;  ///< Greatest number of fields of a word.
   static constexpr unsigned maximum_bits = 128;      ///< Greatest number of bits of a word.
 
   constexpr WordFormat() = default;
 
-  /// Adds a field. Returns why it cannot follow the fields before it, or "".
+  /// Adds a field at the end. Returns why the field cannot follow those before it, and leaves the format unchanged; ""
+  /// if it was added.
   constexpr std::string_view add(const WordField& field) {
     const bool flag = field.meaning >= Meaning::error && field.meaning <= Meaning::parity;
     if (field.bits < 1 || field.bits > 64) return "a field has 1 to 64 bits";
@@ -94,16 +96,16 @@ class WordFormat {
     bits_ += field.bits;
     return {};
   }
-  /// Declares the position as Gray code.
+  /// Declares that turns and position are one Gray-coded number.
   constexpr void set_gray() { gray_ = true; }
 
-  /// Returns the fields in their order.
+  /// Returns the fields in the order of the wire.
   [[nodiscard]] constexpr std::span<const WordField> fields() const { return {fields_.data(), size_}; }
   /// Returns the number of bits of a word.
   [[nodiscard]] constexpr unsigned bits() const { return bits_; }
-  /// Returns whether the position is Gray code.
+  /// Returns whether turns and position are one Gray-coded number.
   [[nodiscard]] constexpr bool gray() const { return gray_; }
-  /// Returns the first bit of the field at `index`.
+  /// Returns the index in the word of the first bit of the field number `index`.
   [[nodiscard]] constexpr unsigned first_of(std::size_t index) const {
     unsigned first = 0;
     for (std::size_t i = 0; i < index; ++i) first += fields_[i].bits;
@@ -117,7 +119,7 @@ class WordFormat {
     }
     return nullptr;
   }
-  /// Returns the bits of the field with this meaning; 0: the word has none.
+  /// Returns the number of bits of the first field with this meaning; 0: the word has none.
   [[nodiscard]] constexpr unsigned bits_of(Meaning meaning) const {
     const WordField* field = find(meaning);
     return field == nullptr ? 0 : field->bits;
@@ -152,7 +154,8 @@ constexpr WordFormatError check_name(std::string_view name) {
   return {};
 }
 
-// Parses "[name=]meaning:bits[!]", without spaces. `at` of the error is relative to the item.
+// Parses `item`, "[name=]meaning:bits[!]" without spaces, into `field`. `at` of the returned error is an index into the
+// item.
 constexpr WordFormatError parse_word_field(std::string_view item, WordField& field) {
   const std::size_t equals = index_of(item, '=');
   const bool named = equals < item.size();
@@ -196,7 +199,8 @@ constexpr bool is_taken(std::string_view name, std::span<const FieldInfo> taken)
 
 }  // namespace detail
 
-/// Parses a word format. `format` changes only without an error. No value may have a name of `taken`.
+/// Parses the text of a word format into `format`, which changes only if there is no error. Returns the error; its
+/// `reason` is empty if there is none. No field with Meaning::value may have a name of the fields `taken`.
 [[nodiscard]] constexpr WordFormatError parse_word_format(std::string_view text, WordFormat& format,
                                                           std::span<const FieldInfo> taken = {}) {
   WordFormat parsed;
@@ -241,7 +245,7 @@ consteval WordFormat word_format_or_stop(std::string_view text) {
 }
 }  // namespace detail
 
-/// A word format known when the program is written: a mistake does not compile.
+/// Returns the word format of a literal such as "position:24"_word: a wrong text does not compile.
 consteval WordFormat operator""_word(const char* text, std::size_t size) {
   return detail::word_format_or_stop({text, size});
 }

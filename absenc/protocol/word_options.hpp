@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Options, models and fields that the units of position words share.
+// Options and models that the units of clocked encoders with position words share, and functions of word formats for
+// them.
 #pragma once
 
 #include <array>
@@ -10,7 +11,7 @@
 
 namespace absenc {
 
-/// Option: bits of the single-turn position.
+/// Option: number of bits of the single-turn position.
 inline constexpr Option singleturn_bits_option{.name = "singleturn_bits",
                                                .meaning = "bits of the position within the turn; 0: linear encoder",
                                                .default_value = 19,
@@ -18,7 +19,7 @@ inline constexpr Option singleturn_bits_option{.name = "singleturn_bits",
                                                .maximum = 64,
                                                .probeable = true,
                                                .describes_word = true};
-inline constexpr Option multiturn_bits_option{.name = "multiturn_bits",  ///< Option: bits of the turns.
+inline constexpr Option multiturn_bits_option{.name = "multiturn_bits",  ///< Option: number of bits of the turns.
                                               .meaning = "bits of the turns; 0: no turns",
                                               .default_value = 0,
                                               .minimum = 0,
@@ -31,44 +32,46 @@ inline constexpr Option multiturn_first_option{.name = "multiturn_first",
                                                .default_value = 1,
                                                .choices = boolean_choices,
                                                .describes_word = true};
-inline constexpr Option position_bits_option{.name = "position_bits",  ///< Option: bits of a linear position.
+/// Option: number of bits of the position of a linear encoder.
+inline constexpr Option position_bits_option{.name = "position_bits",
                                              .meaning = "linear encoders: bits of the position; 0: rotary encoder",
                                              .default_value = 0,
                                              .minimum = 0,
                                              .maximum = 64,
                                              .probeable = true,
                                              .describes_word = true};
-inline constexpr Option unit_um_option{.name = "unit_um",  ///< Option: micrometres per count.
+inline constexpr Option unit_um_option{.name = "unit_um",  ///< Option: micrometres per count of a linear encoder.
                                        .meaning = "linear encoders: micrometres a count",
                                        .default_value = 0,
                                        .minimum = 0,
                                        .maximum = 1'000'000'000'000,
                                        .decimals = 6};
 
-/// Words of the option `after_word`.
+/// Choices of the option `after_word`, in the order of ssi::AfterWord.
 inline constexpr std::array<std::string_view, 4> after_word_choices{"repeat", "zero", "one", "separated"};
-/// In the order of ssi::AfterWord.
+/// Option: what an SSI encoder sends when the host clocks beyond the end of the word.
 inline constexpr Option after_word_option{.name = "after_word",
                                           .meaning = "what an SSI encoder sends when it is clocked on",
                                           .default_value = 0,
                                           .choices = after_word_choices};
 
-/// A format and the options that describe its word.
+/// A protocol format together with the options that describe its position word.
 template <class Format>
 struct WordSettings : Format {
-  std::uint8_t singleturn_bits = 0;  ///< Bits of the single-turn position; 0: that of the word.
+  std::uint8_t singleturn_bits = 0;  ///< Bits of the single-turn position; 0: linear encoder.
   std::uint8_t multiturn_bits = 0;   ///< Bits of the turns; 0: none.
   bool multiturn_first = true;       ///< Whether the turns precede the position.
   std::uint8_t position_bits = 0;    ///< Bits of a linear position; 0: rotary encoder.
-  std::int64_t unit_pm = 0;          ///< Picometres per count; 0: rotary encoder.
+  std::int64_t unit_pm = 0;          ///< Picometres per count of a linear encoder; 0: not given.
 
-  /// Returns the widths of position and turns.
+  /// Returns the numbers of bits of position and turns, and their order, as the options describe them.
   [[nodiscard]] constexpr PositionBits bits() const {
     if (position_bits != 0) return {.position = position_bits};
     return {singleturn_bits, multiturn_bits, multiturn_first};
   }
-  /// Returns the format with its word: that of `values`, else the one that its options describe. `linear`: whether the
-  /// options describe a linear encoder; a word format is linear if it has a unit.
+  /// Returns the protocol format with its position word: the word format in `values` if the user gave one, else
+  /// `described`, which the options describe. `linear`: whether these options describe a linear encoder; a given word
+  /// format is linear if `unit_pm` is set.
   [[nodiscard]] constexpr Format with_word(const Options& values, const WordFormat& described, bool linear) const {
     Format format = *this;
     format.word = values.has_word() ? values.word : described;
@@ -77,22 +80,24 @@ struct WordSettings : Format {
   }
 };
 
-/// Returns whether the word has a position, and position and turns have at most 64 bits together.
+/// Returns whether a word format has a position, and position and turns have at most 64 bits together.
 [[nodiscard]] constexpr bool is_usable(const WordFormat& word) {
   const unsigned position = word.bits_of(Meaning::position);
   return position > 0 && position + word.bits_of(Meaning::multiturn) <= 64;
 }
-/// Returns whether a reading can be shown as an angle or a distance: a linear encoder needs its unit.
+/// Returns whether a position can be shown as an angle or a distance: for a linear encoder, micrometres per count must
+/// be known.
 [[nodiscard]] constexpr bool is_usable(const Scale& scale) { return !scale.linear || scale.unit_um > 0; }
 
-/// Returns the bits of position and turns of a word.
+/// Returns the numbers of bits of position and turns of a word, and the scale of a linear encoder.
 [[nodiscard]] constexpr Resolution resolution_of(const WordFormat& word, const Scale& scale) {
   return {word.bits_of(Meaning::position), word.bits_of(Meaning::multiturn), scale.linear ? scale.unit_um : 0};
 }
 
-/// Returns the bits of a field, of a word that begins at bit `first`. Gray-coded values have none of their own.
+/// Returns the bits of a frame that carry `field`, which belongs to a word that begins at bit `first`; none if the word
+/// lacks the field. Gray-coded values have no bits of their own.
 [[nodiscard]] constexpr BitRanges place_in_word(const WordFormat& format, const FieldInfo& field, std::size_t first) {
-  // Compared by name, because stored frames have copies of fields that do not belong to a unit.
+  // Fields are compared by name, because stored frames have copies of the field descriptions.
   const auto is = [&field](const FieldInfo* shown) { return field.name == shown->name; };
   const auto shows = [&](const WordField& one) {
     switch (one.meaning) {
@@ -119,7 +124,7 @@ struct WordSettings : Format {
   return ranges;
 }
 
-/// The encoders of the four examples in RLS "E201-9S Decoding the BiSS information", which gives no speeds.
+/// Models: the encoders of the four examples in RLS "E201-9S Decoding the BiSS information", which gives no speeds.
 inline constexpr std::array position_models{
     author::ModelText{"rotary-19", "single-turn, 19 bits (example 4)", 0,
                       "singleturn_bits=19 multiturn_bits=0 position_bits=0"},
