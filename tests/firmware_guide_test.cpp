@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests the first program of docs/firmware.md: it reads a position, and keeps the last one if a reply is missing.
+// Tests the first program of docs/firmware.md: it reads a position, and retains the previous position if a reply is
+// missing.
 #include "firmware/hookup/first_reading.cpp"
 
 #include <gtest/gtest.h>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Helpers of all fuzz targets.
+// Helpers shared by all fuzz targets.
 #pragma once
 
 #include <cstdlib>

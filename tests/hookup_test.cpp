@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests the firmware adapters of docs/firmware.md (UART, SPI, CAN) with stubs of the hardware: each reads a position,
-// whether its reply arrives whole or in pieces.
+// Tests the firmware adapters in docs/firmware.md (UART, SPI, CAN) with stubs of the hardware: the host reads a
+// position through each adapter, whether its reply arrives whole or in pieces.
 #include <gtest/gtest.h>
 
 #include <array>
@@ -20,14 +20,14 @@ namespace {
 
 using namespace std::chrono_literals;
 
-// ---- A UART
+// ---- A UART with a DMA receiver
 
 constexpr auto reply = std::to_array<std::uint8_t>({0x1A, 0x00, 0x45, 0x23, 0x01, 0x11, 0x34, 0x12, 0x00, 0x00, 0x4A});
 
 struct Uart {
   bool drives = false;
   std::vector<std::uint8_t> transmitted{};
-  MutableBytes buffer{};  // not empty while the DMA runs
+  MutableBytes buffer{};  // the receive buffer while the DMA runs, otherwise empty
   std::size_t count = 0;
 
   void drive(bool on) { drives = on; }
@@ -45,7 +45,7 @@ struct Uart {
   }
   void set_rate(std::uint32_t) {}
 
-  // Delivers bytes from the encoder. Returns whether the DMA buffer is full.
+  // Delivers bytes from the encoder into the DMA buffer. Returns whether the buffer is full.
   bool deliver(Bytes bytes) {
     EXPECT_FALSE(drives);
     for (const std::uint8_t byte : bytes) {
@@ -74,7 +74,7 @@ struct UartDmaTest : testing::Test {
 };
 
 TEST_F(UartDmaTest, WholeReplyEndsTransfer) {
-  EXPECT_TRUE(uart.deliver(reply));  // full with the last character, before the line becomes idle
+  EXPECT_TRUE(uart.deliver(reply));  // the buffer is full with the reply's last character, before the line becomes idle
   line.arrived(56us);
   expect_position();
 }
@@ -107,7 +107,7 @@ struct Spi {
     ++transfers;
   }
   void set_rate(std::uint32_t) {}
-  // Fills the buffer with `idle` ones, then with these bits, then with ones.
+  // Fills the receive buffer with `idle` one bits, then the bits of the word, then one bits.
   void deliver(Bytes bytes, unsigned idle) {
     for (std::size_t bit = 0; bit < 8 * buffer.size(); ++bit) {
       const std::size_t at = bit - idle;
@@ -139,7 +139,7 @@ TEST(SpiDmaTest, ReadsBiss) {
   ASSERT_NE(read.reading(), nullptr) << static_cast<int>(read.error());
 }
 
-// The bits exclude the idle level, which the stub delivers in the first clock.
+// The bits of the word exclude the idle level of the first clock, which the stub delivers itself.
 TEST(SpiDmaTest, ReadsSsiAfterIdleClock) {
   constexpr auto bits = std::to_array<std::uint8_t>({0x1E, 0xF0, 0x00, 0x00});
   ssi::ReadPosition read{ssi::Format{}};

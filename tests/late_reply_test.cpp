@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Delays replies by various times on every unit whose replies can be late. No reported position may be older than its
-// request. The shaft turns steadily, so that a position gives the time at which it was sampled.
+// Tests that no host takes a late reply for the reply to a newer request. Replies are delayed by various times on every
+// unit whose replies can be late. The shaft turns steadily, so that a position shows the time at which it was sampled.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -66,7 +66,7 @@ class DelayedSession {
         port(line, std::move(delay)),
         session(unit, options, port, host_storage, host::EchoMode::automatic) {}
 
-  /// Runs one command that reports a position, and counts the outcome.
+  /// Runs one command that reports a position, and adds its outcome to `outcomes`.
   void read(const Command& command, bool confirmed, Outcomes& outcomes) {
     const Conversation<Item>* ended = confirmed ? session.read(command) : session.run(command);
     if (ended->error() != Error::none) {
@@ -81,8 +81,8 @@ class DelayedSession {
     if (age > 3ms) ++outcomes.stale;
   }
 
-  /// Returns how long before its timestamp the reading's position was really sampled. The shaft's true motion gives
-  /// that time.
+  /// Returns how much earlier than the reading's timestamp its position was really sampled, from the true motion of the
+  /// shaft.
   Time age_of(const Reading& reading) const {
     const auto fraction = static_cast<std::uint32_t>(reading.singleturn << (32 - reading.singleturn_bits));
     const auto truth = static_cast<std::uint32_t>(shaft.at(reading.latched).position);
@@ -129,7 +129,7 @@ double fraction(sim::Random& random) { return static_cast<double>(random.below(1
 
 bool is_on_can(const Kind& kind) { return find_unit(kind.unit)->link == LinkKind::can; }
 
-/// Reads at a fixed period while a share of the replies is late.
+/// Reads the position with the period `period` while a share of the replies is late. Returns the outcomes.
 template <class Item>
 Outcomes run_at_period(const Kind& kind, const Lateness& lateness, Time period, unsigned count) {
   sim::Random random(1);
@@ -150,8 +150,8 @@ Outcomes run(const Kind& kind, const Lateness& lateness, Time period, unsigned c
                          : run_at_period<std::uint8_t>(kind, lateness, period, count);
 }
 
-/// Runs random commands that report a position and change nothing, with random pauses. Some replies are late by 10 us
-/// to 10 s.
+/// Runs random commands that report a position and change nothing, with random pauses, while some replies are late by
+/// 10 us to 10 s. Returns the outcomes.
 template <class Item>
 Outcomes run_random_commands(const Kind& kind, unsigned count, std::uint64_t seed) {
   sim::Random random(seed);
@@ -179,7 +179,7 @@ class LateReply : public ::testing::TestWithParam<std::size_t> {
   const Kind& kind = kinds()[GetParam()];
 };
 
-// Covers delays from 1 ms to 5 s, some of which make a late reply arrive exactly when the next one is due.
+// Covers delays from 1 ms to 5 s. With some of them a late reply arrives exactly when the next reply is due.
 TEST_P(LateReply, NeverAnswersLaterRequest) {
   constexpr unsigned readings = 40;
   for (const Time period : {Time{}, Time{1ms}, Time{10ms}, Time{100ms}, Time{500ms}, Time{2s}}) {
@@ -226,8 +226,9 @@ TEST_P(LateReply, WithRandomDelayNeverAnswersLaterRequest) {
   EXPECT_GT(all.good, all.failed / 10);
 }
 
-/// Reads over a line that stalls for two seconds of every seven. After a stall, either all delayed replies arrive or
-/// only the first.
+/// Reads over a line that stalls for two seconds of every seven. After a stall, all delayed replies arrive, or only the
+/// first if `only_first_arrives`. Returns the outcomes, and in `longest_silence` the longest time between two good
+/// readings.
 template <class Item>
 Outcomes run_with_stalls(const Kind& kind, bool only_first_arrives, Time& longest_silence) {
   constexpr Time stall = 2s;
@@ -267,7 +268,9 @@ TEST_P(LateReply, ReadingsResumeSoonAfterStall) {
                 only_first_arrives ? "one reply " : "all of them", outcomes.good, outcomes.failed, outcomes.stale,
                 static_cast<double>(silence.count()) / 1e9);
     EXPECT_EQ(outcomes.stale, 0u);
-    // If only one reply was delayed, the host cannot distinguish it from replies that are always that late.
+    // The longest silence is limited only where several requests were outstanding and their other replies are lost.
+    // With a single outstanding request the host cannot distinguish its late reply from the first reply on a line that
+    // is always so late.
     if (only_first_arrives && !is_on_can(kind)) {
       EXPECT_LT(silence, 3s);
     }

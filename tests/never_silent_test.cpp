@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Runs every command of every unit with a character link on a line that is never silent. Each command must end in
-// bounded time with an error.
+// Tests that every command of every unit with a character link ends in bounded time with an error on a line that is
+// never silent.
 #include <gtest/gtest.h>
 
 #include <array>
@@ -18,7 +18,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-/// Returns the next byte on the line; gets the last request.
+/// Function that returns the next byte on the line. Its argument is the last request of the host.
 using ByteSource = std::function<std::uint8_t(Bytes request)>;
 
 struct Outcome {
@@ -26,8 +26,9 @@ struct Outcome {
   Time duration{};
 };
 
-/// Runs the conversation on a line with a byte every `period`. The simulated port would report silence only after a
-/// longer pause. If a byte and a timer are due together, the byte comes first.
+/// Runs the conversation on a line with a byte every `period`, which is shorter than any silence that the port would
+/// report. If a byte and a timer are due together, the byte comes first. Returns whether the conversation ended, and
+/// its duration.
 Outcome run(Conversation<std::uint8_t>& conversation, Time period, const ByteSource& byte_source) {
   constexpr unsigned most_bytes = 2'000'000;
   Time now = 1s;
@@ -81,7 +82,8 @@ Options defaults_of(const Unit& unit, std::span<const OptionText> settings = {})
   return options;
 }
 
-/// Returns the default options, and each choice of each option with choices, one changed at a time.
+/// Returns option sets of a unit: the defaults, and each choice of each option with choices, one option changed at a
+/// time.
 std::vector<Options> all_options(const Unit& unit) {
   std::vector<Options> all{defaults_of(unit)};
   for (const Option& option : unit.options) {
@@ -104,7 +106,7 @@ std::vector<std::int64_t> least_arguments(const Command& command) {
 
 class NeverSilent : public ::testing::TestWithParam<const Unit*> {
  protected:
-  // Runs each command on a line that is never silent.
+  // Runs each command with each option set on a line that is never silent.
   void expect_ends(const Options& options, Time period, const Kind& kind) {
     for (const Command& command : unit.commands) {
       const Any<Conversation> made = unit.host(options, command, least_arguments(command), storage_);
@@ -116,7 +118,7 @@ class NeverSilent : public ::testing::TestWithParam<const Unit*> {
       };
       EXPECT_TRUE(outcome.ended) << what() << "has not ended after " << outcome.duration / 1s << " s";
       EXPECT_LE(outcome.duration, 30s) << what();
-      // An echo that repeats the request may happen to be a valid frame.
+      // Bytes that repeat the request may form a valid frame by chance, so the command may succeed.
       if (kind.name == echo) continue;
       EXPECT_NE(made.bytes->error(), Error::none) << what() << "taken for good";
     }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests that `Step`, `Event` and `Machine` (link/step.hpp) fit every kind of link. Toy machines run in virtual time
-// with exact times. The host and the device of each conversation are machines of the same type.
+// Tests that the types `Step`, `Event` and `Machine` of link/step.hpp suit every kind of link. Toy machines, one as
+// host and one as device, hold conversations in virtual time with exact times.
 #include <gtest/gtest.h>
 
 #include <string>
@@ -23,7 +23,7 @@ using Kind = Event<Byte>::Kind;
 struct RequestReply : testing::Test {
   sim::Line<Byte> line{LinkKind::half_duplex, {.rate = 2'500'000}};
   std::vector<Byte> answer{0x1A, 0x00, 0x55};
-  std::string expected_counts;  // `expect` of every wait, one digit each
+  std::string expected_counts;  // the `expect` value of every wait, one digit each
   std::size_t missing = 3;
   ByteToy device{[this](ByteToy& self, const Event<Byte>& event) {
     if (event.kind == Kind::received) self.send(answer, event.at + microseconds(3));
@@ -41,7 +41,7 @@ struct RequestReply : testing::Test {
     host.idle.gap = microseconds(6);
     host.send({0x1A});
     EXPECT_TRUE(line.run(line.attach(NodeRole::host, host)));
-    line.run_until(line.now());  // runs the device's `sent` event, which has the same time
+    line.run_until(line.now());  // runs the device's `sent` event, which is due at the same time
   }
 };
 
@@ -109,7 +109,8 @@ class SpiDevice final : public Machine<Byte> {
  public:
   void feed(const Event<Byte>& event) override {
     if (event.kind == Kind::selected) {
-      const auto position = static_cast<Byte>(event.at / microseconds(1));  // latched when the chip is selected
+      // The position is the time in microseconds at which the chip was selected.
+      const auto position = static_cast<Byte>(event.at / microseconds(1));
       frame_ = {position, static_cast<Byte>(~position), register_byte_};
       selected_ = true;
     } else if (event.kind == Kind::received) {
@@ -194,7 +195,8 @@ TEST(Spi, ReadsRegisterWithinPositionFrames) {
             "274000 good 250 140\n");
 }
 
-// (d) Clocked bits: SSI with 13 bits, 250 kHz, then the word again from its MSB. 0x1234 left-aligned is 91 A0.
+// (d) Clocked bits: SSI at 250 kHz with a word of 13 bits, which the encoder repeats from its MSB. 0x1234 left-aligned
+// is 91 A0.
 struct Clocked : testing::Test {
   sim::Line<Byte> line{LinkKind::clocked, {.rate = 250'000}};
   std::string notes;
@@ -235,7 +237,7 @@ TEST_F(Clocked, ReportsTooFewClocksToDevice) {
 struct Can : testing::Test {
   sim::Line<CanFrame> line{LinkKind::can, {.rate = 250'000}};
   static CanFrame frame(std::uint32_t id, Byte data) { return {.id = id, .size = 1, .data = {data}}; }
-  // Starts on command 01 and then sends every millisecond.
+  // Node that starts on command 01 and then sends a frame every millisecond.
   static CanToy::React cyclic(std::uint32_t id, Byte data) {
     return [=, at = Time{}](CanToy& self, const Event<CanFrame>& event) mutable {
       if (event.kind == CanToy::Kind::received && event.items[0].data[0] == 0x01) {
@@ -251,7 +253,7 @@ struct Can : testing::Test {
 
 TEST_F(Can, ArbitratesCyclicFramesByIdentifier) {
   CanToy high(cyclic(0x121, 0xB0));
-  // begins at the same nanosecond, comes later in the list of nodes, and wins the arbitration
+  // this node's frame begins at the same nanosecond; it comes later in the list of nodes, and wins the arbitration
   CanToy low(cyclic(0x120, 0xA0));
   CanToy host;
   host.send({frame(0x200, 0x01)});
@@ -298,7 +300,7 @@ TEST(Trigger, RequestsEachFrameWithLongEnoughPulse) {
     toy.push({.kind = Step<Byte>::Kind::pulse, .wire = ExtraWire::trigger, .at = at, .width = width});
   };
   ByteToy host([&](ByteToy& self, const Event<Byte>& event) {
-    // a pulse that is too short
+    // this pulse is too short
     if (event.kind == Kind::received) pulse(self, event.at + microseconds(60), microseconds(9));
     if (event.kind == Kind::silence) self.finish();
   });

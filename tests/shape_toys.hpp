@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Toy machines for tests of the machine interface and of the simulator. They log every event and run the steps that a
-// test queues.
+// Toy machines for tests of the machine interface and of the simulator.
 #pragma once
 
 #include <deque>
@@ -27,7 +26,7 @@ inline std::string text_of(const CanFrame& frame) {
   return text;
 }
 
-// A machine with a function as its reaction to each event. It logs all events.
+// A machine that reacts to each event by calling a function. It logs all events, and runs the steps that a test queues.
 template <class Item>
 class Toy final : public Machine<Item> {
  public:
@@ -61,7 +60,7 @@ class Toy final : public Machine<Item> {
   void emit() { push({.kind = Step<Item>::Kind::emit}); }
   void finish() { push({.kind = Step<Item>::Kind::done}); }
 
-  Step<Item> idle{};  // the step while the queue is empty
+  Step<Item> idle{};  // the step that the machine returns while its queue is empty
   std::string log;
 
  private:

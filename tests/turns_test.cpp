@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Reads every unit and model across pauses, with slow and fast shafts, in virtual time. A reading that claims to
-// continue the previous one must match the true motion of the shaft.
+// Tests that a reading which claims to continue the previous one has the true motion of the shaft. Reads every unit and
+// model across pauses, with slow and fast shafts, in virtual time.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -28,7 +28,7 @@ struct Case {
   Settings encoder_options{};  // options of the virtual encoder
   Settings host_options{};     // options that the host uses
   Take take = Take::newest;
-  unsigned turn_bits = 0;  // turn bits that the encoder really counts
+  unsigned turn_bits = 0;  // number of turn bits that the encoder really counts
 };
 
 void PrintTo(const Case& one, std::ostream* out) {
@@ -56,7 +56,8 @@ std::vector<Case> cases() {
     all.push_back(
         {.unit = find_unit(unit), .encoder_options = encoder_options, .host_options = host_options, .take = take});
   };
-  // The identity says that the encoder counts no turns. Without an option the host would expect 16 bits of turns.
+  // In this case the encoder's identity says that it counts no turns. Without that identity a host would expect 16 bits
+  // of turns.
   for (const std::string_view unit : {"encolink", "encolink-spi"})
     add(unit, {{"multiturn_bits", "0"}}, {}, Take::newest);
   for (const Take take : {Take::newest, Take::every}) {
@@ -81,7 +82,7 @@ struct SpinningShaft final : Shaft {
   double rpm;
 };
 
-/// A turning virtual encoder with the host session that reads it.
+/// A turning virtual encoder and the host session that reads it.
 template <class Item>
 class TurningEncoder {
  public:
@@ -102,7 +103,8 @@ class TurningEncoder {
 
   void pause(Time time) { port_->line().run_until(port_->line().now() + time); }
 
-  /// Reads once. If the unwrapper reports `continued`, the distance must match the shaft's motion.
+  /// Reads the position once and returns how the unwrapper joined it to the previous one. If it continued, the distance
+  /// must equal the motion of the shaft.
   Joined read() {
     const Conversation<Item>* conversation = session_->read(*find_command(*case_.unit, Verb::read), case_.take);
     EXPECT_EQ(text_of(conversation->error()).name, "none") << conversation->detail();
@@ -135,8 +137,8 @@ class TurningEncoder {
   std::int64_t last_shaft_position_ = 0;
 };
 
-// For a linear encoder the measuring range replaces the revolution: its speed in metres per second is the value of
-// `rpm` / 1000.
+// Returns the speed in rpm for a case. For a linear encoder the measuring range replaces the revolution, so that the
+// speed in metres per second is `rpm` / 1000.
 double speed_of(const Case& one, double rpm) {
   const Resolution resolution = one.unit->resolution(options_of(*one.unit, one.model, one.host_options));
   if (resolution.unit_um == 0) return rpm;
@@ -155,8 +157,8 @@ class Turns : public ::testing::TestWithParam<Case> {
         for (int i = 0; i < 3; ++i) bench.read();
         bench.pause(pause);
         const Joined joined = bench.read();
-        // An encoder that counts turns loses none across the pause. Without a count the position is ambiguous, unless
-        // every missed reading is taken.
+        // The position of an encoder that counts turns continues across the pause. Without a count of turns the
+        // position is ambiguous after the pause, unless the host takes every reading that arrived meanwhile.
         const bool counts = GetParam().turn_bits > 0;
         if (counts) {
           EXPECT_EQ(joined, Joined::continued);

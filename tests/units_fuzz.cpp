@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Feeds arbitrary bytes to every unit: as request and reply to its decoder, as captures to its probe, as received bytes
-// to its conversations, and as requests to its virtual encoder. The first bytes select the unit, its options and the
-// command.
+// Fuzz target that feeds arbitrary bytes to every unit: as request and reply to its decoder, as captures to its probe,
+// as received bytes to its conversations, and as requests to its virtual encoder. The first three bytes of an input
+// select the unit, its options and the command.
 #include <algorithm>
 #include <array>
 #include <cstddef>
@@ -29,7 +29,8 @@ struct Nowhere final : EvidenceSink {
   void put(const OptionEvidence&) override {}
 };
 
-/// Returns the configurations of every unit. They are computed once, because that takes longer than one input.
+/// Returns the configurations of every unit. They are computed once, because computing them takes longer than one
+/// input.
 const std::vector<std::vector<Configuration>>& all_configurations() {
   static const std::vector<std::vector<Configuration>> all = [] {
     std::vector<std::vector<Configuration>> made;
@@ -51,7 +52,8 @@ OwnedFrame as_frame(const Unit& unit, Bytes bytes) {
   return frame;
 }
 
-// With an error no field may be reported; a good frame must report at least one.
+// Decodes the input, split into request and reply at each of 17 places. With an error no field may be reported; a good
+// frame must report at least one field.
 void decode(const Unit& unit, const Options& options, Bytes input) {
   for (std::size_t split = 0; split <= input.size() && split <= 16; ++split) {
     const OwnedFrame request = as_frame(unit, input.first(split));
@@ -80,7 +82,7 @@ void probe(const Unit& unit, Options options, Bytes input) {
   (void)unit.probe(options, captures, nowhere);
 }
 
-/// Converts the input into items of the link: bytes or CAN frames.
+/// Returns the input as items of the unit's link: bytes or CAN frames.
 template <class Item>
 std::vector<Item> items_of(const Unit& unit, Bytes bytes) {
   if constexpr (std::is_same_v<Item, CanFrame>) {
@@ -94,8 +96,8 @@ std::vector<Item> items_of(const Unit& unit, Bytes bytes) {
   }
 }
 
-// Runs a conversation with the input as its reply, at once or in pieces. It must end after the last byte, and report
-// nothing together with an error.
+// Runs a conversation whose reply is the input, in pieces of `piece` items. The conversation must end within 30000
+// steps, and report nothing together with an error.
 template <class Item>
 void converse(const Unit& unit, const Options& options, const Command& command, Bytes input, std::size_t piece) {
   using Kind = typename Event<Item>::Kind;
@@ -141,8 +143,8 @@ void converse(const Unit& unit, const Options& options, const Command& command, 
   require(false);
 }
 
-// Feeds the bytes with pauses to the virtual encoder. After each byte it must be waiting again within 100 steps, and it
-// must not send an empty frame.
+// Feeds the input to the virtual encoder, with pauses before bytes from F0 on. After each item the encoder must wait
+// again within 100 steps, and it must not send an empty frame.
 template <class Item>
 void ask_device(const Unit& unit, const Options& options, Bytes input) {
   using Kind = typename Event<Item>::Kind;
@@ -168,14 +170,14 @@ void ask_device(const Unit& unit, const Options& options, Bytes input) {
       require(!step.out.empty());
       now = std::max(now, step.at);
       device->feed({.kind = Kind::sent, .at = now});
-      if (streams) break;  // a streaming encoder never waits
+      if (streams) break;  // a streaming encoder sends without end, so the loop ends here
     }
   }
 }
 
 template <class Item>
 void run(const Unit& unit, const Options& options, const Command& command, Bytes input) {
-  // A scan sends hundreds of requests, so its replies are short.
+  // A scan sends hundreds of requests, so each of its replies is cut to eight bytes.
   const Bytes reply = input.first(std::min<std::size_t>(input.size(), command.verb == Verb::scan ? 8 : input.size()));
   converse<Item>(unit, options, command, reply, 1);
   converse<Item>(unit, options, command, reply, reply.size() + 1);

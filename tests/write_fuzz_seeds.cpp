@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Writes the fuzz seeds, one file each, into the given folder.
+// Program that writes the fuzz seeds, one file each, into the folder given as its argument.
 #include <cstddef>
 #include <cstdio>
 #include <filesystem>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Checks that a user can follow each advice, and that doing so has an effect.
+// Checks that a user can follow the advice for each alarm and error, and that following it has an effect.
 #include <algorithm>
 #include <array>
 #include <cctype>
@@ -11,12 +11,12 @@
 namespace absenc::kit {
 namespace {
 
-// ---- Commands named in a text
+// ---- Commands named in the text of an advice
 
-/// A command line quoted in a text.
+/// A command line quoted in the text of an advice.
 struct NamedCommand {
   std::string text;                  // for example "absenc run ... reset"
-  const Command* command = nullptr;  // the unit's command; null if valid for every unit or `unknown`
+  const Command* command = nullptr;  // the unit's command; null if the line suits every unit or is unknown
   bool unknown = false;
 };
 
@@ -35,7 +35,7 @@ constexpr auto verb_names = std::to_array<VerbName>({{"alarms", Verb::read},
                                                      {"clear-alarms", Verb::clear_alarms},
                                                      {"memory read", Verb::memory_read},
                                                      {"memory write", Verb::memory_write}});
-/// Beginnings of command lines that continue with the name of a setting or of a command.
+/// Beginnings of command lines; the name of a setting or of a command follows them.
 constexpr std::string_view get_setting = "config get ... ";
 constexpr std::string_view set_setting = "config set ... ";
 constexpr std::string_view run_command = "run ... ";
@@ -57,7 +57,7 @@ const Command* find_named(const Unit& unit, std::string_view words) {
   if (words.starts_with(set_setting)) return find_setter(unit, behind(set_setting));
   const bool gets = words.starts_with(get_setting);
   if (!gets && !words.starts_with(run_command)) return nullptr;
-  // Arguments may follow the name.
+  // Arguments may follow the command's name.
   std::string_view name = behind(gets ? get_setting : run_command);
   name = name.substr(0, name.find(' '));
   const Command* const found = find_command(unit, name);
@@ -80,7 +80,7 @@ std::vector<NamedCommand> commands_in(const Unit& unit, std::string_view text) {
   return all;
 }
 
-// Returns the text without its parts in backquotes.
+// Returns the text of an advice without its parts in backquotes.
 std::string unquoted(std::string_view text) {
   std::string rest;
   bool quoted = false;
@@ -91,13 +91,13 @@ std::string unquoted(std::string_view text) {
   return rest;
 }
 
-// ---- Rules for every advice
+// ---- Rules for the wording of every advice
 
-/// Phrases that send the reader back to the alarms which the advice explains.
+/// Phrases that refer the reader to the alarms. The advice explains these alarms, so the phrase would be circular.
 constexpr auto circular_phrases =
     std::to_array<std::string_view>({"read the alarms", "look at the alarms", "the other alarms", "see the alarms"});
 
-/// Checks one advice. `what` names the alarm or error that it belongs to.
+/// Checks the wording of one advice. `what` names the alarm or error that has this advice.
 void check_words(const Unit& unit, const std::string& what, std::string_view advice, Findings& findings) {
   const auto require = [&](bool holds, std::string_view text) {
     findings.require(holds, [&] { return what + " is advised \"" + std::string(advice) + "\": " + std::string(text); });
@@ -130,7 +130,7 @@ std::vector<std::string> clauses_of(std::string_view text) {
   return clauses;
 }
 
-// ---- Alarms and status
+// ---- Advice for alarms and status flags
 
 template <class Item>
 class AlarmedEncoder {
@@ -145,7 +145,7 @@ class AlarmedEncoder {
     const Command& command = *find_command(unit_, Verb::read);
     return world_.run(command, least_arguments(command));
   }
-  /// Returns whether the reading shows every alarm that this encoder has raised.
+  /// Returns whether a reading shows every alarm that was raised in this encoder.
   [[nodiscard]] bool shows_alarms() {
     const ConversationResult now = read();
     return now.seen.reading && (now.seen.reading->alarms & alarms_) == alarms_;
@@ -157,13 +157,14 @@ class AlarmedEncoder {
   World<Item> world_;
 };
 
-// Returns whether the command's result has a field that the reading lacks.
+// Returns whether the result of a command has a field that the reading lacks.
 bool reports_more(const ReportedFields& result, const ReportedFields& reading) {
   return std::any_of(result.fields.begin(), result.fields.end(),
                      [&](const auto& field) { return !reading.fields.contains(field.first); });
 }
 
-/// Runs the commands that this alarm's advice names, in order. Returns whether the alarm has ended.
+/// Runs the commands that the advice of alarm `bit` names, in order. Returns whether the alarm has ended; false also if
+/// the encoder does not exist or does not show the alarm.
 template <class Item>
 bool follow_advice(const Unit& unit, const Configuration& configuration, std::size_t bit, Findings& findings) {
   const FlagInfo& flag = unit.alarms->flags[bit];
@@ -209,7 +210,7 @@ void check_alarms(const Unit& unit, Findings& findings) {
   }
 }
 
-/// Checks that a reading whose status flag refers to the alarms reports an alarm.
+/// Checks, for each alarm, that a reading reports an alarm if the advice of a set status flag refers to the alarms.
 template <class Item>
 void check_status(const Unit& unit, const Configuration& configuration, Findings& findings) {
   if (unit.alarms == nullptr || unit.status == nullptr) return;
@@ -228,7 +229,7 @@ void check_status(const Unit& unit, const Configuration& configuration, Findings
   }
 }
 
-// ---- Errors
+// ---- Advice for errors
 
 void check_message(const Unit& unit, const std::string& what, const Command& command, const ConversationResult& ended,
                    Findings& findings) {
@@ -251,7 +252,8 @@ void check_message(const Unit& unit, const std::string& what, const Command& com
   }
 }
 
-/// Calls `use(name, spoil)` for each problem that an encoder can have: alarms, conditions and line faults.
+/// Calls `use(name, spoil)` for no problem and for each problem that an encoder or line can have: all alarms,
+/// conditions and faults of the line. `spoil(world)` causes the problem.
 template <class Item, class Use>
 void for_each_problem(const Unit& unit, Use use) {
   use(std::string("nothing"), [](World<Item>&) {});
@@ -272,8 +274,8 @@ void for_each_problem(const Unit& unit, Use use) {
   }
 }
 
-// Time limit of one conversation. A host that polls ten thousand times a second is slow to simulate, and a failure
-// shows early.
+// Time limit of one conversation: a host that polls ten thousand times a second is slow to simulate, and a failing
+// conversation fails early.
 constexpr Time time_limit = std::chrono::milliseconds(100);
 
 template <class Item>
@@ -291,7 +293,7 @@ void check_errors(const Unit& unit, const Configuration& configuration, Findings
   });
 }
 
-// Checks the advice that the unit's documents give for bad replies.
+// Checks the advice that `Unit::explain` gives for the bad replies among the unit's vectors.
 void check_explanations(const Unit& unit, Findings& findings) {
   if (unit.explain == nullptr) return;
   for (const Vector& vector : unit.vectors) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Checks that a command which changes an encoder had the effect that its verb promises. The effect is read back over a
-// line without faults.
+// Checks that a command which changes an encoder has the effect that its verb promises. The effect is read over a line
+// without faults.
 #pragma once
 
 #include <algorithm>
@@ -11,7 +11,7 @@
 
 namespace absenc::kit {
 
-/// Returns the value of the argument with this role, or null if the command has no such argument.
+/// Returns the value of the command's argument with this role, or null if the command has no such argument.
 [[nodiscard]] inline std::int64_t* argument(const Command& command, Values& values, Role role) {
   const Argument* const found = find_role(command.arguments, role);
   return found != nullptr ? &values[static_cast<std::size_t>(found - command.arguments.data())] : nullptr;
@@ -31,7 +31,8 @@ namespace absenc::kit {
   return values;
 }
 
-/// Returns random arguments that the command accepts, or nothing if the unit declares no writable memory for it.
+/// Returns random arguments that the command accepts, or no value if the unit declares no writable memory that the
+/// command could write.
 [[nodiscard]] inline std::optional<Values> change_arguments(const Unit& unit, const Command& command,
                                                             sim::Random& random) {
   if (command.verb != Verb::memory_write) return random_arguments(command, random);
@@ -45,8 +46,8 @@ namespace absenc::kit {
   return memory_arguments(command, area, address, static_cast<std::uint8_t>(random.below(256)));
 }
 
-/// Applies the new setting to the host as well, for a setting (such as a baud rate or an address) that the host needs
-/// to reach the encoder.
+/// Applies the new value of a setting to the host's options too, if the host needs the setting (such as a baud rate or
+/// an address) to reach the encoder.
 template <class Item>
 void apply_to_host(World<Item>& world, const Unit& unit, const Command& setter, Arguments arguments) {
   if (setter.changes_option.empty()) return;
@@ -64,8 +65,8 @@ void apply_to_host(World<Item>& world, const Unit& unit, const Command& setter, 
   world.set_options(options);
 }
 
-/// Runs the command up to four times until it succeeds. A session repeats it too, because an unsolicited frame of the
-/// encoder may interrupt it.
+/// Runs the command until it succeeds, four times at most, and returns the last result. An unsolicited frame of the
+/// encoder may interrupt a command; a session repeats it in that case too.
 template <class Item>
 ConversationResult run_repeated(World<Item>& world, const Command& command, Arguments arguments) {
   ConversationResult result = world.run(command, arguments);
@@ -76,22 +77,22 @@ ConversationResult run_repeated(World<Item>& world, const Command& command, Argu
   return result;
 }
 
-/// Returns the fields that the setting's getter reports, or nothing if the setting cannot be read.
+/// Returns the fields that the setting's `config get` command reports, or no field if the setting cannot be read.
 template <class Item>
 ReportedFields read_setting(World<Item>& world, const Unit& unit, const Command& setter) {
   const Command* getter = find_command(unit, setter.reads_back);
   return getter == nullptr ? ReportedFields{} : run_repeated(world, *getter, least_arguments(*getter)).seen;
 }
 
-/// Returns whether any field has this value, as a number or as text.
+/// Returns whether any field has this value, as a number or as decimal text.
 [[nodiscard]] inline bool shows(const ReportedFields& seen, std::int64_t value) {
   return std::any_of(seen.fields.begin(), seen.fields.end(), [&](const auto& field) {
     return field.second.number == value || field.second.bytes == std::to_string(value);
   });
 }
 
-/// Returns the promise that a successful command broke, or an empty text if the encoder is in the promised state. The
-/// line must have no faults.
+/// Returns a text that names the promise which the successful command broke, or an empty text if the encoder is in the
+/// promised state. The line must have no faults.
 template <class Item>
 std::string broken_promise(World<Item>& world, const Unit& unit, const Command& command, Values values,
                            const ReportedFields& written) {
@@ -136,12 +137,13 @@ std::string broken_promise(World<Item>& world, const Unit& unit, const Command& 
       const ReportedFields now = read_setting(world, unit, command);
       if (!command.reads_back.empty() && now.fields.empty()) return "it cannot be read";
       for (const auto& [name, value] : now.fields) {
-        // A numbered field is one of several frames, and a position field depends on the shaft: neither must match.
+        // A numbered field is one of several frames, and a position field depends on the shaft: neither needs to be
+        // equal to the written field.
         if (name.find('#') != std::string::npos || is_of_reading(value.role)) continue;
         const auto found = written.fields.find(name);
         if (found != written.fields.end() && !(found->second == value)) return name + " reads differently";
       }
-      // Text in place of a number means that the encoder cannot report this setting.
+      // A text in the setting's field means that the encoder cannot report the setting.
       const auto setting = now.fields.find(std::string(command.reads_back));
       const bool in_words = setting != now.fields.end() && !setting->second.bytes.empty();
       if (!now.fields.empty() && !values.empty() && !in_words && !shows(now, values[0])) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Checks of commands over the virtual encoder on a line without faults.
+// Checks that commands succeed and report true values, with the virtual encoder on a line without faults.
 #include <algorithm>
 
 #include "absenc/sim/place.hpp"
@@ -9,13 +9,13 @@
 namespace absenc::kit {
 namespace {
 
-/// Returns whether every model of a unit must support this command.
+/// Returns whether the kit requires that every model of a unit supports this command.
 bool is_plain(const Command& command) {
   return command.verb == Verb::read || command.verb == Verb::read_part || command.verb == Verb::info ||
          command.verb == Verb::temperature || command.verb == Verb::config_get;
 }
 
-// Returns whether the command exists but needs an earlier step by the caller.
+// Returns whether `error` of a command other than `read` may mean that the caller must do an earlier step.
 bool is_refused(const Command& command, Error error) {
   return command.verb != Verb::read && (error == Error::unsupported || error == Error::invalid_argument);
 }

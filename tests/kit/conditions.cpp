@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Checks that a host can observe each condition of a virtual encoder.
+// Checks that a host can observe each condition of a virtual encoder in the result of some command.
 #include <algorithm>
 #include <array>
 #include <set>
@@ -25,7 +25,7 @@ class ConditionedEncoder {
 
   [[nodiscard]] bool made() const { return world_.made(); }
   void move() { world_.move(world_.place() + some_turns); }
-  // Cuts the encoder's power while the shaft moves on by some turns.
+  // Switches the encoder off, turns the shaft by `some_turns`, and switches the encoder on.
   void lose_power() {
     world_.device().power_off(now());
     move();
@@ -52,8 +52,8 @@ std::uint32_t all_alarms(const Unit& unit) {
   return bits;
 }
 
-// Returns whether two encoders ever report different results when both are treated equally: at once, after a power
-// cycle, with all alarms raised, and after resets.
+// Returns whether any command reports different results for two encoders that are treated equally: at once, after a
+// power cycle, with all alarms raised, and after resets.
 template <class Item>
 bool reports_differ(const Unit& unit, ConditionedEncoder<Item>&& one, ConditionedEncoder<Item>&& other) {
   if (!one.made()) return false;

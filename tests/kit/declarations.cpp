@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Checks the unit's declarations of memory, registers, settings and roles, and the requests of its commands.
+// Checks what a unit declares about memory, registers, settings and roles, and the requests of its commands.
 #include <algorithm>
 #include <array>
 #include <set>
@@ -19,7 +19,7 @@ bool takes(const Command* command, Role role, std::uint32_t least, std::uint32_t
 void declared_memory(const Unit& unit, Findings& findings) {
   const Command* reads = find_command(unit, Verb::memory_read);
   const Command* writes = find_command(unit, Verb::memory_write);
-  std::uint64_t previous_end = 0;  // end of the previous area
+  std::uint64_t previous_end = 0;  // end of the previous memory area
   for (const MemoryArea& area : unit.memory) {
     const auto require = [&](bool holds, const char* text) {
       findings.require(
@@ -84,7 +84,7 @@ void declared_settings(const Unit& unit, Findings& findings) {
   }
 }
 
-// Checks that each role occurs once. With two, a search by role would find the wrong one.
+// Checks that no two members of a list have the same role: a search by role finds only the first.
 template <class Named>
 void declared_once(std::span<const Named> all, std::string_view whose, Findings& findings) {
   for (const Named& one : all) {
@@ -94,7 +94,7 @@ void declared_once(std::span<const Named> all, std::string_view whose, Findings&
   }
 }
 
-// Checks that each command has the roles which its callers search for.
+// Checks that each command has the arguments, fields and options that its callers search for by role.
 void declared_roles(const Unit& unit, Findings& findings) {
   declared_once(unit.options, unit.id, findings);
   const auto has_field = [&](Role role) { return find_role(unit.fields, role) != nullptr; };
@@ -151,7 +151,7 @@ void request_of(const Unit& unit, const Configuration& configuration, const Comm
   if (error == Error::invalid_argument) return;  // no encoder has this combination of options
   findings.require(error == Error::none && !seen.fields.empty(),
                    [&] { return what() + "is " + std::string(text_of(error).name); });
-  // A field with the argument's name may belong to every request. The value may then be in another field.
+  // Every request may have a field with the name of an argument, so another field may carry the argument's value.
   for (std::size_t i = 0; i < values.size(); ++i) {
     const Argument& one = command.arguments[i];
     if (!seen.fields.contains(std::string(one.name)) || (!one.required && values[i] == one.default_value)) continue;
@@ -161,7 +161,7 @@ void request_of(const Unit& unit, const Configuration& configuration, const Comm
   }
 }
 
-// Checks that a value outside its range, a missing argument and an extra argument are all refused.
+// Checks that the command refuses an argument outside its range, a missing argument and an extra argument.
 void refused_arguments(const Unit& unit, const Configuration& configuration, const Command& command,
                        Findings& findings) {
   std::vector<std::byte> storage(unit.host_storage);

@@ -22,7 +22,7 @@ class Decoding {
     if (seen.reading) reading_shows(seen);
   }
 
-  // Checks that a request without a reply is no evidence against the options of its own vector.
+  // Checks that a request without a reply is no evidence against the options of the vector it comes from.
   void unanswered() {
     if (unit_.probe == nullptr) return;
     struct Against final : EvidenceSink {
@@ -44,7 +44,7 @@ class Decoding {
             [&] { return "its request alone speaks against its options: " + std::string(why); });
   }
 
-  // Checks that a truncated or extended request is refused without any field.
+  // Checks that the decoder refuses a truncated or extended request and reports no field of it.
   void good_request() {
     if (request_.empty() || request_.can || unit_.link == LinkKind::clocked) return;
     const auto unknown = [&](const OwnedFrame& request, std::string_view what) {
@@ -68,7 +68,7 @@ class Decoding {
       ++flipped;
       refused(reply_.flipped(bit), [&] { return "with bit " + std::to_string(bit) + " flipped"; });
     }
-    // In some CAN frames only the identifier has a meaning.
+    // In some CAN frames only the identifier has a meaning, so a frame without data may be valid.
     const bool means_nothing = reply_.can && flipped == 0;
     for (std::size_t size = reply_.can ? 0 : 1; size < reply_.elements() && !means_nothing; ++size) {
       refused(reply_.cut(size), [&] { return "cut after " + std::to_string(size); });
@@ -91,7 +91,7 @@ class Decoding {
     return unit_.decode(options_, request_.frame(), reply.frame(), sink);
   }
 
-  // Checks that the frame is refused and that no field or reading is reported with the error.
+  // Checks that the decoder refuses the frame, and reports no field or reading together with the error.
   template <class Text>
   void refused(const OwnedFrame& reply, Text&& text) {
     ReportedFields seen;
@@ -121,8 +121,8 @@ class Decoding {
     }
   }
 
-  // Checks that CAN frames with another identifier, extended frames and remote frames are refused. Identifiers are
-  // tried only if the request names the node.
+  // Checks that the decoder refuses CAN frames with another identifier, extended frames and remote frames. Other
+  // identifiers are tried only if the request names the node.
   void other_frames() {
     for (unsigned bit = 0; bit < 11 && !request_.empty(); ++bit) {
       OwnedFrame other = reply_;
@@ -138,7 +138,7 @@ class Decoding {
     refused(remote, [] { return std::string("as a remote frame"); });
   }
 
-  // Returns whether a vector's reply has this identifier, because some requests may be answered on one of several
+  // Returns whether the reply of any vector has this identifier: some requests may be answered on one of several
   // identifiers.
   [[nodiscard]] bool is_of_a_vector(std::uint32_t id) const {
     return std::any_of(unit_.vectors.begin(), unit_.vectors.end(), [&](const Vector& one) {

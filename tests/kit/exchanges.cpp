@@ -24,33 +24,34 @@ bool is_repeatable(const Command& command) {
           command.verb == Verb::temperature || command.verb == Verb::config_get || command.verb == Verb::memory_read);
 }
 
-/// Counters of a campaign, summed over all of its virtual encoders.
+/// Counters of a run of `check_exchanges`, summed over all of its virtual encoders.
 struct Tally {
   std::uint64_t exchanges = 0;
   std::uint64_t conversations = 0;
   std::uint64_t accepted = 0;
-  std::uint64_t damaged = 0;                // faults that changed bytes
-  std::uint64_t wrong = 0;                  // wrong results of conversations with damaged bytes
-  std::uint64_t rule_violations = 0;        // rule violations by the host after a fault
-  std::uint64_t damaged_request_bytes = 0;  // damaged bytes of requests
-  std::uint64_t changes = 0;                // conversations that change the encoder
-  std::uint64_t changed = 0;                // changes that the host reported as successful
-  std::uint64_t failed_changes = 0;         // successful changes that had no effect
+  std::uint64_t damaged = 0;                // number of faults that changed bytes
+  std::uint64_t wrong = 0;                  // number of wrong results from conversations with damaged bytes
+  std::uint64_t rule_violations = 0;        // number of times that the host violated a rule of the protocol
+  std::uint64_t damaged_request_bytes = 0;  // number of damaged bytes in requests
+  std::uint64_t changes = 0;                // number of conversations with a command that changes the encoder
+  std::uint64_t changed = 0;                // number of changes that the host reported as successful
+  // Number of changes that the host reported as successful and the encoder did not make.
+  std::uint64_t failed_changes = 0;
   std::string broken_promise_text{};
   std::string violated_rule{};
-  /// Counters of one command.
+  /// Counters of all conversations with one command.
   struct Command {
     std::optional<UndetectedDamage> undetected{};
-    std::uint64_t damaged_reply_count = 0;  // damaged replies
-    std::uint64_t wrong_positions = 0;      // accepted replies with a wrong position
-    std::uint64_t wrong_values = 0;         // accepted replies with another wrong value
-    std::uint64_t cost = 0;                 // exchanges per conversation
-    std::optional<bool> unchecked;          // whether one of its replies has no check; empty if not yet known
+    std::uint64_t damaged_reply_count = 0;  // number of damaged replies
+    std::uint64_t wrong_positions = 0;      // number of accepted replies with a wrong position
+    std::uint64_t wrong_values = 0;         // number of accepted replies with a right position and another wrong value
+    std::uint64_t cost = 0;                 // number of exchanges in a conversation of the command
+    std::optional<bool> unchecked;          // true if a reply of the command has no check; empty if not yet determined
   };
   std::map<std::string, Command> commands{};
 };
 
-/// Difference between a result and the truth; an empty text means none.
+/// Difference between the result of a conversation and the true values; an empty text means no difference.
 struct Difference {
   std::string text{};
   bool position = false;
@@ -86,23 +87,24 @@ class Campaign {
   }
 
  private:
-  /// Results of one command on an undamaged line at each shaft position.
+  /// A command with the results that it reports on an undamaged line at each shaft position.
   struct Query {
     const Command* command;
     Values arguments;
     std::array<std::optional<ReportedFields>, places> truth{};
-    std::uint64_t cost = 0;              // exchanges per conversation
-    std::vector<std::string> varying{};  // fields whose values vary between two runs at the same position
+    std::uint64_t cost = 0;              // number of exchanges in a conversation of the command
+    std::vector<std::string> varying{};  // names of fields whose values differ between two runs at the same position
   };
 
   static sim::FaultRates rates_for(const Unit& unit, const Options& options, const ExchangeTest& test) {
     using sim::FaultKind;
     sim::FaultRates rates = sim::testing::damaged_replies(0.1);
-    if (unit.link == LinkKind::spi) rates = {};                        // the host clocks as many bits as it expects
+    // On SPI the host clocks the reply, so its length and time cannot be wrong.
+    if (unit.link == LinkKind::spi) rates = {};
     rates[FaultKind::corrupt] = unit.link == LinkKind::can ? 0 : 0.1;  // CAN's own checksum detects damaged frames
     if (test.requests_too) rates[FaultKind::request_corrupt] = 0.02;
-    // With odd seeds, replies are delayed beyond the host's timeout. Unsolicited frames are excluded, because a host
-    // cannot determine their age.
+    // With odd seeds, replies are delayed beyond the host's timeout. Encoders with unsolicited frames are excluded,
+    // because a host cannot determine the age of such a frame.
     const bool unsolicited = unit.link == LinkKind::can || (unit.streams != nullptr && unit.streams(options));
     if (test.seed % 2 == 1 && !test.requests_too && !unsolicited) rates.delay = unit.timing.turnaround_limit * 3 / 2;
     return rates;
@@ -118,8 +120,8 @@ class Campaign {
     if (!unit_.alarms->flags[bit].name.empty()) world_.device().raise_alarms(1u << bit);
   }
 
-  // Records the results of each command on an undamaged line. The true position is the shaft's, whatever the encoder
-  // reports.
+  // Records the results of each command on an undamaged line. The true position is that of the shaft, whatever the
+  // encoder reports.
   void record_truth() {
     for (std::int64_t& place : places_) place = static_cast<std::int64_t>(random_.next());
     for (const Command& command : unit_.commands) {
@@ -128,7 +130,7 @@ class Campaign {
       if (cost > 20 && !random_.chance(0.1)) continue;
       Query query{&command,
                   command.verb == Verb::memory_read ? least_arguments(command) : random_arguments(command, random_)};
-      // The other positions are recorded on first use, because some commands take a hundred exchanges.
+      // The results at the other positions are recorded on first use, because some commands take a hundred exchanges.
       if (!record_truth_at(query, 0)) continue;
       cost = query.cost;
       if (command.verb == Verb::read) {
@@ -169,7 +171,7 @@ class Campaign {
   void run_conversation() {
     const bool reads = !reads_.empty() && random_.chance(0.95);
     Query* chosen = &queries_[reads ? reads_[random_.below(reads_.size())] : random_.below(queries_.size())];
-    // A command with many exchanges is chosen correspondingly less often.
+    // A command is chosen the less often, the more exchanges it has.
     if (chosen->cost > 4 && !reads_.empty() && !random_.chance(4.0 / static_cast<double>(chosen->cost))) {
       chosen = &queries_[reads_[random_.below(reads_.size())]];
     }
@@ -179,7 +181,7 @@ class Campaign {
     if (!query.truth[place_]) {
       world_.set_rates({});
       world_.pass(std::chrono::seconds(1));
-      (void)world_.run(*query.command, query.arguments);  // absorbs replies that were late
+      (void)world_.run(*query.command, query.arguments);  // receives late replies to previous requests
       if (!record_truth_at(query, place_)) return;
     }
     world_.move(places_[place_]);
@@ -195,12 +197,12 @@ class Campaign {
                       [&] { return where(query) + "has a reading before any reply, or with an error"; });
     if (!result.good()) return;
     ++tally_.accepted;
-    // info sends several requests, and a fault may lose one
+    // The command `info` sends several requests, and a fault may remove one of the replies
     const bool may_miss = query.command->verb == Verb::info && result.faults != 0;
     const Difference wrong = difference(query, result, may_miss);
     if (wrong.text.empty()) return;
     if (result.damaged == 0 && rates_[sim::FaultKind::request_corrupt] > 0 && is_true_now(query, result.seen)) return;
-    // A reply without a check accepts any bytes, also those of a previous reply.
+    // A host accepts any bytes as a reply without a check, also the bytes of a previous reply.
     const bool unchecked = is_unchecked(query);
     findings_.require(result.damaged != 0 || (unchecked && !faultless_),
                       [&] { return where(query) + wrong.text + ", though no byte was damaged"; });
@@ -210,8 +212,8 @@ class Campaign {
     ++(wrong.position ? command.wrong_positions : command.wrong_values);
   }
 
-  // Returns whether the encoder now really reports these fields. A damaged request may have changed the encoder; the
-  // recorded truth is then discarded.
+  // Returns whether the encoder reports the fields `seen` on a good line too, because a damaged request changed the
+  // encoder. If so, discards the recorded truth of all commands.
   bool is_true_now(const Query& query, const ReportedFields& seen) {
     world_.set_rates({});
     const ConversationResult now = world_.run(*query.command, query.arguments);
@@ -223,8 +225,8 @@ class Campaign {
     return true;
   }
 
-  // Runs commands that change the encoder over the faulty line. Each reported success is verified over a good line. The
-  // campaign ends with these runs, because they alter the encoder.
+  // Runs commands that change the encoder over the faulty line, and verifies each reported success over a good line.
+  // These runs end the work with this encoder, because they alter it.
   void change() {
     for (const Command& command : unit_.commands) {
       if (!command.changes_encoder || command.verb == Verb::run) continue;
@@ -242,7 +244,7 @@ class Campaign {
     if (!values) return;
     world_.set_rates({});
     world_.device().lower_alarms(0xFFFF'FFFF);
-    world_.pass(std::chrono::seconds(2));  // waits for delayed replies
+    world_.pass(std::chrono::seconds(2));  // during this time delayed replies arrive
     world_.move(static_cast<std::int64_t>(random_.next()));
     world_.set_rates(rates);
     const ConversationResult result = world_.run(command, *values);
@@ -280,8 +282,8 @@ class Campaign {
     return {};
   }
 
-  // Returns whether the reading lost only a part of its conversation: it reports fewer alarms than on a good line, and
-  // every flag that it does report is right.
+  // Returns whether the reading is right but incomplete, because a part of its conversation was lost: it reports fewer
+  // alarms than on a good line, and every flag that it does report is right.
   [[nodiscard]] static bool is_part_of(const Reading& seen, const Reading& truth) {
     const std::uint32_t reported = seen.alarms_reported;
     if (reported == truth.alarms_reported || (reported & ~truth.alarms_reported) != 0) return false;
@@ -289,12 +291,14 @@ class Campaign {
            ((seen.status ^ truth.status) & seen.status_reported & truth.status_reported) == 0;
   }
 
-  // Returns the key of the command's counters. It includes the options, because they may select the frame check.
+  // Returns the key of the command's counters in `Tally::commands`. The key includes options other than a model's,
+  // because they may select the frame check.
   [[nodiscard]] std::string counter_key(const Query& query) const {
     return std::string(query.command->name) + (configuration_.is_model ? "" : " " + configuration_.text);
   }
 
-  // Measures the command's frame check once, with the frames that the conversation exchanges.
+  // Counts the damaged replies. Measures once for each command how often its frame check accepts damaged replies, with
+  // the frames that its conversation exchanges.
   void measure_check(const Query& query, std::uint64_t damaged) {
     Tally::Command& command = tally_.commands[counter_key(query)];
     command.damaged_reply_count += damaged;
@@ -306,7 +310,7 @@ class Campaign {
     }
   }
 
-  // Returns whether no bit of one of the command's replies is covered by a check.
+  // Returns whether the command has a reply of which no bit is covered by a check.
   bool is_unchecked(const Query& query) {
     std::optional<bool>& unchecked = tally_.commands[counter_key(query)].unchecked;
     if (unchecked) return *unchecked;
@@ -324,11 +328,13 @@ class Campaign {
 
   [[nodiscard]] std::vector<std::pair<OwnedFrame, OwnedFrame>> frames_of(const Query& query);
 
-  // Counts the rules that the host violated. Before the first fault any violation is a finding.
+  // Counts the rules that the host violated in a conversation. Before the first fault of the line, any violation is a
+  // finding.
   void judge_rules(const Query& query, bool had_faults, std::uint32_t before) {
     const std::uint32_t new_violations = world_.device().violation_count() - before;
     faultless_ = faultless_ && !had_faults;
-    if (new_violations == 0 || !configuration_.is_model) return;  // unusual options allow what no host supports
+    // Options other than a model's allow requests that no host sends by the rules.
+    if (new_violations == 0 || !configuration_.is_model) return;
     tally_.rule_violations += new_violations;
     const std::span<const Violation> rules = world_.device().violations();
     if (tally_.violated_rule.empty() && !rules.empty())
@@ -345,12 +351,13 @@ class Campaign {
   sim::FaultRates rates_;
   std::array<std::int64_t, places> places_{};
   unsigned place_ = 0;
-  bool faultless_ = true;  // no fault has occurred yet; later the reply guard may repeat a request whose reply was late
+  // True until the first fault; after a fault the reply guard may repeat a request whose reply was late.
+  bool faultless_ = true;
   std::vector<Query> queries_;
-  std::vector<std::size_t> reads_;  // indexes of the commands that read the position
+  std::vector<std::size_t> reads_;  // indexes in `queries_` of the commands that read the position
 };
 
-/// Returns the requests of a conversation without faults, each with its reply.
+/// Returns each request of the command's conversation on a line without faults, with its reply.
 template <class Item>
 std::vector<std::pair<OwnedFrame, OwnedFrame>> Campaign<Item>::frames_of(const Query& query) {
   World<Item> world(unit_, configuration_.options, 1);
@@ -440,10 +447,12 @@ Findings check_exchanges(const Unit& unit, const ExchangeTest& test) {
     exchange<std::uint8_t>(unit, test, tally, findings);
   }
   judge_undetected_damage(tally, findings);
-  // A damaged request may itself violate a rule.
+  // A damaged request may itself violate a rule, so the encoder may count as many violations as request bytes were
+  // damaged.
   findings.require(tally.rule_violations <= tally.damaged_request_bytes,
                    [&] { return std::to_string(tally.rule_violations) + " rules broken: " + tally.violated_rule; });
-  // A host reads a written value back, so a false success needs two damaged replies that both look good.
+  // A host reads a written value back, so it reports a false success only after two damaged replies that both look
+  // good.
   findings.require(tally.failed_changes == 0, [&] {
     return std::to_string(tally.failed_changes) + " changes were not made: " + tally.broken_promise_text;
   });

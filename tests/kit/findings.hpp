@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Collects the defects that the kit finds in a unit, as texts. Tests of units expect an empty list; tests of the kit
-// expect a finding for each toy unit with a mistake.
+// Collects the defects ("findings") that the kit finds in a unit, as texts. A unit's test expects no finding; the kit's
+// own tests expect a finding for each toy unit with a mistake.
 #pragma once
 
 #include <cstdint>
@@ -11,12 +11,12 @@ namespace absenc::kit {
 
 class Findings {
  public:
-  /// Counts every finding and stores the text of the first 20.
+  /// A list of findings. It counts all of them and stores the text of the first 20.
   void add(std::string text) {
     if (texts_.size() < 20) texts_.push_back(std::move(text));
     ++count_;
   }
-  /// Adds a finding if `holds` is false. `text()` is called only in that case.
+  /// Adds `text()` as a finding if `holds` is false. `text()` is not called if `holds` is true.
   template <class Text>
   void require(bool holds, Text&& text) {
     ++check_count_;
@@ -26,9 +26,9 @@ class Findings {
 
   [[nodiscard]] const std::vector<std::string>& texts() const { return texts_; }
   [[nodiscard]] std::uint64_t count() const { return count_; }
-  /// Number of requirements checked, so that a test can detect a check which checked nothing.
+  /// Number of calls of `require`, so that a test can detect a check which checked nothing.
   [[nodiscard]] std::uint64_t check_count() const { return check_count_; }
-  /// Measured figures that a test prints, such as the number of exchanges.
+  /// Measured figures for a test to print, such as the number of exchanges.
   [[nodiscard]] const std::vector<std::string>& notes() const { return notes_; }
 
  private:

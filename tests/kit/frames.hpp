@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Frames of any link type that own their bytes, the fields that a unit decodes from them, and the configurations of a
-// unit that the tests use.
+// Types of the kit: frames of any link type that own their bytes, the fields that a unit decodes from a frame, and the
+// configurations of a unit that the tests use.
 #pragma once
 
 #include <map>
@@ -16,8 +16,8 @@ namespace absenc::kit {
 
 using Wire = std::vector<std::uint8_t>;
 
-/// A frame of any link type that owns its bytes. Its elements, counted by `elements`, are bytes, or bits on a clocked
-/// link.
+/// A frame of any link type that owns its bytes. The elements of a frame, counted by `elements`, are bits on a clocked
+/// link, otherwise bytes.
 struct OwnedFrame {
   LinkKind link{};
   Wire bytes{};
@@ -28,18 +28,18 @@ struct OwnedFrame {
   [[nodiscard]] Frame frame() const { return {.bytes = bytes, .bits = bits, .can = can ? &*can : nullptr}; }
   [[nodiscard]] std::size_t elements() const;
   [[nodiscard]] std::size_t bit_count() const;
-  /// Returns the first `count` elements of the frame.
+  /// Returns a frame with the first `count` elements of this one.
   [[nodiscard]] OwnedFrame cut(std::size_t count) const;
-  /// Returns the frame with one bit inverted. Bits are numbered as for `Unit::is_checked`.
+  /// Returns the frame with one bit inverted. `Unit::is_checked` numbers the bits in the same manner.
   [[nodiscard]] OwnedFrame flipped(std::size_t bit) const;
-  /// Returns the frame with extra bytes before and after it. Only for links that carry bytes.
+  /// Returns the frame with extra bytes before and after its own. Only for links that carry bytes.
   [[nodiscard]] OwnedFrame between(Bytes before, Bytes after) const;
 };
 
-/// Returns the frame that a vector's request or reply describes.
+/// Returns the frame whose bytes a vector states for its request or reply.
 [[nodiscard]] OwnedFrame frame_of(const Unit& unit, Bytes text);
 
-/// Value of one field. A real number is a float, so that values which differ only by rounding are equal.
+/// Value of one field. A real number is stored as a float, so that values which differ only by rounding are equal.
 struct Value {
   std::int64_t number = 0;
   float real = 0;
@@ -51,8 +51,8 @@ struct Value {
   }
 };
 
-/// Stores every field that a decoder reports, by name. A repeated name, as in a scan, gets a number from the second
-/// time on.
+/// Stores every field that a decoder reports, by its name. If a name is reported repeatedly, as in a scan, a number is
+/// added to it from the second time on.
 struct ReportedFields final : FieldSink {
   void put(const FieldValue& value) override;
   void put_reading(const Reading& one) override {
@@ -61,7 +61,7 @@ struct ReportedFields final : FieldSink {
   }
   /// Returns whether the fields include a position or turns.
   [[nodiscard]] bool has_position() const;
-  /// Returns the values of all fields with this role.
+  /// Returns the values of all fields with this role, or an empty list.
   [[nodiscard]] std::vector<std::int64_t> numbers(Role role) const;
 
   std::map<std::string, Value> fields;
@@ -71,26 +71,26 @@ struct ReportedFields final : FieldSink {
 
 [[nodiscard]] std::map<std::string, Value> expected_fields(const Vector& vector);
 
-/// Parses options of the form "name=value name=value". Returns nothing if the unit does not accept them.
+/// Returns the options in a text of the form "name=value name=value", or no value if the unit does not accept them.
 [[nodiscard]] std::optional<Options> options_of(const Unit& unit, std::string_view text);
 
-/// One configuration of a unit that the tests use: a text that names it, and its options.
+/// One configuration of a unit that the tests use: its options, and a text that names it.
 struct Configuration {
   std::string text;
   Options options;
   bool is_model = false;
 };
-/// Returns each model; and the first model with each choice of each option and with the minimum and maximum of each
-/// option. None is repeated.
+/// Returns the configurations of a unit, without repetitions: each model; and the first model with each choice of each
+/// option and with the minimum and maximum of each option.
 [[nodiscard]] std::vector<Configuration> configurations(const Unit& unit);
 
 using Values = std::vector<std::int64_t>;
-/// Returns the default of each optional argument and the minimum of each required one.
+/// Returns arguments for the command: the default of each optional argument and the minimum of each required one.
 [[nodiscard]] Values least_arguments(const Command& command);
 [[nodiscard]] Values most_arguments(const Command& command);
-/// Returns a random value in the range of each argument. A quarter of the values lie at an end of the range.
+/// Returns random arguments for the command, each within its range. A quarter of the values are the minimum or maximum.
 [[nodiscard]] Values random_arguments(const Command& command, sim::Random& random);
-/// Returns the bytes of the command's request, or the error of `encode`.
+/// Returns the bytes of the command's request, or the error of `Unit::encode`.
 [[nodiscard]] Result<Wire> encoded(const Unit& unit, const Options& options, const Command& command, Arguments values);
 
 [[nodiscard]] std::string to_text(Bytes bytes);

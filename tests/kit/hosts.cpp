@@ -9,7 +9,7 @@
 namespace absenc::kit {
 namespace {
 
-/// Result of a conversation with a supplied reply.
+/// Result of a conversation whose reply the test supplied.
 struct Outcome {
   bool ended = false;
   unsigned tested_requests = 0;
@@ -17,7 +17,7 @@ struct Outcome {
   ReportedFields seen;
 };
 
-/// Feeds the reply of one vector to a command that sends the vector's request.
+/// A conversation that receives the reply of one vector. Its command sends the vector's request.
 struct VectorReplay {
   const Unit& unit;
   const Vector& vector;
@@ -65,8 +65,8 @@ struct VectorReplay {
     return unit.decode(options, request.frame(), frame.frame(), seen);
   }
 
-  // Checks the reported fields against the vector. A unit may report its raw fields under other names (such as a
-  // temperature read from memory), but a position must match.
+  // Checks the fields that the conversation reported against those of the vector. A unit may report its raw fields
+  // under other names (such as a temperature read from memory), but the position must be equal.
   void require_report(const Outcome& outcome) const {
     const bool reads = command.verb == Verb::read || command.verb == Verb::read_part;
     unsigned shared = 0;
@@ -85,7 +85,7 @@ struct VectorReplay {
     const bool has_reading = decoded(reply, frame) == Error::none && frame.reading.has_value();
     require(!reads || outcome.seen.reading.has_value() == has_reading, [] { return "has another reading"; });
     if (!reads || !has_reading || !outcome.seen.reading) return;
-    // The validity may come from an earlier reply, so only the position and the turns are compared.
+    // The conversation may know the position's validity from an earlier reply, so only position and turns are compared.
     require(outcome.seen.reading->singleturn == frame.reading->singleturn &&
                 outcome.seen.reading->multiturn == frame.reading->multiturn,
             [] { return "reads another position"; });
@@ -95,7 +95,7 @@ struct VectorReplay {
                        [&](const FieldInfo& one) { return one.name == name && is_of_reading(one.role); });
   }
 
-  // ---- Links that carry characters
+  // ---- Conversations on links that carry characters
 
   static std::vector<Wire> bytewise(Bytes bytes) {
     std::vector<Wire> pieces;
@@ -106,12 +106,14 @@ struct VectorReplay {
   void characters() const {
     const Outcome whole = converse({reply.bytes});
     require(request.empty() || whole.tested_requests > 0, [] { return "is not sent"; });
-    // Longer procedures may continue after a good reply, and may repeat the request after a bad one.
+    // Only a command with one exchange must end with the error of the vector: a longer procedure may continue after a
+    // good reply, and may repeat its request after a bad one.
     if (is_one_question()) {
       require(whole.error == vector.error, [&] { return "ends with " + std::string(text_of(whole.error).name); });
     }
     if (whole.error == Error::none && vector.error == Error::none) require_report(whole);
-    // A byte after a complete good reply belongs to the next reply, where it is detected.
+    // If extra bytes follow a complete reply, they belong to the next reply, and a byte-by-byte conversation ends
+    // before them.
     const FrameEnd end = unit.frame_end(options, Direction::reply, vector.reply);
     if (end.kind != FrameEnd::Kind::complete || end.size >= reply.bytes.size()) {
       const Outcome pieces = converse(bytewise(reply.bytes));
@@ -143,18 +145,19 @@ struct VectorReplay {
         reply.between({}, reply.bytes), [] { return std::string("takes a reply that comes twice"); }, false);
   }
 
-  // Checks that the frame is refused in one piece and, if `in_pieces`, byte by byte.
+  // Checks that the conversation refuses the frame as a whole and, if `in_pieces`, byte by byte.
   template <class Text>
   void refused(const OwnedFrame& frame, Text&& text, bool in_pieces = true) const {
     ReportedFields ignored;
-    if (decoded(frame, ignored) == Error::none) return;  // the changed byte is not covered by a check
+    // The decoder accepts the frame, because no check covers the changed bit.
+    if (decoded(frame, ignored) == Error::none) return;
     require(converse({frame.bytes}).error != Error::none, text);
     if (!in_pieces) return;
     require(converse(bytewise(frame.bytes)).error != Error::none, [&] { return text() + ", byte by byte"; });
   }
 
-  // ---- Unsolicited frames. Sends eight frames without a pause, one of them damaged. Every reported position must be
-  // that of the good frames.
+  // ---- Unsolicited frames. `stream` sends eight frames without a pause, one of them damaged. Every reported position
+  // must be that of the good frames.
 
   void stream() const {
     if (vector.error != Error::none) return;
@@ -171,7 +174,7 @@ struct VectorReplay {
       stream_with(reply.between(std::array{byte}, {}), [] { return std::string("with garbage between"); });
     }
   }
-  // Returns the number of positions found.
+  // Sends seven good frames and the frame `odd`, whole and byte by byte. Returns how many positions the host reported.
   template <class Text>
   unsigned stream_with(const OwnedFrame& odd, Text&& text) const {
     unsigned good = 0;
@@ -200,7 +203,8 @@ struct VectorReplay {
     return good;
   }
 
-  // ---- Clocked links. The host reads as many bits as it expects; after the frame the line is idle.
+  // ---- Conversations on clocked links. The host reads as many bits as it expects; after the frame the line has its
+  // idle level.
 
   [[nodiscard]] bool bits() const {
     const bool taken = same_as_decoded(reply);
@@ -224,7 +228,8 @@ struct VectorReplay {
       });
       ReportedFields seen;
       const Error error = decoded(clocked, seen);
-      // A conversation may check more than a frame, such as a life counter that must advance.
+      // A conversation may refuse a frame that the decoder accepts, because it also checks, for example, that a life
+      // counter advances.
       const bool as_decoded = error == Error::none && outcome.seen.fields == seen.fields;
       require(outcome.error != Error::none || as_decoded, [&] {
         return "makes " + to_text(outcome.seen.fields) + " of " + to_text(clocked) + ", which is " +
@@ -235,7 +240,7 @@ struct VectorReplay {
     return taken;
   }
 
-  // ---- CAN
+  // ---- Conversations on CAN
 
   void frames() const {
     std::vector<CanFrame> requests;
@@ -247,7 +252,8 @@ struct VectorReplay {
         return pieces;
       });
     };
-    if (vector.error != Error::none) return;  // other nodes send such frames, and this conversation ignores them
+    // Other nodes may send frames like this bad one, and the conversation ignores them.
+    if (vector.error != Error::none) return;
     const CanFrame other{.id = 0x7A5, .size = 8, .data = {1, 2, 3, 4, 5, 6, 7, 8}};
     std::vector<CanFrame> echo = requests;
     echo.push_back(*reply.can);
@@ -267,7 +273,7 @@ struct VectorReplay {
   }
 };
 
-/// Returns the arguments with which the command sends this vector's request, or nothing if it never does.
+/// Returns the arguments with which the command sends this vector's request, or no value if the command cannot send it.
 std::optional<Values> arguments_for(const Unit& unit, const Options& options, const Command& command,
                                     const Vector& vector) {
   ReportedFields request_fields;
@@ -282,14 +288,15 @@ std::optional<Values> arguments_for(const Unit& unit, const Options& options, co
   }
   const Result<Wire> request = encoded(unit, options, command, values);
   if (request && std::ranges::equal(*request, vector.request)) return values;
-  // A command that only listens sends nothing.
+  // A command that only waits for unsolicited frames has no request.
   const bool unsolicited = !request && request.error() == Error::unsupported && vector.request.empty() &&
                            command.verb == Verb::read && unit.streams != nullptr && unit.streams(options);
   if (unsolicited) return values;
   return std::nullopt;
 }
 
-// Returns whether the vector contains a reading. Some frames only occur in captures, and no conversation accepts them.
+// Returns whether the vector's reply contains a reading. Some frames without a reading only occur in captures, and no
+// conversation accepts them.
 bool has_reading(const Unit& unit, const Options& options, const Vector& vector) {
   ReportedFields seen;
   return unit.decode(options, frame_of(unit, vector.request).frame(), frame_of(unit, vector.reply).frame(), seen) ==
@@ -319,7 +326,7 @@ void feed_vector(const Unit& unit, const Vector& vector, const Options& options,
   }
 }
 
-// Returns how long a reading waits for the first byte of its reply, or nothing if it sends no request.
+// Returns how long the unit's `read` command waits for the first byte of a reply, or no value if it sends no request.
 template <class Item>
 std::optional<Time> wait_for_reply(const Unit& unit, const Options& options) {
   using Kind = typename Step<Item>::Kind;
@@ -343,7 +350,8 @@ std::optional<Time> wait_for_reply(const Unit& unit, const Options& options) {
   return step.answer != Time{} ? step.answer : step.gap;
 }
 
-// Checks that the time after which a capture calls a reply late is within a third of the longest timeout of any host.
+// Compares `turnaround_limit`, after which a decoded capture calls a reply late, with the longest timeout of the host
+// in any configuration: each must be at least three quarters of the other.
 void compare_limits(const Unit& unit, Findings& findings) {
   std::optional<Time> longest;
   for (const Configuration& configuration : configurations(unit)) {
@@ -358,7 +366,7 @@ void compare_limits(const Unit& unit, Findings& findings) {
   });
 }
 
-// Checks that every command has a request in some configuration, or states that it has none.
+// Checks that every command has a request in some configuration, or that `encode` reports it as unsupported.
 void find_requests(const Unit& unit, Findings& findings) {
   const std::vector<Configuration> setups = configurations(unit);
   for (const Command& command : unit.commands) {

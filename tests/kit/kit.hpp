@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Checks that apply to every protocol unit. They use the unit's descriptor only, so a unit's author writes no code for
+// Checks that apply to every protocol unit. They use only the unit's descriptor, so a unit's author writes no code for
 // them.
 #pragma once
 
@@ -42,7 +42,8 @@ namespace absenc::kit {
 /// Writes every setting to the virtual encoder and reads it back.
 [[nodiscard]] Findings check_settings(const Unit& unit);
 
-/// Writes the first and last byte of each memory area and reads them back. A write to a read-only area must be refused.
+/// Writes the first and last byte of each memory area and reads them back. Checks that a write to a read-only area is
+/// refused.
 [[nodiscard]] Findings check_memory(const Unit& unit);
 
 /// Checks that a host can observe each condition of the virtual encoder at both ends of its range: in some
@@ -64,8 +65,8 @@ namespace absenc::kit {
 /// they cannot, or report more than the reading. No advice may be circular, and no message may repeat a clause.
 [[nodiscard]] Findings check_advice(const Unit& unit);
 
-/// Checks that each command succeeds on an undamaged line in each configuration of the unit, and that positions match
-/// the shaft.
+/// Checks that each command succeeds on an undamaged line in each configuration of the unit, and that positions equal
+/// the position of the shaft.
 [[nodiscard]] Findings check_commands(const Unit& unit);
 
 /// Settings of `check_exchanges`, which runs a host against a virtual encoder in virtual time over a line with every
@@ -74,7 +75,7 @@ namespace absenc::kit {
 struct ExchangeTest {
   std::uint64_t count = 100'000;
   std::uint64_t seed = 0;
-  bool requests_too = false;  // also damage requests
+  bool requests_too = false;  // true: requests are damaged too; false: only replies
 };
 [[nodiscard]] Findings check_exchanges(const Unit& unit, const ExchangeTest& test);
 

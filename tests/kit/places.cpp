@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Checks the bit positions that a unit states for its fields.
+// Checks the bit positions that a unit states for the fields of its replies.
 #include <algorithm>
 #include <set>
 
@@ -15,7 +15,7 @@ bool bit_of(const OwnedFrame& frame, std::size_t bit) {
   return (bytes[bit / 8] & (frame.link == LinkKind::clocked ? 0x80u >> bit % 8 : 1u << bit % 8)) != 0;
 }
 
-/// Returns the value of these bits and their number in `width`, at most 64.
+/// Returns the value of the bits at these positions, at most 64, and sets `width` to their number.
 std::uint64_t bits_at(const OwnedFrame& frame, const BitRanges& ranges, unsigned& width) {
   std::uint64_t value = 0;
   width = 0;
@@ -28,12 +28,13 @@ std::uint64_t bits_at(const OwnedFrame& frame, const BitRanges& ranges, unsigned
   return value;
 }
 
-/// Checks the bit positions of each field of one good frame.
+/// Checks the stated bit positions of each field of one frame.
 class Places final : public FieldSink {
  public:
   Places(const Unit& unit, Findings& findings) : unit_(unit), findings_(findings) {}
 
-  /// Checks the frame's fields. Returns whether the frame is valid.
+  /// Checks the bit positions of the frame's fields. Returns false if the frame is invalid, because it has no fields
+  /// then.
   bool check_frame(const Options& options, const OwnedFrame& request, const OwnedFrame& reply) {
     if (unit_.check(options, request.frame(), reply.frame()) != Error::none) return false;
     options_ = &options;
@@ -67,7 +68,7 @@ class Places final : public FieldSink {
     placed_.insert(info.role);
   }
 
-  /// Checks that at least one frame had bit positions for its position field.
+  /// Checks that at least one frame had stated bit positions for its position field.
   void require_position() {
     findings_.require(placed_.contains(Role::position), [] { return "no frame has bit positions of the position"; });
   }
@@ -81,7 +82,7 @@ class Places final : public FieldSink {
   std::set<Role> placed_;
 };
 
-// Checks all vectors, and each vector with one bit flipped if it is still valid.
+// Checks the replies of all vectors, and each such reply with one bit flipped if it is still valid.
 void check_vectors(const Unit& unit, Places& places) {
   for (const Vector& vector : unit.vectors) {
     const std::optional<Options> options = options_of(unit, vector.options);

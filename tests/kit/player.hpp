@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Plays the encoder's side of one conversation. The request under test gets the reply that the test supplies, in
-// pieces; a virtual encoder answers every other request.
+// Plays the encoder's side of one conversation. A reply supplied by the test, in pieces, answers the request under
+// test; a virtual encoder answers every other request.
 #pragma once
 
 #include <algorithm>
@@ -20,19 +20,19 @@ template <class Item>
 class Player {
  public:
   using Pieces = std::vector<std::vector<Item>>;
-  /// Returns the pieces of the reply to the request under test. `clocks` is the number of bits or items that the host
-  /// wants, 0 if unknown.
+  /// Function that returns the pieces of the reply to the request under test. Its argument is the number of bits or
+  /// items that the host clocks or expects, 0 if unknown.
   using Reply = std::function<Pieces(std::size_t clocks)>;
 
-  /// Creates a line without an encoder.
+  /// Creates a player without a virtual encoder: only the request under test gets a reply.
   Player() = default;
   Player(const Unit& unit, const Options& options) : device_storage_(unit.device_storage) {
     device_ = unit.device(options, still_, device_storage_).template of<Item>();
     if (device_ != nullptr) device_->power_on(now_, Device<Item>::PowerOn::skip);
   }
 
-  /// Runs the conversation and returns whether it ended. An empty `request` means one that sends nothing: a pulse, or a
-  /// wait. `on_emit` is called for each result of a streaming conversation.
+  /// Runs the conversation and returns whether it ended. An empty `request` means that the conversation under test
+  /// sends a pulse, or only waits. `on_emit` is called for each result of a streaming conversation.
   template <class OnEmit>
   bool run(Conversation<Item>& conversation, const std::vector<Item>& request, const Reply& reply, OnEmit&& on_emit,
            unsigned most_steps = 2000) {
@@ -65,9 +65,9 @@ class Player {
     }
     return false;
   }
-  /// Number of times the host sent the request under test.
+  /// Number of times that the host sent the request under test.
   [[nodiscard]] unsigned tested_requests() const { return tested_requests_; }
-  /// Number of requests that the host sent.
+  /// Number of requests of any kind that the host sent.
   [[nodiscard]] unsigned request_count() const { return request_count_; }
 
  private:

@@ -6,7 +6,7 @@
 namespace absenc::kit {
 namespace {
 
-// Runs a command on a line without an encoder. It must end with a timeout.
+// Runs a command on a line without an encoder. It must end with a timeout error.
 template <class Item>
 void meet_silence(const Unit& unit, const Configuration& configuration, const Command& command, Findings& findings) {
   std::vector<std::byte> storage(unit.host_storage);
@@ -14,15 +14,15 @@ void meet_silence(const Unit& unit, const Configuration& configuration, const Co
       unit.host(configuration.options, command, least_arguments(command), storage).template of<Item>();
   if (conversation == nullptr) return;
   Player<Item> player;
-  constexpr unsigned every_address = 100'000;  // steps, enough for a scan of every address
+  constexpr unsigned every_address = 100'000;  // limit of simulator steps, enough for a scan of every address
   const bool ended = player.run(
       *conversation, {}, [](std::size_t) { return typename Player<Item>::Pieces{}; }, [] {}, every_address);
-  if (ended && player.request_count() == 0) return;  // this configuration lacks the command
+  if (ended && player.request_count() == 0) return;  // this configuration does not support the command
   const auto where = [&] {
     return std::string(command.name) + " of \"" + configuration.text + "\" without an encoder: ";
   };
   findings.require(ended, [&] { return where() + "does not end"; });
-  // A command without a reply succeeds. A command that stops a stream succeeds when no byte arrives.
+  // A command that expects no reply succeeds. A command that stops a stream succeeds when no byte arrives.
   const bool wants_none = command.verb == Verb::run && conversation->reading() == nullptr;
   const Error error = conversation->error();
   findings.require(!ended || error == Error::timeout || (wants_none && error == Error::none),
@@ -33,7 +33,7 @@ void meet_silence(const Unit& unit, const Configuration& configuration, const Co
 
 Findings check_silence(const Unit& unit) {
   Findings findings;
-  // On clocked links the host always reads some level, even without an encoder.
+  // On clocked links the host always reads some level, even without an encoder, so it cannot detect silence.
   const bool can_be_silent = unit.link != LinkKind::clocked && unit.link != LinkKind::spi;
   if (!can_be_silent) return findings;
   for (const Configuration& configuration : configurations(unit)) {

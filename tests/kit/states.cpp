@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Checks the three states of an alarm: reported and clear, reported and raised, not reported.
+// Checks that readings report the three states of an alarm correctly: reported and clear, reported and raised, not
+// reported.
 #include <algorithm>
 
 #include "tests/kit/kit.hpp"
@@ -8,14 +9,15 @@
 namespace absenc::kit {
 namespace {
 
-/// The flags of one channel of a reading: their field, the set bits, and the bits that are reported.
+/// The alarm or status flags of one channel of a reading: `field` names the flags, `bits` has the set ones, `reported`
+/// those that the reply reports.
 struct Flags {
   const FieldInfo* field;
   std::uint32_t bits;
   std::uint32_t reported;
 };
 
-/// Returns a mask of the bits of `field` that have a name.
+/// Returns a mask of the flags of `field` that have a name.
 std::uint32_t named(const FieldInfo& field) {
   std::uint32_t mask = 0;
   for (std::size_t i = 0; i < field.flags.size(); ++i) {
@@ -39,7 +41,7 @@ std::vector<Flags> status_of(const Unit& unit, const Reading& reading) {
   return channels_of(unit.status, unit.second_status, reading.status, reading.status_reported);
 }
 
-/// A command's live reading, and the fields of its last reply decoded as from a capture.
+/// Two results of a command: its live reading, and the fields of its last reply, decoded as from a capture.
 struct LiveAndCaptured {
   std::optional<Reading> live;
   ReportedFields captured;
@@ -131,7 +133,8 @@ class States {
     if (!is_raised) require(!is_shown, "it is reported raised and is not");
   }
 
-  // Returns the flags that the options declare absent on this encoder, and the status flags that summarize them.
+  // Returns a mask of the flags of `field` that this encoder lacks because of its options, and of status flags that
+  // summarize such alarms.
   [[nodiscard]] std::uint32_t absent(const FieldInfo& field, const Reading& reading) const {
     std::uint32_t alarms = 0;
     for (std::size_t i = 0; i < unit_.alarms->flags.size(); ++i) {
@@ -145,7 +148,7 @@ class States {
     return mask;
   }
 
-  // Checks that a reading reports the flags that its reply carries as fields.
+  // Checks that the reading of a reply reports each flag that the reply also carries as a field, with the same value.
   void check_carried_flags(const ReportedFields& seen) {
     if (!seen.reading) return;
     const auto agrees = [&](const Flags& state) {
@@ -169,7 +172,7 @@ class States {
             "a part reports valid turns, the whole invalid ones");
   }
 
-  // Checks a captured reading that is completed with the alarms of the previous reply to `read`.
+  // Checks a reading from a capture that is completed with the alarms of the previous reply to `read`.
   void check_completed(const LiveAndCaptured& before, const LiveAndCaptured& now, std::size_t bit, bool is_raised) {
     if (unit_.remembered == nullptr || !before.captured.reading || !now.captured.reading) return;
     const Reading reading = unit_.remembered(*before.captured.reading, *now.captured.reading);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Checks settings and memory of the virtual encoder, and the storage of conversations and devices.
+// Checks that settings and memory of the virtual encoder can be written and read back, and that conversations and
+// devices stay within their storage.
 #include <set>
 
 #include "tests/kit/changes.hpp"
@@ -8,7 +9,7 @@
 namespace absenc::kit {
 namespace {
 
-// ---- Settings, zero, turns, alarms
+// ---- Commands that change settings, zero, turns or alarms
 
 template <class Item>
 void change(const Unit& unit, const Configuration& configuration, const Command& command, Findings& findings) {
@@ -38,8 +39,8 @@ void change(const Unit& unit, const Configuration& configuration, const Command&
     apply_to_host(world, unit, command, values);
     const std::string broken = broken_promise(world, unit, command, values, result.seen);
     findings.require(broken.empty(), [&] { return what() + broken; });
-    // A setting that cannot be read may already have the new value. Writing it again violates the rules of some
-    // encoders.
+    // A setting that cannot be read may already have the value that is written. Writing the same value violates the
+    // rules of some encoders, so a violation is accepted then.
     const std::string now = to_text(read_setting(world, unit, command).fields);
     findings.require(world.device().violation_count() == 0 || (command.verb == Verb::config_set && now == before),
                      [&] { return what() + std::string(world.device().violations()[0].rule); });
@@ -49,12 +50,12 @@ void change(const Unit& unit, const Configuration& configuration, const Command&
   }
   findings.require(good > 0 || refused,
                    [&] { return configuration.text + ", " + std::string(command.name) + ": never ends well"; });
-  // At least two values were set, so at least two must be read back.
+  // If at least two different values were set, at least two must have been read back.
   findings.require(set.size() < 2 || read.size() > 1,
                    [&] { return std::string(command.name) + ": the same value is read whatever is set"; });
 }
 
-// ---- Memory
+// ---- Memory and registers of the virtual encoder
 
 template <class Item>
 void try_memory(const Unit& unit, const Configuration& configuration, Findings& findings) {
@@ -105,11 +106,11 @@ void try_registers(const Unit& unit, const Configuration& configuration, Finding
   }
 }
 
-// ---- Storage
+// ---- Storage of conversations and devices
 
 constexpr std::byte untouched{0xA5};
 
-/// Storage of a given size with a fence after it, which shows writes beyond the end.
+/// Storage of a given size, followed by bytes with a known value that reveal writes beyond its end.
 struct Fenced {
   Fenced(std::size_t size_given, std::size_t behind) : bytes(size_given + behind + 64, untouched), size(size_given) {}
   [[nodiscard]] std::span<std::byte> given() { return std::span(bytes).first(size); }
@@ -136,7 +137,7 @@ void store(const Unit& unit, const Configuration& configuration, const Command& 
                      [&] { return std::string(command.name) + ": needs more than host_storage"; });
     return;
   }
-  std::size_t none = 0;  // largest size that is too small
+  std::size_t none = 0;  // largest tried size that the unit refused
   std::size_t needed = unit.host_storage;
   findings.require(!made(0), [&] { return std::string(command.name) + ": needs no storage"; });
   while (needed - none > 1) {
@@ -151,7 +152,7 @@ void store(const Unit& unit, const Configuration& configuration, const Command& 
     return std::pair(result.error, result.seen.fields);
   };
   const auto roomy = end(unit.host_storage);
-  // A later part of a procedure may need more storage than its start. It must then report that error.
+  // A later part of a procedure may need more storage than its start. It must then end with the error buffer_too_small.
   const auto tight = needed == unit.host_storage ? roomy : end(needed);
   findings.require(tight == roomy || tight.first == Error::buffer_too_small,
                    [&] { return std::string(command.name) + ": ends differently in the smallest storage"; });

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// A complete toy unit with one selectable mistake, which the kit must find. The request is one byte. The reply is a
-// 16-bit position with a 16-bit CRC, or one 14-bit word with two parity bits whose reply may begin with any byte.
+// A complete toy unit with one selectable mistake, which the kit must find. Its request is one byte. Its reply is a
+// 16-bit position with a 16-bit CRC; with weak_check, one 14-bit word with two parity bits that may begin with any
+// byte.
 #pragma once
 
 #include <array>
@@ -13,7 +14,7 @@ namespace absenc::kit::toy {
 
 enum class Mistake : std::uint8_t {
   none,
-  weak_check,           // no mistake: a weak check that accepts a quarter of wrong words
+  weak_check,           // no mistake: the parity bits accept a quarter of wrong words
   accepts_two_bytes,    // the host takes the first two bytes for the reply
   ignores_checksum,     // the host ignores the checksum
   accepts_excess,       // the host accepts bytes that begin with a good reply and leaves the rest for the next command
@@ -186,7 +187,7 @@ struct Toy {
    private:
     const Shaft& shaft_;
     unsigned sent_position_ = 0;
-    unsigned offset_ = 0;  // the condition: offset of the position, in counts
+    unsigned offset_ = 0;  // value of the condition: added to the position, in counts
     unsigned previous_position_ = 0;
     Time reply_at_{};
     bool reply_due_ = false;
@@ -271,8 +272,8 @@ inline constexpr Unit unit = [] {
   return made;
 }();
 
-/// A descriptor without code for an encoder with memory on a shared line. The role `forgotten` is missing from it,
-/// while every name is present.
+/// The descriptor, without functions, of an encoder with memory on a shared line. The role `forgotten` is missing, but
+/// every field, option and argument has its name.
 template <Role forgotten>
 struct Declared {
   static constexpr Role unless_forgotten(Role role) { return role == forgotten ? Role::other : role; }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests the kit itself: each toy unit has one mistake, and the kit must find it.
+// Tests the kit itself: each toy unit has one mistake, and the kit must report a finding for it.
 #include <gmock/gmock-more-matchers.h>
 #include <gtest/gtest.h>
 
@@ -31,8 +31,8 @@ void expect_no_finding() {
 
 TEST(KitToys, ReportsNothingForCorrectUnit) { expect_no_finding<Mistake::none>(); }
 
-// The reply may begin with any byte, and its weak check accepts some wrong replies. The kit must accept their expected
-// number.
+// A reply may begin with any byte, and its weak check accepts some wrong replies. The kit must tolerate the number of
+// accepted wrong replies that is expected by chance.
 TEST(KitToys, AllowsWeakFrameCheck) {
   expect_no_finding<Mistake::weak_check>();
   EXPECT_THAT(check_exchanges(toy::unit<Mistake::weak_check>, few).notes(),

@@ -8,7 +8,7 @@
 namespace absenc::kit {
 namespace {
 
-/// Sends the same reply to every request.
+/// A device that sends the same reply to every request.
 template <class Item>
 class FixedReplyDevice final : public Machine<Item> {
  public:
@@ -30,7 +30,7 @@ class FixedReplyDevice final : public Machine<Item> {
   bool reply_due_ = false;
 };
 
-/// Kinds of wrong values that a damaged reply decoded to.
+/// Shows which kinds of wrong values a damaged reply decoded to.
 struct WrongValues {
   bool position = false;
   bool others = false;

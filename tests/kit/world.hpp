@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Simulates a unit's virtual encoder and its host in virtual time, from the descriptor alone. A test sets the shaft's
-// position and the faults of the line, and runs conversations one after another.
+// Simulates a unit's virtual encoder and host in virtual time, from the unit's descriptor alone. A test sets the
+// position of the shaft and the faults of the line, and runs conversations one after another.
 #pragma once
 
 #include <cstring>
@@ -26,17 +26,18 @@ struct SettableShaft final : Shaft {
 
 /// Result of one conversation.
 struct ConversationResult {
-  bool made = false;   // the unit supports this command
-  bool ended = false;  // ended before the time limit
+  bool made = false;   // true if the unit supports the command
+  bool ended = false;  // true if the conversation ended before the time limit
   Error error = Error::none;
-  bool premature_reading = false;  // had a reading before any byte arrived, or together with an error
+  // True if the conversation had a reading before any byte arrived, or together with an error.
+  bool premature_reading = false;
   std::string detail{};
   std::string advice{};
-  ReportedFields seen{};          // every reported field and reading, in order
-  std::uint64_t damaged{};        // faults that changed bytes during the conversation
-  std::uint64_t faults{};         // faults of any kind during the conversation
-  std::uint64_t request_count{};  // requests that the encoder answered during the conversation
-  Wire sent{};                    // the last exchange, on links that carry bytes
+  ReportedFields seen{};          // all reported fields, and the last reading
+  std::uint64_t damaged{};        // number of faults that changed bytes during the conversation
+  std::uint64_t faults{};         // number of faults of any kind during the conversation
+  std::uint64_t request_count{};  // number of requests that the encoder answered during the conversation
+  Wire sent{};                    // bytes sent by the host in its last exchange; empty on CAN
   Wire received{};
 
   [[nodiscard]] bool good() const { return made && ended && error == Error::none; }
@@ -70,8 +71,8 @@ class World {
   [[nodiscard]] const Options& options() const { return options_; }
   void set_rates(const sim::FaultRates& rates) { faulty_->set_rates(rates); }
   void pass(Time time) { line_->run_until(line_->now() + time); }
-  /// Sets the shaft's position. Waits 5 ms if the encoder sends unsolicited frames, because those already sent show the
-  /// old position.
+  /// Sets the position of the shaft. Waits 5 ms if the encoder sends unsolicited frames, because frames on their way
+  /// still have the old position.
   void move(std::int64_t position) {
     shaft_.position = position;
     const bool unsolicited = is_can || (unit_.streams != nullptr && unit_.streams(options_));
@@ -79,7 +80,7 @@ class World {
   }
   [[nodiscard]] std::int64_t place() const { return shaft_.position; }
 
-  /// Sets the options with which the host addresses the encoder, and configures the host's port to match.
+  /// Sets the host's options, and configures the host's port to suit these options.
   void set_options(const Options& options) {
     options_ = options;
     SetRate set(settings());
@@ -87,7 +88,7 @@ class World {
     line_->run(node_, line_->now());
   }
 
-  /// Runs one conversation to its end, or a streaming one up to its first result.
+  /// Runs one conversation to its end, or a streaming conversation up to its first result.
   ConversationResult run(const Command& command, Arguments arguments, Time limit = std::chrono::seconds(100)) {
     return run_in(host_storage_, command, arguments, limit);
   }
@@ -132,8 +133,8 @@ class World {
     return result;
   }
 
-  /// Number of faults that can cause a wrong result. Delays, echoes, missing and repeated replies leave frames intact,
-  /// except where the host clocks the line: there each changes the bits that it reads.
+  /// Returns the number of faults that can cause a wrong result. Delays, echoes, missing and repeated replies leave
+  /// frames intact, except where the host clocks the line: there each such fault changes the bits that the host reads.
   [[nodiscard]] std::uint64_t changed_bytes() const {
     using sim::FaultKind;
     std::uint64_t sum = 0;
@@ -157,7 +158,7 @@ class World {
 
   static constexpr std::size_t none = ~std::size_t{0};
 
-  /// Configures the host's port.
+  /// A machine at the host's end that only configures the host's port.
   class SetRate final : public Machine<Item> {
    public:
     explicit SetRate(const LineSettings& line) : line_(line) {}
@@ -171,8 +172,8 @@ class World {
     LineSettings line_;
     bool done_ = false;
   };
-  /// Occupies the host's end of the line between conversations, because a conversation whose storage is reused must not
-  /// stay attached.
+  /// A machine that occupies the host's end of the line between conversations: a finished conversation must not stay
+  /// attached, because its storage is reused.
   struct Idle final : Machine<Item> {
     void feed(const Event<Item>&) override {}
     Step<Item> next(Time) override { return {.kind = Step<Item>::Kind::done}; }
@@ -180,7 +181,7 @@ class World {
   };
 
   [[nodiscard]] LineSettings settings() const { return line_settings(unit_, options_).with_some_rate(); }
-  // Matches the rule of `host::Session` for which conversations the reply guard covers.
+  // Returns whether the reply guard covers conversations of the command, by the same rule as in `host::Session`.
   [[nodiscard]] bool guarded(const Command& command) const {
     if (is_can) return command.verb == Verb::read || command.verb == Verb::read_part;
     return unit_.link != LinkKind::spi && unit_.link != LinkKind::clocked;
@@ -189,7 +190,7 @@ class World {
     if (node_ == none) {
       node_ = line_->attach(sim::NodeRole::host, idle_, [this] { return !on_emit_ || on_emit_(); });
     }
-    // The caller of a conversation controls how long the SPI chip stays deselected between conversations.
+    // On SPI the chip must stay deselected between two conversations; controlling that time is the caller's task.
     if (unit_.link == LinkKind::spi) pass(std::chrono::microseconds(20));
     line_->replace(node_, machine);
   }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Checks that a host never sets the zero from an invalid position, which would leave a wrong zero for good.
+// Checks that a host never sets the zero from an invalid position, because that would leave a wrong zero permanently.
 #include "absenc/sim/place.hpp"
 #include "tests/kit/kit.hpp"
 #include "tests/kit/world.hpp"
@@ -15,7 +15,8 @@ std::optional<Reading> read_position(World<Item>& world, const Unit& unit) {
   return world.run(read, least_arguments(read)).seen.reading;
 }
 
-/// Tries to set the zero. `spoil` makes the position invalid, `mend` reverses that.
+/// Runs the zero command while the position is invalid, and checks that it is refused. `spoil` makes the position
+/// invalid, `mend` makes it valid again.
 template <class Item, class Spoil, class Mend>
 void try_zero(const Unit& unit, const Configuration& configuration, const std::string& what, Spoil spoil, Mend mend,
               Findings& findings) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Runs a virtual encoder of the library on a CAN interface until standard input ends. Prints its address and position,
-// then switches its power off and on for each byte of input. Usage: can_emulation INTERFACE
+// Program that runs a virtual encoder of the library on a CAN interface until standard input ends. It prints the
+// encoder's address and position, then switches the encoder's power off and on for each byte of input. Usage:
+// can_emulation INTERFACE
 #include <cstdio>
 #include <string>
 #include <vector>
@@ -17,7 +18,7 @@ int main(int count, char** arguments) {
   std::printf("%s %llu\n", emulation.address().c_str(), static_cast<unsigned long long>(encoder.read().singleturn));
   std::fflush(stdout);
   while (std::getchar() != EOF) {
-    emulation.power_off();  // the power can be switched also while the interface is down
+    emulation.power_off();  // the power of the encoder can be switched also while the interface is down
     emulation.power_on();
     std::puts("switched");
     std::fflush(stdout);
