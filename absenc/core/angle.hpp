@@ -25,23 +25,24 @@ enum class Validity : std::uint8_t {
 
 /// One position as an encoder reported it, and which parts of it can be trusted.
 struct Reading {
-  std::uint64_t singleturn = 0;        ///< counts, 0 .. 2^singleturn_bits - 1
-  std::uint64_t multiturn = 0;         ///< revolutions, 0 .. 2^multiturn_bits - 1; users see `turns()`
-  unsigned singleturn_bits = 0;        ///< 0: the reply carries no single-turn position
-  unsigned multiturn_bits = 0;         ///< 0: the reply carries no revolutions
-  unsigned singleturn_valid_bits = 0;  ///< number of valid bits, counted from the top; 0: do not use the position
+  std::uint64_t singleturn = 0;  ///< single-turn position in counts, 0 .. 2^singleturn_bits - 1
+  /// Raw number of revolutions, 0 .. 2^multiturn_bits - 1; `turns()` returns it with its sign.
+  std::uint64_t multiturn = 0;
+  unsigned singleturn_bits = 0;        ///< width of `singleturn` in bits; 0: the reply carries no single-turn position
+  unsigned multiturn_bits = 0;         ///< width of `multiturn` in bits; 0: the reply carries no revolutions
+  unsigned singleturn_valid_bits = 0;  ///< number of valid bits of `singleturn`, counted from the top; 0: do not use it
   bool multiturn_valid = false;        ///< Whether `multiturn` can be trusted.
-  bool singleturn_known = true;   ///< false: no reply so far reports whether the position is valid; it then counts as
-                                  ///< not valid
-  bool multiturn_known = true;    ///< false: no reply so far reports whether the turns are valid
-  bool multiturn_signed = false;  ///< the encoder counts turns below zero: `multiturn` is two's complement of
-                                  ///< `multiturn_bits`
-  double unit_um = 0;             ///< linear encoders: micrometres per count of `singleturn`; 0: rotary encoder
-  bool ready = true;              ///< false while the encoder reports that it is starting
-  std::uint32_t status = 0;       ///< bits named by the unit's status field, then those of its second status field
-  std::uint32_t alarms = 0;       ///< bits named by the unit's alarms field, then those of its second alarms field
-  std::uint32_t status_reported = 0;  ///< bits of `status` that were reported; other bits are unknown, not clear
-  std::uint32_t alarms_reported = 0;  ///< bits of `alarms` that were reported; other bits are unknown
+  /// false: no reply so far reports whether `singleturn` is valid; it is then treated as invalid.
+  bool singleturn_known = true;
+  bool multiturn_known = true;        ///< false: no reply so far reports whether `multiturn` is valid
+  bool multiturn_signed = false;      ///< the encoder counts turns below zero: `multiturn` is two's complement of
+                                      ///< `multiturn_bits`
+  double unit_um = 0;                 ///< linear encoders: micrometres per count of `singleturn`; 0: rotary encoder
+  bool ready = true;                  ///< false while the encoder reports that it is starting
+  std::uint32_t status = 0;           ///< bits named by the unit's status field, then those of its second status field
+  std::uint32_t alarms = 0;           ///< bits named by the unit's alarms field, then those of its second alarms field
+  std::uint32_t status_reported = 0;  ///< bits of `status` that the encoder reported; the others are unknown, not clear
+  std::uint32_t alarms_reported = 0;  ///< bits of `alarms` that the encoder reported; the others are unknown, not clear
   Time latched{};                     ///< time at which the encoder sampled the position
   Time received{};                    ///< time at which the last byte of the reply arrived
 
@@ -49,18 +50,18 @@ struct Reading {
   [[nodiscard]] constexpr bool singleturn_valid() const {
     return singleturn_bits != 0 && singleturn_valid_bits == singleturn_bits;
   }
-  /// Returns whether the single-turn position can be trusted, and if not, whether the encoder reported that.
+  /// Returns whether the single-turn position can be trusted, and if not, whether the encoder reported it as invalid.
   [[nodiscard]] constexpr Validity singleturn_validity() const {
     if (singleturn_bits == 0) return Validity::absent;
     if (!singleturn_known) return Validity::unknown;
     return singleturn_valid() ? Validity::valid : Validity::invalid;
   }
-  /// Returns the revolutions, below zero where the encoder counts them with a sign.
+  /// Returns the number of revolutions; it is below zero only if the encoder counts them with a sign.
   [[nodiscard]] constexpr std::int64_t turns() const {
     if (multiturn_signed && multiturn_bits != 0) return with_sign(multiturn, multiturn_bits);
     return static_cast<std::int64_t>(multiturn);
   }
-  /// Returns whether the turns can be trusted, and if not, whether the encoder reported that.
+  /// Returns whether the number of revolutions can be trusted, and if not, whether the encoder reported it as invalid.
   [[nodiscard]] constexpr Validity multiturn_validity() const {
     if (multiturn_bits == 0) return Validity::absent;
     if (!multiturn_known) return Validity::unknown;

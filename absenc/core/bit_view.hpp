@@ -18,16 +18,16 @@ namespace absenc {
 
 /// A sequence of bits in bytes, the highest bit of each byte first.
 struct BitView {
-  Bytes bytes{};         ///< The bytes that hold the bits.
-  std::size_t size = 0;  ///< number of bits; `bytes` has room for them
+  Bytes bytes{};         ///< bits, packed with the first bit highest; the last byte is left-aligned
+  std::size_t size = 0;  ///< number of bits, at most eight for each byte
 
   /// Returns the bit at `index`, which is less than `size`.
   [[nodiscard]] constexpr bool operator[](std::size_t index) const {
     return ((bytes[index / 8] >> (7 - index % 8)) & 1) != 0;
   }
 
-  /// Returns `count` bits (0 to 64) that begin at index `first`, the first one as the most significant. All must lie
-  /// within the view.
+  /// Returns `count` bits (0 to 64) that begin at index `first`, the first one as the most significant. All `count`
+  /// bits must lie within the view.
   [[nodiscard]] constexpr std::uint64_t load(std::size_t first, unsigned count) const {
     if (count == 0) return 0;
     std::uint64_t value = 0;
@@ -56,14 +56,14 @@ struct BitView {
   [[nodiscard, gnu::always_inline]] constexpr std::size_t window(std::size_t first) const {
     if (bytes.size() < sizeof(std::size_t)) return short_window(first);
     const std::size_t at = std::min(first / 8, bytes.size() - sizeof(std::size_t));
-    if (std::is_constant_evaluated()) {  // clang 14 has not instantiated the template yet
+    if (std::is_constant_evaluated()) {  // at compile time clang 14 has not instantiated `register_at` yet
       std::size_t value = 0;
       for (std::size_t i = 0; i < sizeof(std::size_t); ++i) value = value << 8 | bytes[at + i];
       return value << (first - 8 * at);
     }
     return register_at(at, std::make_index_sequence<sizeof(std::size_t)>{}) << (first - 8 * at);
   }
-  // Without a loop the compiler emits a single load where the processor has one.
+  // Loads a machine word without a loop, so that the compiler emits a single load where the processor has one.
   template <std::size_t... i>
   [[nodiscard]] constexpr std::size_t register_at(std::size_t at, std::index_sequence<i...>) const {
     const std::uint8_t* from = bytes.data() + at;
@@ -81,7 +81,7 @@ struct BitView {
 /// A bit sequence of up to 64 bits in one number, the first bit as the most significant. Has `load` like BitView.
 struct BitNumber {
   std::uint64_t number;  ///< The bits as a number, the first bit highest.
-  unsigned size;         ///< number of bits, 1 to 64
+  unsigned size;         ///< number of bits in `number`, 1 to 64
 
   /// Returns `count` bits from `first` as a number, the first bit highest.
   [[nodiscard]] constexpr std::uint64_t load(std::size_t first, unsigned count) const {
@@ -89,12 +89,12 @@ struct BitNumber {
   }
 };
 
-/// A sequence of bits with room for `Capacity` of them.
+/// A buffer for up to `Capacity` bits.
 template <std::size_t Capacity>
 class BitBuffer {
  public:
   /// Appends the low `count` (0 to 64) bits of `value`, most significant first. Returns false, and stores nothing, if
-  /// they do not all fit.
+  /// the buffer has room for fewer than `count` bits.
   constexpr bool append(std::uint64_t value, unsigned count) {
     if (count > Capacity - size_) return false;
     for (unsigned i = count; i-- > 0;) {
@@ -104,25 +104,25 @@ class BitBuffer {
     }
     return true;
   }
-  /// Removes all bits.
+  /// Removes all bits from the buffer.
   constexpr void clear() { *this = {}; }
 
-  /// Returns the number of bits.
+  /// Returns the number of stored bits.
   [[nodiscard]] constexpr std::size_t size() const { return size_; }
-  /// Returns the greatest number of bits.
+  /// Returns the greatest number of bits that the buffer can store.
   [[nodiscard]] static constexpr std::size_t capacity() { return Capacity; }
-  /// Returns the bytes that hold the bits; unused bits of the last byte are 0.
+  /// Returns the bytes that hold the stored bits; unused bits of the last byte are 0.
   [[nodiscard]] constexpr Bytes bytes() const { return Bytes(bytes_).first((size_ + 7) / 8); }
-  /// Returns the bits; valid while this buffer is unchanged.
+  /// Returns a view of the stored bits; valid while this buffer is unchanged.
   [[nodiscard]] constexpr BitView view() const { return {bytes_, size_}; }
 
  private:
-  std::array<std::uint8_t, (Capacity + 7) / 8> bytes_{};  // bits behind `size_` are 0
+  std::array<std::uint8_t, (Capacity + 7) / 8> bytes_{};  // packed bits; all bits behind the first `size_` are 0
   std::size_t size_ = 0;
 };
 
-/// Returns the CRC of `count` bits that begin at `first`. If `count` is no multiple of 8, zeros are put before the
-/// bits; they change nothing because the remainder begins at 0.
+/// Returns the CRC of the `count` bits of `bits` that begin at index `first`. If `count` is no multiple of 8, zeros are
+/// put before the bits; they change nothing because the remainder begins at 0.
 template <CrcParameters parameters, CrcTable table = CrcTable::byte, class Bits>
 [[nodiscard]] constexpr auto crc_of(const Bits& bits, std::size_t first, std::size_t count) {
   static_assert(parameters.init == 0 && !parameters.refin);

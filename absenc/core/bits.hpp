@@ -15,7 +15,7 @@ namespace absenc {
   return bits >= 64 ? ~std::uint64_t{0} : (std::uint64_t{1} << bits) - 1;
 }
 
-/// Returns true when an odd number of bits is set.
+/// Returns whether an odd number of bits of `value` is set.
 [[nodiscard]] constexpr bool odd_parity(std::uint64_t value) { return (std::popcount(value) & 1) != 0; }
 
 /// Returns the low `bits` bits of `value` in reverse order. 1 to 32 bits: a small processor shifts 32 bits in one
@@ -26,14 +26,14 @@ namespace absenc {
   return reversed;
 }
 
-/// Returns the number in up to 8 bytes, least significant first.
+/// Returns the number that up to 8 bytes contain, least significant byte first.
 [[nodiscard]] constexpr std::uint64_t load_little_endian(Bytes bytes) {
   std::uint64_t value = 0;
   for (std::size_t i = bytes.size(); i-- > 0;) value = value << 8 | bytes[i];
   return value;
 }
 
-/// Returns the number in up to 8 bytes, most significant first.
+/// Returns the number that up to 8 bytes contain, most significant byte first.
 [[nodiscard]] constexpr std::uint64_t load_big_endian(Bytes bytes) {
   std::uint64_t value = 0;
   for (const std::uint8_t byte : bytes) value = value << 8 | byte;

@@ -9,12 +9,13 @@
 
 namespace absenc {
 
-/// Bytes that belong to another object.
+/// A view of bytes that belong to another object; read only.
 using Bytes = std::span<const std::uint8_t>;
-/// Bytes that belong to another object and may be written.
+/// A view of bytes that belong to another object and may be written.
 using MutableBytes = std::span<std::uint8_t>;
 
-/// Up to Capacity items, stored inside the object. Appending to a full buffer is refused, never truncated.
+/// A buffer for up to Capacity items, which are stored inside the object. Appending to a full buffer is refused, never
+/// truncated.
 template <class Item, std::size_t Capacity>
 class Buffer {
  public:
@@ -27,7 +28,7 @@ class Buffer {
     return true;
   }
 
-  /// Appends `items`. Returns false, and stores nothing, if they do not all fit.
+  /// Appends `items`. Returns false, and stores nothing, if the buffer has no room for all of `items`.
   constexpr bool append(std::span<const Item> items) {
     if (items.size() > Capacity - size_) return false;
     std::size_t size = size_;  // local copy: a stored byte might alias `size_`, which would then be loaded again for
@@ -37,23 +38,23 @@ class Buffer {
     return true;
   }
 
-  /// Removes all items.
+  /// Removes all items from the buffer.
   constexpr void clear() { size_ = 0; }
 
-  /// Returns the number of items.
+  /// Returns the number of stored items.
   [[nodiscard]] constexpr std::size_t size() const { return size_; }
-  /// Returns whether there are no items.
+  /// Returns whether no items are stored.
   [[nodiscard]] constexpr bool empty() const { return size_ == 0; }
-  /// Returns the greatest number of items.
+  /// Returns the greatest number of items that the buffer can store.
   [[nodiscard]] static constexpr std::size_t capacity() { return Capacity; }
 
-  /// Returns the item at `index`, which is less than `size()`.
+  /// Returns the stored item at `index`, which is less than `size()`.
   constexpr Item& operator[](std::size_t index) { return items_[index]; }
-  /// Returns the item at `index`, which is less than `size()`.
+  /// Returns the stored item at `index`, which is less than `size()`.
   constexpr const Item& operator[](std::size_t index) const { return items_[index]; }
-  /// Returns the items; valid while this buffer exists and is not cleared.
+  /// Returns a view of the stored items; valid while this buffer exists and is not cleared.
   [[nodiscard]] constexpr std::span<const Item> view() const { return {items_.data(), size_}; }
-  /// Returns the items, as `view` does.
+  /// Converts to a view of the stored items, like `view`.
   constexpr operator std::span<const Item>() const { return view(); }
 
  private:
@@ -61,7 +62,7 @@ class Buffer {
   std::size_t size_ = 0;
 };
 
-/// Bytes, at most `Capacity`.
+/// A buffer for at most `Capacity` bytes.
 template <std::size_t Capacity>
 using ByteBuffer = Buffer<std::uint8_t, Capacity>;
 

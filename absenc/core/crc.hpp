@@ -15,18 +15,19 @@ namespace absenc {
 
 /// Parameters of a CRC. `poly` is in normal notation (the highest power left out): x8+x5+x3+x2+x+1 is 0x2F.
 struct CrcParameters {
-  unsigned width;        ///< width in bits, 3 to 16
-  std::uint16_t poly;    ///< Polynomial without its highest term.
+  unsigned width;        ///< width of the checksum in bits, 3 to 16
+  std::uint16_t poly;    ///< Polynomial of the CRC without its highest term.
   std::uint16_t init;    ///< Value of the register before the first byte.
   bool refin;            ///< Whether each byte is processed lowest bit first.
   bool refout;           ///< Whether the register is reflected before `xorout`.
-  std::uint16_t xorout;  ///< Value that is combined with the result by exclusive OR.
+  std::uint16_t xorout;  ///< Value that is combined with the register by exclusive OR to give the checksum.
 
-  /// Compares all parameters.
+  /// Returns whether two CRCs have the same parameters.
   friend constexpr bool operator==(const CrcParameters&, const CrcParameters&) = default;
 };
 
-/// Computes the CRC bit by bit, straight from the definition. The tests compare the table-driven `Crc` with it.
+/// Returns the CRC of `bytes`, computed bit by bit, straight from the definition. The tests compare the table-driven
+/// `Crc` with it.
 [[nodiscard]] constexpr std::uint16_t crc_bitwise(const CrcParameters& parameters, Bytes bytes) {
   const std::uint32_t top = std::uint32_t{1} << (parameters.width - 1);
   const auto mask = static_cast<std::uint32_t>(low_mask(parameters.width));
@@ -44,14 +45,14 @@ struct CrcParameters {
   return static_cast<std::uint16_t>((remainder ^ parameters.xorout) & mask);
 }
 
-/// Size of the constant table of `Crc`.
+/// Size of the constant table that `Crc` uses.
 enum class CrcTable {
-  byte,    ///< 256 entries, one look-up per byte: 256 bytes up to width 8, 512 above
-  nibble,  ///< 16 entries, two look-ups per byte: 16 or 32 bytes, for firmware
+  byte,    ///< table of 256 entries, one look-up per byte: 256 bytes up to width 8, 512 above
+  nibble,  ///< table of 16 entries, two look-ups per byte: 16 or 32 bytes, for firmware
 };
 
-/// Table-driven CRC. The remainder is stored reflected when `refin` is set, otherwise left-aligned in `Word`, so that
-/// widths that are no multiple of 8 (3 to 7, 9 to 15) need no special case.
+/// The running calculation of a CRC with a table. The remainder is stored reflected when `refin` is set, otherwise
+/// left-aligned in `Word`, so that widths that are no multiple of 8 (3 to 7, 9 to 15) need no special case.
 template <CrcParameters parameters, CrcTable table_kind = CrcTable::byte>
 class Crc {
   static_assert(parameters.width >= 3 && parameters.width <= 16, "widths from 3 to 16 bits");
@@ -61,10 +62,10 @@ class Crc {
   using Word = std::conditional_t<(parameters.width <= 8), std::uint8_t, std::uint16_t>;
 
   constexpr Crc() = default;
-  /// Starts from `init` instead of `parameters.init`, with the same table.
+  /// Starts with the register value `init` instead of `parameters.init`, with the same table.
   constexpr explicit Crc(std::uint16_t init) : remainder_(initial(init)) {}
 
-  /// Adds a byte.
+  /// Adds a byte to the checksum.
   constexpr void update(std::uint8_t byte) {
     if constexpr (table_kind == CrcTable::byte) {
       step<8>(byte);
@@ -77,12 +78,12 @@ class Crc {
     }
   }
 
-  /// Adds bytes in their order.
+  /// Adds bytes to the checksum in their order.
   constexpr void update(Bytes bytes) {
     for (const std::uint8_t byte : bytes) update(byte);
   }
 
-  /// Returns the checksum of all bytes so far.
+  /// Returns the checksum of all bytes added so far.
   [[nodiscard]] constexpr Word value() const {
     std::uint32_t result = parameters.refin ? remainder_ : remainder_ >> spare_bits;
     if constexpr (parameters.refin != parameters.refout) {
@@ -98,7 +99,7 @@ class Crc {
     return crc.value();
   }
 
-  /// Size of the table in constant memory, in bytes.
+  /// Size of the look-up table in constant memory, in bytes.
   static constexpr std::size_t table_bytes = (std::size_t{1} << (table_kind == CrcTable::byte ? 8 : 4)) * sizeof(Word);
 
  private:
@@ -109,7 +110,7 @@ class Crc {
   static constexpr std::uint32_t poly =
       parameters.refin ? reflect(parameters.poly, parameters.width) : std::uint32_t{parameters.poly} << spare_bits;
 
-  // Returns the remainder after `bits` bits of input when it was 0 before: one table entry.
+  // Returns the remainder after `bits` bits of input when it was 0 before: one entry of the look-up table.
   static constexpr Word advance(std::uint32_t input, unsigned bits) {
     std::uint32_t remainder = 0;
     if constexpr (parameters.refin) {

@@ -21,8 +21,8 @@ namespace absenc {
   return -1;
 }
 
-/// Parses pairs of digits; spaces are allowed between bytes. Returns the number of bytes.
-/// Errors: invalid_argument (a character that is no digit, or half a byte), buffer_too_small.
+/// Parses pairs of hexadecimal digits into `bytes`; spaces are allowed between bytes. Returns the number of parsed
+/// bytes. Errors: invalid_argument (a character that is no digit, or half a byte), buffer_too_small.
 [[nodiscard]] constexpr Result<std::size_t> parse_hex(std::string_view text, MutableBytes bytes) {
   std::size_t count = 0;
   for (std::size_t i = 0; i < text.size();) {
@@ -40,14 +40,14 @@ namespace absenc {
   return count;
 }
 
-/// A string literal as a template argument.
+/// A string literal that can be a template argument.
 template <std::size_t size>
 struct HexLiteral {
-  /// Takes a string literal.
+  /// Copies the string literal `text`.
   consteval HexLiteral(const char (&text)[size]) { std::copy_n(text, size, characters); }
-  /// Returns the characters without the terminating zero.
+  /// Returns the characters of the literal without the terminating zero.
   [[nodiscard]] constexpr std::string_view view() const { return {characters, size - 1}; }
-  char characters[size]{};  ///< The characters, with the terminating zero.
+  char characters[size]{};  ///< Characters of the literal, with the terminating zero.
 };
 
 namespace detail {
@@ -63,11 +63,11 @@ consteval auto hex_bytes() {
 }
 }  // namespace detail
 
-/// Static bytes from hexadecimal text, at most 256.
+/// Static bytes that a literal contains as hexadecimal text, at most 256.
 template <HexLiteral literal>
 inline constexpr auto hex = detail::hex_bytes<literal>();
 
-/// Static bytes from the characters of a text, for test vectors of ASCII protocols and of clocked links.
+/// Static bytes that are the characters of a literal, for test vectors of ASCII protocols and of clocked links.
 template <HexLiteral literal>
 inline constexpr auto ascii = [] {
   std::array<std::uint8_t, literal.view().size()> bytes{};

@@ -36,14 +36,14 @@ enum class Error : std::uint8_t {
   not_still,
 };
 
-/// The texts of an error.
+/// Name, description and advice for one kind of error.
 struct ErrorText {
-  std::string_view name;         ///< as printed by the command and written in test vectors
-  std::string_view description;  ///< what happened, valid for every frame and link
-  std::string_view advice;       ///< what the user can try
+  std::string_view name;         ///< name of the error, as printed by the command and written in test vectors
+  std::string_view description;  ///< sentence that states what happened, valid for every frame and link
+  std::string_view advice;       ///< advice what the user can try; "" if none
 };
 
-/// Texts of all errors, indexed by the enumerator.
+/// Names, descriptions and advice for all errors, indexed by Error.
 inline constexpr std::array<ErrorText, 17> error_texts{{
     {"none", "no error", ""},
     {"invalid_argument", "this cannot be done as it was asked", "check the value against its range"},
@@ -67,13 +67,13 @@ inline constexpr std::array<ErrorText, 17> error_texts{{
     {"not_still", "the shaft is turning, and this needs it standing still", "stop the shaft, then try again"},
 }};
 
-/// Returns whether the bytes themselves are wrong. With any other error a whole frame with a right checksum arrived,
-/// but its content was not the expected one.
+/// Returns whether `error` means that the received bytes are damaged: they are no whole frame with a right checksum.
+/// Other errors mean that a frame has unexpected content, or that no bytes arrived.
 [[nodiscard]] constexpr bool is_damage(Error error) {
   return (error >= Error::line_stuck && error <= Error::wrong_length) || error == Error::bad_checksum;
 }
 
-/// Returns the texts of an error.
+/// Returns name, description and advice for `error`.
 [[nodiscard]] constexpr const ErrorText& text_of(Error error) { return error_texts[static_cast<std::size_t>(error)]; }
 
 /// A value (initially T{}) or an Error other than `none`. Reading the value of a failed result is undefined, as in
@@ -82,30 +82,30 @@ template <class T>
 class [[nodiscard]] Result {
  public:
   constexpr Result() = default;
-  /// Holds a value.
+  /// Makes a result that holds `value`.
   constexpr Result(const T& value) : value_(value) {}
-  /// Holds a value.
+  /// Makes a result that holds `value`.
   constexpr Result(T&& value) : value_(std::move(value)) {}
-  /// Holds an error, which is not `Error::none`.
+  /// Makes a failed result that holds `error`, which is not `Error::none`.
   constexpr Result(Error error) : error_(error) {}
 
-  /// Returns whether there is a value.
+  /// Returns whether the result holds a value, and no error.
   [[nodiscard]] constexpr bool has_value() const { return error_ == Error::none; }
-  /// Returns whether there is a value.
+  /// Returns whether the result holds a value, and no error.
   constexpr explicit operator bool() const { return has_value(); }
-  /// Returns the value, if there is one.
+  /// Returns the value of a result that holds one.
   constexpr const T& operator*() const { return value_; }
-  /// Returns the value, if there is one.
+  /// Returns the value of a result that holds one.
   constexpr T& operator*() { return value_; }
-  /// Returns the value, if there is one.
+  /// Returns a pointer to the value of a result that holds one.
   constexpr const T* operator->() const { return &value_; }
-  /// Returns the value, if there is one.
+  /// Returns a pointer to the value of a result that holds one.
   constexpr T* operator->() { return &value_; }
-  /// Returns the value, if there is one.
+  /// Returns the value of a result that holds one.
   [[nodiscard]] constexpr const T& value() const { return value_; }
-  /// Returns the error; `Error::none` if there is a value.
+  /// Returns the error; `Error::none` if the result holds a value.
   [[nodiscard]] constexpr Error error() const { return error_; }
-  /// Returns the value, or `other` if there is none.
+  /// Returns the value, or `other` if the result holds an error.
   [[nodiscard]] constexpr T value_or(T other) const { return has_value() ? value_ : other; }
 
  private:

@@ -10,14 +10,15 @@ namespace absenc {
 
 /// Position and motion of a shaft at one time.
 struct ShaftState {
-  std::int64_t position = 0;        ///< unit 2^-32 revolution; the upper 32 bits count revolutions, negative below zero
-  std::int32_t speed_millirpm = 0;  ///< 1/1000 revolutions per minute, counter-clockwise positive
+  /// Position in units of 2^-32 revolution; the upper 32 bits count revolutions, negative below zero.
+  std::int64_t position = 0;
+  std::int32_t speed_millirpm = 0;  ///< speed in 1/1000 revolutions per minute, counter-clockwise positive
   std::int32_t acceleration = 0;    ///< angular acceleration in rad/s^2
 };
 
-/// A motion as a function of time. Implementations accept any times, in any order.
+/// A shaft whose motion is a function of time. Implementations accept any times, in any order.
 struct Shaft {
-  /// Returns position and motion at `time`.
+  /// Returns position and motion of the shaft at `time`.
   [[nodiscard]] virtual ShaftState at(Time time) const = 0;
 
  protected:

@@ -2,8 +2,8 @@
 // The only clock type: nanoseconds since a start that the caller chooses. No layer below `os` reads a clock.
 #pragma once
 
-// Includes only the durations of <chrono>, without calendars and time zones, which would cost half a second in every
-// file.
+// The include below has only the durations of <chrono>, without calendars and time zones, which would cost half a
+// second in every file.
 #if __has_include(<bits/chrono.h>)
 #include <bits/chrono.h>  // header of libstdc++ with only the durations
 #else
@@ -15,16 +15,16 @@ namespace absenc {
 /// A time since a start that all times of a program share, or a duration, in nanoseconds.
 using Time = std::chrono::nanoseconds;
 
-inline constexpr Time never = Time::max();  ///< A time that never comes.
+inline constexpr Time never = Time::max();  ///< A time that is never reached.
 
-/// Compares the counts as numbers: the operators of chrono use <=>, which costs a call on a small core instead of three
-/// instructions.
+/// Returns whether `one` is before `other`. Compares the counts as numbers: the operators of chrono use <=>, which
+/// costs a call on a small core instead of three instructions.
 [[nodiscard]] constexpr bool operator<(Time one, Time other) { return one.count() < other.count(); }
-/// Compares times.
+/// Returns whether `one` is after `other`.
 [[nodiscard]] constexpr bool operator>(Time one, Time other) { return one.count() > other.count(); }
-/// Compares times.
+/// Returns whether `one` is before or equal to `other`.
 [[nodiscard]] constexpr bool operator<=(Time one, Time other) { return one.count() <= other.count(); }
-/// Compares times.
+/// Returns whether `one` is after or equal to `other`.
 [[nodiscard]] constexpr bool operator>=(Time one, Time other) { return one.count() >= other.count(); }
 
 }  // namespace absenc

@@ -8,8 +8,8 @@
 
 namespace absenc::host {
 
-/// Meaning of a reading's time: when the encoder latched it, or only when it arrived. Readings that waited in a buffer
-/// arrive together.
+/// Meaning of `Reading::latched`: the time at which the encoder latched the position, or the time at which the reading arrived. Readings that waited in a
+/// buffer arrive together.
 enum class Times : std::uint8_t { latched, arrived };
 
 /// Returns whether readings of this encoder have arrival times only, because it transmits unsolicited.
@@ -17,17 +17,17 @@ enum class Times : std::uint8_t { latched, arrived };
   return unit.link == LinkKind::can || (unit.streams != nullptr && unit.streams(options));
 }
 
-/// The time between readings, as they are used.
+/// The longest possible time between two consecutive readings of one encoder.
 class Apart {
  public:
-  /// Counts the times that `times` selects.
+  /// `times` is the meaning of the times that are added.
   explicit constexpr Apart(Times times) : times_(times) {}
 
-  /// Returns the longest time that can lie between this reading and the last one. Readings that arrive together were
-  /// latched during the wait before, or during their delivery, which takes less time.
+  /// Returns the longest time that can lie between the last added reading and one latched at `latched`. Readings that
+  /// arrive together were latched during the wait before, or during their delivery, which takes less time.
   [[nodiscard]] constexpr Time since_last(Time latched) const { return has_waited(latched) ? latched - last_ : wait_; }
 
-  /// Adds a reading that was latched at this time.
+  /// Adds a reading that was latched at `latched`.
   constexpr void add(Time latched) {
     if (started_ && has_waited(latched)) {
       wait_ = latched - last_;

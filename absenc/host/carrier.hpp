@@ -13,7 +13,8 @@
 
 namespace absenc::host {
 
-/// Call all members in one context: from interrupts of one priority, or with these disabled.
+/// Runs one conversation after the other on a line. Call all members in one context: from interrupts of one priority,
+/// or with these disabled.
 ///
 /// Line has `void begin(const Step<Item>&)`, which starts a transfer, a pulse or a change of the rate and does not wait
 /// for its end, and `void result(bool over)`. The carrier calls `result(false)` for every `emit`, and `result(true)` at
@@ -25,12 +26,13 @@ class Carrier {
   /// character.
   explicit Carrier(Line& line, Time latency = {}) : line_(&line), latency_(latency) {}
 
-  /// Starts a conversation, which must live until it is over. A running conversation is abandoned.
+  /// Starts the conversation `machine`, which must live until it has ended. A conversation that still runs is
+  /// abandoned.
   void start(Machine<Item>& machine, Time now) {
     machine_ = &machine;
     expected_ = gathered_ = 0;
     sending_ = waiting_ = item_received_ = false;
-    silence_reported_ = true;  // until a transfer is sent
+    silence_reported_ = true;  // no silence is reported until a transfer is sent
     take_steps(now);
   }
   /// Returns whether a conversation runs.
@@ -56,8 +58,8 @@ class Carrier {
     deliver_input({.kind = Event<Item>::Kind::line_error, .at = now});
   }
 
-  /// Executes what is due. Call it at `due()`; more calls do no harm. A tick slower than the encoder's limits makes
-  /// silences longer, but never wrong.
+  /// Begins the pending transfer, or reports a silence or timer, if its time is reached. Call it at `due()`; more calls
+  /// do no harm. A tick slower than the encoder's limits makes silences longer, but never wrong.
   void tick(Time now) {
     if (now < due()) return;
     deliver_gathered();
@@ -75,12 +77,12 @@ class Carrier {
     at_ = never;
     deliver({.kind = Event<Item>::Kind::timer, .at = now});
   }
-  /// Returns when `tick` has work to do; `never`: only after something is sent or received.
+  /// Returns the time at which `tick` must be called; `never`: not before something is sent or received.
   [[nodiscard]] Time due() const {
     if (!is_busy()) return never;
     return waiting_ ? step_.at : std::min(at_, silence_end());
   }
-  /// Returns how many replies were missing, incomplete, or followed by silence because they were invalid.
+  /// Returns how many silences were reported: a reply was missing, incomplete, or invalid.
   [[nodiscard]] std::uint32_t silences() const { return silences_; }
 
  private:
@@ -161,11 +163,11 @@ class Carrier {
     }
   }
 
-  // Characters of most replies; longer ones are delivered in pieces. CAN: one frame.
+  // Room for the characters of most replies; longer replies are delivered in pieces. CAN: room for one frame.
   static constexpr std::size_t room = sizeof(Item) == 1 ? 16 : 1;
 
-  // Members that every received character needs come first, for short instructions.
-  std::uint8_t expected_ = 0;  // characters to gather, or one more; 0: none
+  // Members that are used for every received character come first, for short instructions.
+  std::uint8_t expected_ = 0;  // number of characters to deliver in one piece; below 2: each character at once
   std::uint8_t gathered_ = 0;
   bool waiting_ = false;
   bool sending_ = false;
@@ -179,7 +181,7 @@ class Carrier {
   Time answer_{};
   Time gap_{};
   Time at_ = never;
-  Step<Item> step_{};  // transfer that waits for its time
+  Step<Item> step_{};  // transfer or pulse that waits for its time
   std::uint32_t silences_ = 0;
 };
 

@@ -6,8 +6,8 @@
 
 namespace absenc::host {
 
-/// Runs the machine. `on_emit()` is called for every `emit` step and returns whether to continue. Returns true when the
-/// machine is done, false when `on_emit` stopped it. Exceptions of the port pass through.
+/// Runs `machine` on `port`. `on_emit()` is called for every `emit` step and returns whether to continue. Returns true
+/// when the machine is done, false when `on_emit` stopped it. Exceptions of the port pass through.
 template <class Item, class OnEmit>
 bool drive(Machine<Item>& machine, Port<Item>& port, OnEmit&& on_emit) {
   // The machine's time stands still between events: reading the clock more often costs time and gains nothing.
@@ -34,7 +34,8 @@ bool drive(Machine<Item>& machine, Port<Item>& port, OnEmit&& on_emit) {
   }
 }
 
-/// Feeds all waiting items to a machine that streams, and drops its results, so that the next result is new.
+/// Feeds all items that have arrived at `port` to a machine that streams, and drops its results, so that the next
+/// result is new.
 template <class Item>
 void catch_up(Machine<Item>& machine, Port<Item>& port) {
   for (Time now = port.now();;) {

@@ -13,21 +13,21 @@
 
 namespace absenc::host {
 
-/// Whether the adapter receives what it sends.
+/// Setting for the echo of an adapter: whether it receives the bytes that it sends.
 enum class EchoMode : std::uint8_t {
-  automatic,  ///< determined from the first good exchange
+  automatic,  ///< the first good exchange shows whether the adapter echoes
   on,
   off,
 };
 
-/// A filter between a conversation and its port.
+/// A filter between a conversation and its port that removes the echo of the adapter.
 class EchoFilter final : public Machine<std::uint8_t> {
  public:
-  /// Handles the echo of the adapter by `mode`.
+  /// Makes a filter; `mode` states whether the adapter echoes.
   explicit EchoFilter(EchoMode mode) : mode_(mode) {}
 
-  /// Sets the unit that decides whether a reply is valid; both arguments must outlive the filter's use. Without a unit
-  /// the number of bytes alone decides.
+  /// Sets the unit that decides whether a reply is valid; `unit` and `options` must outlive the filter's use. Without a
+  /// unit the number of bytes alone decides.
   void use_unit(const Unit& unit, const Options& options) {
     unit_ = &unit;
     options_ = &options;
@@ -38,18 +38,18 @@ class EchoFilter final : public Machine<std::uint8_t> {
     sent_.clear();
     held_.clear();
   }
-  /// Ends the exchange. In automatic mode only a good conversation makes the detected mode final: a reply that is one
-  /// byte too long looks like an echo at first.
+  /// Ends the exchange; `good`: without an error. In automatic mode only a good conversation makes the detected mode
+  /// final: a reply that is one byte too long looks like an echo at first.
   void conclude(bool good);
 
-  /// Takes an event of the port.
+  /// Processes an event that the port reports.
   void feed(const Event<std::uint8_t>& event) override;
-  /// Returns the next step of the port.
+  /// Returns the next step that the port must carry out.
   Step<std::uint8_t> next(Time now) override;
 
-  /// Returns the mode; `automatic` while it is not known whether the adapter echoes.
+  /// Returns the echo mode; `automatic` while it is not known whether the adapter echoes.
   [[nodiscard]] EchoMode mode() const { return mode_; }
-  /// Returns how many of the bytes after the last request were its echo.
+  /// Returns how many of the bytes received after the last request were its echo.
   [[nodiscard]] std::size_t echoed() const { return echoed_; }
   /// Returns whether only the echo of the last request was received.
   [[nodiscard]] bool only_echo() const { return only_echo_; }
@@ -68,13 +68,13 @@ class EchoFilter final : public Machine<std::uint8_t> {
   EchoMode mode_;
   const Unit* unit_ = nullptr;
   const Options* options_ = nullptr;
-  EchoMode detected_ = EchoMode::automatic;  // mode detected in this conversation
+  EchoMode detected_ = EchoMode::automatic;  // echo mode detected in this conversation
   Machine<std::uint8_t>* inner_ = nullptr;
   ByteBuffer<capacity> sent_;
   ByteBuffer<capacity> held_;  // automatic: received bytes that may be echo
-  std::size_t echo_due_ = 0;   // on: echo bytes still to be received
-  std::size_t echoed_ = 0;     // echo bytes of the last request
-  std::size_t reply_due_ = 0;  // bytes that the conversation expects
+  std::size_t echo_due_ = 0;   // on: number of echo bytes still to be received
+  std::size_t echoed_ = 0;     // number of echo bytes received after the last request
+  std::size_t reply_due_ = 0;  // number of reply bytes that the conversation expects
   bool passed_ = false;        // bytes of the reply were passed to the conversation
   bool only_echo_ = false;
 };

@@ -11,26 +11,27 @@
 
 namespace absenc::host {
 
-/// Compares each position with the one before: the distance must be possible at the highest speed in the time between
-/// them. If that speed covers more than 15/32 of the counted range, only positions farther away than 15/32 are refused.
-/// A shaft that is faster, by a factor of `most_excess` at most, is accepted at its third position, if it is as far
-/// from the second as the second from the first.
+/// A check that compares each position with the position before: the shaft must be able to move from one to the other
+/// in the time between them. If that speed covers more than 15/32 of the counted range, only positions farther away
+/// than 15/32 are refused. A shaft that is faster, by a factor of `most_excess` at most, is accepted at its third
+/// position, if it is as far from the second as the second from the first.
 class FirstReading {
  public:
-  /// `maximum_rpm` 0: unknown; the default limit of `SpeedLimit` applies.
+  /// Makes a check for a shaft of at most `maximum_rpm` revolutions per minute; 0: unknown, so the default of
+  /// `SpeedLimit` applies.
   explicit constexpr FirstReading(std::uint32_t maximum_rpm)
       : FirstReading(Reach::of_shaft(maximum_rpm != 0 ? maximum_rpm : SpeedLimit{}.rpm)) {}
-  /// Accepts readings that the shaft can reach.
+  /// Makes a check for a shaft or carriage that moves at most as far as `reach` states.
   explicit constexpr FirstReading(const Reach& reach) : reach_(reach) {}
 
-  /// Forgets all readings.
+  /// Forgets all stored positions.
   constexpr void start_again() {
     last_ = {};
     has_step_ = false;
   }
 
-  /// Returns whether `reading` is ready, valid and as near to the one before as the highest speed allows. Stores it for
-  /// the next comparison.
+  /// Returns whether `reading` is ready, valid and as near to the stored position as the highest speed allows. Stores
+  /// its position for the next comparison.
   constexpr bool confirms(const Reading& reading) {
     const bool agrees = is_near(reading);
     keep(reading);
@@ -41,11 +42,11 @@ class FirstReading {
   [[nodiscard]] static constexpr bool has_position(const Reading& reading) {
     return reading.ready && reading.singleturn_valid();
   }
-  /// Returns whether a position is stored that the next one is compared with.
+  /// Returns whether a position is stored, with which the next one is compared.
   [[nodiscard]] constexpr bool has_last() const { return last_.bits != 0; }
 
-  /// Returns whether the stored position and this one can be `between` apart. `between`: longest possible time between
-  /// the two readings.
+  /// Returns whether the stored position and that of `reading` can be so far apart if the time `between` lies between
+  /// them.
   [[nodiscard]] constexpr bool is_near(const Reading& reading, Time between) const {
     const Place place = place_of(reading);
     if (!is_like_last(place)) return false;
@@ -57,18 +58,19 @@ class FirstReading {
     if (!has_step_ || moved / most_excess > reached || distance(step_, place.bits) <= allowed) return false;
     return distance(step - step_, place.bits) <= least(allowed, most_judged(place.bits) / 8);
   }
-  /// Returns whether the shaft can have moved to `reading` since the one before.
+  /// Returns whether the shaft can have moved from the stored position to `reading` in the time between them.
   [[nodiscard]] constexpr bool is_near(const Reading& reading) const {
     return is_near(reading, reading.latched - latched_);
   }
 
-  /// Returns whether the speed limit excludes any position nearer than half the range after this time.
+  /// Returns whether the speed limit excludes any position nearer than 15/32 of the counted range after the time
+  /// `between`. If not, a wrong position can hardly be detected.
   [[nodiscard]] constexpr bool can_judge(const Reading& reading, Time between) const {
     const Place place = place_of(reading);
     return place.bits != 0 && reach(place, between) < most_judged(place.bits);
   }
 
-  /// Stores `reading` for the next comparison. One without a position clears the stored position.
+  /// Stores the position of `reading` for the next comparison. A reading without a position clears the stored position.
   constexpr void keep(const Reading& reading) {
     const Place place = place_of(reading);
     has_step_ = is_like_last(place);
@@ -81,7 +83,7 @@ class FirstReading {
   // A position in counts, with the turns if they are valid.
   struct Place {
     std::uint64_t counts = 0;
-    std::uint8_t bits = 0;  // 0: no position
+    std::uint8_t bits = 0;  // number of bits of `counts`; 0: no position
     std::uint8_t singleturn_bits = 0;
   };
 
@@ -103,17 +105,17 @@ class FirstReading {
   [[nodiscard]] static constexpr std::uint64_t least(std::uint64_t one, std::uint64_t other) {
     return one < other ? one : other;
   }
-  // Returns the shorter of the two distances around the range.
+  // Returns the shorter of the two distances between two positions around the counted range.
   [[nodiscard]] static constexpr std::uint64_t distance(std::uint64_t step, unsigned bits) {
     return least(step & low_mask(bits), (0 - step) & low_mask(bits));
   }
 
   [[nodiscard]] constexpr std::uint64_t reach(const Place& place, Time between) const {
-    constexpr std::uint64_t noise = 4;  // counts
+    constexpr std::uint64_t noise = 4;  // noise of a position, in counts
     const std::uint64_t counts = reach_.counts(between, place.singleturn_bits);
     return counts < ~noise ? counts + noise : counts;
   }
-  // Largest distance that can be judged: 15/32 of the range, as in longest_gap.
+  // Returns the largest distance that can be judged: 15/32 of the counted range, as in longest_gap.
   [[nodiscard]] static constexpr std::uint64_t most_judged(unsigned bits) {
     constexpr std::uint64_t share = 15;
     return bits >= 5 ? share << (bits - 5) : (share << bits) >> 5;

@@ -7,18 +7,19 @@
 
 namespace absenc::host {
 
-/// The interval in which a position was latched. Within it, between request and reply, the time is unknown.
+/// The interval in which a position was latched, between request and reply. The exact time in it is unknown.
 struct LatchTime {
   Time earliest{};  ///< Earliest time at which the position can have been latched.
   Time latest{};    ///< Latest time at which the position can have been latched.
 
-  /// Returns the middle of the interval.
+  /// Returns the middle of the latch interval.
   [[nodiscard]] constexpr Time middle() const { return earliest + (latest - earliest) / 2; }
-  /// Returns the length of the interval.
+  /// Returns the length of the latch interval.
   [[nodiscard]] constexpr Time width() const { return latest - earliest; }
 };
 
-/// Returns the interval from the times of the reading alone: the position was latched before its reply was received.
+/// Returns the latch interval that the times of `reading` alone allow: the position was latched before its reply was
+/// received.
 [[nodiscard]] constexpr LatchTime latch_time(const Reading& reading) {
   return {reading.latched, reading.received > reading.latched ? reading.received : reading.latched};
 }

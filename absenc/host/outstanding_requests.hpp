@@ -14,42 +14,44 @@
 
 namespace absenc::host {
 
-/// The requests whose replies are outstanding.
+/// A list of the requests of one line whose replies are outstanding.
 template <class Item>
 class OutstandingRequests {
  public:
   static constexpr bool is_can = std::is_same_v<Item, CanFrame>;  ///< Whether items are CAN frames, not bytes.
-  /// A request; longer ones are not stored.
+  /// Items of a request; longer requests are not stored.
   using Request = Buffer<Item, is_can ? 1 : 16>;
   /// Items as they were sent or received.
   using Items = std::span<const Item>;
 
   /// Requests with the same bytes, which may have been sent several times.
   struct Entry {
-    Request request;            ///< The request.
-    std::size_t expect = 0;     ///< Number of items of the reply; 0: unknown before it ends.
-    Buffer<Time, 4> sent_at{};  ///< Times at which the requests were sent, the oldest first.
-    /// Time at which the first request was sent whose reply is most likely lost, because the line was silent after it.
+    Request request;            ///< Items of the request.
+    std::size_t expect = 0;     ///< Number of items of the reply to this request; 0: unknown before it ends.
+    Buffer<Time, 4> sent_at{};  ///< Times at which the request was sent and not lost, the oldest first.
+    /// Time at which the oldest lost request was sent. Lost: the line was silent after it, so most likely no reply
+    /// follows.
     Time lost_first{};
-    Time lost_last{};   ///< Time at which the last of these requests was sent.
-    unsigned lost = 0;  ///< Number of these requests.
+    Time lost_last{};   ///< Time at which the newest lost request was sent.
+    unsigned lost = 0;  ///< Number of lost requests.
 
-    /// Returns the time at which the last request of this entry was sent.
+    /// Returns the time at which the newest request of this entry was sent.
     [[nodiscard]] Time newest() const { return sent_at.empty() ? lost_last : sent_at[sent_at.size() - 1]; }
-    /// Returns the time at which the first request of this entry was sent.
+    /// Returns the time at which the oldest request of this entry was sent.
     [[nodiscard]] Time oldest() const { return lost != 0 ? lost_first : sent_at[0]; }
-    /// Returns the number of requests of this entry.
+    /// Returns how often the request of this entry is outstanding, lost ones included.
     [[nodiscard]] std::size_t count() const { return lost + sent_at.size(); }
   };
 
-  /// Sets the unit that decides which reply belongs to which request. Both arguments must outlive this object's use.
+  /// Sets the unit that decides which reply belongs to which request. `unit` and `options` must outlive this object's
+  /// use.
   void use(const Unit& unit, const Options& options) {
     unit_ = &unit;
     options_ = &options;
   }
-  /// Returns whether an encoder answers this request.
+  /// Returns whether an encoder answers `request`.
   [[nodiscard]] bool is_answered(Items request) const;
-  /// Returns how long after the last received item this request must not be sent again.
+  /// Returns for how long after the last received item `request` must not be sent again.
   [[nodiscard]] Time pause_after(Items request) const;
   /// Returns whether `reply` is a valid reply to `request`.
   [[nodiscard]] bool is_reply(Items request, Items reply) const;
@@ -60,28 +62,29 @@ class OutstandingRequests {
   [[nodiscard]] bool empty() const { return entries_.empty(); }
   /// Returns whether no further entry can be stored.
   [[nodiscard]] bool full() const { return entries_.size() == most; }
-  /// Returns the number of entries.
+  /// Returns the number of entries, one for each different request.
   [[nodiscard]] std::size_t size() const { return entries_.size(); }
   /// Returns the entry at `index`, which is less than `size()`.
   [[nodiscard]] Entry& operator[](std::size_t index) { return entries_[index]; }
-  /// Returns the entry of this request, or null.
+  /// Returns the entry of `request`, or null if it is not outstanding.
   [[nodiscard]] Entry* find(Items request);
-  /// Returns the first entry that this reply could answer, or null.
+  /// Returns the first entry whose request `reply` could answer, or null if no entry matches.
   [[nodiscard]] Entry* find_by_reply(Items reply);
 
-  /// Adds a request that was sent at this time. A full list ignores it, unless the same request has an entry already.
+  /// Adds `request`, which was sent at `sent_at` and whose reply has `expect` items. If the list is full, only a
+  /// request that has an entry already is added.
   void add(Items request, std::size_t expect, Time sent_at);
-  /// Marks all earlier requests with these bytes as lost, because the line was silent before this one is sent. The
-  /// oldest counts as sent at most `longest` before the newest.
+  /// Marks all outstanding requests equal to `request` as lost, because the line was silent after them. The oldest of
+  /// them is treated as sent at most `longest` before the newest.
   void mark_lost(Items request, Time longest);
-  /// Removes the oldest request of this entry, because its reply was received.
+  /// Removes the oldest request of `entry`, because its reply was received.
   void remove_oldest(Entry& entry);
   /// Removes all entries.
   void clear() { entries_.clear(); }
   /// Returns the longest time between two consecutive outstanding requests, whatever their bytes, or from the last one
   /// until `now`.
   [[nodiscard]] Time longest_interval(Time now) const { return std::max(longest_interval_, now - newest_); }
-  /// Removes the entries whose newest request was sent before this time.
+  /// Removes the entries whose newest request was sent before `before`.
   void remove_older(Time before);
 
  private:
@@ -96,7 +99,7 @@ class OutstandingRequests {
   Time longest_interval_{};  // longest time between two consecutively added requests
 };
 
-/// Removes the first `count` items, which must exist.
+/// Removes the first `count` items of `buffer`, which must exist.
 template <class Buffer>
 void drop_first(Buffer& buffer, std::size_t count = 1) {
   const Buffer all = buffer;

@@ -47,22 +47,22 @@ namespace absenc::host {
 template <class Item>
 class ReplyGuard final : public Machine<Item> {
  public:
-  /// Serves this conversation from now on; `unit` and `options` must outlive it. `may_repeat`: whether each of its
-  /// requests may be sent once more.
+  /// Serves the conversation `inner` from now on; `unit` and `options` must outlive it. `may_repeat`: whether each
+  /// request of the conversation may be sent once more.
   void attach(Machine<Item>& inner, const Unit& unit, const Options& options, bool may_repeat);
-  /// Returns whether this guard belongs to `inner`.
+  /// Returns whether this guard serves the conversation `inner`.
   [[nodiscard]] bool serves(const Machine<Item>& inner) const { return inner_ == &inner; }
   /// Ends the exchange of a conversation that is over, or that its caller abandons.
   void conclude() { end_exchange(); }
 
-  /// Takes an event of the port.
+  /// Processes an event that the port reports.
   void feed(const Event<Item>& event) override;
-  /// Returns the next step of the port.
+  /// Returns the next step that the port must carry out.
   Step<Item> next(Time now) override;
 
   /// Returns the number of replies that arrived after their timeout and were dropped.
   [[nodiscard]] std::uint64_t late() const { return late_replies_; }
-  /// Returns the time from a request to its reply, for the latest of all dropped replies; 0: none was dropped.
+  /// Returns the longest time between a request and its dropped late reply; 0: no reply was dropped.
   [[nodiscard]] Time lateness() const { return greatest_lateness_; }
 
  private:
@@ -83,7 +83,7 @@ class ReplyGuard final : public Machine<Item> {
   };
   struct Forwarding {
     bool answerable = false;  // the reply of the last request may still arrive
-    bool received = false;    // items were received that may belong to the reply
+    bool received = false;    // items were received that may belong to the reply to the last request
     bool doubtful = false;    // the received items are no valid reply, and older requests are outstanding
     Report report{};
   };
@@ -100,13 +100,13 @@ class ReplyGuard final : public Machine<Item> {
     Buffer<Item, 1> foreign_frame{};  // CAN: a reply except for its identifier of 29 bits, which explains a timeout
   };
   struct Listening {
-    Time until{};      // when the request is repeated, or a timeout reported
+    Time until{};      // end of listening: the request is then repeated, or a timeout reported
     Time suspected{};  // lateness of the stored reply, if it is late
   };
   // The request that the conversation wants to send; valid in all phases but forwarding.
   struct Pending {
     Step<Item> step{};
-    Time deadline{};  // time limit of delaying and listening: late replies prolong them no further
+    Time deadline{};  // time after which late replies no longer prolong delaying and listening
   };
   struct LastRequest {
     bool exists = false;
@@ -155,7 +155,7 @@ class ReplyGuard final : public Machine<Item> {
   Matching matching_{};
   Listening listening_{};
   // One buffer for all phases, because a microcontroller has little RAM. Forwarding: the reply to report. Matching: the
-  // items received since the request. Delaying and listening: the last received items, whose end may be a late reply.
+  // items received since the request. Delaying and listening: the last received items, which may end with a late reply.
   Buffer<Item, is_can ? 1 : 64> received_{};
 
   Pending pending_{};

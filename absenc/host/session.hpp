@@ -21,15 +21,16 @@
 
 namespace absenc::host {
 
-/// Counts of conversations and of their errors.
+/// Counters of a session: its conversations and their errors.
 struct Counters {
   std::uint64_t good = 0;       ///< conversations that ended well
-  std::uint64_t repeated = 0;   ///< attempts after an error
+  std::uint64_t repeated = 0;   ///< repeated attempts, each after an error
   std::uint64_t late = 0;       ///< replies that arrived after their timeout and were dropped
   std::uint64_t discarded = 0;  ///< damaged frames of streams, whether an error reported them or not
-  std::array<std::uint64_t, error_texts.size()> errors{};  ///< errors of each kind, also of attempts that were repeated
+  std::array<std::uint64_t, error_texts.size()>
+      errors{};  ///< number of errors of each kind, also of repeated attempts; indexed by Error
 
-  /// Returns the number of conversations that failed.
+  /// Returns the number of errors of all kinds, also of attempts that were repeated.
   [[nodiscard]] constexpr std::uint64_t bad() const {
     std::uint64_t sum = 0;
     for (const std::uint64_t count : errors) sum += count;
@@ -48,18 +49,19 @@ struct Filter : Machine<Item> {
   ~Filter() = default;
 };
 
-/// Selects the reading to take of an encoder that sends by itself. A caller with a rate of its own wants the newest,
-/// because a reading that waited in the port would count as current.
+/// Selects which reading of an encoder that transmits unsolicited is returned. A caller that reads at its own rate
+/// needs `newest`, because a reading that waited in the port would be taken for the current one.
 enum class Take : std::uint8_t {
-  newest,  ///< the first one that is received from now on
-  every,   ///< the one after the last, however long ago it was received
+  newest,  ///< the first reading that is received after the call
+  every,   ///< the reading that follows the last returned one, however long ago it was received
 };
 
-/// Runs the commands of one encoder over a port and counts their results.
+/// A session with one encoder: runs its commands over a port and counts their results.
 template <class Item>
 class Session {
  public:
-  /// `storage` holds one conversation at a time: unit.host_storage bytes, aligned for any type.
+  /// `unit`, `port` and `storage` must outlive the session. `storage` holds one conversation at a time:
+  /// unit.host_storage bytes, aligned for any type. `attempts`: how often a repeatable command is tried.
   Session(const Unit& unit, const Options& options, Port<Item>& port, std::span<std::byte> storage,
           EchoMode echo = EchoMode::off, unsigned attempts = 3)
       : unit_(&unit),
@@ -82,23 +84,24 @@ class Session {
     streaming_ = false;  // only readings continue a stream
     return conversation;
   }
-  /// Runs a command once; returns the conversation, or null if the command does not exist for these options.
+  /// Runs `command` to its end and ignores all results but the last. Returns the conversation, or null if the unit
+  /// cannot run the command.
   const Conversation<Item>* run(const Command& command, Arguments arguments = {}) {
     return run(command, arguments, [](const Conversation<Item>&) { return true; });
   }
 
-  /// As `run`, but a conversation that streams continues where it stopped.
+  /// Runs `command` as `run` does, but a conversation that streams continues where it stopped.
   const Conversation<Item>* next(const Command& command, Arguments arguments = {}) {
     if (command_ != &command) streaming_ = false;
     return attempt(command, arguments, [](const Conversation<Item>&) { return true; });
   }
 
-  /// Reads the position. It is confirmed if it is as near to the one before as the speed limit allows. Without a
-  /// position before (after opening and after silence), if it is too far away, or if the time between was too long to
-  /// judge, it is read again until two consecutive positions agree; if none of ten agrees, the last one is returned and
-  /// `confirmed` is false. If those two are near the position before, the first one was damaged and counts as an error,
-  /// cross_check_failed, because no checksum detects all damage; if not, the position jumped.
-  /// A conversation that streams continues where it stopped, because finding its frames again costs two of them; `take`
+  /// Reads the position. The position is confirmed if it is as near to the one before as the speed limit allows.
+  /// Without a position before (after opening and after silence), if it is too far away, or if the time between was too
+  /// long to judge, it is read again until two consecutive positions agree; if none of ten agrees, the last one is
+  /// returned and `confirmed` is false. If those two are near the position before, the first one was damaged and counts
+  /// as an error, cross_check_failed, because no checksum detects all damage; if not, the position jumped. A
+  /// conversation that streams continues where it stopped, because finding its frames again costs two of them; `take`
   /// decides whether frames that were received meanwhile are used. `on_reading` is called with each reading.
   template <class OnReading>
   const Conversation<Item>* read(const Command& command, Take take, OnReading&& on_reading) {
@@ -124,14 +127,15 @@ class Session {
       if (number == most || (known_ && !FirstReading::has_position(*reading))) return conversation;
     }
   }
-  /// Reads with a command; returns the conversation, or null if the command does not exist for these options.
+  /// Reads the position with `command`. Returns the conversation, or null if the unit cannot run the command.
   const Conversation<Item>* read(const Command& command, Take take = Take::newest) {
     return read(command, take, [](const Reading&) {});
   }
 
   /// Asks the running conversation to end early; see Conversation::abort.
   bool abort() { return current_ != nullptr && current_->abort(); }
-  /// Reports what the last conversation left changed when its port threw; see Conversation::report_left.
+  /// Puts into `sink` the settings that the last conversation left changed in the encoder when its port threw; see
+  /// Conversation::report_left.
   void report_left(FieldSink& sink) const {
     if (current_ != nullptr) current_->report_left(sink);
   }
@@ -144,11 +148,13 @@ class Session {
   /// Shares one guard between the sessions of all encoders on a line, because late replies belong to the line. The
   /// guard must outlive the sessions.
   void share(ReplyGuard<Item>& guard) { guard_ = &guard; }
-  /// Lets late replies pass, for a caller that does not know which requests were sent.
+  /// Removes the reply guard, so that late replies reach the conversations: for a caller that does not know which
+  /// requests were sent.
   void leave_unguarded() { guard_ = nullptr; }
-  /// Sets a filter from the next command on; null: none. The filter must outlive the session.
+  /// Sets the filter that is used from the next command on; null: none. The filter must outlive the session.
   void set_filter(Filter<Item>* filter) { filter_ = filter; }
-  /// Returns the greatest lateness of a reply on this line until the last command ended; 0: none was late.
+  /// Returns the longest time between a request and its late reply on this line, as of the end of the last command; 0:
+  /// no reply was late.
   [[nodiscard]] Time lateness() const { return lateness_; }
 
   /// Sets the options from the next command on.
@@ -156,13 +162,15 @@ class Session {
     options_ = options;
     follow_options();
   }
-  /// Sets the encoder's speed limit from the next reading on. The default is the model's limit, else the usual one.
+  /// Sets the encoder's speed limit from the next reading on. The default is the model's limit, else that of
+  /// SpeedLimit.
   void set_speed_limit(const SpeedLimit& limit) {
     limit_ = limit;
     follow_options();
   }
 
-  /// Sets statistics that are fed from now on; null: none. They need 5 kB, which firmware may not have.
+  /// Sets the statistics to which every later conversation is added; null: none. They need 5 kB, which firmware may not
+  /// have.
   void observe(Statistics<Item>* statistics) { statistics_ = statistics; }
 
   /// Requires the next position to be confirmed, because the encoder may be another one now.
@@ -178,11 +186,11 @@ class Session {
     --counters_.good;
     ++counters_.errors[static_cast<std::size_t>(error)];
   }
-  /// Returns whether the last reading was compared with another and agreed.
+  /// Returns whether another position confirmed the last one.
   [[nodiscard]] bool confirmed() const { return confirmed_; }
-  /// Returns the counts so far.
+  /// Returns the counters of this session.
   [[nodiscard]] const Counters& counters() const { return counters_; }
-  /// Returns the filter of echoes.
+  /// Returns the echo filter of this session.
   [[nodiscard]] const EchoFilter& echo() const { return echo_; }
 
  private:
@@ -200,7 +208,7 @@ class Session {
     return first_.has_last() && first_.can_judge(reading, between) && !first_.is_near(reading, between);
   }
 
-  // After a pause that is too long to judge, a second reading of its own (`follows`) confirms the position. If that
+  // After a pause that is too long to judge, a second reading made at once (`follows`) confirms the position. If that
   // reading takes too long as well, the speed limit alone decides what can be excluded.
   bool confirms(const Reading& reading, bool follows) {
     const Time between = apart_.since_last(reading.latched);
@@ -250,7 +258,7 @@ class Session {
 
   [[nodiscard]] std::uint64_t late() const { return guard_ != nullptr ? guard_->late() : 0; }
 
-  // `catch_up` drops frames, but their damage is counted.
+  // `catch_up` drops the frames of a stream, but the damaged ones are counted.
   void count_discarded(const Conversation<Item>& conversation) {
     const StreamCounts* stream = conversation.stream();
     if (stream == nullptr) return;
@@ -263,8 +271,8 @@ class Session {
     return current_ = unit_->host(options_, command, arguments, storage_).template of<Item>();
   }
 
-  // On a link whose clock the host drives no reply is late. On a CAN bus other nodes send too, and a listener receives
-  // all frames.
+  // Returns whether the reply guard is needed for `command`. On a link whose clock the host drives no reply is late. On
+  // a CAN bus other nodes send too, and a listener receives all frames.
   [[nodiscard]] bool guarded(const Command& command) const {
     if (guard_ == nullptr) return false;
     if (unit_->link == LinkKind::can) return command.verb == Verb::read || command.verb == Verb::read_part;
@@ -287,7 +295,7 @@ class Session {
     return *current_;
   }
 
-  // Returns whether the conversation came to its end; one that streams stops at its next result.
+  // Returns whether the conversation came to its end. A conversation that streams stops at its next result instead.
   template <class OnEmit>
   bool drive_one(const Command& command, Conversation<Item>& conversation, OnEmit&& on_emit, bool again) {
     if (!again) guarded_ = guarded(command);
@@ -329,7 +337,7 @@ class Session {
   SpeedLimit limit_;
   FirstReading first_;
   Apart apart_;
-  Time shortest_interval_ = never;      // shortest time between two readings, the second read at once
+  Time shortest_interval_ = never;      // shortest time between a reading and one that was read directly after it
   bool confirmed_ = false;              // the last reading was confirmed
   bool known_ = false;                  // a reading was confirmed since the last doubt
   bool streaming_ = false;              // `current_` has stopped at a result and can continue

@@ -15,7 +15,8 @@
 
 namespace absenc::host {
 
-/// Distribution of latencies up to 68 s in a fixed 4 kB. A percentile is at most 1/32 too long, never too short.
+/// A distribution of reply latencies up to 68 s in a fixed 4 kB. A percentile is at most 1/32 too long, never too
+/// short.
 class Latencies {
  public:
   /// Adds the latency of a reply.
@@ -27,7 +28,7 @@ class Latencies {
     longest_ = std::max(longest_, latency);
   }
 
-  /// Returns the number of replies.
+  /// Returns the number of replies whose latencies were added.
   [[nodiscard]] constexpr std::uint64_t count() const { return count_; }
   /// Returns the longest latency.
   [[nodiscard]] constexpr Time longest() const { return longest_; }
@@ -82,10 +83,10 @@ class Latencies {
   Time longest_{};
 };
 
-/// Events per second: a mean that forgets with a time constant of one second.
+/// The rate of events per second: a mean that forgets with a time constant of one second.
 class Rate {
  public:
-  /// Adds a reading at this time.
+  /// Adds an event that happened at `at`.
   constexpr void add(Time at) {
     if (seen_) {
       fade(at - last_);
@@ -121,21 +122,21 @@ class Rate {
 template <class Item>
 struct BadExchange {
   BadExchange() = default;
-  /// Stores the first bytes of request and reply.
+  /// Stores the error `why` and the first bytes of request and reply.
   BadExchange(Error why, const Exchange<Item>& exchange) : error(why), at(exchange.received_at) {
     sent.append(exchange.sent.first(std::min(exchange.sent.size(), sent.capacity())));
     received.append(exchange.received.first(std::min(exchange.received.size(), received.capacity())));
   }
 
-  Error error = Error::none;  ///< Why it failed.
-  Time at{};                  ///< when the last item was received, or sent
+  Error error = Error::none;  ///< Error with which the exchange failed.
+  Time at{};                  ///< time at which the last item of the exchange was received, or sent
   /// First bytes of the request.
   Buffer<Item, 64 / sizeof(Item)> sent{};
   /// First bytes of the reply.
   Buffer<Item, 64 / sizeof(Item)> received{};
 };
 
-/// A session feeds it with every conversation, repeated ones included.
+/// Statistics of one encoder's conversations. A session adds every conversation, repeated ones included.
 template <class Item>
 class Statistics {
  public:
@@ -153,11 +154,11 @@ class Statistics {
   /// Adds a failed exchange; it replaces the oldest.
   void add(const BadExchange<Item>& bad) { bad_[bad_count_++ % most_stored] = bad; }
 
-  /// Returns the times from the end of the request to the end of the reply, of good exchanges.
+  /// Returns the distribution of the times from the end of the request to the end of the reply, of good exchanges.
   [[nodiscard]] const Latencies& latencies() const { return latencies_; }
-  /// Returns how many of the last bad exchanges are stored.
+  /// Returns how many failed exchanges are stored, at most `most_stored`.
   [[nodiscard]] std::size_t kept() const { return std::min<std::size_t>(bad_count_, most_stored); }
-  /// Returns a bad exchange; 0 is the last one, 1 the one before it.
+  /// Returns a stored failed exchange; `number` 0 is the last one, 1 the one before it.
   [[nodiscard]] const BadExchange<Item>& bad(std::size_t number) const {
     return bad_[(bad_count_ - 1 - number) % most_stored];
   }

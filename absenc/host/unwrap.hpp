@@ -11,9 +11,10 @@
 
 namespace absenc::host {
 
-/// Adds the shorter of the two distances between two readings. That is right while the position changes by less than
-/// half of the counted range: half a revolution for a single-turn encoder. The counted range follows from the readings,
-/// not from the options. If the speed limit allows more than half the range, the position starts again.
+/// A continuous position: adds the shorter of the two distances from each reading to the next. That is right while the
+/// position changes by less than half of the counted range: half a revolution for a single-turn encoder. The counted
+/// range follows from the readings, not from the options. If the speed limit allows more than half the range, the
+/// position starts again.
 class Unwrapper {
  public:
   /// How a reading joins the positions before it.
@@ -21,17 +22,17 @@ class Unwrapper {
     ignored,    ///< the reading has no valid position
     started,    ///< the first position, which is the encoder's own
     continued,  ///< the distance since the reading before was added
-    restarted,  ///< the pause was too long to know the distance: the position is the encoder's own again
+    restarted,  ///< the pause was too long to know the distance: the position is read from the encoder again
   };
 
-  /// Joins readings of a shaft that moves within `limit`.
+  /// Makes a continuous position of a shaft that moves within `limit`. `times` is the meaning of Reading::latched.
   explicit constexpr Unwrapper(const SpeedLimit& limit = {}, Times times = Times::latched)
       : limit_(limit), times_(times), apart_(times) {}
 
-  /// Adds a reading at the time at which it was latched.
+  /// Adds `reading` with the latch interval that its own times allow. Returns how it was joined.
   constexpr Joined add(const Reading& reading) { return add(reading, latch_time(reading)); }
-  /// Adds a reading. Its reply may be late because the encoder was, so the whole interval in which the position may
-  /// have been latched counts.
+  /// Adds `reading`, which was latched in the interval `at`, and returns how it was joined. The reply may be late
+  /// because the encoder was, so the whole interval in which the position may have been latched counts.
   constexpr Joined add(const Reading& reading, const LatchTime& at) {
     if (!has_position(reading)) return Joined::ignored;
     const bool first = !started_;
@@ -45,8 +46,9 @@ class Unwrapper {
     return first ? Joined::started : joins ? Joined::continued : Joined::restarted;
   }
 
-  /// Returns whether the position is farther from the one before than `most_excess` times the speed limit allows: a
-  /// speed a little over the limit is no jump. A jump is damage that the checksum does not detect, or a moved zero.
+  /// Returns whether the position of `reading` is farther from the last added one than `most_excess` times the speed
+  /// limit allows: a speed a little over the limit is no jump. A jump is damage that the checksum does not detect, or a
+  /// moved zero.
   [[nodiscard]] constexpr bool jumps(const Reading& reading) const {
     if (!started_ || !has_position(reading) || !is_near(reading)) return false;
     constexpr Time vague{1'000'000};  // uncertainty of the latch time
@@ -57,11 +59,12 @@ class Unwrapper {
            most_excess * counts_per_second(resolution_of(reading), limit_) * seconds + noise;
   }
 
-  /// Returns the position in counts of the single-turn resolution. It starts with the encoder's own turns and counts.
+  /// Returns the continuous position in counts of the single-turn resolution. It starts with the encoder's own turns
+  /// and counts.
   [[nodiscard]] constexpr std::int64_t position() const { return static_cast<std::int64_t>(position_); }
 
-  /// Returns whether the position started with turns that the encoder counts. If not, it started within an unknown
-  /// turn.
+  /// Returns whether the continuous position started with turns that the encoder counts. If not, it started within an
+  /// unknown turn.
   [[nodiscard]] constexpr bool counts_turns() const { return counts_turns_; }
 
  private:
@@ -91,8 +94,9 @@ class Unwrapper {
     return apart(reading) < longest_gap(resolution_of(reading), limit_);
   }
 
-  // Returns whether the readings are nearer than half the range allows, with latch times at their limits. The 1/16 that
-  // `longest_gap` reserves for unknown times is included here.
+  // Returns whether the time between the last reading and `reading` is short enough to know the distance, even if their
+  // latch times lie at the outer ends of their intervals. The 1/16 that `longest_gap` reserves for unknown times is
+  // included here.
   [[nodiscard]] constexpr bool are_surely_near(const Reading& reading, const LatchTime& at) const {
     const Time gap = longest_gap(resolution_of(reading), limit_);
     return times_ == Times::arrived || gap == never || at.latest - last_at_.earliest < gap / 15 * 16;

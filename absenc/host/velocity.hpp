@@ -23,9 +23,10 @@ namespace absenc::host {
 class Velocity {
  public:
   static constexpr std::size_t most_positions = 48;  ///< Greatest number of positions that are stored.
-  static constexpr int longest_windows = 20;         ///< Longest window, in shortest windows.
+  static constexpr int longest_windows = 20;         ///< Longest window, as a multiple of the shortest one.
 
-  /// If the readings are farther apart than `window`, the window is the time between two readings.
+  /// `window` is the shortest time over which the speed is measured. If readings are farther apart, it is the time
+  /// between two readings.
   explicit constexpr Velocity(Time window = std::chrono::milliseconds(50)) : window_(window) {}
 
   /// Adds a position of `Unwrapper`. A position that was not latched after the one before is ignored.
@@ -40,27 +41,27 @@ class Velocity {
   /// Adds a position whose latch time is known exactly.
   constexpr void add(std::int64_t position, Time at) { add(position, {at, at}); }
 
-  /// Forgets all positions, after a jump or a pause.
+  /// Forgets all stored positions, for use after a jump or a pause.
   constexpr void restart() {
     size_ = 0;
     start_ = none;
   }
 
-  /// Returns whether the last position has a speed.
+  /// Returns whether a speed is known for the last added position.
   [[nodiscard]] constexpr bool valid() const { return start_ != none; }
-  /// Returns the speed; 0 while not valid.
+  /// Returns the mean speed in counts per second; 0 while `valid()` is false.
   [[nodiscard]] constexpr double counts_per_second() const {
     if (!valid()) return 0;
     const double middle = (fastest() + slowest()) / 2;
     return moved() < 0 ? -middle : middle;
   }
-  /// Returns the greatest difference between the true mean speed and `counts_per_second`, in counts/s. 0 while not
-  /// valid.
+  /// Returns the greatest difference between the true mean speed and `counts_per_second`, in counts/s. 0 while
+  /// `valid()` is false.
   [[nodiscard]] constexpr double uncertainty() const { return valid() ? (fastest() - slowest()) / 2 : 0; }
-  /// Returns when the older position was latched, which begins the window. Call only while valid.
+  /// Returns the latch interval of the older position, which begins the window. Call it only while `valid()` is true.
   [[nodiscard]] constexpr const LatchTime& since() const { return positions_[start_].at; }
   /// Returns how long before the newest position (the middle of its latch interval) the shaft had this speed. 0 while
-  /// not valid.
+  /// `valid()` is false.
   [[nodiscard]] constexpr Time delay() const { return valid() ? span(start_) / 2 : Time{}; }
 
  private:
@@ -69,8 +70,8 @@ class Velocity {
     LatchTime at;
   };
   static constexpr std::size_t none = ~std::size_t{0};
-  static constexpr int enough = 20;  // speed / uncertainty, to report a speed at once
-  static constexpr int least = 4;    // speed / uncertainty, with the longest window
+  static constexpr int enough = 20;  // least ratio of speed to uncertainty to report a speed before the longest window
+  static constexpr int least = 4;    // least ratio of speed to uncertainty with the longest window
 
   [[nodiscard]] constexpr const Sample& newest() const { return positions_[size_ - 1]; }
   [[nodiscard]] constexpr Time span(std::size_t start) const {
@@ -103,7 +104,7 @@ class Velocity {
     if (old != 0) remove(0, old);
   }
 
-  // At high rates old positions may be stored at longer intervals than new ones.
+  // Removes one position. At high rates old positions are stored at longer intervals than new ones.
   constexpr void thin_out() {
     std::size_t closest = 1;
     for (std::size_t i = 2; i + 1 < size_; ++i) {
@@ -112,7 +113,7 @@ class Velocity {
     const bool drops_first = positions_[closest].at.width() > positions_[closest + 1].at.width();
     remove(drops_first || closest + 2 == size_ ? closest : closest + 1, 1);
   }
-  // Returns the interval in units of about 1 us, so that a product fits into 64 bits.
+  // Returns the time between positions `i` and `i + 1` in units of about 1 us, so that a product fits into 64 bits.
   [[nodiscard]] constexpr std::int64_t gap(std::size_t i) const {
     return (positions_[i + 1].at.middle() - positions_[i].at.middle()).count() >> 10;
   }
@@ -123,14 +124,14 @@ class Velocity {
     size_ -= count;
   }
 
-  // Selects the shortest window whose uncertainty is low enough.
+  // Selects the shortest window whose speed has a low enough uncertainty.
   constexpr void choose_start() {
     for (std::size_t i = size_ - 1; i-- > 0;) {
       const bool fills_window = span(i) >= window_ || (i > 0 && span(i - 1) > window_);
       if (!fills_window && i > 0) continue;
       const std::uint64_t way = moved_from(i);
       const bool is_resolved = way == 0 ? fills_window : way >= enough;
-      // Uncertainty of the window, to either side.
+      // Uncertainty of the length of the window, to either side.
       const Time open = (newest().at.width() + positions_[i].at.width()) / 2;
       const bool is_longest = span(i) >= longest_windows * window_;
       if ((is_resolved && enough * open <= span(i)) || (is_longest && least * open <= span(i))) {
@@ -143,7 +144,7 @@ class Velocity {
   Time window_;
   std::array<Sample, most_positions> positions_{};  // the oldest first
   std::size_t size_ = 0;
-  std::size_t start_ = none;  // first position of the selected window
+  std::size_t start_ = none;  // index of the position that begins the selected window
 };
 
 }  // namespace absenc::host

@@ -11,15 +11,15 @@ namespace absenc {
 
 /// A frame on a CAN bus.
 struct CanFrame {
-  std::uint32_t id = 0;                ///< identifier: 11 bits, or 29 when `extended`
+  std::uint32_t id = 0;                ///< identifier of the frame: 11 bits, or 29 when `extended`
   bool extended = false;               ///< Whether the identifier has 29 bits.
-  bool remote = false;                 ///< Whether it is a remote frame, which has no data.
+  bool remote = false;                 ///< Whether the frame is a remote frame, which has no data.
   std::uint8_t size = 0;               ///< number of data bytes, 0 to 8
-  std::array<std::uint8_t, 8> data{};  ///< Data bytes, of which `size` are used.
+  std::array<std::uint8_t, 8> data{};  ///< Data bytes; the first `size` of them are used.
 
-  /// Returns the data bytes in use.
+  /// Returns the first `size` data bytes.
   [[nodiscard]] constexpr Bytes bytes() const { return {data.data(), size}; }
-  /// Compares all members.
+  /// Returns whether all members of two frames are equal.
   friend constexpr bool operator==(const CanFrame&, const CanFrame&) = default;
 };
 

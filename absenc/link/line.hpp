@@ -15,14 +15,13 @@ enum class LinkKind : std::uint8_t {
   spi,          ///< the host's clock moves one byte in each direction at once
   clocked,      ///< the host clocks bits out of the encoder (SSI, BiSS); bits are packed MSB first, the last byte
                 ///< left-aligned; the clock idles high, its rising edge brings the next bit
-                ///< the clock idles high, its rising edge brings the next bit
   can,
 };
 
 /// Parity of a character.
 enum class Parity : std::uint8_t { none, odd, even };
 
-/// Wires beside the data; the host drives them.
+/// Wires beside the data wires; the host drives them.
 enum class ExtraWire : std::uint8_t { trigger, clear };
 
 /// Default bit rate of virtual encoders whose protocol does not define one.
@@ -31,26 +30,26 @@ inline constexpr std::uint32_t assumed_rate = 115'200;
 /// Settings of a line. For SPI and clocked links they describe how to configure a controller; sim draws waveforms from
 /// them.
 struct LineSettings {
-  std::uint32_t rate = 0;          ///< bits per second: baud rate, SPI or shift clock, CAN bit rate
-  Parity parity = Parity::none;    ///< Parity of each character.
-  std::uint8_t stop_bits = 1;      ///< Number of stop bits, 1 or 2.
-  std::uint8_t spi_mode = 0;       ///< spi, clocked: 2 * CPOL + CPHA
-  std::uint8_t idle_clocks = 0;    ///< clocked: number of clocks before the first bit, during which the line stays idle
-  Time select_lead{};              ///< spi: minimum time from chip select to the first clock
-  std::uint32_t highest_rate = 0;  ///< highest rate that the document allows, if a controller could be faster; 0: not
-                                   ///< stated
+  std::uint32_t rate = 0;        ///< bits per second: baud rate, SPI or shift clock, CAN bit rate
+  Parity parity = Parity::none;  ///< Parity of each character.
+  std::uint8_t stop_bits = 1;    ///< Number of stop bits, 1 or 2.
+  std::uint8_t spi_mode = 0;     ///< spi, clocked: 2 * CPOL + CPHA
+  std::uint8_t idle_clocks = 0;  ///< clocked: number of clocks before the first bit, during which the line stays idle
+  Time select_lead{};            ///< spi: minimum time from chip select to the first clock
+  /// Highest rate in bits per second that the document allows, if a controller could be faster; 0: not stated.
+  std::uint32_t highest_rate = 0;
 
-  /// Returns the settings, with `assumed_rate` if `rate` is 0.
+  /// Returns these settings, with `assumed_rate` if `rate` is 0.
   [[nodiscard]] constexpr LineSettings with_some_rate() const {
     LineSettings settings = *this;
     if (rate == 0) settings.rate = assumed_rate;
     return settings;
   }
 
-  /// Compares all members.
+  /// Returns whether all members of two settings are equal.
   friend constexpr bool operator==(const LineSettings&, const LineSettings&) = default;
 
-  /// Returns the duration of `count` bits, rounded to the nearest nanosecond. `rate` must not be 0.
+  /// Returns the duration of `count` bits on the line, rounded to the nearest nanosecond. `rate` must not be 0.
   [[nodiscard]] constexpr Time bits(std::uint64_t count) const {
     return Time((count * 1'000'000'000 + rate / 2) / rate);
   }
@@ -58,7 +57,7 @@ struct LineSettings {
   [[nodiscard]] constexpr unsigned character_bits() const {
     return 9u + (parity == Parity::none ? 0u : 1u) + stop_bits;
   }
-  /// Returns the duration of a character.
+  /// Returns the duration of one asynchronous character.
   [[nodiscard]] constexpr Time character() const { return bits(character_bits()); }
 };
 

@@ -6,9 +6,9 @@
 
 namespace absenc {
 
-/// Carries out steps and reports events. Ports of the operating system throw on failure (os/error.hpp); a port on a
-/// microcontroller reports a failure as `line_error`. The interface is defined in link so that only one loop drives
-/// machines (host/drive.hpp) and os does not depend on host.
+/// One end of a line: carries out steps and reports events. Ports of the operating system throw on failure
+/// (os/error.hpp); a port on a microcontroller reports a failure as `line_error`. The interface is defined in link so
+/// that only one loop drives machines (host/drive.hpp) and os does not depend on host.
 template <class Item>
 struct Port {
   /// Returns the time on the port's own clock, which also stamps every event and never runs backwards.
@@ -18,7 +18,8 @@ struct Port {
   /// arrive before its end (the echo of a half-duplex line, or an unsolicited reply).
   virtual void begin(const Step<Item>& step) = 0;
 
-  /// Blocks until the next event that a machine waiting with `step` must see. Items stay valid until the next call.
+  /// Blocks until the next event that a machine waiting with `step` must see, and returns it. Its items stay valid
+  /// until the next call of `wait`.
   [[nodiscard]] virtual Event<Item> wait(const Step<Item>& step) = 0;
 
  protected:

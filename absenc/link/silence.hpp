@@ -6,12 +6,12 @@
 
 namespace absenc {
 
-/// Silence timer at one end of a line. `silence` is reported at most once after each transfer and once after each
+/// A silence timer at one end of a line. `silence` is reported at most once after each transfer and once after each
 /// received item, when the line was quiet for the limit in the machine's last step.
 class Silence {
  public:
   Silence() = default;
-  /// Begins at time `since`.
+  /// Makes a timer for a line that is silent since `since`.
   explicit Silence(Time since) : since_(since) {}
 
   /// Records the end of a transfer or pulse of this end: the `answer` limit now applies.
@@ -22,14 +22,14 @@ class Silence {
     received_ = true;
     reported_ = false;
   }
-  /// Records activity on the line that did not reach this end as an item: the limit starts again.
+  /// Records activity on the line that did not reach this end as an item: the silence starts again.
   void busy(Time at) { since_ = at; }
-  /// Remembers that the silence was reported.
+  /// Records that `silence` was reported.
   void reported() { reported_ = true; }
 
   /// Returns the time since which the line is silent.
   [[nodiscard]] Time since() const { return since_; }
-  /// Returns whether an item was received.
+  /// Returns whether an item was received since the last transfer.
   [[nodiscard]] bool has_received() const { return received_; }
 
   /// Returns when `silence` is due for a step with these limits (Step::answer and gap); `latency` is the port's delay,

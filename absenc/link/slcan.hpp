@@ -19,7 +19,7 @@ inline constexpr std::uint8_t bell = 0x07;         ///< the adapter's reply "ref
 
 /// Longest line: T, 8 digits, length, 16 digits, 4 digits of time, CR.
 inline constexpr std::size_t line_capacity = 31;
-/// A line of text, without its end.
+/// Text of one line, with or without its CR.
 using LineText = ByteBuffer<line_capacity>;
 
 /// Returns whether `byte` begins a frame: t and T for data frames, r and R for remote frames; capitals mean 29-bit
@@ -28,7 +28,8 @@ using LineText = ByteBuffer<line_capacity>;
   return byte == 't' || byte == 'T' || byte == 'r' || byte == 'R';
 }
 
-/// Returns the digit after S that sets a bit rate; nothing if the protocol has no code for this rate.
+/// Returns the digit that follows S in the command that sets the bit rate `rate`; nothing if the protocol has no code
+/// for this rate.
 [[nodiscard]] constexpr std::optional<std::uint8_t> rate_code(std::uint32_t rate) {
   constexpr std::array<std::uint32_t, 9> rates{10'000,  20'000,  50'000,  100'000,  125'000,
                                                250'000, 500'000, 800'000, 1'000'000};
@@ -38,7 +39,7 @@ using LineText = ByteBuffer<line_capacity>;
   return std::nullopt;
 }
 
-/// Returns the bit rate of a digit after S, the inverse of `rate_code`; 0 if `code` is invalid.
+/// Returns the bit rate that S followed by the digit `code` sets, the inverse of `rate_code`; 0 if `code` is invalid.
 [[nodiscard]] constexpr std::uint32_t rate_of(std::uint8_t code) {
   for (const std::uint32_t rate :
        {10'000u, 20'000u, 50'000u, 100'000u, 125'000u, 250'000u, 500'000u, 800'000u, 1'000'000u}) {
@@ -65,7 +66,7 @@ constexpr std::int64_t digits_of(Bytes text) {
 }
 }  // namespace detail
 
-/// Encodes a frame as a line with CR. `time` is in milliseconds (0 to 59999) and is appended if the other side
+/// Returns `frame` encoded as a line with CR. `time` is in milliseconds (0 to 59999) and is appended if the other side
 /// requested timestamps with Z1.
 [[nodiscard]] constexpr LineText encode(const CanFrame& frame, std::optional<std::uint16_t> time = {}) {
   LineText text;
@@ -80,8 +81,8 @@ constexpr std::int64_t digits_of(Bytes text) {
   return text;
 }
 
-/// Decodes a frame from its line without the CR; a timestamp at the end is skipped. Errors: bad_framing (not a frame,
-/// or a character that is no digit), out_of_range (identifier, more than 8 bytes), wrong_length.
+/// Returns the frame that a line without its CR contains; a timestamp at the end is skipped. Errors: bad_framing (not a
+/// frame, or a character that is no digit), out_of_range (identifier, more than 8 bytes), wrong_length.
 [[nodiscard]] constexpr Result<CanFrame> decode(Bytes line) {
   if (line.empty() || !begins_frame(line[0])) return Error::bad_framing;
   CanFrame frame;
@@ -107,11 +108,11 @@ constexpr std::int64_t digits_of(Bytes text) {
   return frame;
 }
 
-/// Splits received bytes into lines. After garbage or a lost CR it resumes at the next letter that begins a frame: none
-/// of the four letters occurs within a frame or a command.
+/// A reader that splits received bytes into lines. After garbage or a lost CR it resumes at the next letter that begins
+/// a frame: none of the four letters occurs within a frame or a command.
 class LineReader {
  public:
-  /// Event that a byte completes.
+  /// Event that a received byte completes.
   enum class LineEvent : std::uint8_t {
     nothing,
     line,     ///< `line()` is complete and valid until the next byte; may be empty
@@ -119,7 +120,7 @@ class LineReader {
     garbage,  ///< bytes that cannot be a line were discarded
   };
 
-  /// Adds a byte; returns what it completes.
+  /// Adds a received byte and returns the event that it completes.
   constexpr LineEvent feed(std::uint8_t byte) {
     if (complete_) line_.clear();
     complete_ = false;

@@ -73,8 +73,8 @@ struct Event {
   };
 
   Kind kind = Kind::timer;        ///< kind of the event
-  Time at{};                      ///< Time at which it happened.
-  std::span<const Item> items{};  ///< received: the items; valid during the call
+  Time at{};                      ///< time at which the event was complete
+  std::span<const Item> items{};  ///< received: the items that were received; valid during the call
   std::size_t bits = 0;           ///< sent, device side of a clocked link: number of clocks counted
   ExtraWire wire{};               ///< triggered: the wire of the pulse
   bool held_low = false;  ///< selected on a clocked link: the clock line was held low before the transfer, not idle
@@ -82,18 +82,18 @@ struct Event {
   Time width{};  ///< triggered: duration of the pulse; device side, selected on a clocked link and sent on an SPI link:
                  ///< the period of the clock, 0 if not known
   Time lead{};   ///< sent, device side of an SPI link: time from chip select to the first clock
-  Time
-      late{};  ///< uncertainty of `at`. received: `items` may have arrived earlier by this time, because the port could
-               ///< not look sooner; sent: the transfer may have ended earlier by this time; 0: none, or not known
+  /// Uncertainty of `at`. received: `items` may have arrived earlier by this time, because the port could not look
+  /// sooner; sent: the transfer may have ended earlier by this time; 0: none, or not known.
+  Time late{};
 };
 
 /// A protocol's side of a conversation. After each `feed`, call `next` until it returns `wait` or `done`. Call both
 /// from one context: interrupts must queue events.
 template <class Item>
 struct Machine {
-  /// Takes an event of the port.
+  /// Processes an event that the port reports.
   virtual void feed(const Event<Item>& event) = 0;
-  /// Returns the next step of the port.
+  /// Returns the next step that the port must carry out.
   virtual Step<Item> next(Time now) = 0;
 
  protected:

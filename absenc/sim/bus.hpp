@@ -19,9 +19,9 @@ class Bus final : public Machine<std::uint8_t> {
   /// `devices` must outlive the bus. `character` is the time of one character on the line.
   Bus(const std::vector<Machine<std::uint8_t>*>& devices, Time character);
 
-  /// Takes an event of the port.
+  /// Processes an event that the port reports.
   void feed(const Event<std::uint8_t>& event) override;
-  /// Returns the next step of the port.
+  /// Returns the next step that the port must carry out.
   Step<std::uint8_t> next(Time now) override;
 
  private:

@@ -65,9 +65,9 @@ class FaultyDevice final : public Machine<std::uint8_t> {
   /// Puts faults between `device` and its line. The same seed gives the same faults.
   FaultyDevice(Machine<std::uint8_t>& device, const FaultRates& rates, std::uint64_t seed);
 
-  /// Takes an event of the port.
+  /// Processes an event that the port reports.
   void feed(const Event<std::uint8_t>& event) override;
-  /// Returns the next step of the port.
+  /// Returns the next step that the port must carry out.
   Step<std::uint8_t> next(Time now) override;
 
   /// Sets the rates, from the next reply on.

@@ -17,9 +17,9 @@ class FaultyNode final : public Machine<CanFrame> {
   /// Puts faults between `device` and its bus. The same seed gives the same faults.
   FaultyNode(Machine<CanFrame>& device, const FaultRates& rates, std::uint64_t seed);
 
-  /// Takes an event of the port.
+  /// Processes an event that the port reports.
   void feed(const Event<CanFrame>& event) override;
-  /// Returns the next step of the port.
+  /// Returns the next step that the port must carry out.
   Step<CanFrame> next(Time now) override;
 
   /// Sets the rates, from the next frame on.

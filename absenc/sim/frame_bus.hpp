@@ -19,9 +19,9 @@ class FrameBus final : public Machine<CanFrame> {
   /// `nodes` must outlive the bus. `rate` is the bit rate of the port, until the first node changes it.
   FrameBus(const std::vector<Machine<CanFrame>*>& nodes, std::uint32_t rate);
 
-  /// Takes an event of the port.
+  /// Processes an event that the port reports.
   void feed(const Event<CanFrame>& event) override;
-  /// Returns the next step of the port.
+  /// Returns the next step that the port must carry out.
   Step<CanFrame> next(Time now) override;
 
  private:
