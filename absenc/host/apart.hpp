@@ -8,8 +8,8 @@
 
 namespace absenc::host {
 
-/// Meaning of `Reading::latched`: the time at which the encoder latched the position, or the time at which the reading arrived. Readings that waited in a
-/// buffer arrive together.
+/// Meaning of `Reading::latched`: the time at which the encoder latched the position, or the time at which the reading
+/// arrived. Readings that waited in a buffer arrive together.
 enum class Times : std::uint8_t { latched, arrived };
 
 /// Returns whether readings of this encoder have arrival times only, because it transmits unsolicited.

@@ -132,7 +132,8 @@ class Session {
     return read(command, take, [](const Reading&) {});
   }
 
-  /// Asks the running conversation to end early; see Conversation::abort.
+  /// Asks the running conversation to end early. Returns true if it restores the encoder and then ends by itself;
+  /// false: it may be abandoned.
   bool abort() { return current_ != nullptr && current_->abort(); }
   /// Puts into `sink` the settings that the last conversation left changed in the encoder when its port threw; see
   /// Conversation::report_left.

@@ -14,7 +14,7 @@ using Addresses = std::unique_ptr<addrinfo, decltype(&::freeaddrinfo)>;
 
 /// Returns the addresses of `host`: a name or an address, an IPv6 address also in brackets. `socket_type` is for
 /// example SOCK_STREAM, `flags` for example AI_PASSIVE. Throws Failure `not_found` with the text `before` + `host` +
-/// `behind`, for example "the host " and " is not known".
+/// `behind`, for example "the host " and " is not known", if there are none.
 [[nodiscard]] Addresses look_up(const std::string& host, std::uint16_t port, int socket_type, int flags,
                                 const std::string& before, const std::string& behind = {});
 

@@ -13,7 +13,7 @@
 
 namespace absenc::os {
 
-/// One end of a connection between two processes. Neither call blocks.
+/// One end of a connection between two processes. `send` and `receive` do not block.
 class Channel {
  public:
   explicit Channel(Descriptor end) : end_(std::move(end)) {}

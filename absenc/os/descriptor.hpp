@@ -24,7 +24,7 @@ class Descriptor {
     if (number_ >= 0) ::close(std::exchange(number_, -1));
   }
 
-  /// Returns the descriptor, which the caller must close.
+  /// Gives up ownership and returns the number of the descriptor, which the caller must close.
   [[nodiscard]] int release() { return std::exchange(number_, -1); }
 
   [[nodiscard]] int get() const { return number_; }

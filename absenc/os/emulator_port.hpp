@@ -54,7 +54,7 @@ class EmulatorPort final : public StreamPort {
   Descriptor master_;
   Descriptor slave_;          // kept open: the master fails while no program has the slave open
   Descriptor in_use_marker_;  // bound socket that marks the link as in use
-  Descriptor watch_;          // inotify: reports programs that open or close the slave
+  Descriptor watch_;          // inotify descriptor: reports programs that open or close the slave
   Descriptor listener_;
   std::vector<Descriptor> clients_;
   std::string terminal_;
@@ -65,7 +65,7 @@ class EmulatorPort final : public StreamPort {
   Time lateness_{};
   Time lateness_until_{};
   std::uint64_t dropped_ = 0;
-  std::uint32_t device_rate_ = 0;  // 0: the device has not set a rate
+  std::uint32_t device_rate_ = 0;  // bit rate that the device has set; 0: none
 };
 
 }  // namespace absenc::os

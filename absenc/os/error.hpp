@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Exceptions of the ports in this folder.
+// Exceptions that the ports of this folder throw.
 #pragma once
 
 #include <cstdint>
@@ -10,7 +10,7 @@
 
 namespace absenc::os {
 
-/// A problem with a port. `what()` reports to the user what happened and what to try.
+/// A failure of a port. `what()` reports to the user what happened and what to try.
 class Failure : public std::runtime_error {
  public:
   /// Kind of a failure of a port.
@@ -19,28 +19,29 @@ class Failure : public std::runtime_error {
     no_permission,  ///< the port exists, but this user may not open it
     in_use,         ///< another program uses the port
     unsupported,    ///< this port cannot do what was requested
-    bad_rate,       ///< this port does not support the baud rate
+    bad_rate,       ///< this port does not support the requested baud rate
     lost,           ///< the port existed and has disappeared
     system,         ///< any other error of the operating system
   };
 
-  /// State of a CAN bus that caused the failure, if known.
+  /// State of the CAN bus that caused a failure: `off` (the controller has left the bus after too many errors),
+  /// `not_acknowledged` (no other node acknowledges frames); `unknown` for every other failure.
   enum class Bus : std::uint8_t { unknown, off, not_acknowledged };
 
   /// Kind of program that holds a port in use.
   enum class Holder : std::uint8_t { unknown, program, absenc, server, modem_manager };
 
-  /// Takes the text of the failure.
+  /// Makes a failure with `sentence` as its text, and the state of the CAN bus if that caused it.
   Failure(Kind kind, const std::string& sentence, Bus bus = Bus::unknown)
       : std::runtime_error(sentence), kind_(kind), bus_(bus) {}
-  /// Creates a Failure of kind `in_use` with the kind of its holder.
+  /// Makes a failure of kind `in_use`, with the kind of program that holds the port.
   Failure(const std::string& sentence, Holder holder)
       : std::runtime_error(sentence), kind_(Kind::in_use), holder_(holder) {}
   /// Returns the kind of the failure.
   [[nodiscard]] Kind kind() const { return kind_; }
-  /// Returns the kind of bus that the port belongs to.
+  /// Returns the state of the CAN bus that caused the failure; `unknown` if no such state did.
   [[nodiscard]] Bus bus() const { return bus_; }
-  /// Returns who holds the port, if another program does.
+  /// Returns the kind of program that holds the port; `unknown` if the failure is not `in_use`.
   [[nodiscard]] Holder holder() const { return holder_; }
 
  private:
@@ -59,14 +60,14 @@ class Failure : public std::runtime_error {
 
 /// Thrown by every wait in this folder after SIGINT or SIGTERM (os/signals.hpp).
 struct Interrupted : std::exception {
-  /// Returns what happened.
+  /// Returns the text "interrupted".
   [[nodiscard]] const char* what() const noexcept override { return "interrupted"; }
 };
 
 /// Thrown by a port when the time set by `StreamPort::set_end` is reached, and by every wait when a CancelCheck
 /// returns true.
 struct Ended : std::exception {
-  /// Returns what happened.
+  /// Returns the text "cancelled".
   [[nodiscard]] const char* what() const noexcept override { return "cancelled"; }
 };
 

@@ -9,7 +9,7 @@
 
 namespace absenc::os {
 
-/// Base of all CAN ports. Every function throws Failure, Interrupted (os/signals.hpp) or Ended.
+/// Base class of all CAN ports. Every function throws Failure, Interrupted (os/signals.hpp) or Ended.
 ///
 /// A transfer begins at `at`, never earlier; `begin` blocks until then. A frame received before the transfer began, or
 /// before `now` was called, is reported with a time that is not later, however long it waited in a queue. Because
@@ -38,14 +38,14 @@ class FramePort : public Port<CanFrame> {
   void set_end(Time end) { end_ = end; }
 
  protected:
-  /// Pushes received frames. Blocks until at least one frame is received or `deadline` is reached; does not block if
-  /// `deadline` is in the past.
+  /// Passes received frames to `push`. Blocks until at least one frame is received or `deadline` is reached; does not
+  /// block if `deadline` is in the past.
   virtual void collect(Time deadline) = 0;
   virtual void send(const CanFrame& frame) = 0;
   virtual void apply(const LineSettings& settings) = 0;
 
   void push(const CanFrame& frame, Time at);
-  /// Reports that a frame was destroyed on the bus.
+  /// Reports at `wait` that a frame was destroyed on the bus.
   void push_error(Time at);
   [[nodiscard]] Time end() const { return end_; }
 

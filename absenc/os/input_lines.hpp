@@ -9,8 +9,8 @@ namespace absenc::os {
 
 class InputLines {
  public:
-  /// `descriptor` is not closed here. If it is a terminal and this program runs in the background, nothing is read and
-  /// the program is not stopped.
+  /// Reads lines from `descriptor`, which is not closed here. If the descriptor is a terminal and this program runs in
+  /// the background, nothing is read and the program is not stopped.
   explicit InputLines(int descriptor = 0);
 
   /// Returns the complete lines of one read, without their line ends. Never blocks. At the end of the input an
@@ -22,7 +22,7 @@ class InputLines {
  private:
   int descriptor_;
   bool ended_ = false;
-  std::string begun_;  // beginning of a line that is not complete yet
+  std::string begun_;  // received bytes of a line that is not complete yet
 };
 
 }  // namespace absenc::os

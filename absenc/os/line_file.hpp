@@ -11,13 +11,13 @@
 
 namespace absenc::os {
 
-/// A new file that this process writes; it must still have its name at every write.
+/// A new file that this process writes. Every write checks that the file still has its name.
 class OutputFile {
  public:
   /// Waits until the content is on the disk. Throws Failure, also as `require_there` does.
   void sync();
-  /// Throws Failure `lost` if the path does not lead to this file any more or the file was truncated: further data
-  /// would not be found.
+  /// Throws Failure `lost` if the path does not lead to this file any more or the file was truncated: nobody would find
+  /// further data.
   void require_there() const;
 
   [[nodiscard]] const std::string& path() const { return path_; }
@@ -26,29 +26,30 @@ class OutputFile {
  protected:
   enum class Appears : std::uint8_t { at_once, later };
 
-  /// Creates the file. Throws Failure: `in_use` if the file exists, `no_permission`, `not_found`, `system`.
+  /// Creates the file at `path`. Throws Failure: `in_use` if a file exists there, `no_permission`, `not_found`,
+  /// `system`.
   OutputFile(const std::string& path, Appears appears);
   ~OutputFile();
   OutputFile(const OutputFile&) = delete;
   OutputFile& operator=(const OutputFile&) = delete;
 
-  /// Writes `bytes` at offset `at`. They survive the end of this process, and a power failure only after `sync`.
-  /// Returns 0 or a value of errno.
+  /// Writes `bytes` at offset `at`. Written bytes survive the end of this process, and a power failure only after
+  /// `sync`. Returns 0 or a value of errno.
   [[nodiscard]] int put(std::uint64_t at, std::string_view bytes);
 
   std::string path_;
   Descriptor file_;
   std::uint64_t size_ = 0;
   bool appeared_ = false;
-  std::string temporary_name_;  // temporary name until `appear`, on file systems without nameless files
+  std::string temporary_name_;  // temporary name of the file until `appear`, on file systems without nameless files
 };
 
 /// An output file of complete lines.
 class LineFile final : public OutputFile {
  public:
   explicit LineFile(const std::string& path) : OutputFile(path, Appears::at_once) {}
-  /// Writes `lines` to the system at once, which takes a few us. If they do not all fit, none of them remains. Throws
-  /// Failure, also as `require_there` does.
+  /// Writes `lines` to the system at once, which takes a few us. If the disk has no room for all of them, none remains
+  /// in the file. Throws Failure, also as `require_there` does.
   void append(std::string_view lines);
 };
 
@@ -59,12 +60,12 @@ class BlockFile final : public OutputFile {
   /// Gives the file its name. Before this call no other process sees the file, and it disappears when the process ends.
   /// Throws Failure; `in_use` if another file has taken the name.
   void appear();
-  /// Writes at any offset; a hole between the end and `at` reads as zeros. Throws Failure, also as `require_there`
-  /// does.
+  /// Writes `bytes` at offset `at`; a hole between the end and `at` reads as zeros. Throws Failure, also as
+  /// `require_there` does.
   void write(std::uint64_t at, Bytes bytes);
   /// Extends the file to at least `size` bytes. Throws Failure.
   void grow(std::uint64_t size);
-  /// Reads `bytes` at offset `at`; bytes behind the end read as zeros. Throws Failure.
+  /// Fills `bytes` with the content at offset `at`; bytes behind the end read as zeros. Throws Failure.
   void read(std::uint64_t at, MutableBytes bytes) const;
 };
 

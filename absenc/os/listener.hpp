@@ -13,19 +13,19 @@ namespace absenc::os {
 
 struct Listener {
   Descriptor socket;
-  std::uint16_t port = 0;    // the actual port, also when any free port was requested
-  bool on_loopback = false;  // only this computer can reach the port
+  std::uint16_t port = 0;    // actual number of the TCP port, also when any free port was requested
+  bool on_loopback = false;  // only programs on this computer can reach the port
 };
 
-/// Listens at `host`: a name, an IPv4 or an IPv6 address, that one also in brackets. `port` 0 means any free port.
-/// Throws Failure: `not_found` (no such host here), `in_use`, `no_permission`, `system`.
+/// Opens a TCP port at `host`: a name, an IPv4 address, or an IPv6 address with or without brackets. `port` 0 means any
+/// free port. Throws Failure: `not_found` (no such host here), `in_use`, `no_permission`, `system`.
 [[nodiscard]] Listener listen_at(const std::string& host, std::uint16_t port);
 
-/// Returns the address as text, for example "127.0.0.1"; "" if it is no internet address.
+/// Returns the IP address in `address` as text, for example "127.0.0.1"; "" if it is no internet address.
 [[nodiscard]] std::string host_text(const sockaddr& address);
 
-/// Shuts down the connection: every reader and writer of it gets its end. The descriptor stays open until its owner
-/// closes it.
+/// Shuts down the connection of `socket`: its readers get the end of the stream, its writers an error. The descriptor
+/// stays open until its owner closes it.
 void end_connection(int socket);
 
 }  // namespace absenc::os

@@ -11,14 +11,14 @@
 
 namespace absenc::os {
 
-/// A folder, locked (flock) for the lifetime of the object.
+/// A folder that this process owns: it is locked (flock) for the lifetime of the object.
 class OwnedFolder {
  public:
-  /// Creates the folder if it is missing, but not its parent. Throws Failure: `in_use` if another process owns it,
-  /// `not_found` if its parent is missing.
+  /// Creates the folder at `path` if it is missing, but not its parent, and locks it. Throws Failure: `in_use` if
+  /// another process owns it, `not_found` if its parent is missing.
   explicit OwnedFolder(const std::string& path);
 
-  /// Returns whether the path still leads to this folder: it may have been removed, moved or replaced.
+  /// Returns whether the path still leads to this folder: the folder may have been removed, moved or replaced.
   [[nodiscard]] bool is_there() const;
 
  private:
@@ -30,19 +30,19 @@ class OwnedFolder {
 class LogFile {
  public:
   enum class Open : std::uint8_t { fresh, existing };
-  /// Opens the file, new or existing. Throws Failure.
+  /// Opens the file at `path`, new or existing. Throws Failure.
   LogFile(const std::string& path, Open how);
 
-  /// Appends all of `bytes` or nothing. Returns 0 or a value of errno.
+  /// Appends all of `bytes` or, on error, none of them. Returns 0 or a value of errno.
   [[nodiscard]] int append(std::string_view bytes);
-  /// Replaces an existing byte, which needs no room on the disk. Returns 0 or a value of errno.
+  /// Replaces the existing byte at `offset`, which needs no room on the disk. Returns 0 or a value of errno.
   [[nodiscard]] int replace(std::size_t offset, char byte) const;
   /// Replaces the whole content by `bytes`, which must not be longer: this needs no room on the disk. Returns false if
   /// not everything was written.
   [[nodiscard]] bool shrink_to(std::string_view bytes);
-  /// Returns up to `size` bytes from `offset`; fewer at the end of the file. Throws Failure.
+  /// Returns up to `size` bytes of the file from `offset`; fewer at its end. Throws Failure.
   [[nodiscard]] std::string read(std::size_t offset, std::size_t size) const;
-  /// Waits until the content is on the disk.
+  /// Waits until the content of the file is on the disk.
   void sync() const;
   [[nodiscard]] std::size_t size() const { return size_; }
   /// Returns whether the file still has a name.

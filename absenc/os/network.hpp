@@ -12,31 +12,31 @@
 
 namespace absenc::os {
 
-/// UDP datagrams to one address. Sending never blocks.
+/// A sender of UDP datagrams to one address. Sending never blocks.
 class Datagrams {
  public:
   /// Resolves `host`, a name or an address, once. Throws Failure: `not_found`, `system`.
   Datagrams(const std::string& host, std::uint16_t port);
 
-  /// Sends one datagram. Returns false if the datagram is lost, because there was no room for it or the other side is
-  /// unreachable.
+  /// Sends `text` as one datagram. Returns false if the datagram is lost, because the send buffer is full or the other
+  /// side is unreachable.
   [[nodiscard]] bool send(std::string_view text);
 
  private:
   Descriptor socket_;
 };
 
-/// Resolves `host` now. Returns the addresses as text, in the order in which they are to be tried. Throws Failure
+/// Resolves the name `host`. Returns its addresses as text, in the order in which they are to be tried. Throws Failure
 /// `not_found`.
 [[nodiscard]] std::vector<std::string> addresses_of(const std::string& host);
 
-/// Directions in which a socket of another library is ready.
+/// Directions in which a socket is ready: to be read or written without blocking.
 struct Ready {
   bool to_read = false;
   bool to_write = false;
 };
-/// Waits until the socket is ready, at most `longest`, or until a signal arrives. Works with any descriptor number,
-/// unlike select().
+/// Waits until `socket` is ready, at most `longest`, or until a signal arrives. Returns the directions in which it is
+/// ready. Works with any descriptor number, unlike select().
 [[nodiscard]] Ready wait_for_socket(int socket, bool for_writing, Time longest);
 
 /// Returns the name of this computer; "" if it has none.

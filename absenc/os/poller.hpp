@@ -14,20 +14,20 @@ namespace absenc::os {
 
 class Poller {
  public:
-  static constexpr std::size_t most_ready = 16;  // maximum per call of `wait`; further descriptors follow with the next
-                                                 // call
+  // Greatest number of descriptors that one call of `wait` returns; the next call returns further ones.
+  static constexpr std::size_t most_ready = 16;
 
   /// Creates the epoll and timer descriptors. Throws Failure.
   Poller();
 
   /// Makes `wait` report `descriptor` when it is readable or has an error. Throws Failure.
   void add(int descriptor);
-  /// Removes a descriptor; call it before the descriptor is closed.
+  /// Stops watching `descriptor`; call it before the descriptor is closed.
   void remove(int descriptor);
 
-  /// Blocks until a descriptor is readable and returns the readable ones; empty if `deadline` (`never`: no deadline) is
-  /// reached first. Descriptors that are ready at once are reported even after the deadline. Throws Interrupted, Ended
-  /// and Failure.
+  /// Blocks until an added descriptor is readable and returns the readable ones; empty if `deadline` (`never`: no
+  /// deadline) is reached first. Descriptors that are ready at once are reported even after the deadline. Throws
+  /// Interrupted, Ended and Failure.
   [[nodiscard]] std::span<const int> wait(Time deadline);
 
  private:
@@ -35,8 +35,8 @@ class Poller {
 
   Descriptor epoll_;
   Descriptor timer_;
-  Time armed_ = never;   // time for which the timer is set: never later than the deadline
-  int interrupts_ = -1;  // descriptor of caught interrupts; -1 before
+  Time armed_ = never;   // time for which `timer_` is set: never later than the deadline
+  int interrupts_ = -1;  // descriptor that is readable after SIGINT or SIGTERM; -1 if not caught yet
   std::array<int, most_ready> ready_{};
 };
 

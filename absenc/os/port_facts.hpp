@@ -10,10 +10,10 @@
 
 namespace absenc::os {
 
-/// Counts of damaged characters, since the UART was initialised.
+/// Numbers of damaged characters that a UART has counted since it was initialised.
 struct LineCounts {
-  std::uint64_t breaks = 0;   // breaks: the line was low for longer than a character
-  std::uint64_t framing = 0;  // characters without a stop bit
+  std::uint64_t breaks = 0;   // number of breaks: the line was low for longer than a character
+  std::uint64_t framing = 0;  // number of characters without a stop bit
   std::uint64_t parity = 0;
   std::uint64_t overruns = 0;  // characters lost because the computer was too slow
 
@@ -22,7 +22,7 @@ struct LineCounts {
   }
 };
 
-/// Properties of a port; unknown ones are empty.
+/// Properties of a serial port; unknown ones are empty.
 struct PortFacts {
   std::string driver{};                     // name of the driver, for example "ftdi_sio", "serial8250"
   std::optional<unsigned> latency_timer{};  // time for which a USB adapter holds back received bytes, in milliseconds
@@ -31,13 +31,13 @@ struct PortFacts {
   bool pseudo_terminal = false;  // a pseudo-terminal has no line and so no rate
 };
 
-/// Returns the properties of the port at `path`. The port should not be open in any program, or the properties known to
-/// its driver are missing. `sys` is a parameter for tests.
+/// Returns the properties of the port at `path`. The port should not be open in any program, or its driver does not
+/// report all of them. `sys` is a parameter for tests.
 [[nodiscard]] PortFacts port_facts(const std::string& path, const std::filesystem::path& sys = "/sys/class/tty");
 
-/// Returns whether `driver` is that of a mobile modem, whose ports lead to no line.
+/// Returns whether `driver` is a driver of mobile modems, whose ports lead to no serial line.
 [[nodiscard]] bool is_modem_driver(const std::string& driver);
-/// Returns whether `driver` is that of a built-in UART, which has no transceiver that switches direction by itself.
+/// Returns whether `driver` is a driver of built-in UARTs, which have no transceiver that switches direction by itself.
 [[nodiscard]] bool is_bare_uart(const std::string& driver);
 
 }  // namespace absenc::os

@@ -11,28 +11,28 @@
 
 namespace absenc::os {
 
-/// From this call on, a closed pipe and a file at its size limit (`ulimit -f`) cause write errors instead of ending the
-/// process. Standard streams that were closed are occupied, so that no port gets their numbers: with standard output
-/// closed, the readings would be sent to the encoder. Writing to a standard output that was closed fails. Throws
-/// Failure.
+/// Protects this process from its standard streams: from this call on, a closed pipe and a file at its size limit
+/// (`ulimit -f`) cause write errors instead of ending the process. Standard streams that were closed are occupied, so
+/// that no port gets their numbers: with standard output closed, the readings would be sent to the encoder. Writing to
+/// a standard output that was closed fails. Throws Failure.
 void protect_standard_streams();
 
-/// Writes `bytes` to standard output. If they do not all fit into a file, none of them remains. Returns 0 or a value of
-/// errno.
+/// Writes `bytes` to standard output. If that is a file and the disk has no room for all of them, none remains. Returns
+/// 0 or a value of errno.
 [[nodiscard]] int write_standard_output(std::string_view bytes);
 
 [[nodiscard]] bool is_terminal(int descriptor);
 
-/// Returns the user and system time of this process so far.
+/// Returns the processor time (user and system) that this process has used so far.
 [[nodiscard]] Time processor_time();
 
-/// Measures how long the thread that creates it was ready to run but had to wait for a processor. Events during such a
-/// time could not be noticed earlier.
+/// A measurement of how long the thread that creates it was ready to run but had to wait for a processor. Events during
+/// such a time could not be noticed earlier.
 class RunDelay {
  public:
   RunDelay();
-  /// Returns the waiting time since the last call or the constructor; 0 if the kernel does not report it (proc(5),
-  /// schedstat).
+  /// Returns how long the thread waited for a processor since the last call or the constructor; 0 if the kernel does
+  /// not report it (proc(5), schedstat).
   [[nodiscard]] Time take();
 
  private:
@@ -46,7 +46,7 @@ class RunDelay {
 
 enum class Durable : std::uint8_t { no, yes };
 
-/// A new file that takes the place of `path` when it is complete; before, no other program sees it. Throws Failure.
+/// A new file that replaces the file at `path` when it is complete; before, no other program sees it. Throws Failure.
 class NewFile {
  public:
   explicit NewFile(const std::string& path);
@@ -55,24 +55,25 @@ class NewFile {
   NewFile& operator=(const NewFile&) = delete;
 
   [[nodiscard]] int descriptor() const { return file_.get(); }
-  /// Returns a path by which the file can be opened before `take_place`.
+  /// Returns a path by which the new file can be opened before `take_place`.
   [[nodiscard]] const std::string& path() const { return temporary_path_; }
   void write(std::string_view content);
-  /// Gives the file its final name and returns it, open. `Durable::yes` waits for the disk.
+  /// Gives the file its final name and returns its open descriptor. `Durable::yes` waits for the disk.
   Descriptor take_place(Durable durable);
 
  private:
   std::string path_;
   std::string temporary_path_;
-  std::string temporary_name_;  // temporary name, if the file has one
+  std::string temporary_name_;  // temporary name of the new file; "" if it has none
   Descriptor file_;
 };
 
-/// Creates a file in `folder` ("": the working directory) without a name, which disappears when it is closed. Throws
-/// Failure.
+/// Creates a file without a name in `folder` ("": the working directory) and returns its open descriptor. The file
+/// disappears when it is closed. Throws Failure.
 [[nodiscard]] Descriptor nameless_file(const std::string& folder);
 
-/// Replaces the file at `path` by a new one with `content`, so that there is always a complete file. Throws Failure.
+/// Replaces the file at `path` by a new one with `content`, so that `path` always leads to a complete file. Throws
+/// Failure.
 void replace_file(const std::string& path, std::string_view content, Durable durable);
 
 }  // namespace absenc::os

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Wires beside the data that a host pulses: RTS or DTR of the serial port, or a GPIO line of the board.
+// Wires beside the data wires on which a host sends pulses: RTS or DTR of the serial port, or a GPIO line of the board.
 #pragma once
 
 #include <optional>
@@ -11,12 +11,13 @@ struct gpiod_line;
 
 namespace absenc::os {
 
-/// A wire for pulses. Levels are those of the UART's own pins, where a set RTS or DTR is low; an RS-232 driver inverts
-/// them. A wire is pulsed only if the user names it, because opening a port sets both RTS and DTR.
+/// The user's choice of a wire for pulses. Levels are those of the UART's own pins, where a set RTS or DTR is low; an
+/// RS-232 driver inverts them. A wire is pulsed only if the user names it, because opening a port sets both RTS and
+/// DTR.
 struct PulseWire {
   enum class Kind { none, rts, dtr, gpio } kind = Kind::none;
   std::string name{};           // gpio: name of the line as `gpioinfo` lists it
-  bool active_high = false;     // level during the pulse; at rest the wire has the other level
+  bool active_high = false;     // level of the wire during the pulse; at rest it has the other level
   std::optional<Time> width{};  // pulse width that replaces the one requested by the protocol
 };
 
@@ -26,21 +27,21 @@ struct PulseWires {
   PulseWire clear{};
 };
 
-/// The system calls of a PulseOutput. Few test machines have such wires, and the kernel offers no virtual ones, so
-/// tests override these calls and see every request. A call that fails sets errno.
+/// The system calls of a PulseOutput. Few test machines have wires for pulses, and the kernel offers no virtual ones,
+/// so tests override these calls and see every request. A call that fails sets errno.
 struct WireKernel {
   virtual ~WireKernel() = default;
   /// Calls ioctl(2) with TIOCMBIS or TIOCMBIC.
   virtual int set_modem_lines(int descriptor, unsigned long request, int lines);
   virtual gpiod_line* find_gpio(const std::string& name);
-  /// Requests the line as an output at level 0.
+  /// Requests `line` as an output at level 0.
   virtual int request_gpio(gpiod_line* line, bool active_low);
   virtual int set_gpio(gpiod_line* line, int value);
   virtual void release_gpio(gpiod_line* line);
 };
 [[nodiscard]] WireKernel& system_wires();
 
-/// A wire that is held at rest from its construction on.
+/// A wire for pulses in use: it is held at rest from its construction on.
 class PulseOutput {
  public:
   /// `descriptor` belongs to the serial port `path`. Throws Failure: `not_found`, `no_permission` and `in_use` for a

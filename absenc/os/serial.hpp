@@ -17,8 +17,8 @@ namespace absenc::os {
 
 /// Selects the component that switches an RS-485 transceiver to sending.
 enum class Rs485 : std::uint8_t {
-  automatic,  // the kernel switches with RTS if the port supports it and RTS is free, otherwise the adapter; for
-              // half-duplex lines
+  automatic,  // the kernel switches with RTS if the port supports it and RTS is free, otherwise the adapter switches;
+              // for half-duplex lines
   on,         // the kernel switches; a port that does not support it is an error
   off,        // the kernel never switches; for full-duplex lines
 };

@@ -20,23 +20,23 @@ namespace absenc::os {
 [[nodiscard]] std::optional<unsigned> latency_timer(const std::string& terminal,
                                                     const std::filesystem::path& sys = "/sys/class/tty");
 
-/// Returns the driver's name, for example "ftdi_sio", "serial8250"; "" if /sys does not state it.
+/// Returns the name of the driver of `terminal`, for example "ftdi_sio", "serial8250"; "" if /sys does not state it.
 [[nodiscard]] std::string driver_of(const std::string& terminal, const std::filesystem::path& sys = "/sys/class/tty");
 
-/// Returns the program that holds the port or has it open, for example "absenc (process 4711)"; "" if there is none
-/// that this user can see.
+/// Returns the program that holds the port at `path` or has it open, for example "absenc (process 4711)"; "" if there
+/// is none that this user can see.
 [[nodiscard]] std::string holder_of(const std::string& path);
 
 /// Properties of a port that can be read without opening it: opening raises DTR, which resets some boards.
 struct ListedPort {
   std::string path{};
-  std::string lasting_path{};  // "/dev/serial/by-id/...", which stays the same when ports are plugged in in another
-                               // order; or ""
+  std::string lasting_path{};  // "/dev/serial/by-id/...", a path that stays the same when ports are plugged in in
+                               // another order; or ""
   std::string driver{};
   std::optional<UsbAdapter> usb{};
   std::optional<unsigned> latency_timer{};  // time for which a USB adapter holds back received bytes, in milliseconds
-  std::optional<std::uint32_t> highest_rate{};  // highest rate of the chip, in bits per second
-  std::string refusal{};                        // reason why this user may not open it; "" if the user may
+  std::optional<std::uint32_t> highest_rate{};  // highest bit rate of the adapter's chip, in bits per second
+  std::string refusal{};                        // reason why this user may not open the port; "" if the user may
   std::string holder{};                         // program that uses the port, as returned by `holder_of`
 };
 

@@ -12,24 +12,25 @@
 
 namespace absenc::os {
 
-/// The kernel's struct termios2, saved to be restored.
+/// The settings of a terminal: the kernel's struct termios2, saved to be restored.
 using TerminalState = std::array<std::byte, 44>;
 
-/// Returns the settings of a terminal; empty if the descriptor is no terminal.
+/// Returns the settings of the terminal; empty if `descriptor` is no terminal.
 [[nodiscard]] std::optional<TerminalState> terminal_state(int descriptor);
 
-/// Returns the rate that was set, in bits per second; 0 if the descriptor is no terminal.
+/// Returns the bit rate of the terminal, in bits per second; 0 if `descriptor` is no terminal.
 [[nodiscard]] std::uint32_t terminal_rate(int descriptor);
 
-/// Restores saved settings after all written bytes have been sent. Errors are ignored: the port may have disappeared.
+/// Restores the saved settings of a terminal after all written bytes have been sent. Errors are ignored: the port may
+/// have disappeared.
 void restore_terminal(int descriptor, const TerminalState& state);
 
 /// Sets raw mode, 8 data bits, no flow control, and `settings`, after all written bytes have been sent. Returns the
-/// settings that the driver made of them, which may differ; nothing on error, with errno set.
+/// settings that the driver has applied, which may differ; nothing on error, with errno set.
 std::optional<LineSettings> set_terminal(int descriptor, const LineSettings& settings);
 
-/// Returns whether UARTs at the two rates understand each other: at most 1 % difference. (Each end may be 2 to 3 % off
-/// before a 10-bit character breaks; the encoder needs its share.)
+/// Returns whether `given` differs from `requested` by at most 1 %, so that UARTs at the two rates understand each
+/// other. (Each end may be 2 to 3 % off before a 10-bit character breaks; the encoder needs its share.)
 [[nodiscard]] constexpr bool rates_agree(std::uint32_t requested, std::uint32_t given) {
   const std::uint64_t difference = requested > given ? requested - given : given - requested;
   return difference * 100 <= requested;

@@ -7,9 +7,9 @@
 
 namespace absenc::os {
 
-/// One file per port in $RUNTIME_DIRECTORY, which systemd gives to a service, or else in $XDG_RUNTIME_DIR/absenc, from
-/// the constructor to the destructor. Without these folders, or if they cannot be written, there are no files: a
-/// program that opens the port then finds only the process that holds it.
+/// The files of one server: one file per port in $RUNTIME_DIRECTORY, which systemd gives to a service, or else in
+/// $XDG_RUNTIME_DIR/absenc, from the constructor to the destructor. Without these folders, or if they cannot be
+/// written, there are no files: a program that opens the port then finds only the process that holds it.
 class ServedPorts {
  public:
   /// `url` is the address of the server's page, for example "http://127.0.0.1:8420/".

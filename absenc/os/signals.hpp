@@ -12,7 +12,7 @@
 
 namespace absenc::os {
 
-/// Makes SIGINT and SIGTERM end the waits below, even if the parent process ignored them (as a shell does for
+/// Makes SIGINT and SIGTERM end every wait of this folder, even if the parent process ignored them (as a shell does for
 /// background programs). Call it early in main; further calls change nothing. Throws Failure.
 void catch_interrupts();
 
@@ -21,7 +21,7 @@ void catch_interrupts();
 
 /// Returns a descriptor that is readable after SIGINT or SIGTERM; -1 before `catch_interrupts`.
 [[nodiscard]] int interrupt_descriptor();
-/// Takes the signal out of the descriptor. Returns false if another thread has taken it.
+/// Takes a pending signal out of `interrupt_descriptor`. Returns false if another thread has taken it.
 bool take_interrupt();
 
 /// While an object exists, every longer wait of this thread calls `over` every 20 ms and throws Ended if it returns
@@ -34,9 +34,9 @@ class CancelCheck {
   CancelCheck(const CancelCheck&) = delete;
   CancelCheck& operator=(const CancelCheck&) = delete;
 
-  /// Returns how long a wait may take before it must call `check`; `never` if no object exists.
+  /// Returns how long a wait may take before it must call `check`; `never` if no CancelCheck exists in this thread.
   [[nodiscard]] static Time interval();
-  /// Calls `over`. Throws Ended if it returns true.
+  /// Calls `over` of the CancelCheck of this thread. Throws Ended if it returns true.
   static void check();
 
  private:
@@ -54,8 +54,8 @@ inline constexpr std::size_t most_watched = 32;
 /// code may wait again; throws Ended (CancelCheck) and Failure.
 bool wait_for(std::span<pollfd> watched, Time deadline);
 
-/// Sleeps until `time`: late by the kernel's timer slack (50 us) and scheduling, never early. Throws as `wait_for`
-/// does.
+/// Sleeps until `time`: may return late by the kernel's timer slack (50 us) and scheduling, never early. Throws as
+/// `wait_for` does.
 void sleep_until(Time time);
 
 /// Returns exactly at `time`, within one read of the clock: it polls the clock for the last 100 us. Throws as

@@ -13,20 +13,20 @@
 
 namespace absenc::os {
 
-/// CAN frames and adapter replies as lines over a byte port.
+/// The text lines of a CAN adapter over a byte port: frames and replies.
 class SlcanLine : public FramePort {
  protected:
   explicit SlcanLine(std::shared_ptr<Port<std::uint8_t>> bytes) : bytes_(std::move(bytes)) {}
 
   void write(Bytes text);
   void collect(Time deadline) final;
-  /// Collects until something is received or the deadline is reached. Returns whether something was received.
+  /// Calls `collect` until anything is received or `deadline` is reached. Returns whether anything was received.
   bool receives_until(Time deadline);
   /// Returns the time of the next event that does not depend on received bytes; `never` if none is due.
   [[nodiscard]] virtual Time due() const { return never; }
-  /// Handles the event of `due()` if its time is reached. Returns whether an event was pushed.
+  /// Handles the event that is due at `due()` if its time is reached. Returns whether an event was pushed.
   virtual bool reach(Time) { return false; }
-  /// Handles a line without its CR, a refusal, or garbage.
+  /// Handles a received line without its CR, a refusal by the adapter, or garbage.
   virtual void handle_line(slcan::LineReader::LineEvent line_event, Bytes line, Time at) = 0;
 
  private:
@@ -35,7 +35,7 @@ class SlcanLine : public FramePort {
   bool received_any_ = false;
 };
 
-/// A CAN adapter, opened at the bit rate of `settings` and closed at the end.
+/// A port on a CAN adapter, which is opened at the bit rate of `settings` and closed at the end.
 class SlcanPort final : public SlcanLine {
  public:
   /// `name` is for example "/dev/ttyACM0" and is used in messages. Throws Failure: `bad_rate` if the adapter does not
@@ -43,7 +43,7 @@ class SlcanPort final : public SlcanLine {
   SlcanPort(std::shared_ptr<Port<std::uint8_t>> bytes, std::string name, const LineSettings& settings);
   ~SlcanPort() override;
 
-  /// Returns hints about the adapter, one sentence each.
+  /// Returns hints to the user about the adapter, one sentence each.
   [[nodiscard]] const std::vector<std::string>& notes() const { return notes_; }
 
  private:
@@ -57,13 +57,13 @@ class SlcanPort final : public SlcanLine {
 
   std::string name_;
   std::vector<std::string> notes_;
-  bool awaiting_reply_ = false;  // a command is outstanding: the next line is its reply, not that of a frame
+  bool awaiting_reply_ = false;  // a command is outstanding: the next received line is its reply, not a frame
   Reply reply_ = Reply::none;
   unsigned garbage_ = 0;
 };
 
-/// Simulates an adapter: passes frames between the host and the device that is driven on this port, while the host has
-/// opened the adapter at the device's bit rate. Each frame takes its time on the bus. Frames that the host sends at
+/// A simulated CAN adapter: passes frames between the host and the device that is driven on this port, while the host
+/// has opened the adapter at the device's bit rate. Each frame takes its time on the bus. Frames that the host sends at
 /// once are queued, as many as an adapter can store; further frames are refused (BEL).
 class SlcanAdapter final : public SlcanLine {
  public:
@@ -95,7 +95,7 @@ class SlcanAdapter final : public SlcanLine {
   bool listen_only_ = false;
   bool with_time_ = false;
   std::deque<CanFrame> waiting_;  // queued frames of the host; the first one is on the bus
-  Time bus_free_{};               // end of the frame on the bus, or of the last one
+  Time bus_free_{};               // end of the frame that is on the bus or was there last
   std::uint64_t lost_ = 0;
   std::uint64_t overflowed_ = 0;
   std::uint64_t garbage_ = 0;

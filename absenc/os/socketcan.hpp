@@ -31,11 +31,12 @@ struct CanKernel {
 };
 [[nodiscard]] CanKernel& system_can_kernel();
 
-/// A CAN interface. Its bit rate is set by `ip link`, never here; virtual interfaces have none. Frames sent here are
-/// not received; those of other programs on the same interface are.
+/// A port on a CAN interface. The bit rate is set by `ip link`, never here; virtual interfaces have none. Frames sent
+/// here are not received; those of other programs on the same interface are.
 class SocketCan final : public FramePort {
  public:
-  /// Throws Failure, which states the command to type. `kernel` must outlive the port.
+  /// Opens the CAN interface `interface`. Throws Failure, whose text names the command to type. `kernel` must outlive
+  /// the port.
   explicit SocketCan(const std::string& interface, const LineSettings& settings,
                      CanKernel& kernel = system_can_kernel());
 
@@ -48,7 +49,7 @@ class SocketCan final : public FramePort {
   void set_options();
   void take(const can_frame& frame, Time at);
   void take_error(const can_frame& frame, Time at);
-  // A virtual interface has no bit rate: every rate is accepted.
+  // Returns whether the interface is virtual: then it has no bit rate and every rate is accepted.
   [[nodiscard]] bool is_virtual() const { return interface_.starts_with("vcan") || interface_.starts_with("vxcan"); }
   [[nodiscard]] std::string up_command(std::uint32_t rate) const;
   [[noreturn]] void fail(const std::string& what, int error) const;
@@ -60,7 +61,7 @@ class SocketCan final : public FramePort {
   Poller poller_;
 };
 
-/// Returns the CAN interfaces, "can0", "vcan0" and so on, sorted. `sys` is a parameter for tests.
+/// Returns the names of all CAN interfaces, "can0", "vcan0" and so on, sorted. `sys` is a parameter for tests.
 [[nodiscard]] std::vector<std::string> can_interfaces(const std::filesystem::path& sys = "/sys/class/net");
 
 }  // namespace absenc::os

@@ -12,45 +12,45 @@
 
 namespace absenc::os {
 
-/// A part of a message, like spidev's transfers.
+/// One transfer of an SPI message, as in spidev.
 struct SpiTransfer {
-  std::size_t size = 0;    // number of bytes; without both buffers nothing is clocked
-  Bytes out{};             // bytes of the host, `size` of them; empty: zeros are sent
-  MutableBytes in{};       // buffer for the device's bytes, `size` of them; empty: they are discarded
+  std::size_t size = 0;    // number of bytes of the transfer; without both buffers nothing is clocked
+  Bytes out{};             // bytes that the host sends, `size` of them; empty: zeros are sent
+  MutableBytes in{};       // buffer for the bytes of the device, `size` of them; empty: they are discarded
   std::uint32_t rate = 0;  // clock rate in Hz
   std::uint8_t mode = 0;   // 2 * CPOL + CPHA
   bool lsb_first = false;
-  Time delay{};           // pause behind the last bit
+  Time delay{};           // pause behind the last bit of the transfer
   bool deselect = false;  // deselects the chip behind `delay`; in the last transfer: the chip stays selected
 };
 
 /// One device machine behind a controller, simulated edge by edge in every SPI mode. A side that samples at an edge at
 /// which the other side shifts gets the old bit, and a bit that no side drives is 1. A whole message is processed in
-/// one call, with the future times of its parts; the caller must answer the program when that time is reached. For this
-/// reason it is no Port.
+/// one call, with the future times of its parts; the caller must answer the program when the time of its end is
+/// reached. For this reason SpiDevice is no Port.
 class SpiDevice {
  public:
   /// `kind` must be spi or clocked, otherwise throws std::invalid_argument. `device` must outlive this object.
   SpiDevice(LinkKind kind, const LineSettings& settings, Machine<std::uint8_t>& device);
 
-  /// Takes the device's first step, which every carrier does before the first event: the device may want a timer.
+  /// Takes the device's first step, as every port does before the first event: the device may request a timer.
   void begin(Time now) { run_device(now); }
-  /// Processes a message and returns the time of its end. On a clocked link a pause of the clock between two transfers
-  /// ends a word.
+  /// Processes an SPI message and returns the time of its end. On a clocked link a pause of the clock between two
+  /// transfers ends a word.
   Time message(std::span<const SpiTransfer> transfers, Time start);
 
   /// Sets the mode between two messages: until the next message the clock line rests at the idle level of this mode.
   void rest(std::uint8_t mode);
 
-  /// Returns the time at which `wake` must be called.
+  /// Returns the time at which `wake` must be called; `never` without a requested timer.
   [[nodiscard]] Time timer() const { return timer_; }
-  /// Reports the device's timer; does nothing before `timer()`.
+  /// Reports to the device that its timer has expired; does nothing before `timer()`.
   void wake(Time now);
 
   [[nodiscard]] const LineSettings& settings() const { return settings_; }
-  /// Returns the number of messages in which bits were clocked.
+  /// Returns the number of SPI messages in which bits were clocked.
   [[nodiscard]] std::uint64_t messages() const { return messages_; }
-  /// Returns the number of messages whose clock or sampling did not suit the device.
+  /// Returns the number of messages whose SPI mode did not suit the device.
   [[nodiscard]] std::uint64_t wrong_modes() const { return wrong_modes_; }
 
  private:
@@ -78,9 +78,9 @@ class SpiDevice {
   std::vector<std::uint8_t> received_;
   std::size_t clocks_ = 0;
   bool last_out_ = false;
-  Time period_{};  // shortest clock period of the frame
+  Time period_{};  // shortest clock period since the chip was selected
   Time selected_at_{};
-  Time lead_{};  // time to the first clock
+  Time lead_{};  // time from chip select to the first clock
 };
 
 }  // namespace absenc::os

@@ -19,9 +19,9 @@ namespace absenc::os {
 /// (os/cuse), so tests override these calls and see every request to the kernel.
 struct SpiKernel {
   virtual ~SpiKernel() = default;
-  /// Works like open(2) with O_RDWR: negative, with errno, on failure.
+  /// Opens `path` like open(2) with O_RDWR: returns a negative number, with errno set, on failure.
   virtual int open(const std::string& path);
-  /// Sends a request to the driver like ioctl(2).
+  /// Sends a request to the driver like ioctl(2), and returns its result.
   virtual int control(int descriptor, unsigned long request, void* argument);
 };
 [[nodiscard]] SpiKernel& system_kernel();
@@ -35,13 +35,13 @@ struct SpiChoice {
 /// A port on an SPI controller, locked against other programs that use locks. Every function throws Failure or
 /// Interrupted (os/signals.hpp).
 ///
-/// A transfer begins at `at`, never earlier, and `begin` blocks until it is over. On an `spi` link `expect` is the
-/// minimum number of bytes to receive; on a `clocked` link nothing is sent but clocks. A controller clocks whole bytes:
+/// A transfer begins at `at`, never earlier, and `begin` blocks until it is over. On an `spi` link the transfer
+/// receives at least `expect` bytes; on a `clocked` link nothing is sent but clocks. A controller clocks whole bytes:
 /// the first `bits` bits after `idle_clocks` are returned, and up to seven more clocks are given. `timer` is reported
 /// as by StreamPort.
 class SpiPort final : public Port<std::uint8_t> {
  public:
-  /// `path` is /dev/spidevB.C, `kind` spi or clocked. `kernel` must outlive the port.
+  /// Opens the controller at `path`, /dev/spidevB.C; `kind` spi or clocked. `kernel` must outlive the port.
   SpiPort(const std::string& path, LinkKind kind, const LineSettings& settings, const SpiChoice& choice = {},
           SpiKernel& kernel = system_kernel());
   SpiPort(const SpiPort&) = delete;
@@ -85,7 +85,7 @@ class SpiPort final : public Port<std::uint8_t> {
   bool idle_low_ = false;          // the data line was low before the first bit of a clocked transfer
 };
 
-/// Returns the controllers' chip selects, "/dev/spidev0.0" and so on, sorted. `sys` is a parameter for tests.
+/// Returns the chip selects of all SPI controllers, "/dev/spidev0.0" and so on, sorted. `sys` is a parameter for tests.
 [[nodiscard]] std::vector<std::string> spi_devices(const std::filesystem::path& sys = "/sys/class/spidev");
 
 }  // namespace absenc::os

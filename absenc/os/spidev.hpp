@@ -20,12 +20,12 @@ struct UserMemory {
 
 struct SpidevReply {
   int result = 0;  // return value of ioctl, read and write; negative: -errno
-  /// True if the request must be repeated, with the content of `in` and room for `out`, concatenated.
+  /// True if the program's request must be repeated, with the content of `in` and with room for `out`, concatenated.
   bool again = false;
   std::vector<UserMemory> in{};
   std::vector<UserMemory> out{};
-  std::vector<std::uint8_t> bytes{};  // content for the ranges in `out`
-  Time at{};                          // earliest time for the reply: the end of the message
+  std::vector<std::uint8_t> bytes{};  // content for the memory ranges in `out`
+  Time at{};                          // earliest time for the reply to the program: the end of its message
 };
 
 /// Settings of the controller and their possible values.
@@ -36,10 +36,10 @@ struct SpidevSettings {
   std::uint32_t mode_bits;  // mode flags that the controller supports
 };
 
-/// Implements Documentation/spi/spidev.rst with the kernel module's own limits. The controller sends words of 8 bits on
-/// one wire at every speed, and selects the chip as it is wired. It begins in mode 0, the default without an entry in
-/// the device tree. It never reads memory of the requesting program itself but returns the ranges that it needs, as the
-/// kernel requires of CUSE; tests read them by pointer.
+/// A simulated spidev device: implements Documentation/spi/spidev.rst with the kernel module's own limits. The
+/// controller sends words of 8 bits on one wire at every speed, and selects the chip as it is wired. It begins in mode
+/// 0, the default without an entry in the device tree. It never reads memory of the requesting program itself but
+/// returns the ranges that it needs, as the kernel requires of CUSE; tests read them by pointer.
 class Spidev {
  public:
   explicit Spidev(SpiDevice& device);
@@ -48,9 +48,9 @@ class Spidev {
   /// Closes the device; the last close resets the speed.
   void close();
 
-  /// Handles an ioctl. `in` is the content of the ranges `in` of the last reply, empty at first; `room` is the total
-  /// size of its ranges `out`. Errors: ENOTTY (no request of spidev), EINVAL, EMSGSIZE (more than 4096 bytes in a
-  /// direction, or more than 255 buffers).
+  /// Handles an ioctl. `in` is the content of the memory ranges `in` that the last SpidevReply requested, empty at
+  /// first; `room` is the total size of the ranges `out` of that reply. Errors: ENOTTY (no request of spidev), EINVAL,
+  /// EMSGSIZE (more than 4096 bytes in a direction, or more than 255 buffers).
   [[nodiscard]] SpidevReply control(unsigned long request, std::uint64_t address, Bytes in, std::size_t room, Time now);
   [[nodiscard]] SpidevReply read(std::size_t size, Time now);
   [[nodiscard]] SpidevReply write(Bytes bytes, Time now);

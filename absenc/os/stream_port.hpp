@@ -17,7 +17,7 @@
 
 namespace absenc::os {
 
-/// Base of all byte stream ports. Every function throws Failure, Interrupted (os/signals.hpp) or Ended.
+/// Base class of all byte stream ports. Every function throws Failure, Interrupted (os/signals.hpp) or Ended.
 ///
 /// A transfer begins at `at`, never earlier; `begin` blocks until then. `timer` is reported if the `at` of a wait was
 /// later than the last event and the last call of `now`.
@@ -61,14 +61,15 @@ class StreamPort : public Port<std::uint8_t> {
   /// Returns the end of the last transfer.
   [[nodiscard]] Time sent_at() const { return sent_at_; }
 
-  /// Returns the poller; the derived port adds its descriptors.
+  /// Returns the poller; a derived port adds its descriptors.
   [[nodiscard]] Poller& poller() { return poller_; }
-  /// Reads bytes from the ready descriptors, as many as fit; returns 0 if none of the events were bytes.
+  /// Reads bytes from the `ready` descriptors, as many as fit into `into`, and returns their number; 0 if no bytes were
+  /// received.
   virtual std::size_t read_some(MutableBytes into, std::span<const int> ready) = 0;
-  /// Returns how long this program may have been unable to read the bytes of `read_some`; 0 if unknown.
+  /// Returns how long this program may have been unable to read the bytes that `read_some` returned; 0 if unknown.
   virtual Time lateness() { return {}; }
   virtual void write_all(Bytes bytes) = 0;
-  /// Both throw `unsupported` unless overridden.
+  /// `drive` and `change_rate` throw Failure `unsupported` unless overridden.
   virtual void drive(ExtraWire wire, bool active);
   virtual void change_rate(std::uint32_t rate);
   /// Returns the duration of a pulse: `requested`, unless overridden.
@@ -90,12 +91,12 @@ class StreamPort : public Port<std::uint8_t> {
 
   Waiting<std::uint8_t> waiting_;
   Time sent_at_{};             // end of the last transfer
-  Time sent_late_{};           // the last transfer may have ended earlier by this time
+  Time sent_late_{};           // time by which the last transfer may have ended earlier
   bool sent_pending_ = false;  // `sent` is still to be reported
   std::array<std::uint8_t, 4096> buffer_;
 };
 
-/// A stream port on one descriptor for reading and writing. Its default latency is 0.
+/// A stream port on one descriptor that is read and written. Its default latency is 0.
 class DescriptorPort : public StreamPort {
  public:
   /// `name` is for example "the port /dev/ttyUSB0" and is used in messages. Makes the descriptor non-blocking.
@@ -112,7 +113,7 @@ class DescriptorPort : public StreamPort {
   std::size_t read_some(MutableBytes into, std::span<const int> ready) override;
   void write_all(Bytes bytes) override;
 
-  /// Throws the exception for `error`, a value of errno, or 0 for the end of the file.
+  /// Throws the exception for `error`: a value of errno, or 0 for the end of the stream.
   [[noreturn]] void fail(int error) const;
 
  private:

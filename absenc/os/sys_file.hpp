@@ -11,7 +11,7 @@
 
 namespace absenc::os {
 
-/// Returns the first line of the file; "" if the file does not exist.
+/// Returns the first line of the file at `path`; "" if the file does not exist.
 [[nodiscard]] inline std::string first_line(const std::filesystem::path& path) {
   std::ifstream file(path);
   std::string line;
@@ -19,7 +19,8 @@ namespace absenc::os {
   return line;
 }
 
-/// Returns the number at the beginning of the file; empty if there is none or it has more than 32 bits.
+/// Returns the number at the beginning of the file at `path`; empty if the file does not begin with a number or the
+/// number has more than 32 bits.
 [[nodiscard]] inline std::optional<std::uint32_t> first_number(const std::filesystem::path& path, int base = 10) {
   const std::string text = first_line(path);
   std::uint32_t number = 0;

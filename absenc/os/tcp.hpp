@@ -9,12 +9,12 @@
 
 namespace absenc::os {
 
-/// A TCP connection as a byte port. Its default latency is 200 ms. The server configures the line: configure and pulse
-/// steps throw `unsupported`.
+/// A port for bytes on a TCP connection. Its default latency is 200 ms. The server configures the line: configure and
+/// pulse steps throw `unsupported`.
 class TcpPort final : public DescriptorPort {
  public:
-  /// `host` is a name, an IPv4 or an IPv6 address, that one also in brackets. Tries every address of a name, for 3 s in
-  /// total. Throws Failure: `not_found`, `lost` (no connection in time), `system`.
+  /// Connects to `host`: a name, an IPv4 address, or an IPv6 address with or without brackets. Tries every address of a
+  /// name, for 3 s in total. Throws Failure: `not_found`, `lost` (no connection in time), `system`.
   TcpPort(const std::string& host, std::uint16_t port);
 
  private:

@@ -9,7 +9,7 @@
 
 namespace absenc::os {
 
-/// Identity from the descriptors of the USB device; missing ones are empty.
+/// Identity of a USB adapter, from its USB descriptors; a missing text is empty, a missing number 0.
 struct UsbAdapter {
   std::uint16_t vendor = 0;     // vendor number, from idVendor
   std::uint16_t product = 0;    // product number, from idProduct
@@ -22,15 +22,15 @@ struct UsbAdapter {
 /// A bridge chip between USB and UART.
 struct AdapterChip {
   std::string_view name;       // name of the chip, for example "FT232R"
-  std::uint32_t highest_rate;  // in bits per second, from its data sheet
+  std::uint32_t highest_rate;  // highest rate in bits per second, from the chip's data sheet
 };
 
-/// Reads the identity of the adapter behind a terminal ("ttyUSB0"); empty if it is not on USB. `sys` is a parameter for
-/// tests.
+/// Reads the identity of the adapter behind a terminal ("ttyUSB0"); empty if the terminal is not on USB. `sys` is a
+/// parameter for tests.
 [[nodiscard]] std::optional<UsbAdapter> usb_adapter(const std::string& terminal,
                                                     const std::filesystem::path& sys = "/sys/class/tty");
 
-/// Returns the chip of the adapter, or null if the numbers do not identify it.
+/// Returns the chip of `adapter`, or null if its identification numbers do not identify the chip.
 [[nodiscard]] const AdapterChip* chip_of(const UsbAdapter& adapter);
 
 }  // namespace absenc::os

@@ -20,7 +20,7 @@ class Waiting {
 
   Silence silence;
 
-  /// Returns the time known to the machine: that of `now` or of its last event.
+  /// Returns the time known to the machine: that of the last call of `now` or of the last event.
   [[nodiscard]] Time known_time() const { return known_time_; }
   Time now() { return known_time_ = os::now(); }
   /// Returns `event` and records its time as known to the machine: a timer later than this time is still to be
@@ -30,14 +30,14 @@ class Waiting {
     return event;
   }
 
-  /// Starts a wait with this step. A timer stays due if another event occurred at the same time and the machine
-  /// requests the timer again.
+  /// Starts a wait for the events that `step` requests. A timer stays due if another event occurred at the same time
+  /// and the machine requests the timer again.
   void begin(const Step<Item>& step, Time latency = {}) {
     timer_ = step.at > known_time_ || step.at == timer_ ? step.at : never;
     silence_ = silence.due(step.answer, step.gap, latency);
   }
   [[nodiscard]] Time due() const { return std::min(timer_, silence_); }
-  /// Returns the timer or silence event that is due at `time`, or nothing.
+  /// Returns the timer or silence event if its time is reached at `time`, or nothing.
   std::optional<Event<Item>> take_due(Time time) {
     using Kind = typename Event<Item>::Kind;
     if (time < due()) return {};
@@ -51,7 +51,7 @@ class Waiting {
 
  private:
   Time known_time_{};
-  Time timer_ = never;    // requested timer that was not reported yet
+  Time timer_ = never;    // time of the requested timer; `never` if it was reported or none is requested
   Time silence_ = never;  // time at which silence is due in this wait
 };
 

@@ -11,10 +11,10 @@
 
 namespace absenc::os {
 
-/// Sleeps for a millisecond again and again in its own thread, as long as the object exists.
+/// A measurement of late wake-ups: sleeps for a millisecond again and again in its own thread, as long as it exists.
 class WakeupWatch {
  public:
-  /// Returns the longest delay of a wake-up so far.
+  /// Returns the longest delay of a wake-up that was measured so far.
   [[nodiscard]] Time latest() const { return Time(latest_.load()); }
 
  private:

@@ -27,7 +27,7 @@ class Bus final : public Machine<std::uint8_t> {
  private:
   enum class SendState : std::uint8_t {
     waiting,
-    pending,  ///< has a transfer that has not begun
+    pending,  ///< the device has requested a transfer that has not begun
     sending,
     done,
   };
@@ -37,7 +37,7 @@ class Bus final : public Machine<std::uint8_t> {
     Step<std::uint8_t> wait{};        // last wait step of the device
     Time timer = never;               // time of the device's next `timer` event
     Time at{};                        // pending: time at which the transfer begins
-    std::vector<std::uint8_t> out{};  // pending, sending: the bytes of the transfer
+    std::vector<std::uint8_t> out{};  // pending, sending: bytes of the transfer
   };
 
   void report_sent(const Event<std::uint8_t>& event);

@@ -9,7 +9,8 @@
 
 namespace absenc::sim {
 
-/// Returns the bits from the start to the end of `frame`, with stuff bits and with the acknowledge bit of another node.
+/// Returns the bits of `frame` on the bus from its start to its end, with stuff bits and with the acknowledge bit of
+/// another node.
 [[nodiscard]] std::vector<bool> can_bits(const CanFrame& frame);
 
 /// Number of recessive bits between two frames.

@@ -14,10 +14,10 @@
 
 namespace absenc::sim {
 
-/// Kind of a fault of the device's end of the line.
+/// Kind of an injected fault.
 enum class FaultKind : std::uint8_t {
-  drop,             ///< one byte is lost
-  corrupt,          ///< 1 to 3 bits are flipped
+  drop,             ///< one byte of the reply is lost
+  corrupt,          ///< 1 to 3 bits of the reply are flipped
   truncate,         ///< the reply stops at a random byte, at least one byte is sent
   delay,            ///< the reply is sent late
   echo,             ///< the bytes of the request are sent before the reply
@@ -27,7 +27,7 @@ enum class FaultKind : std::uint8_t {
   request_corrupt,  ///< 1 to 3 bits of a byte that the device receives are flipped
 };
 
-/// Names of the faults.
+/// Names of the fault kinds, indexed by FaultKind.
 inline constexpr std::array<std::string_view, 9> fault_names{"drop",    "corrupt", "truncate", "delay",          "echo",
                                                              "garbage", "silence", "repeat",   "request_corrupt"};
 
@@ -36,33 +36,35 @@ using FaultCounts = std::array<std::uint64_t, fault_names.size()>;
 
 /// Probability of each fault, 0 to 1 per reply; `request_corrupt` per byte (CAN: per frame) received.
 struct FaultRates {
-  /// Probability of each fault for each place where it can happen, 0 to 1.
+  /// Probability of each fault, 0 to 1, indexed by FaultKind.
   std::array<double, fault_names.size()> rates{};
   Time delay = std::chrono::microseconds(200);  ///< additional delay of a late reply
 
-  /// Returns the probability of a fault.
+  /// Returns the probability of faults of this kind; a reference that can be assigned to.
   constexpr double& operator[](FaultKind kind) { return rates[static_cast<std::size_t>(kind)]; }
-  /// Returns the probability of a fault.
+  /// Returns the probability of faults of this kind, 0 to 1.
   constexpr double operator[](FaultKind kind) const { return rates[static_cast<std::size_t>(kind)]; }
 };
 
-/// A fault with its probability.
+/// A kind of fault with its probability.
 struct FaultRate {
-  FaultKind kind;  ///< The fault.
-  double rate;     ///< Its probability, 0 to 1.
+  FaultKind kind;  ///< Kind of the fault.
+  double rate;     ///< Probability of the fault, 0 to 1.
 };
 
-/// Parses `corrupt=0.01`. Throws std::invalid_argument with a sentence that names the known kinds or the allowed range.
+/// Parses text like `corrupt=0.01`. Throws std::invalid_argument with a sentence that names the known kinds or the
+/// allowed range.
 [[nodiscard]] FaultRate parse_fault(std::string_view text);
 
-/// A machine between the line and a device machine; `device` must outlive it. The same seed gives the same faults.
+/// A machine between a line and a device machine that injects faults. The device must outlive it. The same seed gives
+/// the same faults.
 ///
 /// On character links whole replies are damaged, on clocked links the bits that the device drives. A reply that a fault
 /// makes longer or later does not follow the device's own timing. Until it is sent, the device receives nothing (like a
 /// real one), so it does not report a protocol violation by the host.
 class FaultyDevice final : public Machine<std::uint8_t> {
  public:
-  /// Puts faults between `device` and its line. The same seed gives the same faults.
+  /// Injects faults between `device` and its line. The same seed gives the same faults.
   FaultyDevice(Machine<std::uint8_t>& device, const FaultRates& rates, std::uint64_t seed);
 
   /// Processes an event that the port reports.
@@ -70,11 +72,11 @@ class FaultyDevice final : public Machine<std::uint8_t> {
   /// Returns the next step that the port must carry out.
   Step<std::uint8_t> next(Time now) override;
 
-  /// Sets the rates, from the next reply on.
+  /// Sets the probabilities of faults, from the next reply on.
   void set_rates(const FaultRates& rates) { rates_ = rates; }
   /// Returns the number of injected faults of this kind.
   [[nodiscard]] std::uint64_t count(FaultKind kind) const { return counts_[static_cast<std::size_t>(kind)]; }
-  /// Returns how often each fault happened.
+  /// Returns the number of injected faults of each kind, indexed by FaultKind.
   [[nodiscard]] const FaultCounts& counts() const { return counts_; }
   /// Returns the number of replies with at least one fault.
   [[nodiscard]] std::uint64_t damaged_replies() const { return damaged_replies_; }

@@ -8,13 +8,13 @@
 
 namespace absenc::sim {
 
-/// A machine between the CAN bus and a device; `device` must outlive it. The faults are those of FaultRates with a
-/// frame in place of a reply: `drop` removes the last byte of a frame, `truncate` any number of bytes, `echo` sends the
-/// last received frame, `garbage` sends a frame of random identifier and data first. On a real bus the CAN checksum
-/// would discard frames damaged on the wire: these faults model a node with faulty software.
+/// A machine between a CAN bus and a device that injects faults. The device must outlive it. The faults are those of
+/// FaultRates with a frame in place of a reply: `drop` removes the last byte of a frame, `truncate` any number of
+/// bytes, `echo` sends the last received frame, `garbage` sends a frame of random identifier and data first. On a real
+/// bus the CAN checksum would discard frames damaged on the wire: these faults model a node with faulty software.
 class FaultyNode final : public Machine<CanFrame> {
  public:
-  /// Puts faults between `device` and its bus. The same seed gives the same faults.
+  /// Injects faults between `device` and its bus. The same seed gives the same faults.
   FaultyNode(Machine<CanFrame>& device, const FaultRates& rates, std::uint64_t seed);
 
   /// Processes an event that the port reports.
@@ -22,9 +22,9 @@ class FaultyNode final : public Machine<CanFrame> {
   /// Returns the next step that the port must carry out.
   Step<CanFrame> next(Time now) override;
 
-  /// Sets the rates, from the next frame on.
+  /// Sets the probabilities of faults, from the next frame on.
   void set_rates(const FaultRates& rates) { rates_ = rates; }
-  /// Returns the number of injected faults of each kind.
+  /// Returns the number of injected faults of each kind, indexed by FaultKind.
   [[nodiscard]] const FaultCounts& counts() const { return counts_; }
   /// Returns the number of frames with at least one fault.
   [[nodiscard]] std::uint64_t damaged_frames() const { return damaged_; }

@@ -27,7 +27,7 @@ class FrameBus final : public Machine<CanFrame> {
  private:
   enum class SendState : std::uint8_t {
     waiting,
-    pending,  ///< has a frame that has not begun
+    pending,  ///< the node has requested a frame that has not begun
     sending,
     done,
   };

@@ -16,11 +16,11 @@ namespace absenc::sim {
 /// Whether a node is host or device.
 enum class NodeRole : std::uint8_t { host, device };
 
-/// One shared line. Hosts and devices are machines of the same kind; the role only decides who drives the clock (SPI,
-/// clocked) and the pulses, and which pair a full-duplex node drives.
+/// One shared line with the machines on it. Hosts and devices are machines of the same kind; the role only decides who
+/// drives the clock (SPI, clocked) and the pulses, and which pair a full-duplex node drives.
 ///
-/// Characters that overlap on one pair reach every receiver as the AND of both (an idle line is high); a receiver sees
-/// those that begin during another character as part of that one. CAN frames are arbitrated by identifier; the same
+/// Characters that overlap on one pair reach every receiver as the AND of both (an idle line is high); a character that
+/// begins during another one is received as part of that other one. CAN frames are arbitrated by identifier; the same
 /// identifier with other data is a `line_error` for every node. A node receives its own characters only with
 /// `set_echo`, then before their `sent`. A machine that begins a transfer during another one of its own causes a
 /// std::logic_error.
@@ -29,7 +29,7 @@ class Line {
  public:
   /// Index of a machine on the line.
   using Node = std::size_t;
-  /// Called at an `emit` step. Returns whether the node continues; false: it is treated as done.
+  /// Called at an `emit` step of a machine. Returns whether the machine continues; false: it is treated as done.
   using OnEmit = std::function<bool()>;
   /// Called at the end of every character or CAN frame on the wire.
   using Observer = std::function<void(Node sender, Time start, Time end, const Item& item)>;
@@ -37,12 +37,12 @@ class Line {
   /// left-aligned. `lead` is the time from `start`, when the chip was selected, to the first clock.
   struct Transfer {
     Time start;                 ///< Time of the first bit.
-    Time end;                   ///< Time after the last bit.
-    std::size_t bits;           ///< Number of bits; 0: whole items.
+    Time end;                   ///< End of the last bit.
+    std::size_t bits;           ///< clocked: number of clocks; 0: whole items
     std::span<const Item> out;  ///< Items that the host sent.
     std::span<const Item> in;   ///< Items that the host received.
     Time lead{};                ///< Time from chip select to the first clock.
-    Time held_low = never;  ///< clocked: time from which the clock line was held low before `start`; never: it was idle
+    Time held_low = never;  ///< clocked: time from which the clock line was held low before `start`; never: it was not
     Time low_after{};       ///< clocked: time for which the device drives the data line low after the last clock edge
   };
   /// Called at the end of every transfer of SPI bytes or clocked bits.
@@ -50,7 +50,7 @@ class Line {
   /// Called at the beginning of every pulse.
   using PulseObserver = std::function<void(ExtraWire wire, Time start, Time end)>;
 
-  /// Makes a line without machines.
+  /// Makes a line without machines on it.
   Line(LinkKind kind, LineSettings settings);
   ~Line();
   Line(const Line&) = delete;
@@ -58,9 +58,9 @@ class Line {
 
   /// Attaches a machine and takes its first step at once. `machine` must outlive the line or be replaced.
   Node attach(NodeRole role, Machine<Item>& machine, const OnEmit& on_emit = {});
-  /// Gives the node another machine, from now on. A transfer of the old machine is cut off.
+  /// Replaces the machine of `node`, from now on. A transfer of the old machine is cut off.
   void replace(Node node, Machine<Item>& machine);
-  /// Takes the machine's next step, after something other than an event has changed it.
+  /// Takes the next step of the node's machine, after something other than an event has changed the machine.
   void wake(Node node);
   /// Sets whether a node receives what it sends.
   void set_echo(Node node, bool echo);
@@ -79,7 +79,7 @@ class Line {
   [[nodiscard]] bool done(Node node) const;
   /// Returns the time before which all items that began were reported to the observers.
   [[nodiscard]] Time settled() const;
-  /// Returns the time of the next event, or `never`.
+  /// Returns the time of the next scheduled event, or `never` if none is scheduled.
   [[nodiscard]] Time next_event() const;
 
   /// Handles the next event and advances `now` to it. Returns false if no event is scheduled.

@@ -10,51 +10,51 @@
 
 namespace absenc::sim {
 
-/// Returns the level of two senders at once: 0 wins.
+/// Returns the character on a line that two senders drive at once: 0 bits win.
 [[nodiscard]] inline std::uint8_t combine(std::uint8_t a, std::uint8_t b) { return a & b; }
-/// Returns the frame of two senders at once.
+/// Returns `a`: arbitration leaves only one sender of a CAN frame, so frames are never combined.
 [[nodiscard]] inline CanFrame combine(const CanFrame& a, const CanFrame&) { return a; }
 
-/// State of one node.
+/// State of one node of a line.
 template <class Item>
 struct Line<Item>::State {
-  NodeRole role{};                   ///< Whether it is host or device.
-  Machine<Item>* machine = nullptr;  ///< The machine.
-  OnEmit on_emit;                    ///< Called for what the machine emits.
-  LineSettings settings{};           ///< Settings of its port.
-  bool echo = false;                 ///< Whether it receives what it sends.
-  bool done = false;                 ///< Whether the machine has ended.
+  NodeRole role{};                   ///< Whether the node is host or device.
+  Machine<Item>* machine = nullptr;  ///< Machine of the node.
+  OnEmit on_emit;                    ///< Function that is called at each `emit` step of the machine.
+  LineSettings settings{};           ///< Settings of the node's end of the line.
+  bool echo = false;                 ///< Whether the node receives its own characters.
+  bool done = false;                 ///< Whether the machine of the node has ended.
 
   Step<Item> waiting{};    ///< last wait step of the machine
   Time timer_due = never;  ///< time of `timer` in the last wait step, `never` once it was reported
-  Silence silence;         ///< Time without an item, for its limits.
+  Silence silence;         ///< Silence timer of the node.
   Time due = never;        ///< time of the next `timer` or `silence` event
 
   /// The sender whose character this node's receiver is synchronised to; a character that begins before its end is not
   /// received separately.
   Node framed_sender = 0;
-  Time framed_from = never;  ///< Time at which its frame begins.
-  Time framed_until{};       ///< Time at which its frame ends.
+  Time framed_from = never;  ///< Time at which the character of `framed_sender` begins.
+  Time framed_until{};       ///< Time at which the character of `framed_sender` ends.
 
   typename Step<Item>::Kind active_step = Step<Item>::Kind::wait;  ///< kind of the transfer or pulse that is pending or
                                                                    ///< in progress
   std::uint64_t begin_generation = 0;                              ///< number of transfers and pulses so far
   bool begun = false;              ///< false while the transfer's `at` lies in the future
-  std::vector<Item> out;           ///< Items that it sends.
-  std::size_t bits = 0;            ///< Number of bits that it sends.
-  std::size_t expect = 0;          ///< Number of items that it expects.
-  Time width{};                    ///< Duration of a pulse.
+  std::vector<Item> out;           ///< items of the transfer that the node sends
+  std::size_t bits = 0;            ///< clocked: number of bits of the transfer
+  std::size_t expect = 0;          ///< number of items that the node expects
+  Time width{};                    ///< duration of the pulse
   std::uint8_t behind_out = 0xFF;  ///< clocked link: byte that the host samples after `out` has ended
   bool hold_low = false;           ///< clocked: the host holds the clock line low before the transfer
   Time accepted_at{};              ///< time at which the machine requested the transfer
   Time lead{};                     ///< spi: time from chip select to the first clock
-  ExtraWire pulse_wire{};          ///< Wire of a pulse.
+  ExtraWire pulse_wire{};          ///< wire of the pulse
   Time start{};                    ///< start of the transfer; CAN: start of the frame
-  std::size_t index = 0;           ///< index of the item on the wire
+  std::size_t index = 0;           ///< index of the item of `out` that is on the wire
   std::size_t on_wire = 0;         ///< number of items of `out` that have been, are or will be on the wire
   Time each{};                     ///< duration of one character
 
-  /// Returns whether its frame has not ended.
+  /// Returns whether a transfer of this node has begun and not ended.
   [[nodiscard]] bool frame_pending() const {
     return active_step == Step<Item>::Kind::transfer && begun && index < out.size();
   }

@@ -12,14 +12,14 @@
 
 namespace absenc::sim {
 
-/// A shaft motion as a value: copies move alike and independently. Positions are in 2^-32 revolution and have no error
-/// that grows with time. After 2^31 revolutions the position wraps.
+/// The motion of a shaft, as a value: copies move alike and independently. Positions are in 2^-32 revolution and have
+/// no error that grows with time. After 2^31 revolutions the position wraps.
 class Motion final : public Shaft {
  public:
   /// A point of a path: position of the shaft at `time`, relative to the start position.
   struct Knot {
-    Time time;              ///< Time of the knot.
-    std::int64_t position;  ///< Position, unit 2^-32 revolution.
+    Time time;              ///< time of the point
+    std::int64_t position;  ///< position relative to the start position, unit 2^-32 revolution
   };
 
   /// Returns a shaft that stands at `start`, unit 2^-32 revolution.
@@ -71,7 +71,7 @@ class Motion final : public Shaft {
 };
 
 /// Parses `still`, `rpm=R`, `sine=DEGREES,HZ` or `file=CSV` (the file is opened and read here). Throws
-/// std::invalid_argument with a sentence that says what is wrong and what is allowed.
+/// std::invalid_argument with a sentence that states the mistake and the allowed values.
 [[nodiscard]] Motion parse_motion(std::string_view text, std::int64_t start_position);
 
 }  // namespace absenc::sim

@@ -7,10 +7,10 @@
 
 namespace absenc::sim {
 
-/// Pseudo-random numbers; not for secrets.
+/// A generator of pseudo-random numbers; not for secrets.
 class Random {
  public:
-  /// Begins a sequence; the same seed gives the same numbers.
+  /// Makes a generator; the same seed gives the same numbers.
   explicit constexpr Random(std::uint64_t seed) : state_(seed) {}
 
   /// Returns 64 random bits.
@@ -31,7 +31,7 @@ class Random {
     return value % limit;
   }
 
-  /// Returns true with this probability: 0 never, 1 always.
+  /// Returns true with the given probability: 0 never, 1 always.
   constexpr bool chance(double probability) { return static_cast<double>(next() >> 11) * 0x1p-53 < probability; }
 
  private:

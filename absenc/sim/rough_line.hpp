@@ -33,17 +33,17 @@ struct RoughCounts {
   std::uint64_t late = 0;      ///< Replies that arrived late.
 };
 
-/// A damaged line that is faster than Line, which moves single characters; use Line for collisions or single
-/// characters. A frame arrives in one piece at its end; if the ends have different rates it arrives as a `line_error`.
-/// On CAN the controllers check: a damaged frame is a `line_error`. Clocked and SPI links have no late frames and only
-/// one rate.
+/// A line with damage at random. It is simulated faster than Line, which moves single characters; use Line for
+/// collisions or single characters. A frame arrives in one piece at its end; if the ends have different rates it
+/// arrives as a `line_error`. On CAN the controllers check: a damaged frame is a `line_error`. Clocked and SPI links
+/// have no late frames and only one rate.
 template <class Item>
 class RoughLine final : public Port<Item> {
  public:
-  /// `device` must outlive the line. The same seed gives the same faults.
+  /// Makes a line to `device`, which must outlive it. The same seed gives the same faults.
   RoughLine(LinkKind kind, LineSettings settings, Machine<Item>& device, std::uint64_t seed);
 
-  /// Sets the rates, from the next frame on.
+  /// Sets the probabilities of damage, from the next frame on.
   void set_rates(const RoughRates& rates);
 
   [[nodiscard]] Time now() override;
@@ -55,15 +55,15 @@ class RoughLine final : public Port<Item> {
   /// Discards frames that have arrived but were not reported, like a host that reads only the newest frame.
   void drop();
 
-  /// Marks all frames sent so far as old.
+  /// Marks all frames that the device has sent so far as old.
   void mark();
   /// Returns the send time of each old frame that was reported to the host since `mark`.
   [[nodiscard]] std::span<const Time> old_frames() const { return old_; }
-  /// Returns how often each disturbance happened.
+  /// Returns the counts of disturbances so far.
   [[nodiscard]] const RoughCounts& counts() const { return counts_; }
-  /// Return the last request, and the device's reply to it (of any length) before it was damaged.
+  /// Returns the last request of the host.
   [[nodiscard]] std::span<const Item> request() const { return request_; }
-  /// Returns the reply of the device before it was damaged.
+  /// Returns the last reply of the device, of any length, before it was damaged.
   [[nodiscard]] std::span<const Item> reply() const { return out_; }
   /// Returns the number of bits of the last transfer on a clocked link.
   [[nodiscard]] std::size_t bits() const { return bits_; }

@@ -11,29 +11,31 @@
 
 namespace absenc::sim {
 
-/// Holds virtual time to a clock of the caller's choice. If both functions are empty, time jumps from event to event.
+/// A clock of the caller's choice that virtual time follows. If both functions are empty, time jumps from event to
+/// event.
 struct RealTime {
-  /// Returns the time of the computer.
+  /// Function that returns the time of the clock.
   std::function<Time()> now;
-  /// Sleeps until the given time. May return early, and may throw to end a wait.
+  /// Function that sleeps until the given time of the clock. May return early, and may throw to end a wait.
   std::function<void(Time)> sleep_until;
 };
 
-/// A private line with one device on it. Times are virtual, start at 0 when the port is made and are exact to the
-/// nanosecond. With a RealTime they follow its clock, also when the caller is late.
+/// A port at the host's end of a private line with one device. Times are virtual, start at 0 when the port is made and
+/// are exact to the nanosecond. With a RealTime they follow its clock, also when the caller is late.
 template <class Item>
 class SimPort final : public Port<Item> {
  public:
-  /// `device` must outlive the port.
+  /// Makes a line to `device`, which must outlive the port.
   SimPort(LinkKind kind, LineSettings settings, Machine<Item>& device, RealTime real_time = {});
 
   [[nodiscard]] Time now() override;
-  /// A transfer or pulse that begins during an abandoned one waits until that one has been sent.
+  /// Begins a step. A transfer or pulse that begins during an abandoned one waits until the abandoned one has been
+  /// sent.
   void begin(const Step<Item>& step) override;
-  /// Without a RealTime, throws std::logic_error if no event can ever end the wait.
+  /// Blocks until the next event. Without a RealTime, throws std::logic_error if no event can ever end the wait.
   [[nodiscard]] Event<Item> wait(const Step<Item>& step) override;
 
-  /// Returns the line, so that callers can observe it.
+  /// Returns the simulated line, so that callers can observe it.
   [[nodiscard]] Line<Item>& line() { return line_; }
 
   /// Sets whether the host receives what it sends.

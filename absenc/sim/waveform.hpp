@@ -15,23 +15,23 @@
 
 namespace absenc::sim {
 
-/// Draws the items that are passed to it or that it observes on a line, with logic levels: an idle line and a mark are
-/// 1. It stores only changes that are not settled yet: characters of two pairs overlap, and files need their times in
-/// order.
+/// A drawing of the wires of a line: draws the items that are passed to it or that it observes, with logic levels: an
+/// idle line and a mark are 1. It stores only changes that are not settled yet: characters of two pairs overlap, and
+/// files need their times in order.
 ///
 /// - half duplex: `line`; full duplex: `host` and `device`, named by the sender that drives the pair
 /// - additional wires after the first pulse: `trigger`, `clear`, which a pulse pulls to 0
 /// - spi: `cs`, `sck`, `mosi`, `miso`; `miso` is 1 while no device drives it
 /// - clocked: `clock`, idle high, and `data`, which changes at its rising edges. The host samples each bit at the next
-///   falling edge. `idle_clocks` adds as many clocks before the first bit. After the last edge the device may hold
-///   `data` low: the timeout of BiSS, the monoflop of SSI.
+/// falling edge. `idle_clocks` adds as many clocks before the first bit. After the last edge the device may hold
+/// `data` low: the timeout of BiSS, the monoflop of SSI.
 /// - CAN: `can`, recessive is 1; every frame is acknowledged
 class Waveform {
  public:
-  /// A wire of a waveform.
+  /// A wire of a waveform, for example `clock`.
   struct Wire {
-    std::string_view name;  ///< Name of the wire.
-    bool idle;              ///< the level before the first change
+    std::string_view name;  ///< name of the wire
+    bool idle;              ///< level of the wire before its first change
   };
   /// Receives level changes and comments in the order of time, as soon as their order is known.
   struct Sink {
@@ -44,13 +44,13 @@ class Waveform {
     ~Sink() = default;
   };
 
-  /// `sink` must outlive the waveform.
+  /// Makes a waveform without items. `sink` must outlive it.
   Waveform(LinkKind kind, const LineSettings& settings, Sink& sink);
 
-  /// Draws everything on `line`, of the same kind and settings, from now on. Replaces the line's observers; must
-  /// outlive the line.
+  /// Draws all items on `line`, of the same kind and settings, from now on. Replaces the observers of the line; the
+  /// waveform must outlive the line.
   void observe(Line<std::uint8_t>& line);
-  /// Draws what happens on the line.
+  /// Draws all frames on `line`, of the same settings, from now on. Replaces the observers of the line.
   void observe(Line<CanFrame>& line);
 
   /// Draws one asynchronous character.
@@ -62,14 +62,14 @@ class Waveform {
   /// Draws a pulse on an extra wire.
   void pulse(ExtraWire wire, Time start, Time end);
 
-  /// Passes everything before `time` to the sink. No item drawn later may begin before `time`.
+  /// Passes all changes and comments before `time` to the sink. No item drawn later may begin before `time`.
   void settle(Time time);
-  /// Passes everything to the sink.
+  /// Passes all remaining changes and comments to the sink.
   void finish() { settle(never); }
 
-  /// Returns the wires; those of pulses are added by the first pulse.
+  /// Returns the wires; extra wires are added when their first pulse is drawn.
   [[nodiscard]] const std::vector<Wire>& wires() const { return wires_; }
-  /// Returns the end of the last item.
+  /// Returns the end of the last drawn item.
   [[nodiscard]] Time end() const { return end_; }
 
  private:

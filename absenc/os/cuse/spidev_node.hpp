@@ -25,8 +25,8 @@ class SpidevNode {
 
   [[nodiscard]] const std::string& path() const { return path_; }
 
-  /// Answers requests of programs until `end`, one message at a time and each at its end. Throws as `wait_for`
-  /// (os/signals.hpp), and Failure if the kernel removes the device.
+  /// Answers requests of programs until `end`, one SPI message at a time, each when the message has ended. Throws as
+  /// `wait_for` (os/signals.hpp), and Failure if the kernel removes the device.
   void serve(Time end = never);
 
  private:
@@ -48,7 +48,7 @@ class SpidevNode {
   Spidev* spidev_;
   std::string path_;
   bool made_ = false;
-  std::optional<Pending> pending_;  // request that is answered when its message is over
+  std::optional<Pending> pending_;  // request of a program that is answered when its SPI message is over
   std::unique_ptr<fuse_session, CloseSession> session_;
 };
 
