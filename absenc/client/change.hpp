@@ -13,7 +13,7 @@
 
 namespace absenc::client {
 
-/// How far a change of the encoder came.
+/// Whether a change of the encoder was made, as far as it is known.
 enum class ChangeState : std::uint8_t {
   none,       ///< the command changes no encoder
   not_sent,   ///< no request was sent, so the encoder is unchanged
@@ -25,41 +25,43 @@ enum class ChangeState : std::uint8_t {
 /// Returns "not_sent", "confirmed", "refused" or "unknown"; "" for `none`.
 [[nodiscard]] std::string_view word_of(ChangeState state);
 
-/// State of a change of the encoder, with the advice that follows from it.
+/// State of a change of the encoder, with advice for the user.
 struct Change {
-  ChangeState state = ChangeState::none;  ///< Whether the encoder was changed.
+  ChangeState state = ChangeState::none;  ///< Whether the encoder was changed, as far as it is known.
   std::string
-      /// For `unknown`, how to find out the state of the encoder; for `confirmed`, the address from now on; or "".
+      /// For `unknown`, how to find out the state of the encoder; for `confirmed`, the encoder's new address; "": no
+      /// advice.
       advice{};
 
-  std::string note{};  ///< Reason why the journal has no entry of this change, or "".
+  std::string note{};  ///< Reason why the journal has no entry of this change; "": the journal has it, or needs none.
 
-  /// Returns the sentence, as "sent, result unknown: ADVICE; NOTE"; "" for `none`.
+  /// Returns state, advice and note in one sentence, as "sent, result unknown: ADVICE; NOTE"; "" for `none`.
   [[nodiscard]] std::string text() const;
 };
 
-/// Returns the text of a failure with the change on a line of its own.
+/// Returns `what`, the text of a failure, followed by the sentence of the change on a line of its own.
 [[nodiscard]] std::string with_change(std::string_view what, const Change& change);
 
 /// The part of an exception that carries the state of a change.
 struct Changing {
-  /// Adds the state of the change to an exception.
+  /// Carries `what_became`, the change and its state.
   explicit Changing(Change what_became) : change(std::move(what_became)) {}
   virtual ~Changing() = default;
   Change change;  ///< The change and its state when the exception was thrown.
 };
 
-/// An exception of a command that changes the encoder. Handlers of `Base` catch it.
+/// An exception of a command that changes the encoder: `Base` with the state of the change. Handlers of `Base` catch
+/// it.
 template <class Base>
 class OfChange final : public Base, public Changing {
  public:
-  /// `text` is the whole text, as `with_change` returns it.
+  /// Copies `failure`. `text` is the whole text of the exception, as `with_change` returns it.
   OfChange(const Base& failure, std::string text, Change what_became)
       : Base(failure), Changing(std::move(what_became)), text_(std::move(text)) {}
-  /// Takes the text of `failure` and adds that of the change.
+  /// Copies `failure` and adds the sentence of the change to its text.
   OfChange(const Base& failure, const Change& what_became)
       : OfChange(failure, with_change(failure.what(), what_became), what_became) {}
-  /// Returns the text of the failure, followed by that of the change.
+  /// Returns the text of the failure, followed by the sentence of the change.
   [[nodiscard]] const char* what() const noexcept override { return text_.c_str(); }
 
  private:
@@ -73,7 +75,8 @@ class OfChange final : public Base, public Changing {
 /// in a catch block.
 [[noreturn]] void rethrow_with(const Change& change);
 
-/// Runs `work`, which sends nothing that changes the encoder. Marks its exceptions as `not_sent`.
+/// Runs `work`, which sends nothing that changes the encoder, and returns its result. Marks its exceptions as
+/// `not_sent`.
 template <class Work>
 auto before_change(const Work& work) {
   try {

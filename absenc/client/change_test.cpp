@@ -25,7 +25,7 @@ namespace {
 using Values = std::vector<std::int64_t>;
 using Stored = std::vector<std::uint8_t>;
 
-/// Fails after `left` steps, like a port whose adapter is unplugged.
+/// A port that fails after `left` steps, as if its adapter were unplugged.
 template <class Item>
 class BreakingPort final : public Port<Item> {
  public:
@@ -78,7 +78,8 @@ Stored stored(VirtualDevice& device) {
   return one.bytes != nullptr ? of(one.bytes->memory()) : of(one.frames->memory());
 }
 
-/// Runs a command. The port fails after `steps` steps; without a value it does not fail.
+/// Runs a command on a virtual encoder and returns its end. The port fails after `steps` steps; without `steps` the
+/// port does not fail.
 Ended run(const std::string& address, const Command& command, const Values& values,
           std::optional<std::size_t> steps = {}) {
   VirtualDevice* device = nullptr;
@@ -108,8 +109,8 @@ Ended run(const std::string& address, const Command& command, const Values& valu
   return ended;
 }
 
-/// Returns arguments with which the command changes something on a good line. Returns nothing if it needs options that
-/// only its installation knows.
+/// Returns arguments with which the command changes something on a good line. Returns nothing if the command needs
+/// options that depend on the encoder's installation.
 std::optional<Values> working_values(const Unit& unit, const Command& command) {
   std::vector<Values> candidates;
   for (const std::int64_t wanted : {INT64_MAX, std::int64_t{2}, std::int64_t{3}, std::int64_t{90}, INT64_MIN}) {
@@ -170,7 +171,7 @@ void require_truth(const Ended& ended, const Ended& good, const std::string& wha
   }
 }
 
-// Counts the steps that a command takes at the port until it ends well.
+// Returns the number of steps that the command takes at the port until it ends well.
 std::size_t steps_of(const std::string& address, const Command& command, const Values& values) {
   std::size_t most = 64;
   while (run(address, command, values, most).thrown) most *= 2;
@@ -211,7 +212,7 @@ TEST_P(EveryUnit, ReportedChangeMatchesMemoryUnderFaults) {
     const std::string address = fmt::format("sim:{}?singleturn=77", unit.id);
     const Ended good = run(address, command, values);
     for (const std::string_view fault : sim::fault_names) {
-      // A CAN controller drops frames whose CRC is wrong.
+      // Skips this fault on CAN: a CAN controller drops frames whose CRC is wrong.
       if (unit.link == LinkKind::can && fault.ends_with("corrupt")) continue;
       for (const double rate : {0.1, 0.4, 1.0}) {
         for (unsigned seed = 1; seed <= test_cases(5); ++seed) {

@@ -12,29 +12,29 @@
 
 namespace absenc::client {
 
-/// Whether the encoder, or a host, complies with a clause.
+/// Verdict on whether the encoder, or a host, complies with a clause.
 enum class Verdict : std::uint8_t {
   kept,      ///< the tested behaviour was observed, and the clause was satisfied
   broken,    ///< the tested behaviour was observed, and the clause was violated
   untested,  ///< the tested behaviour was not observed
 };
 
-/// Result of one clause of a document.
+/// Result of the test of one clause of a document.
 struct ClauseResult {
-  std::string_view id{};         ///< Name of the clause, as "crc".
-  std::string_view document{};   ///< Name of the document.
-  std::string_view paragraph{};  ///< Paragraph of the document.
-  std::string_view words{};      ///< The requirement in words.
-  Verdict verdict{};             ///< Whether the encoder complies.
-  std::string evidence{};        ///< What was observed and how often, or why nothing was.
+  std::string_view id{};         ///< Identifier of the clause, as "crc".
+  std::string_view document{};   ///< Name of the document that contains the clause.
+  std::string_view paragraph{};  ///< Paragraph of the document that contains the clause.
+  std::string_view words{};      ///< Requirement of the clause, in words.
+  Verdict verdict{};             ///< Whether the encoder or the host complies with the clause.
+  std::string evidence{};        ///< What was observed and how often; if the clause is untested, the reason.
 };
 
-/// Results of all clauses of a unit.
+/// Results of all clauses of a unit that were tested.
 struct Conformance {
   std::string protocol{};               ///< Identifier of the unit.
   std::vector<ClauseResult> clauses{};  ///< Results in the order of the unit's clauses.
-  /// Commands with which the user restores values that could not be restored. If there are any, the encoder is left
-  /// changed.
+  /// Commands with which the user restores values that the test changed and could not restore. If there are any, the
+  /// encoder is left changed.
   std::vector<std::string> left{};
 
   /// Returns the number of clauses with this verdict.
@@ -46,26 +46,27 @@ struct Conformance {
   [[nodiscard]] std::string tap() const;
   /// Returns the results as JUnit XML, with an error if no clause could be judged.
   [[nodiscard]] std::string junit() const;
-  /// Returns the results as text for people.
+  /// Returns the results as text for people: three lines for each clause, then the numbers of verdicts.
   [[nodiscard]] std::string report() const;
 };
 
 /// Limits of a conformance test of an encoder: its length, and the changes it may make.
 struct ConformChoices {
   std::size_t readings = 100;  ///< Number of readings, at least 1.
-  bool changes = false;        ///< Also test clauses that change the encoder, and restore it afterwards.
-  /// With `changes`, also test clauses that erase zero, turns or alarms, which nothing can restore.
+  /// Whether clauses that change the encoder are tested too; the test restores the encoder afterwards.
+  bool changes = false;
+  /// With `changes`, whether clauses that erase zero, turns or alarms are tested too. Nothing can restore these values.
   bool resets = false;
   /// Polled during the test; once it returns true, the test ends with Cancelled. Empty: never.
   std::function<bool()> over{};
 };
 
-/// Returns "kept", "broken" or "untested".
+/// Returns the verdict as a word: "kept", "broken" or "untested".
 [[nodiscard]] std::string_view name_of(Verdict verdict);
 
-/// Tests an encoder. Writes to it only with `changes`. `text` and `settings` are those of `open`. Restores changed
-/// values before it throws UsageError, Cancelled or an exception of the port. If it cannot restore them, it throws a
-/// Failure with the commands that do.
+/// Tests the encoder of an address and returns the results. Writes to the encoder only with `changes`. `text` and
+/// `settings` are those of `open`. Restores changed values before it throws UsageError, Cancelled or an exception of
+/// the port. If it cannot restore them, it throws a Failure whose text contains the commands that do.
 [[nodiscard]] Conformance conform(std::string_view text, std::span<const std::string> settings = {},
                                   const ConformChoices& choices = {});
 

@@ -13,18 +13,18 @@
 
 namespace absenc::client {
 
-/// How long a conformance test of a host lasts.
+/// Length of a conformance test of a host, and its callbacks.
 struct ConformHostChoices {
-  std::size_t answers = 100;                      ///< Number of requests that get a good reply, at least 2.
+  std::size_t answers = 100;  ///< Number of good replies that the host must get before the test ends, at least 2.
   Time patience = std::chrono::seconds(10);       ///< The test ends when the host sends nothing for this long.
-  std::function<void(const Emulation&)> ready{};  ///< Called when the host can connect.
+  std::function<void(const Emulation&)> ready{};  ///< Called with the running emulation when the host can connect.
   /// Polled during the test; once it returns true, the test ends and the host is judged. Empty: never.
   std::function<bool()> over{};
 };
 
-/// Suppresses replies for a while and damages others; the host must continue with its requests. Returns when the number
-/// of answered requests or the silence of the host reaches its limit. `text` and `place` are those of `emulate`. Throws
-/// UsageError, os::Interrupted and exceptions of the port.
+/// Tests a host and returns the results. Suppresses replies for a while and damages others; the host must continue with
+/// its requests. Ends when the number of answered requests or the silence of the host reaches its limit. `text` and
+/// `place` are those of `emulate`. Throws UsageError, os::Interrupted and exceptions of the port.
 [[nodiscard]] Conformance conform_host(std::string_view text, const EmulateChoices& place = {},
                                        const ConformHostChoices& choices = {});
 

@@ -16,17 +16,18 @@
 
 namespace absenc::client {
 
-/// Properties of a capture and of the encoder in it. A property that is left out is detected in the capture or has the
+/// Properties of a capture and of the encoder in it. A property that is not set is detected in the capture, or is the
 /// protocol's default.
 struct DecodeChoices {
-  /// Channels, as "D0" or "clock=D0"; one entry may hold several, separated by commas.
+  /// Channels of the wires, as "D0" or "clock=D0"; one entry may hold several, separated by commas.
   std::vector<std::string> channels{};
-  unsigned raw_channels = 0;             ///< Number of channels of a file of raw samples; 0: another kind of file.
-  std::uint64_t samples_per_second = 0;  ///< Sample rate; 0: as stated in the file.
-  double baud = 0;                       ///< Rate of the line in bits per second; 0: found in the capture.
-  std::optional<Parity> parity{};        ///< Parity of the line; without a value that of the unit.
-  std::string model{};                   ///< Name of a model of the unit; empty: none.
-  std::vector<std::string> options{};    ///< Options of the unit, as "name=value".
+  unsigned raw_channels = 0;  ///< Number of channels in a file of raw samples; 0: the file is of another kind.
+  std::uint64_t samples_per_second = 0;  ///< Number of samples per second; 0: the rate that the file states.
+  double baud = 0;                       ///< Baud rate of the line, in bits per second; 0: detected in the capture.
+  /// Parity of the line; without a value the parity of the unit, or the parity detected in the capture.
+  std::optional<Parity> parity{};
+  std::string model{};                 ///< Name of a model of the unit; empty: the default model.
+  std::vector<std::string> options{};  ///< Options of the unit, as "name=value".
 };
 
 /// An input range of rows, ordered by the end of their frames. Rows are produced while the file is read, so its size is
@@ -46,7 +47,7 @@ class Decoded {
   /// Iterator of the range.
   using Iterator = InputIterator<Decoded>;
 
-  /// Opens the file like `decode`.
+  /// Opens the file `path`, like `decode`.
   Decoded(const std::string& path, std::string_view protocol, const DecodeChoices& choices);
   /// Moves the decoder; the other one may only be destroyed or assigned to.
   Decoded(Decoded&&) noexcept;
@@ -57,11 +58,11 @@ class Decoded {
 
   /// Waits for the first row; call it once. Throws UsageError or Failure, as every later step does.
   [[nodiscard]] Iterator begin();
-  /// Returns the end of the range.
+  /// Returns the end of the range, for comparison with an iterator.
   [[nodiscard]] static Iterator::End end() { return {}; }
   /// Returns the row at the iterator, or null at the end. It is valid until `advance`.
   [[nodiscard]] const Row* current() const { return row_; }
-  /// Goes to the next row.
+  /// Moves to the next row, and waits until it is decoded.
   void advance();
   /// Cancels from any thread: a caller that waits for a row, now or later, gets Cancelled.
   void cancel();
@@ -79,8 +80,8 @@ class Decoded {
   const Row* row_ = nullptr;
 };
 
-/// Decodes the file `path`: a sigrok session, a VCD, CSV or binary export of a logic analyser, a candump log, or bytes
-/// as text. Throws UsageError, Failure.
+/// Decodes the file `path` and returns its rows: a sigrok session, a VCD, CSV or binary export of a logic analyser, a
+/// candump log, or bytes as text. Throws UsageError, Failure.
 [[nodiscard]] inline Decoded decode(const std::string& path, std::string_view protocol,
                                     const DecodeChoices& choices = {}) {
   return {path, protocol, choices};

@@ -17,7 +17,7 @@ namespace absenc::client {
 
 /// Kinds of findings, in the order of the diagnosis.
 enum class FindingKind : std::uint8_t {
-  // The port
+  // Faults of the port
   port_missing,
   port_forbidden,
   port_in_use,
@@ -28,11 +28,11 @@ enum class FindingKind : std::uint8_t {
   port_failed,
   latency_timer,
   direction_unswitched,
-  // The bus
+  // Faults of the bus
   can_bus_off,
   can_not_acknowledged,
   can_errors,
-  // The line
+  // Faults of the line
   never_silent,
   line_inverted,
   wrong_baud,
@@ -46,7 +46,7 @@ enum class FindingKind : std::uint8_t {
   modem_answers,
   no_answer,
   baud_pattern,
-  // The frames: what an adapter or its driver does to bytes, then what the line does
+  // Faults of frames: first what an adapter or its driver does to bytes, then what the line does
   byte_before,
   byte_after,
   flow_control,
@@ -70,16 +70,16 @@ enum class FindingKind : std::uint8_t {
   requests_damaged,
   refused,
   counter_stands,
-  // The time
+  // Faults of times
   reply_late,
   sometimes_late,
   reply_slow,
-  // The reports of the encoder
+  // States that the encoder reports
   starting,
   alarm,
   status,
   position_invalid,
-  // The position
+  // Faults of the position
   position_noise,
   position_jumps,
   position_frozen,
@@ -87,81 +87,82 @@ enum class FindingKind : std::uint8_t {
   stuck_bits,
 };
 
-/// How serious a finding is.
+/// Severity of a finding.
 enum class Severity : std::uint8_t {
   note,     ///< information, no action needed
   warning,  ///< the encoder works, but not as well as it could, or not for long
   fault,    ///< the encoder does not work, or its values cannot be trusted
 };
 
-/// A finding, as data and in words.
+/// A fault or a note that the diagnosis found, as data and in words.
 struct Finding {
-  FindingKind finding_kind{};  ///< The fault that was found.
+  FindingKind finding_kind{};  ///< Kind of the finding.
   std::string_view id{};       ///< Identifier of the kind, as "only_echo".
-  Severity severity{};         ///< How serious it is.
-  std::string evidence{};      ///< What was observed.
-  std::string cause{};         ///< The most probable cause.
+  Severity severity{};         ///< How serious the finding is.
+  std::string evidence{};      ///< What was observed, as a sentence.
+  std::string cause{};         ///< Most probable cause of the finding.
   std::string action{};        ///< What the user should do.
 
-  /// Returns "only_echo: EVIDENCE. Likely: CAUSE. Try: ACTION", on one line.
+  /// Returns the whole finding on one line: "only_echo: EVIDENCE. Likely: CAUSE. Try: ACTION".
   [[nodiscard]] std::string sentence() const;
 };
 
-/// Extent of the readings' reports. A property that no reading reports cannot be called good.
+/// How many readings report alarms and validity. A property that no reading reports cannot be called good.
 struct Reported {
   std::size_t alarms = 0;  ///< Number of readings that report every alarm of the protocol.
   std::size_t valid = 0;   ///< Number of readings that report a valid position.
   std::string missing{};   ///< Names of alarms that no reading reports, as "over_speed, over_heat".
 };
 
-/// Measurements of the readings and of the line.
+/// Times, rates and settings that were measured during the diagnosis.
 struct Measured {
   Time time{};          ///< Time from the first to the last reading.
   double failures = 1;  ///< Upper limit of the share of failed readings, 0 to 1, at 95 % confidence (Wilson).
   Time quickest{};      ///< Shortest time from the end of a request to the end of its good reply; 0: not known.
   Time slowest{};       ///< Longest time from the end of a request to the end of its good reply; 0: not known.
-  double rate = 0;      ///< Good readings per second; 0: not known.
-  /// Echo of the adapter: "echo seen", "no echo", or the setting, "echo=off"; "": the line has none.
+  double rate = 0;      ///< Number of good readings per second; 0: not known.
+  /// Echo of the adapter: "echo seen" or "no echo", or the user's setting, "echo=off"; "": the line has no echo.
   std::string echo{};
-  /// Latency of the connection, from the latency timer or the setting latency=; nothing: not known.
+  /// Latency of the connection, from the adapter's latency timer or the setting `latency`; without a value: not known.
   std::optional<Time> latency{};
-  bool turned = false;  ///< Whether positions were also read while the shaft was turned.
+  bool turned = false;  ///< Whether positions were also read while the user turned the shaft by hand.
 };
 
-/// Result of `doctor`: its findings, and the measurements behind them.
+/// Result of `examine`: its findings, and the measurements behind them.
 struct Examination {
-  std::vector<Finding> findings{};  ///< Findings, the first one to mend first.
+  std::vector<Finding> findings{};  ///< Findings, in the order in which the user should mend them.
   std::size_t tried = 0;            ///< Number of attempts to read.
   std::size_t good = 0;             ///< Number of good readings.
-  Reported reported{};              ///< What the encoder reported about itself.
-  Measured measured{};              ///< What was measured on the line.
+  Reported reported{};              ///< How many readings report alarms and validity.
+  Measured measured{};              ///< Times, rates and settings that were measured.
   bool complete = true;             ///< False if the diagnosis was interrupted.
 
-  /// Returns whether no finding needs to be mended.
+  /// Returns whether no finding is a warning or a fault.
   [[nodiscard]] bool healthy() const;
-  /// Returns the first finding to mend; null if none.
+  /// Returns the first finding that the user should mend; null if there is none.
   [[nodiscard]] const Finding* first() const;
-  /// Returns one line, "good: ..." or "first: ...".
+  /// Returns the result on one line, "good: ..." or "first: ...".
   [[nodiscard]] std::string verdict() const;
 };
 
-/// Length of the diagnosis, and its callbacks.
+/// Limits of the diagnosis, and its callbacks.
 struct DoctorChoices {
   std::size_t readings = 100'000;        ///< Greatest number of readings.
-  Time limit = std::chrono::seconds(3);  ///< Time limit of the readings.
+  Time limit = std::chrono::seconds(3);  ///< Time limit of the readings while the shaft is as it is.
   Time turning{};                        ///< Time of further readings while the user turns the shaft by hand; 0: none.
-  std::function<void(const std::string& what)> progress{};  ///< Called with the present step.
-  /// Polled all the time; once it returns true, the diagnosis ends with Cancelled. Empty: never.
+  std::function<void(const std::string& what)> progress{};  ///< Called with the step that begins, as a phrase.
+  /// Polled during the whole diagnosis; once it returns true, the diagnosis ends with Cancelled. Empty: never.
   std::function<bool()> over{};
 };
 
-/// Returns "note", "warning" or "fault".
+/// Returns the severity as a word: "note", "warning" or "fault".
 [[nodiscard]] std::string_view name_of(Severity severity);
 /// Returns the identifier of the kind, as "only_echo".
 [[nodiscard]] std::string_view id_of(FindingKind finding_kind);
 
-/// Diagnoses an encoder from the port upwards, by readings; never writes to the encoder. `text` and `settings` are
-/// those of `open`. A port that does not open is a finding. Throws UsageError, Cancelled.
+/// Diagnoses an encoder from the port upwards, by readings, and returns the result. Never writes to the encoder. `text`
+/// and `settings` are those of `open`. A port that cannot be opened is a finding, not an exception. Throws UsageError,
+/// Cancelled.
 [[nodiscard]] Examination examine(std::string_view text, std::span<const std::string> settings = {},
                                   const DoctorChoices& choices = {});
 

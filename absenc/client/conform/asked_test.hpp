@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Addresses and names that the conform tests share.
+// Addresses of encoders, and names of tests, that the conformance tests share.
 #pragma once
 
 #include <fmt/format.h>
@@ -15,8 +15,8 @@
 
 namespace absenc::client {
 
-/// Returns the encoder of this address. If it sends unsolicited frames, sets the first choice of an option with which
-/// it is polled.
+/// Parses the address. If its encoder sends unsolicited frames, selects the first option with which the encoder is
+/// polled.
 inline EncoderAddress polled_address(const std::string& text) {
   const EncoderAddress usual = parse_address(text);
   const Unit& unit = *usual.unit;
@@ -31,8 +31,8 @@ inline EncoderAddress polled_address(const std::string& text) {
   return usual;
 }
 
-/// Returns the unit with its default options, and with each option at other values: each choice, both ends of a range,
-/// and both neighbours of the default. Leaves out values that no virtual encoder has.
+/// Returns addresses of the unit's virtual encoder: with default options, and with each option at other values (each
+/// choice, both ends of a range, both neighbours of the default). Leaves out values that no virtual encoder has.
 inline std::vector<EncoderAddress> variations_of(const Unit& unit) {
   std::vector<EncoderAddress> all{parse_address(fmt::format("sim:{}", unit.id))};
   const auto add = [&](const Option& option, std::int64_t value) {
@@ -54,7 +54,7 @@ inline std::vector<EncoderAddress> variations_of(const Unit& unit) {
   }
   return all;
 }
-/// Returns the option that differs from its default, "UNIT crc_width=0".
+/// Returns the unit with the option that differs from its default, "UNIT crc_width=0".
 inline std::string variation_name(const EncoderAddress& address) {
   const EncoderAddress usual = parse_address(fmt::format("sim:{}", address.unit->id));
   for (std::size_t i = 0; i < address.unit->options.size(); ++i) {
@@ -66,7 +66,7 @@ inline std::string variation_name(const EncoderAddress& address) {
   return std::string(address.unit->id);
 }
 
-/// Returns the name of a test that exists for each unit.
+/// Returns the name of the test of one unit.
 inline std::string test_name(const Unit& unit) {
   std::string name(unit.id);
   for (char& letter : name) letter = letter == '-' ? '_' : letter;

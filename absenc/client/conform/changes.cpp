@@ -19,13 +19,13 @@ namespace absenc::client {
 
 namespace {
 
-// Wait that is longer than any encoder is busy with a byte, including its reply.
+// Wait that is longer than the longest busy time of an encoder after a byte write, including its reply.
 constexpr Time settling = std::chrono::milliseconds(50);
 constexpr unsigned tries = 3;                 // attempts to restore one value
-constexpr std::uint32_t beside = 4;           // bytes before the written one that must stay unchanged
-constexpr unsigned position_tolerance = 512;  // positions are equal within this fraction of a turn
+constexpr std::uint32_t beside = 4;           // number of bytes before the written byte that must stay unchanged
+constexpr unsigned position_tolerance = 512;  // tolerance of equal positions: this fraction of a turn
 
-/// Thrown when the encoder refuses a command or its reply is bad: the clause is broken.
+/// Thrown when the encoder refuses a command or sends a bad reply, so that the clause is broken.
 struct ClauseBroken {
   std::string evidence;
 };
@@ -101,7 +101,7 @@ void ChangeTester::test_one(const Clause& clause, ClauseResult& result) {
   }
 }
 
-// ---- The memory
+// ---- Clauses about the memory
 
 void ChangeTester::test_byte(const Clause& clause, ClauseResult& result) {
   if (!clause.setting.empty()) save_setting(clause);  // reading the memory changes this setting
@@ -130,12 +130,12 @@ void ChangeTester::test_bytes_beside(const Clause& clause, ClauseResult& result)
   std::string seen = fmt::format("{} of {} others are as before, when 0x{:02X} was written and 0x{:02X} is read", same,
                                  others.size(), written, now);
   if (same != std::ssize(others)) return conclude(result, false, std::move(seen));
-  // Without a write of the byte itself, unchanged neighbours prove nothing.
+  // Unchanged neighbours prove nothing if the byte itself was not written.
   result.evidence = seen;
   if (now == written) conclude(result, true, std::move(seen));
 }
 
-// Sends single requests, because the commands wait until the memory is ready.
+// Sends single requests: commands would wait until the memory is no longer busy.
 void ChangeTester::test_busy(const Clause& clause, ClauseResult& result) {
   const std::int64_t written = save_byte(clause.page, clause.address) ^ 0xFF;
   const Command& reader = *find_command(unit_, Verb::memory_read);
@@ -154,24 +154,25 @@ void ChangeTester::test_busy(const Clause& clause, ClauseResult& result) {
   const std::optional<BusyReply> reply = busy_reply(asked);
   result.evidence = "the byte could not be written: " + seen;
   if (!accepted || accepted->busy || now != written) return;
-  // The memory may be ready already, because the document states no shortest duration.
+  // A memory that is ready is no violation, because the document states no shortest busy time.
   result.evidence = "it was not busy any more: " + seen;
   if (reply && !reply->busy && reply->value == written) return;
   conclude(result, reply && reply->busy, std::move(seen));
 }
 
-// Afterwards the test selects the page of power-on again, by reading a byte of it.
+// At the end, reads a byte of the page that is selected after power-on, to select that page again.
 void ChangeTester::test_closed(const Clause& clause, ClauseResult& result) {
   save({.look = [this] { return std::int64_t{read_byte(0, 0)}; }, .write = [](std::int64_t) {}});
   static_cast<void>(read_byte(clause.page, clause.address));
   const SingleExchange sent = line_.send(parse_wire_text(unit_.link, "a request", clause.ask.wire).bytes);
   const bool as_demanded = reply_error(unit_, line_.options(), clause.as, {sent.request, sent.reply}) == Error::none;
   const std::string seen = exchange_text(unit_.link, sent.request.frame(), sent.reply.frame());
-  static_cast<void>(read_byte(clause.page, clause.address));  // proves that the encoder replies, and selects the page
+  // proves that the encoder still replies, and selects the page of the byte
+  static_cast<void>(read_byte(clause.page, clause.address));
   conclude(result, as_demanded, seen);
 }
 
-// ---- Settings
+// ---- Clauses about settings
 
 void ChangeTester::test_setting(const Clause& clause, ClauseResult& result) {
   const std::int64_t before = save_setting(clause);
@@ -193,7 +194,7 @@ void ChangeTester::test_offset(const Clause& clause, ClauseResult& result) {
   if (!is_near(before, 0)) conclude(result, true, seen);
 }
 
-// The direction shows in the position only, which is unchanged or mirrored.
+// The direction setting cannot be read, so the test looks at the position, which is unchanged or mirrored.
 void ChangeTester::test_direction(const Clause& clause, ClauseResult& result) {
   const Reading before = read();
   const std::uint64_t turn = std::uint64_t{1} << before.singleturn_bits;
@@ -211,7 +212,7 @@ void ChangeTester::test_direction(const Clause& clause, ClauseResult& result) {
   const auto set = [this, &setter](std::int64_t value) {
     static_cast<void>(run(setter, complete_arguments(setter, std::array{value})));
   };
-  // Writes the direction that restores the position.
+  // Tries both directions until the position is the wanted one.
   save({.look = is_mirrored,
         .write =
             [is_mirrored, set, values = std::array{clause.other, clause.value}](std::int64_t wanted) {
@@ -233,7 +234,8 @@ void ChangeTester::test_direction(const Clause& clause, ClauseResult& result) {
 }
 
 void ChangeTester::test_pace(const Clause& clause, ClauseResult& result) {
-  constexpr Time heard_for = std::chrono::milliseconds(2200);  // long enough for two frames at one frame per second
+  // long enough for two frames at the lowest rate, one frame per second
+  constexpr Time heard_for = std::chrono::milliseconds(2200);
   const Command& start = *find_command(unit_, clause.command);
   const Command& stop = *find_command(unit_, clause.stop);
   const auto look = [this] { return line_.count_unsolicited(heard_for).per_second(); };
@@ -254,10 +256,10 @@ void ChangeTester::test_pace(const Clause& clause, ClauseResult& result) {
                        now, wanted, stopped));
 }
 
-// ---- Values that cannot be restored
+// ---- Clauses that erase values which cannot be restored
 
-// Returns whether the test may erase `what`. Without a value to lose the command is sent anyway: it may be refused, or
-// do harm.
+// Returns whether the test may erase `what`, a value in words. Returns true if it is "": the test sends the command
+// even if no value can be lost, because the encoder may refuse it or do harm.
 bool ChangeTester::may_erase(std::string_view what, ClauseResult& result) const {
   if (what.empty() || resets_) return true;
   result.evidence = fmt::format("there is {}, which nothing could bring back: --resets gives it up", what);
@@ -290,7 +292,7 @@ void ChangeTester::test_reset(const Clause& clause, ClauseResult& result) {
   const Reading after = read();
   std::string seen = fmt::format("position {}, turns {}, alarms {:x} before; {}, {}, {:x} after", before.singleturn,
                                  before.turns(), before.alarms, after.singleturn, after.turns(), after.alarms);
-  // The command also ends with an error if other alarms remain, which it cannot clear.
+  // The clear command also fails if other alarms remain, which it cannot clear.
   const bool obeyed = ran.error == Error::none || (ran.error == Error::cross_check_failed && after.alarms != 0);
   const bool cleared = (after.alarms & demanded) == 0 && (!turns || after.multiturn == 0);
   const bool nothing_else = is_near(after, before.singleturn) && (turns || after.multiturn == before.multiturn);
@@ -315,7 +317,7 @@ void ChangeTester::test_restart(const Clause& clause, ClauseResult& result) {
                        after.singleturn, before.singleturn));
 }
 
-// ---- Saved values
+// ---- Saving and restoring values
 
 std::int64_t ChangeTester::save(Saved one) {
   one.value = one.look();
@@ -367,7 +369,8 @@ void ChangeTester::put_back() {
   }
 }
 
-// Restores one value. Delays an interrupt until all values are restored, because the encoder would stay changed.
+// Restores one value; returns false if that fails. Delays an interrupt until all values are restored, because otherwise
+// the encoder would stay changed.
 bool ChangeTester::put_back(const Saved& one) {
   for (unsigned i = 0; i < tries; ++i) {
     try {
@@ -386,7 +389,7 @@ bool ChangeTester::put_back(const Saved& one) {
   return false;
 }
 
-// ---- The line
+// ---- Access to the line
 
 CommandResult ChangeTester::run(const Command& command, Arguments arguments) const {
   CommandResult ran = line_.run(command, arguments);
@@ -394,7 +397,7 @@ CommandResult ChangeTester::run(const Command& command, Arguments arguments) con
   throw ClauseBroken{fmt::format("{}: {} {}", command.name, text_of(ran.error).name, ran.detail)};
 }
 
-// Returns the decoded reply; nothing if it is not a good one.
+// Returns the decoded reply of the memory; nothing if the reply is bad.
 std::optional<BusyReply> ChangeTester::busy_reply(const SingleExchange& sent) const {
   if (sent.reply.frame().empty()) return std::nullopt;
   BusySink sink;

@@ -17,36 +17,38 @@
 
 namespace absenc::client {
 
-/// Result of a command.
+/// Result of a command that the test ran on the encoder.
 struct CommandResult {
   Error error = Error::none;
   std::string detail{};
   std::uint64_t requests = 0;  // number of requests that the command sent
-  bool heard = false;          // anything was received after the last request
+  bool heard = false;          // whether anything was received after the last request
   Answer answer{};
-  std::vector<std::uint8_t> data{};  // bytes that were read from a memory
+  std::vector<std::uint8_t> data{};  // bytes that the command read from the memory; empty for other commands
   std::optional<Reading> reading{};
 };
 
-/// A single request and its reply. Both are empty if no request exists with these options.
+/// A single request and its reply. Both are empty if the request does not exist with these options; the reply is empty
+/// if none came.
 struct SingleExchange {
   capture::ObservedFrame request{};
   capture::ObservedFrame reply{};
 };
 
-/// The reply of a memory, with its busy bit.
+/// The reply to an access to the memory, with the memory's busy bit.
 struct BusyReply {
   bool busy = false;
   std::int64_t value = 0;
 };
 
-/// Unsolicited frames of a period.
+/// Number and times of the unsolicited frames that were received in a period.
 struct UnsolicitedFrames {
   std::uint64_t frames = 0;
   Time first{};
   Time last{};
 
-  /// Returns the rate in frames per second, rounded, from the time between the first and the last frame.
+  /// Returns the rate in frames per second, rounded, from the times of the first and the last frame; for fewer than two
+  /// frames their number.
   [[nodiscard]] std::int64_t per_second() const {
     if (frames < 2) return static_cast<std::int64_t>(frames);
     const std::int64_t between = (last - first).count();
@@ -55,36 +57,38 @@ struct UnsolicitedFrames {
 };
 
 /// Access to the line, independent of its link. All functions throw the exceptions of the port, and os::Interrupted
-/// once for each request of the caller to end.
+/// once each time the caller asks the test to end.
 struct ChangesLine {
   std::function<CommandResult(const Command&, Arguments)> run;
   // sends a request, encoded by Unit::encode, and returns the exchange
   std::function<SingleExchange(const std::vector<std::uint8_t>& request)> send;
   std::function<UnsolicitedFrames(Time)> count_unsolicited;
   std::function<void(Time)> wait_for;
-  // reports a new value of a setting, which may change how the encoder is reached
+  // adopts a new value of a setting, which may change how the encoder is reached
   std::function<void(const Command& setter, std::int64_t value)> note_setting;
-  std::function<const Options&()> options;  // returns the present options
+  std::function<const Options&()> options;  // returns the options with which the encoder is reached now
 };
 
-/// Returns whether the position equals `wanted` within the noise of a shaft at rest.
+/// Returns whether the reading has the position `wanted`, in counts, within the noise of a shaft at rest.
 [[nodiscard]] bool is_near(const Reading& reading, std::uint64_t wanted);
 
 class ChangeTester {
  public:
-  /// `name` is the encoder's name in commands for the user. `resets` permits tests that erase values which cannot be
-  /// restored.
+  /// Takes the encoder's name in commands for the user, the access to its line, and whether tests may erase values that
+  /// cannot be restored (`resets`).
   ChangeTester(const Unit& unit, std::string_view name, ChangesLine line, bool resets)
       : unit_(unit), name_(name), line_(std::move(line)), resets_(resets) {}
 
-  /// Tests one clause and restores the changed values, also before an exception is passed on.
+  /// Tests one clause, stores verdict and evidence in `result`, and restores the changed values, also before an
+  /// exception is passed on.
   void test(const Clause& clause, ClauseResult& result);
 
   /// Returns the commands with which the user restores values that the test could not restore.
   [[nodiscard]] const std::vector<std::string>& left() const { return restore_commands_; }
 
  private:
-  /// A saved value, with functions to read and write it and the user's command to restore it.
+  /// A value of the encoder before the test changed it, with functions to read and write it and the user's command to
+  /// restore it.
   struct Saved {
     std::function<std::int64_t()> look{};
     std::function<void(std::int64_t)> write{};
@@ -123,7 +127,7 @@ class ChangeTester {
   bool resets_;
   std::vector<Saved> saved_{};
   std::vector<std::string> restore_commands_{};
-  bool interrupted_ = false;  // an interrupt came while values were restored
+  bool interrupted_ = false;  // an interrupt was delayed because values were being restored
 };
 
 }  // namespace absenc::client

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Clauses that change an encoder: at least two mutants break each, one of them no other clause. An end at any step
-// leaves the memory of the virtual encoder unchanged.
+// Tests the clauses that change an encoder: at least two mutants break each clause, one of them breaks no other clause.
+// If the test is ended at any step, the memory of the virtual encoder is unchanged.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
@@ -38,7 +38,7 @@ class Disobedient final : public Machine<Item> {
       : line_(machine_of<Item>(device)), device_(*device.device().template of<Item>()) {}
 
   void feed(const Event<Item>& event) override {
-    // A clocked request has no bytes.
+    // On a clocked link a request has no bytes, so each start of the clock counts as a request.
     if (event.kind == Kind::received || event.kind == Kind::selected) {
       ++requests;
       const bool is_ignored_now = requests >= ignored_from && requests < ignored_until;
@@ -67,14 +67,15 @@ class Disobedient final : public Machine<Item> {
     return step;
   }
 
-  std::vector<Item> ignored_request{};  // a request that the encoder ignores
-  unsigned obeyed_times = 0;            // number of times that the encoder still obeys the request `ignored_request`
-  unsigned ignored_from = 0;            // first ignored request, counted from 1
-  unsigned ignored_until = 0;           // first request after the ignored ones
+  std::vector<Item> ignored_request{};  // request that the encoder ignores; empty: none
+  unsigned obeyed_times = 0;            // number of times that the encoder obeys `ignored_request` before it ignores it
+  // number of the first ignored request, counted from 1; 0 together with `ignored_until` 0: none
+  unsigned ignored_from = 0;
+  unsigned ignored_until = 0;  // number of the first request after the ignored ones
   // number of the request whose reply has a wrong bit; 0: none
   unsigned damaged_at = 0;
-  unsigned change = 0;  // number of the memory change that is corrupted, from 1
-  // corrupts the memory, given its new and its previous content
+  unsigned change = 0;  // number of the memory change that `spoil` corrupts, from 1; 0: none
+  // corrupts the memory, given its new content and its previous content
   std::function<void(MutableBytes, const ByteList&)> spoil{};
   unsigned requests = 0;
 
@@ -92,7 +93,7 @@ class Disobedient final : public Machine<Item> {
   std::vector<Item> reply_;
 };
 
-/// Interrupts the test or loses the line at step `at`.
+/// A port that interrupts the test, or loses the line, at step `at`.
 template <class Item>
 class EndingPort final : public Port<Item> {
  public:
@@ -125,11 +126,11 @@ struct Bench {
     port = std::make_unique<EndingPort<Item>>(*line);
   }
   [[nodiscard]] ByteList memory() const { return {device->memory().begin(), device->memory().end()}; }
-  /// Returns the settings that clauses change, and the position, as the encoder reports them. Its memory is no measure:
-  /// it may count how often it was written.
+  /// Returns, as text, the position and the settings that clauses change, as the encoder reports them. The memory of
+  /// the encoder is no measure: it may count how often it was written.
   [[nodiscard]] std::string settings() const {
-    // The test may have ended at another rate or just after a restart of the encoder. A program that opens the port
-    // sets the rate.
+    // Sets the rate first, as a program that opens the port: the test may have ended at another rate, or just after a
+    // restart of the encoder.
     line->begin({.kind = Step<Item>::Kind::configure, .rate = address.line.with_some_rate().rate});
     const Step<Item> rest{.at = line->now() + std::chrono::seconds(2)};
     while (line->now() < rest.at && line->wait(rest).kind != Event<Item>::Kind::timer) {
@@ -152,7 +153,7 @@ struct Bench {
     if (position != address.unit->fields.end()) add_value(*find_command(*address.unit, Verb::read), position->name);
     return text;
   }
-  // Runs the test on a link without the device, which stays available for inspection.
+  // Runs the test on a link that does not own the device, so that the device can be inspected afterwards.
   [[nodiscard]] Conformance run(bool resets = false, const std::function<bool()>& over = {}) const {
     Link port_link;
     if constexpr (std::is_same_v<Item, CanFrame>) {
@@ -180,14 +181,15 @@ std::vector<const Clause*> changing(const Unit& unit) {
   return clauses;
 }
 
-/// Returns the address of an encoder at a third of a turn, a position that is neither zero nor its own mirror image.
+/// Returns the address of an encoder whose shaft is at a third of a turn, a position that is neither zero nor its own
+/// mirror image.
 EncoderAddress address_of_unit(const Unit& unit, std::string_view more = {}) {
   const std::string text = fmt::format("sim:{}?{}", unit.id, more);
   const Resolution resolution = unit.resolution(parse_address(text).options);
   return parse_address(fmt::format("{}{}singleturn={}", text, more.empty() ? "" : "&",
                                    (std::uint64_t{1} << resolution.singleturn_bits) / 3));
 }
-/// Returns an address whose encoder has turns and alarms that a reset must clear.
+/// Returns the address of an encoder with turns and alarms that a reset must clear.
 EncoderAddress address_showing_change(const Unit& unit, const Clause& clause) {
   std::string more(clause.shown_with);
   const auto add = [&](const std::string& setting) { more += (more.empty() ? "" : "&") + setting; };
@@ -270,13 +272,14 @@ std::vector<Spoil<Item>> spoils_of(const EncoderAddress& address, const Clause& 
       });
     }
   }
-  // Adds encoders that ignore a window of requests, because a setting may have no place in the memory.
+  // Adds encoders that ignore a window of consecutive requests, because the memory of some encoders does not contain
+  // the setting.
   const unsigned step = address.unit->link == LinkKind::clocked ? 20 : 5;
   for (const unsigned window : {30u, 1000u}) {
     for (unsigned from = 1; clause.demand >= Demand::set && from <= requests; from += step) {
       all.push_back([=](Encoder& one) {
         one.ignored_from = from;
-        one.ignored_until = from + window;  // longer than any repetition
+        one.ignored_until = from + window;  // the window is longer than the host repeats a request
       });
     }
   }
@@ -320,7 +323,7 @@ void check_ends(const EncoderAddress& address) {
   ASSERT_EQ(original.verdict(), Verdict::kept) << original.report();
   const unsigned steps = whole.port->steps;
   const std::string settings = whole.settings();
-  // The write counter of an encoder is not restored.
+  // Ignores the write counter of an encoder, which cannot be restored.
   const bool counts = whole.memory() != before;
   // In long runs each step has only one of the three kinds of end.
   const unsigned kinds = steps < 1000 ? 3 : 1;
@@ -346,7 +349,8 @@ void check_ends(const EncoderAddress& address) {
     } catch (const Cancelled&) {
       ended = kind == 2;
     }
-    EXPECT_TRUE(ended || kind != 0) << at;  // a short loss of the line while values are restored does no harm
+    // a short loss of the line is harmless if values are being restored at that time
+    EXPECT_TRUE(ended || kind != 0) << at;
     if (!counts) {
       ASSERT_EQ(bench.memory(), before) << "end " << kind << " at " << at << " of " << steps;
     }
@@ -383,7 +387,7 @@ INSTANTIATE_TEST_SUITE_P(Units, ChangingClauses, ::testing::ValuesIn([] {
                          }()),
                          [](const auto& one) { return test_name(*one.param); });
 
-// If a value cannot be restored, the error contains the command that does.
+// If a value cannot be restored, the text of the error must contain the command that restores it.
 TEST(Conformance, NamesCommandThatRestoresAfterLostLine) {
   const EncoderAddress address = parse_address("sim:tformat");
   const Bench<std::uint8_t> whole(address);
@@ -409,7 +413,7 @@ TEST(Conformance, NamesCommandThatRestoresAfterLostLine) {
   EXPECT_GT(changed, 4U);
 }
 
-// A test erases values that cannot be restored only with `resets`. A counter that is already 0 proves nothing.
+// A test must erase values that cannot be restored only with `resets`. A counter that is already 0 proves nothing.
 TEST(Conformance, ErasesZeroTurnsAndAlarmsOnlyWithResets) {
   const auto found = [](std::string_view text, bool resets) {
     const Bench<std::uint8_t> bench(parse_address(text));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests the clauses of a unit over an open port.
+// Tests the clauses of a unit over a port that is already open.
 #pragma once
 
 #include "absenc/client/conform.hpp"
@@ -7,7 +7,7 @@
 
 namespace absenc::client {
 
-/// Tests the clauses over `link`. `name` is the encoder's name in commands for the user.
+/// Tests the clauses over `link` and returns the results. `name` is the encoder's name in commands for the user.
 [[nodiscard]] Conformance conform(const EncoderAddress& address, Link link, const ConformChoices& choices,
                                   std::string_view name = {});
 

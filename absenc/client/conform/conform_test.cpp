@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The virtual encoder satisfies every clause, and at least two mutants break each clause, one of them no other clause.
+// Checks that the virtual encoder satisfies every clause, and that at least two mutants break each clause, one of them
+// no other clause.
 #include <gtest/gtest.h>
 
 #include <cstdio>
@@ -34,7 +35,7 @@ void flip_bit(FrameList& items, std::size_t bit) {
   byte = static_cast<std::uint8_t>(byte ^ 1U << bit % 8);
 }
 
-/// Flips a bit of the reply and tries to repair the checksum in its last two bytes.
+/// Lets the mutant flip a bit of its reply and search for the last two bytes with which the checksum is right again.
 template <class Item>
 void flip_and_repair(Mutant<Item>& mutant, const EncoderAddress& address, std::size_t bit) {
   if constexpr (std::is_same_v<Item, std::uint8_t>) {
@@ -54,8 +55,8 @@ void flip_and_repair(Mutant<Item>& mutant, const EncoderAddress& address, std::s
   }
 }
 
-/// Adds mutants that change the reply to one request, to all from the third on (as a host may repeat its request), and
-/// to all from the eighth on (as some hosts use the first requests to detect the echo).
+/// Adds mutants that change the reply to a single request, to all requests from the third on (a host may repeat its
+/// request), and to all from the eighth on (some hosts use the first requests to detect the echo).
 template <class Item>
 void add_reply_mutants(ReplyChanges<Item>& all, const std::function<void(Mutant<Item>&)>& change) {
   all.push_back({.change = change});
@@ -72,7 +73,7 @@ void add_reply_mutants(ReplyChanges<Item>& all, void (*change_reply)(std::vector
   add_reply_mutants<Item>(all, [change_reply](Mutant<Item>& m) { m.change_reply = change_reply; });
 }
 
-/// Adds mutants that repeat their first reply, as a whole or with its first bits before the rest of a later reply.
+/// Adds mutants that send their first reply again: the whole reply, or its first bits with the rest of a later reply.
 template <class Item>
 void add_stale_mutants(ReplyChanges<Item>& all, const Clause& clause) {
   if constexpr (std::is_same_v<Item, std::uint8_t>) {
@@ -140,8 +141,8 @@ ReplyChanges<Item> frame_mutants(const EncoderAddress& address, const Clause& cl
   return all;
 }
 
-/// Returns mutants with a defect inside the encoder, at both ends of its range, and mutants whose line always flips a
-/// bit.
+/// Returns mutants with each condition of the encoder at both ends of its range, and mutants whose line always flips
+/// the same bit.
 template <class Item>
 ReplyChanges<Item> command_mutants(const EncoderAddress& address) {
   ReplyChanges<Item> all;
@@ -164,8 +165,8 @@ ReplyChanges<Item> command_mutants(const EncoderAddress& address) {
   return all;
 }
 
-/// Returns mutants that treat requests other than the first one wrongly: like the first, not at all, or with another
-/// reply.
+/// Returns mutants that treat every request except the first kind wrongly: they send the reply to the first request, no
+/// reply, or another reply.
 template <class Item>
 ReplyChanges<Item> special_request_mutants(const Clause& clause) {
   using M = Mutant<Item>;
@@ -184,7 +185,7 @@ ReplyChanges<Item> special_request_mutants(const Clause& clause) {
     };
   }});
   if constexpr (std::is_same_v<Item, std::uint8_t>) {
-    // This mutant's reply has the right length but wrong content.
+    // A mutant whose reply has the right length but wrong content.
     all.push_back({.change = [hears_good](M& m) {
       hears_good(m);
       m.changes_special = true;
@@ -205,7 +206,7 @@ ReplyChanges<Item> special_request_mutants(const Clause& clause) {
       }
     }
   } else {
-    // This mutant replies with the node number of the request.
+    // A mutant whose reply carries the node number of the request.
     all.push_back({.change = [hears_good](M& m) {
       const auto requested = std::make_shared<std::uint32_t>(0);
       m.change_request = [&m, requested](List& last_request) {
@@ -260,7 +261,7 @@ ReplyChanges<Item> mutants_of(const EncoderAddress& address, const Clause& claus
     default:
       break;
   }
-  // Valid requests that are not for this encoder.
+  // Sends valid requests that are addressed to other encoders.
   if (clause.demand == Demand::foreign_silent) {
     for (const ReplyChange<Item>& change : special_request_mutants<Item>(clause)) {
       all.push_back({.change = [change = change.change, &address](Mutant<Item>& m) {
@@ -292,8 +293,8 @@ ReplyChanges<Item> mutants_of(const EncoderAddress& address, const Clause& claus
   return all;
 }
 
-// Returns whether the mutant breaks only this clause. Clauses about commands may break together, because registers
-// depend on channel 2 and both on the identity.
+// Returns whether the mutant breaks only this clause. Clauses about commands may break together: the registers depend
+// on channel 2, and both depend on the identity.
 bool breaks_only(const Unit& unit, const Clause& clause, const std::vector<std::string>& broken) {
   return std::all_of(broken.begin(), broken.end(), [&](const std::string& id) {
     const auto other = std::ranges::find(clauses_of(unit), id, &Clause::id);
@@ -343,14 +344,14 @@ TEST_P(Clauses, EachClauseIsBrokenByTwoMutantsOneAlone) {
   }
 }
 
-// Checks that each clause with verdict `kept` can be broken: a clause that does not apply with these options must not
-// be kept.
+// Checks that a mutant can break each clause whose verdict is `kept`: a clause that does not apply with these options
+// must not be `kept`.
 template <class Item>
 void check_kept(const EncoderAddress& address, std::set<std::string>& seen) {
   const Unit& unit = *address.unit;
   try {
     const Conformance good = conform_mutant<Item>(address, {}, {.readings = 3});
-    // An equal report, including the number of detectable changes, needs no second check.
+    // A report that equals an earlier one, including the number of detectable changes, needs no second check.
     if (!seen.insert(good.report()).second) return;
     for (const Clause& clause : clauses_of(unit)) {
       if (verdict_of(good, clause.id) != Verdict::kept) continue;
@@ -380,7 +381,7 @@ TEST_P(Clauses, EachKeptClauseCanBeBroken) {
 INSTANTIATE_TEST_SUITE_P(Units, Clauses, ::testing::ValuesIn(all_units().begin(), all_units().end()),
                          [](const auto& one) { return test_name(*one.param); });
 
-// The echo must not count as a reply or in its time.
+// The echo must not be taken for a reply, and its time not for the response time.
 TEST(Conformance, EchoOfAdapterIsNoReply) {
   for (const char* const text : {"sim:tformat?echo=auto", "sim:tformat?echo=on", "sim:amt21?echo=auto"}) {
     const EncoderAddress address = parse_address(text);
@@ -404,7 +405,7 @@ TEST(Conformance, EchoOfAdapterIsNoReply) {
   }
 }
 
-// A port that cannot change its rate, like a TCP bridge or a pseudo-terminal.
+// A port that cannot change its rate, such as a TCP bridge or a pseudo-terminal.
 class FixedRatePort final : public Port<std::uint8_t> {
  public:
   explicit FixedRatePort(Port<std::uint8_t>& port) : port_(port) {}
@@ -450,7 +451,7 @@ TEST(Conformance, PrintsTapJunitAndReport) {
   EXPECT_EQ(one.verdict(), Verdict::broken);
 }
 
-// Programs that count tests regard skipped tests as passed.
+// Without "Bail out!", programs that count tests would regard a run with only skipped tests as passed.
 TEST(Conformance, TapBailsOutIfNoClauseWasJudged) {
   const Conformance nothing{.protocol = "toy", .clauses = {{"a", "doc", "1", "x", Verdict::untested, "nothing came"}}};
   EXPECT_EQ(nothing.verdict(), Verdict::untested);
@@ -468,12 +469,12 @@ TEST(Conformance, TapBailsOutIfNoClauseWasJudged) {
   EXPECT_EQ(some.verdict(), Verdict::broken);
 }
 
-// A report prints the paragraph after the document.
+// The text for people must name the paragraph after the document.
 TEST(Clauses, DocumentNameContainsNoParagraph) {
   for (const Unit* unit : all_units()) {
     const auto look = [&](std::string_view id, std::string_view paragraph) {
       const std::string_view number = paragraph.substr(0, paragraph.find(' '));
-      // the paragraph has a name instead of a number
+      // this paragraph of the document has a name instead of a number
       if (number.find_first_not_of("0123456789.") != std::string_view::npos) return;
       EXPECT_EQ(unit->document.find(number), std::string_view::npos) << unit->id << " " << id << ": " << unit->document;
     };

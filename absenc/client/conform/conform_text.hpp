@@ -6,8 +6,9 @@
 
 namespace absenc::client {
 
-/// Returns {"ok","protocol","verdict","kept","broken","untested","clauses":[{"id","document","paragraph","words",
-/// "verdict","evidence"}],"left"}.
+/// Converts the results to
+/// {"ok","protocol","verdict","kept","broken","untested","clauses":[{"id","document","paragraph",
+/// "words","verdict","evidence"}],"left"}.
 [[nodiscard]] Json to_json(const Conformance& conformance);
 
 }  // namespace absenc::client

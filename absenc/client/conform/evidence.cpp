@@ -21,7 +21,8 @@ std::size_t bits_of(const ObservedFrame& frame) {
   return frame.bits != 0 ? frame.bits : frame.bytes.size() * 8;
 }
 
-// Flips a bit. On clocked links bit 0 is the highest bit of its byte.
+// Flips the bit `bit` of the frame. On clocked links bit 0 is the most significant bit of the first byte, otherwise the
+// least significant.
 void flip(ObservedFrame& frame, std::size_t bit) {
   std::uint8_t& byte = frame.can ? frame.can->data[bit / 8] : frame.bytes[bit / 8];
   byte = static_cast<std::uint8_t>(byte ^ (frame.bits != 0 ? 0x80U >> bit % 8 : 1U << bit % 8));
@@ -35,7 +36,7 @@ void resize(ObservedFrame& frame, int by) {
   }
 }
 
-// Returns the request of a command; empty if it does not exist with these options.
+// Returns the request of a command with valid arguments; empty if it does not exist with these options.
 ObservedFrame request_of(const Unit& unit, const Options& options, const Command& command) {
   std::array<std::uint8_t, longest_request> bytes{};
   std::vector<std::int64_t> arguments;
@@ -51,7 +52,7 @@ ObservedFrame request_of(const Unit& unit, const Options& options, const Command
   return {.can = parse_wire_text(unit.link, "a request", text).can};
 }
 
-// Returns the requests of all commands, for this encoder and for one with another address.
+// Returns the requests of all commands, addressed to this encoder and to one with another address.
 std::vector<ObservedFrame> other_requests(const Unit& unit, const Options& options) {
   std::vector<ObservedFrame> requests;
   const auto add = [&](const Options& with, const Command& command) {
@@ -117,9 +118,9 @@ std::size_t detected_changes(const Unit& unit, const Options& options, const Obs
     try_one(good.request, changed);
   }
   for (const ObservedFrame& request : other_requests(unit, options)) try_one(request, good.reply);
-  if (unit.link == LinkKind::clocked) return noticed;  // on clocked links the check is no byte at the end
-  // A checksum hides the fields before it. So this flips a bit and tries each last byte, one of which makes the
-  // checksum right.
+  if (unit.link == LinkKind::clocked) return noticed;  // on a clocked link the checksum is no byte at the end
+  // Flips a bit of a field before the checksum: the checksum would hide the change, so each last byte is tried, one of
+  // which makes the checksum right.
   ObservedFrame changed = good.reply;
   for (std::size_t bit = 0; noticed == 0 && changed.bytes.size() > 2 && bit < bits_of(good.reply) - 8; ++bit) {
     flip(changed, bit);

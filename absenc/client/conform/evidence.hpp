@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Evidence of a verdict: how often a run observed the subject of a clause.
+// Evidence of a verdict: how often a run observed the behaviour that a clause demands.
 #pragma once
 
 #include <cstddef>
@@ -16,29 +16,31 @@
 
 namespace absenc::client {
 
-inline constexpr std::size_t longest_request = 64;  // bytes of a request or characters of its text
+inline constexpr std::size_t longest_request = 64;  // limit of the bytes of a request, or of the characters of its text
 
 inline void conclude(ClauseResult& result, bool kept, std::string evidence) {
   result.verdict = kept ? Verdict::kept : Verdict::broken;
   result.evidence = std::move(evidence);
 }
 
-/// Returns the reason why the clause does not apply with these options; "" if it does.
+/// Returns the reason why the clause does not apply with these options; "" if it applies.
 [[nodiscard]] std::string reason_against(const Unit& unit, const Options& options, const Clause& clause);
 
-/// Returns how many changes of a good reply are detected as one of `errors`. Changes are a wrong bit, a missing or
-/// additional byte, and a request that it does not answer. 0: these options have no such check.
+/// Returns how many changes of a good exchange the decoder reports as one of `errors`. Changes are a wrong bit, a
+/// missing or additional byte, and the same reply to another request. 0: the unit has no such check with these options.
 [[nodiscard]] std::size_t detected_changes(const Unit& unit, const Options& options,
                                            const capture::ObservedExchange& good, Errors errors);
 
-/// Returns the error of the reply, checked as the reply to a request of `command`; "": to its own request.
+/// Returns the error of the exchange's reply, checked as the reply to a request of `command`; if that is "", to its own
+/// request.
 [[nodiscard]] Error reply_error(const Unit& unit, const Options& options, std::string_view command,
                                 const capture::ObservedExchange& exchange);
 
-/// Returns the encoder to which the request is addressed. Returns nothing if it is no request or has no address.
+/// Returns the address of the encoder to which the request is sent; nothing if the frame is no request or has no
+/// address.
 [[nodiscard]] std::optional<std::int64_t> encoder_of(const Unit& unit, const Options& options, const Frame& request);
 
-/// Returns "to 9a came 1a 40 ...".
+/// Returns request and reply as text, "to 9a came 1a 40 ...".
 [[nodiscard]] std::string exchange_text(LinkKind link, const Frame& request, const Frame& reply);
 
 }  // namespace absenc::client

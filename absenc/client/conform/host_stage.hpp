@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The virtual encoder that serves a host during a test.
+// Runs the virtual encoder that serves a host during a conformance test of the host.
 #pragma once
 
 #include <cstdint>
@@ -16,19 +16,20 @@ class HostStage {
  public:
   virtual HostTrial::TrialCounts seen() = 0;
   virtual void set_fault(HostTrial::Fault fault) = 0;  // replaces the previous fault
-  virtual void play(Time until) = 0;                   // serves the host until this time; throws os::Interrupted
+  virtual void play(Time until) = 0;                   // serves the host until the time `until`; throws os::Interrupted
 
  protected:
   ~HostStage() = default;
 };
 
-/// Throws UsageError if the unit has no clauses for hosts, or its encoder is not polled.
+/// Makes a stage with the unit's virtual encoder. Throws UsageError if the unit has no clauses for hosts, or its
+/// encoder is not polled.
 void require_host(const Unit& unit, const Options& options);
 
-/// Tests the host until the limits of `choices` end the test, and judges it.
+/// Serves the host until the limits of `choices` end the test, and returns the verdicts on the host.
 [[nodiscard]] Conformance judge_host(const Unit& unit, HostStage& stage, const ConformHostChoices& choices);
 
-/// Adds the count of the SPI mode rule, which only the SPI device can check.
+/// Adds the counts of the rule about the SPI mode, which only the SPI device can check.
 [[nodiscard]] inline std::vector<RuleCount> with_mode(std::vector<RuleCount> counts, const os::SpiDevice& device) {
   counts.push_back({.rule = spi_mode_rule, .looked = device.messages(), .broken = device.wrong_modes()});
   return counts;

@@ -18,15 +18,16 @@ std::uint64_t HostTrial::length() const {
   return is_polled ? requests_to_continue : 0;
 }
 
-// Returns how often the fault of this phase occurred; in phases without a fault, how many requests were answered.
+// Returns the progress of the present phase: how often its fault occurred, or, in a phase without a fault, how many
+// requests were answered.
 std::uint64_t HostTrial::counted() const {
   if (phase_ == Phase::silence) return seen_.missing;
   if (phase_ == Phase::refusal) return seen_.requests.good + seen_.requests.bad;
   return phase_ == Phase::damage ? seen_.damaged : seen_.answered;
 }
 
-// Returns whether no fault has an effect. After a fault that made the host abort a sequence, the first requests may
-// still show it.
+// Returns whether no fault affects the host's requests. After a fault that made the host abort a sequence, its first
+// requests may still differ.
 bool HostTrial::is_calm() const {
   return phase_ == Phase::good || phase_ == Phase::over ||
          (phase_ == Phase::last && counted() - phase_begin_ >= requests_to_continue);
@@ -96,7 +97,7 @@ void HostTrial::judge_requests(ClauseResult& result) const {
   conclude(result, true, std::move(evidence));
 }
 
-// Concludes `kept` only if the host sends nothing but requests: among other bytes a request may be there by chance.
+// Concludes `kept` only if the host sends nothing but requests: among random bytes a request may occur by chance.
 void HostTrial::conclude_if_all_are_requests(ClauseResult& result, bool kept, std::string evidence) const {
   if (!kept || seen_.requests.bad == 0) return conclude(result, kept, std::move(evidence));
   result.evidence = fmt::format("{}, but the host also sent what is no request", evidence);

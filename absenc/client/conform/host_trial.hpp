@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Test of a host: injects faults in phases and judges each clause.
+// Test of a host: injects faults in phases and judges the host by each clause.
 #pragma once
 
 #include <cstddef>
@@ -21,7 +21,7 @@ class HostTrial {
 
   HostTrial(const Unit& unit, std::size_t answers) : unit_(unit), answers_(answers) {}
 
-  /// Counts since the start.
+  /// What the host and the virtual encoder did since the test began.
   struct TrialCounts {
     std::uint64_t answered = 0;  // requests that the encoder answered, including replies that a fault suppressed
     std::uint64_t missing = 0;   // replies that the fault `silence` suppressed
@@ -29,23 +29,24 @@ class HostTrial {
     RequestCounts requests{};
     std::vector<RuleCount> rules{};
   };
-  /// Takes new counts and returns the fault to inject from now on.
+  /// Takes the latest counts and returns the fault that the virtual encoder must inject from now on.
   Fault look(TrialCounts seen);
   [[nodiscard]] bool over() const { return phase_ == Phase::over; }
 
-  /// Judges each clause by the latest counts.
+  /// Returns the verdict on each clause, from the latest counts.
   [[nodiscard]] Conformance judge() const;
 
  private:
   enum class Phase : std::uint8_t { good, silence, after_silence, damage, after_damage, refusal, last, over };
-  static constexpr std::uint64_t requests_to_continue = 3;  // requests after a fault that prove that the host continues
+  // number of requests after a fault that proves that the host continues
+  static constexpr std::uint64_t requests_to_continue = 3;
 
   [[nodiscard]] std::uint64_t counted() const;
   [[nodiscard]] std::uint64_t length() const;
   [[nodiscard]] bool is_calm() const;
   void judge_one(const HostClause& clause, ClauseResult& result) const;
   void judge_requests(ClauseResult& result) const;
-  /// Judges whether the host continued after `count` faults of `phase`.
+  /// Stores in `result` whether the host continued after the fault of `phase`, which occurred `count` times.
   void judge_continuation(Phase phase, std::string_view what, std::uint64_t count, ClauseResult& result) const;
   void judge_rule(const HostClause& clause, ClauseResult& result) const;
   void conclude_if_all_are_requests(ClauseResult& result, bool kept, std::string evidence) const;
@@ -54,19 +55,19 @@ class HostTrial {
   std::size_t answers_;
   Phase phase_ = Phase::good;
   std::uint64_t phase_begin_ = 0;  // value of `counted` when the phase began
-  std::uint64_t refused_ = 0;      // requests received while the fault damages every request byte
+  std::uint64_t refused_ = 0;  // number of requests received while the fault `damaged_request` damages every request
   TrialCounts seen_{};
-  // rule counts of the times with good replies, in which no earlier fault can have an effect
+  // rule counts from the times in which all replies were good and no earlier fault can affect the host
   std::vector<RuleCount> calm_{};
 };
 
-/// Returns how often the virtual encoder injected this fault into a reply.
+/// Returns how often the virtual encoder injected this fault into a reply; 0 if it has no faults.
 [[nodiscard]] inline std::uint64_t count_of(const VirtualDevice& encoder, HostTrial::Fault fault) {
   const sim::FaultKind kind = fault == HostTrial::Fault::silence ? sim::FaultKind::silence : sim::FaultKind::corrupt;
   return encoder.faults() != nullptr ? (*encoder.faults())[static_cast<std::size_t>(kind)] : 0;
 }
 
-/// Returns the virtual encoder's name of the fault; "" for none.
+/// Returns the name that the virtual encoder uses for the fault; "" for none.
 [[nodiscard]] constexpr std::string_view name_of(HostTrial::Fault fault) {
   switch (fault) {
     case HostTrial::Fault::silence:

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Our own host satisfies every clause of a host; two mutants break each clause and no other; senders that are no host
-// of the protocol keep none.
+// Checks that our own host satisfies every clause for hosts, that two mutants break each clause and no other, and that
+// no clause is kept by a sender that is no host of the protocol.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -20,7 +20,7 @@ namespace {
 
 Flaws host_that_sends(HostScript script) { return {.sends = {script.begin(), script.end()}}; }
 
-/// Returns controllers with defects that break one of the rules about clock, length or mode.
+/// Returns defects of SPI controllers, each of which breaks one of the rules about clock, length or mode.
 std::vector<Flaws> flaws_of_controllers() {
   using std::chrono::microseconds;
   using std::chrono::milliseconds;
@@ -70,7 +70,7 @@ std::vector<Flaws> flaws_for(const EncoderAddress& address) {
   return all;
 }
 
-/// Returns a host that also sends permitted requests which our own host does not send.
+/// Returns flaws of a host that also sends permitted requests which our own host never sends.
 Flaws host_with_permitted_extras(const Unit& unit) {
   Flaws flaws;
   for (const HostClause& clause : host_clauses_of(unit)) {
@@ -101,12 +101,12 @@ EncoderAddress address_of_unit(const Unit& unit, std::string_view motion) {
 }
 
 bool is_mistake_of(std::span<const std::string> broken, std::string_view clause) {
-  // A host that sends other bytes also violates the clause that requests must be as drawn.
+  // A host that sends other bytes also violates the clause "asks", which demands the documented requests.
   return std::find(broken.begin(), broken.end(), clause) != broken.end() &&
          std::all_of(broken.begin(), broken.end(), [&](const std::string& id) { return id == clause || id == "asks"; });
 }
 
-/// Returns the request for a position.
+/// Returns the unit's request for a position.
 template <class Item>
 std::vector<Item> request_of(const EncoderAddress& address) {
   const Unit& unit = *address.unit;
@@ -136,7 +136,7 @@ Error error_of(const EncoderAddress& address, const std::vector<CanFrame>& reque
   return address.unit->check(address.options, {.can = request.data()}, {});
 }
 
-/// Returns requests for a position that one wrong bit makes invalid.
+/// Returns all variants of the request for a position in which one wrong bit makes the request invalid.
 template <class Item>
 std::vector<std::vector<Item>> damaged_requests(const EncoderAddress& address) {
   std::vector<std::vector<Item>> all;
@@ -151,7 +151,7 @@ std::vector<std::vector<Item>> damaged_requests(const EncoderAddress& address) {
   return all;
 }
 
-/// Returns results for hosts that send only one damaged request, and for hosts that alternate it with good ones.
+/// Returns the verdicts on hosts that send only one damaged request, and on hosts that alternate it with good requests.
 template <class Item>
 std::vector<Conformance> judged_with_damaged_requests(const EncoderAddress& address) {
   std::vector<Conformance> all;
@@ -218,7 +218,7 @@ TEST_P(HostClauses, ScriptBreaksItsClause) {
   }
 }
 
-// A rule that the host never put to the test is untested, not kept.
+// A rule for which the host gave no occasion must be untested, not kept.
 TEST_P(HostClauses, UnobservedRuleIsUntested) {
   const EncoderAddress address = address_of_unit(*GetParam(), "still");
   const Conformance silent = judged(address, {.is_silent = true});
@@ -227,7 +227,7 @@ TEST_P(HostClauses, UnobservedRuleIsUntested) {
   EXPECT_EQ(read.verdict(), Verdict::kept) << read.report();
   for (const ClauseResult& one : read.clauses) {
     const HostClause& clause = *std::ranges::find(host_clauses_of(*GetParam()), one.id, &HostClause::id);
-    // This host only reads positions and memory; other requests need a script.
+    // This host only reads positions and memory; its other requests need a script.
     if (!clause.breaks[0].empty() && clause.options.empty() && one.verdict == Verdict::kept) {
       EXPECT_NE(one.evidence.find("looked at "), std::string::npos) << one.evidence;
       EXPECT_EQ(one.evidence.find("looked at 0"), std::string::npos) << one.evidence;
@@ -241,7 +241,8 @@ void expect_none_kept(const Conformance& found, std::string_view who) {
   EXPECT_EQ(with_verdict(found, Verdict::kept), std::vector<std::string>{}) << who << "\n" << found.report();
 }
 
-/// Checks senders that send again and again and ignore replies.
+/// Judges senders of random bytes, damaged requests and requests of other units, which ignore replies. They must keep
+/// no clause.
 template <class Item>
 void check_stranger_hosts(const EncoderAddress& address) {
   const auto judged_sending = [&](const auto& next) { return Host<Item>(address, {}).judged_sending(next); };
@@ -263,7 +264,7 @@ void check_stranger_hosts(const EncoderAddress& address) {
   for (const Unit* const other : all_units()) {
     if (other->link == LinkKind::clocked || (other->link == LinkKind::can) != std::is_same_v<Item, CanFrame>) continue;
     const std::vector<Item> request = request_of<Item>(polled_address(fmt::format("sim:{}", other->id)));
-    // Skips requests that this unit accepts too.
+    // Skips requests that both units accept.
     if (request.empty() || error_of(address, request) == Error::none) continue;
     expect_none_kept(judged_sending([&] { return request; }), other->id);
   }
@@ -281,7 +282,7 @@ TEST_P(HostClauses, StrangerKeepsNoClause) {
   }
 }
 
-// Two requests in one write: the second does not wait for the first reply.
+// The host sends two requests in one write, so that the second does not wait for the reply to the first.
 TEST_P(HostClauses, TwoRequestsInOneWriteBreakAClause) {
   const Unit& unit = *GetParam();
   if (unit.link != LinkKind::half_duplex) GTEST_SKIP() << "its host need not wait";

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Devices that are no encoder of the protocol keep no clause. For each kept clause the test checks its evidence on the
-// line.
+// Devices that are no encoder of the protocol must keep no clause. For each kept clause the test searches the evidence
+// on the line.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -25,7 +25,7 @@ namespace {
 using capture::ObservedExchange;
 using capture::ObservedFrame;
 
-/// Stores all exchanges of the line: each request with everything received until the next.
+/// A port that stores all exchanges: each request with everything received until the next request.
 template <class Item>
 class TapPort final : public Port<Item> {
  public:
@@ -51,13 +51,14 @@ class TapPort final : public Port<Item> {
     return event;
   }
 
-  std::vector<Exchange> exchanges{1};  // items before the first request belong to an empty request
+  // the first exchange has an empty request; it holds items received before the first request
+  std::vector<Exchange> exchanges{1};
 
  private:
   Port<Item>& port_;
 };
 
-/// Replies to every request, and sends unsolicited where an encoder of the unit would.
+/// A device that replies to every request, and sends unsolicited frames where an encoder of the unit would.
 template <class Item>
 class Stranger final : public Machine<Item> {
  public:
@@ -111,7 +112,7 @@ class Stranger final : public Machine<Item> {
   bool sending_ = false;
 };
 
-/// Returns a good reply of this encoder; empty if it cannot be read.
+/// Returns a good reply of the encoder at this address; empty if the encoder cannot be read.
 template <class Item>
 std::vector<Item> reply_of(const EncoderAddress& address) {
   VirtualDevice device(*address.unit, address.options, address.device);
@@ -125,7 +126,7 @@ std::vector<Item> reply_of(const EncoderAddress& address) {
   return {reply_items.begin(), reply_items.end()};
 }
 
-/// Returns a good reply of an encoder with another number on the same line.
+/// Returns a good reply of an encoder with another address on the same line.
 template <class Item>
 std::vector<Item> reply_of_neighbour(const EncoderAddress& address) {
   EncoderAddress other = address;
@@ -167,7 +168,8 @@ ObservedFrame frame_of(const std::vector<Item>& items, std::size_t bits = 0) {
   return frame;
 }
 
-/// Returns the number of good replies or stream frames on the line, checked with the options of the clause.
+/// Returns the number of good replies and stream frames that the port `tap` stored, checked with the options of the
+/// clause.
 template <class Item>
 std::size_t good_replies(EncoderAddress address, const Clause& clause, const TapPort<Item>& tap) {
   const Unit& unit = *address.unit;
@@ -194,7 +196,7 @@ std::size_t good_replies(EncoderAddress address, const Clause& clause, const Tap
   return good;
 }
 
-/// Returns whether the request of the clause was sent.
+/// Returns whether the port `tap` stored the request of the clause.
 template <class Item>
 bool was_sent(const EncoderAddress& address, const Clause& clause, const TapPort<Item>& tap) {
   const Unit& unit = *address.unit;
@@ -216,7 +218,7 @@ bool was_sent(const EncoderAddress& address, const Clause& clause, const TapPort
       return std::ranges::any_of(tap.exchanges, [&](const auto& one) { return one.request == wanted; });
     }
   }
-  // For a clause without a request text: whether requests other than those of readings were sent.
+  // The clause has no request text: returns whether requests other than those of readings were sent.
   std::set<std::string> different;
   for (const auto& one : tap.exchanges) {
     if (!one.request.empty()) different.insert(to_wire_text(unit.link, frame_of(one.request).frame()));
@@ -276,7 +278,7 @@ void check_strangers(const EncoderAddress& address, const ConformChoices& choice
   }
 }
 
-// A real encoder on a line that damages every reply, or every second one.
+// The device is a real encoder on a line that damages every reply, or every second reply.
 template <class Item>
 void check_damaged_line(const EncoderAddress& address, const ConformChoices& choices) {
   for (const unsigned every : {1u, 2u}) {
@@ -325,7 +327,7 @@ TEST_P(HostileEncoders, KeepNoClauseWithoutEvidence) {
   }
 }
 
-// Checks an encoder with each option with which it can be read.
+// Checks the encoder with each option value with which it can be read.
 template <class Item>
 void check_good_one(const EncoderAddress& address) {
   if (reply_of<Item>(address).empty()) return;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Encoders that break a clause: a mutant between virtual encoder and line that changes requests and replies, in virtual
+// Encoders that break a clause: a mutant between virtual encoder and line changes requests and replies, in virtual
 // time.
 #pragma once
 
@@ -21,7 +21,7 @@
 
 namespace absenc::client {
 
-/// Changes the requests that an encoder receives, and its replies to some of them.
+/// A virtual encoder behind a filter that changes the requests it receives, and its replies to some of them.
 template <class Item>
 class Mutant final : public Machine<Item> {
  public:
@@ -56,11 +56,11 @@ class Mutant final : public Machine<Item> {
       Step<Item> step = device_.next(now);
       if (step.kind != Step<Item>::Kind::transfer) return step;
       reply_items.assign(step.out.begin(), step.out.end());
-      if (!driven && last_request_.empty()) ++requests;  // the device sends an unsolicited frame
+      if (!driven && last_request_.empty()) ++requests;  // counts an unsolicited frame of the device as a request
       if (change_reply && mutates()) {
         change_reply(reply_items, step);
         if (reply_items.empty() && driven) continue;
-        // The device must see the suppressed reply as sent.
+        // Reports the suppressed reply to the device as sent.
         if (reply_items.empty()) {
           device_.feed({.kind = Kind::sent, .at = now});
           continue;
@@ -75,21 +75,24 @@ class Mutant final : public Machine<Item> {
 
   std::function<void(std::vector<Item>&)> change_request{};
   std::function<void(std::vector<Item>&, Step<Item>&)> change_reply{};
-  bool on_damage = false;        // a damaged request is received as the good one
-  bool changes_special = false;  // changes replies to requests that differ from the first
-  bool always = false;           // changes the replies to all requests from number `mutated` on
-  // number of the request whose reply is changed, from 1; the first request may only detect the echo
+  bool on_damage = false;  // whether a damaged special request reaches the encoder as the first request, `good`
+  // whether replies to special requests are changed, instead of the replies to the request number `mutated`
+  bool changes_special = false;
+  bool always = false;  // whether the replies to all requests from number `mutated` on are changed
+  // number of the first request whose reply is changed, from 1; a host may use request 1 only to detect the echo
   unsigned mutated = 3;
   bool driven = false;
   unsigned requests = 0;
   std::vector<Item> reply_items;
-  std::vector<Item> good;  // the first request, a good one
-  int special = -1;        // index of the only special request, in order of arrival; -1: all
-  std::function<bool(const std::vector<Item>&)> is_meant{};  // further condition of special requests; empty: none
-  bool is_special = false;                                   // the last request is special
+  std::vector<Item> good;  // the first request that was received, a good one
+  // index of the only special request, in order of arrival; -1: every request that differs from `good` is special
+  int special = -1;
+  // further condition that a special request must fulfil; empty: none
+  std::function<bool(const std::vector<Item>&)> is_meant{};
+  bool is_special = false;  // whether the last request is special
 
  private:
-  // Decides whether the request is special. A damaged request has no items.
+  // Decides whether the request is special, that is, differs from the first one. A damaged request has no items.
   void note_special(const std::vector<Item>& request) {
     is_special = false;
     if (!request.empty() && request == good) return;
@@ -108,7 +111,7 @@ class Mutant final : public Machine<Item> {
   std::vector<std::vector<Item>> specials_;
 };
 
-/// A defect of an encoder, and the conditions that cause it.
+/// A defect of an encoder: a change of the mutant, or a condition of the virtual encoder.
 template <class Item>
 struct ReplyChange {
   std::function<void(Mutant<Item>&)> change{};
@@ -150,7 +153,7 @@ inline Verdict verdict_of(const Conformance& conformance, std::string_view id) {
   return Verdict::untested;
 }
 
-/// Returns an address, "sim:raa38?mode=bus", whose encoder shows the behaviour of the clause.
+/// Returns an address, as "sim:raa38?mode=bus", whose encoder shows the behaviour that the clause demands.
 inline std::string address_showing(const Unit& unit, const Clause& clause) {
   return fmt::format("sim:{}{}{}", unit.id, clause.shown_with.empty() ? "" : "?", clause.shown_with);
 }

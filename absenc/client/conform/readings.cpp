@@ -27,8 +27,8 @@ std::size_t distinct_counters(const Readings& readings) {
   return values.size();
 }
 
-// Returns how many mixtures are detected as one of `errors`. A mixture has the first bits of one good reply and the
-// rest of another, so that each part alone is right.
+// Returns how many mixtures of replies the decoder reports as one of `errors`. A mixture has the first bits of one good
+// reply and the rest of another, so that each part alone is right.
 std::size_t detected_mixtures(const Unit& unit, const Options& options, const Readings& readings, Errors errors) {
   const Attempted* const one = readings.first_good();
   std::size_t noticed = 0;
@@ -123,7 +123,7 @@ void judge_frames(const Unit& unit, const Options& options, const Readings& read
                         ? "no good reply came"
                         : "all bits were alike, as on a line that nobody drives: turn the shaft a little";
   if (good == nullptr) return;
-  // a single reply cannot show an error of the counter
+  // an error of a counter needs two replies to show
   const bool about_counters = errors == any_of(Error::sequence_mismatch);
   const std::size_t noticed = about_counters ? 0 : detected_changes(unit, options, good->exchange, errors);
   if (noticed != 0) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Readings of a run, and the verdicts on clauses that need only readings.
+// Readings of a conformance test, and the verdicts on clauses that need only readings.
 #pragma once
 
 #include <cstdint>
@@ -14,32 +14,33 @@ namespace absenc::client {
 /// Returns whether all bits of a clocked word are equal, as on a line that nothing drives.
 [[nodiscard]] bool is_flat(const capture::ObservedFrame& reply);
 
-/// Returns whether the last request got a reply other than the constant level of an undriven line.
+/// Returns whether the last request of the reading got a reply other than the constant level of an undriven line.
 [[nodiscard]] inline bool was_answered(const Attempted& one) { return one.answered && one.error != Error::line_stuck; }
 
-/// Readings with one set of options, with their replies.
+/// Readings that were taken with one set of options, and their counts.
 struct Readings {
   std::vector<Attempted> all{};
-  std::uint64_t requests = 0;   // requests, pulses and transfers that were sent
-  std::uint64_t answered = 0;   // number of answered requests
-  std::uint64_t good = 0;       // replies or unsolicited frames that yielded a reading
-  std::uint64_t discarded = 0;  // damaged frames of a stream
+  std::uint64_t requests = 0;   // number of requests, pulses and transfers that were sent
+  std::uint64_t answered = 0;   // number of requests that got a reply
+  std::uint64_t good = 0;       // number of replies or unsolicited frames that yielded a reading
+  std::uint64_t discarded = 0;  // number of damaged frames in a stream
 
-  /// Returns the first good reading; null if none is good, or all good words consist of equal bits.
+  /// Returns the first good reading; null if none is good, or if each good word consists of equal bits.
   [[nodiscard]] const Attempted* first_good() const;
 };
 
-/// Judges whether each request was answered.
+/// Stores the verdict on whether the encoder replied to each request.
 void judge_answered(const Readings& readings, ClauseResult& result);
 
-/// Judges whether unsolicited frames were received, up to the last reading.
+/// Stores the verdict on whether unsolicited frames were received until the last reading.
 void judge_streamed(const Readings& readings, ClauseResult& result);
 
-/// Judges the time between request and good reply against the limit of a host. `latency` is the precision of the port's
-/// times.
+/// Stores the verdict on whether each good reply began within the time that a host waits for it. `latency` is the
+/// precision of the port's times.
 void judge_time(const Unit& unit, const Options& options, const Readings& readings, Time latency, ClauseResult& result);
 
-/// Judges whether a reply has one of `errors`. Concludes `kept` only if a wrong bit in a good reply would show as one.
+/// Stores the verdict on whether no reply has one of `errors`. Concludes `kept` only if a wrong bit in a good reply
+/// would cause one of them.
 void judge_frames(const Unit& unit, const Options& options, const Readings& readings, Errors errors,
                   ClauseResult& result);
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests the clauses about readings and about requests that no host sends, and gives Changes access to the line.
+// Tests the clauses about readings and about requests that no host sends, and gives ChangeTester access to the line.
 #pragma once
 
 #include <fmt/format.h>
@@ -37,7 +37,7 @@ class Tester {
         read_(*find_command(unit_, Verb::read)),
         count_(std::max<std::size_t>(1, choices.readings)) {
     runner_.attach(port, latency);
-    // Interrupts only once, so that changed values can still be restored.
+    // Throws os::Interrupted only once, so that changed values can still be restored afterwards.
     runner_.port().over = [this, over = choices.over] {
       if (!over || ended_ || !over()) return false;
       ended_ = true;
@@ -47,7 +47,7 @@ class Tester {
   Tester(const Tester&) = delete;
   Tester& operator=(const Tester&) = delete;
 
-  /// Takes the readings that the tests judge; call this before them.
+  /// Takes the readings that the tests judge; must be called before the tests.
   void read() { readings_ = read_all(options_); }
 
   /// Returns whether ConformChoices::over ended the test.
@@ -90,13 +90,15 @@ class Tester {
   }
 
  private:
-  static constexpr Time listening = std::chrono::milliseconds(20);  // time in which a late reply is still received
-  static constexpr unsigned times = 3;                              // repetitions of a request that no host sends
+  // time after a failed reading in which a late reply is still received
+  static constexpr Time listening = std::chrono::milliseconds(20);
+  static constexpr unsigned times = 3;  // number of times that a request which no host sends is sent
   static constexpr bool is_can = std::is_same_v<Item, CanFrame>;
 
-  // ---- The line
+  // ---- Access to the line
 
-  // Runs a command. On an interrupt the conversation first restores what it changed in the encoder for its own use.
+  // Runs a command and returns its result. On an interrupt, the conversation first restores what it changed in the
+  // encoder for its own use.
   CommandResult run(const Command& command, Arguments arguments, unsigned attempts) {
     runner_.set_options(options_);
     runner_.start_again(attempts);
@@ -126,7 +128,7 @@ class Tester {
     AnswerSink sink;
   };
 
-  // Runs one reading. Each request counts separately; a reply that comes after a repeated request is late, not missing.
+  // Takes one reading with these options, then listens for a late reply.
   Attempted once(const Options& options, Time listen_for = listening) {
     runner_.set_options(options);
     if (!is_streamed(options)) runner_.start_again();
@@ -136,7 +138,7 @@ class Tester {
                                    one.detail));
     }
     if (one.error == Error::none || !is_polled() || is_streamed(options)) return one;
-    // No reply is a timeout, whatever error the host reports.
+    // A reading without any reply is a timeout, whatever error the host reports.
     if (!one.answered) one.error = Error::timeout;
     runner_.listen(listen_for);
     runner_.keep_exchange(one);
@@ -150,7 +152,7 @@ class Tester {
       const std::uint64_t requests = runner_.port().requests - before;
       const std::uint64_t unanswered = std::min(requests, one.unanswered + (was_answered(one) ? 0 : 1));
       readings.requests += requests;
-      // A reply that comes after a repeated request is late, not missing.
+      // Counts a reply that came after a repeated request as late, not as missing.
       readings.answered += was_answered(one) && one.is_late() ? requests : requests - unanswered;
       readings.good += one.error == Error::none ? std::max<std::uint64_t>(requests, 1) : 0;
       readings.discarded += one.discarded;
@@ -164,7 +166,7 @@ class Tester {
   }
   // Returns whether the encoder replies to requests. On clocked and SPI links the host clocks the bits instead.
   [[nodiscard]] bool is_polled() const { return unit_.link != LinkKind::clocked && unit_.link != LinkKind::spi; }
-  // Returns whether the encoder replies to a reading: a missing reply to another request is no evidence otherwise.
+  // Returns whether the encoder replies to a reading: otherwise a missing reply to another request is no evidence.
   [[nodiscard]] bool answers() {
     for (unsigned i = 0; i < times; ++i) {
       if (once(options_).error == Error::none) return true;
@@ -172,7 +174,8 @@ class Tester {
     return false;
   }
 
-  /// Sends an edited request in place of the first request of a reading. Returns nothing if readings send no request.
+  /// Sends an edited request in place of the first request of a reading and returns the exchange; nothing if readings
+  /// send no request.
   std::optional<Attempted> send_instead(const std::function<void(std::vector<Item>&)>& edit, std::uint32_t permille = 0,
                                         Time listen_for = listening) {
     const std::uint64_t before = runner_.port().requests;
@@ -197,7 +200,7 @@ class Tester {
     return one;
   }
   void set_rate(std::uint32_t rate) { runner_.port().begin({.kind = Step<Item>::Kind::configure, .rate = rate}); }
-  /// Sends a request, given as bytes or, for a CAN bus, as text.
+  /// Sends a request, given as bytes or, for a CAN bus, as text, and returns the exchange.
   SingleExchange send(const std::vector<std::uint8_t>& request) {
     SingleExchange sent;
     const auto attempted = send_instead([&](std::vector<Item>& edited) { edited = items_of(request); }, 0,
@@ -213,7 +216,7 @@ class Tester {
       return request;
     }
   }
-  /// Counts unsolicited frames with the identifier of the readings' replies, for `time`.
+  /// Listens for `time` and counts unsolicited frames with the identifier of the readings' replies. CAN only.
   UnsolicitedFrames count_unsolicited(Time time) {
     UnsolicitedFrames heard;
     const Attempted* const good = readings_.first_good();
@@ -263,8 +266,8 @@ class Tester {
 
   // ---- Requests that no host sends
 
-  // Requests other addresses, several of them because a neighbour on the line may reply at one. A reply in the name of
-  // our encoder, or replies with its position at every address, are from our encoder.
+  // Sends requests to several other addresses; a single one might belong to a neighbour on the line. A reply with the
+  // address of our encoder, or replies with its position at every address, are from our encoder.
   void test_foreign(ClauseResult& result) {
     constexpr std::size_t most_addresses = 8;
     const auto role = std::find_if(unit_.options.begin(), unit_.options.end(),
@@ -316,8 +319,8 @@ class Tester {
     return unit_.check(options_, frame, {}) == Error::none &&
            encoder_of(unit_, options_, frame).value_or(value) == value;
   }
-  // Returns whether no reply came. On CAN only a frame that can be the reply counts, because a node may send other
-  // frames at any time.
+  // Returns whether the encoder did not reply. On CAN other frames than the reply are ignored, because a node may send
+  // them at any time.
   [[nodiscard]] static bool is_silent(const Attempted& one) {
     if constexpr (is_can) return one.error == Error::timeout;
     return !one.answered;
@@ -351,7 +354,7 @@ class Tester {
       if (!one) return;
       last = exchange_text(unit_.link, one->exchange.request.frame(), one->exchange.reply.frame());
       const Compliance seen = reaction_of(clause, *one);
-      // The port may return to the usual rate too late for the reply.
+      // A port that changes its rate for the request may return to the usual rate too late for the reply.
       const bool missed = slow && (is_silent(*one) || seen == Compliance::unclear);
       result.evidence = last + ": a port that changes its rate may be too late to hear the reply";
       if (missed) return;
@@ -401,7 +404,7 @@ class Tester {
   Runner<Item> runner_;
   const Command& read_;
   std::size_t count_;
-  bool ended_ = false;  // ConformChoices::over ended the test
+  bool ended_ = false;  // whether ConformChoices::over ended the test
   Readings readings_{};
 };
 

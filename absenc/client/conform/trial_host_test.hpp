@@ -27,25 +27,25 @@
 
 namespace absenc::client {
 
-/// Defects of a host.
+/// Defects of a host; by default the host has none.
 struct Flaws {
   bool is_silent = false;
-  unsigned stops_at_silence = 0;  // number of requests without reply after which it stops; 0: never
-  unsigned stops_at_damage = 0;   // number of damaged replies after which it stops; 0: never
-  unsigned stops_at_refusal = 0;  // number of damaged requests after which it stops; 0: never
-  Time skipped_wait{};            // waits up to this length are skipped
+  unsigned stops_at_silence = 0;  // number of missing replies after which the host stops; 0: it never stops
+  unsigned stops_at_damage = 0;   // number of damaged replies after which the host stops; 0: it never stops
+  unsigned stops_at_refusal = 0;  // number of damaged requests after which the host stops; 0: it never stops
+  Time skipped_wait{};            // longest wait that the host skips; 0: it skips none
   std::vector<HostStep> sends{};
   // Defects of an SPI controller:
-  Time too_early_by{};     // time by which transfers begin too early
-  std::uint32_t rate = 0;  // clock rate in Hz; 0: that of the step
-  int bytes = 0;           // bytes added to each transfer, negative: removed; at least one byte remains
+  Time too_early_by{};     // time by which each transfer begins too early
+  std::uint32_t rate = 0;  // clock rate in Hz; 0: the rate that the host requests
+  int bytes = 0;           // number of bytes added to each transfer, negative: removed; at least one byte remains
   bool other_mode = false;
   bool without_lead = false;
 };
 
 struct Stopped {};
 
-/// The port of a host that skips waits, or stops after some requests.
+/// A port that skips the waits of its host, or stops the host after some requests.
 template <class Item>
 class HastyPort final : public Port<Item> {
  public:
@@ -74,7 +74,7 @@ class HastyPort final : public Port<Item> {
   bool sending_ = false;
 };
 
-/// An SPI controller in virtual time, with defects.
+/// The port of an SPI controller in virtual time, with the defects of `Flaws`.
 class ControllerPort final : public Port<std::uint8_t> {
  public:
   ControllerPort(LinkKind kind, const LineSettings& line, Machine<std::uint8_t>& device, const Flaws& flaws)
@@ -148,7 +148,7 @@ class Host {
     port_.skipped_wait = flaws_.too_early_by;
   }
 
-  /// Judges a host that sends `next()` again and again and ignores replies.
+  /// Returns the verdict on a host that sends `next()` again and again and ignores replies.
   template <class Next>
   Conformance judged_sending(const Next& next) {
     constexpr unsigned most = 60;
@@ -156,13 +156,13 @@ class Host {
     for (unsigned i = 0; i < most; ++i) {
       set_fault(trial.look(seen()));
       send(next());
-      listen(std::chrono::milliseconds(25));  // longer than the reply of any encoder
+      listen(std::chrono::milliseconds(25));  // a wait longer than the slowest reply of any encoder
     }
     trial.look(seen());
     return trial.judge();
   }
 
-  /// Judges our own host with its defects. `all`: it finally runs every command once.
+  /// Returns the verdict on our own host with its defects. With `all`, the host finally runs every command once.
   Conformance judged(bool all = false) {
     constexpr unsigned most_rounds = 40;
     HostTrial trial(unit_, 20);
@@ -172,7 +172,8 @@ class Host {
     device_.set_faults({});
     if (!flaws_.sends.empty()) send_all();
     for (const Command& command : unit_.commands) {
-      const bool moves = !command.changes_option.empty();  // the host would have to change its options
+      // the command changes an option, so the host would have to change its own options
+      const bool moves = !command.changes_option.empty();
       if (all && !moves) run(command, complete_arguments(command, required_arguments(command)));
     }
     trial.look(seen());
@@ -252,7 +253,7 @@ class Host {
     trial.look(seen());
   }
 
-  // Sends each step without waiting for the reply.
+  // Sends each step of the script without waiting for the reply.
   void send_all() {
     listen(std::chrono::milliseconds(50));
     for (const HostStep& one : flaws_.sends) {
@@ -312,7 +313,7 @@ class Host {
   RuleCounter rules_;
   VirtualDevice device_;
   RequestWatch<Item> watch_;
-  std::shared_ptr<ControllerPort> controller_;  // null on other links
+  std::shared_ptr<ControllerPort> controller_;  // set on clocked and SPI links only
   std::shared_ptr<Port<Item>> line_;
   HastyPort<Item> port_;
   std::vector<std::byte> storage_;

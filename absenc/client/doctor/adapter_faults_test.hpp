@@ -10,13 +10,13 @@
 
 namespace absenc::client {
 
-/// A fault and how the test produces it.
+/// An expected finding, and a function that examines an encoder with the fault behind it.
 struct Fault {
   std::string id;
   std::function<Examination()> examine;
 };
 
-/// Returns each fault, produced with the first unit that can have it.
+/// Returns a fault for each finding, produced with the first unit that can have the fault.
 inline std::vector<Fault> adapter_faults() {
   std::vector<Fault> faults;
   std::vector<path_faults::PathFault> all = path_faults::faults_of_bytes();

@@ -13,11 +13,12 @@ bool has_characters(const Case& one) {
   return one.unit.link == LinkKind::half_duplex || one.unit.link == LinkKind::full_duplex;
 }
 
-// Returns whether flipping a single bit makes the reply good.
+// Returns whether flipping any single bit of the reply makes the reply good.
 bool is_mended(const Case& one, const Frame& request, std::vector<std::uint8_t> bytes, std::size_t bits) {
   const std::size_t count = bits != 0 ? bits : bytes.size() * 8;
   for (std::size_t bit = 0; bit < count; ++bit) {
-    // Clocked bits are numbered from the most significant; the order does not matter here, because all bits are tried.
+    // Numbers bits from the least significant, on clocked links too: the order does not matter, because all bits are
+    // tried.
     bytes[bit / 8] ^= static_cast<std::uint8_t>(0x80u >> (bit % 8));
     const bool is_good = decodes(one, request, {.bytes = bytes, .bits = bits});
     bytes[bit / 8] ^= static_cast<std::uint8_t>(0x80u >> (bit % 8));
@@ -40,13 +41,14 @@ bool has_good_part(const Case& one, const Attempted& attempt) {
     return end.kind == FrameEnd::Kind::complete && end.size == bytes.size() && decodes(one, request, {.bytes = bytes});
   };
   const Bytes raw = attempt.raw;
-  if (is_frame(raw)) return false;  // the whole reply is one frame, without other bytes
+  if (is_frame(raw)) return false;  // the whole reply is a single frame, without other bytes
   const Bytes sent = request.bytes;
   if (!sent.empty() && raw.size() > sent.size() && std::equal(sent.begin(), sent.end(), raw.begin()) &&
       is_frame(raw.subspan(sent.size()))) {
     return true;
   }
-  // Two good frames, or a good frame after more than half of another one: the other one is a damaged reply, not noise.
+  // Looks for two good frames, or for a good frame after more than half of another frame, which is then a damaged reply
+  // and not noise.
   for (std::size_t size = 2; size < raw.size(); ++size) {
     const bool is_long = size * 3 >= raw.size() * 2;
     if (is_long ? is_frame(raw.first(size)) || is_frame(raw.last(size))

@@ -13,7 +13,7 @@ namespace absenc::client {
 
 using All = std::vector<const Attempted*>;
 
-/// Returns the attempts for which `is` is true, in order.
+/// Returns the attempts of `all` for which `is` returns true, in their order.
 template <class Is>
 [[nodiscard]] All chosen(const All& all, const Is& is) {
   All those;
@@ -21,36 +21,41 @@ template <class Is>
   return those;
 }
 
-/// Returns whether the reply is good with the user's options. With an empty request: a good reply to any request.
+/// Returns whether the reply is good with the user's options. With an empty request, a good reply to any request
+/// counts.
 [[nodiscard]] bool decodes(const Case& one, const Frame& request, const Frame& reply);
 
-/// Returns whether a good reply has other bytes beside it: the request before it, a few bytes before or after it, or
-/// the same reply again. Only for lines of characters.
+/// Returns whether the attempt received a good reply together with other bytes: the request before it, a few bytes
+/// before or after it, or the same reply again. Only for lines of characters.
 [[nodiscard]] bool has_good_part(const Case& one, const Attempted& attempt);
 
-/// Returns whether fewer bytes arrived than the beginning of the frame requires. Only for lines of characters.
+/// Returns whether the attempt received fewer bytes than the beginning of the frame requires. Only for lines of
+/// characters.
 [[nodiscard]] bool is_cut(const Case& one, const Attempted& attempt);
 
-/// Returns how many of the replies become good if one bit is flipped; 0 if random replies of the same length become
-/// good as often, because a short checksum accepts many by chance.
+/// Returns how many of the damaged replies become good if one bit is flipped. Returns 0 if random replies of the same
+/// length become good as often, because a short checksum accepts many by chance.
 [[nodiscard]] std::size_t mended_by_one_bit(const Case& one, const All& all);
 
-/// Returns the change that an adapter, a driver or a device server made to nearly all these damaged replies, or beside
-/// the good ones. Undoing it makes far more of them good than chance would. Only for lines of characters.
+/// Finds a change of bytes that an adapter, a driver or a device server made to nearly all these damaged replies, or
+/// bytes that it added to good ones. Undoing the change makes far more replies good than chance would. Returns nothing
+/// if no change explains them. Only for lines of characters.
 [[nodiscard]] std::optional<Finding> damage_by_adapter(const Case& one, const All& all);
 
-/// Finds text of a modem, a console or a GPS receiver; nothing if the unit's own replies are similar text.
+/// Finds text of a modem, a console or a GPS receiver in the bytes. Returns nothing if there is none, or if the unit's
+/// own replies are similar text.
 [[nodiscard]] std::optional<Finding> text_of_others(const Case& one, Bytes bytes);
 
-/// Finds another model or other options of the unit, with which these damaged replies are good.
+/// Finds another model or other options of the unit with which these damaged replies are good; nothing if there are
+/// none.
 [[nodiscard]] std::optional<Finding> other_settings(const Case& one, const All& all);
 
-/// Returns the settings ("model=23-bit") that make `wanted` of the options `now`; none where both are the same.
+/// Returns the settings ("model=23-bit") that change the options `now` into `wanted`; empty if both are equal.
 [[nodiscard]] std::vector<std::string> settings_to_set(const Unit& unit, const Options& wanted, const Options& now);
-/// Returns these options in words: "model=23-bit", or "the usual settings".
+/// Returns options as the settings that give them, "model=23-bit", or "the usual settings".
 [[nodiscard]] std::string said_settings(const Unit& unit, const Options& options);
 
-/// Finds another checksum than the unit's, which is good in all these damaged replies.
+/// Finds a checksum, other than the unit's, that is right in all these damaged replies; nothing if there is none.
 [[nodiscard]] std::optional<Finding> other_checksum(const Case& one, const All& all);
 
 }  // namespace absenc::client

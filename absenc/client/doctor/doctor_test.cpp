@@ -26,16 +26,16 @@ using testing::IsEmpty;
 
 namespace {
 
-// ---- Examinations
+// ---- Functions that examine an encoder or a line
 
-/// Examines a serial encoder without facts about its port.
+/// Examines an encoder of the address `text` over the links that `open` returns.
 Examination examine_with(std::string_view text, const std::function<Link(const EncoderAddress&)>& open,
                          const os::PortFacts& facts = {}) {
   const Surroundings surroundings{open, [&](const std::string&) { return facts; }};
   return examine(parse_address(text), {.readings = 120, .limit = 20s}, surroundings);
 }
 
-/// Examines a line on which `answer` makes the replies.
+/// Examines a line on which the function `answer` makes the replies.
 Examination examine_line(std::function<ByteList(const ByteList&)> answer, ByteList babble = {},
                          const os::PortFacts& facts = {}) {
   return examine_with(
@@ -49,7 +49,7 @@ Examination examine_line(std::function<ByteList(const ByteList&)> answer, ByteLi
       facts);
 }
 
-/// Examines a virtual encoder in virtual time.
+/// Examines the virtual encoder of an address, in virtual time.
 Examination examine_sim(std::string_view text) {
   return examine_with(text, [](const EncoderAddress& address) { return virtual_link(address); });
 }
@@ -58,7 +58,7 @@ Link refused(os::Failure::Kind kind, os::Failure::Bus bus = os::Failure::Bus::un
   throw os::Failure(kind, "the port is not to be had", bus);
 }
 
-// ---- Each fault, and how it comes about
+// ---- Each finding, with the fault that causes it
 
 std::vector<Fault> port_faults() {
   using Kind = os::Failure::Kind;
@@ -103,7 +103,7 @@ std::vector<Fault> port_faults() {
   return faults;
 }
 
-/// A line that is good at one rate and silent at all others.
+/// Examines a line on which an encoder replies at one rate and is silent at all others.
 Examination examine_rate(std::string_view text, std::uint32_t rate) {
   return examine_with(text, [rate](const EncoderAddress& address) {
     auto port = std::make_shared<ScriptedPort<std::uint8_t>>();
@@ -112,7 +112,7 @@ Examination examine_rate(std::string_view text, std::uint32_t rate) {
   });
 }
 
-/// An encoder on SPI whose replies are good only with these settings.
+/// Examines an encoder on SPI whose replies are good only with settings for which `understands` returns true.
 Examination examine_spi(const std::function<bool(const EncoderAddress&)>& understands) {
   return examine_with("encolink-spi:spi:/dev/spidev0.0", [understands](const EncoderAddress& address) {
     if (understands(address)) return virtual_link(address);
@@ -165,7 +165,7 @@ std::vector<Fault> line_faults() {
   return faults;
 }
 
-/// Returns replies of a moving encoder that has a CRC instead of the sum.
+/// Returns the reply number `number` of a moving encoder that has a CRC instead of the unit's checksum.
 ByteList with_other_checksum(unsigned number) {
   ByteList reply = good_reply();
   for (std::size_t i = 2; i < 5; ++i) reply[i] = static_cast<std::uint8_t>(number * (37 + 11 * i) + number * number);
@@ -252,7 +252,7 @@ std::vector<Fault> other_faults() {
   return faults;
 }
 
-/// Returns replies to requests, some of which are cut, have bytes before them, or are refused.
+/// Returns faults of replies that are cut, have bytes before them, or refuse the request.
 std::vector<Fault> partial_faults() {
   std::vector<Fault> faults;
   faults.push_back({"extra_bytes", [] {
@@ -356,9 +356,9 @@ TEST(Doctor, FindingsSayWhatHelps) {
   EXPECT_THAT(bits.findings.at(0).evidence, HasSubstr("bad_checksum"));
 }
 
-// ---- Health
+// ---- Healthy encoders
 
-/// Examines all units with random pauses; every second encoder turns.
+/// Examines all units with random pauses between readings; every second encoder turns.
 TEST(Doctor, AThousandHealthyEncodersGiveNoFinding) {
   std::mt19937_64 random(16);
   std::size_t runs = 0;
@@ -380,14 +380,14 @@ TEST(Doctor, AThousandHealthyEncodersGiveNoFinding) {
   }
 }
 
-/// A shaft at rest that moves to and fro by a count is not noise.
+/// A position that moves to and fro by one count, with the shaft at rest, is not noise.
 TEST(Doctor, AFlickeringLastBitIsNoNoise) {
   EXPECT_THAT(ids(judged(positions([](std::size_t i) { return i % 2; }))), IsEmpty());
   EXPECT_THAT(ids(judged(positions([](std::size_t i) { return i * 13; }))), IsEmpty());
   EXPECT_THAT(ids(judged(positions([](std::size_t i) { return i * i / 3 + i; }))), IsEmpty());
 }
 
-/// Ends the examination while it listens, reads, or tries other rates.
+/// Ends the examination early: while it listens, while it reads, and while it tries other rates.
 TEST(Doctor, EndsAsSoonAsItIsToldTo) {
   for (const bool answers : {true, false}) {
     const auto open = [&](const EncoderAddress&) {
@@ -406,7 +406,7 @@ TEST(Doctor, EndsAsSoonAsItIsToldTo) {
   }
 }
 
-// ---- SPI as the kernel has it
+// ---- SPI, with the settings of the kernel's driver
 
 TEST(Doctor, TheModeOfAnSpiControllerIsFoundOnItsWires) {
   os::testing::FakeSpi kernel;

@@ -17,21 +17,21 @@ using testing::IsEmpty;
 using testing::Not;
 using testing::StartsWith;
 
-/// Doctor reads for the whole time, not only until a number of readings, so that it sees a loose contact.
+/// Doctor must read for the whole time limit, not only a fixed number of readings, so that it finds a loose contact.
 TEST(Doctor, FailuresThatComeAndGoAreToldWithTheirPeriod) {
   const Examination even = examine_contact(5s, [](Time at) { return at % 1s < 300ms; });
   EXPECT_THAT(even.findings.at(0).evidence, AllOf(HasSubstr("bursts of about 3"), HasSubstr("one every 1 s")));
   const Examination uneven = examine_contact(
       6s, [](Time at) { return (at > 1s && at < 1100ms) || (at > 1900ms && at < 2s) || (at > 5s && at < 5100ms); });
   EXPECT_THAT(uneven.findings.at(0).evidence, AllOf(HasSubstr("in 3 bursts"), HasSubstr("at uneven distances")));
-  // Independent failures are not bursts.
+  // Failures that occur independently are no bursts.
   std::mt19937 random(5);
   const Examination any = examine_contact(5s, [&](Time) { return random() % 10 == 0; });
   EXPECT_THAT(ids(any), Contains("sometimes_silent"));
   EXPECT_THAT(ids(any), Not(Contains("comes_and_goes")));
 }
 
-/// The shaft is turned; the turn counter changes where the position passes zero.
+/// The user turns the shaft by hand; the number of turns changes where the position passes zero.
 TEST(Doctor, AShaftThatFollowsTheHandGivesNoFinding) {
   const auto place = [](std::size_t i) { return i * hand_counts; };
   EXPECT_THAT(ids(judged(turned_by_hand(
@@ -43,7 +43,7 @@ TEST(Doctor, AShaftThatFollowsTheHandGivesNoFinding) {
   EXPECT_THAT(ids(judged(turned_by_hand(less_than_a_turn, [](std::size_t) { return 3; }))), IsEmpty());
 }
 
-/// A reply that is no later than this computer's own delay is no evidence against the encoder.
+/// A reply that is late by no more than this computer's own wake-up delay is no evidence against the encoder.
 TEST(Doctor, ALatenessOfThisComputerIsNotTheEncoders) {
   Observations seen = positions([](std::size_t) { return 5; });
   for (Attempted& one : seen.readings) one.limit = 3ms;
@@ -54,7 +54,7 @@ TEST(Doctor, ALatenessOfThisComputerIsNotTheEncoders) {
   EXPECT_THAT(ids(judged(seen)), Contains("sometimes_late"));
   seen.woken_late = 13ms;
   EXPECT_THAT(ids(judged(seen)), IsEmpty());
-  // One late reply of few is a tenth of all, but still a single one.
+  // One late reply of nine is more than a tenth, but still a single one, which this computer may have caused.
   seen.readings.resize(9);
   EXPECT_THAT(ids(judged(seen)), Contains("reply_late"));
   seen.late = 1;
@@ -63,7 +63,7 @@ TEST(Doctor, ALatenessOfThisComputerIsNotTheEncoders) {
   EXPECT_THAT(ids(judged(seen)), Contains("reply_late"));
 }
 
-/// On a busy computer less than 0.1 % late replies are no finding; on an idle one they are.
+/// On a busy computer, late replies in less than 0.1 % of the readings are no finding; on an idle one they are.
 TEST(Doctor, FewOfThousandsMayBeABusyComputer) {
   Observations seen = positions([](std::size_t) { return 5; });
   const std::vector<Attempted> some = seen.readings;
@@ -88,8 +88,8 @@ TEST(Doctor, FewOfThousandsMayBeABusyComputer) {
   }
 }
 
-/// One failure among 200 readings is no finding on a busy computer. It is a finding on an idle one, and among three
-/// readings.
+/// On a busy computer one failure among 200 readings is no finding. On an idle one, or among three readings, it is a
+/// finding.
 TEST(Doctor, OneOfManyMayBeABusyComputer) {
   const auto with_one = [](std::size_t count, const Attempted& failed) {
     Observations seen = positions([](std::size_t) { return 5; });
@@ -113,7 +113,7 @@ TEST(Doctor, OneOfManyMayBeABusyComputer) {
     many.woken_late = 2ms;
     EXPECT_THAT(ids(judged(many)), IsEmpty());
   }
-  // A byte after a reply is not a late reply.
+  // A single byte after a reply is no late reply, so a busy computer does not explain it.
   Attempted noise = late_and_next;
   noise.exchange.reply.bytes.resize(good_reply().size() + 1);
   noise.raw = noise.exchange.reply.bytes;
@@ -122,7 +122,8 @@ TEST(Doctor, OneOfManyMayBeABusyComputer) {
   EXPECT_THAT(ids(judged(busy)), Contains("extra_bytes"));
 }
 
-/// Two failures among 300 readings with a timeout of 300 ms.
+/// Examines two failures among 300 readings with a timeout of 300 ms: a computer that stood still for 300 ms explains
+/// them, a third failure it does not.
 TEST(Doctor, AComputerThatStoodStillExplainsSilence) {
   Observations seen = positions([](std::size_t) { return 5; });
   const std::vector<Attempted> some = seen.readings;
@@ -144,7 +145,7 @@ TEST(Doctor, AComputerThatStoodStillExplainsSilence) {
 TEST(Doctor, APositionThatThisComputerTookLateIsNoJump) {
   Observations seen = positions([](std::size_t i) { return i * 20; });
   for (std::size_t i = 100; i < 150; ++i)
-    seen.readings[i].reading->latched += 49ms;  // these frames are read together with the 150th
+    seen.readings[i].reading->latched += 49ms;  // frames 100 to 149 arrive together with the frame 150
   for (std::size_t i = 101; i < 150; ++i) {
     seen.readings[i].reading->latched = seen.readings[100].reading->latched + static_cast<std::int64_t>(i) * 1us;
   }

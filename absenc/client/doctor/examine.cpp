@@ -24,8 +24,10 @@ namespace absenc::client {
 namespace {
 
 constexpr std::size_t first_readings =
-    2;  // readings with another setting before the comparison; a setting without any reply is not tried again
-constexpr std::size_t trial_readings = 5;  // readings per turn of the comparison
+    // number of readings with another setting before it is compared with the user's; a setting without any good reply
+    // is dropped
+    2;
+constexpr std::size_t trial_readings = 5;  // number of readings with each setting per turn of the comparison
 constexpr unsigned trial_turns = 2;
 constexpr Time trial_limit = std::chrono::milliseconds(500);
 constexpr Time models_limit = std::chrono::seconds(3);  // time limit for trying all models
@@ -36,7 +38,7 @@ bool is_serial(const EncoderAddress& address) {
   return address.port_kind == PortKind::serial || address.port_kind == PortKind::slcan;
 }
 
-// Returns the port on which `identify` can search for other encoders.
+// Returns whether `identify` can search the port for encoders of other protocols.
 bool may_be_another(const EncoderAddress& address) {
   const bool characters = address.unit->link == LinkKind::half_duplex || address.unit->link == LinkKind::full_duplex;
   return characters && (address.port_kind == PortKind::serial || address.port_kind == PortKind::tcp);
@@ -51,7 +53,7 @@ bool streams(const EncoderAddress& address) {
   return address.unit->streams != nullptr && address.unit->streams(address.options);
 }
 
-// Returns the address at which a scan receives only damaged replies.
+// Stores the addresses at which a scan receives only damaged replies.
 struct Clashes final : FieldSink {
   void put(const FieldValue& value) override {
     if (value.info->role == Role::encoder) address = value.number;
@@ -61,7 +63,7 @@ struct Clashes final : FieldSink {
   std::set<std::int64_t> all;
 };
 
-// ---- The steps of an examination
+// ---- Class Doctor: the steps of an examination
 
 class Doctor {
  public:
@@ -97,7 +99,7 @@ class Doctor {
       seen_.port = address_.path;
       seen_.facts = surroundings_.facts(address_.path);
     }
-    // A setting that the controller does not support is skipped; other settings may help.
+    // Skips a setting that the controller does not support, because other settings may help.
     if (address_.unit->link == LinkKind::can) {
       look_over<CanFrame>();
     } else {
@@ -106,7 +108,7 @@ class Doctor {
     if (is_serial(address_)) count_damage();
   }
 
-  // Reads the driver's error counters after the port was closed.
+  // Reads the driver's error counters again, after the port was closed, and stores how much they have grown.
   void count_damage() {
     const os::PortFacts now = surroundings_.facts(address_.path);
     if (now.counts && seen_.facts.counts) seen_.damage = now.counts->since(*seen_.facts.counts);
@@ -141,7 +143,7 @@ class Doctor {
       }
       examiner.conclude(seen_);
     }
-    // Another bit rate would destroy frames of other devices on a bus, so it is tried only on a silent one.
+    // Other bit rates are tried only on a silent CAN bus, because they would destroy frames of other devices.
     const bool disturbs = std::is_same_v<Item, CanFrame> && any_heard();
     if (none_good() && !seen_.never_silent && seen_.lateness == Time{} && !disturbs) try_others<Item>();
     if constexpr (std::is_same_v<Item, std::uint8_t>) {
@@ -151,7 +153,7 @@ class Doctor {
     }
   }
 
-  // A short checksum accepts some damaged replies.
+  // Returns whether fewer than one in 20 readings is good: a short checksum accepts some damaged replies.
   [[nodiscard]] bool none_good() const { return count_good(seen_.readings) * 20 < seen_.readings.size() + 1; }
   [[nodiscard]] bool any_good() const {
     return std::any_of(seen_.readings.begin(), seen_.readings.end(),
@@ -161,7 +163,7 @@ class Doctor {
     return std::any_of(seen_.readings.begin(), seen_.readings.end(), [](const Attempted& one) { return one.heard; });
   }
 
-  // Checks whether two encoders have the same address.
+  // Scans the bus, and stores the encoder's address if two encoders share it.
   template <class Item>
   void scan(Examiner<Item>& examiner) {
     const Command* command = find_command(*address_.unit, Verb::scan);
@@ -176,7 +178,8 @@ class Doctor {
 
   template <class Item>
   void try_others() {
-    // A pseudo-terminal has no rate; the rate of a CAN adapter is the bit rate of the bus.
+    // Other rates are tried only if the port has a rate. A pseudo-terminal has none; the rate of a CAN adapter is the
+    // bit rate of the bus.
     const bool has_rate = address_.port_kind == PortKind::slcan ||
                           (address_.port_kind == PortKind::serial && !seen_.facts.pseudo_terminal);
     if (try_each<Item>(other_models(address_), models_limit)) return;
@@ -184,8 +187,8 @@ class Doctor {
     try_each<Item>(other_addresses(address_), addresses_limit);
   }
 
-  // Tries settings until one helps, or until the encoder replies with the user's own setting. Returns whether the
-  // search is over.
+  // Tries settings until one of them helps, or until the encoder replies with the user's own settings. Returns true
+  // then, so that the search ends; false if nothing helped.
   template <class Item>
   bool try_each(const std::vector<Other>& others, Time limit) {
     Time spent{};
@@ -201,8 +204,8 @@ class Doctor {
     return false;
   }
 
-  // Tries both settings in turns; otherwise an encoder that was silent for a while would count as evidence for the
-  // setting tried afterwards. Returns whether the search is over.
+  // Compares a setting with the user's by reading with both in turns; otherwise an encoder that was silent for a while
+  // would make the later one look better. Returns whether the search is over.
   template <class Item>
   bool compare(const EncoderAddress& other, Trial& trial) {
     std::vector<Attempted> theirs;
@@ -224,14 +227,14 @@ class Doctor {
     return true;
   }
 
-  // The encoder may have been powered on meanwhile.
+  // Reads once more with the user's settings, because the encoder may have been powered on meanwhile.
   void ask_once_more() {
     std::vector<Attempted> attempts;
     ask<std::uint8_t>(address_, first_readings, attempts);
     if (count_good(attempts) == first_readings) read_again<std::uint8_t>();
   }
 
-  // The encoder replies now.
+  // Replaces the silent readings by new ones, because the encoder replies now.
   template <class Item>
   void read_again() {
     tell("reading");
@@ -240,7 +243,7 @@ class Doctor {
     examiner.conclude(seen_);
   }
 
-  // Returns the duration. A port that does not open gives no attempts.
+  // Takes `count` readings with these settings and returns their duration. A port that does not open adds no attempts.
   template <class Item>
   Time ask(const EncoderAddress& address, std::size_t count, std::vector<Attempted>& attempts) {
     const Command* read = find_command(*address.unit, Verb::read);
@@ -256,7 +259,7 @@ class Doctor {
     return {};
   }
 
-  // Returns whether another protocol may explain the received bytes.
+  // Returns whether the received bytes have no explanation yet, so that another protocol may be one.
   [[nodiscard]] bool is_unexplained() const {
     if (any_good() || seen_.never_silent || seen_.lateness != Time{}) return false;
     const Examination so_far = judge(*address_.unit, address_.options, seen_);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Runs an examination with replaceable surroundings (port, clock), and converts its result to JSON.
+// Runs an examination with a replaceable port and clock, and converts its result to JSON.
 #pragma once
 
 #include <functional>
@@ -16,16 +16,17 @@ struct Surroundings {
   std::function<os::PortFacts(const std::string& path)> facts = [](const std::string& path) {
     return os::port_facts(path);
   };
-  bool on_the_clock = false;  // the port runs in real time, so the wake-up delay of this computer is measured
+  // whether the port runs in real time, so that the wake-up delay of this computer must be measured
+  bool on_the_clock = false;
 };
 
-/// Examines as client::examine of client/doctor.hpp does.
+/// Examines an encoder like client::examine of client/doctor.hpp, over the ports and facts of `surroundings`.
 [[nodiscard]] Examination examine(const EncoderAddress& address, const DoctorChoices& choices,
                                   const Surroundings& surroundings = {.on_the_clock = true});
 
-/// Returns {"ok","findings":[{"id","severity","evidence","cause","action"}],"readings","good","complete","seconds",
-/// "failures_below","verdict"}; if known, also "readings_per_second", "echo", "latency_ms", "quickest_reply_ms",
-/// "slowest_reply_ms".
+/// Converts the result to {"ok","findings":[{"id","severity","evidence","cause","action"}],"readings","good",
+/// "complete","seconds","failures_below","verdict"}; if known, also "readings_per_second", "echo", "latency_ms",
+/// "quickest_reply_ms", "slowest_reply_ms".
 [[nodiscard]] Json to_json(const Examination& examination);
 
 }  // namespace absenc::client

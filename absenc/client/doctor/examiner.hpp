@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Listens to an open link, reads over it, and records the observations.
+// Listens to an open link, takes readings over it, and records the observations that doctor judges.
 #pragma once
 
 #include <algorithm>
@@ -15,7 +15,7 @@ namespace absenc::client {
 template <class Item>
 class Examiner {
  public:
-  /// All waiting ends with os::Ended as soon as `over` returns true; empty: never.
+  /// Takes over an open link. All waiting ends with os::Ended as soon as `over` returns true; empty: never.
   Examiner(const EncoderAddress& address, Link link, std::function<bool()> over)
       : link_(std::move(link)),
         runner_(address),
@@ -28,7 +28,7 @@ class Examiner {
     runner_.port().over = std::move(over);
   }
 
-  /// Records unsolicited bytes or frames for a time.
+  /// Listens before the first request and records unsolicited bytes or frames.
   void listen(Observations& seen) {
     if constexpr (!std::is_same_v<Item, CanFrame>) {
       unsigned busy = 0;
@@ -50,7 +50,8 @@ class Examiner {
   /// Records bytes that arrive after the last timeout, from an encoder that is later than every timeout.
   void listen_for_late() { runner_.listen(pieces * piece_time); }
 
-  /// Takes up to `count` readings within `limit`; ends early without any reply. Throws as the port.
+  /// Takes up to `count` readings within `limit` and adds them to `into`. Ends early if no reply comes. Throws the
+  /// exceptions of the port.
   void read(const Command& command, std::size_t count, Time limit, std::vector<Attempted>& into) {
     const auto attempt = [&] {
       Attempted one = runner_.once(command);
@@ -62,13 +63,13 @@ class Examiner {
     runner_.repeat({.count = count, .limit = limit, .patience = never, .least = longest_gap}, attempt, into);
   }
 
-  /// Returns the fields of another reading command. Throws as the port.
+  /// Runs another reading command and passes the fields of its reply to `sink`. Throws the exceptions of the port.
   void report(const Command& command, Arguments arguments, FieldSink& sink) {
     const Conversation<Item>* conversation = runner_.run(command, arguments);
     if (conversation != nullptr && conversation->error() == Error::none) conversation->report(sink);
   }
 
-  /// Returns the time of the port's clock.
+  /// Returns the present time of the port's clock.
   [[nodiscard]] Time now() { return runner_.port().now(); }
 
   void conclude(Observations& seen) const {
@@ -87,7 +88,8 @@ class Examiner {
   static constexpr unsigned pieces = 5;
   static constexpr Time piece_time = std::chrono::milliseconds(20);
   static constexpr std::size_t most_heard = 4096;
-  static constexpr Time longest_gap = std::chrono::milliseconds(500);  // longest silence of a loose contact
+  // longest time for which a loose contact is assumed to be open
+  static constexpr Time longest_gap = std::chrono::milliseconds(500);
   static constexpr Time longest_reply = std::chrono::milliseconds(100);
 
   Link link_;

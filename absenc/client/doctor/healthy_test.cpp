@@ -72,8 +72,8 @@ TEST_P(HealthyEncoder, IsNeverCalledIll) {
     const unsigned bits = std::min(unit.resolution(usual->options).singleturn_bits, 62u);
     unsigned ill = 0;
     for (unsigned i = 0; i < examinations && ill < 3; ++i) {
-      // From here the counter of turns does not wrap when it turns backwards. Some modes lose the turns at power-on and
-      // begin at 0.
+      // Starts at a number of turns that does not wrap when the shaft turns backwards. Some modes lose the turns at
+      // power-on and begin at 0.
       const bool has_turns = unit.resolution(usual->options).multiturn_bits >= 8;
       const std::string turns = has_turns ? "&multiturn=100" : "";
       const std::string state = fmt::format("singleturn={}{}&motion={}", random.below(std::uint64_t{1} << bits), turns,

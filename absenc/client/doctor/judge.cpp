@@ -18,7 +18,8 @@ namespace absenc::client {
 
 namespace {
 
-constexpr Time slow = std::chrono::milliseconds(8);  // half of the default latency timer of a USB adapter
+// delay from which a reply is slow: half of the default latency timer of a USB adapter
+constexpr Time slow = std::chrono::milliseconds(8);
 
 FindingKind ailment_of(const Refusal& refusal) {
   using Kind = os::Failure::Kind;
@@ -43,7 +44,7 @@ FindingKind ailment_of(const Refusal& refusal) {
   return FindingKind::port_failed;
 }
 
-// Returns how a port that is in use becomes free.
+// Returns the advice to make a port free, by the program that uses it.
 std::string_view action_for(os::Failure::Holder holder) {
   using Holder = os::Failure::Holder;
   switch (holder) {
@@ -87,7 +88,7 @@ std::string inversion(const Case& one) {
   std::size_t zeros = 0;
   for (const Attempted& attempt : seen.readings) {
     const auto& reply = attempt.exchange.reply.bytes;
-    // A frame that was cut after its first bytes has fewer zeros.
+    // Ignores a frame of zeros that was cut after its first bytes: it may be the beginning of a good frame.
     constexpr std::size_t many = 8;
     if (!reply.empty() && all_are(reply, 0) && (reply.size() >= many || !is_cut(one, attempt))) ++zeros;
   }
@@ -96,7 +97,7 @@ std::string inversion(const Case& one) {
   return {};
 }
 
-// Judges missing replies on any kind of line.
+// Finds the reason for missing replies if nothing was received, on any kind of line.
 void judge_silence(const Case& one, std::vector<Finding>& findings) {
   const Observations& seen = one.seen;
   if (seen.readings.empty() || count(seen.readings, was_heard) != 0 || seen.never_silent) return;
@@ -117,9 +118,10 @@ void judge_silence(const Case& one, std::vector<Finding>& findings) {
 void judge_lateness(const Case& one, std::vector<Finding>& findings) {
   const Observations& seen = one.seen;
   const std::size_t tried = seen.readings.size();
-  // On a CAN bus encoders send unsolicited frames, so a frame after an unanswered request is not a late reply to it.
+  // Skips CAN: encoders there send unsolicited frames, so a frame after an unanswered request is no late reply to it.
   if (seen.late == 0 || one.unit.link == LinkKind::can) return;
-  // A single late reply may be due to this busy computer. The verdict counts it nevertheless.
+  // A single late reply may be due to this busy computer. The verdict of the examination counts the failed reading
+  // nevertheless.
   const bool nothing_else = one.good == 0 && count(seen.readings, was_heard) * 10 < tried;
   const bool often = seen.late * 10 >= tried || nothing_else;
   if (!often && (seen.late < 2 || may_be_the_computer(seen, seen.late))) return;
@@ -127,7 +129,7 @@ void judge_lateness(const Case& one, std::vector<Finding>& findings) {
   for (const Attempted& attempt : seen.readings) limit = std::max(limit, attempt.limit);
   const bool is_ours = seen.woken_late > Time{} && seen.lateness - limit <= seen.woken_late;
   const bool is_one_of_few = seen.late < 2 && !nothing_else;
-  if ((!often || is_one_of_few) && is_ours) return;  // no later than this computer's own delay
+  if ((!often || is_one_of_few) && is_ours) return;  // the replies are no later than this computer's own wake-up delay
   const auto allowance = std::chrono::ceil<std::chrono::milliseconds>(seen.lateness * 3 / 2).count();
   findings.push_back(finding(often ? FindingKind::reply_late : FindingKind::sometimes_late,
                              {fmt::format("{}", std::min<std::size_t>(seen.late, tried)), fmt::format("{}", tried),
@@ -209,7 +211,7 @@ void judge_line(const Case& one, std::vector<Finding>& findings) {
 
 namespace {
 
-// Finds a counter in every reply that never changed.
+// Finds a counter that is in every reply and never changes.
 void judge_counter(const Case& one, std::vector<Finding>& findings) {
   constexpr std::size_t enough = 8;
   std::set<std::int64_t> values;
@@ -226,7 +228,7 @@ void judge_counter(const Case& one, std::vector<Finding>& findings) {
                              {std::string(field->name), fmt::format("{}", *values.begin()), fmt::format("{}", count)}));
 }
 
-// Returns the names of the alarms in this mask, of both channels.
+// Returns the names of the alarms in `mask`, which holds the alarms of both channels.
 std::set<std::string_view> alarm_names(const Unit& unit, std::uint32_t mask) {
   std::set<std::string_view> names;
   for (const Flags& flags : alarms_of(unit, {.alarms = mask})) {
@@ -290,11 +292,11 @@ Examination judge(const Unit& unit, const Options& options, const Observations& 
   const Case one{unit, options, seen, result.good};
   judge_port(one, result.findings);
   judge_line(one, result.findings);
-  // A fault of the line explains bad frames, which then give no finding of their own.
+  // A fault of the line explains bad frames, so these give no finding of their own.
   const bool explained = std::any_of(result.findings.begin(), result.findings.end(), [](const Finding& found) {
     return found.severity == Severity::fault && found.finding_kind != FindingKind::can_errors;
   });
-  // One of 256 damaged frames passes a checksum of 8 bits, so a few good frames do not make a good line.
+  // A few good frames do not make a good line: one of 256 damaged frames passes a checksum of 8 bits.
   if (result.good * 20 < result.tried || result.good == 0) {
     if (!explained) judge_bad_frames(one, result.findings);
   } else {
@@ -311,7 +313,7 @@ Examination judge(const Unit& unit, const Options& options, const Observations& 
   }
   const std::size_t failed = result.tried - result.good;
   if (failed * 20 > result.tried && result.first() == nullptr) {
-    // No judge explains the failures: reports them without a specific cause.
+    // If no judge explains the failures, reports them without a specific cause.
     const std::size_t silent = result.tried - count(seen.readings, was_heard);
     const std::string all = fmt::format("{}", result.tried);
     if (silent * 2 < failed) {

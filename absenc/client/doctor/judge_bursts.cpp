@@ -16,16 +16,17 @@ namespace absenc::client {
 
 namespace {
 
-/// A series of consecutive failed readings.
+/// A series of consecutive failed readings, with its times and its length.
 struct Burst {
   Time begin{};
   Time end{};
   std::size_t count = 0;
 };
 
-// Returns the series that are too long for independent failures.
+// Returns the series of failures that are too long for independent failures.
 std::vector<Burst> bursts_of(const std::vector<Attempted>& readings, std::size_t failed) {
-  constexpr double chance = 1e-3;  // greatest probability that such a series occurs among all these readings
+  // greatest probability that independent failures form such a series among all these readings
+  constexpr double chance = 1e-3;
   const auto all = static_cast<double>(readings.size());
   const double longest = std::log(chance / all) / std::log(static_cast<double>(failed) / all);
   const auto least = static_cast<std::size_t>(std::max(3.0, std::ceil(longest)));
@@ -40,10 +41,10 @@ std::vector<Burst> bursts_of(const std::vector<Attempted>& readings, std::size_t
     if (burst.count >= least) bursts.push_back(burst);
     burst = {};
   }
-  return bursts;  // leaves out the last series, which may continue
+  return bursts;  // without the last series of failures, which may continue
 }
 
-// Returns "of about 300 ms each, one every 1 s" if the bursts are periodic.
+// Returns the length of the bursts, and their period if they are periodic: "of about 300 ms each, one every 1 s".
 std::string rhythm(const std::vector<Burst>& bursts) {
   std::vector<Time> lengths;
   std::vector<Time> periods;

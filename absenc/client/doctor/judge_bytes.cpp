@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Finds changes of bytes by adapters, drivers and device servers: undoing the change makes the replies good.
+// Finds changes of bytes by adapters, drivers and device servers. A change is found if undoing it makes the replies
+// good.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -28,13 +29,14 @@ constexpr std::uint8_t xoff = 0x13;
 constexpr std::uint8_t lf = 0x0A;
 constexpr std::uint8_t cr = 0x0D;
 
-/// Tries to make one reply good by undoing a change.
+/// A received reply, with functions that undo a change of its bytes and return whether the reply is then good.
 class Mender {
  public:
-  static constexpr std::size_t most_bytes = 12;  // longest reply for which all combinations of 8th bits are tried
+  // longest reply for which all combinations of 8th bits are tried, in bytes
+  static constexpr std::size_t most_bytes = 12;
 
-  /// `random`: undoes random changes instead, which measures how often chance makes the reply good; null: undoes the
-  /// change.
+  /// Takes a damaged reply. With `random`, the functions undo random changes instead, to measure how often chance makes
+  /// the reply good; null: they undo the change.
   Mender(const Case& one, const Attempted& attempt, sim::Random* random)
       : one_(one), request_(attempt.exchange.request.frame()), raw_(attempt.raw), random_(random) {}
 
@@ -42,14 +44,14 @@ class Mender {
   [[nodiscard]] sim::Random* random() const { return random_; }
   [[nodiscard]] bool is_good(Bytes bytes) const { return decodes(one_, request_, {.bytes = bytes}); }
 
-  /// Returns whether the first `size` bytes are the whole request.
+  /// Returns whether the first `size` received bytes are the whole request.
   [[nodiscard]] bool begins_with_request(std::size_t size) const {
     const Bytes sent = request_.bytes;
     return sent.size() == size && raw_.size() >= size && std::equal(sent.begin(), sent.end(), raw_.begin());
   }
 
-  /// Returns whether the reply is good without the bytes at these indexes, in ascending order (or, by chance, without
-  /// as many others).
+  /// Returns whether the reply is good without the bytes at these indexes, which ascend. With `random`, leaves out as
+  /// many other bytes.
   [[nodiscard]] bool without(const std::vector<std::size_t>& places) const {
     if (places.empty() || places.size() >= raw_.size()) return false;
     std::vector<bool> removed(raw_.size(), false);
@@ -72,15 +74,15 @@ class Mender {
     return is_good(rest);
   }
 
-  /// Returns whether the reply is good with up to `most` of these values inserted anywhere (or, by chance, other
-  /// values). Stores their number.
+  /// Returns whether the reply is good with up to `most` of these values inserted anywhere, and stores their number in
+  /// `put`. With `random`, inserts other values.
   [[nodiscard]] bool with(Bytes values, std::size_t most, std::size_t& put) const {
     ByteList used(values.begin(), values.end());
     if (random_ != nullptr) {
       for (std::uint8_t& value : used) value = static_cast<std::uint8_t>(0x20 + random_->below(0xE0));
     }
     std::size_t tries = most_tries;
-    // As many at least as the frame lacks.
+    // Begins with the number of bytes that the frame lacks.
     const FrameEnd end = one_.unit.frame_end(one_.options, Direction::reply, raw_);
     const bool is_cut = end.kind == FrameEnd::Kind::incomplete && end.size > raw_.size();
     for (put = is_cut ? std::min(end.size - raw_.size(), most) : 1; put <= most && tries > 0; ++put) {
@@ -90,15 +92,15 @@ class Mender {
     return false;
   }
 
-  /// Returns whether the reply is good with the 8th bit of some bytes set (or, by chance, also with two other bits
-  /// changed).
+  /// Returns whether the reply is good with the 8th bit of some bytes set, and stores their number. With `random`, also
+  /// changes two other bits.
   [[nodiscard]] bool with_eighth_bits(std::size_t& set) const {
     ByteList bytes = raw_;
     if (random_ != nullptr && bytes.size() > 2) {
       for (int i = 0; i < 2; ++i)
         bytes[random_->below(bytes.size())] ^= static_cast<std::uint8_t>(1u << random_->below(7));
     }
-    if (bytes.size() > most_bytes) {  // checks longer replies only for completeness
+    if (bytes.size() > most_bytes) {  // a longer reply is only checked for completeness
       const FrameEnd end = one_.unit.frame_end(one_.options, Direction::reply, bytes);
       set = bytes.size();
       return end.kind == FrameEnd::Kind::complete && end.size == bytes.size();
@@ -117,9 +119,9 @@ class Mender {
   }
 
  private:
-  static constexpr std::size_t most_tries = 5000;  // greatest number of decodings of one reply
+  static constexpr std::size_t most_tries = 5000;  // limit of the decodings of one reply
 
-  // Inserts at all indexes from `from` on.
+  // Inserts `count` of the values at all indexes from `from` on, and returns whether any result is good.
   [[nodiscard]] bool insert(ByteList& bytes, const ByteList& values, std::size_t from, std::size_t count,
                             std::size_t& tries) const {
     if (count == 0) {
@@ -151,21 +153,21 @@ bool contains(const ByteList& bytes, std::uint8_t value) {
   return std::find(bytes.begin(), bytes.end(), value) != bytes.end();
 }
 
-/// A change that is made to the bytes of every reply.
+/// A change that an adapter may make to the bytes of every reply, and how to undo it.
 struct Suspicion {
   FindingKind finding_kind;
-  bool (*fits)(const ByteList& raw);  // returns false if this reply, good or not, shows that the change is not made
-  /// Returns whether undoing the change makes the reply good; `count` is the number of bytes changed.
+  bool (*fits)(const ByteList& raw);  // returns false if this reply, good or not, proves that the change is not made
+  /// Undoes the change, returns whether that makes the reply good, and stores in `count` the number of changed bytes.
   bool (*undo)(const Mender& mender, std::size_t& count);
-  std::size_t most_tried;      // greatest number of replies that are tried
-  bool of_each_reply = false;  // the change affects each reply, independent of its bytes
+  std::size_t most_tried;      // greatest number of replies for which undoing the change is tried
+  bool of_each_reply = false;  // whether the change affects each reply, independent of its bytes
 };
 
-// ---- The changes
+// ---- The changes, each with functions `fits` and `undo`
 
 bool fits_any(const ByteList&) { return true; }
 
-// Bytes before each reply. If they are the request itself, that is an echo.
+// Removes the first `size` bytes of the reply. If they equal the request, they are an echo and no change.
 template <std::size_t size>
 bool undo_bytes_before(const Mender& mender, std::size_t& count) {
   count = size;
@@ -198,7 +200,7 @@ bool undo_newline(const Mender& mender, std::size_t& count) {
   return mender.without(places);
 }
 
-// Removes the second FF of each pair.
+// Returns the indexes of the second FF of each pair FF FF.
 std::vector<std::size_t> doubled(const ByteList& raw) {
   std::vector<std::size_t> places;
   for (std::size_t i = 0; i + 1 < raw.size(); ++i) {
@@ -232,10 +234,10 @@ bool fits_seven_bits(const ByteList& raw) {
 }
 bool undo_seven_bits(const Mender& mender, std::size_t& count) { return mender.with_eighth_bits(count); }
 
-constexpr std::size_t cheap = 24;  // number of replies that are tried
-constexpr std::size_t dear = 10;   // number of replies if each is decoded thousands of times
+constexpr std::size_t cheap = 24;  // number of replies to try
+constexpr std::size_t dear = 10;   // number of replies to try if each is decoded thousands of times
 
-// Changes at any index are tried before changes at one end.
+// Changes at any index precede changes at one end, because they are more specific.
 constexpr auto suspicions = std::to_array<Suspicion>({
     {FindingKind::telnet_doubled, fits_telnet, undo_telnet, cheap},
     {FindingKind::newline_translated, fits_newline, undo_newline, cheap},
@@ -263,12 +265,14 @@ std::size_t variety(const All& all) {
   return sum;
 }
 
-// Requires that nearly all damaged replies become good.
+// Returns the finding of this change if undoing it makes nearly all damaged replies good, far more than chance would;
+// otherwise nothing.
 std::optional<Finding> suspected(const Case& one, const All& all, const Suspicion& suspicion) {
   constexpr std::size_t enough = 4;
   const bool of_nearly_all = all.size() * 10 >= one.seen.readings.size() * 8;
   if (suspicion.of_each_reply && !of_nearly_all) return {};
-  // Longer replies are rarely good without 8th bits, except replies of text, whose damage then has another cause.
+  // Longer replies are rarely good without 8th bits. If some are good, the damage has another cause, except in replies
+  // of text.
   const auto is_long = [](const Attempted* attempt) { return attempt->raw.size() > Mender::most_bytes; };
   if (suspicion.finding_kind == FindingKind::seven_bits && !of_nearly_all && std::ranges::any_of(all, is_long))
     return {};
@@ -292,7 +296,7 @@ std::optional<Finding> suspected(const Case& one, const All& all, const Suspicio
       example = attempt;
     }
     by_chance += suspicion.undo(Mender(one, *attempt, &random), ignored) ? 1 : 0;
-    // A change that explains none of the first replies cannot explain nearly all.
+    // A change that explains none of the first replies cannot explain nearly all of them.
     if (tried >= enough && mended == 0) return {};
   }
   tried = std::min(tried, suspicion.most_tried);
@@ -305,7 +309,8 @@ std::optional<Finding> suspected(const Case& one, const All& all, const Suspicio
                   to_hex(Bytes(example->raw).first(std::min<std::size_t>(example->raw.size(), 24)))});
 }
 
-// An XOR checksum is also good without the 8th bits; then a byte of the position repeatedly goes from 7F to 00.
+// Finds 8th bits that are lost although replies are good: an XOR checksum can be right without them. Then a byte of the
+// position goes from 7F to 00 again and again.
 std::optional<Finding> seven_bits_of_good(const Case& one) {
   constexpr std::size_t enough = 40;
   constexpr std::size_t least_wraps = 2;
@@ -333,7 +338,7 @@ std::optional<Finding> seven_bits_of_good(const Case& one) {
                   to_hex(Bytes(before->raw).first(std::min<std::size_t>(before->raw.size(), 24)))});
 }
 
-// Finds a byte before each reply to a request of one byte, which the port took for the echo.
+// Finds a byte before each reply to a request of one byte, which the port took for the echo of the request.
 std::optional<Finding> false_echo(const Case& one) {
   std::size_t good = 0;
   std::size_t wrong = 0;
@@ -357,7 +362,7 @@ std::optional<Finding> false_echo(const Case& one) {
                   to_hex(Bytes(example->raw).first(std::min<std::size_t>(example->raw.size(), 24)))});
 }
 
-// Finds bytes after good replies that are too few for a second reply.
+// Finds one or two bytes after most good replies, too few for a second reply.
 std::optional<Finding> byte_behind_good(const Case& one) {
   const Observations& seen = one.seen;
   if (seen.overfull * 10 < one.good * 8 || one.good < 4 || seen.most_behind == 0 || seen.most_behind > 2) return {};

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Judges damaged replies by their content.
+// Judges damaged replies by their content, and failures among good replies.
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
@@ -24,7 +24,7 @@ using ByteList = std::vector<std::uint8_t>;
 
 bool is_damaged(const Attempted& one) { return one.error != Error::none && one.heard; }
 
-// Returns the errors of the replies: "bad_checksum, wrong_length".
+// Returns the names of all errors of the damaged replies: "bad_checksum, wrong_length".
 std::string errors_of(const std::vector<Attempted>& readings) {
   std::vector<std::string_view> names;
   for (const Attempted& one : readings) {
@@ -36,7 +36,7 @@ std::string errors_of(const std::vector<Attempted>& readings) {
 
 bool is_good(const Case& one, const Frame& request, Bytes reply) { return decodes(one, request, {.bytes = reply}); }
 
-// ---- No reply is good
+// ---- Judges for lines on which no reply is good
 
 All damaged(const Case& one) {
   All all;
@@ -52,7 +52,7 @@ Finding counted(FindingKind finding_kind, const Case& one, const All& those) {
                   to_hex(Bytes(those.front()->raw).first(std::min<std::size_t>(those.front()->raw.size(), 16)))});
 }
 
-// Returns whether nearly all attempts fulfil `is`; one or two may be noise.
+// Returns whether `is` returns true for at least 8 of 10 attempts; the others may be noise.
 template <class Is>
 bool most(const All& all, const Is& is) {
   const auto those = std::count_if(all.begin(), all.end(), [&](const Attempted* one) { return is(*one); });
@@ -100,7 +100,8 @@ std::optional<Finding> two_frames(const Case& one, const All& all) {
   return finding(FindingKind::two_answer, {fmt::format("{}", two), fmt::format("{}", all.size()), shown(**first)});
 }
 
-// If two encoders reply at once, flipping a single bit does not make the replies good.
+// Reports that two encoders reply at the same address if a scan found that. Flipping a single bit does not make such
+// replies good.
 std::optional<Finding> same_address(const Case& one, const All&) {
   if (one.seen.clash.empty()) return {};
   return finding(FindingKind::same_address, {one.seen.clash});
@@ -126,7 +127,7 @@ std::optional<Finding> single_bits(const Case& one, const All& all) {
                   errors_of(one.seen.readings), fmt::format("{} would be good with one bit changed", mended)});
 }
 
-// The reply is good by itself, but not a reply to this request.
+// Returns whether the reply is good by itself but is no reply to this request.
 bool answers_another(const Case& one, const Attempted& attempt) {
   return attempt.error != Error::none && one.unit.link != LinkKind::can && !attempt.exchange.request.frame().empty() &&
          !attempt.exchange.reply.frame().empty() && decodes(one, {}, attempt.exchange.reply.frame());
@@ -137,7 +138,8 @@ bool is_contradiction(const Attempted& attempt) {
          attempt.error == Error::unexpected_reply;
 }
 
-// These errors are found after a good checksum, so neither the line nor another protocol is the cause.
+// Makes the finding for errors that are detected after a good checksum, so that neither the line nor another protocol
+// is the cause.
 Finding contradiction(const Case& one, const All& all) {
   std::size_t count = 0;
   const Attempted* last = nullptr;
@@ -170,8 +172,8 @@ std::optional<Finding> refusal(const Case&, const All& all) {
                                         last.advice.empty() ? std::string(text.advice) : last.advice});
 }
 
-// A sender that is several times slower than the receiver produces long runs of equal bits: no byte has more than one
-// level change, unlike the bytes of a frame with a checksum.
+// Finds a sender that is several times slower than the receiver. Its bytes have long runs of equal bits, with at most
+// one level change each, unlike the bytes of a frame with a checksum.
 std::optional<Finding> stretched(const Case& one, const All& all) {
   if (one.unit.link != LinkKind::half_duplex && one.unit.link != LinkKind::full_duplex) return {};
   if (const auto& damage = one.seen.damage; damage && damage->framing > 0) {
@@ -193,11 +195,11 @@ std::optional<Finding> stretched(const Case& one, const All& all) {
   return finding(FindingKind::baud_pattern, {fmt::format("long runs of equal bits, such as {}", shown(*all.front()))});
 }
 
-// ---- Some replies are good
+// ---- Judges for lines on which some replies are good
 
-// The bits in which a damaged reply differs from the good ones of a shaft at rest.
+// The bytes and bits in which a damaged reply differs from the usual reply of a shaft at rest.
 struct Damage {
-  std::size_t first = 0;  // first and last damaged byte
+  std::size_t first = 0;  // indexes of the first and the last damaged byte
   std::size_t last = 0;
   std::size_t flips = 0;
 };
@@ -215,7 +217,7 @@ std::optional<Damage> compare(const ByteList& reply, const ByteList& good) {
   return damage;
 }
 
-// Returns the reply that nearly all good ones equal; empty if the shaft moves, or if frames have a counter.
+// Returns the reply that at least 9 of 10 good replies equal; empty if the shaft moves, or if frames have a counter.
 ByteList usual_reply(const std::vector<Attempted>& readings) {
   std::map<ByteList, std::size_t> counts;
   std::size_t good = 0;
@@ -230,7 +232,7 @@ ByteList usual_reply(const std::vector<Attempted>& readings) {
   return is_usual ? usual->first : ByteList{};
 }
 
-// Reading a stream continues to its next good frame, so more frames may be damaged than were reported.
+// Returns the number of damaged frames that no reading reports: reading a stream continues to its next good frame.
 std::size_t unreported(const std::vector<Attempted>& readings) {
   std::size_t count = 0;
   for (const Attempted& one : readings) {
@@ -245,7 +247,7 @@ Finding some_damage(const Case& one, const All& all) {
                                   fmt::format("{}", one.seen.readings.size() + more), errors_of(one.seen.readings)};
   const ByteList usual = usual_reply(one.seen.readings);
   if (usual.empty()) return finding(FindingKind::sometimes_damaged, values);
-  constexpr std::size_t few = 3;  // greatest number of bits that a disturbance of one bit's length changes
+  constexpr std::size_t few = 3;  // greatest number of bits that a short disturbance, as long as one bit, changes
   std::size_t single = 0;
   std::size_t compared = 0;
   Damage sum{.first = usual.size()};
@@ -279,7 +281,7 @@ void judge_bad_frames(const Case& one, std::vector<Finding>& findings) {
       return;
     }
   }
-  if (all.size() * 10 < one.seen.readings.size()) return;  // silence is the main fault, which other judges explain
+  if (all.size() * 10 < one.seen.readings.size()) return;  // silence is the main fault, which another judge reports
   findings.push_back(finding(FindingKind::always_damaged,
                              {fmt::format("{}", all.size()), errors_of(one.seen.readings), shown(*all.front())}));
 }
@@ -295,7 +297,7 @@ Finding finding_of(const Unit& unit, const Options& options, PortKind place, con
     return suited(last.heard ? finding(FindingKind::sometimes_damaged, {"", "", ""})
                              : finding(FindingKind::sometimes_silent, {"", ""}));
   }
-  // A single frame can show another model, as many frames do in an examination.
+  // A single frame can show that another model is connected, like the many frames of an examination.
   const auto& [request, reply] = last.exchange;
   if (last.error != Error::none && !reply.frame().empty()) {
     const std::string setting = diagnose(unit, options, request.frame(), reply.frame()).setting;
@@ -326,7 +328,7 @@ void judge_mixed_frames(const Case& one, std::vector<Finding>& findings) {
     });
     return taken;
   };
-  // On a clocked line, a data line that never changes counts as silence.
+  // Takes a data line that never changes for silence, because a clocked line always delivers bits.
   const All stuck = take([](const Attempted& attempt) { return attempt.error == Error::line_stuck; });
   const auto is_misheard = [&](const Attempted& attempt) {
     return is_refusal(attempt) || (!has_good_part(one, attempt) && answers_another(one, attempt));
@@ -337,7 +339,8 @@ void judge_mixed_frames(const Case& one, std::vector<Finding>& findings) {
                                 refused.back()->detail.empty() ? std::string(text_of(refused.back()->error).description)
                                                                : refused.back()->detail}));
   }
-  // Beside damaged replies, these may be damage that the checksum misses.
+  // If other replies are damaged as well, replies with these errors may be damage that the checksum missed; if not,
+  // they are reported.
   if (!all.empty() && std::ranges::all_of(all, [](const Attempted* attempt) { return is_contradiction(*attempt); })) {
     findings.push_back(contradiction(one, all));
     all.clear();
@@ -351,7 +354,7 @@ void judge_mixed_frames(const Case& one, std::vector<Finding>& findings) {
                                {fmt::format("{}", one.seen.overfull), fmt::format("{}", one.seen.readings.size()),
                                 to_hex(example.first(std::min(example.size(), most_shown)))}));
   } else if (std::optional<Finding> extra = extra_bytes(one, all)) {
-    // A complete reply after a reply may be the next one, if the first was late.
+    // A complete reply after a reply may be the next reply, if the first was late.
     const bool may_be_late = std::ranges::all_of(all, [&](const Attempted* one_of) { return holds_two(one, *one_of); });
     if (!may_be_late || !may_be_the_computer(one.seen, all.size())) findings.push_back(std::move(*extra));
   } else if (!all.empty()) {
@@ -362,7 +365,7 @@ void judge_mixed_frames(const Case& one, std::vector<Finding>& findings) {
                          one.seen.readings.begin(), one.seen.readings.end(),
                          [](const Attempted& attempt) { return attempt.error != Error::none && !attempt.heard; }));
   const std::size_t late = one.unit.link == LinkKind::can ? 0 : one.seen.late;
-  // A late reply can cost the next reading, too.
+  // A late reply may make the next reading fail as well, so silent readings are compared with twice the late replies.
   if (silent > 2 * late && !may_be_the_computer(one.seen, silent)) {
     findings.push_back(finding(FindingKind::sometimes_silent,
                                {fmt::format("{}", silent), fmt::format("{}", one.seen.readings.size())}));

@@ -24,7 +24,7 @@ namespace absenc::client {
 
 namespace {
 
-// Returns the address setting of the polled encoder.
+// Returns the setting of the polled encoder's address, "address=3"; empty if the unit has no addresses.
 std::vector<std::string> address_settings(const Unit& unit, const Options& options) {
   const Option* option = find_role(unit.options, Role::encoder);
   if (option == nullptr) return {};
@@ -50,7 +50,7 @@ bool speaks_text(const Unit& unit) {
   return all != 0 && text * 10 >= all * 9;
 }
 
-// Returns the first characters from `at` on: "$GPGGA,120000".
+// Returns the bytes from `at` on as quoted text, up to the end of the line: "$GPGGA,120000".
 std::string quoted(Bytes bytes, std::size_t at) {
   constexpr std::size_t most = 32;
   std::string text = "\"";
@@ -61,11 +61,11 @@ std::string quoted(Bytes bytes, std::size_t at) {
   return text + "\"";
 }
 
-// Returns the checks that explain these frames.
+// Returns the checksums that explain these frames; none if there are too few frames.
 CheckFindings checks_of(const std::vector<CheckedFrame>& frames) {
   try {
     return find_crc(frames);
-  } catch (const UsageError&) {  // too few frames, or of a kind in which no checksum is searched
+  } catch (const UsageError&) {  // there are too few frames, or frames in which no checksum is searched
     return {};
   }
 }
@@ -75,7 +75,7 @@ bool is_same_kind(const FoundCheck& one, const FoundCheck& other) {
                                                           one.parameters.poly == other.parameters.poly));
 }
 
-// The unit's own checksum with another initial value is not another checksum.
+// Returns whether the unit's own frames have this kind of checksum, perhaps with another initial value.
 bool is_of_unit(const FoundCheck& check, const Unit& unit) {
   std::vector<CheckedFrame> frames;
   for (const Vector& vector : unit.vectors) {
@@ -118,7 +118,7 @@ std::optional<Finding> text_of_others(const Case& one, Bytes bytes) {
     if (at != std::string::npos) return finding(FindingKind::modem_answers, {quoted(bytes, at)});
   }
   constexpr std::size_t enough_kinds =
-      6;  // number of different characters; a frame that repeats may contain letters, too
+      6;  // least number of different characters in a text: a frame that repeats may contain letters, too
   const bool has_lines = text.find_first_of("\r\n") != std::string::npos;
   if (bytes.size() < enough || !has_lines || std::set(text.begin(), text.end()).size() < enough_kinds) return {};
   if (printed(bytes) * 20 < bytes.size() * 19 || speaks_text(one.unit)) return {};
@@ -127,13 +127,14 @@ std::optional<Finding> text_of_others(const Case& one, Bytes bytes) {
   return finding(FindingKind::modem_answers, {quoted(bytes, static_cast<std::size_t>(begin - bytes.begin()))});
 }
 
-// Searches options as `identify` does, limited to this unit and this encoder.
+// Searches for other options like `identify`, limited to this unit and to the encoder's address.
 std::optional<Finding> other_settings(const Case& one, const All& all) {
-  constexpr std::size_t enough = 4;  // number of frames; fewer are weak evidence
+  constexpr std::size_t enough = 4;  // least number of frames; fewer are weak evidence
   if (all.size() < enough) return {};
   std::vector<capture::ObservedExchange> exchanges;
   for (const Attempted* attempt : all) exchanges.push_back(attempt->exchange);
-  constexpr std::size_t most_tried = 32;  // number of frames, because each is decoded with many sets of options
+  // greatest number of frames, because each is decoded with many sets of options
+  constexpr std::size_t most_tried = 32;
   exchanges.resize(std::min(exchanges.size(), most_tried));
   const std::vector<std::string> address = address_settings(one.unit, one.options);
   std::vector<OptionText> known;

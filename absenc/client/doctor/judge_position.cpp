@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Judges whether positions move as those of a shaft: steady at rest, not too fast, without missing codes.
+// Judges whether positions are those of a shaft: steady at rest, not too fast, without missing codes.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -16,21 +16,21 @@ namespace absenc::client {
 
 namespace {
 
-constexpr double quiet_share = 1e-4;  // fraction of a turn, 0.04 degrees, by which a position at rest may vary
+constexpr double quiet_share = 1e-4;  // fraction of a turn (1e-4, 0.04 degrees) by which a position at rest may vary
 constexpr std::int64_t quiet_counts = 4;
 constexpr std::uint32_t hand_rpm = 600;
 
-/// The movement of the position from reading to reading.
+/// The positions of consecutive readings, and the movement between them.
 struct Walk {
   unsigned bits = 0;
   double unit_um = 0;
   std::vector<std::uint64_t> places{};
   std::vector<std::int64_t> steps{};
   std::vector<Time> pauses{};
-  std::int64_t lowest = 0;  // lowest continuous position, relative to the first
+  std::int64_t lowest = 0;  // lowest position relative to the first, in counts, continued past the end of the counter
   std::int64_t highest = 0;
   std::int64_t end = 0;
-  std::set<std::int64_t> turns{};  // turns that were reported as valid
+  std::set<std::int64_t> turns{};  // all numbers of turns that were reported as valid
   std::size_t zero_crossings = 0;
   Time time{};  // time from the first to the last reading
 
@@ -68,7 +68,8 @@ std::int64_t quiet(const Walk& walk) {
   return std::max(quiet_counts, static_cast<std::int64_t>(std::ldexp(quiet_share, static_cast<int>(walk.bits))));
 }
 
-// A turning shaft moves in one direction or swings; the noise of a shaft at rest changes direction all the time.
+// Finds a position that is noisy at rest. A turning shaft moves in one direction or swings; the noise of a shaft at
+// rest changes direction all the time.
 void judge_noise(const Walk& walk, std::vector<Finding>& findings) {
   constexpr std::size_t enough = 40;
   std::size_t turns = 0;
@@ -81,7 +82,7 @@ void judge_noise(const Walk& walk, std::vector<Finding>& findings) {
     ++moved;
   }
   if (walk.steps.size() < enough || walk.span() <= quiet(walk) || moved * 4 < walk.steps.size()) return;
-  // A visible swing does not change direction at every third step, and a wide movement is not noise.
+  // A wide movement is no noise, and neither is a swing that changes direction at fewer than every third step.
   const bool wide = walk.unit_um > 0 ? walk.span() > 1000 : walk.span() > (std::int64_t{1} << walk.bits) / 32;
   if (turns * 3 < moved || wide) return;
   const std::string size = walk.unit_um > 0
@@ -91,8 +92,8 @@ void judge_noise(const Walk& walk, std::vector<Finding>& findings) {
   findings.push_back(finding(FindingKind::position_noise, {fmt::format("{}", walk.span()), size}));
 }
 
-// Returns the counts that the shaft can pass in this time, limited to half of the range, beyond which the direction is
-// ambiguous.
+// Returns how many counts the shaft can move in the time `pause`. The movement between two readings is at most half of
+// the range, beyond which its direction is ambiguous.
 double reach(const Walk& walk, Time pause, const host::SpeedLimit& limit) {
   const double seconds = std::chrono::duration<double>(pause).count();
   const double counts =
@@ -100,9 +101,10 @@ double reach(const Walk& walk, Time pause, const host::SpeedLimit& limit) {
   return 1.25 * counts * seconds + static_cast<double>(quiet(walk));
 }
 
-// `damaged` is the number of readings seen as damaged. A sum of 8 bits misses one of 20 errors of three bits, and each
-// missed one causes two jumps; so up to as many jumps as damaged readings count as damage. `woken_late`: a pause may
-// have been this much longer, because this computer read the first of two positions late.
+// Finds positions that the shaft cannot have reached. `damaged` is the number of readings that failed by damage. A sum
+// of 8 bits misses one of 20 errors of three bits, and each missed error causes two jumps; so up to `damaged` jumps are
+// taken for damage. `woken_late`: a pause may have been this much longer, because this computer read the first of two
+// positions late.
 void judge_jumps(const Walk& walk, const host::SpeedLimit& limit, Time woken_late, std::size_t damaged,
                  std::vector<Finding>& findings) {
   std::size_t jumps = 0;
@@ -118,7 +120,8 @@ void judge_jumps(const Walk& walk, const host::SpeedLimit& limit, Time woken_lat
   findings.push_back(finding(FindingKind::position_jumps, {fmt::format("{}", jumps), fmt::format("{}", furthest)}));
 }
 
-// A shaft turned by hand moves its position, and its turns change within each whole turn.
+// Judges a shaft that is turned by hand: its position must move, and its number of turns must change within each whole
+// turn.
 void judge_turning(const Walk& walk, std::vector<Finding>& findings) {
   constexpr std::size_t enough = 20;
   if (walk.steps.size() < enough) return;
@@ -134,8 +137,8 @@ void judge_turning(const Walk& walk, std::vector<Finding>& findings) {
   }
 }
 
-// Finds a bit that never changes although the position passed several of its changes in uneven steps. With even steps
-// the bit may always have the same value.
+// Finds bits that never change although the position moved in uneven steps by several times their value. With even
+// steps a bit may always have the same value.
 void judge_bits(const Walk& walk, std::vector<Finding>& findings) {
   constexpr std::size_t enough = 64;
   constexpr std::size_t uneven = 8;

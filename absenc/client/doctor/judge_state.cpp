@@ -22,17 +22,17 @@ namespace {
 struct RaisedFlag {
   const FlagInfo* flag = nullptr;
   bool is_alarm = false;
-  std::set<std::string_view> channels{};  // names of the fields that report the flag
-  const Reading* last = nullptr;          // the last reading that reports the flag
+  std::set<std::string_view> channels{};  // names of the fields, one for each channel, that report the flag
+  const Reading* last = nullptr;          // the last reading that has the flag raised
   std::size_t readings = 0;
-  std::size_t invalid = 0;  // number of these readings with an invalid position or invalid turns
+  std::size_t invalid = 0;  // number of readings with this flag raised in which the position or the turns are invalid
 };
 
 bool is_invalid(const Reading& reading) {
   return reading.singleturn_validity() == Validity::invalid || reading.multiturn_validity() == Validity::invalid;
 }
 
-// Returns the raised alarms of both channels, as bits of the first.
+// Returns the raised alarms of both channels, joined as bits of the first channel's field.
 std::uint32_t alarms_of_either(const Unit& unit, const Reading& reading) {
   std::uint32_t bits = 0;
   for (const Flags& flags : alarms_of(unit, reading)) bits |= flags.bits;
@@ -44,7 +44,7 @@ void count_flags(const std::vector<Flags>& all, bool is_alarm, const Reading& re
   for (const Flags& flags : all) {
     for (const FlagInfo* flag : raised(*flags.field, flags.bits)) {
       if (!is_alarm && (flag->action.empty() || (flag->sums & alarms) != 0)) continue;
-      // Each channel has a field of its own with the same flag names.
+      // A flag of the second channel has a field of its own, so flags are compared by name.
       auto count = std::ranges::find_if(counts, [&](const RaisedFlag& known) {
         return known.is_alarm == is_alarm && known.flag->name == flag->name;
       });
@@ -63,8 +63,8 @@ std::string share(std::size_t some, std::size_t all) {
   return some == all ? fmt::format("all {}", all) : fmt::format("{} of {}", some, all);
 }
 
-// Judges positions and turns that are invalid without an alarm. `is_damage` returns whether so few may be damage that
-// the checksum missed.
+// Reports positions and turns that are invalid although no alarm explains it. `is_damage` returns whether so few
+// invalid readings may be damage that the checksum missed.
 template <class IsDamage>
 void judge_validity(const std::vector<const Reading*>& readings, const IsDamage& is_damage,
                     std::vector<Finding>& findings) {
@@ -89,7 +89,8 @@ void judge_validity(const std::vector<const Reading*>& readings, const IsDamage&
 
 void judge_state(const Case& one, std::vector<Finding>& findings) {
   std::vector<const Reading*> readings;
-  std::vector<const Reading*> ready;  // readings after the start-up, because alarms during start-up do not count
+  // readings after the start-up; flags that are raised during the start-up are ignored
+  std::vector<const Reading*> ready;
   for (const Attempted& attempt : one.seen.readings) {
     if (!attempt.reading) continue;
     readings.push_back(&*attempt.reading);
@@ -111,8 +112,8 @@ void judge_state(const Case& one, std::vector<Finding>& findings) {
   std::stable_sort(flags.begin(), flags.end(), [](const RaisedFlag& before, const RaisedFlag& after) {
     return (before.invalid > 0) > (after.invalid > 0);  // flags that make the position invalid come first
   });
-  // A checksum of 6 bits misses one of 64 damaged replies, by chance a few more, so the encoder may not have raised
-  // these flags.
+  // Removes flags of so few readings that they may be damage: a checksum of 6 bits misses one of 64 damaged replies, by
+  // chance a few more.
   const std::size_t failed = one.seen.readings.size() - one.good;
   const auto is_damage = [failed](std::size_t count) { return count * 10 < failed; };
   std::erase_if(flags, [&](const RaisedFlag& rare) { return is_damage(rare.readings); });
@@ -137,7 +138,7 @@ void judge_state(const Case& one, std::vector<Finding>& findings) {
 }
 
 std::optional<Finding> judge_start(const Case& one) {
-  constexpr std::size_t enough = 20;  // good ones
+  constexpr std::size_t enough = 20;  // least number of good readings
   const std::vector<Attempted>& readings = one.seen.readings;
   const auto first =
       std::ranges::find_if(readings, [](const Attempted& attempt) { return attempt.error == Error::none; });

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The judges: each adds its findings.
+// The judges of doctor: each adds its findings about one aspect of the observations.
 #pragma once
 
 #include <algorithm>
@@ -10,7 +10,7 @@
 
 namespace absenc::client {
 
-/// The observations and the number of good readings among them.
+/// The observations of one examination, with the unit, its options, and the number of good readings.
 struct Case {
   const Unit& unit;
   const Options& options;
@@ -18,9 +18,9 @@ struct Case {
   std::size_t good = 0;
 };
 
-/// Returns whether this number of late or missing replies may be due to this busy computer; an emulator or an adapter's
-/// driver on it is delayed, too. That may be a single one among many readings, or one of a hundred if the computer
-/// stood still for as long as the timeout.
+/// Returns whether `some` late or missing replies may be due to this busy computer, which also delays an emulator or an
+/// adapter's driver. That is a single one among many readings, less than one in a thousand, or less than one in a
+/// hundred if the computer stood still for as long as the timeout.
 [[nodiscard]] inline bool may_be_the_computer(const Observations& seen, std::size_t some) {
   constexpr Time busy = std::chrono::milliseconds(1);
   constexpr std::size_t many = 20;
@@ -34,19 +34,20 @@ struct Case {
 
 void judge_port(const Case& one, std::vector<Finding>& findings);
 void judge_line(const Case& one, std::vector<Finding>& findings);
-/// Judges replies of which none is good.
+/// Adds the finding about damaged replies if no reply, or hardly any, is good.
 void judge_bad_frames(const Case& one, std::vector<Finding>& findings);
-/// Judges bursts of failures with good readings between them.
+/// Returns the finding about bursts of failures with good readings between them; nothing if there are no bursts.
 [[nodiscard]] std::optional<Finding> coming_and_going(const Case& one);
-/// Judges replies of which some are good.
+/// Adds the findings about failures if some replies are good.
 void judge_mixed_frames(const Case& one, std::vector<Finding>& findings);
-/// Finds an encoder that was powered on meanwhile: no replies at first, then only good readings.
+/// Returns the finding for an encoder that was powered on during the examination: no replies at first, then only good
+/// readings. Otherwise nothing.
 [[nodiscard]] std::optional<Finding> judge_start(const Case& one);
 void judge_state(const Case& one, std::vector<Finding>& findings);
 void judge_position(const Case& one, const std::vector<Attempted>& readings, bool by_hand,
                     std::vector<Finding>& findings);
 
-/// Returns bytes as "1A 20 45", cut after `most` bytes.
+/// Returns the received bytes of the attempt as "1A 20 45", cut after a few bytes.
 [[nodiscard]] std::string shown(const Attempted& one);
 
 }  // namespace absenc::client

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Scripted lines for tests of doctor.
+// A scripted line for tests of doctor.
 #pragma once
 
 #include <algorithm>
@@ -16,16 +16,16 @@ namespace absenc::client {
 
 using namespace std::chrono_literals;
 
-/// A line on which a function makes the replies, and on which another device may send all the time.
+/// A line in virtual time on which the function `answer` makes the replies. Another device may send on it all the time.
 template <class Item>
 class ScriptedPort final : public Port<Item> {
  public:
   using List = std::vector<Item>;
   std::function<List(const List& request)> answer = [](const List&) { return List{}; };
-  List babble{};  // bytes that the other device sends every millisecond
+  List babble{};  // bytes that another device sends every millisecond; empty: no other device
   Time after = 100us;
   Time latency{};
-  bool destroys = false;  // every frame is destroyed, as on a CAN bus without acknowledgement
+  bool destroys = false;  // whether every frame is destroyed, as on a CAN bus without acknowledgement
 
   Time now() override { return now_; }
   void begin(const Step<Item>& step) override {

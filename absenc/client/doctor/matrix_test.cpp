@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Checks doctor in virtual time with every unit in every mode, each alarm, each condition at both ends of its range,
-// and each fault at 1, 10 and 100 %. Reported or damaged encoders are never called good, and no finding names another
-// cause. docs/doctor.md has the tables of first findings; ABSENC_UPDATE_DOCS=1 updates them.
+// and each fault at 1, 10 and 100 %. Doctor must not call an encoder good that reports a defect or whose frames are
+// damaged, and no finding may name another cause. docs/doctor.md has the tables of first findings; ABSENC_UPDATE_DOCS=1
+// updates them.
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <gmock/gmock-more-matchers.h>
@@ -30,10 +31,10 @@ using Ids = std::set<std::string_view>;
 
 constexpr std::size_t readings = 200;
 
-/// A position without a byte 0: the rest of a truncated frame with zeros could be a good frame.
+/// Setting of a position without a byte 0: with zeros, the rest of a truncated frame could be a good frame.
 constexpr std::string_view at_no_zero = "singleturn=1383&";
 
-/// A virtual encoder whose faults and state can be read after the examination.
+/// The examination of a virtual encoder, whose faults and state can be read afterwards.
 struct Watched {
   std::shared_ptr<VirtualDevice> device;
   Examination examination{};
@@ -47,7 +48,7 @@ struct Watched {
   }
 };
 
-/// A device on a line in virtual time.
+/// Returns a link to the virtual encoder `device`, in virtual time.
 Link link_on(const EncoderAddress& address, const std::shared_ptr<VirtualDevice>& device) {
   struct Both {
     std::shared_ptr<VirtualDevice> device;
@@ -96,7 +97,7 @@ Ids ids_of(const Examination& examination) {
   return ids;
 }
 
-/// Takes one reading without doctor: the reported state and the bytes on the wire.
+/// Result of one reading without doctor: the reported state, and the bytes on the wire.
 struct Read {
   Error error = Error::unsupported;
   std::optional<Reading> reading{};
@@ -129,7 +130,7 @@ Read reading_of(const EncoderAddress& address) {
   return link.bytes != nullptr ? reading_on(address, *link.bytes) : reading_on(address, *link.frames);
 }
 
-/// Returns the bits of flags that are defects; a status flag without advice is none.
+/// Returns the raised flags that are defects, as bits: all alarms, and status flags with an advice.
 std::uint64_t ailments_of(const Unit& unit, const Reading& reading) {
   std::uint64_t bits = reading.alarms;
   unsigned at = 0;
@@ -146,23 +147,23 @@ std::uint64_t ailments_of(const Unit& unit, const Reading& reading) {
 /// Findings that may result from a state that the encoder reports.
 const Ids of_state{"starting", "alarm", "status", "position_invalid", "contradictory", "counter_stands", "refused"};
 
-/// Findings that may result from each kind of fault; damage appears differently in each frame format.
+/// Returns the findings that may result from each kind of fault; damage appears differently in each frame format.
 const Ids& causes_of(const Unit& unit, sim::FaultKind kind) {
   using enum sim::FaultKind;
   static const Ids damage{"damaged_bits",   "damaged_bursts", "sometimes_damaged", "always_damaged", "bytes_missing",
                           "position_jumps", "position_noise", "stuck_bits",        "can_errors"};
   static const std::map<sim::FaultKind, Ids> others{
-      // If the next reply arrives before the late one, nothing shows a late reply.
+      // If the next reply arrives before the late reply, nothing shows that a reply was late.
       {delay, {"reply_late", "sometimes_late", "sometimes_silent"}},
       {echo, {"wrong_echo", "two_answer", "extra_bytes"}},
-      // On a bus random bytes may look like two encoders that send at the same time.
+      // Random bytes on a bus may look like two encoders that send at the same time.
       {garbage,
        {"same_address", "extra_bytes", "bytes_missing", "sometimes_damaged", "damaged_bits", "damaged_bursts",
         "always_damaged", "position_jumps", "position_noise", "stuck_bits"}},
       {silence, {"no_answer", "sometimes_silent", "miso_stuck"}},
       {repeat, {"two_answer", "extra_bytes"}},
-      // If a damaged request is taken for another one, its reply does not fit; it is unknown which direction was
-      // damaged.
+      // If the encoder takes a damaged request for another request, its reply does not fit; doctor cannot know which
+      // direction was damaged.
       {request_corrupt,
        {"requests_damaged", "sometimes_silent", "no_answer", "refused", "damaged_bits", "damaged_bursts",
         "sometimes_damaged", "always_damaged", "bytes_missing", "contradictory", "position_jumps"}},
@@ -198,7 +199,8 @@ class Matrix : public ::testing::TestWithParam<const Unit*> {
   const Unit& unit() const { return *GetParam(); }
 };
 
-/// Returns the settings with which a virtual encoder can be read, each manner of reading once.
+/// Returns the settings with which a virtual encoder can be read; of settings with the same bytes on the wire only the
+/// first.
 std::vector<std::string> readable_modes(const Unit& unit) {
   std::vector<std::string> modes;
   std::set<std::string> known;
@@ -207,7 +209,7 @@ std::vector<std::string> readable_modes(const Unit& unit) {
       const EncoderAddress address = address_of(unit, mode, "");
       const Read one = reading_of(address);
       if (one.error == Error::none && known.insert(one.wire).second) modes.push_back(mode);
-    } catch (const std::exception&) {  // options that exclude each other
+    } catch (const std::exception&) {  // these options exclude each other
     }
   }
   return modes;
@@ -254,7 +256,7 @@ TEST_P(Matrix, WhatTheEncoderReportsIsNeverGood) {
       try {
         address = address_of(unit(), mode, state);
         static_cast<void>(device_of(*address));
-      } catch (const std::exception&) {  // the options exclude this state
+      } catch (const std::exception&) {  // these options exclude this state
         continue;
       }
       const auto [error, reading, wire] = reading_of(*address);
@@ -284,7 +286,8 @@ TEST_P(Matrix, WhatTheEncoderReportsIsNeverGood) {
   std::printf("%s: %zu states reported, %zu not\n", std::string(unit().id).c_str(), reported, unreported);
 }
 
-/// The damage of frames depends on whether the encoder is polled or sends by itself, not on their content.
+/// Returns one mode in which the encoder is polled and one in which it sends unsolicited, as far as the unit has them:
+/// damage depends on that, not on the content of the frames.
 std::vector<std::string> damaged_modes(const Unit& unit) {
   std::vector<std::string> modes;
   std::set<bool> known;
@@ -305,7 +308,7 @@ TEST_P(Matrix, DamageIsNeverGoodAndNamedAsWhatItIs) {
         const Watched one = examined(address);
         const Examination& examination = one.examination;
         const bool all_good = examination.good == examination.tried;
-        // A fault without effect on the host is none, such as a delay within the timeout.
+        // Skips faults without an effect on the host, such as a delay within the timeout.
         if (one.injected() == 0 || (all_good && examination.findings.empty())) continue;
         EXPECT_FALSE(examination.healthy()) << sentences(examination);
         EXPECT_EQ(differences(ids_of(examination), causes_of(unit(), static_cast<sim::FaultKind>(kind))), "")
@@ -322,8 +325,8 @@ std::string first_of(const Examination& examination) {
   return first == nullptr ? "good" : std::string(first->id);
 }
 
-/// Returns the table with a row for each unit and a column for each fault: the first findings at 1, 10 and 100 %, once
-/// if they are equal.
+/// Returns the table with a row for each unit and a column for each fault. A cell has the first findings at 1, 10 and
+/// 100 %, or a single one if they are equal.
 std::string fault_table() {
   std::string table = "| protocol |";
   for (const std::string_view name : sim::fault_names) table += fmt::format(" {} |", name);
@@ -346,7 +349,8 @@ std::string fault_table() {
   return table;
 }
 
-/// Returns the table of each alarm and each condition at its ends, with the first finding and its evidence.
+/// Returns the table with a row for each alarm, and each condition at its ends, with the first finding and its
+/// evidence.
 std::string state_table() {
   std::string table = "| protocol | state of the encoder | first finding | evidence |\n|---|---|---|---|\n";
   for (const Unit* unit : all_units()) {
@@ -354,7 +358,7 @@ std::string state_table() {
       std::optional<Examination> examination;
       try {
         examination = examined(address_of(*unit, "", state)).examination;
-      } catch (const std::exception&) {  // the options exclude this state
+      } catch (const std::exception&) {  // these options exclude this state
         continue;
       }
       const Finding* first = examination->first();
@@ -365,7 +369,7 @@ std::string state_table() {
   return table;
 }
 
-/// Replaces the lines between `<!-- name -->` and `<!-- end -->`.
+/// Replaces the part of the document between the marks `<!-- name -->` and `<!-- end -->`.
 std::string& replace_between(std::string& text, const std::string& name, const std::string& with) {
   const std::string begin = fmt::format("<!-- {} -->\n", name);
   const std::size_t from = text.find(begin);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The observations of an encoder and its port, which the judges evaluate.
+// The observations of an encoder and its port, from which the judges derive their findings.
 #pragma once
 
 #include <cstdint>
@@ -17,19 +17,19 @@
 
 namespace absenc::client {
 
-/// A setting that was tried instead of the user's.
+/// A setting that was tried instead of the user's setting, and how well the encoder could be read with both.
 struct Trial {
-  FindingKind finding_kind{};  // the finding if this setting helps
+  FindingKind finding_kind{};  // the finding if the other setting helps
   std::string said{};          // the user's setting, "baud=115200"
-  std::string setting{};       // the setting tried, "baud=9600"
+  std::string setting{};       // the other setting, "baud=9600"
   std::size_t good = 0;
   std::size_t tried = 0;
-  std::size_t good_as_said = 0;  // good readings with the user's setting in the same turns
+  std::size_t good_as_said = 0;  // number of good readings with the user's setting in the same turns
   std::size_t tried_as_said = 0;
-  std::string command{};  // other_protocol: the command that reads the encoder
+  std::string command{};  // only for the finding other_protocol: the command that reads the encoder
 };
 
-/// Why the port did not open, or was lost.
+/// The reason why the port could not be opened, or was lost.
 struct Refusal {
   os::Failure::Kind kind{};
   std::string sentence{};
@@ -39,36 +39,37 @@ struct Refusal {
 
 struct Observations {
   PortKind place = PortKind::serial;
-  std::string port{};  // path of a serial port
+  std::string port{};  // path of the serial port; "": the port is of another kind
   os::PortFacts facts{};
-  std::optional<os::LineCounts> damage{};  // errors that the UART counted during the examination
+  // errors that the UART counted during the examination; nothing: the driver does not count them
+  std::optional<os::LineCounts> damage{};
   std::optional<Refusal> refusal{};
   std::vector<std::uint8_t> unsolicited{};  // bytes received before the first request
   Time listened{};
-  bool never_silent = false;  // the line was never silent while listening
+  bool never_silent = false;  // whether the line was never silent while doctor listened
   std::vector<Attempted> readings{};
-  std::vector<Attempted> turned{};  // readings while the shaft was turned by hand
-  std::uint64_t line_errors = 0;    // number of error frames of a CAN bus
-  std::uint64_t late = 0;           // number of replies after their timeout
-  Time lateness{};                  // delay of the latest of them
-  std::uint64_t overfull = 0;       // number of good replies that were followed by more items
+  std::vector<Attempted> turned{};  // readings that were taken while the user turned the shaft by hand
+  std::uint64_t line_errors = 0;    // number of error frames that the CAN bus reported
+  std::uint64_t late = 0;           // number of replies that began after their timeout
+  Time lateness{};                  // greatest time from a request to its late reply; 0: no reply was late
+  std::uint64_t overfull = 0;       // number of good replies that were followed by further items
   std::vector<std::uint8_t> overfull_example{};
-  std::size_t most_behind = 0;  // greatest number of items after one of them
+  std::size_t most_behind = 0;  // greatest number of items that followed a good reply
   std::vector<Trial> trials{};
   host::EchoMode echo_said{};     // echo mode that the user set
   host::EchoMode echo{};          // echo mode that was detected
   std::optional<Time> latency{};  // latency that the user set
   Time woken_late{};              // greatest wake-up delay of this computer during the examination
-  host::SpeedLimit limit{};       // speed limit of the encoder
-  std::string clash{};            // "address 3", if all replies of that address are damaged
+  host::SpeedLimit limit{};       // speed limit of the encoder's shaft
+  std::string clash{};            // address that two encoders share, "address 3"; "": none
   bool complete = true;
 };
 
-/// Judges the observations; findings are in the order of their kinds.
+/// Derives the findings from the observations, in the order of their kinds, and returns the result of the examination.
 [[nodiscard]] Examination judge(const Unit& unit, const Options& options, const Observations& seen);
 
-/// Returns the most likely finding for a single failed reading. `usually_good`: other readings mostly succeed; `late`:
-/// replies arrived after their timeout. The evidence may be incomplete.
+/// Returns the most likely finding for a single failed reading, whose evidence may be incomplete. `usually_good`: other
+/// readings mostly succeed; `late`: replies arrived after their timeout.
 [[nodiscard]] Finding finding_of(const Unit& unit, const Options& options, PortKind place, const Attempted& last,
                                  bool usually_good, bool late);
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Invented observations and interrupted lines for tests of doctor.
+// Invented observations, and lines that are interrupted, for tests of doctor.
 #pragma once
 
 #include <functional>
@@ -23,13 +23,13 @@ inline std::vector<std::string> ids(const Examination& examination) {
   return all;
 }
 
-/// Reply to 1A: position of 17 bits and turns of 16 bits, both 0, no alarm.
+/// Returns the T-format reply to the request 1A: position of 17 bits and turns of 16 bits, both 0, no alarm.
 inline const ByteList& good_reply() {
   static const ByteList reply{0x1A, 0, 0, 0, 0, 0x11, 0, 0, 0, 0, 0x0B};
   return reply;
 }
 
-/// Returns readings of positions, one every millisecond.
+/// Returns observations with 200 good readings, one every millisecond, with the positions `place(i)`.
 inline Observations positions(const std::function<std::uint64_t(std::size_t)>& place, unsigned bits = 17) {
   Observations seen;
   for (std::size_t i = 0; i < 200; ++i) {
@@ -48,7 +48,7 @@ inline Examination judged(const Observations& seen) {
   return judge(*address.unit, address.options, seen);
 }
 
-/// Returns a reading every millisecond while the shaft is turned by hand.
+/// Returns observations in which the shaft is turned by hand, with a reading of position and turns every millisecond.
 inline Observations turned_by_hand(const std::function<std::uint64_t(std::size_t)>& place,
                                    const std::function<std::int64_t(std::size_t)>& turns) {
   Observations seen = positions([](std::size_t) { return 5; });
@@ -62,9 +62,9 @@ inline Observations turned_by_hand(const std::function<std::uint64_t(std::size_t
   return seen;
 }
 
-constexpr std::uint64_t hand_counts = 1201;  // counts per millisecond, 550 rpm
+constexpr std::uint64_t hand_counts = 1201;  // counts per millisecond of a shaft at 550 rpm (17 bits)
 
-/// Returns readings for a time, of a line that is dead during a part of each period.
+/// Examines for `time` a line that is dead whenever `dead(now)` returns true.
 inline Examination examine_contact(Time time, const std::function<bool(Time)>& dead) {
   const Surroundings surroundings{[&](const EncoderAddress&) {
                                     auto port = std::make_shared<ScriptedPort<std::uint8_t>>();

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Each fault of an adapter or of another device at the other end, with its expected finding, for tests of doctor.
+// Each fault of an adapter, of the line or of another device at the other end, with its expected finding, for tests of
+// doctor.
 #pragma once
 
 #include <set>
@@ -12,10 +13,10 @@ namespace absenc::client::path_faults {
 
 using Ids = std::set<std::string>;
 
-/// The outcome of one fault; nothing if this unit cannot have it.
+/// Result of examining one unit with one fault.
 struct Outcome {
   Seen seen{};
-  Ids causes{};  // the allowed first findings
+  Ids causes{};  // findings that doctor may name first
 };
 
 struct PathFault {
@@ -55,7 +56,8 @@ inline std::vector<std::string> positions_with(const Unit& unit, const Options& 
   return all;
 }
 
-/// A checksum of few bits accepts many damaged replies, so the change of bytes cannot be recognised.
+/// Returns whether the unit's checksum accepts more than 5 % of damaged replies, so that a change of bytes cannot be
+/// recognised.
 inline bool has_weak_check(const Pair& pair) {
   Opener opener(pair.far);
   const EncoderAddress asked = parse_address(pair.asked);
@@ -63,8 +65,8 @@ inline bool has_weak_check(const Pair& pair) {
   return capture::acceptance(*asked.unit, asked.options, one.exchange, 1u << 10) > 0.05;
 }
 
-/// Returns a small swing of the shaft about a position at which most replies are changed; nothing without such a
-/// position.
+/// Returns a fault that changes these byte values in replies. The shaft swings a little about a position at which most
+/// replies contain them; the fault has no outcome for a unit without such a position.
 inline PathFault of_bytes(const std::string& name, const std::vector<std::uint64_t>& values, const Change& change,
                           Ids causes = {}) {
   causes.insert(name);
@@ -114,7 +116,7 @@ inline std::vector<PathFault> faults_of_bytes() {
                       if (one.seen.changed != 0) outcome = one;
                       return outcome;
                     }});
-  // A frame that is mostly 00 loses nearly all of its bytes.
+  // A frame of mostly 00 bytes loses nearly all of its bytes, so it may look cut.
   faults.push_back(of_bytes("nul_lost", {0x00},
                             [](const ByteList&, const ByteList& reply) { return without(reply, {0x00}); },
                             {"bytes_missing"}));
@@ -137,7 +139,7 @@ inline PathFault of_encoder_fault(const std::string& name, const std::string& fa
               pair.far.encoder.device.delay = limit * 5 / 4;
             }
             Outcome one{examined(pair.asked, pair.far, {.readings = 400, .limit = 60s}), causes};
-            // If the unit itself repeats requests, no reading fails.
+            // A unit that repeats requests itself may have no failed reading.
             const bool is_spared =
                 one.seen.first() == "good" && one.seen.examination.good == one.seen.examination.tried;
             if (!is_spared) outcome = one;
@@ -148,7 +150,7 @@ inline PathFault of_encoder_fault(const std::string& name, const std::string& fa
 inline PathFault of_talker(const std::string& name, const std::string& text, Time period, bool answers, Ids causes) {
   return {name, [=](const Unit& unit, const std::string& mode, const std::string& rate) {
             Pair pair = pair_of(unit, mode, rate);
-            // The unit takes the first bytes of the text for its reply.
+            // A unit with a weak checksum takes the first bytes of the text for its reply, so it is skipped.
             if (has_weak_check(pair)) return std::optional<Outcome>();
 
             pair.far.other = [=] {
@@ -165,7 +167,7 @@ inline std::vector<PathFault> faults_of_line() {
   faults.push_back(of_encoder_fault("lost 10 %", "fault=silence=0.1", {"sometimes_silent"}));
   faults.push_back(of_encoder_fault("corrupt 2 %", "fault=corrupt=0.02", damage));
   faults.push_back(of_encoder_fault("always late", "fault=delay=1", {"reply_late"}));
-  // If the next reply arrives before the late one, nothing shows a late reply.
+  // If the next reply arrives before the late reply, nothing shows that a reply was late.
   faults.push_back(
       of_encoder_fault("randomly late", "fault=delay=0.2", {"reply_late", "sometimes_late", "sometimes_silent"}));
   faults.push_back({"line low", [](const Unit& unit, const std::string& mode, const std::string& rate) {
@@ -181,9 +183,9 @@ inline std::vector<PathFault> faults_of_line() {
   return faults;
 }
 
-// ---- Other encoders than the given one
+// ---- Other encoders than that of the user's settings
 
-/// Returns options of models that change the frames; "" for the default ones.
+/// Returns the setting of each model, "model=23-bit"; "" for the default model.
 inline std::vector<std::string> models_of(const Unit& unit) {
   std::vector<std::string> models{""};
   for (const Model& model : unit.models) models.push_back(fmt::format("model={}", model.name));
@@ -194,7 +196,7 @@ inline std::vector<PathFault> faults_of_others() {
   std::vector<PathFault> faults;
   faults.push_back({"another protocol", [](const Unit& unit, const std::string& mode, const std::string& rate) {
                       std::optional<Outcome> last;
-                      // Takes the first protocol that `identify` can find and that is not a variant of this one.
+                      // Takes the first other protocol that has a usual rate, so that `identify` can find it.
                       for (const Unit* other : character_units()) {
                         if (other == &unit || other->line.rate == 0) continue;
                         Pair pair = pair_of(unit, mode, rate);
@@ -227,7 +229,7 @@ inline std::vector<PathFault> faults_of_others() {
   return faults;
 }
 
-// ---- States of an encoder that replies
+// ---- States of an encoder that replies to requests
 
 inline std::vector<PathFault> faults_of_state() {
   std::vector<PathFault> faults;
@@ -259,7 +261,7 @@ inline std::vector<PathFault> faults_of_state() {
                         if (condition.name != "battery") continue;
                         const Pair pair = pair_of(unit, mode, rate, {"condition=battery=0"});
                         Outcome outcome{examined(pair.asked, pair.far), {"alarm", "status", "position_invalid"}};
-                        // The replies of some units do not report the battery.
+                        // Skips units whose replies do not report the battery.
                         if (unit.alarms == nullptr) return none;
                         return std::optional(outcome);
                       }
@@ -276,8 +278,8 @@ inline std::vector<PathFault> all_path_faults() {
   return all;
 }
 
-/// Returns the table with a row for each unit and a column for each fault: the first finding; "-" if the unit cannot
-/// have the fault.
+/// Returns the table with a row for each unit and a column for each fault. A cell has the first finding; "-" if the
+/// unit cannot have the fault.
 inline std::string path_fault_table() {
   const std::vector<PathFault> faults = all_path_faults();
   std::string table = "| protocol |";

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Checks that each fault of an adapter and each other device at the other end is the first finding, for every unit and
-// rate.
+// Checks, for every unit and rate, that each fault of an adapter and each other device at the other end is the first
+// finding of doctor.
 #include <gtest/gtest.h>
 
 #include "absenc/client/doctor/path_faults_test.hpp"
@@ -17,7 +17,7 @@ class DoctorWays : public ::testing::TestWithParam<const Unit*> {
     return text;
   }
 
-  /// Tests each of these faults at each rate.
+  /// Checks the first finding of each of these faults at each rate of the unit.
   void examine_each(const std::vector<PathFault>& faults) const {
     const Unit& unit = *GetParam();
     const std::string mode = asked_mode(unit);
@@ -38,7 +38,7 @@ TEST_P(DoctorWays, FaultOfLineIsNamed) { examine_each(faults_of_line()); }
 TEST_P(DoctorWays, OtherEncoderIsNamed) { examine_each(faults_of_others()); }
 TEST_P(DoctorWays, StateIsNamed) { examine_each(faults_of_state()); }
 
-/// Tests each given model with each real model.
+/// Checks each model that the user may set against each model that may be connected.
 TEST_P(DoctorWays, OtherModelIsNamedInBothDirections) {
   const Unit& unit = *GetParam();
   const std::string mode = asked_mode(unit);
@@ -50,7 +50,7 @@ TEST_P(DoctorWays, OtherModelIsNamedInBothDirections) {
       Pair pair = pair_of(unit, said, mode, {});
       pair.far = pair_of(unit, there, mode, {"motion=rpm=20"}).far;
       const Seen seen = examined(pair.asked, pair.far);
-      // If both models have equal frames, there is no finding.
+      // If both models have the same frames, doctor must find nothing.
       const bool is_same = seen.examination.good == seen.examination.tried;
       if (is_same) continue;
       EXPECT_EQ(seen.first(), "wrong_settings") << sentences(seen.examination);
@@ -58,7 +58,7 @@ TEST_P(DoctorWays, OtherModelIsNamedInBothDirections) {
   }
 }
 
-/// For a single reading `read` names the same finding as doctor, or none.
+/// The finding that `read` names for a single failed reading must be that of doctor, or "".
 TEST_P(DoctorWays, ReadSaysTheSameOrLeavesItOpen) {
   static const Ids open{"no_answer", "always_damaged", "extra_bytes", "bytes_missing", "sometimes_damaged"};
   const Unit& unit = *GetParam();

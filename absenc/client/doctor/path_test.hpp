@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Adapters, drivers and other devices between host and virtual encoder in virtual time, for tests of doctor with every
-// unit on a line of characters.
+// Adapters, drivers and other devices between host and virtual encoder in virtual time, for tests of doctor. Every unit
+// on a line of characters is tested on its own.
 #pragma once
 
 #include <fmt/format.h>
@@ -25,10 +25,10 @@ namespace absenc::client::path_faults {
 using namespace std::chrono_literals;
 using ByteList = std::vector<std::uint8_t>;
 
-/// A function that changes the bytes of a reply to this request.
+/// A function that returns the changed bytes of the reply to a request.
 using Change = std::function<ByteList(const ByteList& request, ByteList reply)>;
 
-/// Changes the bytes between a device and the line, like the receiving side of an adapter.
+/// A machine that changes the bytes between a device and the line, like the receiving side of an adapter.
 class Adapter final : public Machine<std::uint8_t> {
  public:
   Adapter(Machine<std::uint8_t>& device, Change change, std::function<bool(Time)> is_cut)
@@ -98,18 +98,19 @@ class Talker final : public Machine<std::uint8_t> {
   Time at_{};
 };
 
-/// The device at the other end of the port.
+/// Description of what is connected at the other end of the port: encoder, line and adapter.
 struct Far {
-  EncoderAddress encoder;                  // address of the encoder, "sim:tformat?model=23-bit"
-  std::uint32_t rate = 0;                  // rate of its line; 0: the encoder's
-  Change change{};                         // change by the adapter; empty: none
+  EncoderAddress encoder;  // address of the virtual encoder, "sim:tformat?model=23-bit"
+  std::uint32_t rate = 0;  // rate of the encoder's line in bits per second; 0: the rate of the user's address
+  Change change{};         // change of reply bytes by the adapter; empty: none
   std::optional<EncoderAddress> second{};  // another encoder on the same line
-  std::function<bool(Time now)> is_cut{};  // returns true while a contact is open
-  bool goes_on = false;                    // the encoder's time continues from one opening of the port to the next
-  std::function<std::unique_ptr<Talker>()> other{};  // makes another device instead of an encoder
+  std::function<bool(Time now)> is_cut{};  // returns true while a contact of the line is open; empty: never
+  bool goes_on = false;                    // whether the time of the encoder continues when the port is opened again
+  // makes another device instead of the encoder; empty: the encoder is connected
+  std::function<std::unique_ptr<Talker>()> other{};
 };
 
-/// Opens a link to the device, as often as doctor needs it.
+/// Opens links to the devices that `Far` describes, a new one each time doctor opens the port.
 class Opener {
  public:
   explicit Opener(Far far) : far_(std::move(far)) {}
@@ -132,7 +133,7 @@ class Opener {
     ends_.push_back(end);
     return link_to(end, host_rate);
   }
-  /// Number of replies that the adapter changed.
+  /// Returns the number of replies that the adapter changed.
   [[nodiscard]] std::size_t changed() const {
     std::size_t sum = 0;
     for (const auto& end : ends_) {
@@ -177,7 +178,7 @@ class Opener {
 struct Seen {
   Examination examination{};
   std::size_t changed = 0;
-  std::string read_alone{};  // the finding that `read` names for the first reading; "": it was good
+  std::string read_alone{};  // the finding that `read` names for the first reading; "": the reading was good
 
   [[nodiscard]] std::string first() const {
     const Finding* one = examination.first();
@@ -192,7 +193,7 @@ struct Choices {
   os::PortFacts facts{};
 };
 
-/// Takes one reading as `read` does.
+/// Takes one reading of the address, as the command `read` does.
 inline Attempted read_once(const EncoderAddress& address, Opener& opener, bool* was_late = nullptr) {
   const Link link = opener.open(address);
   Runner<std::uint8_t> runner(address);
@@ -220,7 +221,7 @@ inline Seen examined(const std::string& asked, const Far& far, const Choices& ch
   return seen;
 }
 
-// ---- Units and their settings
+// ---- Units and the settings with which they are tested
 
 inline bool has_characters(const Unit& unit) {
   return unit.link == LinkKind::half_duplex || unit.link == LinkKind::full_duplex;
@@ -234,7 +235,8 @@ inline std::vector<const Unit*> character_units() {
   return units;
 }
 
-/// Returns settings with which the unit replies to requests: the default ones, or else the first choice that does.
+/// Returns the setting with which the unit replies to requests: "" if the default options do, otherwise the first
+/// choice of an option that does.
 inline std::string asked_mode(const Unit& unit) {
   const auto streams = [&](const std::string& mode) {
     const auto address = parse_address(fmt::format("sim:{}{}{}", unit.id, mode.empty() ? "" : "?", mode));
@@ -250,7 +252,7 @@ inline std::string asked_mode(const Unit& unit) {
   return "";
 }
 
-/// Returns the setting of each rate of the unit: "rate=9600", or "baud=9600" of the line.
+/// Returns each rate of the unit as a setting: "rate=9600", or "baud=9600" if the rate belongs to the line.
 inline std::vector<std::string> rates_of(const Unit& unit) {
   std::vector<std::string> rates;
   if (const Option* option = find_role(unit.options, Role::rate)) {
@@ -271,7 +273,7 @@ inline std::string joined(const std::vector<std::string>& settings) {
   return text;
 }
 
-/// Returns the setting if the virtual encoder has it too; "" if it is only one of the line.
+/// Returns the setting if it is one of the virtual encoder; "" if it belongs to the line only.
 inline std::string of_encoder(const Unit& unit, const std::string& setting) {
   if (setting.empty()) return "";
   const std::string_view name = split_setting(setting).name;
@@ -279,11 +281,12 @@ inline std::string of_encoder(const Unit& unit, const std::string& setting) {
 }
 
 struct Pair {
-  std::string asked;  // the address that the user writes
+  std::string asked;  // address as the user writes it
   Far far;
 };
 
-/// An address and an encoder that agree; `state` only applies to the encoder, "motion=rpm=60".
+/// Returns the user's address and an encoder with the same settings. `state` holds further settings of the encoder
+/// only, such as "motion=rpm=60".
 inline Pair pair_of(const Unit& unit, const std::string& mode, const std::string& rate,
                     const std::vector<std::string>& state = {}) {
   std::vector<std::string> settings{mode, of_encoder(unit, rate)};

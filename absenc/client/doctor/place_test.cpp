@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Checks that the advice fits the place: none about USB for a network, none about ModemManager for absenc's own port.
+// Checks that advice fits the kind of port: none about USB for a network, none about ModemManager for a port that
+// absenc itself uses.
 #include <gmock/gmock-more-matchers.h>
 #include <gtest/gtest.h>
 
@@ -14,7 +15,7 @@ namespace {
 using testing::HasSubstr;
 using testing::Not;
 
-/// Findings that need facts of a serial port.
+/// Findings that occur only with facts about a serial port.
 const std::set<std::string_view> of_serial_ports{"port_is_modem", "latency_timer", "direction_unswitched"};
 
 std::string advice_of(FindingKind finding_kind, PortKind place) {
@@ -30,7 +31,7 @@ TEST(DoctorAdvice, NamesNothingThatThePlaceHasNot) {
       const std::string_view id = id_of(finding_kind);
       if (of_serial_ports.contains(id)) continue;
       if (place == PortKind::sim && (id.starts_with("port_") || id == "modem_answers"))
-        continue;  // the simulated port always opens
+        continue;  // the simulated port can always be opened
       const std::string advice = advice_of(finding_kind, place);
       for (const char* word : {"USB", "latency timer", "ModemManager", "/dev/serial"}) {
         EXPECT_THAT(advice, Not(HasSubstr(word))) << id << " at " << port_kind_names[static_cast<std::size_t>(place)];
@@ -39,7 +40,7 @@ TEST(DoctorAdvice, NamesNothingThatThePlaceHasNot) {
   }
 }
 
-/// Virtual encoders and SPI have no setting `latency`.
+/// Advice for virtual encoders and SPI must not name the setting `latency`, which they do not have.
 TEST(DoctorAdvice, ProposesALatencyOnlyWhereItCanBeSet) {
   for (const FindingKind finding_kind :
        {FindingKind::reply_late, FindingKind::sometimes_late, FindingKind::sometimes_silent}) {

@@ -26,9 +26,9 @@ bool carries_characters(const Unit& unit) {
   return unit.link == LinkKind::half_duplex || unit.link == LinkKind::full_duplex;
 }
 
-// ---- Rates
+// ---- Trials of other rates
 
-// Returns the trial of a rate; nothing if the unit has no such rate.
+// Returns the trial of a rate; nothing if the unit cannot have this rate.
 std::optional<EncoderAddress> with_rate(const EncoderAddress& address, std::uint32_t rate) {
   EncoderAddress other = address;
   const Option* option = find_role(address.unit->options, Role::rate);
@@ -50,7 +50,7 @@ std::optional<EncoderAddress> with_rate(const EncoderAddress& address, std::uint
   return other;
 }
 
-// Returns rates to try: those of the protocol and its models, then common ones.
+// Returns the rates to try: first those of the protocol and its models, then common ones.
 std::vector<std::uint32_t> rates_of(const Unit& unit) {
   std::vector<std::uint32_t> rates;
   const auto add = [&](std::uint32_t rate) {
@@ -100,9 +100,9 @@ void add_spi(const EncoderAddress& address, std::vector<Other>& others) {
   }
 }
 
-// ---- Models and addresses
+// ---- Trials of other models and addresses
 
-/// Refuses requests that could change an encoder of another protocol on the line.
+/// Decides which requests must not be sent because they could change an encoder of another protocol on the line.
 class Safety {
  public:
   explicit Safety(const EncoderAddress& address)
@@ -111,7 +111,7 @@ class Safety {
     harmful_ = harmful_to_others(unit_, address.line.rate, search_of(address));
     said_ = is_harmful(address.options);
   }
-  /// The request of the user's own command is always allowed.
+  /// Returns whether the request may be sent; the request of the user's own command always may.
   [[nodiscard]] bool allows(const Options& options) const { return said_ || !is_harmful(options); }
 
  private:
@@ -128,7 +128,7 @@ class Safety {
   bool said_ = false;
 };
 
-// Returns the address with another setting on the same port; keeps the user's rate.
+// Returns the address with another setting on the same port, at the user's rate.
 EncoderAddress with_options(const EncoderAddress& address, const Options& options) {
   EncoderAddress other = address;
   other.options = options;
@@ -138,7 +138,7 @@ EncoderAddress with_options(const EncoderAddress& address, const Options& option
   return other;
 }
 
-// Tries a choice only if the unit accepts the resulting options.
+// Adds the choice of an option if the unit accepts the resulting options.
 bool is_possible(const Unit& unit, const Options& options) {
   std::vector<std::string> texts = option_texts(unit, options);
   std::vector<OptionText> settings;
@@ -184,7 +184,7 @@ std::vector<Other> other_models(const EncoderAddress& address) {
   const Safety safety(address);
   const std::string said = said_settings(unit, address.options);
   const auto add = [&](Options options) {
-    if (encoder != nullptr) {  // keeps the address: another model, but the same encoder on the line
+    if (encoder != nullptr) {  // sets the user's address: another model is tried, but of the same encoder on the line
       const auto index = static_cast<std::size_t>(encoder - unit.options.data());
       options.values[index] = address.options[index];
     }
@@ -247,7 +247,7 @@ bool is_far_better(std::size_t good, std::size_t tried, std::size_t good_as_said
            std::lgamma(static_cast<double>(all - some + 1));
   };
   const std::size_t all_good = good + good_as_said;
-  double sum = 0;  // probability that as many or more good readings have this setting
+  double sum = 0;  // probability that chance gives as many or more good readings to this setting
   for (std::size_t more = good; more <= std::min(tried, all_good); ++more) {
     if (all_good - more > tried_as_said) continue;
     sum += std::exp(log_choose(tried, more) + log_choose(tried_as_said, all_good - more) -

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Settings to try if no reading is good: rates, SPI modes, echo, models, addresses.
+// Lists the settings to try if no reading is good: rates, SPI modes, echo, models, addresses.
 #pragma once
 
 #include <cstddef>
@@ -13,29 +13,32 @@
 
 namespace absenc::client {
 
-/// A setting to try instead of the user's.
+/// A setting to try instead of the user's, with the address that results.
 struct Other {
-  FindingKind finding_kind{};  // the finding if this setting helps
+  FindingKind finding_kind{};  // the finding if the setting helps
   std::string said{};          // the user's setting, "baud=115200"
   std::string setting{};       // the setting to try, "baud=9600"
   EncoderAddress address{};
 };
 
-/// Returns SPI modes and clocks, echo, and other rates if the port has a rate (`has_rate`).
+/// Returns the other line settings to try: SPI modes and clocks, echo, and other rates if the port has a rate
+/// (`has_rate`).
 [[nodiscard]] std::vector<Other> other_lines(const EncoderAddress& address, bool has_rate);
 
-/// Returns each other model, and on lines of characters each other choice of an option. None of their requests would
-/// change another encoder on the line. Returns none for a virtual encoder, which always has the given options.
+/// Returns each other model, and on lines of characters each other choice of an option, as settings to try. Leaves out
+/// those whose requests would change another encoder on the line. Returns none for a virtual encoder, which always has
+/// the given options.
 [[nodiscard]] std::vector<Other> other_models(const EncoderAddress& address);
 
-/// Returns each other address on the line, the lowest first; none if polling would disturb other devices.
+/// Returns each other address on the line as a setting to try, the lowest first; none if polling would disturb other
+/// devices.
 [[nodiscard]] std::vector<Other> other_addresses(const EncoderAddress& address);
 
-/// Returns the search of `identify` for encoders of other protocols. Only for lines of characters.
+/// Returns the search that `identify` runs to find encoders of other protocols. Only for lines of characters.
 [[nodiscard]] LineSearch search_of(const EncoderAddress& address);
 
-/// Returns whether `good` of `tried` are nearly all and exceed `good_as_said` of `tried_as_said` by far more than
-/// chance (Fisher's exact test).
+/// Returns whether nearly all of the `tried` readings are good, and far more than chance would give in comparison with
+/// `good_as_said` of `tried_as_said` readings with the user's setting (Fisher's exact test).
 [[nodiscard]] bool is_far_better(std::size_t good, std::size_t tried, std::size_t good_as_said,
                                  std::size_t tried_as_said);
 

@@ -25,9 +25,9 @@ struct Words {
 
 using enum Severity;
 
-// {0}, {1} ... are the values that the judge passes to `finding`.
+// In these texts {0}, {1} ... are replaced by the values that the judge passes to `finding`.
 constexpr auto table = std::to_array<Words>({
-    // {0}: the error of the system and its advice
+    // In the texts of ports, {0} is the error of the system with its advice.
     {FindingKind::port_missing, "port_missing", fault, "{0}",
      "the adapter is not plugged in, or the name is another one",
      "plug it in, or correct the name; `ls /dev/serial/by-id` shows adapters by their own names"},
@@ -194,7 +194,7 @@ constexpr auto table = std::to_array<Words>({
 
     {FindingKind::starting, "starting", warning, "{0}",
      "it was switched on just now, or its supply is too weak to come up", "wait, then look again; measure the supply"},
-    // The text is from the encoder's document
+    // The text of these findings comes from the encoder's document.
     {FindingKind::alarm, "alarm", warning, "the encoder reports {0}", "{1}", "{2}"},
     {FindingKind::status, "status", warning, "the status of the encoder has {0}", "{1}", "{2}"},
     {FindingKind::position_invalid, "position_invalid", fault,
@@ -220,7 +220,7 @@ constexpr auto table = std::to_array<Words>({
      "the resolution is another one, or codes are missing", "check the resolution of the model; replace the encoder"},
 });
 
-/// Texts to use if the encoder is not on a serial port; "": the same text.
+/// Replaces texts of a finding if the encoder is not on a serial port; "": the text is not replaced.
 struct Elsewhere {
   FindingKind finding_kind;
   PortKind place;
@@ -299,7 +299,7 @@ static_assert(is_in_order() && table.size() == static_cast<std::size_t>(FindingK
 
 const Words& words_of(FindingKind finding_kind) { return table[static_cast<std::size_t>(finding_kind)]; }
 
-// Beginning of a sentence that the caller completes.
+// Returns the text with its {0}, {1} ... replaced by these values.
 std::string filled(std::string_view text, const std::vector<std::string>& values) {
   fmt::dynamic_format_arg_store<fmt::format_context> arguments;
   for (const std::string& value : values) arguments.push_back(value);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The texts of all findings, in one table.
+// The texts of all findings of doctor, in one table.
 #pragma once
 
 #include <string>
@@ -10,10 +10,10 @@
 
 namespace absenc::client {
 
-/// Returns a finding; `values` replace {0}, {1} ... in its texts.
+/// Returns a finding of this kind; `values` replace {0}, {1} ... in its texts.
 [[nodiscard]] Finding finding(FindingKind finding_kind, const std::vector<std::string>& values = {});
 
-/// Replaces a cause or an action that does not fit the place: no advice about USB for a network.
+/// Replaces the finding's cause or action if it does not fit the kind of port: no advice about USB for a network.
 void suit(Finding& finding, PortKind place);
 
 }  // namespace absenc::client
