@@ -14,11 +14,12 @@ using author::testing::RunResult;
 using Fields = std::map<std::string, std::int64_t>;
 
 constexpr std::int64_t turn = std::int64_t{1} << 32;
-constexpr std::int64_t count = std::int64_t{1} << 13;  // one count of 19 bits, in 2^-32 revolution
+constexpr std::int64_t count = std::int64_t{1} << 13;  // size of one count of 19 bits, in 2^-32 revolution
 
 inline bool says(const std::string& text, const std::string& words) { return text.find(words) != std::string::npos; }
 
-/// A text that a test sends instead of the interface's reply, `after` the event before it.
+/// A text that a test sends instead of the interface's reply, at the time `after` after the request or the previous
+/// text.
 struct TextReply {
   std::string text;
   Time after = 1ms;
@@ -29,7 +30,7 @@ inline Tamper answering(char letter, const std::vector<TextReply>& answer) {
   return [=](char asked) { return asked == letter ? std::optional(answer) : std::nullopt; };
 }
 
-/// Passes the bytes of the interface on, except for commands that `tamper` answers itself.
+/// Forwards requests and replies of the virtual interface, but answers the commands for which `tamper` returns texts.
 class TamperedInterface final : public Machine<std::uint8_t> {
  public:
   explicit TamperedInterface(Device<std::uint8_t>& device) : device_(device) {}
@@ -69,7 +70,7 @@ class TamperedInterface final : public Machine<std::uint8_t> {
             .out = {reinterpret_cast<const std::uint8_t*>(out_.text.data()), out_.text.size()},
             .at = now + out_.after};
   }
-  /// Returns the letters of all commands received so far.
+  /// Returns the letters of all commands that were received so far.
   [[nodiscard]] std::string asked() const {
     std::string letters;
     for (const auto& [letter, at] : log) letters += letter;
@@ -83,13 +84,13 @@ class TamperedInterface final : public Machine<std::uint8_t> {
   Device<std::uint8_t>& device_;
   std::vector<TextReply> pending_texts_;
   TextReply out_;
-  unsigned rest_ = 0;  // remaining bytes of this command
+  unsigned rest_ = 0;  // remaining bytes of the command that is being received
   bool is_tampered_ = false;
   bool busy_ = false;          // a transmission is in progress
   bool sending_text_ = false;  // the transmission in progress is a text of `tamper`
 };
 
-/// Result of a command with the name of its error.
+/// Result of a command, with the error as its name.
 struct CommandResult : RunResult {
   CommandResult(const RunResult& told)
       : RunResult(told), error(told.finished ? text_of(told.error).name : "hangs"), fields(told.numbers) {}
@@ -105,7 +106,8 @@ struct Bench : author::testing::UnitBench<19> {
                     const OnEmit& on_emit = {}) {
     return UnitBench::run(name, arguments, on_emit);
   }
-  /// Runs a command with replies made by `tamper`; `answering.log` has the received commands.
+  /// Runs a command while `tamper` makes replies. Afterwards `answering.log` has the received commands with their
+  /// times.
   CommandResult run_tampered(const Tamper& tamper, std::string_view name,
                              const std::vector<std::int64_t>& arguments = {}) {
     answering.tamper = tamper;

@@ -32,7 +32,7 @@ inline constexpr std::array<Clause, 5> clauses{{
      .other = 4},
 }};
 
-// ---- Requests that break a clause
+// ---- Requests of hosts that break a clause
 
 namespace script {
 inline constexpr std::array no_number{HostStep{{}, "4d 0d"}};

@@ -23,7 +23,7 @@ void append_number(ByteBuffer<64>& reply, std::uint64_t number) {
   append_text(reply, {digits.data() + first, digits.size() - first});
 }
 
-// Appends a number with as many digits as `width` bits need.
+// Appends a number as hexadecimal text with as many digits as `width` bits need.
 void append_hexadecimal(ByteBuffer<64>& reply, std::uint64_t number, unsigned width) {
   for (unsigned digit = (width + 3) / 4; digit-- > 0;) {
     reply.push_back(static_cast<std::uint8_t>("0123456789ABCDEF"[number >> (4 * digit) & 0xF]));
@@ -44,8 +44,8 @@ void VirtualInterface::stopped(Time) {
   zero_ = 0;
 }
 
-// Returns the bytes of a request without its CR. Whether `M` needs its CR is unknown, and a CR after any other command
-// does no harm.
+// Returns the length of a request without its CR. It is unknown whether `M` needs a CR, and a CR after any other
+// command does no harm.
 std::size_t VirtualInterface::request_size(Bytes begin) const {
   return begin[0] == letter::set_clock ? 2 : begin[0] == letter::set_width ? 3 : 1;
 }
@@ -83,7 +83,7 @@ author::Responder::Answer VirtualInterface::respond(Bytes bytes, Time at, ByteBu
     case letter::hexadecimal:
       append_hexadecimal(reply, (counts(at) - zero_) & low_mask(width_), width_);
       break;
-    default: {  // `?`, and the first position of a stream: signed if a zero is set
+    default: {  // `?`, and the first position of a stream: a signed number if a zero is set
       const std::uint64_t number = counts(at) - zero_;
       const bool negative = zero_ != 0 && static_cast<std::int64_t>(number) < 0;
       append_text(reply, negative ? "-" : "");
@@ -94,7 +94,7 @@ author::Responder::Answer VirtualInterface::respond(Bytes bytes, Time at, ByteBu
   return Answer::sent;
 }
 
-// Executes a command without a reply. Returns false for a command with a reply.
+// Executes a command that has no reply. Returns false for any other command.
 bool VirtualInterface::change(const Request& request, Time at) {
   switch (request.letter) {
     case letter::supply_on:
@@ -143,7 +143,7 @@ std::uint64_t VirtualInterface::samples(Time at, Time period) {
   return samples.view().load(0, sample_bits);
 }
 
-// Returns turns and position as one number of `width_` bits. Without supply the line is 0.
+// Returns turns and position as one number of `width_` bits; 0 if the encoder has no supply.
 std::uint64_t VirtualInterface::counts(Time at) const {
   if (!encoder_.is_powered()) return 0;
   const Word now = word_of(format_.word, shaft_->at(at), 0);

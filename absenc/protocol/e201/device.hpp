@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A virtual E201-9S with a BiSS or SSI encoder behind it: every command, the encoder's supply and the MA clock.
+// A virtual E201-9S interface with a BiSS or SSI encoder behind it: all commands, the encoder's supply and the MA
+// clock.
 #pragma once
 
 #include "absenc/protocol/author/device.hpp"
@@ -8,10 +9,10 @@
 
 namespace absenc::e201 {
 
-/// A virtual interface with an encoder behind it.
+/// A virtual E201-9S interface with an encoder behind it.
 class VirtualInterface final : public author::Responder {
  public:
-  /// Creates an interface that is off until `power_on`. `shaft` must outlive it.
+  /// Creates an interface that is off until `power_on`. `shaft`, which moves the encoder, must outlive it.
   VirtualInterface(const Format& format, const Shaft& shaft);
 
   [[nodiscard]] MutableBytes memory() override { return {}; }
@@ -30,9 +31,10 @@ class VirtualInterface final : public author::Responder {
 
   Format format_;
   const Shaft* shaft_;
-  biss::Encoder encoder_;  // with an SSI encoder only its supply is used
-  unsigned clock_ = 4;     // number of the MA clock; 4 is 280 kHz
-  unsigned width_;         // bits of the number that `?` returns
+  // encoder behind the interface; if it is an SSI encoder, only the supply of this object is used
+  biss::Encoder encoder_;
+  unsigned clock_ = 4;  // number of the MA clock, 1 to 8; 4 is 280 kHz
+  unsigned width_;      // number of bits of the number that `?` returns
   std::uint64_t zero_ = 0;
 };
 

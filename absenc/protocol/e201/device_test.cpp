@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The virtual E201-9S, tested with raw commands.
+// Tests of the virtual E201-9S with raw commands.
 #include <gtest/gtest.h>
 
 #include "absenc/protocol/biss/frame.hpp"
@@ -13,7 +13,8 @@ using testing::count;
 using testing::turn;
 
 TEST(E201Device, RepliesWithExample4) {
-  // 13 bits of ACK at 280 kHz (3571 ns): more than 12 periods of latency, less than the timeout allows.
+  // The encoder sends 13 bits of ACK at 280 kHz (3571 ns): its latency is longer than 12 periods, and 13 fit into the
+  // timeout.
   Bench bench("singleturn_bits=19 latency_us=46");
   bench.shaft.start.position = 275087 * count;
   EXPECT_EQ(bench.raw("4"), "c0014328ff300000\r");
@@ -45,7 +46,7 @@ TEST(E201Device, RepliesToEveryCommand) {
   bench.device.power_off(bench.line.now());
   expect("?", "");
   bench.device.power_on(bench.line.now(), Device<std::uint8_t>::PowerOn::real);
-  expect("?", "1048580\r");  // the zero is lost at power off
+  expect("?", "1048580\r");  // the zero is lost when the interface is powered off
   expect("za?", "1048580\r");
   expect("0", "");
   expect("f", "");
@@ -87,14 +88,14 @@ TEST(E201Device, AckBitsFollowClock) {
   }
 }
 
-// A reading takes 64 clocks and the time of USB.
+// A reading takes the time of 64 clocks and the time of USB.
 TEST(E201Device, ReadingTakes64Clocks) {
   Bench bench;
   bench.raw("M1");
   const Time slow = bench.run("position").took;
   bench.raw("M4");
   EXPECT_EQ(slow - bench.run("position").took, 64 * (clock_period(1) - clock_period(4)));
-  // The clock command transfers 15 characters less.
+  // The reply to the clock command is 15 characters shorter.
   const Time characters = slow - bench.run("clock").took - 64 * clock_period(1);
   EXPECT_LT(std::chrono::abs(characters - line_settings.bits(150)), 1us);
 }

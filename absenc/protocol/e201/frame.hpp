@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Commands of the RLS E201-9S USB interface, one letter each, and its ASCII replies. README.md lists them with their
-// sources. Replies that no document describes are read as leniently as possible: text.hpp.
+// Commands of the RLS E201-9S USB interface, one letter each, and its ASCII replies. README.md lists the commands with
+// their sources. Replies that no document describes are decoded as leniently as possible: text.hpp.
 #pragma once
 
 #include <array>
@@ -21,46 +21,56 @@ namespace absenc::e201 {
 using namespace std::chrono_literals;
 
 namespace letter {
-inline constexpr std::uint8_t samples = '4';                       ///< Reads the bits of one transfer.
-inline constexpr std::uint8_t version = 'v';                       ///< Reads the version.
-inline constexpr std::uint8_t serial = 's';                        ///< Reads the serial number.
-inline constexpr std::uint8_t supply = 'e';                        ///< Reads the state of the supply.
-inline constexpr std::uint8_t supply_on = 'n';                     ///< Switches the supply on.
-inline constexpr std::uint8_t supply_off = 'f';                    ///< Switches the supply off.
-inline constexpr std::uint8_t decimal = '?';                       ///< Reads the position as a decimal number.
-inline constexpr std::uint8_t zero = 'z';                          ///< Sets the zero of positions.
-inline constexpr std::uint8_t clear_zero = 'a';                    ///< Removes the zero of positions.
-inline constexpr std::uint8_t hexadecimal = '>';                   ///< Reads the position as a hexadecimal number.
-inline constexpr std::uint8_t stream_on = '1';                     ///< Starts the stream.
-inline constexpr std::uint8_t stream_off = '0';                    ///< Ends the stream.
-inline constexpr std::uint8_t set_clock = 'M';                     ///< Sets the clock.
-inline constexpr std::uint8_t clock = 'm';                         ///< Reads the clock.
-inline constexpr std::uint8_t width = 'b';                         ///< Reads the width of the position.
-inline constexpr std::uint8_t set_width = 'B';                     ///< Sets the width of the position.
-inline constexpr std::string_view all = "4vse?>mbnfza01MB";        ///< All letters.
-inline constexpr std::string_view answered_by_a_line = "vse?>mb";  ///< Letters whose reply is a line of text.
+inline constexpr std::uint8_t samples = '4';  ///< Command that reads the 64 bits of one transfer.
+inline constexpr std::uint8_t version = 'v';  ///< Command that reads the firmware version.
+/// Command that reads the serial number of the interface.
+inline constexpr std::uint8_t serial = 's';
+/// Command that reads the state of the encoder's supply.
+inline constexpr std::uint8_t supply = 'e';
+inline constexpr std::uint8_t supply_on = 'n';   ///< Command that switches the encoder's supply on.
+inline constexpr std::uint8_t supply_off = 'f';  ///< Command that switches the encoder's supply off.
+/// Command that reads the position as a decimal number.
+inline constexpr std::uint8_t decimal = '?';
+inline constexpr std::uint8_t zero = 'z';        ///< Command that sets the zero of positions.
+inline constexpr std::uint8_t clear_zero = 'a';  ///< Command that removes the zero of positions.
+/// Command that reads the position as a hexadecimal number.
+inline constexpr std::uint8_t hexadecimal = '>';
+inline constexpr std::uint8_t stream_on = '1';   ///< Command that starts the stream of positions.
+inline constexpr std::uint8_t stream_off = '0';  ///< Command that ends the stream of positions.
+/// Command that sets the MA clock, followed by 1 to 8.
+inline constexpr std::uint8_t set_clock = 'M';
+inline constexpr std::uint8_t clock = 'm';  ///< Command that reads the number of the MA clock.
+/// Command that reads the width of the position in bits.
+inline constexpr std::uint8_t width = 'b';
+/// Command that sets the width of the position in bits.
+inline constexpr std::uint8_t set_width = 'B';
+inline constexpr std::string_view all = "4vse?>mbnfza01MB";  ///< Letters of all commands.
+/// Letters of the commands whose reply is a line of text.
+inline constexpr std::string_view answered_by_a_line = "vse?>mb";
 
-/// Returns whether a letter is one of `letters`.
+/// Returns whether `letter` is one of `letters`.
 [[nodiscard]] constexpr bool is_in(std::string_view letters, std::uint8_t one) {
   return index_of(letters, static_cast<char>(one)) < letters.size();
 }
 }  // namespace letter
 
-inline constexpr std::size_t sample_bits = 64;     ///< Bits of a sample.
-inline constexpr std::size_t samples_length = 17;  ///< length of the reply to `4`: 16 hexadecimal digits and CR
+inline constexpr std::size_t sample_bits = 64;  ///< Number of samples that the interface takes in one transfer.
+/// Length of the reply to `4` in bytes: 16 hexadecimal digits and CR.
+inline constexpr std::size_t samples_length = 17;
 
 // ---- Times. No document gives any: the interface clocks 64 bits and replies as fast as USB does.
 
-/// Line of a virtual COM port; its rate has no effect on the interface.
+/// Settings of the virtual COM port; its baud rate has no effect on the interface.
 inline constexpr LineSettings line_settings{.rate = 115'200};
 
-inline constexpr Time answer_limit = 50ms;  ///< timeout of a reply; 64 clocks at 35 kHz take 1.8 ms
-inline constexpr Time gap_limit = 20ms;     ///< timeout between two characters of a reply
-inline constexpr Time reply_limit = 100ms;  ///< longest time of a reply, even if characters still arrive
-inline constexpr Time silent_limit = 10ms;  ///< timeout of a command that may have no reply
-inline constexpr Time supply_time = 200ms;  ///< time after `n` and `f` until the encoder is ready or the supply is down
+inline constexpr Time answer_limit = 50ms;  ///< Timeout of a reply; the 64 clocks of a transfer at 35 kHz take 1.8 ms.
+inline constexpr Time gap_limit = 20ms;     ///< Timeout between two characters of a reply.
+inline constexpr Time reply_limit = 100ms;  ///< Longest duration of a reply, even if characters still arrive.
+inline constexpr Time silent_limit = 10ms;  ///< Timeout of a command that may have no reply.
+/// Time after `n` until the encoder is ready, and after `f` until the supply is down.
+inline constexpr Time supply_time = 200ms;
 
-/// Returns the period of MA at clock 1 to 8.
+/// Returns the period of MA at clock number 1 to 8.
 [[nodiscard]] constexpr Time clock_period(unsigned clock) {
   return LineSettings{.rate = clocks_khz[clock - 1] * 1000u}.bits(1);
 }
@@ -70,46 +80,48 @@ inline constexpr Time supply_time = 200ms;  ///< time after `n` and `f` until th
 /// Protocol of the encoder behind the interface.
 enum class Carries : std::uint8_t { biss, ssi };
 
-/// Encoders for which the maker recommends certain clocks of this interface.
+/// Kinds of encoders: the maker recommends certain clocks of this interface for some.
 enum class Kind : std::uint8_t { other, resolute };
-inline constexpr unsigned resolute_slowest = 4;  ///< slowest clock recommended for a Renishaw Resolute: 280 kHz
-inline constexpr unsigned resolute_fastest = 5;  ///< fastest clock recommended for a Renishaw Resolute: 560 kHz
+inline constexpr unsigned resolute_slowest = 4;  ///< Slowest clock number recommended for a Renishaw Resolute: 280 kHz.
+inline constexpr unsigned resolute_fastest = 5;  ///< Fastest clock number recommended for a Renishaw Resolute: 560 kHz.
 
-/// Frame layout and settings of one encoder, as the unit's options select them.
+/// Layout of the encoder's frames and properties of the interface, as the unit's options select them.
 struct Format {
-  WordFormat word = biss::Format{}.word;               ///< Fields of the position word.
-  Scale scale{};                                       ///< Length of a count of a linear encoder.
-  Carries carries = Carries::biss;                     ///< Protocol behind the interface.
-  ssi::AfterWord after_word = ssi::AfterWord::repeat;  ///< What an SSI encoder sends after its word.
-  Kind kind = Kind::other;                             ///< Kind of the encoder behind the interface.
+  WordFormat word = biss::Format{}.word;               ///< Layout of the position word.
+  Scale scale{};                                       ///< Whether the encoder is linear, and the length of a count.
+  Carries carries = Carries::biss;                     ///< Protocol of the encoder behind the interface.
+  ssi::AfterWord after_word = ssi::AfterWord::repeat;  ///< Bits that an SSI encoder sends after its word.
+  /// Kind of the encoder behind the interface, for recommended clocks.
+  Kind kind = Kind::other;
   // ---- Members for the virtual interface and its encoder
   Version firmware{1, 16};  ///< Firmware version of the virtual interface.
-  Time latency = 10us;      ///< Time that the encoder takes before its start bit.
-  Time line_delay{};        ///< Delay of the line.
+  Time latency = 10us;      ///< Time that the virtual encoder needs for a position.
+  Time line_delay{};        ///< Delay of the virtual encoder's line, there and back.
 
-  /// Returns the format of a BiSS encoder.
+  /// Returns the frame format of a BiSS encoder behind the interface.
   [[nodiscard]] constexpr biss::Format biss() const { return {.word = word, .scale = scale}; }
-  /// Returns the format of an SSI encoder.
+  /// Returns the word format of an SSI encoder behind the interface.
   [[nodiscard]] constexpr ssi::Format ssi() const { return {.word = word, .after_word = after_word, .scale = scale}; }
 };
 
-/// Returns whether the word fits into the samples; for BiSS with the shortest ACK.
+/// Returns whether the position word fits into the 64 samples; for BiSS with the shortest ACK.
 [[nodiscard]] constexpr bool fits(const Format& format) {
   const bool is_biss = format.carries == Carries::biss;
   return is_usable(format.word) &&
          (is_biss ? biss::idle_bits + 3 + biss::data_bits(format.biss()) : 1 + format.word.bits()) <= sample_bits;
 }
 
-/// A position that the interface reported.
+/// A position that was decoded from the 64 samples.
 struct Position {
-  unsigned ack_bits = 0;  ///< BiSS: clocks until the encoder was ready
-  std::uint16_t crc = 0;  ///< BiSS: CRC as sent
+  unsigned ack_bits = 0;  ///< BiSS: number of ACK bits, the clocks until the encoder was ready.
+  std::uint16_t crc = 0;  ///< BiSS: CRC as the encoder sent it.
   Word word{};            ///< Decoded fields of the position word.
 };
 
-/// Decodes the samples. Errors: invalid_argument (the word does not fit), line_stuck (all samples alike), bad_framing
-/// (the samples do not begin with 110, no start bit, CDS is 1), truncated (the frame is longer than the samples),
-/// bad_checksum; for SSI bad_framing (the line is not idle before the word) and those of ssi::decode_clocked_on.
+/// Decodes a position from the 64 samples. Errors: invalid_argument (the word does not fit), line_stuck (all samples
+/// alike), bad_framing (the samples do not begin with 110, no start bit, CDS is 1), truncated (the frame is longer than
+/// the samples), bad_checksum; for SSI bad_framing (the line is not idle before the word) and the errors of
+/// ssi::decode_clocked_on.
 [[nodiscard]] constexpr Result<Position> decode_position(const Format& format, std::uint64_t samples) {
   if (!fits(format)) return Error::invalid_argument;
   if (samples == 0 || samples == ~std::uint64_t{0}) return Error::line_stuck;
@@ -117,8 +129,8 @@ struct Position {
   store_big_endian(bytes, samples);
   const BitView bits{bytes, sample_bits};
   if (format.carries == Carries::ssi) {
-    // The first sample is taken before the first rising edge, which shifts out the MSB. The interface clocks on after
-    // the word.
+    // The first sample is taken before the first rising edge, which shifts out the MSB. The interface continues to
+    // clock after the word.
     if (!bits[0]) return Error::bad_framing;
     const Result<Word> word = ssi::decode_clocked_on(format.ssi(), bits, 1);
     return word ? Result(Position{.word = *word}) : word.error();
@@ -130,23 +142,24 @@ struct Position {
 
 // ---- Commands and replies
 
-/// A request to the encoder.
+/// A command to the interface.
 struct Request {
   std::uint8_t letter = letter::samples;  ///< Letter of the command.
-  unsigned clock = 0;                     ///< set_clock: the clock, 1 to 8
-  unsigned width = 0;                     ///< set_width: the width in bits, 1 to 64
+  unsigned clock = 0;                     ///< Only for set_clock: number of the clock, 1 to 8.
+  unsigned width = 0;                     ///< Only for set_width: width of the position in bits, 1 to 64.
 };
 
-/// A reply of the encoder.
+/// A decoded reply of the interface.
 struct Reply {
-  std::uint64_t samples = 0;  ///< The 64 samples, the first one in the highest bit.
-  std::int64_t number = 0;    ///< number in the reply to ? > m b
-  Text text{};                ///< text of a reply line, trimmed
+  std::uint64_t samples = 0;  ///< The 64 samples in the reply to `4`, the first one in the highest bit.
+  std::int64_t number = 0;    ///< Number in the reply to a position, clock or width command.
+  Text text{};                ///< Text of a reply line, without white space around it.
 };
 
-inline constexpr unsigned widest = 64;  ///< largest width of a position in bits
+inline constexpr unsigned widest = 64;  ///< Greatest width of a position in bits.
 
-/// Decodes the reply to `4`. Errors: wrong_length (not 16 characters and CR), bad_framing (not hexadecimal).
+/// Decodes the 64 samples in the reply to `4`. Errors: wrong_length (not 16 characters and CR), bad_framing (not
+/// hexadecimal).
 [[nodiscard]] constexpr Result<std::uint64_t> decode_samples(Bytes reply) {
   if (reply.size() != samples_length || reply[samples_length - 1] != end_of_line) return Error::wrong_length;
   std::uint64_t samples = 0;
@@ -158,8 +171,8 @@ inline constexpr unsigned widest = 64;  ///< largest width of a position in bits
   return samples;
 }
 
-/// Decodes a reply line. Errors: wrong_length (no complete line, or more than one), bad_framing (not a reply to the
-/// command `asked`).
+/// Decodes a reply that is a line of text. Errors: wrong_length (no complete line, or more than one), bad_framing (the
+/// text is no reply to the command `asked`).
 [[nodiscard]] constexpr Result<Reply> decode_line(std::uint8_t asked, Bytes bytes) {
   const std::size_t end = end_of_first_line(bytes);
   const Bytes text = trimmed(bytes.first(end));
@@ -178,18 +191,19 @@ inline constexpr unsigned widest = 64;  ///< largest width of a position in bits
   return reply;
 }
 
-/// The interface's commands for the engine; author/dialog.hpp explains each member.
+/// The protocol, as author layers use it: frames, lengths and times. author/dialog.hpp explains each member.
 struct Protocol {
-  /// Frame layout and settings of one encoder, as the unit's options select them.
+  /// Layout of the encoder's frames and properties of the interface, as the unit's options select them.
   using Format = e201::Format;
-  /// Type of requests to the encoder.
+  /// Type of commands to the interface.
   using Request = e201::Request;
-  /// Type of the encoder's replies.
+  /// Type of the interface's replies.
   using Reply = e201::Reply;
-  /// No document gives the longest line; the engine stores up to three times this length.
+  /// Assumed length of the longest reply in bytes. No document gives it; the engine stores up to three times this
+  /// length.
   static constexpr std::size_t longest_reply = 32;
 
-  /// Returns how long a host waits for replies.
+  /// Returns the host's timeouts: for a reply, between two of its characters, and for a line that is never silent.
   static constexpr author::HostTimes host_times(const Format&) {
     return {.answer_limit = answer_limit, .gap_limit = gap_limit, .patience = reply_limit};
   }
@@ -217,7 +231,7 @@ struct Protocol {
     if (!letter::is_in(letter::all, begin[0])) return 0;
     return begin[0] == letter::set_clock ? 3 : begin[0] == letter::set_width ? 4 : 1;
   }
-  /// Decodes a request, with its CR or without. Errors: unsupported (unknown letter, clock or width), wrong_length.
+  /// Decodes a command, with or without its CR. Errors: unsupported (unknown letter, clock or width), wrong_length.
   static constexpr Result<Request> decode_request(const Format&, Bytes bytes) {
     const Bytes text = trimmed(bytes);
     if (text.empty()) return Error::wrong_length;
@@ -239,10 +253,10 @@ struct Protocol {
     if (request.letter == letter::samples) return samples_length;
     return letter::is_in(letter::answered_by_a_line, request.letter) ? end_of_first_line(reply) : 0;
   }
-  /// A reply with a CR at its end is complete, whatever its content.
+  /// Returns whether the host awaits no more bytes: a reply with a CR at its end is complete, even if it is invalid.
   static constexpr bool is_whole(const Format&, Error error) { return error != Error::wrong_length; }
-  /// Decodes a reply. Errors: those of decode_samples and decode_position, or of decode_line; unsupported (no document
-  /// describes the reply to this command).
+  /// Decodes a reply. Errors: those of decode_samples and decode_position, those of decode_line, or unsupported (no
+  /// document describes the reply to this command).
   static constexpr Result<Reply> decode(const Format& format, const Request& request, Bytes bytes) {
     if (letter::is_in(letter::answered_by_a_line, request.letter)) return decode_line(request.letter, bytes);
     if (request.letter != letter::samples) return Error::unsupported;
@@ -251,7 +265,7 @@ struct Protocol {
     const Error error = decode_position(format, *samples).error();
     return error == Error::none ? Result(Reply{.samples = *samples}) : error;
   }
-  /// Converts a reply to a reading.
+  /// Converts the samples in a reply to a reading; returns an empty reading for other replies.
   static constexpr Reading reading(const Format& format, const Request& request, const Reply& reply) {
     if (request.letter != letter::samples) return {};
     return to_reading(format.word, decode_position(format, reply.samples)->word, format.scale);

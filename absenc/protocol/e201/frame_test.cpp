@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Cases of frames and texts that the vectors do not cover.
+// Tests of frames and texts that the test vectors do not cover.
 #include "absenc/protocol/e201/frame.hpp"
 
 #include <gtest/gtest.h>
@@ -33,7 +33,7 @@ TEST(E201Frame, DistinguishesErrorsOfSamples) {
            {"80014328ff300000\r", Error::bad_framing},     // begins with 100
            {"c000000000000002\r", Error::truncated},       // the CDS bit is the last sample
            {"c000000000000003\r", Error::bad_framing},     // CDS is 1, and the frame is truncated
-           {"c0014328ff310000\r", Error::none},            // changed after the CRC
+           {"c0014328ff310000\r", Error::none},            // a bit after the CRC has changed
            {"c0014328fe300000\r", Error::bad_checksum},
        })) {
     EXPECT_EQ(name(decode('4', reply).error()), name(error)) << reply;
@@ -119,7 +119,7 @@ TEST(E201Frame, DecodesReplyLines) {
   const std::string longest(64, 'x');
   for (const auto& [letter, reply, error] : std::to_array<std::tuple<char, std::string, std::string_view>>(
            {{'v', "anything 1\r", "none"},
-            {'s', "\n anything ~\r\n", "none"},  // LF of the line before, and its own
+            {'s', "\n anything ~\r\n", "none"},  // begins with the LF of the previous line, and ends with an LF
             {'e', longest + "\r", "none"},
             {'e', longest + "x\r", "wrong_length"},
             {'v', "anything 1", "wrong_length"},
@@ -167,7 +167,7 @@ TEST(E201Frame, FindsNumbersInUndocumentedTexts) {
            {{"5", 5}, {"M3", 3}, {"1", 1}, {"8", 8}, {"1100 kHz", 6}, {"35", 1}, {"4400", 8}, {"9", 0}, {"0", 0}})) {
     EXPECT_EQ(find_clock(bytes(words)).value_or(0), clock) << words;
   }
-  EXPECT_EQ(find_number(bytes("B1234567890")).value(), 123'456'789);  // only nine digits are used
+  EXPECT_EQ(find_number(bytes("B1234567890")).value(), 123'456'789);  // only the first nine digits are used
   EXPECT_EQ(decode_number(bytes("-17")).value(), -17);
   EXPECT_EQ(decode_number(bytes("+17")).value(), 17);
   EXPECT_EQ(decode_number(bytes("-9223372036854775808")).value(), std::numeric_limits<std::int64_t>::min());

@@ -14,7 +14,7 @@ using author::Procedure;
 
 namespace {
 
-constexpr unsigned supplied_above = 1000;  // voltage in mV above which the encoder's supply counts as on
+constexpr unsigned supplied_above = 1000;  // voltage in mV above which the encoder counts as supplied
 
 constexpr std::string_view check_firmware = "`absenc info` shows which firmware it has";
 constexpr std::string_view check_clocks =
@@ -48,8 +48,8 @@ Procedure read(Dialog& dialog, InterfaceResults& found) {
   co_return done;
 }
 
-// A text does not show which command it answers. A reply that is sent twice must not be taken for the next one, so the
-// procedure waits for silence.
+// The text of a reply does not show which command it answers. So that a repeated reply is not taken for the reply to
+// the next command, the procedure waits for silence after each reply.
 Procedure read_info(Dialog& dialog, InterfaceResults& found) {
   static constexpr auto letters = std::array{letter::version, letter::serial, letter::supply, letter::clock};
   for (const std::uint8_t asked : letters) {
@@ -61,12 +61,12 @@ Procedure read_info(Dialog& dialog, InterfaceResults& found) {
   co_return done;
 }
 
-// ---- Settings, each read back
+// ---- Settings: each is read back
 
 namespace {
 
-// Sets the clock and reads it back. Returns none, the error of an exchange, or cross_check_failed (another clock is
-// set).
+// Sets the clock and reads it back. Returns none, the error of an exchange, or cross_check_failed (another clock is set
+// afterwards).
 Part<Error> switch_clock(Dialog& dialog, unsigned clock) {
   const Result<Reply> told = co_await dialog.attempt({letter::set_clock, clock}).changes();
   if (!told) co_return told.error();
@@ -100,7 +100,7 @@ Procedure switch_supply(Dialog& dialog, InterfaceResults& found, bool on) {
 
 namespace {
 
-// Returns whether two numbers of `?` are near each other. They include the turns, so the difference does not wrap.
+// Returns whether two positions from `?` are near each other. They include the turns, so the difference does not wrap.
 bool is_near(const Dialog& dialog, std::int64_t counts, std::int64_t other) {
   const unsigned bits = dialog.format().word.bits_of(Meaning::position);
   const auto to = static_cast<std::uint64_t>(counts);
@@ -111,7 +111,7 @@ bool is_near(const Dialog& dialog, std::int64_t counts, std::int64_t other) {
 }  // namespace
 
 Procedure set_zero(Dialog& dialog, InterfaceResults& found) {
-  // `?` does not report errors, so `4` is read too. An interface that does not know `4` cannot report more.
+  // `?` does not report errors, so `4` is read too. An interface that lacks `4` cannot report errors.
   const Result<Reply> samples = co_await dialog.attempt({letter::samples});
   if (samples) {
     const Reading look = Protocol::reading(dialog.format(), {letter::samples}, *samples);
@@ -150,16 +150,17 @@ unsigned InterfaceResults::recommended() const {
 
 namespace {
 
-// Explains the last exchange now, because others follow before the procedure ends.
+// Returns error and explanation of the last exchange. Called at once, because more exchanges follow before the
+// procedure ends.
 Outcome failure(const Dialog& dialog, Error error) {
   const Explanation what = explain(dialog.format(), error, dialog.exchange().sent, dialog.reply());
   return {error, dialog.is_noisy() ? endless_noise.detail : what.detail,
           what.advice.empty() ? text_of(error).advice : what.advice};
 }
 
-// Reads frames at each clock. Ends early if the sweep is aborted or cannot continue.
+// Reads frames at each clock. Ends early if the sweep is aborted or an exchange fails.
 Part<Outcome> try_clocks(Dialog& dialog, InterfaceResults& found) {
-  Outcome bad = done;  // outcome of the last bad frame
+  Outcome bad = done;  // outcome of the last invalid frame
   if (dialog.is_aborted()) co_return done;
   for (unsigned clock = 1; clock <= clocks_khz.size(); ++clock) {
     found.left = clock;
@@ -237,7 +238,7 @@ constexpr auto of_lines = std::to_array<ErrorExplanation>({
     {Error::bad_framing, {"this is no answer to that command", check_model}},
 });
 
-// Explains bad_framing by the check of decode_position that failed.
+// Explains bad_framing of a position by the check of decode_position that failed.
 Explanation explain_framing(const Format& format, Bytes reply) {
   const Result<std::uint64_t> samples = decode_samples(reply);
   if (!samples) return {"the interface answers with hexadecimal digits", check_model};

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The unit's commands against the virtual E201-9S, and against interfaces with other replies.
+// Tests of the unit's commands with the virtual E201-9S, and with interfaces that send other replies.
 #include <gtest/gtest.h>
 
 #include "absenc/protocol/e201/bench_test.hpp"
@@ -59,7 +59,7 @@ TEST(E201Read, RefusesContradictingOptions) {
     EXPECT_EQ(made(settings, "position"), readable) << settings;
     EXPECT_EQ(made(settings, "clock-sweep"), readable);
     EXPECT_TRUE(made(settings, "info"));
-    EXPECT_FALSE(made(settings, "set-clock"));  // 20 is not a clock
+    EXPECT_FALSE(made(settings, "set-clock"));  // 20 is not a clock number or frequency
     EXPECT_EQ(unit.device(author::testing::options_of(unit, settings), shaft, device_storage).bytes != nullptr, usable);
   }
 }
@@ -97,7 +97,7 @@ TEST(E201Read, ExplainsEachError) {
     EXPECT_FALSE(read.reading);
     EXPECT_TRUE(read.fields.empty());
   }
-  // The second `4` may be answered.
+  // Only the second `4` is answered.
   int asked = 0;
   const Tamper once = [&](char letter) {
     return letter == '4' && ++asked == 1 ? std::optional(garbage) : std::nullopt;
@@ -105,7 +105,7 @@ TEST(E201Read, ExplainsEachError) {
   EXPECT_EQ(bench.run_tampered(once, "position").error, "none");
 }
 
-// No document gives these times: a slower reply counts as missing, and the host waits no longer.
+// No document gives reply times: a slower reply counts as missing, and the host waits no longer.
 TEST(E201Read, UsesReplyTimeouts) {
   Bench bench("singleturn_bits=19");
   const std::string good = "c0014328ff300000\r";
@@ -140,7 +140,7 @@ TEST(E201Info, ReportsTextsWithoutNumbers) {
   EXPECT_EQ(partly.fields, (Fields{{"version", 0}, {"serial", 0}, {"supply", 0}, {"clock", 4}, {"clock_khz", 280}}));
   EXPECT_EQ(bench.run_tampered(answering('e', {}), "info").fields,
             (Fields{{"version", 0}, {"serial", 0}, {"clock", 4}, {"clock_khz", 280}}));
-  // A text that is sent twice is not a reply to the next command.
+  // A repeated reply must not be taken for the reply to the next command.
   EXPECT_EQ(bench.run_tampered(answering('v', {{"E201-9S V1.16\r"}, {"E201-9S V1.16\r"}}), "info").error,
             "wrong_length");
   EXPECT_EQ(
@@ -164,7 +164,7 @@ TEST(E201Set, ReadsClockBack) {
   EXPECT_EQ(refused.error, "cross_check_failed");
   EXPECT_TRUE(says(refused.detail, "another setting")) << refused.detail;
   EXPECT_EQ(bench.raw("M2\rm"), "2\r");
-  // An undocumented reply is ignored, but one that does not end is an error.
+  // An undocumented reply is ignored, but an undocumented reply that does not end is an error.
   EXPECT_EQ(bench.run_tampered(answering('M', {{"M2 ok\r\n"}, {"more", 15ms}}), "set-clock", {2}).error, "none");
   const Tamper stream = answering('M', std::vector<TextReply>(40, {"1", 10ms}));
   EXPECT_EQ(bench.run_tampered(stream, "set-clock", {2}).error, "wrong_length");
@@ -215,12 +215,13 @@ TEST(E201Zero, ReadsZeroBack) {
   EXPECT_EQ(bench.run("set-zero").fields, (Fields{{"counts", 0}}));
   bench.shaft.start.position -= 10 * count;
   EXPECT_EQ(bench.run("decimal").fields, (Fields{{"counts", -10}}));
-  EXPECT_EQ(bench.run("position").fields.at("singleturn"), 275086);  // the encoder's own position
+  // position of the encoder, without the interface's zero
+  EXPECT_EQ(bench.run("position").fields.at("singleturn"), 275086);
   EXPECT_EQ(bench.run("clear-zero").error, "none");
   EXPECT_EQ(bench.run("decimal").fields, (Fields{{"counts", 275086}}));
 }
 
-// 0.02 degrees are 29 counts of 19 bits, and 1 of 12.
+// 0.02 degrees are 29 counts of 19 bits, and 1 count of 12 bits.
 TEST(E201Zero, RefusesMovingEncoder) {
   struct Case {
     std::string bits;
@@ -231,7 +232,8 @@ TEST(E201Zero, RefusesMovingEncoder) {
                                            {"19", {"129", "100", "-29"}, "none"},
                                            {"19", {"100", "130"}, "not_still"},
                                            {"19", {"130", "100"}, "not_still"},
-                                           {"19", {"100", "524388"}, "not_still"},  // a turn further
+                                           // the second position is one turn further
+                                           {"19", {"100", "524388"}, "not_still"},
                                            {"19", {"100", "100", "30"}, "cross_check_failed"},
                                            {"19", {"100", "100", "524288"}, "cross_check_failed"},
                                            {"12", {"-1", "0", "1"}, "none"},

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// clock-sweep: its counts, that it restores the clock in every case, and its errors.
+// Tests of clock-sweep: its counts of valid frames, its errors, and that it restores the clock in every case.
 #include <gtest/gtest.h>
 
 #include "absenc/protocol/e201/bench_test.hpp"
@@ -16,7 +16,7 @@ using testing::says;
 using testing::Tamper;
 using testing::TextReply;
 
-/// 10 us of latency, 32 + 8 bits: up to 20 bits of ACK fit, so M8 (45 bits) and M7 (22) are too fast.
+/// 10 us of latency and 32 + 8 bits: at most 20 bits of ACK fit, so clocks 8 (45 bits of ACK) and 7 (22) are too fast.
 TEST(E201Sweep, CountsRecommendsAndRestores) {
   Bench bench("singleturn_bits=32");
   bench.raw("M7\r");
@@ -47,7 +47,8 @@ TEST(E201Sweep, CountsRecommendsAndRestores) {
 }
 
 TEST(E201Sweep, LineDelayMovesTheRecommendation) {
-  // The line is two bits late at 4400 kHz and one at 2200; 900 ns are the period at 1100: no fast clock is stable.
+  // The line is two bits late at 4400 kHz and one bit at 2200 kHz; its delay of 900 ns is about one period at 1100 kHz:
+  // no fast clock is stable.
   Bench bench("singleturn_bits=19 latency_us=0 line_delay_ns=905");
   const Fields fields = bench.run("clock-sweep", {20}).fields;
   EXPECT_LT(fields.at("valid_1100_khz"), 20);
@@ -88,7 +89,7 @@ TEST(E201Sweep, AbortRestoresTheClockAtAnyStep) {
   }
 }
 
-// An aborted sweep reports its results so far, and recommends nothing.
+// An aborted sweep reports the results so far, and recommends no clock.
 TEST(E201Sweep, RecommendsNothingAfterAbort) {
   Bench bench;
   unsigned emits = 0;
@@ -128,7 +129,7 @@ TEST(E201Sweep, ReportLeftNamesClockThatWasSetLast) {
 
 TEST(E201Sweep, ReportsEachErrorAndRestoresClock) {
   struct Case {
-    char letter;  // the command that is answered with `answer` the `nth` time; if `always`, every time from then on
+    char letter;  // the command whose `nth` request is answered with `answer`; if `always`, every later request too
     int nth;
     bool always;
     std::vector<TextReply> answer;
@@ -165,7 +166,7 @@ TEST(E201Sweep, ReportsEachErrorAndRestoresClock) {
   }
 }
 
-// Single bad frames are a normal result of a sweep.
+// Single invalid frames are a normal result of a sweep, not an error.
 TEST(E201Sweep, ContinuesAfterBadFrame) {
   Bench bench;
   int asked = 0;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Finds numbers and versions in texts that no document describes.
+// Finds numbers and versions in reply texts of the E201-9S that no document describes.
 #pragma once
 
 #include <array>
@@ -16,11 +16,11 @@ namespace absenc::e201 {
 /// Frequencies of MA for M1 to M8, in kHz.
 inline constexpr std::array<std::uint16_t, 8> clocks_khz{35, 70, 140, 280, 560, 1100, 2200, 4400};
 
-inline constexpr char end_of_line = '\r';  ///< End of each text.
-/// A text of the interface.
+inline constexpr char end_of_line = '\r';  ///< Last character of each reply text.
+/// Text of a reply.
 using Text = ByteBuffer<64>;
 
-/// Returns the index after the first CR; 0 if there is none.
+/// Returns the index after the first CR; 0 if the text has none.
 [[nodiscard]] constexpr std::size_t end_of_first_line(Bytes text) {
   for (std::size_t i = 0; i < text.size(); ++i) {
     if (text[i] == end_of_line) return i + 1;
@@ -28,7 +28,7 @@ using Text = ByteBuffer<64>;
   return 0;
 }
 
-/// Returns the text without CR, LF, tabs and spaces around it.
+/// Returns the text without leading and trailing CR, LF, tabs and spaces.
 [[nodiscard]] constexpr Bytes trimmed(Bytes text) {
   const auto blank = [](std::uint8_t c) { return c == ' ' || c == '\r' || c == '\n' || c == '\t'; };
   while (!text.empty() && blank(text.front())) text = text.subspan(1);
@@ -36,12 +36,12 @@ using Text = ByteBuffer<64>;
   return text;
 }
 
-/// Returns whether a character is a digit.
+/// Returns whether a character is a decimal digit.
 [[nodiscard]] constexpr bool is_digit(std::uint8_t c) { return c >= '0' && c <= '9'; }
 
 namespace detail {
 
-// Returns the number at `at`, of at most 9 digits, and moves `at` behind it.
+// Returns the number at index `at`, of at most 9 digits, and moves `at` after it.
 constexpr unsigned number_at(Bytes text, std::size_t& at) {
   unsigned number = 0;
   for (unsigned digits = 0; at < text.size() && is_digit(text[at]) && digits < 9; ++at, ++digits) {
@@ -57,10 +57,10 @@ constexpr bool skip_to_digit(Bytes text, std::size_t& at) {
 
 }  // namespace detail
 
-/// Version of the interface.
+/// Firmware version of the interface.
 struct Version {
-  unsigned major;  ///< Major number.
-  unsigned minor;  ///< Minor number.
+  unsigned major;  ///< Number before the point.
+  unsigned minor;  ///< Number after the point.
 };
 
 /// Returns whether this firmware has the command `4` (E201-9S document: since 1.16).
@@ -68,7 +68,7 @@ struct Version {
   return version.major > 1 || (version.major == 1 && version.minor >= 16);
 }
 
-/// Returns the first two numbers with a point between them.
+/// Returns the first two numbers in a text that are separated by a point; no value if the text has none.
 [[nodiscard]] constexpr std::optional<Version> find_version(Bytes text) {
   for (std::size_t at = 0; detail::skip_to_digit(text, at);) {
     const unsigned major = detail::number_at(text, at);
@@ -78,14 +78,14 @@ struct Version {
   return std::nullopt;
 }
 
-/// Returns the first whole number. Error: bad_framing.
+/// Returns the first whole number in a text. Error: bad_framing (the text has no digit).
 [[nodiscard]] constexpr Result<std::int64_t> find_number(Bytes text) {
   std::size_t at = 0;
   if (!detail::skip_to_digit(text, at)) return Error::bad_framing;
   return detail::number_at(text, at);
 }
 
-/// Returns the clock, 1 to 8, for its number or its frequency in kHz; 0 if there is none.
+/// Converts a clock number or a frequency in kHz to the clock number, 1 to 8; returns 0 for any other number.
 [[nodiscard]] constexpr unsigned clock_of(std::int64_t number) {
   for (unsigned i = 0; i < clocks_khz.size(); ++i) {
     if (number == i + 1 || number == clocks_khz[i]) return i + 1;
@@ -93,13 +93,13 @@ struct Version {
   return 0;
 }
 
-/// Decodes the reply to `m`: the clock, 1 to 8. Error: bad_framing.
+/// Returns the clock number, 1 to 8, in the reply to `m`. Error: bad_framing.
 [[nodiscard]] constexpr Result<std::int64_t> find_clock(Bytes text) {
   const unsigned clock = clock_of(find_number(text).value_or(0));
   return clock != 0 ? Result(std::int64_t{clock}) : Error::bad_framing;
 }
 
-/// Decodes the reply to `?`: digits with an optional sign. Error: bad_framing.
+/// Returns the number in the reply to `?`: digits with an optional sign. Error: bad_framing.
 [[nodiscard]] constexpr Result<std::int64_t> decode_number(Bytes text) {
   const bool negative = !text.empty() && text[0] == '-';
   if (!text.empty() && (text[0] == '-' || text[0] == '+')) text = text.subspan(1);
@@ -114,12 +114,13 @@ struct Version {
   return static_cast<std::int64_t>(negative ? 0 - number : number);
 }
 
-/// Returns the first number that is followed by `symbol` (V or A), or by m and `symbol`, in thousandths of the unit.
+/// Returns the first number that is followed by `symbol` (V or A), or by m and `symbol`, in mV or mA; no value if the
+/// text has none.
 [[nodiscard]] constexpr std::optional<unsigned> find_milli(Bytes text, std::uint8_t symbol) {
   for (std::size_t at = 0; detail::skip_to_digit(text, at);) {
     std::uint64_t milli = std::uint64_t{detail::number_at(text, at)} * 1000;
     const bool has_point = at < text.size() && text[at] == '.';
-    // decimal comma of another locale
+    // the reply may have a decimal comma instead of a point
     const bool has_comma = at + 1 < text.size() && text[at] == ',' && is_digit(text[at + 1]);
     if (has_point || has_comma) {
       unsigned weight = 100;
@@ -136,7 +137,7 @@ struct Version {
   return std::nullopt;
 }
 
-/// Decodes the reply to `>`. Error: bad_framing.
+/// Returns the number in the reply to `>`, hexadecimal digits. Error: bad_framing.
 [[nodiscard]] constexpr Result<std::int64_t> decode_hexadecimal(Bytes text) {
   if (text.empty() || text.size() > 16) return Error::bad_framing;
   std::uint64_t number = 0;

@@ -19,7 +19,7 @@ using namespace author;
 
 // ---- Options
 
-/// Values of the options.
+/// Values of the unit's options.
 struct Settings {
   std::uint8_t singleturn_bits = 0;
   std::uint8_t multiturn_bits = 0;
@@ -32,7 +32,7 @@ struct Settings {
   Kind kind = Kind::other;
   std::int64_t latency_ns = 10'000;
   std::int64_t line_delay_ns = 0;
-  unsigned firmware = 116;  // version in hundredths
+  unsigned firmware = 116;  // firmware version of the virtual interface in hundredths: 116 is 1.16
 };
 
 constexpr std::array<std::string_view, 2> carries_choices{"biss", "ssi"};
@@ -65,7 +65,7 @@ constexpr WordFormat word_of(const Settings& given) {
 
 constexpr Format format_of(const Settings& given, const WordFormat* word) {
   return {.word = word != nullptr ? *word : word_of(given),
-          // A word given by the user is linear if the user gives a unit.
+          // A word that the user gives is linear if the user also gives a unit of length.
           .scale = {.linear = (word != nullptr ? given.unit_pm : given.position_bits) != 0,
                     .unit_um = static_cast<double>(given.unit_pm) / 1e6},
           .carries = given.carries,
@@ -76,7 +76,7 @@ constexpr Format format_of(const Settings& given, const WordFormat* word) {
           .line_delay = Time(given.line_delay_ns)};
 }
 
-// The length alone does not prove a Resolute, so the models without one come first.
+// The length of a word alone does not prove a Resolute, so the models of other encoders come first.
 constexpr auto resolute_models = std::array{
     ModelText{"rotary-26", "single-turn, 26 bits", 0,
               "singleturn_bits=26 multiturn_bits=0 position_bits=0 encoder=other"},
@@ -157,7 +157,7 @@ constexpr auto own_fields = fields_of<InterfaceResults>(
     field<khz<recommended>>("recommended_khz", "kHz", "that clock"),
     field<restored>("restored_clock", "", "clock before the sweep, which is restored"),
     field<aborted>("aborted", "", "the sweep was ended early: not all clocks were tried"));
-// Fields of a sweep that was interrupted.
+// Fields that are reported after a sweep was interrupted.
 constexpr auto left_fields = fields_of<InterfaceResults>(
     field<left>("left_clock", "", "the clock that the sweep set last"),
     field<khz<left>>("left_khz", "kHz", "that clock"),
@@ -205,8 +205,8 @@ constexpr Finding<Format, InterfaceResults> found{.put = put_found, .put_left = 
 
 // ---- Commands
 
-// Returns whether positions can be read. A linear encoder needs its unit, so that its readings are not taken for
-// angles.
+// Returns whether positions can be read. A linear encoder needs its unit of length, so that its readings are not taken
+// for angles.
 constexpr bool is_readable(const Format& format) { return fits(format) && absenc::is_usable(format.scale); }
 
 template <std::uint8_t one>
@@ -259,8 +259,8 @@ constexpr std::size_t size_of_reply(const Format&, Bytes begin) {
 }
 constexpr Result<Request> guess_request(const Format&, Bytes) { return Request{letter::samples}; }
 
-// Returns whether a wrong bit is detected. Bits after the CRC are ignored, capital letters are the same digits, and
-// neither SSI nor text has a checksum.
+// Returns whether a wrong bit in a reply is detected. Bits after the CRC are ignored, upper and lower case digits are
+// the same, and neither SSI nor text has a checksum.
 bool is_checked(const Options& values, Frame, Frame reply, std::size_t bit) {
   const Format f = format_by(values);
   const Result<std::uint64_t> samples = decode_samples(reply.bytes);

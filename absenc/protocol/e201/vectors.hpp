@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Replies of an E201-9S with their source. Each is decoded at compile time: a wrong frame breaks the build.
+// Test replies of an E201-9S with their source. Each is decoded at compile time: a wrong vector is a compile error.
 #pragma once
 
 #include <array>

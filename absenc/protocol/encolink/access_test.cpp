@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Registers of the virtual AksIM-2 are read and written through channels 2 and 3, on both interfaces.
+// Tests that read and write registers of the virtual AksIM-2 through channels 2 and 3, on UART and SPI.
 #include "absenc/protocol/encolink/procedures.hpp"
 
 #include "absenc/protocol/author/dialog.hpp"
@@ -16,14 +16,14 @@ using PowerOn = Bench::PowerOn;
 class EncolinkRegister : public testing::OnBothInterfaces {};
 INSTANTIATE_TEST_SUITE_P(Interfaces, EncolinkRegister, ::testing::Values(Interface::uart, Interface::spi));
 
-/// Damages the replies with these frame numbers, counted from 0.
+/// Returns a function that damages the replies whose frame number, counted from 0, is in `frames`.
 author::testing::Tamper damaging(std::vector<unsigned> frames) {
   return [=](unsigned nth, RawBytes& reply) {
     if (std::find(frames.begin(), frames.end(), nth) != frames.end()) reply[1] ^= 0x10;
   };
 }
 
-/// Replaces the byte `right` by `wrong` in the first `times` requests that carry it, as received by the encoder.
+/// Returns a function that replaces the byte `right` by `wrong` in the first `times` requests that contain `right`.
 author::testing::Tamper replacing(std::uint8_t right, std::uint8_t wrong, int times) {
   return [=](unsigned, RawBytes& request) mutable {
     for (std::uint8_t& byte : request) {
@@ -52,7 +52,7 @@ TEST_P(EncolinkRegister, ReadsRegisterWithoutLosingPositions) {
     EXPECT_EQ(wrong, 0u);
     EXPECT_EQ(read.texts.at("register"), "order_number");
     EXPECT_EQ(read.numbers.at("length"), 20);
-    // All frames but the two of the identity and the last one, which ends the procedure.
+    // Frames without an emitted position: the two of the identity, and the last one, which ends the procedure.
     EXPECT_EQ(read.emits, read.frames - 2 - 1);
     EXPECT_EQ(bench.first_violation(), "");
     const auto size = static_cast<std::int64_t>(bench.encoder.format().frame_bytes());
@@ -156,7 +156,7 @@ TEST_P(EncolinkRegister, StopsAfterTwoSecondsOfBusy) {
   EXPECT_LT(read.took, busy_limit + 10ms);
 }
 
-// Damages the third key byte, so that the encoder detects no access, or the address, so that the checksum is wrong.
+// Damages the third key byte, so that the encoder detects no access; or the address, so that the checksum is wrong.
 TEST_P(EncolinkRegister, RepeatsAccessThatArrivedDamaged) {
   for (const auto& [right, wrong, error, words] :
        std::to_array<std::tuple<std::uint8_t, std::uint8_t, Error, std::string_view>>(
@@ -209,7 +209,7 @@ TEST_P(EncolinkRegister, ReportsUnpluggedEncoder) {
     EXPECT_FALSE(told.reading);
     EXPECT_EQ(bench.device.memory_version(), 0u);
   }
-  // Not even the identity was received, so nothing was written.
+  // The identity was not received, so nothing was written.
   Bench bench(testing::multi, interface);
   bench.tampered.replies([](unsigned, RawBytes& reply) { reply.clear(); });
   const RunResult save = bench.run("save");
@@ -217,7 +217,7 @@ TEST_P(EncolinkRegister, ReportsUnpluggedEncoder) {
   EXPECT_FALSE(says(save.detail, "may have been executed")) << save.detail;
 }
 
-// The answer to the write is lost, so the register must be read back before it is written again.
+// The answer to the write is lost, so the procedure must read the register before it writes again.
 TEST_P(EncolinkRegister, ReadsBackBeforeRepeatingWrite) {
   Bench bench(testing::single, interface);
   bench.tampered.replies(damaging({22}));
@@ -242,8 +242,8 @@ TEST_P(EncolinkRegister, RepeatsWriteThatWasNotExecuted) {
   }
 }
 
-// Frames 0 and 1 are for the identity, frame 2 resets the channels; cycles of 7 frames follow. The cycle in progress
-// when the access ends is idle too.
+// Frames 0 and 1 are for the identity, frame 2 resets the channels; cycles of 7 frames follow. The cycle during which
+// the access ends is idle too.
 TEST_P(EncolinkRegister, AcceptsAnswerAfterEightIdleCycles) {
   for (const auto& [more, asked] : std::to_array<std::pair<unsigned, unsigned>>({{7, 1}, {8, 2}})) {
     Bench bench(testing::single, interface);
@@ -273,11 +273,11 @@ TEST_P(EncolinkRegister, AcceptsAnswerAfterEightIdleCycles) {
   }
 }
 
-/// Changes the channel 3 bytes on a UART, one per cycle of seven frames.
+/// Replaces the channel 3 bytes on a UART, one per cycle of seven frames.
 struct OnChannel3 {
   OnChannel3(Bench& bench, std::function<std::uint8_t(std::uint8_t)> change) : change_(std::move(change)) {
     bench.tampered.requests([this](unsigned, RawBytes& request) {
-      if (request[0] == 0xAA) at_ = 7;  // the next reply does not belong to the new cycle yet
+      if (request[0] == 0xAA) at_ = 7;  // the reply to a reset does not belong to the new cycle yet
     });
     bench.tampered.replies([this](unsigned, RawBytes& reply) {
       if (at_ == 7) {
@@ -304,7 +304,7 @@ TEST(EncolinkAccess, RejectsAnswerWithoutReady) {
   EXPECT_EQ(read.detail, "channel 3 says neither idle nor busy nor ready");
 }
 
-// The encoder does not count the calibration, or reports that the ring is too eccentric.
+// Two failures: the encoder's counter of calibrations does not change, or it reports that the ring is too eccentric.
 TEST(EncolinkAccess, ReportsFailedAndEndlessSelfCalibration) {
   for (const auto& [says, error, words] : std::to_array<std::tuple<std::uint8_t, Error, std::string_view>>(
            {{calibration::out_of_range, Error::cross_check_failed, "too eccentric"},
@@ -369,7 +369,7 @@ TEST_P(EncolinkRegister, NeverRepeatsCommand) {
   EXPECT_EQ(bench.device.memory_version(), 1u);
 }
 
-// After a refusal, bytes of data may follow: the next access must not begin among them.
+// After a refusal, the encoder may still send data bytes: the next access must not begin among them.
 author::Procedure read_twice(Dialog& dialog, ProcedureState& found) {
   const AccessOutcome refused = co_await attempt_read(dialog, found, 0x1234, 20);
   if (refused != AccessOutcome::refused) co_return found.why;

@@ -23,8 +23,8 @@ struct Bench : author::testing::UnitBench<20> {
       : UnitBench(interface == Interface::spi ? spi_unit : encolink::unit, settings) {
     shaft.put(7, 0x12345);
   }
-  /// Sends the requests one after the other, each padded with zeros to `size` (on SPI a reply has the length of its
-  /// request), and returns the replies.
+  /// Sends the requests one after the other and returns the replies. Pads each request with zeros to `size`, because on
+  /// SPI a reply has the length of its request.
   std::vector<RawBytes> ask(std::vector<RawBytes> requests, std::size_t size = 0) {
     std::vector<RawBytes> replies;
     for (RawBytes& request : requests) {
@@ -36,7 +36,7 @@ struct Bench : author::testing::UnitBench<20> {
   VirtualEncoder& encoder = static_cast<VirtualEncoder&>(device);
 };
 
-/// Base of tests that run on UART and SPI.
+/// Base of tests that run on both UART and SPI.
 class OnBothInterfaces : public ::testing::TestWithParam<Interface> {
  protected:
   const Interface interface = GetParam();

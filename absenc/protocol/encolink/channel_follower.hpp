@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Finds channels 2 and 3 in a capture: cycles, of which each position frame carries one byte, and register accesses,
-// whose requests are in the `ra` bytes and whose answers are in these cycles.
+// Finds the content of channels 2 and 3 in a capture: cycles of channel 2, of which each position frame carries one
+// byte, and register accesses, whose requests are in the `ra` bytes and whose answers are in the channel 3 bytes of the
+// cycles.
 #pragma once
 
 #include <cstddef>
@@ -14,12 +15,12 @@
 
 namespace absenc::encolink {
 
-/// Combines frames to cycles of channel 2 and to register accesses. A cycle begins with the frame after a reset of the
-/// channels (AA, BB). If the capture has no reset, a cycle is found by its checksum and its position, which equals that
-/// of the cycle's first frame.
+/// Combines captured frames to cycles of channel 2 and to register accesses. A cycle begins with the frame after a
+/// reset of the channels (AA, BB). If the capture has no reset, a cycle is found by its checksum and by its position,
+/// which equals that of the first frame of the cycle.
 class ChannelFollower final : public Follower {
  public:
-  /// Follows encoders of this format.
+  /// Creates a follower for encoders with this format.
   explicit ChannelFollower(const Format& format) : format_(format) {}
 
   void follow(std::uint64_t number, Bytes request, Bytes reply) override;
@@ -35,20 +36,20 @@ class ChannelFollower final : public Follower {
   void take_request(std::uint64_t number, std::uint8_t byte);
 
   Format format_;
-  // Channel 2: the positions and channel 2 bytes of the latest frames.
+  // State of channel 2: positions and channel 2 bytes of the latest frames.
   bool in_step_ = false;
   Buffer<Position, longest_cycle> frames_;
   std::uint64_t first_ = 0;  // exchange number of the oldest frame in `frames_`
   std::optional<Composed> cycle_;
   ByteBuffer<longest_cycle> cycle_bytes_;
-  // Channel 3.
-  AccessBytes partial_access_;  // the `ra` bytes of an unfinished access
+  // State of channel 3.
+  AccessBytes partial_access_;  // `ra` bytes of a register access that is not complete yet
   std::uint64_t partial_access_from_ = 0;
-  AccessBytes last_access_;  // the last complete access
+  AccessBytes last_access_;  // `ra` bytes of the last complete register access
   std::uint64_t last_access_from_ = 0;
   bool awaits_answer_ = false;
   ByteBuffer<2 + access_capacity> answer_;
-  bool has_answer_ = false;  // the answer was completed by the last exchange
+  bool has_answer_ = false;  // whether the last exchange completed the answer to the register access
 };
 
 }  // namespace absenc::encolink

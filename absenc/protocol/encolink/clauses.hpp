@@ -54,7 +54,7 @@ inline constexpr auto clauses = std::array{
            .field = "position_offset"},
 };
 
-/// Clauses of the document for the encoder on SPI.
+/// Requirements of the document that an encoder on SPI must fulfil.
 inline constexpr auto spi_clauses = std::array{
     Clause{"answer", "SPI timing diagram", "the encoder drives its output while it is selected", Demand::answered},
     Clause{"crc", "SPI, Channel 1", "the inverted CRC of polynomial 97 is right", Demand::checked},
@@ -78,7 +78,7 @@ inline constexpr auto spi_clauses = std::array{
            .shown_with = "resolution=20&multiturn_bits=0"},
 };
 
-// ---- Requests that break the clause `access`: a second register access before the first was answered
+// ---- Requests that break the clause `access`: a second register access before the first is answered
 
 namespace script {
 inline constexpr std::chrono::milliseconds pause{1};
@@ -94,7 +94,7 @@ inline constexpr std::array zeros_and_keys{
     HostStep{pause, "00 10"}, HostStep{pause, "00 00", {}, 3}, HostStep{pause, "00 cd"}};
 }  // namespace script
 
-/// Clauses of the document for the host on SPI.
+/// Requirements of the document that a host on SPI must fulfil.
 inline constexpr std::array<HostClause, 8> spi_host_clauses{{
     {"asks", "SPI, Channel 1", "the first byte of a frame is a command", HostDemand::asks},
     {"silence", "SPI, Channel 1", "after a data line that stayed as it was it asks again", HostDemand::after_silence},
@@ -114,7 +114,7 @@ inline constexpr std::array<HostClause, 8> spi_host_clauses{{
      .breaks = {script::keys_again, script::zeros_and_keys}},
 }};
 
-/// Requirements of the document that a host must fulfil.
+/// Requirements of the document that a host on a UART must fulfil.
 inline constexpr std::array<HostClause, 4> host_clauses{{
     {"asks", "UART, Channel 1", "requests are two bytes, command and data", HostDemand::asks},
     {"silence", "UART, Channel 1", "after no reply it asks again", HostDemand::after_silence},

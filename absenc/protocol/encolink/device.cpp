@@ -7,9 +7,10 @@ namespace absenc::encolink {
 
 namespace {
 
-constexpr std::string_view part_text = "MB080SLA20MENT00";  // 16 characters; [8..9] are the resolution
+constexpr std::string_view part_text = "MB080SLA20MENT00";  // part number, 16 characters; [8..9] are the resolution
 constexpr std::string_view access_rule = "register access before the last one was answered";
-constexpr Time access_time = 200us;  // time from the last byte of an access to its execution; assumed
+// time from the last byte of a register access to its execution; assumed, not in the document
+constexpr Time access_time = 200us;
 
 struct Text {
   std::size_t index;
@@ -18,9 +19,9 @@ struct Text {
 constexpr std::array<Text, 3> texts{
     {{serial_number, "AK2A0001"}, {serial_number_extended, "AK2A0001-0000001"}, {part_number, "MB080SLA20MENT00 SIM"}}};
 
-// Values at shipping of the number registers and of `turns_taken`. Values that only a calibration or the factory could
-// know are 0.
-// Index of the turns that a preset subtracts from the shaft's turns.
+// Initial values of the registers that are numbers, and of `turns_taken`. Values that only a calibration or the factory
+// determines are 0.
+// Index, after those of the registers, of the turns that a preset subtracts from the shaft's turns.
 constexpr std::size_t turns_taken = registers.size();
 constexpr auto at_shipping = [] {
   std::array<std::uint32_t, turns_taken + 1> values{};
@@ -30,14 +31,14 @@ constexpr auto at_shipping = [] {
   return values;
 }();
 
-// Registers that `save` stores, in the order of the memory.
+// Registers that the command `save` stores, in the order of their bytes in the memory.
 constexpr std::array<std::size_t, 9> stored_registers{position_offset, multiturn_preset,      write_lock,
                                                       turns_taken,     position_filter,       position_filter_speed,
                                                       velocity_filter, velocity_filter_speed, calibration_range};
 
 }  // namespace
 
-// The encoder answers while it starts, with zeros.
+// While it starts, the encoder answers requests with zeros.
 VirtualEncoder::VirtualEncoder(const Format& format, const Shaft& shaft)
     : Responder({.character = uart_settings.character(), .answer_time = answer_time}), format_(format), shaft_(&shaft) {
   if (format_.resolution == 0) format_.resolution = virtual_format.resolution;
@@ -117,7 +118,7 @@ Identity VirtualEncoder::identity() const {
   return identity;
 }
 
-// Executes a request. The frame of this exchange was made before: the effect shows in the next frame.
+// Executes a request. The frame of this exchange was made before, so the effect is visible in the next frame.
 void VirtualEncoder::handle(Bytes request, Time at) {
   if (at < zeros_until_) return;
   const auto config = static_cast<Config>(request[0]);
@@ -167,7 +168,7 @@ void VirtualEncoder::ra_received(std::uint8_t byte, Time at) {
 
 // ---- State
 
-// Returns the shaft's position with the offset in 2^-32 revolution, as if the turn counter had no limit.
+// Returns the shaft's position plus the position offset in 2^-32 revolution, as if the turn counter had no limit.
 std::int64_t VirtualEncoder::offset_position(Time now) const {
   const auto fraction = static_cast<std::int32_t>(format_.offset_fraction(offset()));
   const std::int64_t position = shaft_->at(now).position;
@@ -225,12 +226,12 @@ void VirtualEncoder::execute(Time at) {
   answer_.clear();
   sent_answer_bytes_ = 0;
   busy_until_ = std::max(busy_until_, at + access_time);
-  if (request.error() == Error::unsupported) return;  // an unknown operation is ignored: channel 3 stays idle
+  if (request.error() == Error::unsupported) return;  // the encoder ignores an unknown operation: channel 3 stays idle
   AccessStatus status = writes ? AccessStatus::write_checksum : AccessStatus::read_checksum;
   if (request.error() == Error::wrong_length) status = AccessStatus::byte_count;
   std::size_t index = 0;
   if (request) {
-    // The registers of an AksIM-4 are not described, so none is found.
+    // The registers of an AksIM-4 are not documented, so its virtual encoder has none.
     const Register* found = format_.generation == Generation::aksim2 ? find_register(request->address) : nullptr;
     if (found != nullptr) index = static_cast<std::size_t>(found - registers.data());
     status = check_access(*request, found);
@@ -241,7 +242,7 @@ void VirtualEncoder::execute(Time at) {
   if (!request || writes) return;
   if (status == AccessStatus::ok) {
     answer_.append(value_of(index, at));
-  } else {  // the vendor's host reads all requested bytes whatever the status is
+  } else {  // the vendor's host reads all requested bytes, whatever the status is
     for (std::size_t i = 0; i < std::min<std::size_t>(request->length, access_capacity); ++i) answer_.push_back(0);
   }
 }

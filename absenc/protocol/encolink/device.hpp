@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A virtual AksIM-2 on UART or SPI: three channels, registers, write lock, busy times, and checks of the host's timing.
+// A virtual AksIM-2 on UART or SPI: its three channels, registers, write lock, busy times, and checks of the host's
+// timing.
 #pragma once
 
 #include <array>
@@ -14,20 +15,20 @@
 
 namespace absenc::encolink {
 
-/// Conditions of the virtual encoder.
+/// Conditions of the virtual encoder that a user can set.
 inline constexpr std::array<Condition, 3> conditions{{
     {"temperature", "degC", "of the readhead", -100, 200, 35},
     {"busy", "", "a register access never ends", 0, 1, 0},
     {"channels_disagree", "", "channel 2 has another position than channel 1", 0, 1, 0},
 }};
-/// Index of a condition.
+/// Index of a condition in `conditions`.
 enum ConditionIndex : std::size_t { condition_temperature, condition_busy, condition_channels_disagree };
 
-/// A virtual encoder.
+/// A virtual AksIM-2 encoder.
 class VirtualEncoder final : public author::Responder {
  public:
-  /// Creates an encoder that is off until `power_on`. `shaft` must outlive it. Unknown members of `format` are taken
-  /// from virtual_format.
+  /// Creates an encoder that is off until `power_on`. `shaft` must outlive it. Unknown members of `format` get their
+  /// values from virtual_format.
   VirtualEncoder(const Format& format, const Shaft& shaft);
 
   /// Processes an event of the port, such as received data or silence.
@@ -38,16 +39,16 @@ class VirtualEncoder final : public author::Responder {
   /// Switches the encoder on.
   void power_on(Time now, PowerOn kind) override;
   void set_condition(std::size_t index, std::int64_t value, Time) override { conditions_[index] = value; }
-  /// Returns the 31 bytes that `save` stores: offset, preset, lock, turns, filters, calibration range.
+  /// Returns the 31 bytes that the command `save` stores: offset, preset, lock, turns, filters, calibration range.
   [[nodiscard]] MutableBytes memory() override { return memory_; }
 
   /// Returns the format of the encoder.
   [[nodiscard]] const Format& format() const { return format_; }
-  /// Returns the position that a frame would carry at `now`.
+  /// Returns the position that a frame sent at `now` would carry.
   [[nodiscard]] Position measure(Time now) const;
-  /// Returns the stored position offset.
+  /// Returns the value of the register position_offset.
   [[nodiscard]] std::uint32_t offset() const { return values_[position_offset]; }
-  /// Returns the raised alarms.
+  /// Returns the raised alarms as bits of the detailed status.
   [[nodiscard]] std::uint16_t alarms() const { return static_cast<std::uint16_t>(raised()); }
 
  private:
@@ -81,7 +82,7 @@ class VirtualEncoder final : public author::Responder {
   Format format_;
   const Shaft* shaft_;
   std::array<std::int64_t, conditions.size()> conditions_{};
-  // Values of the registers, then the turns that a preset subtracts from the shaft's turns.
+  // Values of the registers, followed by the turns that a preset subtracts from the shaft's turns.
   std::array<std::uint32_t, registers.size() + 1> values_{};
   std::array<std::uint8_t, 31> memory_{};
 
@@ -100,7 +101,7 @@ class VirtualEncoder final : public author::Responder {
   ByteBuffer<access_capacity + 2> answer_;
   std::size_t sent_answer_bytes_ = 0;
 
-  Time next_frame_{};  // start of the next frame of an encoder that streams
+  Time next_frame_{};  // time at which an encoder that streams sends its next frame
   Time pause_since_{};
   bool was_selected_ = false;
 };

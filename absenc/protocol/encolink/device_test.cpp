@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The virtual AksIM-2 alone: its replies, their times, and the rules that it checks.
+// Tests of the virtual AksIM-2 without the host code: its replies, their times, and its checks of the host.
 #include "absenc/protocol/encolink/device.hpp"
 
 #include "absenc/core/hex.hpp"
@@ -69,11 +69,11 @@ TEST(EncolinkDevice, ReportsBrokenRulesOfAccessAndTransmission) {
 
   Bench loud(testing::single);
   loud.ask({RawBytes(6)});
-  EXPECT_EQ(loud.device.violation_count(), 2u);  // violations are counted per request, not per byte
+  EXPECT_EQ(loud.device.violation_count(), 2u);  // the encoder counts violations per request, not per byte
   EXPECT_EQ(loud.first_violation(), "request during the encoder's transmission");
 }
 
-/// Makes two SPI transfers with this pause between them.
+/// Makes two SPI transfers with this pause between them, and returns the rule that the host broke.
 class SpiHost final : public Machine<std::uint8_t> {
  public:
   explicit SpiHost(Time pause) : pause_(pause) {}
@@ -103,7 +103,7 @@ TEST(EncolinkDevice, ReportsBrokenSpiTimes) {
   fastest.rate = 4'000'000;
   LineSettings fast = spi_settings;
   fast.rate = 8'000'000;
-  LineSettings early = spi_settings;  // the line's settings decide how long NCS is low before the first clock
+  LineSettings early = spi_settings;  // the settings of the line decide how long NCS is low before the first clock
   early.select_lead = 4999ns;
   for (const auto& [settings, pause, rule] : std::to_array<std::tuple<LineSettings, Time, std::string>>(
            {{spi_settings, 5us, ""},
@@ -161,7 +161,7 @@ TEST(EncolinkDevice, StreamsAtItsRate) {
   EXPECT_EQ(ends[95] - ends[0], 19 * 500us);
 }
 
-/// Returns the channel 3 bytes, one per cycle, that answer a register access.
+/// Returns the channel 3 bytes, one per cycle, with which the encoder answers a register access.
 RawBytes answer_to(Bench& bench, Bytes access) {
   std::vector<RawBytes> requests(80, position_request);
   requests[0] = {0xAA, 0x00};

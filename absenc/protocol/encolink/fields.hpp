@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Names, units and meanings of all fields of EncoLink frames and registers, in words for the user.
+// Fields of EncoLink frames and registers with name, unit and meaning, and the functions that report their values.
 #pragma once
 
 #include <algorithm>
@@ -23,21 +23,21 @@ inline constexpr std::array<FlagInfo, 2> general_flags{{
     {"warning", "the position is valid, but something is near its limit", read_the_alarms, false, status::warnings},
 }};
 
-/// Explains out_of_range of a position.
+/// Cause and advice for a position with the error out_of_range.
 inline constexpr std::string_view wrong_resolution =
     "padding bits are set: the encoder has more bits than the options resolution and multiturn_bits say; `absenc info` "
     "asks it";
 
-/// Sentence where channels contradict each other.
+/// Detail of the error that channels 1 and 2 have different positions.
 inline constexpr std::string_view channels_disagree =
     "channel 2 has another position than channel 1: positions go on, but the detailed status cannot be trusted";
 
-/// Explains why register accesses to an AksIM-4 are refused.
+/// Cause and advice for register accesses to an AksIM-4, which are refused.
 inline constexpr std::string_view not_described =
     "protocol version 4 (AksIM-4) has its registers at other addresses, which are not described here: its positions "
     "may be read";
 
-/// The advice is not from the vendor, who only names the bits.
+/// Names and advice for the alarms. The advice is not from the vendor, who only names the bits.
 inline constexpr std::array<FlagInfo, 16> alarm_flags{{
     {"acceleration_error", "the position changed faster than a shaft can", "check the fixing of ring and readhead"},
     {"magnetic_pattern_error", "the magnetic pattern of the ring is not what it should be",
@@ -70,30 +70,32 @@ inline constexpr std::array<FlagInfo, 4> calibration_flags{{
      "mount the ring again, then `absenc run ... self-calibrate` again"},
 }};
 
-/// Values of frames and register accesses. Members without a value are not reported.
+/// Values of a frame or of a register access. Only members with a value are reported.
 struct Values {
-  /// A value that may be missing.
+  /// A value that may be absent.
   template <class T>
   using Maybe = std::optional<T>;
-  Maybe<std::uint8_t> general_status{};  ///< Declared for its flags, which a reading has; never put.
-  Maybe<Position> position{};            ///< Value of the field `position`, if there is one.
-  Maybe<std::uint16_t> multiturn{};      ///< Value of the field `multiturn`, if there is one.
-  Maybe<std::uint8_t> channel2{};        ///< Value of the field `channel2`, if there is one.
-  Maybe<std::uint16_t> status{};         ///< Value of the field `status`, if there is one.
-  Maybe<std::uint8_t> channel3{};        ///< Value of the field `channel3`, if there is one.
-  Maybe<Identity> identity{};            ///< Value of the field `identity`, if there is one.
-  Maybe<std::uint8_t> config{};          ///< Value of the field `config`, if there is one.
-  Maybe<std::uint8_t> ra{};              ///< Value of the field `ra`, if there is one.
-  Maybe<std::string_view> op{};          ///< Value of the field `op`, if there is one.
-  Maybe<std::string_view> name{};        ///< Value of the field `name`, if there is one.
-  Maybe<std::uint32_t> address{};        ///< Value of the field `address`, if there is one.
-  Maybe<std::size_t> length{};           ///< Value of the field `length`, if there is one.
-  Maybe<Bytes> data{};                   ///< Value of the field `data`, if there is one.
-  Maybe<std::int64_t> value{};           ///< Value of the field `value`, if there is one.
+  /// Never set: the field is declared for the names of its bits, which a reading carries.
+  Maybe<std::uint8_t> general_status{};
+  Maybe<Position> position{};        ///< Position and its error and warning bits.
+  Maybe<std::uint16_t> multiturn{};  ///< Turns of the turn counter.
+  Maybe<std::uint8_t> channel2{};    ///< Byte of channel 2 in a position frame.
+  Maybe<std::uint16_t> status{};     ///< Detailed status in a cycle of channel 2.
+  Maybe<std::uint8_t> channel3{};    ///< Byte of channel 3 in a cycle of channel 2.
+  Maybe<Identity> identity{};        ///< Content of an identity frame.
+  /// First byte of a request: 00 position, AA reset of the channels, BB identify.
+  Maybe<std::uint8_t> config{};
+  Maybe<std::uint8_t> ra{};        ///< Second byte of a request, which is one byte of a register access.
+  Maybe<std::string_view> op{};    ///< Operation of a register access: read or write.
+  Maybe<std::string_view> name{};  ///< Name of the accessed register in the table.
+  Maybe<std::uint32_t> address{};  ///< Address of the accessed register.
+  Maybe<std::size_t> length{};     ///< Number of bytes of the accessed register.
+  Maybe<Bytes> data{};             ///< Bytes of the accessed register, most significant first.
+  Maybe<std::int64_t> value{};     ///< Number in the accessed register, if the table does not describe it.
 };
 
 namespace detail {
-// Returns a member of an optional part.
+// Returns a member of an optional struct in Values; no value if the struct is absent.
 template <auto part, auto member>
 constexpr auto of(const Values& values) {
   return values.*part ? std::optional((*(values.*part)).*member) : std::nullopt;
@@ -104,7 +106,7 @@ constexpr std::optional<author::AsciiText> part_number_of(const Values& values) 
 }
 }  // namespace detail
 
-/// Fields of position frames.
+/// Fields of position frames, channel 2 cycles, identities and requests.
 inline constexpr auto frame_fields = [] {
   using author::field;
   using detail::of;
@@ -136,16 +138,16 @@ inline constexpr auto frame_fields = [] {
       field<&Values::value>("value", "", "the same as a number", Role::value));
 }();
 
-/// The value of a register, by its content.
+/// The value of a register. The register's content decides which member is used.
 struct RegisterValue {
-  std::int64_t number;     ///< A plain number.
+  std::int64_t number;     ///< Value of a register that is a plain number.
   double celsius;          ///< Temperature of the readhead, in degC.
   double rpm;              ///< Speed of the ring, in rpm.
-  std::uint8_t flags;      ///< Flags of the last self-calibration.
-  author::AsciiText text;  ///< A number of the encoder.
+  std::uint8_t flags;      ///< Result bits of the last self-calibration.
+  author::AsciiText text;  ///< Serial number, order number or part number.
 };
 
-/// Fields of the registers, in the order of the table `registers`.
+/// Fields in which register values are reported, in the order of the table `registers`.
 inline constexpr auto register_fields = [] {
   using author::field;
   constexpr auto by_content = author::fields_of<RegisterValue>(
@@ -163,22 +165,22 @@ inline constexpr auto register_fields = [] {
   return made;
 }();
 
-/// Values that a procedure reports besides registers and frames.
+/// Values of procedures that are neither in frames nor in registers.
 struct ProcedureValues {
-  std::uint8_t calibrations;        ///< Self-calibrations that ended, modulo 4.
-  bool running;                     ///< Whether the self-calibration is running.
-  author::AsciiText not_described;  ///< Why no register is shown.
+  std::uint8_t calibrations;        ///< Number of self-calibrations that ended, modulo 4.
+  bool running;                     ///< Whether a self-calibration is running.
+  author::AsciiText not_described;  ///< Text that explains why no register was read.
 };
-/// Fields of these values.
+/// Fields in which ProcedureValues are reported.
 inline constexpr auto procedure_fields = author::fields_of<ProcedureValues>(
     author::field<&ProcedureValues::calibrations>("calibrations", "", "self-calibrations that ended, modulo 4"),
     author::field<&ProcedureValues::running>("running", "", "whether the self-calibration is running"),
     author::field<&ProcedureValues::not_described>("registers", "", "why no register is shown"));
 
-/// Fields of frames, registers and procedures.
+/// All fields of the unit: those of frames, registers and procedures.
 inline constexpr auto fields = author::joined(frame_fields.infos, register_fields, procedure_fields.infos);
 
-/// Reports a position frame with its detailed status if known; with `channel3`, a cycle of channel 2.
+/// Puts a position frame into `sink`, with the detailed status if known; with `channel3`, a cycle of channel 2.
 constexpr void put_position(FieldSink& sink, const Format& format, const Position& position,
                             std::optional<std::uint16_t> detailed = {}, std::optional<std::uint8_t> channel3 = {}) {
   Values values{.position = position, .status = detailed, .channel3 = channel3};
@@ -188,14 +190,14 @@ constexpr void put_position(FieldSink& sink, const Format& format, const Positio
   sink.put_reading(to_reading(format, position, detailed));
 }
 
-/// Returns a two's complement number of 1 to 8 bytes.
+/// Returns the two's complement number in 1 to 8 bytes, most significant byte first.
 [[nodiscard]] constexpr std::int64_t signed_value(Bytes bytes) {
   const auto bits = static_cast<unsigned>(8 * bytes.size());
   return bits >= 64 ? static_cast<std::int64_t>(load_big_endian(bytes))
                     : wrapped_difference(load_big_endian(bytes), 0, bits);
 }
 
-/// Reports the value of register `index` of the table.
+/// Puts the value of register `index` of the table into `sink`.
 constexpr void put_value(FieldSink& sink, std::size_t index, Bytes bytes) {
   FieldValue shown{.info = &register_fields[index], .bytes = bytes};
   switch (registers[index].content) {
@@ -216,7 +218,7 @@ constexpr void put_value(FieldSink& sink, std::size_t index, Bytes bytes) {
   }
 }
 
-/// Reports a register that was read or written.
+/// Puts a register that was read or written into `sink`.
 constexpr void put_register(FieldSink& sink, std::uint32_t address, Bytes data,
                             std::optional<std::string_view> op = {}) {
   const Register* known = find_register(address);
@@ -228,8 +230,8 @@ constexpr void put_register(FieldSink& sink, std::uint32_t address, Bytes data,
   if (in_table) put_value(sink, static_cast<std::size_t>(known - registers.data()), data);
 }
 
-/// Returns the format that decodes a reply when the encoder's identity is unknown: 22 bits, and turns if the length of
-/// the reply includes them.
+/// Returns `format` with values for its unknown members, to decode a reply of an encoder whose identity is unknown: 22
+/// bits, and turns if the length of the reply includes them.
 [[nodiscard]] constexpr Format assumed(const Format& format, Bytes reply) {
   Format known = format;
   if (known.resolution == 0) known.resolution = maximum_resolution;
@@ -250,7 +252,7 @@ constexpr BitRanges identity_bits(const FieldInfo& field) {
   return {};  // the resolution is two decimal digits, so its bits are not reported
 }
 
-// Channel 1 is one big-endian number; its lowest two bits are active low.
+// Returns the bits of a field of channel 1, which is one big-endian number with two active-low bits at its end.
 constexpr BitRanges position_bits(const Format& format, const FieldInfo& field) {
   const std::size_t size = format.position_bytes();
   if (&field == frame_fields.of<of<&Values::position, &Position::singleturn>>()) {
@@ -268,7 +270,7 @@ constexpr BitRanges position_bits(const Format& format, const FieldInfo& field) 
 
 }  // namespace detail
 
-/// Returns the bits of a valid reply that hold `field`.
+/// Returns the bits of a valid reply that hold `field`; empty if no bits do.
 [[nodiscard]] constexpr BitRanges bits_of(const Format& format, Bytes reply, const FieldInfo& field) {
   if (reply.size() == identity_bytes || reply.size() == padded_identity_bytes) return detail::identity_bits(field);
   const Format known = assumed(format, reply);
@@ -281,7 +283,7 @@ constexpr BitRanges position_bits(const Format& format, const FieldInfo& field) 
   return detail::position_bits(known, field);
 }
 
-/// Decodes a request without a reply: two bytes, or all `ra` bytes of a register access.
+/// Decodes a request whose reply is not known: two bytes, or all `ra` bytes of a register access.
 constexpr Error decode_request(Bytes request, FieldSink& sink) {
   if (request.size() == request_bytes) {
     if (!is_config(request[0])) return Error::unsupported;
@@ -298,7 +300,7 @@ constexpr Error decode_request(Bytes request, FieldSink& sink) {
   return Error::none;
 }
 
-/// Decodes the answer to a register access.
+/// Decodes the answer to a register access into `sink` and returns the first error.
 constexpr Error decode_access_answer(Bytes request, Bytes reply, FieldSink& sink) {
   const Result<RegisterRequest> access = decode_access(request);
   if (!access) return access.error();
@@ -309,8 +311,9 @@ constexpr Error decode_access_answer(Bytes request, Bytes reply, FieldSink& sink
   return Error::none;
 }
 
-/// Decodes a reply. If the request is a register access (all its `ra` bytes), the reply is its answer. Otherwise the
-/// length of the reply selects: position frame, channel 2 cycle or identity.
+/// Decodes a reply into `sink` and returns the first error. If the request is a register access (all its `ra` bytes),
+/// the reply is the answer to it. Otherwise the length of the reply decides: position frame, channel 2 cycle or
+/// identity.
 constexpr Error decode(const Format& format, Bytes request, Bytes reply, FieldSink& sink) {
   if (reply.empty()) return decode_request(request, sink);
   if (is_access(request)) return decode_access_answer(request, reply, sink);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Encodes and decodes the EncoLink frames of RLS AksIM-2 encoders on UART and SPI: channel 1, cycles of channel 2 and
-// the identity. README.md draws them; the register access bytes of channel 3 are in registers.hpp.
+// Encodes and decodes the EncoLink frames of RLS AksIM-2 encoders on UART and SPI: positions of channel 1, cycles of
+// channel 2 and the identity. README.md draws them; the register access bytes of channel 3 are in registers.hpp.
 #pragma once
 
 #include <array>
@@ -20,36 +20,38 @@ namespace absenc::encolink {
 
 using namespace std::chrono_literals;
 
-// ---- Times that the host keeps and the virtual encoder demands
+// ---- Times that hosts keep and the virtual encoder checks
 
-inline constexpr LineSettings uart_settings{.rate = 1'000'000};  ///< line of interface variant L
-inline constexpr Time spi_lead = 5us;  ///< t_s: shortest time from NCS low to the first edge of SCK
-/// SPI mode 1 (CPOL 0, CPHA 1), at most 4 MHz.
+inline constexpr LineSettings uart_settings{.rate = 1'000'000};  ///< Settings of the line of interface variant L.
+inline constexpr Time spi_lead = 5us;  ///< Time t_s: shortest time from NCS low to the first edge of SCK.
+/// Settings of the SPI line: mode 1 (CPOL 0, CPHA 1), at most 4 MHz.
 inline constexpr LineSettings spi_settings{
     .rate = 1'000'000, .spi_mode = 1, .select_lead = spi_lead, .highest_rate = 4'000'000};
 inline constexpr Time shortest_clock = 250ns;  ///< Shortest period of the SPI clock.
-inline constexpr Time spi_pause = 5us;         ///< t_p: shortest time that NCS stays high between two frames
+inline constexpr Time spi_pause = 5us;         ///< Time t_p: shortest time that NCS stays high between two frames.
 
-/// The document gives no reply times. The virtual encoder replies `answer_time` after a request; the host waits up to
+/// Time from a request to the reply of the virtual encoder. The document gives no reply times; the host waits up to
 /// `answer_limit`.
 inline constexpr Time answer_time = 5us;
-inline constexpr Time answer_limit = 500us;  ///< Longest time until a reply begins.
-inline constexpr Time gap_limit = 30us;      ///< Longest time between two characters of a reply.
+inline constexpr Time answer_limit = 500us;  ///< Longest time that the host waits until a reply begins.
+inline constexpr Time gap_limit = 30us;      ///< Longest time that the host waits between two characters of a reply.
 
-inline constexpr Time start_up = 100ms;  ///< the encoder sends well-formed zeros for this time after power on; assumed
-inline constexpr Time save_time = 50ms;  ///< the encoder is busy for this time after `save`; assumed
-inline constexpr Time busy_limit = 2s;   ///< Longest time that a register access may be busy.
-inline constexpr Time calibration_time = 1s;     ///< duration of the virtual encoder's self-calibration
-inline constexpr Time calibration_limit = 15s;   ///< timeout of a self-calibration; the vendor allows the shaft 10 s
-inline constexpr Time calibration_poll = 100ms;  ///< Time between two looks at a running calibration.
-inline constexpr Time listen_limit = 500ms;      ///< longest time without a valid frame of a streaming encoder
+/// Time after power on during which the encoder sends well-formed zeros; assumed.
+inline constexpr Time start_up = 100ms;
+inline constexpr Time save_time = 50ms;  ///< Time for which the encoder is busy after `save`; assumed.
+inline constexpr Time busy_limit = 2s;   ///< Longest time for which the host waits while a register access is busy.
+inline constexpr Time calibration_time = 1s;     ///< Duration of the virtual encoder's self-calibration.
+inline constexpr Time calibration_limit = 15s;   ///< Timeout of a self-calibration; the vendor allows the shaft 10 s.
+inline constexpr Time calibration_poll = 100ms;  ///< Time between two polls of a running self-calibration.
+/// Longest time without a valid frame while the host receives a stream.
+inline constexpr Time listen_limit = 500ms;
 
 // ---- Frames
 
 /// Checksum of all frames: "Inverted CRC, 0x97 polynom", in normal notation x8 + x7 + x4 + x2 + x + 1.
 inline constexpr CrcParameters crc_parameters{8, 0x97, 0, false, false, 0xFF};
 
-/// Returns the checksum.
+/// Returns the checksum of `bytes`.
 [[nodiscard]] constexpr std::uint8_t checksum(Bytes bytes) { return Crc<crc_parameters, CrcTable::nibble>::of(bytes); }
 
 /// Returns whether the last byte is the checksum of the bytes before it.
@@ -57,67 +59,71 @@ inline constexpr CrcParameters crc_parameters{8, 0x97, 0, false, false, 0xFF};
   return !bytes.empty() && checksum(bytes.first(bytes.size() - 1)) == bytes.back();
 }
 
-/// First byte of a request.
+/// First byte of a request. Every request asks for a position; some have a further effect.
 enum class Config : std::uint8_t {
   position = 0x00,
-  reset_channels = 0xAA,  ///< position; channels 2 and 3 begin anew in the next frame
-  identify = 0xBB,        ///< position; the next frame carries the identity
+  reset_channels = 0xAA,  ///< Channels 2 and 3 restart in the next frame.
+  identify = 0xBB,        ///< The next frame carries the identity.
 };
-/// Returns whether a byte is a configuration byte.
+/// Returns whether a byte is a valid first byte of a request.
 [[nodiscard]] constexpr bool is_config(std::uint8_t byte) { return byte == 0x00 || byte == 0xAA || byte == 0xBB; }
 
-inline constexpr std::size_t request_bytes = 2;    ///< bytes of a request: config, ra
-inline constexpr std::size_t identity_bytes = 19;  ///< bytes of an identity, checksum included
-/// Bytes of an identity as the vendor's library reads it: one more.
+inline constexpr std::size_t request_bytes = 2;    ///< Number of bytes of a request: config and ra.
+inline constexpr std::size_t identity_bytes = 19;  ///< Number of bytes of an identity, checksum included.
+/// Number of bytes of an identity as the vendor's library reads it: one more than the identity has.
 inline constexpr std::size_t padded_identity_bytes = 20;
-inline constexpr std::size_t reply_capacity = 20;       ///< Length of the longest reply in bytes.
+inline constexpr std::size_t reply_capacity = 20;       ///< Number of bytes of the longest reply.
 inline constexpr unsigned maximum_resolution = 22;      ///< Greatest number of bits of the position.
 inline constexpr unsigned maximum_multiturn_bits = 16;  ///< Greatest number of bits of the turns.
-/// Bytes of a reply.
+/// Bytes of one reply.
 using ReplyBytes = ByteBuffer<reply_capacity>;
 
-/// On SPI, a transfer carries the frame of the moment at which it begins. On a UART, the reply follows the request.
+/// Interface of the encoder. On SPI, a transfer carries a frame made when the transfer begins. On a UART, the reply
+/// follows the request.
 enum class Interface : std::uint8_t { uart, spi };
-/// Whether the position offset is added to the measured position or subtracted. The register map does not state it.
+/// Whether the encoder adds the position offset to the measured position or subtracts it. The register map does not
+/// state it.
 enum class OffsetSign : std::uint8_t { add, subtract };
 /// Unit of the position offset. The register map does not state it; in the vendor's example the value FFFFFFFF is
 /// refused.
 enum class OffsetUnit : std::uint8_t { counts, turn_fraction };
-/// Generation of the encoder.
+/// Generation of the encoder, on which its registers depend.
 enum class Generation : std::uint8_t { aksim2, aksim4 };
 
 /// Layout of an encoder's frames. Unknown members are read from the encoder's identity.
 struct Format {
-  unsigned resolution = 0;                      ///< bits of a turn, 1 to 22; 0: unknown
-  int multiturn_bits = -1;                      ///< bits of the turn counter, 0 to 16; -1: unknown
-  bool has_ch2 = true;                          ///< false: frames as of an AksIM-1, without the channel 2 byte
-  Interface interface = Interface::uart;        ///< Interface of the encoder.
-  OffsetSign offset_sign = OffsetSign::add;     ///< Sign of the position offset.
+  unsigned resolution = 0;                      ///< Number of bits of the position in a turn, 1 to 22; 0: unknown.
+  int multiturn_bits = -1;                      ///< Number of bits of the turn counter, 0 to 16; -1: unknown.
+  bool has_ch2 = true;                          ///< Whether frames have a channel 2 byte; false for an AksIM-1.
+  Interface interface = Interface::uart;        ///< Line on which the encoder is connected.
+  OffsetSign offset_sign = OffsetSign::add;     ///< Whether the position offset is added or subtracted.
   OffsetUnit offset_unit = OffsetUnit::counts;  ///< Unit of the position offset.
-  std::uint32_t stream_rate = 0;  ///< frames per second that the encoder sends without requests; 0: it answers requests
-  Generation generation = Generation::aksim2;   ///< generation of the virtual encoder
-  std::uint8_t identity_size = identity_bytes;  ///< identity bytes of the virtual encoder on a UART, 19 or 20
+  /// Frames per second that the encoder sends without requests; 0: it answers requests.
+  std::uint32_t stream_rate = 0;
+  Generation generation = Generation::aksim2;   ///< Generation of the virtual encoder.
+  std::uint8_t identity_size = identity_bytes;  ///< Identity bytes that the virtual encoder sends on a UART, 19 or 20.
 
-  /// Returns whether resolution and turns are known.
+  /// Returns whether the numbers of bits of position and turns are known.
   [[nodiscard]] constexpr bool known() const { return resolution != 0 && multiturn_bits >= 0; }
-  /// Returns the number of bytes of the turns.
+  /// Returns the number of bytes of the turns in a frame.
   [[nodiscard]] constexpr std::size_t turns_bytes() const { return multiturn_bits > 0 ? 2 : 0; }
   /// Returns the number of padding bits below the turn counter.
   [[nodiscard]] constexpr unsigned spare_turns() const {
     return maximum_multiturn_bits - static_cast<unsigned>(multiturn_bits);
   }
-  /// Returns the bytes of channel 1 before its checksum.
+  /// Returns the number of bytes of channel 1 before its checksum.
   [[nodiscard]] constexpr std::size_t position_bytes() const { return turns_bytes() + 3; }
-  /// Returns the number of bytes of a frame.
+  /// Returns the number of bytes of a position frame.
   [[nodiscard]] constexpr std::size_t frame_bytes() const { return position_bytes() + (has_ch2 ? 2 : 1); }
-  /// Returns the number of bytes of a whole cycle.
+  /// Returns the number of bytes of a whole cycle of channel 2.
   [[nodiscard]] constexpr std::size_t cycle_bytes() const { return position_bytes() + 4; }
 
-  /// Returns the largest position offset that the register accepts.
+  /// Returns the largest position offset that the encoder's register accepts.
   [[nodiscard]] constexpr std::uint32_t largest_offset() const {
     return static_cast<std::uint32_t>(low_mask(offset_unit == OffsetUnit::counts ? resolution : 32));
   }
-  /// Returns the offset that makes the present position zero, if the encoder reports `singleturn` with `offset`.
+  /// Returns the position offset that makes the present position zero, if the encoder reports `singleturn` with
+  /// `offset`.
   [[nodiscard]] constexpr std::uint32_t moved_offset(std::uint32_t offset, std::uint32_t singleturn) const {
     const std::uint32_t here = offset_unit == OffsetUnit::counts ? singleturn : singleturn << (32 - resolution);
     return (offset_sign == OffsetSign::add ? offset - here : offset + here) & largest_offset();
@@ -131,64 +137,69 @@ struct Format {
 /// Format of a virtual encoder whose options leave resolution and turns unknown.
 inline constexpr Format virtual_format{.resolution = 20, .multiturn_bits = 16};
 
-/// Content of a channel 1 frame. The checksum does not cover `channel2`.
+/// Content of a position frame. The checksum does not cover `channel2`.
 struct Position {
-  std::uint32_t singleturn = 0;  ///< Position in counts.
-  std::uint16_t multiturn = 0;   ///< Turns.
-  bool error = false;            ///< the position is invalid
-  bool warning = false;          ///< the position is valid, but near its limits
-  std::uint8_t channel2 = 0;     ///< Byte of channel 2.
+  std::uint32_t singleturn = 0;  ///< Position within the turn, in counts.
+  std::uint16_t multiturn = 0;   ///< Turns of the turn counter.
+  bool error = false;            ///< Whether the position is invalid.
+  /// Whether the position is valid, but a quantity such as the temperature is near its limit.
+  bool warning = false;
+  std::uint8_t channel2 = 0;  ///< Byte of channel 2.
 };
 
-/// A cycle of channel 2. Each frame carries one byte of it; its position is that of the frame with its first byte.
+/// A cycle of channel 2. Each position frame carries one byte of it.
 struct Cycle {
-  Position position{};        ///< its member `channel2` is unused
-  std::uint16_t status = 0;   ///< Detailed status.
-  std::uint8_t channel3 = 0;  ///< Byte of channel 3.
+  Position position{};       ///< Position of the frame that carried the first byte; the member `channel2` is unused.
+  std::uint16_t status = 0;  ///< Detailed status: bits of `status`.
+  /// Byte of channel 3: state of the encoder, or a byte of its answer to a register access.
+  std::uint8_t channel3 = 0;
 };
 
 /// Bits of the detailed status in a channel 2 cycle.
 namespace status {
-inline constexpr std::uint16_t acceleration = 0x0001;         ///< Status: acceleration.
-inline constexpr std::uint16_t magnetic_pattern = 0x0002;     ///< Status: magnetic pattern.
-inline constexpr std::uint16_t system = 0x0004;               ///< Status: system.
-inline constexpr std::uint16_t supply = 0x0008;               ///< Status: supply.
-inline constexpr std::uint16_t temperature = 0x0010;          ///< Status: temperature.
-inline constexpr std::uint16_t signal_lost = 0x0020;          ///< Status: signal lost.
-inline constexpr std::uint16_t position_invalid = 0x0200;     ///< Status: position invalid.
-inline constexpr std::uint16_t configuration_error = 0x0400;  ///< Status: configuration error.
-inline constexpr std::uint16_t multiturn_mismatch = 0x8000;   ///< Status: multiturn mismatch.
-/// Bits that are warnings: amplitude high and low, near limits, temperature.
+inline constexpr std::uint16_t acceleration = 0x0001;         ///< The position changed faster than a shaft can.
+inline constexpr std::uint16_t magnetic_pattern = 0x0002;     ///< The magnetic pattern of the ring is faulty.
+inline constexpr std::uint16_t system = 0x0004;               ///< System error.
+inline constexpr std::uint16_t supply = 0x0008;               ///< The supply voltage is out of range.
+inline constexpr std::uint16_t temperature = 0x0010;          ///< The temperature is out of range.
+inline constexpr std::uint16_t signal_lost = 0x0020;          ///< The signal of the ring is lost.
+inline constexpr std::uint16_t position_invalid = 0x0200;     ///< The position is invalid.
+inline constexpr std::uint16_t configuration_error = 0x0400;  ///< The stored configuration is damaged.
+inline constexpr std::uint16_t multiturn_mismatch = 0x8000;   ///< The turn counter contradicts the position.
+/// Mask of the bits that are warnings: amplitude high and low, near limits, temperature.
 inline constexpr std::uint16_t warnings = 0x21D0;
-inline constexpr std::uint16_t errors = 0xDE2F;  ///< bits that are errors: all but the warnings
+inline constexpr std::uint16_t errors = 0xDE2F;  ///< Mask of the bits that are errors: all bits but the warnings.
 static_assert((warnings ^ errors) == 0xFFFF);
 }  // namespace status
 
-/// Bits of Reading::status, from the position frame.
+/// Bits of Reading::status, from the two bits of a position frame.
 namespace general {
-inline constexpr std::uint32_t error = 1;    ///< Status: error.
-inline constexpr std::uint32_t warning = 2;  ///< Status: warning.
+inline constexpr std::uint32_t error = 1;    ///< The position is invalid.
+inline constexpr std::uint32_t warning = 2;  ///< The position is valid, but a quantity is near its limit.
 }  // namespace general
 
-/// Protocol versions. Both have the same frames, but different registers.
+/// Protocol versions in an identity. Both have the same frames, but different registers.
 namespace version {
-inline constexpr std::uint8_t aksim2 = 2;  ///< AksIM-2
-inline constexpr std::uint8_t aksim4 = 4;  ///< AksIM-4
+inline constexpr std::uint8_t aksim2 = 2;  ///< Version of an AksIM-2.
+inline constexpr std::uint8_t aksim4 = 4;  ///< Version of an AksIM-4.
 }  // namespace version
 
 /// Content of an identity frame.
 struct Identity {
-  std::uint8_t protocol_version = version::aksim2;  ///< Version of the protocol.
-  std::uint8_t frame_bytes = 5;                     ///< Number of bytes of a frame.
-  unsigned resolution = 20;                         ///< Bits of the position.
-  std::array<std::uint8_t, 18> text{};  ///< all identity bytes before the checksum; text[2..17] is the part number
+  std::uint8_t protocol_version = version::aksim2;  ///< Protocol version: 2 or 4.
+  /// Number of bytes of a position frame: 5 without turns, 7 with turns.
+  std::uint8_t frame_bytes = 5;
+  unsigned resolution = 20;  ///< Number of bits of the position in a turn, 1 to 22.
+  /// All bytes of the identity before the checksum; text[2..17] is the part number.
+  std::array<std::uint8_t, 18> text{};
   /// Returns the characters of the part number.
   [[nodiscard]] constexpr Bytes part_number() const { return Bytes(text).subspan(2); }
 };
 
 namespace detail {
 
-// Returns channel 1 as one big-endian number of turns, position, error and warning. `format` must be known.
+// Returns the bytes of channel 1 as one big-endian number of turns, position, error and warning. `format` must be
+// known.
 constexpr ReplyBytes position_bytes(const Format& format, const Position& position) {
   std::uint64_t number = std::uint64_t{position.singleturn} << (24 - format.resolution);
   if (!position.error) number |= 2;
@@ -201,7 +212,8 @@ constexpr ReplyBytes position_bytes(const Format& format, const Position& positi
   return frame;
 }
 
-// Decodes channel 1. Padding that is not zero means that the encoder has another resolution: out_of_range.
+// Decodes channel 1. Padding that is not zero means that the encoder has more position bits than `format`:
+// out_of_range.
 constexpr Result<Position> load_position(const Format& format, Bytes bytes) {
   const std::uint64_t number = load_big_endian(bytes.first(format.position_bytes()));
   const auto word = static_cast<std::uint32_t>(number & low_mask(24));
@@ -216,7 +228,7 @@ constexpr Result<Position> load_position(const Format& format, Bytes bytes) {
 
 }  // namespace detail
 
-/// Returns the frame of a position.
+/// Returns the position frame that carries `position`.
 [[nodiscard]] constexpr ReplyBytes encode_position(const Format& format, const Position& position) {
   ReplyBytes frame = detail::position_bytes(format, position);
   frame.push_back(checksum(frame));
@@ -233,7 +245,7 @@ constexpr Result<Position> load_position(const Format& format, Bytes bytes) {
   return position;
 }
 
-/// Returns the frame of a whole cycle.
+/// Returns the bytes of a whole cycle of channel 2.
 [[nodiscard]] constexpr ReplyBytes encode_cycle(const Format& format, const Cycle& cycle) {
   ReplyBytes bytes = detail::position_bytes(format, cycle.position);
   bytes.push_back(static_cast<std::uint8_t>(cycle.status >> 8));
@@ -253,7 +265,7 @@ constexpr Result<Position> load_position(const Format& format, Bytes bytes) {
   return Cycle{*position, static_cast<std::uint16_t>(load_big_endian(rest.first(2))), rest[2]};
 }
 
-/// Returns the reply that identifies the encoder.
+/// Returns the identity frame.
 [[nodiscard]] constexpr ReplyBytes encode_identity(const Identity& identity) {
   ReplyBytes bytes;
   bytes.append(identity.text);
@@ -283,7 +295,7 @@ constexpr Result<Position> load_position(const Format& format, Bytes bytes) {
 }
 
 /// Returns `format` with the resolution of `identity`. An identity reports whether the encoder counts turns, but not
-/// with how many bits.
+/// the number of bits of the turn counter.
 [[nodiscard]] constexpr Format as_identified(const Format& format, const Identity& identity) {
   Format known = format;
   known.resolution = identity.resolution;
@@ -301,24 +313,25 @@ constexpr Result<Position> load_position(const Format& format, Bytes bytes) {
   return known;
 }
 
-/// Returns whether two positions are the same. Channel 2 repeats the position of channel 1.
+/// Returns whether two positions have equal turns and counts. Channel 2 repeats the position of channel 1.
 [[nodiscard]] constexpr bool same_place(const Position& a, const Position& b) {
   return a.singleturn == b.singleturn && a.multiturn == b.multiturn;
 }
 
-/// Returns whether the position is zero: a real position, or the zeros that an encoder sends while it starts.
+/// Returns whether turns and counts are zero: a real position, or the zeros that an encoder sends while it starts.
 [[nodiscard]] constexpr bool is_all_zero(const Position& position) {
   return position.singleturn == 0 && position.multiturn == 0;
 }
 
-/// Returns the alarms that the error and warning bits of a frame report as clear: all errors, all warnings. A bit that
-/// is set does not report which alarm raised it. Without channel 2 an encoder has no named alarms.
+/// Returns the mask of the alarms that a position frame reports as clear: all errors if its error bit is clear, all
+/// warnings if its warning bit is clear. A set bit does not report which alarm raised it. Without channel 2 an encoder
+/// has no named alarms: 0.
 [[nodiscard]] constexpr std::uint32_t clear_by(const Format& format, const Position& position) {
   if (!format.has_ch2) return 0;
   return (position.error ? 0u : status::errors) | (position.warning ? 0u : status::warnings);
 }
 
-/// Converts a position to a reading. `detailed`: the status of the latest cycle of channel 2, if one is known.
+/// Converts a position to a reading. `detailed`: the status in the latest cycle of channel 2, if one was received.
 [[nodiscard]] constexpr Reading to_reading(const Format& format, const Position& position,
                                            std::optional<std::uint16_t> detailed = {}) {
   const std::uint16_t alarms = detailed.value_or(0);
@@ -337,9 +350,10 @@ constexpr Result<Position> load_position(const Format& format, Bytes bytes) {
   return reading;
 }
 
-/// Adds remembered alarms to a later reading; see Unit. The status of a channel 2 cycle stays valid as long as the
-/// error and warning bits of position frames agree with it. If they change, only the next cycle reports which alarm
-/// changed: a set bit does not name its alarm, and a clear bit clears only the alarms of its own kind.
+/// Returns the reading `now` with the alarms of the earlier reading `before` that still apply; see Unit. The status of
+/// a channel 2 cycle stays valid while the error and warning bits of position frames do not contradict it. If these
+/// bits change, only the next cycle reports which alarm changed: a set bit does not name its alarm, and a clear bit
+/// clears only the alarms of its own kind.
 [[nodiscard]] constexpr Reading remembered(const Reading& before, Reading now) {
   const std::uint32_t unknown = before.alarms_reported & ~now.alarms_reported;
   if (unknown == 0 || now.singleturn_bits == 0) return now;

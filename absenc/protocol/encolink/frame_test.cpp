@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Cases of frames, identities and register accesses that the vectors do not cover.
+// Tests of frames, identities and register accesses that the test vectors do not cover.
 #include "absenc/protocol/encolink/frame.hpp"
 
 #include <gtest/gtest.h>
@@ -61,7 +61,7 @@ TEST(EncolinkFrame, ReadingValidityFollowsStatus) {
   EXPECT_FALSE(to_reading(single, {}).multiturn_valid);
 }
 
-// A frame has only two status bits and no named alarms: a cycle of channel 2 has these.
+// A position frame has only two status bits and no named alarms; a cycle of channel 2 has named alarms.
 TEST(EncolinkFrame, StatusBitsReportOnlyClearAlarms) {
   EXPECT_EQ(to_reading(multi, {}).status_reported, general::error | general::warning);
   EXPECT_EQ(to_reading(multi, {}).alarms_reported, 0xFFFFu);
@@ -74,7 +74,8 @@ TEST(EncolinkFrame, StatusBitsReportOnlyClearAlarms) {
   EXPECT_EQ(to_reading(alone, {}).status_reported, general::error | general::warning);
 }
 
-// The earlier cycle reported which alarm is set. The clear bit of the frame only reports that no warning is set.
+// The earlier cycle reported which error is set. The clear warning bit of the frame only reports that no warning is
+// set.
 TEST(EncolinkFrame, RemembersAlarmsOfCycleWhileStatusBitsAgree) {
   constexpr Position bad{.singleturn = 5, .error = true};
   constexpr Position warned{.singleturn = 5, .warning = true};
@@ -84,7 +85,7 @@ TEST(EncolinkFrame, RemembersAlarmsOfCycleWhileStatusBitsAgree) {
   EXPECT_EQ(remembered(lost, to_reading(multi, bad)).alarms_reported, 0xFFFFu);
   EXPECT_EQ(remembered(hot, to_reading(multi, warned)).alarms, status::temperature);
   EXPECT_EQ(remembered(hot, to_reading(multi, warned)).alarms_reported, 0xFFFFu);
-  // An alarm appeared or vanished: only the next cycle reports which one.
+  // An alarm was raised or cleared: only the next cycle reports which one.
   EXPECT_EQ(remembered(hot, to_reading(multi, bad)).alarms, 0u);
   EXPECT_EQ(remembered(hot, to_reading(multi, bad)).alarms_reported, status::warnings);
   EXPECT_EQ(remembered(lost, to_reading(multi, {.singleturn = 5})).alarms, 0u);

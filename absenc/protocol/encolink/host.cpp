@@ -15,7 +15,7 @@ std::array<std::uint8_t, request_bytes> Frames::encode(const Format&, const Requ
 }
 
 // Returns 0 if only silence ends the reply: on a UART the frame before an identity may have an unknown length, and one
-// more byte may follow either.
+// more byte may follow that frame or the identity.
 std::size_t Frames::expected(const Format& format, const Request& request, Bytes) {
   const bool identifies = request.ask == Ask::identify || request.ask == Ask::identity;
   if (!identifies) return format.frame_bytes();
@@ -58,8 +58,8 @@ void Channels::take(const author::HostOf<Frames>& host) {
     }
   }
   reading = to_reading(format, position, status);
-  // On SPI the encoder takes the position when NCS falls. For a UART the document does not state when: at the latest at
-  // the end of the request.
+  // Returns when the encoder took the position. On SPI it does so when NCS falls. For a UART the document does not
+  // state it: at the latest at the end of the request.
   reading.latched = format.interface == Interface::spi ? host.begun_at() : host.sent_at();
   reading.received = host.received_at();
 }

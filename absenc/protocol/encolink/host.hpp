@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Host side of EncoLink: one frame, the channels that several frames make, and the position that a drive polls.
-// procedures.hpp has the commands that take more frames.
+// Host side of EncoLink: requests for one frame, the channels that successive frames carry, and the conversation with
+// which a drive polls positions. procedures.hpp has the commands that take more frames.
 #pragma once
 
 #include <array>
@@ -11,27 +11,28 @@
 
 namespace absenc::encolink {
 
-/// Purpose of a request.
+/// Purpose of a request. Every request asks for a position frame except `identity`.
 enum class Ask : std::uint8_t {
   position,
-  reset,     ///< position; channels 2 and 3 begin anew in the next frame
-  identify,  ///< position; the next frame is the identity
+  reset,     ///< Also restarts channels 2 and 3 in the next frame.
+  identify,  ///< Also requests that the next frame is the identity.
   identity,
 };
 
-/// EncoLink frames for the engine; author/dialog.hpp explains each member.
+/// The protocol, as author layers use it: frames, lengths and times. author/dialog.hpp explains each member.
 struct Frames {
   /// Frame layout and settings of one encoder, as the unit's options select them.
   using Format = encolink::Format;
   /// A request to the encoder.
   struct Request {
     Ask ask = Ask::position;  ///< Purpose of the request.
-    std::uint8_t ra = 0;      ///< one byte of a register access
+    std::uint8_t ra = 0;      ///< One byte of a register access.
   };
-  using Reply = Position;                                       ///< empty for an identity
-  static constexpr std::size_t longest_reply = identity_bytes;  ///< Greatest length of a reply in bytes.
+  /// Type of replies; an identity is stored elsewhere and leaves it empty.
+  using Reply = Position;
+  static constexpr std::size_t longest_reply = identity_bytes;  ///< Number of bytes of the longest reply.
 
-  /// Returns how long a host waits for replies.
+  /// Returns the host's timeouts for a reply and between its characters, and the silence before a request.
   static constexpr author::HostTimes host_times(const Format& format) {
     return {.answer_limit = answer_limit, .gap_limit = gap_limit, .silence = pause(format)};
   }
@@ -41,27 +42,30 @@ struct Frames {
   static std::array<std::uint8_t, request_bytes> encode(const Format&, const Request& request);
   /// Returns the length of a reply in bytes, judged by its first bytes; 0 if they do not determine it.
   static std::size_t expected(const Format& format, const Request& request, Bytes);
-  /// Decodes a reply. Errors: timeout, line_stuck (SPI: all bits alike), those of decode_position or of
+  /// Decodes a reply. Errors: timeout, line_stuck (SPI: all bits alike), and those of decode_position or of
   /// decode_identity.
   static Result<Position> decode(const Format& format, const Request& request, Bytes reply);
-  /// Returns true on SPI, where a transfer has a fixed length; on a UART more bytes may follow.
+  /// Returns whether the host awaits no more bytes: on SPI, where a transfer has a fixed length; on a UART more may
+  /// follow.
   static bool is_whole(const Format& format, Error) { return format.interface == Interface::spi; }
-  /// Returns the shortest time between two frames; it also holds between conversations.
+  /// Returns the shortest time between two frames; the host also keeps it between two conversations.
   static constexpr Time pause(const Format& format) { return format.interface == Interface::spi ? spi_pause : Time{}; }
 };
 
 /// The content of successive frames: the position, and cycles of channel 2. A cycle takes one byte of each frame, from
 /// a reset of the channels until a frame is lost.
 struct Channels {
-  Reading reading{};                      ///< reading of the last valid frame; empty before the first
-  std::optional<std::uint16_t> status{};  ///< detailed status of the last valid cycle
-  std::optional<Error> ended{};           ///< set if the last frame completed a cycle: none, or the cycle's error
-  std::uint8_t channel3 = 0;              ///< channel 3 byte of the last valid cycle
-  bool in_step = false;                   ///< the channel 2 bytes are aligned to a cycle
-  bool silent = false;                    ///< all bytes of the last cycle were 0: the encoder is starting
+  Reading reading{};                      ///< Reading from the last valid frame; empty before the first.
+  std::optional<std::uint16_t> status{};  ///< Detailed status in the last valid cycle; no value before it.
+  /// Set if the last frame completed a cycle: `none`, or the error of the cycle.
+  std::optional<Error> ended{};
+  std::uint8_t channel3 = 0;  ///< Channel 3 byte of the last valid cycle.
+  bool in_step = false;       ///< Whether the channel 2 bytes are aligned to a cycle.
+  /// Whether all bytes of the last cycle were 0, because the encoder is starting.
+  bool silent = false;
 
-  /// Takes a valid frame. A cycle whose position is not that of its first frame ends with cross_check_failed. A cycle
-  /// with an error ends the alignment.
+  /// Processes the valid frame that `host` has received. A cycle whose position differs from that of its first frame
+  /// ends with cross_check_failed. A cycle with an error ends the alignment.
   void take(const author::HostOf<Frames>& host);
 
  private:
@@ -69,17 +73,17 @@ struct Channels {
   Position first_{};
 };
 
-/// Reads one frame. If its position is invalid, near a limit or all zero (as while the encoder starts), also reads a
+/// Reads one frame. If the position is invalid, near a limit or all zero (as while the encoder starts), also reads a
 /// cycle of channel 2 and takes the alarms from it. If both channels are zero, the reading is not `ready`. If the cycle
-/// is otherwise wrong, the alarms stay unknown. If `format` has unknown members, reads the identity first.
+/// has another error, the alarms stay unknown. If `format` has unknown members, reads the identity first.
 class ReadPosition : public author::HostOf<Frames> {
  public:
-  /// Reads from an encoder of this format.
+  /// Creates a conversation that reads an encoder of this format.
   explicit ReadPosition(const Format& format);
   [[nodiscard]] const Reading* reading() const final {
     return error() == Error::none && channels_.reading.singleturn_bits != 0 ? &channels_.reading : nullptr;
   }
-  /// Returns what channels 2 and 3 reported.
+  /// Returns the content of channels 2 and 3 that was received.
   [[nodiscard]] const Channels& found() const { return channels_; }
 
  private:

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Positions, the identity, channel 2 and listening against the virtual AksIM-2, on both interfaces.
+// Tests of positions, the identity, channel 2 and listening with the virtual AksIM-2, on UART and SPI.
 #include "absenc/protocol/encolink/host.hpp"
 
 #include "absenc/core/hex.hpp"
@@ -201,7 +201,8 @@ TEST_P(EncolinkHost, ReadsDetailedStatusInOneCycle) {
   constexpr std::uint16_t raised = status::temperature | status::multiturn_mismatch;
   for (const std::string_view settings : {testing::single, testing::multi}) {
     Bench bench(settings, interface);
-    bench.shaft.spin(3000, bench.line.now());  // each frame has another position; the first frame of the cycle counts
+    // each frame has another position; that of the cycle's first frame counts
+    bench.shaft.spin(3000, bench.line.now());
     bench.device.raise_alarms(raised);
     const RunResult read = bench.run("alarms");
     ASSERT_EQ(read.error, Error::none) << read.detail;
@@ -301,8 +302,8 @@ TEST_P(EncolinkHost, ZerosWithWrongChannel2AreReady) {
   }
 }
 
-// At 10 000 rpm a turn of 20 bits advances by 175 counts per microsecond, so `latched` must be the time of the
-// position.
+// At 10 000 rpm a position of 20 bits advances by 175 counts per microsecond, so `latched` must be the time at which
+// the encoder took the position.
 TEST_P(EncolinkHost, LatchedIsTimeOfPosition) {
   for (const std::string_view told : {testing::multi, std::string_view("")}) {
     Bench bench(testing::multi, interface);
@@ -396,7 +397,7 @@ TEST(EncolinkListen, ReportsDamagedFramesAndContinues) {
   bench.listen(listen, [&] {
     if (listen.error() != Error::none) errors.push_back(listen.error());
     if (listen.error() != Error::none) return true;
-    // The first position is from before the shaft was set.
+    // The first position was taken before the shaft was set.
     EXPECT_TRUE(good == 0 || listen.reading()->singleturn == 0x12345u) << listen.reading()->singleturn;
     return ++good < 40;
   });

@@ -23,11 +23,12 @@ void Listen::end(Error error, std::string_view detail) {
 
 ByteStep Listen::next(Time now) {
   if (!done_ && find()) {
-    deadline_ = Time{};  // the time that the caller takes for the emitted frame does not count towards the timeout
+    // the time that the caller takes to process the emitted frame does not count towards the timeout
+    deadline_ = Time{};
     return {.kind = ByteStep::Kind::emit};
   }
   if (deadline_ == Time{}) deadline_ = now + listen_limit;
-  // Bytes that are no frames do not extend the deadline, so it is checked even while they arrive.
+  // Bytes that form no frames do not extend the deadline, so the deadline is checked even while bytes arrive.
   if (!done_ && now >= deadline_) {
     frame_.clear();
     if (!received_anything_) {
@@ -62,7 +63,7 @@ void Listen::feed(const ByteEvent& event) {
   counts_.discarded = discarded_.count();
 }
 
-// Finds the next frame, or the loss of alignment. Returns whether one was found.
+// Finds the next valid frame, or the loss of alignment. Returns whether it found one of these.
 bool Listen::find() {
   if (std::exchange(disturbed_, false)) {
     lose(Error::bad_framing, {});
@@ -74,7 +75,8 @@ bool Listen::find() {
     const Result<Position> position = decode_position(format_, first);
     const bool good = position && (in_step_ || decode_position(format_, waiting().subspan(size, size)));
     if (good) {
-      // Two valid frames establish alignment. The older one is dropped, because the time at which it began is unknown.
+      // Two valid frames establish alignment. The older frame is dropped, because the time at which it began is
+      // unknown.
       if (!std::exchange(in_step_, true)) begin_ += size;
       discarded_.found();
       const Bytes frame = waiting().first(size);
@@ -101,8 +103,8 @@ void Listen::take(Bytes frame, const Position& position) {
   frame_.clear();
   frame_.append(frame);
   reading_ = to_reading(format_, position_);
-  // The document does not state when the position was taken; at the latest when the frame began. The unexamined bytes
-  // ended at `received_at_`.
+  // The document does not state when the encoder takes the position: at the latest when the frame begins. That time is
+  // counted back from `received_at_`, when the last received byte ended.
   reading_.latched = received_at_ - uart_settings.character() * static_cast<std::int64_t>(waiting().size());
   reading_.received = received_at_;
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The conversation that only receives, for encoders that transmit without requests.
+// The conversation that only receives, for EncoLink encoders that transmit without requests.
 #pragma once
 
 #include <array>
@@ -17,8 +17,8 @@ namespace absenc::encolink {
 /// valid frame arrives for `listen_limit`.
 class Listen final : public Conversation<std::uint8_t> {
  public:
-  /// `format` must be known, because the encoder cannot be asked for its identity. Errors: invalid_argument, timeout,
-  /// bad_checksum.
+  /// Creates a conversation that receives an encoder of this format, which must be known, because it sends no requests
+  /// for the identity. Errors: invalid_argument, timeout, bad_checksum.
   explicit Listen(const Format& format);
 
   /// Processes an event of the port, such as received data or silence.
@@ -32,7 +32,7 @@ class Listen final : public Conversation<std::uint8_t> {
     return error_ == Error::none && !frame_.empty() ? &reading_ : nullptr;
   }
   void report(FieldSink& sink) const override;
-  /// Returns the items of the last exchange.
+  /// Returns the bytes of the last frame; before the first frame, all bytes that were received.
   [[nodiscard]] Exchange<std::uint8_t> exchange() const override {
     return {{}, frame_.empty() ? waiting() : frame_.view(), received_at_, received_at_};
   }
@@ -50,12 +50,12 @@ class Listen final : public Conversation<std::uint8_t> {
   DiscardedFrames discarded_;
   StreamCounts counts_{};
   bool in_step_ = false;
-  bool disturbed_ = false;          // a damaged character was received while in step
-  bool received_anything_ = false;  // bytes or damaged characters were received since the last valid frame
+  bool disturbed_ = false;          // whether a damaged character was received while aligned
+  bool received_anything_ = false;  // whether bytes or damaged characters were received since the last valid frame
   bool done_ = false;
   Error last_bad_ = Error::wrong_length;
   std::array<std::uint8_t, 1024> bytes_{};  // received bytes; the size is the most that a port delivers at once
-  std::size_t begin_ = 0;                   // index of the first byte that was not yet examined
+  std::size_t begin_ = 0;                   // index of the first byte that was not examined yet
   std::size_t end_ = 0;
   ReplyBytes frame_;  // the last valid or damaged frame
   Position position_{};

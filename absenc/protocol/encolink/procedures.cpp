@@ -15,9 +15,11 @@ namespace {
 
 constexpr unsigned frame_attempts = 3;
 constexpr unsigned cycle_attempts = 3;
-constexpr unsigned access_attempts = 5;  // an access takes some hundred frames, and all of them must be valid
+// greatest number of attempts; an access takes some hundred frames, and all of them must be valid
+constexpr unsigned access_attempts = 5;
 constexpr unsigned write_attempts = 3;
-constexpr unsigned idle_cycles_allowed = 8;  // idle cycles allowed between the last byte of an access and its answer
+// number of idle cycles allowed between the last byte of an access and its answer
+constexpr unsigned idle_cycles_allowed = 8;
 
 constexpr std::string_view channel2_damaged = "channel 2 is damaged: positions go on, but registers cannot be reached";
 constexpr std::string_view no_channel2 = "without channel 2 (has_ch2=false) there is neither status nor register";
@@ -27,7 +29,7 @@ constexpr std::string_view size_needed = "this address is not in the table of re
 
 // ---- Frames
 
-// Requests one frame. A lost or damaged frame ends the alignment of channel 2.
+// Requests one frame and returns whether it is valid. A lost or damaged frame ends the alignment of channel 2.
 Part<Error> ask_frame(Dialog& dialog, ProcedureState& found, Frames::Request request) {
   if (found.emits && found.is_new) dialog.emit();
   found.is_new = false;
@@ -55,7 +57,7 @@ Outcome stopped(const ProcedureState& found, Error error) {
 }
 
 // Reads the identity, which also resets the channels. If `trusted`, the identity overrides the options; otherwise a
-// contradiction is an error. Stops the procedure if no identity arrives.
+// contradiction between identity and options is an error. Stops the procedure if no identity arrives.
 Part<Identity> identify(Dialog& dialog, ProcedureState& found, bool trusted) {
   for (;;) {
     Error error = co_await ask_frame(dialog, found, {Ask::identify});
@@ -72,7 +74,8 @@ Part<Identity> identify(Dialog& dialog, ProcedureState& found, bool trusted) {
   co_return identity;
 }
 
-// Reads the next valid frame; if channel 2 is not aligned, with request `ask`. Stops the procedure if none arrives.
+// Reads the next valid frame; requests it with `ask` if channel 2 is not aligned. Stops the procedure if no valid frame
+// arrives.
 Part<bool> next_frame(Dialog& dialog, ProcedureState& found, Ask ask = Ask::position) {
   if (!dialog.format().known()) co_await identify(dialog, found, false);
   for (;;) {
@@ -84,12 +87,12 @@ Part<bool> next_frame(Dialog& dialog, ProcedureState& found, Ask ask = Ask::posi
 
 // ---- Register accesses
 
-// Returns the error of the last frame, or of the cycle that it completed.
+// Returns the error of the last frame, or of the cycle that the frame completed.
 Error frame_or_cycle_error(const ProcedureState& found, Error error) {
   return error == Error::none ? found.ended.value_or(Error::none) : error;
 }
 
-// Sends the `ra` bytes of the access, one per frame.
+// Sends the `ra` bytes of the present register access, one per frame.
 Part<Error> send(Dialog& dialog, ProcedureState& found) {
   found.was_sent = false;
   for (std::size_t sent = 0; !found.was_sent;) {
@@ -103,7 +106,7 @@ Part<Error> send(Dialog& dialog, ProcedureState& found) {
   co_return Error::none;
 }
 
-// Receives the next cycle; its channel 3 byte is part of the answer.
+// Receives the next cycle; the channel 3 byte of the cycle is part of the answer to the register access.
 Part<Error> receive(Dialog& dialog, ProcedureState& found) {
   do {
     const Error error = co_await ask_frame(dialog, found, {});
@@ -112,7 +115,8 @@ Part<Error> receive(Dialog& dialog, ProcedureState& found) {
   co_return Error::none;
 }
 
-// Ends an access whose answer was lost. A write that may have been executed is not repeated before it was read back.
+// Ends a register access whose answer was lost. A write that the encoder may have executed is not repeated before the
+// register was read back.
 AccessOutcome lost(ProcedureState& found, Error error, std::string_view detail = {}) {
   if (found.ended.value_or(Error::none) != Error::none) {
     detail = *found.ended == Error::cross_check_failed ? channels_disagree : channel2_damaged;
@@ -163,7 +167,7 @@ Part<AccessOutcome> execute(Dialog& dialog, ProcedureState& found) {
   if (found.protocol_version == version::aksim4) co_await dialog.stop({Error::unsupported, not_described});
   for (unsigned left = access_attempts - 1;; --left) {
     const AccessOutcome access_outcome = co_await try_to_execute(dialog, found);
-    // More bytes of the answer may follow, so the channels must be reset before the next access.
+    // The encoder may send more bytes of the answer, so the channels must be reset before the next access.
     if (access_outcome != AccessOutcome::good) found.in_step = false;
     if (is_lost(dialog, found)) co_return found.end(AccessOutcome::gone, stopped(found, found.why.error));
     if (!found.again || left == 0) co_return access_outcome;
@@ -196,14 +200,15 @@ Part<bool> read(Dialog& dialog, ProcedureState& found, RegisterIndex index) {
   return read(dialog, found, registers[index].address, registers[index].size);
 }
 
-// Notes that the encoder refused a write. A procedure may write twice: only a refusal of the first write leaves the
+// Records that the encoder refused a write. A procedure may write twice: only a refusal of the first write leaves the
 // encoder unchanged.
 void note_refusal(Dialog& dialog, const ProcedureState& found, AccessOutcome access_outcome) {
   if (access_outcome == AccessOutcome::refused && found.why.error == Error::request_rejected && !found.changed)
     dialog.refused();
 }
 
-// Writes a register and reads it back. A write with a lost answer is repeated only if reading back shows the old value.
+// Writes a register and reads it back. If the answer to the write is lost, repeats it only if reading back shows the
+// old value.
 Part<bool> write(Dialog& dialog, ProcedureState& found, std::uint32_t address, std::uint16_t size,
                  std::uint64_t value) {
   constexpr std::string_view in_the_middle =
@@ -251,7 +256,7 @@ bool is_near(const Dialog& dialog, std::uint32_t singleturn,
   return author::is_near(dialog.last().singleturn, singleturn, dialog.format().resolution, millidegrees);
 }
 
-// Stops the procedure if a zero must not be set. A frame and a cycle of channel 2 must have been read before.
+// Stops the procedure if the zero must not be set now. A frame and a cycle of channel 2 must have been read before.
 Part<bool> may_set_zero(Dialog& dialog, ProcedureState& found) {
   const Reading first = to_reading(dialog.format(), dialog.last(), found.status);
   const Time first_at = dialog.received_at();
@@ -390,7 +395,7 @@ Procedure preset_multiturn(Dialog& dialog, ProcedureState& found, Arguments argu
   co_return done;
 }
 
-// The self-calibration has ended when its counter has changed, or when it reports a failure that was not set before.
+// The self-calibration has ended when its counter has changed, or when it reports a failure that was not set before it.
 Procedure self_calibrate(Dialog& dialog, ProcedureState& found) {
   co_await read(dialog, found, calibration_status);
   const std::uint8_t before = found.data[0];

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Procedures that use registers, against the virtual AksIM-2, on both interfaces.
+// Tests of procedures that use registers, with the virtual AksIM-2 on UART and SPI.
 #include "absenc/protocol/encolink/procedures.hpp"
 
 #include "absenc/protocol/encolink/bench_test.hpp"
@@ -24,13 +24,13 @@ TEST_P(EncolinkProcedure, ZeroSurvivesPowerOffWhenSaved) {
   bench.shaft.put(7, 0x22345);
   bench.restart(PowerOn::skip);
   EXPECT_EQ(bench.run("position").reading->singleturn, 0x10000u);
-  // A second zero adds to the stored offset and is lost at power off.
+  // A second zero adds to the stored offset, and is lost at power off because it is not saved.
   ASSERT_EQ(bench.run("zero", {0}).error, Error::none);
   EXPECT_EQ(bench.run("position").reading->singleturn, 0u);
   EXPECT_EQ(bench.device.memory_version(), 1u);
   bench.restart(PowerOn::skip);
   EXPECT_EQ(bench.run("position").reading->singleturn, 0x10000u);
-  ASSERT_EQ(bench.run("reset").error, Error::none);  // the reset is lost at power off too
+  ASSERT_EQ(bench.run("reset").error, Error::none);  // the value written by reset is lost at power off too
   EXPECT_EQ(bench.run("position").reading->singleturn, 0x22345u);
   bench.restart(PowerOn::skip);
   EXPECT_EQ(bench.run("position").reading->singleturn, 0x10000u);

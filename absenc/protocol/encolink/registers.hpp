@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Channel 3: the table of AksIM-2 registers, and the bytes that access them. Each request carries one of these bytes.
+// Channel 3 of EncoLink: the table of AksIM-2 registers, and the bytes of a register access, of which each request
+// carries one.
 #pragma once
 
 #include <algorithm>
@@ -16,12 +17,14 @@
 
 namespace absenc::encolink {
 
-/// State of the encoder in the channel 3 byte of a cycle.
+/// Values of the channel 3 byte of a cycle while it is not a byte of an answer.
 namespace channel3 {
-inline constexpr std::uint8_t idle = 0x33;         ///< Channel 3: idle.
-inline constexpr std::uint8_t busy = 0x66;         ///< Channel 3: busy.
-inline constexpr std::uint8_t read_ready = 0x88;   ///< status and data follow, one byte per cycle
-inline constexpr std::uint8_t write_ready = 0x99;  ///< the status follows in the next cycle
+inline constexpr std::uint8_t idle = 0x33;  ///< The encoder executes no register access.
+inline constexpr std::uint8_t busy = 0x66;  ///< The encoder is executing a register access.
+/// The encoder's answer to a read begins: status and data follow, one byte per cycle.
+inline constexpr std::uint8_t read_ready = 0x88;
+/// The encoder's answer to a write begins: the status follows in the next cycle.
+inline constexpr std::uint8_t write_ready = 0x99;
 }  // namespace channel3
 
 /// Status byte in the encoder's answer to a register access.
@@ -31,19 +34,19 @@ enum class AccessStatus : std::uint8_t {
   out_of_range = 0x56,
   denied = 0x96,
   read_checksum = 0xE4,
-  read_checksum_too = 0xE6,  ///< same meaning as read_checksum; used in other code of the vendor
+  read_checksum_too = 0xE6,  ///< Same meaning as read_checksum; used in other code of the vendor.
   byte_count = 0xEE,
   locked = 0xF6,
   write_checksum = 0xF9,
 };
 
-/// Returns whether the encoder received a damaged request, so that a repetition helps.
+/// Returns whether the status means that the encoder received a damaged request, so that a repetition helps.
 [[nodiscard]] constexpr bool is_damaged(AccessStatus status) {
   return status == AccessStatus::read_checksum || status == AccessStatus::read_checksum_too ||
          status == AccessStatus::write_checksum;
 }
 
-/// Returns what an access status means.
+/// Returns the meaning of a status byte as a sentence.
 [[nodiscard]] constexpr std::string_view text_of(AccessStatus status) {
   constexpr auto texts = std::to_array<std::pair<AccessStatus, std::string_view>>({
       {AccessStatus::ok, "done"},
@@ -60,23 +63,23 @@ enum class AccessStatus : std::uint8_t {
   return "the encoder answered with an unknown status";
 }
 
-/// Whether hosts may read or write a register.
+/// Whether hosts can read and write a register.
 enum class Access : std::uint8_t { read_only, read_write, write_only };
 
-/// How the bytes of a register are decoded; all are big endian.
-enum class Content : std::uint8_t { number, celsius, rpm, flags, text };  // celsius and rpm: signed, in tenths
+/// How the bytes of a register are decoded. All numbers are big endian.
+enum class Content : std::uint8_t { number, celsius, rpm, flags, text };  // celsius and rpm: signed numbers in tenths
 
-/// Description of a register.
+/// Description of a register of the encoder.
 struct Register {
-  std::string_view name;              ///< Name of the register.
+  std::string_view name;              ///< Name of the register in fields and commands.
   std::uint16_t address;              ///< Address of the register.
-  std::uint8_t size;                  ///< Number of bytes.
-  Access access;                      ///< Whether hosts may read or write it.
-  Content content = Content::number;  ///< What the bytes mean.
-  bool in_info = false;               ///< the command `info` reads it
+  std::uint8_t size;                  ///< Number of bytes of the register.
+  Access access;                      ///< Whether hosts can read and write the register.
+  Content content = Content::number;  ///< How the bytes of the register are decoded.
+  bool in_info = false;               ///< Whether the command `info` reads the register.
 };
 
-/// Index of a register.
+/// Index of a register in the table `registers`.
 enum RegisterIndex : std::size_t {
   position_offset,
   position_filter,
@@ -102,8 +105,9 @@ enum RegisterIndex : std::size_t {
   serial_number_extended,
 };
 
-/// Addresses and sizes are from rls-encolink 1.0.1, product_aksim2_map.h. Some registers overlap; each is accessed as a
-/// whole. The vendor does not state which registers can be written: README.md lists the assumptions.
+/// Table of the registers. Addresses and sizes are from rls-encolink 1.0.1, product_aksim2_map.h. Some registers
+/// overlap; each is accessed as a whole. The vendor does not state which registers can be written: README.md lists the
+/// assumptions.
 inline constexpr auto registers = [] {
   using enum Access;
   using enum Content;
@@ -136,20 +140,21 @@ inline constexpr auto registers = [] {
       {"voltage_compensation_n", 0x1218, 4, read_only},
   });
 }();
-inline constexpr std::size_t largest_register = 20;  ///< bytes of the largest register
+inline constexpr std::size_t largest_register = 20;  ///< Number of bytes of the largest register in the table.
 
-/// Values of the command register.
+/// Values that a host writes to the command register.
 namespace commands {
-inline constexpr std::uint8_t save = 0x63;            ///< Command: save.
-inline constexpr std::uint8_t reset = 0x72;           ///< Command: reset.
-inline constexpr std::uint8_t self_calibrate = 0x41;  ///< Command: self calibrate.
+inline constexpr std::uint8_t save = 0x63;            ///< Stores the configuration in the non-volatile memory.
+inline constexpr std::uint8_t reset = 0x72;           ///< Restores the configuration at shipping.
+inline constexpr std::uint8_t self_calibrate = 0x41;  ///< Starts the self-calibration.
 }  // namespace commands
 
-/// Bits of calibration_status.
+/// Bits of the register calibration_status.
 namespace calibration {
-inline constexpr std::uint8_t count = 0x03;         ///< number of finished calibrations, modulo 4
-inline constexpr std::uint8_t timed_out = 0x04;     ///< Calibration: timed out.
-inline constexpr std::uint8_t out_of_range = 0x08;  ///< Calibration: out of range.
+inline constexpr std::uint8_t count = 0x03;  ///< Mask of the number of finished self-calibrations, modulo 4.
+inline constexpr std::uint8_t timed_out =
+    0x04;  ///< The shaft did not turn far enough in time for the last self-calibration.
+inline constexpr std::uint8_t out_of_range = 0x08;  ///< The last self-calibration found the ring too eccentric.
 }  // namespace calibration
 
 /// Returns the register at `address`, or null if the table has none there.
@@ -160,31 +165,32 @@ inline constexpr std::uint8_t out_of_range = 0x08;  ///< Calibration: out of ran
   return nullptr;
 }
 
-inline constexpr std::size_t access_capacity = 100;  ///< most data bytes of one access; limit of the vendor's library
+/// Greatest number of data bytes of one register access; limit of the vendor's library.
+inline constexpr std::size_t access_capacity = 100;
 
-/// A request on channel 3.
+/// A register access: read or write.
 struct RegisterRequest {
-  /// Whether it reads or writes.
+  /// Operation codes of a register access.
   enum class Operation : std::uint8_t { write = 0x58, read = 0x59 };
-  Operation operation = Operation::read;  ///< Whether it reads or writes.
-  std::uint32_t address = 0;              ///< Address of the register.
-  std::uint16_t length = 0;               ///< Number of bytes.
-  ByteBuffer<access_capacity> data{};     ///< written bytes, `length` of them; empty for a read
+  Operation operation = Operation::read;  ///< Whether the access reads or writes.
+  std::uint32_t address = 0;              ///< Address of the accessed register.
+  std::uint16_t length = 0;               ///< Number of data bytes.
+  ByteBuffer<access_capacity> data{};     ///< Bytes to write, `length` in number; empty for a read.
 };
 
-/// Bytes that open write access, in their order.
+/// First bytes of a register access, which open write access, in their order.
 inline constexpr std::array<std::uint8_t, 5> access_keys{0x00, 0xCD, 0xEF, 0x89, 0xAB};
-/// Bytes of keys, operation, length and address.
+/// Number of bytes before the data: keys, operation, length and address.
 inline constexpr std::size_t access_header = access_keys.size() + 1 + 2 + 4;
-/// Bytes of a register access.
+/// All bytes of a register access.
 using AccessBytes = ByteBuffer<access_header + access_capacity + 1>;
 
-/// Returns a request that reads a register.
+/// Returns a register access that reads `length` bytes at `address`.
 [[nodiscard]] constexpr RegisterRequest read_request(std::uint32_t address, std::uint16_t length) {
   return {RegisterRequest::Operation::read, address, length};
 }
 
-/// Returns the request that writes `value` as `size` bytes, 1 to 8.
+/// Returns a register access that writes `value` as `size` bytes, 1 to 8.
 [[nodiscard]] constexpr RegisterRequest write_request(std::uint32_t address, std::uint16_t size, std::uint64_t value) {
   RegisterRequest request{RegisterRequest::Operation::write, address, size};
   std::array<std::uint8_t, 8> bytes{};
@@ -193,7 +199,7 @@ using AccessBytes = ByteBuffer<access_header + access_capacity + 1>;
   return request;
 }
 
-/// Returns all `ra` bytes of an access.
+/// Returns all `ra` bytes of a register access, in the order in which requests carry them.
 [[nodiscard]] constexpr AccessBytes encode_access(const RegisterRequest& request) {
   AccessBytes bytes;
   bytes.append(access_keys);
@@ -206,15 +212,15 @@ using AccessBytes = ByteBuffer<access_header + access_capacity + 1>;
   return bytes;
 }
 
-/// Returns whether `request` is all `ra` bytes of a register access. On SPI, zeros are clocked behind the two bytes of
-/// a request; an access is longer than two bytes and its keys are not zeros.
+/// Returns whether `request` is all `ra` bytes of a register access. On SPI, zeros are clocked after the two bytes of a
+/// request; an access is longer than two bytes and its keys are not zeros.
 [[nodiscard]] constexpr bool is_access(Bytes request) {
   if (request.size() <= request_bytes) return false;
   const Bytes behind = request.subspan(request_bytes);
   return std::any_of(behind.begin(), behind.end(), [](std::uint8_t byte) { return byte != 0; });
 }
 
-/// Decodes the `ra` bytes of an access. Errors in this order: bad_framing (wrong keys), unsupported (unknown
+/// Decodes the `ra` bytes of a register access. Errors in this order: bad_framing (wrong keys), unsupported (unknown
 /// operation), wrong_length, bad_checksum.
 [[nodiscard]] constexpr Result<RegisterRequest> decode_access(Bytes bytes) {
   for (std::size_t i = 0; i < access_keys.size(); ++i) {
@@ -235,9 +241,9 @@ using AccessBytes = ByteBuffer<access_header + access_capacity + 1>;
   return request;
 }
 
-/// Decodes the encoder's answer to an access, one byte per cycle, beginning with `channel3::read_ready` or
-/// `write_ready`: the status, then the data of a register that was read. Errors in this order: wrong_length,
-/// unexpected_reply, request_rejected.
+/// Decodes the encoder's answer to a register access, one byte per cycle, beginning with `channel3::read_ready` or
+/// `write_ready`: the status, then the data of a register that was read, which is returned. Errors in this order:
+/// wrong_length, unexpected_reply, request_rejected.
 [[nodiscard]] constexpr Result<Bytes> decode_answer(const RegisterRequest& request, Bytes answer) {
   if (answer.size() < 2) return Error::wrong_length;
   const bool reads = request.operation == RegisterRequest::Operation::read;

@@ -57,7 +57,7 @@ constexpr auto options = author::OptionsOf{
 
 // ---- Requests
 
-/// A request: its two bytes, or a register access whose bytes are sent one by one as `ra`.
+/// Content of a request: its two bytes, or a register access whose bytes are sent one by one as `ra`.
 struct Request {
   Config config = Config::position;
   std::optional<RegisterRequest> access{};
@@ -123,7 +123,7 @@ Result<Request> memory_writing(const Format&, Arguments arguments) {
 }
 
 constexpr MakeRequest not_encodable =
-    nullptr;  // used where the value depends on the position, or where nothing is sent
+    nullptr;  // null where the value depends on the position, or where nothing is sent
 
 // ---- End of a frame: found by its checksum alone
 
@@ -141,11 +141,12 @@ constexpr std::size_t reply_size(const Format& format, Bytes begin) {
   return 0;
 }
 
-// Returns whether a checksum covers `bit`. The channel 2 byte is outside the checksum of a position frame, and the byte
-// that may follow an identity is outside the identity's checksum.
+// Returns whether a checksum covers `bit` of a reply. The channel 2 byte is outside the checksum of a position frame,
+// and a byte that follows an identity is outside the checksum of the identity.
 bool is_checked(const Options& values, Frame request, Frame reply, std::size_t bit) {
   const Format format = assumed(options.format(values), reply.bytes);
-  // The checksums are in the cycles that carried the answer: only its first two bytes (ready, status) are checked here.
+  // The checksums are in the cycles that carried the answer to a register access, so only the first two bytes of the
+  // answer (ready, status) are checked here.
   if (is_access(request.bytes)) return bit / 8 < 2;
   if (reply.bytes.size() == padded_identity_bytes) return bit / 8 < identity_bytes;
   return !format.has_ch2 || reply.bytes.size() != format.frame_bytes() || bit / 8 != format.frame_bytes() - 1;
@@ -199,7 +200,7 @@ Explanation explain_host(const Host& host) {
       return {};
   }
 }
-/// Explains an error of a captured frame, or of a register access with all its bytes.
+/// Returns cause and advice for an error of a captured frame, or of a register access with all its bytes.
 constexpr Explanation explain(const Format&, Error error, Bytes request, Bytes reply) {
   if (is_access(request)) {
     if (error != Error::request_rejected || reply.size() < 2) return {};
@@ -307,17 +308,17 @@ constexpr auto commands_of_unit = std::array{
         {"listen", Verb::run, 0, "the last of some frames of an encoder that transmits by itself", listen_arguments}),
 };
 
-// ---- Format of a captured encoder, which cannot be asked
+// ---- Format of a captured encoder, from which no identity can be requested
 
 constexpr std::size_t option_resolution = options.find("resolution");
 constexpr std::size_t option_multiturn_bits = options.find("multiturn_bits");
 
-// Evidence for a format: the identity, or without one the length that most frames have.
+// Evidence for the format of captured frames: the identity, or without one the length of most frames.
 struct FormatEvidence {
   std::optional<Identity> identity{};
   std::size_t identity_at = 0;         // index of the capture with the identity
-  std::array<std::size_t, 2> good{};   // number of valid position frames without turns, and with turns
-  std::array<std::size_t, 2> first{};  // index of the first capture of each kind
+  std::array<std::size_t, 2> good{};   // number of valid position frames: [0] without turns, [1] with turns
+  std::array<std::size_t, 2> first{};  // index of the first valid capture: [0] without turns, [1] with turns
 
   [[nodiscard]] bool is_conclusive() const { return identity || good[0] != good[1]; }
   [[nodiscard]] bool has_turns() const { return identity ? identity->frame_bytes == 7 : good[1] > good[0]; }
@@ -341,8 +342,8 @@ FormatEvidence collect_evidence(const Format& format, std::span<const Capture> c
   return evidence;
 }
 
-// Finds the resolution and the turns that fit the captures. Without an identity, the length of most position frames
-// decides: in one of 250 frames with turns, a shorter part has a valid checksum too.
+// Finds the numbers of bits of position and turns that fit the captures. Without an identity, the length of most
+// position frames decides: in one of 250 frames with turns, a shorter part has a valid checksum too.
 bool probe(Options& values, std::span<const Capture> captures, EvidenceSink& sink) {
   const FormatEvidence evidence = collect_evidence(options.format(values), captures);
   constexpr std::string_view open = "these frames do not tell";
@@ -391,7 +392,7 @@ constexpr Format format_of(const Options& values) {
   made.interface = interface;
   return made;
 }
-// Returns the resolution; unknown members are the virtual encoder's.
+// Returns the numbers of bits of position and turns; unknown members get the values of the virtual encoder.
 constexpr Resolution resolution_of(const Format& format) {
   return {format.resolution != 0 ? format.resolution : virtual_format.resolution,
           static_cast<unsigned>(format.multiturn_bits >= 0 ? format.multiturn_bits : virtual_format.multiturn_bits)};
@@ -417,7 +418,7 @@ Follower* make_follower(const Options& values, std::span<std::byte> storage) {
 
 constexpr auto known_as = std::array<std::string_view, 2>{"RLS", "AksIM"};
 
-/// The declaration of the protocol for `interface`.
+/// Declaration of the protocol on `interface`.
 template <Interface interface>
 constexpr author::Declaration<Protocol, VirtualEncoder, Host> declaration{
     .id = interface == Interface::spi ? "encolink-spi" : "encolink",

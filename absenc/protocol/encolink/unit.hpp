@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// The EncoLink protocol as units, one for each interface.
+// The EncoLink protocol as two units for the list of units, one for each interface.
 #pragma once
 
 #include "absenc/protocol/unit.hpp"
 
 namespace absenc::encolink {
 
-extern constinit const Unit unit;      ///< UART
-extern constinit const Unit spi_unit;  ///< SPI
+extern constinit const Unit unit;      ///< EncoLink on a UART.
+extern constinit const Unit spi_unit;  ///< EncoLink on SPI.
 
 }  // namespace absenc::encolink

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// EncoLink test frames with their source. The unit decodes each frame at compile time: a wrong frame breaks the build.
+// EncoLink test frames with their source. The unit decodes each frame at compile time: a wrong vector is a compile
+// error.
 #pragma once
 
 #include <array>
