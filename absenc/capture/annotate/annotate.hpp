@@ -122,9 +122,8 @@ class Annotator {
   Exchanges exchanges_;
   Options options_;
   std::array<Channel, 2> channels_{};
-  std::array<std::size_t, 256>
-      reply_sizes_{};                 // size of the last good reply in bytes, indexed by the first byte of its request
-  std::vector<Character> undecided_;  // characters stored until the channels' directions are known
+  std::array<std::size_t, 256> reply_sizes_{};  // size of the last good reply, by the first byte of its request
+  std::vector<Character> undecided_;            // characters stored until the channels' directions are known
 
   bool is_first_ = true;  // no frame was parsed yet: the first part of the first frame may lie before the capture
 

@@ -242,8 +242,8 @@ std::size_t Annotator::match_unsolicited() {
   channel_->last_size = channel_->stream_size = size;
   last_reply_size_ = 0;
   const bool good = streams || !exchanges_.has_request();
-  static_cast<void>(
-      judge_.decode({}, {.bytes = rest(at_).first(size)}));  // a look-ahead has changed the judge's contents
+  // A look-ahead has changed the content stored in `judge_`: decode this frame again.
+  static_cast<void>(judge_.decode({}, {.bytes = rest(at_).first(size)}));
   exchanges_.report_unpaired(Annotation::Kind::reply, piece(size), good ? Error::none : Error::unexpected_reply,
                              good ? Remark::none : Remark::unsolicited, good ? judge_.contents() : Contents{});
   return size;

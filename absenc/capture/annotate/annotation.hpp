@@ -54,9 +54,8 @@ struct Annotation {
   // The members below are valid only during the call of AnnotationSink::put.
   Frame request{};
   Frame reply{};
-  Contents contents{};  // decoded content of request and reply; empty for bad frames
-  std::optional<Tick>
-      turnaround{};  // time from the end of the request to the beginning of its reply, in ticks; empty without a reply
+  Contents contents{};               // decoded content of request and reply; empty for bad frames
+  std::optional<Tick> turnaround{};  // ticks from the end of the request to the beginning of its reply
 };
 
 /// Receives annotations in the order of their end times.

@@ -15,8 +15,7 @@ namespace absenc::capture {
 
 /// Time limits of a line, in ticks of the capture.
 struct LineTicks {
-  static constexpr Tick never =
-      UINT64_MAX / 4;  // a time that is never reached; small enough that times can be added without overflow
+  static constexpr Tick never = UINT64_MAX / 4;  // a time that is never reached; sums with it do not overflow
 
   Tick pause = 1;       // a silence of this length ends a frame
   Tick character = 1;   // duration of a character; a silence within a character is shorter
@@ -35,8 +34,7 @@ class Exchanges {
  public:
   /// A request whose reply has not been found yet.
   struct PendingRequest {
-    static constexpr std::size_t capacity =
-        272;  // capacity in bytes; a longer request is cut to it, because it is bad in any case
+    static constexpr std::size_t capacity = 272;  // in bytes; a longer request is cut: it is bad in any case
     std::array<std::uint8_t, capacity> storage{};
     std::size_t size = 0;
     Tick begin = 0;

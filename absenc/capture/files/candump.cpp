@@ -35,8 +35,8 @@ bool append_byte(std::string_view digits, CanFrame& frame) {
   return true;
 }
 
-// Parses the data behind '#': "R", "R4", "1122", "11.22", each optionally with the raw length code of newer logs
-// ("_9").
+// Parses the data behind '#' in a log line: "R", "R4", "1122", "11.22", each optionally with the raw length code of
+// newer logs ("_9"). Returns false if the data is invalid.
 bool parse_compact(std::string_view data, CanFrame& frame) {
   if (data.size() >= 2 && data[data.size() - 2] == '_' && hex_digit(data.back()) > 8) data.remove_suffix(2);
   if (data.starts_with('R')) {
@@ -61,8 +61,8 @@ bool parse_log(std::string_view identifier, std::string_view data, CandumpLine& 
   return parse_identifier(identifier, parsed.record) && parse_compact(data, parsed.record.frame);
 }
 
-// Parses the text behind the identifier: "[3]  11 22 33", "[0]  remote request", followed by output of -a or of error
-// frames.
+// Parses the text behind the identifier in a line of screen output: "[3]  11 22 33", "[0]  remote request"; text that
+// option -a or an error frame adds is ignored. Returns false if the text is invalid.
 bool parse_screen(std::string_view rest, CandumpLine& parsed) {
   const std::string_view length = take_word(rest);
   if (length.size() == 4 && length.front() == '[') {  // a length with two digits, "[08]", is CAN FD
@@ -110,13 +110,14 @@ class CandumpReader final : public ParsedReader {
         break;
       }
     }
-    // The next frame may have the same time as the last one.
+    // The next frame may have the same time as the last frame of this block, so the block ends at that time.
     block.end = at_ + (timed_ && done_ ? 1 : 0);
     return true;
   }
 
  private:
-  // Finds the interfaces, whether lines have times, and of what kind these are.
+  // Finds the interfaces, and whether lines have times, in the first 64 KiB; times that do not rise are those since the
+  // previous frame.
   void look_ahead(std::string_view name) {
     TextLines lines(*source_);
     std::string_view line;
@@ -131,7 +132,7 @@ class CandumpReader final : public ParsedReader {
       if (find(parsed.channel) == layout_.channels.size() && layout_.channels.size() < 255) {
         layout_.channels.emplace_back(parsed.channel);
       }
-      // Two frames of one bus cannot begin at the same time.
+      // Two frames of one bus cannot begin at the same time, so absolute times rise from frame to frame.
       const bool zero = parsed.at.seconds == 0 && parsed.at.picoseconds == 0;
       constexpr std::int64_t day = 86400;
       if (last && !zero && parsed.at.seconds < day) {
@@ -226,7 +227,7 @@ bool parse_candump(std::string_view line, CandumpLine& parsed) {
   std::string_view word = take_word(line);
   if (const std::size_t hash = word.find('#'); hash != std::string_view::npos) {
     line = trim(line);
-    if (!line.empty() && line != "R" && line != "T") return false;  // newer logs contain the direction
+    if (!line.empty() && line != "R" && line != "T") return false;  // R received, T transmitted: only in newer logs
     return parse_log(word.substr(0, hash), word.substr(hash + 1), parsed);
   }
   while (is_flag(word)) word = take_word(line);

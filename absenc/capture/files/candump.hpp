@@ -23,7 +23,7 @@ struct CandumpLine {
   CanRecord record;
 };
 
-/// Parses a line. Returns false if it is no line of candump.
+/// Parses one line of candump's output into `parsed`. Returns false if the line has another form.
 [[nodiscard]] bool parse_candump(std::string_view line, CandumpLine& parsed);
 
 /// Reads lines of these forms, either all with a time in parentheses or all without:

@@ -23,7 +23,8 @@ std::optional<Number> number_in(std::string_view text, int base) {
   return value;
 }
 
-// Appends the bytes of a group of digits; removes its prefix.
+// Appends the bytes of a group of hexadecimal digits, which may have a prefix such as 0x. Returns false if the group is
+// invalid.
 bool append_digits(std::string_view group, std::vector<std::uint8_t>& bytes) {
   bool prefixed = true;
   if (group.starts_with("0x") || group.starts_with("0X") || group.starts_with("\\x")) {
@@ -58,7 +59,7 @@ bool append_groups(std::string_view text, std::vector<std::uint8_t>& bytes) {
   }
 }
 
-// Parses a line like "00000010  48 65 6c  |Hel|".
+// Parses a line of hexdump -C or od, like "00000010  48 65 6c  |Hel|". Returns false if the line has another form.
 bool parse_dump(std::string_view line, HexLine& parsed) {
   if (line == "*") {
     parsed.problem = "'*' stands for lines that the dump left out: write it with hexdump -v -C or od -v";
@@ -77,7 +78,8 @@ bool parse_dump(std::string_view line, HexLine& parsed) {
   return true;
 }
 
-// Parses a line like "00000010: 4865 6c6c 6f0a            Hello." The text begins behind two blanks.
+// Parses a line of xxd, like "00000010: 4865 6c6c 6f0a            Hello."; the text begins behind two blanks. Returns
+// false if the line has another form.
 bool parse_xxd(std::string_view line, HexLine& parsed) {
   if (line == "*") {
     parsed.problem = "'*' stands for lines that the dump left out: write it without -a";
@@ -90,7 +92,7 @@ bool parse_xxd(std::string_view line, HexLine& parsed) {
   return parsed.offset && append_groups(line.substr(0, line.find("  ")), parsed.bytes);
 }
 
-// Parses a line like "210-290 uart-1: rx-data: 1A".
+// Parses a line of sigrok-cli, like "210-290 uart-1: rx-data: 1A". Returns false if the line has another form.
 bool parse_sigrok(std::string_view line, HexLine& parsed) {
   std::string_view rest = line;
   const std::string_view range = take_word(rest);
@@ -107,7 +109,7 @@ bool parse_sigrok(std::string_view line, HexLine& parsed) {
   const std::string_view kind = take_word(rest);
   const bool classed = kind.ends_with(':');
   if (classed) {
-    if (kind != "rx-data:" && kind != "tx-data:") return true;  // an annotation of another class has no bytes
+    if (kind != "rx-data:" && kind != "tx-data:") return true;  // annotations of other classes are no bytes
     parsed.channel = kind == "tx-data:" ? 0 : 1;
     line = rest;
   }

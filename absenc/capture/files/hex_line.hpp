@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Parsing of one line of hexadecimal text.
+// Parses one line of hexadecimal text that is typed, dumped or written by a decoder.
 #pragma once
 
 #include <cstdint>
@@ -17,26 +17,27 @@ enum class HexForm : std::uint8_t { plain, dump, xxd, sigrok };
 
 struct HexLine {
   std::optional<Instant> at;
-  std::optional<Tick> begin;  // first sample of the annotation, for sigrok
+  std::optional<Tick> begin;  // first sample of the annotation, only for the form sigrok
   Tick end = 0;
-  int channel = -1;  // 0: tx, 1: rx, -1: no direction
+  int channel = -1;  // direction of the bytes: 0 tx, 1 rx, -1 not stated
   std::optional<std::uint64_t> offset;
   std::vector<std::uint8_t> bytes;
   std::string source;   // name of the port in a terminal log; "": none
-  std::string problem;  // reason why the line is invalid
+  std::string problem;  // reason why the line is invalid, as words; "" if no reason is known
 };
 
-/// Parses a group: two digits, or more with a prefix: 1A, 1A00, 0x1A, \x1A, $1A. Returns false and leaves `bytes` if it
-/// is invalid.
+/// Parses a group of hexadecimal digits and appends its bytes: two digits, or more with a prefix: 1A, 1A00, 0x1A, \x1A,
+/// $1A. Returns false and leaves `bytes` unchanged if the group is invalid.
 bool append_group(std::string_view group, std::vector<std::uint8_t>& bytes);
 
-/// Returns the line without its comment and without blanks around it.
+/// Returns `line` without its comment and without blanks around the rest.
 [[nodiscard]] std::string_view strip_comment(std::string_view line);
 
-/// Returns the form of a file, found from its first line; nothing if the form is unknown.
+/// Returns the form of a file whose first line is `line`; nothing if the form is unknown.
 [[nodiscard]] std::optional<HexForm> hex_form(std::string_view line);
 
-/// Parses a line. Returns false if it does not have this form; `problem` may contain the reason.
+/// Parses a line of the given form into `parsed`. Returns false if the line does not have this form; `parsed.problem`
+/// may then contain the reason.
 [[nodiscard]] bool parse_hex_line(HexForm form, std::string_view line, HexLine& parsed);
 
 }  // namespace absenc::capture

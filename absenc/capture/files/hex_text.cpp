@@ -16,7 +16,8 @@ namespace {
 
 constexpr std::size_t bytes_at_once = 1 << 16;
 
-// Comments are removed only in plain text: the text beside a dump may contain any character.
+// Returns the part of `line` to parse. Comments are removed only in plain text: the text beside a dump may contain any
+// character.
 std::string_view content_of(std::string_view line, std::optional<HexForm> form) {
   if (form == HexForm::dump || form == HexForm::xxd) return trim(line);
   return strip_comment(line);
@@ -39,7 +40,8 @@ class HexTextReader final : public ParsedReader {
     const std::optional<HexForm> form = first_form(line);
     if (!form) throw OpenError(std::string(name) + " holds no bytes as text");
     form_ = *form;
-    // The first line with bytes decides what lines contain: a decoder may print other annotations before.
+    // The first line with bytes decides which form and items the lines have: a decoder may print other annotations
+    // before it.
     constexpr std::uint64_t far_enough = 1 << 16;
     do {
       if (!parse_hex_line(form_, content_of(line, form_), line_)) break;
@@ -62,7 +64,7 @@ class HexTextReader final : public ParsedReader {
         break;
       }
     }
-    // The next line may begin at the same time as the last one.
+    // The next line may begin at the same time as the last line of this block.
     block.end = done_ || clock_ == LineTime::none ? at_ : last_;
     return true;
   }
@@ -145,8 +147,8 @@ class HexTextReader final : public ParsedReader {
   HexLine line_;
   std::optional<std::uint64_t> next_offset_;
   std::uint64_t index_ = 0;
-  Tick at_ = 0;    // latest end of a byte
-  Tick last_ = 0;  // begin time of the previous line
+  Tick at_ = 0;    // end of the latest byte, in ticks
+  Tick last_ = 0;  // begin time of the previous line, in ticks
 };
 
 }  // namespace

@@ -16,19 +16,19 @@ namespace absenc::capture {
 /// Returns true if the first line that is not empty and not a comment can be read by `read_hex_text`.
 [[nodiscard]] bool is_hex_text(std::string_view head);
 
-/// Returns the reason why the first line with content cannot be read; "" if it can.
+/// Returns the reason why the first line with content cannot be read as hexadecimal text; "" if it can.
 [[nodiscard]] std::string hex_text_problem(std::string_view head);
 
 /// Reads lines of one of the forms below; the first line decides which. Empty lines, and text behind `#` or `//`, are
 /// ignored. HEX is any number of bytes: pairs of digits, adjacent or separated by blanks, commas or semicolons, each
 /// group optionally with `0x`, `\x` or `$` before it; `0x` also before a single digit.
 ///
-/// - Lines that people type and terminal programs log, see log_line.hpp: a time, a port and a direction in any
-///   order, the bytes, and their text. All lines must be of one port.
+/// - Lines that people type and terminal programs log, see log_line.hpp: a time, a port and a direction in any order,
+///   the bytes, and their text. All lines must be of one port.
 /// - Dumps of `hexdump -C`, `od -A x -t x1` and `xxd`: an offset, bytes (of xxd also in groups), then text. Jumping
 ///   offsets are noted once. A `*` for repeated lines is a damage: write the dump with -v.
-/// - `sigrok-cli -P uart`: `[BEGIN-END ]uart-1: [CLASS: ]HEX`. Of the classes only `rx-data` and `tx-data` are read; of
-///   lines without a class those of two digits.
+/// - `sigrok-cli -P uart`: `[BEGIN-END ]uart-1: [CLASS: ]HEX`. Lines of the classes `rx-data` and `tx-data` are read,
+///   and lines without a class that have two digits.
 ///
 /// Channels are "tx" and "rx" if there are directions. Ticks are nanoseconds from the first line on, and all bytes of a
 /// line have its time; with BEGIN-END they are samples, `samples_per_second` per second. Without times each byte takes

@@ -27,7 +27,8 @@ class LevelWriter {
     block_->changes[channel].before = level;
   }
 
-  /// Sets a level. Times must not decrease; a level that returns to its value at the same time counts as no change.
+  /// Sets the level of a channel at the time `at`. Times must not decrease; a level that returns to its value at the
+  /// same time is no change.
   void set(std::size_t channel, bool level, Tick at) {
     if ((levels_[channel] != 0) == level) return;
     levels_[channel] = level ? 1 : 0;
@@ -40,7 +41,7 @@ class LevelWriter {
     }
   }
 
-  /// Returns the number of changes in the present block.
+  /// Returns the number of level changes in the present block, of all channels.
   [[nodiscard]] std::size_t changes() const { return changes_; }
 
  private:

@@ -31,7 +31,8 @@ std::string quoted(std::string_view text) {
 
 // ---- Bytes
 
-// Appends joined bytes like "1A:00:35" or "1A-00-35".
+// Appends the bytes of a group with separators, like "1A:00:35" or "1A-00-35". Returns false if the group has another
+// form.
 bool append_joined(std::string_view group, std::vector<std::uint8_t>& bytes) {
   const std::size_t before = bytes.size();
   if (group.size() < 5 || (group[2] != ':' && group[2] != '-')) return false;
@@ -53,7 +54,7 @@ bool is_bytes(std::string_view word) {
   return append_any(word, bytes);
 }
 
-// Returns whether `text` is what a terminal shows for these bytes; its end may have been removed as a comment.
+// Returns whether `text` is what a terminal shows for `bytes`; the end of the text may have been removed as a comment.
 bool is_text_of(std::string_view text, Bytes bytes) {
   std::string letters;
   for (const char c : text) {
@@ -80,11 +81,11 @@ bool is_column(std::string_view text, Bytes bytes) {
     text.remove_prefix(1);
   }
   if (is_text_of(text, bytes)) return true;
-  while (!bytes.empty() && bytes[0] == ' ') bytes = bytes.subspan(1);  // blanks of the text look like those around it
+  while (!bytes.empty() && bytes[0] == ' ') bytes = bytes.subspan(1);  // blanks at the text's beginning were removed
   return trim(text).empty() || is_text_of(trim(text), bytes);
 }
 
-// Parses the rest of the line as bytes.
+// Parses the rest of a line as bytes, perhaps followed by their text. Returns false if the rest is invalid.
 bool take_bytes(std::string_view text, HexLine& parsed) {
   constexpr std::string_view between = " \t,;";
   for (;;) {
@@ -115,11 +116,12 @@ struct ParsedTime {
   std::size_t size = 0;  // number of characters that the time takes
 };
 
-// Returns the length of a clock time at the beginning: "17:55:24.123", "17:55:24,123", "17:55:24:123", "5:55:24".
+// Returns the length of a clock time at the beginning of `text`: "17:55:24.123", "17:55:24,123", "17:55:24:123",
+// "5:55:24"; 0 if `text` begins otherwise.
 std::size_t clock_size(std::string_view text) {
   std::size_t size = std::min(text.find_first_not_of("0123456789:."), text.size());
   const bool seconds = size > 3 && text[size - 3] == ':' && std::count(text.begin(), text.begin() + size, ':') == 2;
-  // A comma begins a fraction only with three or six digits, otherwise another field.
+  // A comma begins a fraction of a second only before three or six digits; otherwise it begins another field.
   if (seconds && text.substr(size).starts_with(',')) {
     const std::string_view behind = text.substr(size + 1);
     const std::size_t digits = std::min(behind.find_first_not_of("0123456789"), behind.size());
@@ -151,8 +153,8 @@ ParsedTime match_clock(std::string_view text, const std::string& date) {
   return {parse_clock(date.empty() ? clock : date + ' ' + clock), size};
 }
 
-// Returns the date at the beginning in the form of the first example: "2026-11-21", "2026/11/21", "21.11.2026",
-// "11/21/2026"; "" if there is none.
+// Returns the date at the beginning of `text` in the form "2026-11-21", converted from "2026/11/21", "21.11.2026" or
+// "11/21/2026"; "" if `text` begins otherwise.
 std::string match_date(std::string_view text) {
   if (text.size() < 10) return "";
   text = text.substr(0, 10);
@@ -172,7 +174,7 @@ std::string match_date(std::string_view text) {
   return part(6, 4) + "-" + (month_first ? part(0, 2) : part(3, 2)) + "-" + (month_first ? part(3, 2) : part(0, 2));
 }
 
-// Parses a time like "12.000250" or "250us".
+// Parses a time like "12.000250" (seconds) or "250us"; returns nothing for another word.
 std::optional<Instant> parse_count(std::string_view word) {
   struct TimeUnit {
     std::string_view suffix;
@@ -234,7 +236,7 @@ bool is_port(std::string_view word) {
   return false;
 }
 
-// Returns whether the word is ignored: a line number, a length, or a word like "data".
+// Returns whether the word has no meaning for the bytes: a line number, a length, or a word like "data".
 bool is_filler(std::string_view word) {
   const std::string lower = lower_case(word);
   if (all_digits(lower)) return true;
@@ -245,7 +247,7 @@ bool is_filler(std::string_view word) {
   return lower == "byte" || lower == "bytes" || lower == "data" || lower == "hex" || lower == "-";
 }
 
-/// Parses and removes the part of a line before the bytes.
+/// Parses and removes the part of a log line before the bytes: time, direction, port and fillers.
 class Prefix {
  public:
   Prefix(std::string_view text, HexLine& parsed) : text_(text), parsed_(parsed) {}
@@ -332,7 +334,7 @@ class Prefix {
     parsed_.source += name;
   }
 
-  // Handles a word like "RX", "COM3:", "COM3>".
+  // Handles a word with a direction or a port, like "RX", "COM3:", "COM3>". Returns false for another word.
   bool take_word_of_prefix(std::string_view word) {
     text_.remove_prefix(word.size());
     const bool label = word.ends_with(':') || word.ends_with('=');
@@ -354,7 +356,7 @@ class Prefix {
     return false;
   }
 
-  // Handles text in brackets, which counts as if it had none. Returns true if the brackets contain the bytes.
+  // Handles text in brackets like the same text without brackets. Returns true if the brackets contain the bytes.
   bool take_bracket() {
     const char closing = text_[0] == '[' ? ']' : ')';
     const std::size_t end = text_.find(closing);
@@ -383,12 +385,12 @@ class Prefix {
     return false;
   }
 
-  // Returns whether the word is a count, as in "11 bytes".
+  // Returns whether the word is a number of bytes, as in "11 bytes".
   [[nodiscard]] bool is_count(std::string_view word) const {
     return lower_case(trim(text_.substr(word.size()))).starts_with("byte");
   }
 
-  // Returns whether bytes follow the word, so that the word is a byte itself.
+  // Returns whether bytes follow the word: then the word itself is a byte too, not a time or number.
   [[nodiscard]] bool bytes_follow(std::string_view word) const {
     std::string_view rest = text_.substr(word.size());
     rest.remove_prefix(std::min(rest.find_first_not_of(separators), rest.size()));

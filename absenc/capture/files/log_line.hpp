@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Parsing of one line of bytes as people type it and terminal programs log it.
+// Parses one line of bytes as people type it and terminal programs log it.
 #pragma once
 
 #include <string_view>
@@ -8,14 +8,14 @@
 
 namespace absenc::capture {
 
-/// Parses a line. Before the bytes these items may occur in any order, each also in `[]` or `()` or with a colon behind
-/// it, separated by blanks, `,`, `;`, `|` or ` - `:
+/// Parses a line into `parsed`. Before the bytes these items may occur in any order, each also in `[]` or `()` or with
+/// a colon behind it, separated by blanks, `,`, `;`, `|` or ` - `:
 ///
 /// - a time: seconds with a point (`12.000250`), a number with a unit (`250us`; s, ms, us, ns), or a clock time
 ///   (`17:55:24.123`, `17:55:24,123`, `5:55:24 PM`), optionally with a date (ISO 8601, `2026/11/21`, `21.11.2026`,
 ///   `11/21/2026`);
 /// - a direction: `tx`, `out`, `host`, `sent`, `write` ..., `>`, `>>`, `->`, `-->` and `rx`, `in`, `device`,
-///   `received`, `read` ..., `<`, `<<`, `<-`, `<--`, in any case, the arrows also behind a port (`COM3>`);
+///   `received`, `read` ..., `<`, `<<`, `<-`, `<--`, in upper or lower case, the arrows also behind a port (`COM3>`);
 /// - a port (`COM3`, `ttyUSB0`, `/dev/ttyS1`), or any other name with a colon behind it or in brackets: `source`;
 /// - line numbers and lengths (`12:`, `[11]`, `11 bytes`, `len=11`), which are ignored.
 ///
@@ -23,7 +23,7 @@ namespace absenc::capture {
 /// `:` or `-`. The text of the bytes may follow, and must match them: printable bytes as they are, others as a dot or a
 /// similar character.
 ///
-/// Returns false if the line is invalid or ambiguous: `problem` contains the reason.
+/// Returns false if the line is invalid or ambiguous; `parsed.problem` then contains the reason.
 bool parse_log_line(std::string_view line, HexLine& parsed);
 
 }  // namespace absenc::capture

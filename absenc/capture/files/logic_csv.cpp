@@ -53,7 +53,7 @@ bool names_kinds(std::string_view line) {
   return first == "logic" || (first != line && (find_unit(first) != nullptr || first == "samples"));
 }
 
-// Kinds of time in a row.
+// Time that a row states: in seconds, as a count of time units, or none (each row is one sample).
 enum class RowTime : std::uint8_t { seconds, counts, rows };
 
 class LogicCsv final : public ParsedReader {
@@ -84,7 +84,7 @@ class LogicCsv final : public ParsedReader {
     levels_->begin(block);
     const std::uint64_t begin = lines_.offset();
     const Tick first = at_;
-    // A block ends before a row with a later time, so that all changes of one time are in one block.
+    // A block ends before a row with a later time, so that all level changes of one time are in one block.
     Tick last = first;
     do {
       if (at_ != last && lines_.offset() - begin >= text_at_once) {
@@ -167,7 +167,7 @@ class LogicCsv final : public ParsedReader {
     return false;
   }
 
-  // Reads the next row and its time. Returns false at the end or if the file is damaged from here on.
+  // Reads the next row and its time. Returns false at the end of the file or if the file is damaged from here on.
   bool next_row() {
     std::string_view row;
     do {
@@ -246,7 +246,7 @@ class LogicCsv final : public ParsedReader {
   bool skip_first_ = false;
   bool first_row_ = true;
   bool started_ = false;
-  bool pending_ = false;  // the last row read belongs to the next block
+  bool pending_ = false;  // the row that was read last belongs to the next block
   bool done_ = false;
   bool finished_ = false;
   std::uint64_t index_ = 0;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A capture in memory, read as samples or as changes in blocks of any size.
+// A reader for tests: a capture in memory, read as samples or as changes in blocks of any size.
 #pragma once
 
 #include <algorithm>
@@ -34,7 +34,8 @@ struct Wires {
   [[nodiscard]] std::size_t ticks() const { return levels.front().size(); }
 };
 
-/// Finds the level changes by comparing each sample with the previous one.
+/// Returns the level changes from sample `first` on, found by comparing each sample with the previous one; `before` is
+/// the level before sample `first`.
 inline Changes changes_of(const Drawn& levels, bool before, std::size_t first, std::size_t end) {
   Changes found{before, {}};
   bool level = before;
@@ -47,7 +48,8 @@ inline Changes changes_of(const Drawn& levels, bool before, std::size_t first, s
 
 class MemoryReader final : public Reader {
  public:
-  /// Reads blocks of random sizes from 1 to `most` ticks. Ticks set by `leave_out` are skipped.
+  /// Reads blocks of random sizes from 1 to `most` ticks. Ticks set by `leave_out` are skipped, as if the file were
+  /// damaged there.
   MemoryReader(const Wires& wires, Content content, std::size_t most, std::uint64_t seed)
       : wires_(wires), most_(most), random_(seed) {
     layout_.content = content;
@@ -110,7 +112,7 @@ class MemoryReader final : public Reader {
   std::vector<Damage> damages_;
 };
 
-/// Draws an asynchronous line, level by level; an idle line is high.
+/// Draws the levels of an asynchronous line, tick by tick; an idle line is high.
 class Pen {
  public:
   Pen(double bit, Parity parity, unsigned stop_bits) : bit_(bit), parity_(parity), stop_bits_(stop_bits) {}

@@ -21,8 +21,8 @@ constexpr std::uint64_t zip64_end_signature = 0x06064B50;
 constexpr std::uint64_t zip64_locator_signature = 0x07064B50;
 constexpr std::uint64_t end_signature = 0x06054B50;
 constexpr std::size_t local_bytes = 30;
-constexpr std::uint64_t size_behind = 1 << 3;   // flag of an entry whose sizes follow its data
-constexpr std::uint64_t in_zip64 = 0xFFFFFFFF;  // value of a size that is stored in the zip64 extra field
+constexpr std::uint64_t size_behind = 1 << 3;   // flag of an entry whose sizes are stored behind its data
+constexpr std::uint64_t in_zip64 = 0xFFFFFFFF;  // value in a size field if the size is stored in the zip64 extra field
 constexpr std::uint64_t zip64_version = 45;
 constexpr std::size_t largest_directory = 1 << 26;
 
@@ -44,7 +44,7 @@ struct Directory {
   }
 };
 
-// The local header before an entry.
+// The local header of a zip archive, which is stored before each entry.
 struct Header {
   std::vector<std::uint8_t> bytes;
   std::uint64_t size = 0;
@@ -53,7 +53,7 @@ struct Header {
   [[nodiscard]] Bytes name() const { return Bytes(bytes).subspan(local_bytes, number(bytes, 26, 2)); }
   [[nodiscard]] Bytes extra() const { return Bytes(bytes).last(number(bytes, 28, 2)); }
 
-  // Reads the header at `at`. Returns false if there is none.
+  // Reads the local header at offset `at`. Returns false if no valid header is at that place.
   [[nodiscard]] bool read(Source& source, std::uint64_t at) {
     bytes.resize(local_bytes);
     if (source.read(at, bytes) != local_bytes || number(bytes, 0, 4) != local_signature) return false;
@@ -82,8 +82,9 @@ struct Header {
 void add_entry(Directory& directory, const Header& header, std::uint64_t at, std::uint64_t packed) {
   directory.put(directory_signature, 4).put(zip64_version, 2);
   directory.put(Bytes(header.bytes).subspan(4, 14)).put(in_zip64, 4).put(in_zip64, 4);
-  directory.put(header.name().size(), 2).put(28, 2);  // lengths of the name and of the extra field
-  directory.put(0, 10).put(in_zip64, 4);              // comment, disk, attributes; then the offset
+  directory.put(header.name().size(), 2).put(28, 2);  // lengths of the name and of the zip64 extra field
+  directory.put(0, 10).put(in_zip64, 4);              // comment, disk and attributes; then the offset of the entry,
+                                                      // stored in the extra field
   directory.put(header.name()).put(1, 2).put(24, 2).put(header.size, 8).put(packed, 8).put(at, 8);
 }
 
@@ -95,7 +96,7 @@ void add_end(Directory& directory, std::uint64_t at, std::uint64_t entries) {
   directory.put(end_signature, 4).put(0, 4).put(0xFFFF, 2).put(0xFFFF, 2).put(in_zip64, 4).put(in_zip64, 4).put(0, 2);
 }
 
-// The first `end` bytes of a source, followed by another source.
+// A source that consists of the first `end` bytes of one source, followed by another source.
 class TwoSources final : public Source {
  public:
   TwoSources(std::unique_ptr<Source> front, std::uint64_t end, std::unique_ptr<Source> behind)

@@ -12,14 +12,14 @@ namespace absenc::capture {
 
 struct MendedZip {
   std::unique_ptr<Source> archive;         // the remaining part of the archive, followed by a new directory
-  std::uint64_t end = 0;                   // end of the last complete entry
-  bool complete = false;                   // the lost directory begins at `end`: no entry is missing
+  std::uint64_t end = 0;                   // offset of the end of the last complete entry
+  bool complete = false;                   // the directory was lost but began at `end`: no entry is missing
   std::optional<std::uint64_t> cut_entry;  // index of the last entry, if the file ends within it
 };
 
-/// Builds a directory from the local headers of the entries. It ends before an entry whose size follows its data; no
-/// program that writes sessions does that. Memory grows with the number of entries, up to 64 MiB (700'000 pieces of a
-/// session); later entries count as missing.
+/// Builds a new directory for a zip archive from the local headers of its entries. The directory ends before an entry
+/// whose size is stored behind its data; no program that writes sigrok sessions does that. Memory grows with the number
+/// of entries, up to 64 MiB (700'000 pieces of a session); later entries count as missing.
 [[nodiscard]] MendedZip mend_zip(std::unique_ptr<Source> source);
 
 }  // namespace absenc::capture

@@ -30,7 +30,7 @@ bool is_candump(std::string_view head) {
   return parse_candump(head.substr(first, head.find('\n', first) - first), line);
 }
 
-// Returns whether at least the first line is text.
+// Returns whether at least the first line of a file that begins with `head` is text.
 bool is_text(std::string_view head) {
   const std::string_view line = head.substr(0, head.find_first_of("\r\n"));
   return std::all_of(line.begin(), line.end(), [](char c) {
@@ -39,7 +39,7 @@ bool is_text(std::string_view head) {
   });
 }
 
-// Opens a file of a format with channel names; returns nullptr if it is none of them.
+// Opens a file of a format that contains channel names; returns nullptr if the file has none of these formats.
 std::unique_ptr<Reader> open_logic(std::unique_ptr<Source>& source, std::string_view head, std::string_view name,
                                    const OpenChoices& choices) {
   if (is_zip(head)) return read_sigrok(std::move(source), name, choices.samples_per_second);
@@ -62,7 +62,8 @@ std::unique_ptr<Reader> checked(std::unique_ptr<Reader> reader, std::string_view
   return reader;
 }
 
-// Opens a folder exported by Logic 2 with digital_0.bin, digital_1.bin ..., in the order of the numbers.
+// Opens a folder exported by Logic 2, which contains digital_0.bin, digital_1.bin ...; channels are in the order of the
+// numbers.
 std::unique_ptr<Reader> open_folder(const std::filesystem::path& folder, const OpenChoices& choices) {
   std::vector<std::pair<unsigned, std::filesystem::path>> files;
   std::error_code error;

@@ -12,7 +12,7 @@
 
 namespace absenc::capture {
 
-/// Information about a file that it may not contain itself.
+/// Properties of a capture that the user states, because the file may not contain them.
 struct OpenChoices {
   unsigned channels = 0;                 // raw samples: 1 to 64, required; other files: must match the content
   std::uint64_t samples_per_second = 0;  // raw samples: required; other files: used if the file has no rate
@@ -25,7 +25,8 @@ struct OpenChoices {
 /// beginning is invalid.
 [[nodiscard]] std::unique_ptr<Reader> open_capture(const std::filesystem::path& path, const OpenChoices& choices);
 
-/// Opens bytes from any source; `name` is used in messages and as the channel name of a binary export.
+/// Opens a capture from any source, like the function for a path; `name` is used in messages and as the channel name of
+/// a binary export. Throws OpenError.
 [[nodiscard]] std::unique_ptr<Reader> open_capture(std::unique_ptr<Source> source, std::string_view name,
                                                    const OpenChoices& choices);
 

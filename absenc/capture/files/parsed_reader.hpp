@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Common parts of the readers: their layout, and the list of damages. Text is parsed in `claim`, because each part
-// depends on the previous one.
+// Common parts of the readers of text and parsed files: their layout, and the list of damages. Text is parsed in
+// `claim`, because each part depends on the previous one.
 #pragma once
 
 #include <algorithm>
@@ -13,7 +13,7 @@
 
 namespace absenc::capture {
 
-/// Damages in the order of the file. Several threads may add to the list.
+/// A list of a file's damages, in the order of the file. Several threads may add to the list.
 class Damages {
  public:
   void add(Damage damage) {
@@ -29,7 +29,8 @@ class Damages {
   std::vector<Damage> list_;
 };
 
-/// An event that may occur often and is reported only once, with its count and the place of the first one.
+/// An event in a file that may occur often. It is reported only once, with its count and the place of its first
+/// occurrence.
 struct Occurrences {
   std::uint64_t count = 0;
   std::uint64_t offset = 0;
@@ -61,7 +62,7 @@ class ParsedReader : public Reader {
   Damages damages_;
 };
 
-/// Clears a block for its next part, except the samples, whose storage is reused as it is.
+/// Clears a block for the next part of the file, except the samples, whose storage is reused as it is.
 inline void begin_block(Block& block, std::uint64_t index, Tick first) {
   block.index = index;
   block.first = first;

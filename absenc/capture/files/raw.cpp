@@ -12,8 +12,8 @@ namespace absenc::capture {
 
 namespace {
 
-// Block size in bytes: it fits into the cache of a core, so that the decoder finds the data there; large enough that
-// the cost of the call does not matter.
+// Number of bytes in a block: few enough to fit into the cache of a core, so that the decoder finds the data there;
+// enough that the cost of a call does not matter.
 constexpr std::uint64_t block_bytes = 1 << 20;
 
 class RawReader final : public Reader {
@@ -47,7 +47,7 @@ class RawReader final : public Reader {
     return true;
   }
 
-  // The vector keeps its size, so resize does not clear it again.
+  // The vector of samples keeps its size, so resize does not clear it again.
   void fill(Block& block) override {
     block.samples.resize(static_cast<std::size_t>(block.file_size));
     const std::size_t got = source_->read(block.file_offset, block.samples);

@@ -12,12 +12,13 @@
 
 namespace absenc::capture {
 
-/// Returns the number of bytes per sample, 1, 2, 4 or 8, for 1 to 64 channels.
+/// Returns the number of bytes per sample, 1, 2, 4 or 8, for a number of channels from 1 to 64.
 [[nodiscard]] constexpr unsigned bytes_per_sample(unsigned channels) {
   return channels <= 8 ? 1 : channels <= 16 ? 2 : channels <= 32 ? 4 : 8;
 }
 
-/// Throws OpenError if `channels` is not 1 to 64 or the rate is 0. An incomplete sample at the end is a damage.
+/// Reads raw samples of `channels` channels. Throws OpenError if `channels` is not 1 to 64 or the rate is 0. An
+/// incomplete sample at the end of the file is a damage.
 [[nodiscard]] std::unique_ptr<Reader> read_raw(std::unique_ptr<Source> source, std::string_view name, unsigned channels,
                                                std::uint64_t samples_per_second);
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests raw samples, and the checks that all readers share when they are opened.
+// Tests the reader of raw samples, and the checks that all readers make when a file is opened.
 #include "absenc/capture/files/raw.hpp"
 
 #include <gtest/gtest.h>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Layouts as in Saleae's "Binary Export Format - Version 0" and "Binary and CSV Export Formats - 2025 Update" (version
-// 1).
+// Implements the reader of Saleae's binary export, with layouts as in Saleae's "Binary Export Format - Version 0" and
+// "Binary and CSV Export Formats - 2025 Update" (version 1).
 #include "absenc/capture/files/saleae.hpp"
 
 #include <algorithm>
@@ -22,7 +22,8 @@ namespace {
 
 constexpr std::string_view magic = "<SALEAE>";
 constexpr double ticks_per_second = 1e12;
-constexpr double longest_seconds = 8e6;  // 92 days; less than 64-bit ticks with a sign can hold
+constexpr double longest_seconds = 8e6;  // limit for times in a file, 92 days: less than 64-bit ticks with a sign can
+                                         // hold
 constexpr std::size_t transitions_at_once = 1 << 13;
 
 template <class Unsigned>
@@ -39,7 +40,7 @@ bool is_time(double seconds) { return std::isfinite(seconds) && std::abs(seconds
 // Converts seconds, which may be negative, to picoseconds, rounded because a double is rarely exact.
 std::int64_t to_picoseconds(double seconds) { return std::llround(seconds * ticks_per_second); }
 
-/// The transitions of one file, some of which are read ahead.
+/// The transitions in the file of one channel, of which some are read ahead.
 class TransitionStream {
  public:
   TransitionStream(SaleaeChannel channel, Damages& damages)
@@ -76,13 +77,13 @@ class TransitionStream {
   [[nodiscard]] std::int64_t end() const { return end_; }
   [[nodiscard]] bool exhausted() const { return remaining_ == 0 && chunks_ == 0; }
   [[nodiscard]] bool damaged() const { return !damage_.what.empty(); }
-  /// Returns the last good time before the damage.
+  /// Returns the time of the last good transition, in picoseconds: the place of a damage.
   [[nodiscard]] std::int64_t last() const { return last_; }
   [[nodiscard]] Damage damage() const { return damage_; }
-  /// Returns the time up to which all transitions are known: that of the last transition read ahead, unless exhausted.
+  /// Returns the time up to which all transitions are known, in picoseconds: that of the last transition read ahead.
   [[nodiscard]] std::int64_t known() const { return last_; }
 
-  /// Reads ahead until a transition before `known` is available or the file ends.
+  /// Reads ahead until a transition before the time `known` is available or the file ends.
   void refill(std::int64_t origin) {
     times_.erase(times_.begin(), times_.begin() + static_cast<std::ptrdiff_t>(next_));
     next_ = 0;
@@ -99,7 +100,7 @@ class TransitionStream {
     }
   }
 
-  /// Appends the transitions before `limit`, in ticks from `origin`.
+  /// Appends the times of the transitions before `limit` to `at`, in ticks from `origin`.
   void take(std::int64_t limit, std::int64_t origin, std::vector<Tick>& at) {
     for (; next_ < times_.size() && times_[next_] < limit; ++next_) {
       at.push_back(static_cast<Tick>(times_[next_]) - static_cast<Tick>(origin));
@@ -138,7 +139,7 @@ class TransitionStream {
     return true;
   }
 
-  // Adds a change. Two changes within a picosecond cancel each other.
+  // Adds a level change at `time`. Two changes within a picosecond cancel each other.
   void toggle_at(std::int64_t time) {
     if (!times_.empty() && times_.back() == time) {
       times_.pop_back();
@@ -171,13 +172,13 @@ class TransitionStream {
   Damages* damages_;
   std::uint32_t version_ = 0;
   std::uint64_t position_ = 0;
-  std::uint64_t chunks_ = 0;     // number of chunks still to read
-  std::uint64_t remaining_ = 0;  // number of transitions of the present chunk still to read
+  std::uint64_t chunks_ = 0;     // number of chunks of the file that are not read yet
+  std::uint64_t remaining_ = 0;  // number of transitions in the present chunk that are not read yet
   std::int64_t begin_ = 0;
   std::int64_t end_ = std::numeric_limits<std::int64_t>::min();
   std::int64_t last_ = 0;
-  bool state_ = false;   // level behind the transitions read so far
-  bool before_ = false;  // level behind the transitions returned so far
+  bool state_ = false;   // level after the transitions read so far
+  bool before_ = false;  // level after the transitions returned so far
   std::vector<std::int64_t> times_;
   std::size_t next_ = 0;
   Damage damage_;
@@ -205,7 +206,7 @@ class SaleaeReader final : public ParsedReader {
     if (done_) return false;
     begin_block(block, index_++, first_);
     block.changes.resize(streams_.size());
-    // All transitions of every channel before `limit` are known.
+    // Limit of the block: all transitions of every channel before this time are known.
     std::optional<std::int64_t> limit;
     std::optional<std::int64_t> damaged;
     for (TransitionStream& stream : streams_) {

@@ -17,16 +17,18 @@ struct SaleaeChannel {
   std::unique_ptr<Source> source;
 };
 
-/// Returns true if a file with this beginning is such an export, digital or analog.
+/// Returns true if a file that begins with `head` is a binary export of Saleae, digital or analog.
 [[nodiscard]] bool is_saleae(std::string_view head);
 
 /// Returns the channel name for a file name without ".bin": "Channel 3" for "digital_3", as Logic 2 names its files;
 /// any other name unchanged.
 [[nodiscard]] std::string saleae_channel_name(std::string_view stem);
 
-/// Reads versions 0 and 1, little endian, after "<SALEAE>", int32 version and int32 type (0: digital):
+/// Reads binary exports of versions 0 and 1, little endian, after "<SALEAE>", int32 version and int32 type (0:
+/// digital):
 ///
-/// - 0: uint32 initial state, double begin and end in seconds, uint64 number of transitions, a double for each
+/// - 0: uint32 initial state, double begin and end in seconds, uint64 number of transitions, a double with the time of
+///   each transition
 /// - 1: uint64 number of chunks; each like version 0, with a double sample rate behind the initial state. Between
 ///   chunks the level is constant, and the gap is noted.
 ///

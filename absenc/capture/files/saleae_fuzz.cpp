@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Reads any bytes as a binary export, and valid ones of both versions with some bytes changed.
+// Reads any bytes as a binary export of Saleae, and valid exports of both versions with some bytes changed.
 #include "absenc/capture/files/saleae.hpp"
 
 #include "absenc/capture/files/test_files.hpp"

@@ -23,8 +23,8 @@ namespace absenc::capture {
 
 namespace {
 
-// A piece takes memory in each thread, and libdeflate can expand it only as a whole: larger pieces are expanded by
-// libzip.
+// Limit in bytes for a piece that a block holds as a whole. Such a piece takes memory in each thread, because
+// libdeflate can expand it only as a whole: larger pieces are expanded by libzip in parts.
 constexpr std::uint64_t largest_piece = 1 << 24;  // sigrok-cli writes pieces of 4 MiB, PulseView of 10 MiB
 constexpr std::uint64_t streamed_bytes = 1 << 22;
 constexpr std::uint64_t longest_metadata = 1 << 20;
@@ -47,7 +47,7 @@ unsigned to_number(std::string_view text) {
   return error == std::errc() && end == text.data() + text.size() ? value : 0;
 }
 
-// Parses the first device with samples.
+// Parses the metadata of a session: the first device that has samples.
 Metadata parse_metadata(std::string_view text) {
   Metadata found;
   bool in_device = false;
@@ -74,7 +74,7 @@ Metadata parse_metadata(std::string_view text) {
   return found;
 }
 
-// Widens samples of 3, 5, 6 or 7 bytes, which are packed at the beginning, in place.
+// Widens samples of 3, 5, 6 or 7 bytes in place to 4 or 8 bytes; they are packed at the beginning of `samples`.
 void widen(std::vector<std::uint8_t>& samples, std::size_t count, std::size_t from, std::size_t to) {
   for (std::size_t i = count; i-- > 0;) {
     std::memmove(&samples[i * to], &samples[i * from], from);
@@ -120,7 +120,7 @@ class SigrokReader final : public Reader {
   }
 
   void fill(Block& block) override {
-    if (block.file_size == 0) return;  // a part of a streamed piece, which `claim` has read
+    if (block.file_size == 0) return;  // the block is a part of a streamed piece, which `claim` has already read
     const auto index = static_cast<std::size_t>(block.file_offset);
     const SamplePiece& piece = pieces_[index];
     const auto size = static_cast<std::size_t>(piece.entry.size);
@@ -153,12 +153,12 @@ class SigrokReader final : public Reader {
     std::string name;
     ZipArchive::Entry entry{};
     Tick first = 0;
-    // Number of bytes at the borders of pieces: sigrok splits samples of 3 bytes there.
-    unsigned skip = 0;  // bytes at the beginning that belong to a sample of the previous piece
-    unsigned tail = 0;  // bytes of the last sample that are in the next piece
+    // Number of bytes of split samples at the borders of this piece: sigrok splits samples of 3 bytes between pieces.
+    unsigned skip = 0;  // bytes at the beginning of the piece that belong to the last sample of the previous piece
+    unsigned tail = 0;  // bytes of this piece's last sample that are in the next piece
   };
 
-  // Opens the archive; a file without a directory at its end gets a new one.
+  // Opens the session as a zip archive; a file that lost the directory at its end gets a new one.
   void open_archive(std::string_view name) {
     std::unique_ptr<ZipArchive> archive = take_handle();
     if (archive == nullptr) {
@@ -214,7 +214,7 @@ class SigrokReader final : public Reader {
     }
   }
 
-  // Returns N of all entries NAME-N, in rising order.
+  // Returns the numbers N of all entries named NAME-N, in rising order.
   static std::vector<unsigned> numbers_of_pieces(const ZipArchive& archive, const std::string& name) {
     std::vector<unsigned> numbers;
     for (const std::string& entry : archive.names()) {
@@ -227,8 +227,8 @@ class SigrokReader final : public Reader {
     return numbers;
   }
 
-  // Leaves a gap for missing pieces. sigrok writes all pieces but the last with equal length, so the time of later
-  // pieces is known. Returns the number of bytes before `next`.
+  // Leaves a gap in the capture for missing pieces. sigrok writes all pieces but the last with equal length, so the
+  // time of later pieces is known. Returns the number of bytes of samples before the piece `next`.
   std::uint64_t leave_gap(ZipArchive& archive, const std::string& name, const std::string& next,
                           std::pair<unsigned, unsigned> missing_numbers, std::uint64_t before) {
     ZipArchive::Entry neighbour;
@@ -303,18 +303,19 @@ class SigrokReader final : public Reader {
 
   [[nodiscard]] bool is_cut(const SamplePiece& piece) const { return cut_ && cut_->cut_entry == piece.entry.index; }
 
-  // Returns whether a piece that was read is correct except for its missing end.
+  // Returns whether a piece that was read is the one that the end of a cut file shortened, and is correct up to the
+  // cut.
   [[nodiscard]] bool ends_at_cut(const SamplePiece& piece, const ZipArchive* archive) const {
     return is_cut(piece) && archive != nullptr && archive->ran_out();
   }
 
-  // Returns the number of bytes from here to the beginning of the next sample.
+  // Returns the number of bytes that the sample at offset `bytes` of the data needs to be complete.
   [[nodiscard]] unsigned missing(std::uint64_t bytes) const {
     return static_cast<unsigned>((unit_size_ - bytes % unit_size_) % unit_size_);
   }
 
-  // Reads the part of a piece's last sample that is in the next piece; less if that piece is damaged, which is reported
-  // there.
+  // Reads the part of a piece's last sample that is in the next piece, and returns its size: less if the next piece is
+  // damaged, which is reported for that piece.
   [[nodiscard]] std::size_t read_tail(ZipArchive& archive, std::size_t index, std::span<std::uint8_t> into) const {
     return into.empty() || !archive.open(pieces_[index + 1].entry) ? 0 : archive.read(into);
   }
@@ -325,7 +326,7 @@ class SigrokReader final : public Reader {
     block.end = first + count;
   }
 
-  // Completes a block with `count` samples in the file's sample size.
+  // Completes a block that holds `count` samples in the file's sample size.
   void finish(Block& block, std::size_t count) const {
     if (unit_size_ != bytes_per_sample_) {
       block.samples.resize(std::max(block.samples.size(), count * bytes_per_sample_));
@@ -347,7 +348,7 @@ class SigrokReader final : public Reader {
     return_handle(std::move(stream_));
   }
 
-  // Reads the next part of a large piece.
+  // Reads the next part of a large piece into `block`.
   void claim_streamed(Block& block) {
     const SamplePiece& piece = pieces_[next_ - 1];
     const auto wanted = static_cast<std::size_t>(std::min(stream_left_, streamed_bytes / unit_size_ * unit_size_));
@@ -379,7 +380,8 @@ class SigrokReader final : public Reader {
                           ", is damaged: " + why});
   }
 
-  // Data before the cut is as it was written: a disk that lost other parts leaves complete pieces with wrong checksums.
+  // Reports that the file is cut off. Data before the cut is as it was written: a disk that lost other parts leaves
+  // complete pieces with wrong checksums.
   void report_cut(const SamplePiece& piece, Tick at, bool checked) {
     damages_.add({.offset = cut_->end,
                   .tick = at,
@@ -420,7 +422,7 @@ class SigrokReader final : public Reader {
   unsigned bytes_per_sample_ = 1;
   std::size_t next_ = 0;
   std::uint64_t index_ = 0;
-  std::unique_ptr<ZipArchive> stream_;  // the large piece being read
+  std::unique_ptr<ZipArchive> stream_;  // the large piece that is being read in parts; null: none
   Tick stream_tick_ = 0;
   std::uint64_t stream_left_ = 0;
   Layout layout_;

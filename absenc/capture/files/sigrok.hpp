@@ -11,7 +11,7 @@
 
 namespace absenc::capture {
 
-/// Returns true if a file with this beginning is a zip archive.
+/// Returns true if a file that begins with `head` is a zip archive.
 [[nodiscard]] bool is_zip(std::string_view head);
 
 /// Reads sessions of versions 1 and 2 with up to 64 logic channels; analog channels are left out, with a note. Without
@@ -19,7 +19,7 @@ namespace absenc::capture {
 ///
 /// - A piece of up to 16 MiB is one block, expanded by `fill`; a larger one is expanded by `claim`, 4 MiB at a time.
 /// - A damaged piece is an empty block, because it is unknown which of its samples are wrong (a larger piece ends where
-///   the damage shows); later pieces are valid. The offset of the damage is that of the piece.
+///   the damage shows); later pieces are valid. The damage has the offset of the piece in the file.
 /// - If the file is cut off, everything before the cut is read; the damage has the offset and the tick of the cut. The
 ///   remaining part of the cut piece is used if it can be expanded, although its checksum cannot be verified.
 [[nodiscard]] std::unique_ptr<Reader> read_sigrok(std::unique_ptr<Source> source, std::string_view name,

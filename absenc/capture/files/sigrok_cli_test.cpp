@@ -23,7 +23,7 @@ class SigrokCli : public testing::Test {
   }
   ~SigrokCli() override { std::filesystem::remove_all(folder_); }
 
-  // Returns samples of `channels` lines that change rarely, in as many bytes as sigrok needs.
+  // Returns samples of `channels` lines whose levels change rarely, with as many bytes per sample as sigrok needs.
   FileBytes make_samples(unsigned channels, std::size_t count) {
     std::mt19937_64 random(channels);
     const unsigned bytes = (channels + 7) / 8;
@@ -43,7 +43,7 @@ class SigrokCli : public testing::Test {
     ASSERT_EQ(std::system(command.c_str()), 0) << command;
   }
 
-  // Converts raw samples to a session, from which sigrok-cli writes the other formats.
+  // Writes raw samples as a session, which sigrok-cli then converts to the other formats.
   void write_session(unsigned channels) {
     run("-I binary:numchannels=" + std::to_string(channels) + ":samplerate=12500000 -i samples -o session");
   }
@@ -51,7 +51,7 @@ class SigrokCli : public testing::Test {
   std::filesystem::path folder_;
 };
 
-// Returns the level changes of one channel in samples of `bytes` bytes.
+// Returns the level changes of one channel in samples of `bytes` bytes each.
 Changes changes_of(const FileBytes& samples, unsigned bytes, unsigned channel) {
   Changes changes;
   bool level = false;
@@ -85,7 +85,7 @@ TEST_F(SigrokCli, Sessions) {
   }
 }
 
-// Sessions of two writers, cut off as by an interrupted copy.
+// Reads sessions of two writers, sigrok-cli and this library, cut off as by an interrupted copy.
 TEST_F(SigrokCli, CutSessions) {
   make_samples(8, 9'000'000);
   ASSERT_NO_FATAL_FAILURE(write_session(8));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Reads any bytes as a session, a complete and a cut one with some bytes changed, and any metadata.
+// Reads any bytes as a sigrok session; a complete and a cut session with some bytes changed; and any metadata.
 #include "absenc/capture/files/sigrok.hpp"
 
 #include <algorithm>
@@ -16,7 +16,7 @@ FileBytes session(const FileBytes& metadata, const FileBytes& samples, bool defl
                   deflate);
 }
 
-// Cuts the file within the last piece.
+// Returns the file cut off within its last piece.
 FileBytes cut_off(FileBytes file) {
   constexpr std::string_view directory = "PK\x01\x02";
   file.erase(std::search(file.begin(), file.end(), directory.begin(), directory.end()) - 5, file.end());

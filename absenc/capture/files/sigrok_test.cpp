@@ -12,7 +12,7 @@
 namespace absenc::capture {
 namespace {
 
-// Returns samples like those of a line: long runs, and a part that does not compress.
+// Returns samples with long runs, like those of a real line, and a part that cannot be compressed.
 FileBytes wave(std::size_t size) {
   std::mt19937 random(11);
   FileBytes bytes(size);
@@ -79,7 +79,8 @@ TEST(Sigrok, OnePieceThatIsLargeComesInParts) {
 }
 
 TEST(Sigrok, SamplesOfThreeBytesAreSpread) {
-  for (const std::size_t count : {std::size_t{1000}, std::size_t{6'000'000}}) {  // as one piece, and in parts
+  for (const std::size_t count : {std::size_t{1000}, std::size_t{6'000'000}}) {  // one piece that is a single block,
+                                                                                 // and one that is read in parts
     const FileBytes samples = wave(3 * count);
     const auto reader = open_bytes(session(sigrok_metadata("1 MHz", 24, 3), {{"logic-1-1", samples}}));
     const CaptureContents contents = read_all(*reader);
@@ -133,7 +134,7 @@ TEST(Sigrok, ADamagedPieceIsCutShortAndTheOthersCount) {
   const FileBytes samples = wave(300'000);
   const FileBytes good =
       session(sigrok_metadata("1 MHz", 8, 1), {{"logic-1-1", samples}, {"logic-1-2", samples}, {"logic-1-3", samples}});
-  // Changes bytes of the second of three pieces; its deflated data follows its name in the local header.
+  // Changes bytes in the second of three pieces; the deflated data of a piece follows its name in the local header.
   const std::string_view name = "logic-1-2";
   const auto local = std::search(good.begin(), good.end(), name.begin(), name.end());
   const auto begin = static_cast<std::size_t>(local - good.begin());
@@ -182,9 +183,9 @@ TEST(Sigrok, APieceWithAWrongChecksumIsLeftOutAndTheOthersCount) {
     std::vector<std::pair<std::string, FileBytes>> pieces;
     for (int i = 1; i <= 12; ++i) pieces.emplace_back("logic-1-" + std::to_string(i), samples);
     FileBytes file = session(sigrok_metadata("1 MHz", 8, 1), pieces, "2", deflate);
-    constexpr std::string_view name = "logic-1-7";  // the name is in front of the piece and in the directory
+    constexpr std::string_view name = "logic-1-7";  // the name is stored in front of the piece and in the directory
     const auto in_directory = std::find_end(file.begin(), file.end(), name.begin(), name.end());
-    *(in_directory - 30) ^= 1;  // a byte of the checksum
+    *(in_directory - 30) ^= 1;  // changes a byte of the piece's checksum
     const auto reader = open_bytes(file);
     FileBytes expected;
     for (int i = 0; i < 11; ++i) expected.insert(expected.end(), samples.begin(), samples.end());
@@ -243,9 +244,10 @@ TEST(Sigrok, ReadsEverythingBeforeACut) {
     for (std::size_t size = 4; size < good.size(); ++size) {
       SCOPED_TRACE(size);
       const FileBytes file = cut_at(good, size);
-      if (size < first + 39) {  // the first piece is missing completely
+      if (size < first + 39) {  // the first piece is completely missing
         const std::string why = problem(file);
-        const std::size_t seen = size + (deflate ? 1 : 0);  // the last byte of deflated data only marks the end
+        const std::size_t seen = size + (deflate ? 1 : 0);  // number of bytes needed for all samples: the last byte of
+                                                            // deflated data only marks the end
         EXPECT_NE(why.find("cut off at byte "), std::string::npos) << why;
         EXPECT_NE(why.find(seen < metadata - 30 ? "version:"
                            : seen < first       ? "metadata:"
@@ -261,12 +263,12 @@ TEST(Sigrok, ReadsEverythingBeforeACut) {
       const Damage& damage = reader->damages()[0];
       EXPECT_EQ(damage.tick, contents.samples.size());
       EXPECT_LE(damage.offset, size);
-      EXPECT_GE(damage.offset + 39, std::min(size, directory));  // the damage may be reported at the beginning of an
+      EXPECT_GE(damage.offset + 39, std::min(size, directory));  // a damage may be reported at the beginning of an
                                                                  // incomplete header
       EXPECT_EQ(damage.note, size >= directory + 4);
       EXPECT_NE(damage.what.find("cut off"), std::string::npos);
       if (deflate) continue;
-      std::size_t expected = 0;  // the size of stored data is known exactly
+      std::size_t expected = 0;  // samples expected before the cut; exactly known for stored data only
       for (const auto& [name, bytes] : pieces) {
         const std::size_t begin = place_of(good, name) + name.size();
         expected += std::min(std::max(size, begin) - begin, bytes.size());
@@ -293,7 +295,7 @@ TEST(Sigrok, ReadsExpandablePartOfCutPiece) {
   EXPECT_EQ(reader->damages()[0].tick, seen.size());
   EXPECT_NE(reader->damages()[0].what.find("within logic-1-2, and the checksum"), std::string::npos);
 
-  // Data that cannot be expanded is wrong at an earlier place too.
+  // Deflated data that cannot be expanded further may already be wrong at an earlier place.
   std::mt19937 random(5);
   std::generate(cut.begin() + static_cast<std::ptrdiff_t>(begin) + 1000, cut.end(),
                 [&] { return static_cast<std::uint8_t>(random()); });
@@ -336,7 +338,7 @@ TEST(Sigrok, SamplesOfThreeBytesMayBeCut) {
     EXPECT_EQ(reader->damages().size(), 1u);
     return contents.samples.size() / 4;
   };
-  EXPECT_EQ(count(second - 40), 333u);  // within the first piece, between its sample 333 and the rest
+  EXPECT_EQ(count(second - 40), 333u);  // the damage is within the first piece, between its sample 333 and the rest
   EXPECT_EQ(count(second - 1), 333u);
   EXPECT_EQ(count(second + 1), 333u);
   EXPECT_EQ(count(second + 2), 334u);
@@ -373,7 +375,7 @@ TEST(Sigrok, ACutArchiveEndsBeforeAnEntryOfUnknownSize) {
   FileBytes file = session(sigrok_metadata("1 MHz", 8, 1), {{"logic-1-1", samples}, {"logic-1-2", samples}});
   file.resize(place_of(file, "PK\x01\x02"));
   const std::size_t header = place_of(file, "logic-1-2") - 30;
-  file[header + 6] |= 1 << 3;  // flag: the size follows the data
+  file[header + 6] |= 1 << 3;  // flag of a local header: the size is stored behind the data
   const auto reader = open_bytes(file);
   EXPECT_EQ(read_all(*reader).samples, samples);
   ASSERT_EQ(reader->damages().size(), 1u);

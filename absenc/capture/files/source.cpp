@@ -15,7 +15,7 @@ namespace {
 
 using Handle = std::unique_ptr<std::filebuf>;
 
-// Opens a file without a buffer of its own: reads go directly to the caller's memory.
+// Opens a file without a buffer in the stream: reads go directly to the caller's memory. Returns null on failure.
 Handle open_handle(const std::filesystem::path& path) {
   auto handle = std::make_unique<std::filebuf>();
   handle->pubsetbuf(nullptr, 0);
@@ -23,7 +23,7 @@ Handle open_handle(const std::filesystem::path& path) {
   return handle;
 }
 
-// A file. A handle has only one position, so each reading thread takes its own handle.
+// A capture file on a disk. A handle has only one position, so each reading thread takes a handle of its own.
 class FileSource final : public Source {
  public:
   FileSource(std::filesystem::path path, std::uint64_t size, Handle first) : path_(std::move(path)), size_(size) {
@@ -43,7 +43,7 @@ class FileSource final : public Source {
       const auto wanted = static_cast<std::streamsize>(std::min<std::uint64_t>(into.size(), size_ - offset));
       const std::streamsize got = handle->sgetn(reinterpret_cast<char*>(into.data()), wanted);
       count = got > 0 ? static_cast<std::size_t>(got) : 0;
-    } catch (const std::exception&) {  // libstdc++ throws when the disk fails
+    } catch (const std::exception&) {  // libstdc++ throws when the disk fails; the read then returns fewer bytes
       return 0;
     }
     const std::lock_guard lock(mutex_);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The bytes of a capture file, on a disk or in memory.
+// Access to the bytes of a capture file, on a disk or in memory.
 #pragma once
 
 #include <cstddef>
@@ -12,21 +12,21 @@
 
 namespace absenc::capture {
 
-/// A capture cannot be opened: a sentence that states the reason and what to try.
+/// Exception for a capture that cannot be opened. Its text is a sentence that states the reason and what to try.
 struct OpenError : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// The bytes of a file. Several threads may read at once.
+/// The bytes of a capture file. Several threads may read at once.
 struct Source {
   virtual ~Source() = default;
   [[nodiscard]] virtual std::uint64_t size() const = 0;
-  /// Copies bytes from `offset` on and returns their number: fewer than requested only at the end of the file or if it
-  /// cannot be read further.
+  /// Copies bytes from `offset` on into `into` and returns their number: fewer than requested only at the end of the
+  /// file or if the file cannot be read further.
   [[nodiscard]] virtual std::size_t read(std::uint64_t offset, std::span<std::uint8_t> into) = 0;
 };
 
-/// Opens a file. Throws OpenError if it cannot be opened or is a folder.
+/// Opens a file as a source of bytes. Throws OpenError if the file cannot be opened or is a folder.
 [[nodiscard]] std::unique_ptr<Source> file_source(const std::filesystem::path& path);
 
 [[nodiscard]] std::unique_ptr<Source> memory_source(std::vector<std::uint8_t> bytes);

@@ -47,7 +47,8 @@ inline void require_that(bool condition) {
   if (!condition) std::abort();
 }
 
-/// Reads a capture to its end, into one reused block, and aborts if a block violates the rules in signal.hpp.
+/// Reads a capture to its end, into one reused block, and returns its contents; aborts if a block violates the rules in
+/// signal.hpp.
 inline CaptureContents read_all(Reader& reader) {
   CaptureContents all;
   Block block;
@@ -88,7 +89,7 @@ inline CaptureContents read_all(Reader& reader) {
   return all;
 }
 
-/// Returns the samples of a capture that four threads fill at once.
+/// Returns the samples of a capture whose blocks are filled by four threads at once.
 inline FileBytes read_in_threads(Reader& reader) {
   std::mutex mutex;
   std::vector<FileBytes> parts;
@@ -113,7 +114,7 @@ inline FileBytes read_in_threads(Reader& reader) {
   return all;
 }
 
-/// Returns a zip archive written by libzip with this compression method.
+/// Returns a zip archive with these entries, written by libzip with the given compression method.
 inline FileBytes make_zip(const std::vector<std::pair<std::string, FileBytes>>& entries, zip_int32_t method) {
   zip_source_t* target = zip_source_buffer_create(nullptr, 0, 0, nullptr);
   zip_source_keep(target);
@@ -135,7 +136,7 @@ inline FileBytes make_zip(const std::vector<std::pair<std::string, FileBytes>>& 
   return made;
 }
 
-/// Returns a zip archive with deflated or stored entries.
+/// Returns a zip archive with these entries, deflated or stored.
 inline FileBytes make_zip(const std::vector<std::pair<std::string, FileBytes>>& entries, bool deflate = true) {
   return make_zip(entries, deflate ? zip_int32_t{ZIP_CM_DEFLATE} : zip_int32_t{ZIP_CM_STORE});
 }
@@ -147,7 +148,7 @@ inline std::string sigrok_metadata(std::string_view rate, unsigned channels, uns
   return text + "unitsize=" + std::to_string(unit_size) + "\n";
 }
 
-/// Writes little endian numbers for binary exports.
+/// Writes little endian numbers for tests of Saleae's binary exports.
 struct BinaryWriter {
   FileBytes bytes;
 
@@ -177,7 +178,7 @@ inline FileBytes saleae_file(bool level, double begin, double end, const std::ve
   return writer.bytes;
 }
 
-/// Feeds a reader with the fuzzer's input as a file, and with a good file changed by the input: each three bytes give a
+/// Calls `read` with the fuzzer's input as a file, and with a good file changed by the input: each three bytes give a
 /// position and a new value; a single remaining byte cuts the file off.
 template <class Read>
 void fuzz_file(const std::uint8_t* data, std::size_t size, const FileBytes& good, Read read) {
@@ -191,7 +192,7 @@ void fuzz_file(const std::uint8_t* data, std::size_t size, const FileBytes& good
   read(std::move(changed));
 }
 
-/// Requires for any bytes that the reader reports why it cannot open them, or reads them to the end.
+/// Requires, for any bytes, that opening reports why it is impossible, or that the reader reads the capture to its end.
 inline void read_or_refuse(FileBytes bytes, const OpenChoices& choices = {}) {
   std::unique_ptr<Reader> reader;
   try {

@@ -16,7 +16,7 @@ namespace {
 
 constexpr std::size_t read_at_once = 1 << 18;
 
-// Parses a whole number of at most `most` digits that is all of `text`.
+// Parses all of `text` as a whole number of at most `most` digits. Returns nothing or false for another text.
 template <class Number>
 std::optional<Number> whole(std::string_view text, std::size_t most) {
   Number value = 0;
@@ -53,7 +53,7 @@ std::optional<Decimal> parse_decimal(std::string_view text) {
     } else if (is_digit(c) && decimal.count < decimal.digits.size()) {
       decimal.digits[decimal.count++] = c;
       if (!point) ++before;
-    } else if (!is_digit(c) || !point) {  // the number of digits behind the point is not limited
+    } else if (!is_digit(c) || !point) {  // the number of digits behind the decimal point is not limited
       return std::nullopt;
     }
   }
@@ -62,8 +62,8 @@ std::optional<Decimal> parse_decimal(std::string_view text) {
   return decimal;
 }
 
-// Returns `count` digits of the number from index `first` on, where index 0 is the first written digit; digits outside
-// are 0.
+// Returns the number made of `count` digits of `decimal` from index `first` on, where index 0 is the first written
+// digit; digits outside are 0.
 std::int64_t digits_at(const Decimal& decimal, std::int64_t first, std::int64_t count) {
   std::int64_t value = 0;
   for (std::int64_t i = first; i < first + count; ++i) {
@@ -94,7 +94,7 @@ bool read_plain_seconds(std::string_view text, Instant& instant) {
   return at == end;
 }
 
-// Parses seconds in any decimal form.
+// Parses seconds in any decimal form into `instant`; returns false if `text` is no number.
 bool read_seconds(std::string_view text, Instant& instant) {
   const std::optional<Decimal> decimal = parse_decimal(text);
   if (!decimal || decimal->point > 18) return false;
@@ -103,7 +103,7 @@ bool read_seconds(std::string_view text, Instant& instant) {
   return true;
 }
 
-// Returns the days since 1970 for "2026-11-21".
+// Returns the days since 1970 for a date like "2026-11-21"; nothing for an invalid date.
 std::optional<std::int64_t> parse_day(std::string_view text) {
   if (text.size() != 10 || text[4] != '-' || text[7] != '-') return std::nullopt;
   const auto year = whole<int>(text.substr(0, 4), 4);
@@ -115,7 +115,7 @@ std::optional<std::int64_t> parse_day(std::string_view text) {
   return std::chrono::sys_days(date).time_since_epoch().count();
 }
 
-// Returns the seconds east of Greenwich for "+01:00", "-0330", "Z".
+// Returns the seconds east of Greenwich for a time zone: "+01:00", "-0330", "Z"; nothing for another text.
 std::optional<std::int64_t> parse_zone(std::string_view text) {
   if (text.empty() || text == "Z") return 0;
   const std::string_view minutes =

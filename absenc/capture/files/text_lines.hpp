@@ -14,7 +14,7 @@
 
 namespace absenc::capture {
 
-/// Longest accepted line, in bytes.
+/// Greatest length of a line that `TextLines` accepts, in bytes.
 inline constexpr std::size_t longest_line = 1 << 20;
 
 [[nodiscard]] constexpr bool is_digit(char c) { return c >= '0' && c <= '9'; }
@@ -36,35 +36,35 @@ class TextLines {
 
   Source& source_;
   std::vector<std::uint8_t> buffer_;
-  std::size_t begin_ = 0;  // first unread byte in the buffer
+  std::size_t begin_ = 0;  // index of the first unread byte in the buffer
   std::size_t end_ = 0;
-  std::uint64_t base_ = 0;  // offset of the buffer in the file
+  std::uint64_t base_ = 0;  // offset in the file of the buffer's first byte
   std::uint64_t offset_ = 0;
   bool too_long_ = false;
 };
 
-inline constexpr std::int64_t nanosecond = 1000;  // a nanosecond in picoseconds
+inline constexpr std::int64_t nanosecond = 1000;  // number of picoseconds in a nanosecond
 inline constexpr std::int64_t picoseconds_per_second = 1'000'000'000'000;
 
-/// A time of day, or a time on the counter of any program.
+/// A time of day, or a time on the counter of any program, with a resolution of a picosecond.
 struct Instant {
   std::int64_t seconds = 0;
-  std::int64_t picoseconds = 0;  // 0 to 10^12 - 1, added to `seconds`
+  std::int64_t picoseconds = 0;  // picoseconds to add to `seconds`, 0 to 10^12 - 1
 };
 
-/// Parses seconds like "12", "-0.000125", "1.8e-08"; digits below a picosecond are cut off. No other characters are
-/// allowed.
+/// Parses seconds like "12", "-0.000125", "1.8e-08"; digits below a picosecond are cut off. Returns nothing if `text`
+/// contains anything else.
 [[nodiscard]] std::optional<Instant> parse_seconds(std::string_view text);
 
-/// Parses a clock time like "2026-11-21T17:55:24.123456789+00:00" (also a blank for T, Z, no zone), or "17:55:24.123"
-/// without a date.
+/// Parses a clock time like "2026-11-21T17:55:24.123456789+00:00" (also with a blank instead of T, with Z or without a
+/// zone), or "17:55:24.123" without a date. Returns nothing for another text.
 [[nodiscard]] std::optional<Instant> parse_clock(std::string_view text);
 
 /// Returns the time between two instants in ticks of `picoseconds`; nothing if `to` is before `from` or the number is
 /// too large.
 [[nodiscard]] constexpr std::optional<Tick> ticks_between(const Instant& from, const Instant& to,
                                                           std::int64_t picoseconds) {
-  // Both are below 10^18 seconds, so the difference fits.
+  // Seconds of both instants are below 10^18, so their difference fits.
   std::int64_t seconds = to.seconds - from.seconds;
   std::int64_t rest = to.picoseconds - from.picoseconds;
   if (rest < 0) {
@@ -82,7 +82,7 @@ struct Instant {
 
 [[nodiscard]] std::string_view trim(std::string_view text);
 
-/// Removes the next word, which ends at a blank, from `text` and returns it; "" at the end.
+/// Removes the next word, which ends at a blank, from the beginning of `text` and returns it; "" at the end of `text`.
 [[nodiscard]] std::string_view take_word(std::string_view& text);
 
 /// Returns the value of a hexadecimal digit, 0 to 15, or -1 for another character.

@@ -20,7 +20,8 @@ namespace absenc::capture {
 namespace {
 
 constexpr std::uint64_t block_text = 1 << 20;
-constexpr std::size_t block_changes = 1 << 20;  // separate limit, because one identifier may drive many channels
+constexpr std::size_t block_changes = 1 << 20;  // limit of the changes in a block, in addition to that of its bytes,
+                                                // because one identifier may drive many channels
 
 enum class Value : std::uint8_t { low, high, unknown, none };
 
@@ -96,7 +97,8 @@ class VcdReader final : public ParsedReader {
       }
     }
     done_ = true;
-    // A time without changes at the end of the file is the end; otherwise the last change is still in the capture.
+    // The end of the capture is the last time in the file if no changes follow it; otherwise one tick behind that time,
+    // so that the last changes are within the capture.
     block.end = std::max(block.first, now_ + (last_changed_ ? 1 : 0));
     unknown_.report(damages_, "values are x or z: taken as the level before");
     return true;
@@ -120,7 +122,7 @@ class VcdReader final : public ParsedReader {
     return true;
   }
 
-  // Handles a value change or a section.
+  // Handles a word that begins a time, a value change or a section. Returns false if the file is damaged from here on.
   bool take(std::string_view word) {
     if (word[0] == '$') return take_section(word);
     started_ = true;
@@ -170,7 +172,8 @@ class VcdReader final : public ParsedReader {
     return true;
   }
 
-  // Missing upper bits of a vector are 0 if its first bit is 0 or 1, otherwise equal to the first bit.
+  // Changes the channels of a vector. Missing upper bits are 0 if the first written bit is 0 or 1, otherwise equal to
+  // the first bit.
   bool change_vector(const VcdVariable& variable, std::string_view bits, std::uint64_t offset) {
     const Value extension = to_value(bits[0]) == Value::unknown ? Value::unknown : Value::low;
     for (std::size_t i = 0; i < std::max(variable.width, bits.size()); ++i) {
@@ -200,9 +203,9 @@ class VcdReader final : public ParsedReader {
   std::string vector_;
   std::uint64_t index_ = 0;
   Tick now_ = 0;
-  bool started_ = false;  // a time or a value was read
+  bool started_ = false;  // a time or a value change was read
   bool valued_ = false;   // a value change was read
-  bool initial_ = true;   // the present time is the first one
+  bool initial_ = true;   // the present time is the first time in the file
   bool last_changed_ = false;
   bool done_ = false;
   Occurrences unknown_;

@@ -28,7 +28,7 @@ bool parse(std::string_view text, long& value) {
   return error == std::errc() && end == text.data() + text.size();
 }
 
-// Parses "[7:0]" or "[3]"; returns false if `text` is no range.
+// Parses the index range of a variable, "[7:0]" or "[3]"; returns false if `text` is no range.
 bool parse_range(std::string_view text, long& left, long& right) {
   if (text.size() < 3 || text.front() != '[' || text.back() != ']') return false;
   text = text.substr(1, text.size() - 2);
@@ -38,7 +38,7 @@ bool parse_range(std::string_view text, long& left, long& right) {
   return colon == std::string_view::npos || parse(text.substr(colon + 1), right);
 }
 
-// Parses 1, 10 or 100 units of 1 s to 1 fs. Returns ticks per second, 0 if invalid.
+// Parses a time scale of 1, 10 or 100 units of 1 s to 1 fs. Returns ticks per second, 0 if the text is invalid.
 std::uint64_t parse_timescale(std::string_view text) {
   std::uint64_t number = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
@@ -101,7 +101,7 @@ void VcdHeader::read_timescale() {
 }
 
 void VcdHeader::read_scope() {
-  static_cast<void>(next("in $scope"));  // the type of the scope: module, task ...
+  static_cast<void>(next("in $scope"));  // skips the type of the scope: module, task ...
   const std::string scope = next("in $scope");
   if (scope == "$end") return scopes_.push_back(scopes_.empty() ? "" : scopes_.back());
   std::string path = scopes_.empty() ? scope : scopes_.back() + "." + scope;
@@ -132,7 +132,8 @@ void VcdHeader::read_variable() {
   if (!has_width || width < 1 || names_.size() + static_cast<std::size_t>(width) > most_channels) {
     fail("declares " + name.substr(0, 80) + " with an impossible width, or more than 65536 channels in all");
   }
-  if (std::abs(left - right) != width - 1) {  // the range belongs to something else: an element of an array
+  if (std::abs(left - right) != width - 1) {  // the range has another width than the variable: it is the index of an
+                                              // array element
     name += ranged ? "[" + std::to_string(left) + "]" : "";
     left = width - 1;
     right = 0;

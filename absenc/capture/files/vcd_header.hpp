@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The declarations of a value change dump: which identifier drives which channels.
+// The declarations of a value change dump: they state which identifier drives which channels.
 #pragma once
 
 #include <array>
@@ -17,15 +17,15 @@ namespace absenc::capture {
 /// The channels of one variable: `width` channels, of which `first` is the rightmost bit.
 struct VcdVariable {
   std::size_t first = 0;
-  std::size_t width = 0;  // 0: a variable that is left out
+  std::size_t width = 0;  // number of bits; 0: a variable that is left out
 };
 
 class VcdHeader {
  public:
-  /// Reads up to $enddefinitions. Throws OpenError.
+  /// Reads the declarations up to $enddefinitions. Throws OpenError if they are invalid.
   VcdHeader(TextWords& words, std::string_view name);
 
-  /// Returns all variables of an identifier; nullptr if it was not declared.
+  /// Returns all variables of an identifier; nullptr if the identifier was not declared.
   [[nodiscard]] const std::vector<VcdVariable>* find(std::string_view identifier) const {
     const std::size_t code = short_code(identifier);
     if (code < short_.size()) return short_[code] < 0 ? nullptr : &variables_[static_cast<std::size_t>(short_[code])];
@@ -75,7 +75,7 @@ class VcdHeader {
   std::unordered_map<std::string, std::size_t> long_;
   std::uint64_t ticks_per_second_ = 0;
   std::size_t left_out_ = 0;
-  std::uint64_t comments_ = 0;  // bytes of comments; their number is not limited and they are not stored
+  std::uint64_t comments_ = 0;  // number of bytes in comments, which are not stored and whose number is not limited
 };
 
 }  // namespace absenc::capture

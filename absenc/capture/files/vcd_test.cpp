@@ -39,14 +39,14 @@ TEST(Vcd, LevelsAndTimes) {
   EXPECT_EQ(reader->layout().channels, (Names{"tx", "rx"}));
   const CaptureContents contents = read_all(*reader);
   EXPECT_TRUE(contents.changes[0].before);
-  EXPECT_EQ(contents.changes[0].at, (Ticks{7}));  // the pulse without length at 9 is no change
+  EXPECT_EQ(contents.changes[0].at, (Ticks{7}));  // the pulse of no length at tick 9 is no change
   EXPECT_FALSE(contents.changes[1].before);
   EXPECT_EQ(contents.changes[1].at, (Ticks{9}));
   EXPECT_EQ(contents.end, 20u);
   EXPECT_TRUE(reader->damages().empty());
 }
 
-// A file too large for memory: one text repeated many times, then another.
+// A source for a file too large for memory: one text repeated many times, then another text.
 class Repeated final : public Source {
  public:
   Repeated(std::string part, std::uint64_t count, std::string last)
@@ -73,7 +73,7 @@ std::unique_ptr<Reader> open_repeated(const std::string& part) {
       "long.vcd");
 }
 
-// `absenc wave` writes each byte of the traffic as a comment.
+// Reads a dump as `absenc wave` writes it: each byte of the traffic is a comment.
 TEST(Vcd, AnyNumberOfCommentsBeforeTheChanges) {
   const auto reader = open_repeated("$comment #123456789012 device 1A and 0 more words like these in between $end\n");
   const CaptureContents contents = read_all(*reader);
@@ -161,7 +161,8 @@ TEST(Vcd, RefusesInvalidHeaders) {
   EXPECT_NE(problem("$timescale 1 us $end $var wire 999999999 ! a $end").find("impossible width"), std::string::npos);
 }
 
-// Many blocks, words across the borders of the read buffer, and identifiers of one to three characters.
+// Reads a file with many blocks, with words across the borders of the read buffer, and with identifiers of one to three
+// characters.
 TEST(Vcd, LargeFiles) {
   std::string text = "$timescale 1 ns $end\n";
   constexpr std::size_t channels = 300;

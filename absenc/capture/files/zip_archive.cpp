@@ -15,14 +15,15 @@ namespace absenc::capture {
 
 namespace {
 
-// The source as libzip reads it, with a buffer: libzip requests 8 KiB at a time, the system is asked for more.
+// A window into the source through which libzip reads: libzip requests 8 KiB at a time, and a larger buffer reduces the
+// calls of the system.
 struct Window {
   Source* source = nullptr;
   std::uint64_t position = 0;
   std::uint64_t buffered_at = 0;
   std::size_t buffered = 0;
   std::array<std::uint8_t, 1 << 16> buffer{};
-  bool mark = false;  // the next read is the first of an entry
+  bool mark = false;  // the next read is the first read of an entry
   std::uint64_t entry = 0;
   zip_error_t error{};
 
@@ -96,8 +97,8 @@ struct Close {
   void operator()(libdeflate_decompressor* inflater) const { libdeflate_free_decompressor(inflater); }
 };
 
-// Limit for the packed size: deflate adds 5 bytes to 64 KiB of incompressible data; a much larger entry would waste
-// memory.
+// Returns the limit for the packed size of an entry of `size` bytes: deflate adds 5 bytes to 64 KiB of incompressible
+// data; a much larger entry would waste memory.
 constexpr std::size_t most_packed(std::size_t size) { return size + size / 64 + 1024; }
 
 }  // namespace
@@ -105,7 +106,7 @@ constexpr std::size_t most_packed(std::size_t size) { return size + size / 64 + 
 struct ZipArchive::State {
   Window window;
   std::unique_ptr<zip_t, Close> archive;
-  std::unique_ptr<zip_file_t, Close> file;  // must be closed before its archive
+  std::unique_ptr<zip_file_t, Close> file;  // the entry that is read; must be closed before its archive
   std::unique_ptr<libdeflate_decompressor, Close> inflater;
   std::vector<std::uint8_t> packed;
   std::string problem;
@@ -195,7 +196,7 @@ std::size_t ZipArchive::read(std::span<std::uint8_t> into) {
   while (done < into.size()) {
     const zip_int64_t got = zip_fread(state_->file.get(), into.data() + done, into.size() - done);
     if (got <= 0) {
-      // At the end of an entry libzip checks its checksum and size.
+      // At the end of an entry libzip checks the entry's checksum and size.
       const int code = zip_error_code_zip(zip_file_get_error(state_->file.get()));
       state_->ran_out = got == 0 || code == ZIP_ER_CRC || code == ZIP_ER_INCONS;
       state_->problem = got == 0 ? "it ends early" : zip_error_strerror(zip_file_get_error(state_->file.get()));

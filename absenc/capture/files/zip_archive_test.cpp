@@ -12,7 +12,7 @@
 namespace absenc::capture {
 namespace {
 
-// Returns bytes of which half can be compressed.
+// Returns `size` bytes of which half can be compressed.
 FileBytes mixed(std::size_t size) {
   std::mt19937 random(7);
   FileBytes bytes(size);
@@ -22,7 +22,7 @@ FileBytes mixed(std::size_t size) {
 
 const FileBytes content = mixed(100'000);
 
-// Returns the byte at offset `at` of an entry in the directory, counted from its signature.
+// Returns the byte at offset `at` of an entry of the archive's directory; the offset begins at the entry's signature.
 std::uint8_t& in_directory(FileBytes& file, std::size_t at) {
   constexpr std::string_view signature = "PK\x01\x02";
   const auto found = std::search(file.begin(), file.end(), signature.begin(), signature.end());
@@ -83,7 +83,7 @@ TEST(ZipArchive, ReadingReportsDamage) {
   }
 }
 
-// Includes stored entries: libzip always checks their checksum.
+// Reads entries of other compression methods, and stored entries, whose checksum libzip always checks.
 TEST(ZipArchive, ReadsOtherCompressionMethodsWithoutExpand) {
   for (const zip_int32_t method : {ZIP_CM_STORE, ZIP_CM_BZIP2}) {
     if (zip_compression_method_supported(method, 1) == 0) continue;

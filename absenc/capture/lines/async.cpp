@@ -13,9 +13,9 @@ namespace {
 
 constexpr Tick never = std::numeric_limits<Tick>::max();
 constexpr Tick characters_ahead = 12;   // number of characters examined to find the first start bit
-constexpr std::size_t candidates = 16;  // number of falling edges tried as start bit: more of them within a character
-                                        // are noise
-constexpr std::size_t step = 64;        // number of changes after which the guess is compared with the true state
+constexpr std::size_t candidates = 16;  // number of falling edges tried as the first start bit: more than 16 within a
+                                        // character are noise
+constexpr std::size_t step = 64;        // number of changes after which the true state is compared with the guess again
 
 }  // namespace
 
@@ -23,8 +23,8 @@ constexpr std::size_t step = 64;        // number of changes after which the gue
 struct AsyncDecoder::Candidate {
   Tick begin;
   unsigned levels;
-  Tick last;      // last change within the character
-  unsigned bits;  // number of bits from `begin` to `last`
+  Tick last;      // time of the last change within the character
+  unsigned bits;  // number of bits from the character's `begin` to `last`
   Tick next;      // first falling edge behind the middle of the stop bit
 };
 
@@ -62,9 +62,9 @@ void AsyncDecoder::restart(Start start) {
   unsure_.reset();
 }
 
-// Visits characters from the falling edge `start` on, as long as `needed` ticks of each lie before `limit`. `visit`
-// returns false to stop before the character passed to it. Returns the index of the falling edge at which to continue,
-// which may be one behind the known edges. `edges_` ends with `never`.
+// Visits the characters from the falling edge with index `start` on, as long as `needed` ticks of a character lie
+// before `limit`. `visit` returns false to stop before the character passed to it. Returns the index of the falling
+// edge at which to continue, which may be that of the next edge, not known yet. `edges_` ends with `never`.
 template <class Visit>
 std::size_t AsyncDecoder::walk(std::size_t start, Tick limit, Tick needed, Visit&& visit) const {
   const Tick* const edges = edges_.data();
@@ -116,8 +116,8 @@ std::uint64_t AsyncDecoder::faults_from(std::size_t start, Tick limit) const {
   return faults;
 }
 
-// Returns the index of the first start bit, or nothing if more changes are needed. The result does not depend on how
-// many further changes are known already.
+// Returns the index of the edge that begins the first start bit, or nothing if more changes are needed. The result does
+// not depend on how many further changes are known already.
 std::optional<std::size_t> AsyncDecoder::find_start(Tick limit, bool final) const {
   const std::size_t count = edges_.size() - 1;
   const std::size_t first = level_ ? 0 : 1;
@@ -243,7 +243,8 @@ void AsyncDecoder::join(const Changes& part, Tick first, Tick end, AsyncDecoder&
   const auto met = meet(part, first, end, guessed, characters);
   if (!met) return;
   characters.insert(characters.end(), guessed.begin() + static_cast<std::ptrdiff_t>(*met), guessed.end());
-  // The faults that `other` counted before the two met are wrong: they are computed again and subtracted.
+  // `other` counted wrong faults before its characters met those of this decoder: a third decoder counts these faults
+  // again, and they are subtracted.
   AsyncDecoder wrong(format_, channel_, Start::trust);
   std::vector<Character> ignored;
   wrong.meet(part, first, end, std::span(guessed).subspan(*met, 1), ignored);

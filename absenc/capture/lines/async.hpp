@@ -22,44 +22,45 @@ struct AsyncFormat {
   Tick glitch = 0;         // a level shorter than this is noise; 0: no filter
 };
 
-/// Decodes a capture part by part. A bit is the level at its middle, counted from the falling edge of the start bit; a
-/// pulse that is not low at the middle of its start bit is no character. After a wrong stop bit, the next falling edge
-/// begins a character.
+/// A decoder of asynchronous characters, which decodes a capture part by part. A bit is the level at its middle,
+/// counted from the falling edge of the start bit; a pulse that is not low at the middle of its start bit is no
+/// character. After a wrong stop bit, the next falling edge begins a character.
 ///
-/// Between parts it stores the changes from the first incomplete character on, and no state within a character.
+/// Between parts the decoder stores the changes from the first incomplete character on, and no state within a
+/// character.
 ///
 /// A capture may begin inside a character: of the falling edges within the first character, the one with the fewest
 /// errors in the next twelve characters is the start bit.
 class AsyncDecoder {
  public:
-  /// Sums over all characters without an error, from the start bit to the last change, so that rounding errors do not
-  /// add up.
+  /// Sums over all characters without an error, from the start bit to the last change of a character, from which the
+  /// true bit time is measured: rounding errors do not add up.
   struct Statistics {
     std::uint64_t ticks = 0;
     std::uint64_t bits = 0;
     std::uint64_t characters = 0;
-    std::uint64_t faults = 0;  // wrong stop and parity bits, and falling edges that were no start bit
+    std::uint64_t faults = 0;  // number of wrong stop and parity bits, and of falling edges that were no start bit
 
     Statistics& operator+=(const Statistics& other);
     Statistics& operator-=(const Statistics& other);
   };
-  /// Whether the first start bit must be searched, or is the first falling edge.
+  /// How decoding begins: the first start bit must be searched, or the first falling edge is a start bit.
   enum class Start : std::uint8_t { search, trust };
 
-  /// `channel` is stored in each character.
+  /// `channel` is stored as the channel of each character.
   explicit AsyncDecoder(const AsyncFormat& format, std::uint8_t channel = 0, Start start = Start::search);
 
-  /// Clears everything except the statistics: the next part does not follow the previous one.
+  /// Clears everything except the statistics, because the next part does not follow the previous one.
   void restart(Start start = Start::search);
-  /// Decodes the next part, from `first` to `end`. If `part.before` differs from the last level, the line changed at
-  /// `first`.
+  /// Decodes the next part, from the tick `first` to `end`, and appends its complete characters. If `part.before`
+  /// differs from the last level, the line changed at `first`.
   void decode(const Changes& part, Tick first, Tick end, std::vector<Character>& characters);
   /// Works like `decode` with the result of `other`, which has decoded the same part into `guessed` after a restart
   /// with `Start::trust`. The correct part of the guess is taken over with its state. The result equals that of
   /// `decode` exactly.
   void join(const Changes& part, Tick first, Tick end, AsyncDecoder& other, std::vector<Character>& guessed,
             std::vector<Character>& characters);
-  /// Ends the capture; also returns characters whose stop bit has begun.
+  /// Ends the capture; appends the character in progress if its stop bit has begun.
   void finish(std::vector<Character>& characters);
 
   /// Returns a time before which no further character begins.
@@ -76,7 +77,8 @@ class AsyncDecoder {
   [[nodiscard]] std::optional<std::size_t> find_start(Tick limit, bool final) const;
   [[nodiscard]] std::uint64_t faults_from(std::size_t start, Tick limit) const;
 
-  // Decodes until a character begins at the same time as one of `targets`; returns its index and stops before it.
+  // Decodes until a character begins at the same time as one of `targets`; returns the index of that target and stops
+  // before it. Returns nothing if the part ends first.
   std::optional<std::size_t> meet(const Changes& part, Tick first, Tick end, std::span<const Character> targets,
                                   std::vector<Character>& characters);
   void begin_part(const Changes& part, Tick first);
@@ -86,19 +88,20 @@ class AsyncDecoder {
 
   AsyncFormat format_;
   std::uint8_t channel_;
-  unsigned stop_;                  // index of the stop bit
-  std::array<Tick, 11> middle_{};  // middle of each bit in ticks, from the falling edge
+  unsigned stop_;                  // index of the stop bit, counted from the start bit
+  std::array<Tick, 11> middle_{};  // time from the falling edge of the start bit to the middle of each bit, in ticks
   Tick length_;                    // duration of a character in ticks
-  double per_tick_;                // number of bits per tick
+  double per_tick_;                // number of bits per tick, at most 0.4
 
   Start start_;
   bool begun_ = false;
-  Tick origin_ = 0;             // beginning of the first part
-  Tick end_ = 0;                // end of the last part
-  bool line_ = true;            // level behind all changes fed so far; from here on, idle is high
+  Tick origin_ = 0;             // first tick of the first part
+  Tick end_ = 0;                // end of the last part, in ticks
+  bool line_ = true;            // level of the line behind all changes fed so far; idle is high, as an inverted line is
+                                // inverted before
   bool level_ = true;           // level before the first of `edges_`
   std::vector<Tick> edges_;     // changes from the first incomplete character on
-  std::optional<Tick> unsure_;  // a change that may be part of a glitch
+  std::optional<Tick> unsure_;  // time of a change that may be part of a glitch
   Statistics statistics_;
 };
 

@@ -13,9 +13,9 @@ constexpr double shortest_bit = 2.5;       // shortest bit time, in ticks
 constexpr std::size_t fewest_changes = 4;  // two pulses, the least from which a bit time can be found
 constexpr std::size_t tried_changes = 4096;
 constexpr std::size_t most_clusters = 8;
-constexpr int most_bits = 4;    // the shortest pulse may have up to this number of bits
+constexpr int most_bits = 4;    // limit for the number of bits in the shortest pulse
 constexpr double worst = 0.5;   // errors per character above which a format is refused
-constexpr double alike = 0.01;  // formats whose errors per character differ by less count as equal
+constexpr double alike = 0.01;  // formats count as equal if their errors per character differ by less
 
 // Returns the lengths of the pulses between changes, without glitches, the shortest first.
 std::vector<Tick> pulses(const Changes& changes, Tick glitch) {
@@ -28,7 +28,7 @@ std::vector<Tick> pulses(const Changes& changes, Tick glitch) {
   return lengths;
 }
 
-// Returns the bit time as the mean over pulses that have up to `most` bits and are nearly a multiple of `bit`.
+// Returns the bit time in ticks as the mean over pulses that have up to `most` bits and are nearly a multiple of `bit`.
 double fitted(const std::vector<Tick>& lengths, double bit, double most) {
   double ticks = 0;
   double bits = 0;
@@ -43,7 +43,8 @@ double fitted(const std::vector<Tick>& lengths, double bit, double most) {
   return bits == 0 ? bit : ticks / bits;
 }
 
-// Returns the mean lengths of groups of similar pulses, the shortest first. Rare lengths are noise and are left out.
+// Returns the mean lengths of groups of similar pulses, the shortest first. Pulses of rare lengths are noise and are
+// left out.
 std::vector<double> clusters(const std::vector<Tick>& lengths) {
   const std::size_t rare = lengths.size() < 50 ? 1 : std::max<std::size_t>(2, lengths.size() / 200);
   std::vector<double> means;
@@ -87,8 +88,8 @@ AsyncDecoder::Statistics decoded(const Stretch& part, const AsyncFormat& format)
   return decoder.statistics();
 }
 
-// Returns the errors per character. Pulses that are clearly shorter than a bit count as errors too: in a short capture,
-// a bit time that is too long may cause no others.
+// Returns the number of errors per character. Pulses that are clearly shorter than a bit count as errors too: in a
+// short capture, a bit time that is too long may cause no others.
 double faults(const AsyncDecoder::Statistics& statistics, const std::vector<Tick>& lengths, double bit) {
   if (statistics.characters == 0) return 1;
   const auto shorter = std::find_if(lengths.begin(), lengths.end(),

@@ -10,9 +10,9 @@ namespace absenc::capture {
 
 enum class Idle : std::uint8_t { automatic, low, high };
 
-/// Settings of a line that the user knows.
+/// Settings of an asynchronous line as far as the user knows them.
 struct AsyncSettings {
-  double baud = 0;  // 0: detected from the changes
+  double baud = 0;  // baud rate in bits per second; 0: detected from the changes
   Parity parity = Parity::none;
   unsigned stop_bits = 1;
   Idle idle = Idle::automatic;  // `low` means an inverted line
@@ -20,10 +20,10 @@ struct AsyncSettings {
 };
 
 /// Finds the format from the first changes of a line between `first` and `end`. It tries each bit time of which the
-/// pulses could be multiples, with each idle level, and takes the one with the fewest errors; of equal ones the longest
-/// bit. The bit time is then measured from start bit to last change. Returns nothing if there are too few changes to
-/// find the baud rate, or if every second character would be wrong. `ticks_per_second` is needed when the baud rate is
-/// given.
+/// pulses could be multiples, with each idle level, and takes the format with the fewest errors, of equal formats that
+/// with the longest bit. The bit time is then measured from the start bit to the last change of the characters. Returns
+/// nothing if there are too few changes to find the baud rate, or if every second character would be wrong.
+/// `ticks_per_second` is needed when the baud rate is given.
 std::optional<AsyncFormat> find_format(const Changes& changes, Tick first, Tick end, const AsyncSettings& settings,
                                        std::uint64_t ticks_per_second);
 

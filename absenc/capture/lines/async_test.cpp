@@ -60,7 +60,7 @@ TEST(Async, ACharacterLastsFromItsStartBitToTheEndOfItsStopBit) {
 }
 
 TEST(Async, ANextCharacterThatComesEarlyEndsTheOneBefore) {
-  Pen pen(7.8, Parity::none, 1);  // the sender is 2.5 % too fast
+  Pen pen(7.8, Parity::none, 1);  // bits of 7.8 ticks: the sender is 2.5 % too fast
   pen.hold(true, 12);
   pen.character(0x55);
   pen.character(0xAA);
@@ -164,7 +164,7 @@ TEST(Async, RestartsBehindAHole) {
   for (const unsigned threads : {1u, 3u}) {
     for (const Content content : {Content::samples, Content::changes}) {
       MemoryReader reader(wires, content, 100, 1);
-      // The hole is from the middle of character 10 to the pause before character 20.
+      // The missing part is from the middle of character 10 to the pause before character 20.
       reader.leave_out(160 + 10 * 168 + 30, 160 + 20 * 168 - 85);
       std::vector<std::uint8_t> wanted;
       for (unsigned i = 0; i < 30; ++i) {
@@ -186,11 +186,11 @@ TEST(Async, ASilentLineTakesTheBaudRateOfAnother) {
   EXPECT_EQ(all.characters.size(), 200u);
   EXPECT_EQ(all.characters.front().channel, 1);
   EXPECT_NEAR(all.outcome.formats[0].bit, 10.5, 0.05);
-  EXPECT_NEAR(all.outcome.measured_baud[1], 100'000, 500);  // the rounding is the same in each character
+  EXPECT_NEAR(all.outcome.measured_baud[1], 100'000, 500);  // the rounding error is the same in each character
   EXPECT_EQ(all.outcome.measured_baud[0], 0);
 }
 
-// A sender whose clock drifts by 1 %, with more changes than the detection uses.
+// Decodes a sender whose clock drifts by 1 %, with more changes than the detection uses.
 TEST(Async, DetectionDoesNotDependOnBlocks) {
   Wires wires{{{}}};
   for (const double bit : {5.0, 5.05}) {
@@ -269,8 +269,8 @@ TEST(Async, PassesOnExceptionsOfReader) {
   }
 }
 
-// A reader that claims slowly, as for text formats that are parsed in `claim`: a claiming thread must not keep the
-// others from decoding earlier blocks.
+// A reader that claims slowly, as for text formats that are parsed in `claim`. A claiming thread must not keep the
+// other threads from decoding earlier blocks.
 class Slow final : public Reader {
  public:
   explicit Slow(Reader& reader) : reader_(reader) {}

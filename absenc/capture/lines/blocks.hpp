@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Moves blocks of a reader through several threads: they are expanded and decoded by guess in any order, and joined in
-// the order of the capture.
+// Moves the blocks of a reader through several threads: blocks are expanded, and decoded by guess, in any order, and
+// joined in the order of the capture.
 #pragma once
 
 #include <algorithm>
@@ -17,7 +17,7 @@
 
 namespace absenc::capture {
 
-/// A part of a capture as level changes of the requested channels, in their order.
+/// A part of a capture as level changes of the requested channels, in the order of the request.
 struct Levels {
   Tick first = 0;
   Tick end = 0;
@@ -29,14 +29,14 @@ class LevelReader {
  public:
   LevelReader(Reader& reader, std::vector<unsigned> channels) : reader_(reader), channels_(std::move(channels)) {}
 
-  /// Returns why the capture cannot be read as levels, as a sentence; "" if it can.
+  /// Returns why the capture cannot be read as levels, as a sentence; "" if it can be read.
   [[nodiscard]] std::string problem() const;
   [[nodiscard]] std::string name(unsigned channel) const;
   [[nodiscard]] const Layout& layout() const { return reader_.layout(); }
 
-  /// Claims the next block; only one thread may call this at a time.
+  /// Claims the next block; only one thread at a time may call this. Returns false at the end of the capture.
   [[nodiscard]] bool claim(Block& block) { return reader_.claim(block); }
-  /// Expands a claimed block to level changes. Several threads may call it, each with its own block.
+  /// Converts a claimed block to level changes. Several threads may call it, each with its own block.
   void expand(Block& block, Levels& levels) const;
 
  private:
@@ -69,14 +69,14 @@ void look_ahead(LevelReader& reader, std::vector<Levels>& parts, Enough&& enough
   }
 }
 
-/// Decodes the rest of the reader with several threads. `Decoding` must have
+/// An object that decodes the rest of a reader's capture with several threads. `Decoding` must have
 /// - `bool decode(const Levels&)`: decodes the next part, in order; returns false to end the run
-/// - `Guess`, and `void guess(const Levels&, Guess&) const`: decodes in any thread a part whose first state is
-///   unknown
-/// - `bool join(const Levels&, Guess&)`: works like `decode`, with the result of `guess`
-/// A guess assumes that the first change begins a character or word. The true state runs into the block until it begins
-/// one at the same time as the guess. From there on both depend only on later changes, so the guess is correct. If they
-/// never meet, the block is decoded twice, and the result is still correct.
+/// - `Guess`, and `void guess(const Levels&, Guess&) const`: decodes in any thread a part at whose beginning the state
+///   of the line is unknown
+/// - `bool join(const Levels&, Guess&)`: works like `decode`, with the result of `guess` A guess assumes that the first
+///   change begins a character or word. The true state is continued into the block until it begins a character or word
+///   at the same time as the guess. From there on both depend only on later changes, so the guess is correct. If true
+///   state and guess never meet, the block is decoded twice, and the result is still correct.
 ///
 /// The calling thread calls `decode` and `join`. Each thread has two blocks in progress. Exceptions of the reader or
 /// the decoding are thrown here.
@@ -88,13 +88,13 @@ class BlockRun {
     for (Job& job : jobs_) free_jobs_.push_back(&job);
   }
 
-  /// Decodes all blocks. Returns false if `decode` or `join` ended the run.
+  /// Decodes all blocks. Returns false if `decode` or `join` of the decoding ended the run.
   bool run() {
     if (threads_ < 2) return run_alone();
     bool wanted = true;
     {
       std::vector<std::jthread> workers;
-      const Stop stop{*this};  // destroyed before the workers, which wait for it
+      const Stop stop{*this};  // destroyed before the worker threads, which wait for the stop
       for (unsigned i = 1; i < threads_; ++i) workers.emplace_back([this, i] { work(i); });
       wanted = join_all();
       stop.now();
@@ -134,7 +134,7 @@ class BlockRun {
   [[nodiscard]] bool can_claim() const { return !exhausted_ && !stopped_ && !claiming_ && !free_jobs_.empty(); }
 
   // Claims a block and prepares it; the lock is held before and after the call. Only one thread claims at a time, which
-  // for text is most of the work, while the others decode earlier blocks.
+  // is most of the work for text, while the other threads decode earlier blocks.
   void prepare(std::unique_lock<std::mutex>& lock, unsigned thread) {
     // The block that this thread used last is still in its cache.
     const auto last =
@@ -205,7 +205,7 @@ class BlockRun {
   std::mutex mutex_;
   std::condition_variable changed_;
   std::vector<Job*> free_jobs_;
-  std::deque<Job*> in_order_;  // claimed jobs in the order of the capture
+  std::deque<Job*> in_order_;  // claimed blocks in the order of the capture
   bool claiming_ = false;
   bool exhausted_ = false;
   bool stopped_ = false;

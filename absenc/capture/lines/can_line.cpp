@@ -9,7 +9,7 @@ namespace absenc::capture {
 namespace {
 
 constexpr unsigned integration_bits = 11;  // number of consecutive recessive bits that mean an idle bus
-constexpr unsigned most_equal = 5;         // after this number of equal bits follows a stuff bit of the other level
+constexpr unsigned most_equal = 5;         // number of equal bits after which a stuff bit of the other level follows
 constexpr std::size_t crc_bits = 15;
 constexpr std::uint32_t protocol_error = 0x08, nobody_acknowledged = 0x20;
 constexpr std::uint32_t bus_off = 0x40, arbitration_lost = 0x02, controller = 0x04;
@@ -63,11 +63,12 @@ void CanDecoder::change(Tick at, std::vector<CanRecord>& frames) {
 void CanDecoder::finish(std::vector<CanRecord>& frames) {
   if (end_ > level_since_) level_for(level_, level_since_, end_, frames);
   level_since_ = end_;
-  // The frame is cut off by the end: no bus error.
+  // A frame that is cut off by the end of the capture is no bus error.
   if (state_ == State::stuffed || state_ == State::tail) state_ = State::waiting;
 }
 
-// Takes the number of bits that fits the time best; of an idle bus only as many as matter.
+// Handles a level that lasted from `from` to `to`, as the number of bits that fits the time best; of an idle bus only
+// as many bits as matter.
 void CanDecoder::level_for(bool level, Tick from, Tick to, std::vector<CanRecord>& frames) {
   constexpr double enough = 32;
   const double bits = std::min(static_cast<double>(to - from) / bit_, enough);
@@ -115,8 +116,8 @@ void CanDecoder::take_stuffed(bool bit, std::vector<CanRecord>& frames) {
   tail_ = 0;
 }
 
-// Handles the bits behind the CRC: CRC delimiter, acknowledge slot, acknowledge delimiter, seven bits of the end. The
-// next frame may cut the last one short.
+// Handles a bit behind the CRC: CRC delimiter, acknowledge slot, acknowledge delimiter, or one of seven bits of the
+// end. The next frame may begin in the last bit of the end.
 void CanDecoder::take_tail(bool bit, std::vector<CanRecord>& frames) {
   constexpr unsigned acknowledge = 1, last = 8;
   if (tail_ == acknowledge) {
@@ -130,7 +131,7 @@ void CanDecoder::take_tail(bool bit, std::vector<CanRecord>& frames) {
   if (tail_++ < last) return;
   frames.push_back(record_);
   state_ = State::waiting;
-  recessive_ = last;  // the rest of the end and the intermission complete the idle time
+  recessive_ = last;  // the rest of the frame's end and the intermission complete the idle time
 }
 
 std::uint32_t CanDecoder::field(std::size_t first, std::size_t count) const {
@@ -139,8 +140,8 @@ std::uint32_t CanDecoder::field(std::size_t first, std::size_t count) const {
   return value;
 }
 
-// Decodes the header: start, 11 identifier bits, RTR or SRR, IDE; then r0 and DLC, or 18 identifier bits, RTR, r1, r0
-// and DLC.
+// Decodes the frame's header from the stored bits: start, 11 identifier bits, RTR or SRR, IDE; then r0 and DLC, or 18
+// identifier bits, RTR, r1, r0 and DLC.
 void CanDecoder::interpret() {
   if (length_ != 0 || bits_.size() < 19) return;
   const bool extended = bits_[13];

@@ -10,22 +10,23 @@
 
 namespace absenc::capture {
 
-/// Returns the meaning of an error frame as words without a full stop; also for error frames reported by controllers.
+/// Returns the meaning of an error frame, of this decoder or of a CAN controller, as words without a full stop.
 [[nodiscard]] std::string_view text_of_error(const CanFrame& error);
 
-/// Decodes a capture part by part. Each falling edge synchronises the bit clock, as in a receiver. A violation of the
-/// protocol is reported as an error frame like that of the kernel (linux/can/error.h): the identifier gives the class
-/// (0x08 protocol error, 0x20 not acknowledged); for a protocol error data[2] gives the kind (0x04 bit stuffing, 0x02
-/// form) and data[3] the place (0x08 CRC). After an error the decoder waits for eleven recessive bits.
+/// A decoder of CAN frames, which decodes a capture part by part. Each falling edge synchronises the bit clock, as in a
+/// receiver. A violation of the protocol is reported as an error frame like that of the kernel (linux/can/error.h): the
+/// identifier gives the class (0x08 protocol error, 0x20 not acknowledged); for a protocol error data[2] gives the kind
+/// (0x04 bit stuffing, 0x02 form) and data[3] the place (0x08 CRC). After an error the decoder waits for eleven
+/// recessive bits.
 class CanDecoder {
  public:
-  /// `bit` is the bit time in ticks, at least 3; need not be a whole number.
+  /// `bit` is the bit time in ticks, at least 3; it need not be a whole number.
   explicit CanDecoder(double bit) : bit_(bit) {}
 
-  /// Decodes the next part, from `first` to `end`. If it does not follow the previous part, the decoder waits for an
-  /// idle bus.
+  /// Decodes the next part, from the tick `first` to `end`, and appends its frames. If the part does not follow the
+  /// previous part, the decoder waits for an idle bus.
   void decode(const Changes& part, Tick first, Tick end, std::vector<CanRecord>& frames);
-  /// Ends the capture; a frame that is cut off there is no error.
+  /// Ends the capture; a frame that is cut off by the end is no error.
   void finish(std::vector<CanRecord>& frames);
 
  private:
@@ -42,16 +43,16 @@ class CanDecoder {
 
   double bit_;
   bool level_ = true;
-  Tick level_since_ = 0;  // time of the last level change
+  Tick level_since_ = 0;  // time of the last level change, in ticks
   Tick end_ = 0;
-  std::size_t bits_taken_ = 0;  // number of bits of the present level that were handled already
+  std::size_t bits_taken_ = 0;  // number of bits at the present level that were handled already
 
   State state_ = State::waiting;
   unsigned recessive_ = 0;  // number of consecutive recessive bits
-  unsigned run_ = 0;        // number of consecutive equal bits in the stuffed part
+  unsigned run_ = 0;        // number of consecutive equal bits in the stuffed part of a frame
   bool before_ = true;
-  std::vector<bool> bits_;  // bits without stuff bits, from the start of the frame on
-  std::size_t length_ = 0;  // number of bits up to the end of the CRC; 0: not known yet
+  std::vector<bool> bits_;  // bits of the present frame without stuff bits, from the start of the frame on
+  std::size_t length_ = 0;  // number of bits from the start of the frame to the end of its CRC; 0: not known yet
   unsigned tail_ = 0;
   CanRecord record_{};
 };

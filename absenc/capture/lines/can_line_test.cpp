@@ -13,7 +13,7 @@
 namespace absenc::capture {
 namespace {
 
-/// A bus as a capture shows it: bits of any duration, with edges at whole ticks.
+/// A drawing of a CAN bus for tests: bits of any duration, with edges at whole ticks.
 struct CanBusDrawing {
   explicit CanBusDrawing(double one_bit) : bit(one_bit) { pass(12); }
 
@@ -133,7 +133,7 @@ TEST(CanDecoder, ReportsMissingAcknowledge) {
 TEST(CanDecoder, ReportsPlaceOfError) {
   CanBusDrawing bus(10);
   std::vector<bool> bits = sim::can_bits({.id = 0x555, .size = 1, .data = {0x55}});
-  bits[26] = !bits[26];  // a bit of the CRC, where bits alternate
+  bits[26] = !bits[26];  // changes a bit of the CRC, where bits alternate
   bus.add(bits);
   bus.pass(20);
   const std::vector<CanRecord> frames = bus.decoded();

@@ -36,7 +36,8 @@ std::optional<ClockRests> find_rests(const Changes& clock) {
   for (std::size_t i = 1; i < rests.size() && found.pauses.size() <= most_lengths; ++i) {
     const Tick shorter = rests[i - 1];
     const Tick longer = rests[i];
-    // Two lengths differ clearly: by a seventh, and by more than the sampling error of two changes.
+    // Two lengths of rests are clearly different if they differ by a seventh, and by more than the sampling error of
+    // two changes.
     if (longer <= found.half_period || longer - shorter <= std::max<Tick>(2, shorter / 7)) continue;
     found.pauses.push_back(std::min(shorter + (longer - shorter) / 2, 2 * shorter));
   }
@@ -88,7 +89,8 @@ void ClockedDecoder::begin_part(const ClockedPart& part) {
   if (format_.has_select && select_.level == format_.select_high) open(part.first, true, nullptr);
 }
 
-// Begins a burst. Returns true if it begins together with one of the targets.
+// Begins a burst at the time `at`. Returns true, without a burst, if one of the targets begins at the same time and in
+// the same state.
 bool ClockedDecoder::open(Tick at, bool cut, Targets* targets) {
   if (targets != nullptr && !cut) {
     while (targets->next < targets->bursts.size() && targets->bursts[targets->next].begin < at) ++targets->next;
@@ -128,15 +130,15 @@ void ClockedDecoder::take(Tick at, std::vector<Burst>& bursts) {
   ++burst_.bits;
 }
 
-// Stores the level behind the last clock change. A previous part may have ended too early for that.
+// Stores the level of the data line behind the last clock change. A previous part may have ended too early for that.
 void ClockedDecoder::sample_last_bit() {
   if (format_.settle == 0 || burst_.has_last || !has_in_) return;
   burst_.last = in_.before(last_ + format_.settle);
   burst_.has_last = true;
 }
 
-// Detects a change of the data line during a rest, until `until`. A data line that changes together with the clock was
-// sampled too coarsely to tell which changed first.
+// Detects whether the data line changed during a rest of the clock, up to the time `until`. If the data line changes
+// together with the clock, samples are too coarse to tell which changed first.
 void ClockedDecoder::detect_data_change(Tick until) {
   if (format_.change_pause == 0 || !has_in_ || until - last_ <= format_.settle) return;
   if (open_) sample_last_bit();
@@ -176,7 +178,8 @@ bool ClockedDecoder::select_changes(Tick at, Targets* targets, std::vector<Burst
   return false;
 }
 
-// Decodes a part. A clock change at the same time as a chip select change belongs to the earlier burst.
+// Decodes a part; returns true if it stopped because a burst begins together with one of the targets. A clock change at
+// the same time as a chip select change belongs to the earlier burst.
 bool ClockedDecoder::run(const ClockedPart& part, Targets* targets, std::vector<Burst>& bursts) {
   begin_part(part);
   for (;;) {
@@ -187,7 +190,7 @@ bool ClockedDecoder::run(const ClockedPart& part, Targets* targets, std::vector<
   }
   if (!format_.has_select && open_ && part.end - last_ > format_.settle) sample_last_bit();
   detect_data_change(part.end);
-  // Data changes behind the last clock change count for the next part.
+  // Levels behind the last clock change of this part are needed in the next part.
   in_.before(no_change);
   out_.before(no_change);
   if (!format_.has_select && open_ && is_over(part.end - last_)) {

@@ -12,12 +12,13 @@ namespace absenc::capture {
 
 /// Settings of a clocked line. The idle level of the clock does not matter: a word is a sequence of its changes.
 struct ClockedFormat {
-  bool rising = false;       // the clock edge that samples a bit; the bit is the level just before it
-  bool has_select = false;   // words end with chip select; the clock may pause within them
+  bool rising = false;       // true: the rising edge of the clock samples a bit, false: the falling edge; the bit is
+                             // the level just before the edge
+  bool has_select = false;   // words end with chip select; the clock may pause within a word
   bool select_high = false;  // chip select is active high
-  Tick pause = 0;            // without chip select: a clock that rests longer than this ends a word
-  Tick settle = 0;        // without chip select: the last bit is sampled this long behind the last clock change; 0: not
-                          // sampled
+  Tick pause = 0;            // without chip select: a clock that rests longer than this ends a word, in ticks
+  Tick settle = 0;           // without chip select: the last bit is sampled this long behind the last clock change, in
+                             // ticks; 0: not sampled
   Tick change_pause = 0;  // without chip select: a clock that rests longer than this also ends a word if the data line
                           // changes during the rest, later than `settle` (end of a timeout or a monoflop); 0: it does
                           // not
@@ -27,14 +28,14 @@ struct ClockedFormat {
 struct ClockRests {
   Tick half_period = 0;
   Tick longest = 0;
-  std::vector<Tick> pauses;  // possible word limits (a longer rest ends a word): three periods, then one value between
-                             // each two clearly different lengths of rests, the shortest first
+  std::vector<Tick> pauses;  // possible limits, in ticks, above which a rest ends a word: three periods, then one value
+                             // between each two clearly different lengths of rests, the shortest first
 };
 
-/// Measures the rests of a clock; returns nothing if it has too few changes.
+/// Measures the rests of a clock; returns nothing if the clock has too few changes.
 std::optional<ClockRests> find_rests(const Changes& clock);
 
-/// A part of the capture. `in`, `out` and `select` may be null.
+/// A part of the capture with the changes of its wires. `in`, `out` and `select` may be null.
 struct ClockedPart {
   const Changes* clock;
   const Changes* in = nullptr;
@@ -44,21 +45,22 @@ struct ClockedPart {
   Tick end = 0;
 };
 
-/// Decodes a capture part by part. A burst whose beginning or end is not in the capture is marked as cut. A single
-/// clock change between two pauses is no burst: the host holds the clock low, or lets it rise again.
+/// A decoder of clocked bursts, which decodes a capture part by part. A burst whose beginning or end is not in the
+/// capture is marked as cut. A single clock change between two pauses is no burst: the host holds the clock low, or
+/// lets it rise again.
 class ClockedDecoder {
  public:
-  static constexpr std::size_t most_bits = 65536;  // longest burst; a longer one is cut
+  static constexpr std::size_t most_bits = 65536;  // longest burst, in bits; a longer burst is cut
 
   explicit ClockedDecoder(const ClockedFormat& format) : format_(format) {}
 
-  /// Clears the state: the next part does not follow the previous one.
+  /// Clears the state, because the next part does not follow the previous one.
   void restart() { *this = ClockedDecoder(format_); }
   void decode(const ClockedPart& part, std::vector<Burst>& bursts);
   /// Works like `decode` with the result of `other`, which has decoded the same part into `guessed` after a restart.
   /// The correct part of the guess is taken over with its state. The result equals that of `decode` exactly.
   void join(const ClockedPart& part, ClockedDecoder& other, std::vector<Burst>& guessed, std::vector<Burst>& bursts);
-  /// Ends the capture; a burst in progress is returned as cut.
+  /// Ends the capture; a burst in progress is appended as cut.
   void finish(std::vector<Burst>& bursts);
   /// Returns a time before which no further burst begins; `end` is the end of the last part.
   [[nodiscard]] Tick settled(Tick end) const { return open_ ? burst_.begin : end; }
@@ -67,17 +69,17 @@ class ClockedDecoder {
   // The changes of one wire within a part.
   struct Wire {
     bool level = false;
-    std::span<const Tick> left{};  // changes of the wire that are not handled yet
+    std::span<const Tick> left{};  // changes of the wire that are not handled yet, in ticks
     std::optional<Tick> border{};  // additional change at the border of two parts with different levels
 
     void begin(const Changes* changes, Tick first, bool known);
     [[nodiscard]] Tick next() const;
     void step();
-    bool before(Tick at);  // returns the level just before `at`
+    bool before(Tick at);  // returns the level just before the tick `at`
   };
   struct Targets {
     std::span<const Burst> bursts;
-    const Burst* open;  // burst that is not complete yet
+    const Burst* open;  // burst that `other` has not completed yet; null: none
     std::size_t next = 0;
     bool met = false;
   };
@@ -101,12 +103,12 @@ class ClockedDecoder {
   Wire in_;
   Wire out_;
   Wire select_;
-  Tick last_ = 0;  // time of the last clock change, or the beginning of the capture
+  Tick last_ = 0;  // time of the last clock change, or the beginning of the capture, in ticks
   bool seen_pause_ = false;
   bool open_ = false;
-  bool lone_ = false;     // the clock has changed only once in this burst
-  bool fell_ = false;     // since the last word the clock has changed once and rested low
-  bool changed_ = false;  // the data line has changed during this rest
+  bool lone_ = false;     // the clock has changed only once in the present burst
+  bool fell_ = false;     // since the last word the clock has changed once and then rested low
+  bool changed_ = false;  // the data line has changed during the present rest of the clock
   Burst burst_;
 };
 

@@ -11,7 +11,7 @@
 namespace absenc::capture {
 namespace {
 
-// Draws a clock with data and optional chip select, with 4 ticks per period.
+// A drawing of a clock with data lines and optional chip select, with 4 ticks per clock period.
 struct ClockedDrawing {
   Wires wires{std::vector<Drawn>(4)};  // wires in the order clock, in, out, select
 
@@ -20,7 +20,7 @@ struct ClockedDrawing {
     for (std::size_t i = 0; i < 4; ++i) wires.levels[i].insert(wires.levels[i].end(), ticks, levels[i]);
   }
   void idle(std::size_t ticks, bool clock = true, bool select = true) { hold(clock, true, true, select, ticks); }
-  // Draws an SSI word: a falling edge latches, each rising edge brings the next bit.
+  // Draws an SSI word: a falling edge of the clock latches the position, each rising edge brings the next bit.
   void ssi(std::uint32_t word, unsigned bits) {
     hold(false, true, true, true, 2);
     for (unsigned i = bits; i-- > 0;) {
@@ -99,7 +99,7 @@ TEST(Clocked, SpiTakesBothDirectionsBetweenEdgesOfChipSelect) {
     drawing.hold(idle_clock, true, true, false, 60);  // a pause within the exchange
     drawing.spi(0x34, 0x0E);
     drawing.idle(10, idle_clock);
-    drawing.hold(!idle_clock, true, true, true, 4);  // a clock for another chip
+    drawing.hold(!idle_clock, true, true, true, 4);  // a clock for another chip, while chip select is inactive
     drawing.idle(10, idle_clock);
     drawing.spi(0x56, 0x81);
     drawing.idle(10, idle_clock);

@@ -24,7 +24,7 @@ constexpr std::size_t word = 64;  // number of samples whose changes are collect
 // Number of samples per piece: they stay in the L1 cache while one channel after the other is searched.
 constexpr std::size_t piece = 64 * word;
 
-// Returns the levels of a channel in 64 samples: bit i is that of sample i.
+// Returns the levels of a channel in 64 samples: bit i is the level in sample i.
 template <class T>
 HWY_INLINE std::uint64_t levels(const std::uint8_t* HWY_RESTRICT samples, T channel_bit) {
   std::uint64_t bits = 0;
@@ -48,8 +48,8 @@ HWY_INLINE std::uint64_t levels(const std::uint8_t* HWY_RESTRICT samples, T chan
   return bits;
 }
 
-// Writes the positions of the set bits, and up to 8 further values behind them: most words have few bits, so this
-// avoids a branch on their number.
+// Writes the positions of the set bits of `toggles`, and up to 8 meaningless values behind them: most words have few
+// bits, so this avoids a branch on their number. Returns the end of the positions.
 HWY_INLINE Tick* put(std::uint64_t toggles, Tick base, Tick* out) {
   const auto count = static_cast<std::size_t>(std::popcount(toggles));
   for (std::size_t i = 0; i < count; i += 8) {

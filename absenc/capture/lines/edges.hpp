@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Converts samples to level changes, with the widest vector instructions of the processor.
+// Converts samples to level changes, with the widest vector instructions that the processor has.
 #pragma once
 
 #include <cstddef>
@@ -23,10 +23,11 @@ namespace absenc::capture {
 /// level before the block: for consecutive blocks, the level after the last change of the previous block.
 void find_changes(const Block& block, std::span<const unsigned> channels, std::span<Changes> changes);
 
-/// Returns the level after the last change.
+/// Returns the level after the last change; without changes the level before them.
 [[nodiscard]] inline bool level_after(const Changes& changes) { return changes.before != (changes.at.size() % 2 != 0); }
 
-/// Appends `next`, a part that begins at `first`. If its level differs from the last one, the line changed at `first`.
+/// Appends the changes of `next`, a part that begins at `first`. If its first level differs from the last level in
+/// `changes`, the line changed at `first`.
 void append(Changes& changes, const Changes& next, Tick first);
 
 }  // namespace absenc::capture

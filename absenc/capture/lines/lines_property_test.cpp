@@ -35,7 +35,8 @@ struct Line {
   Drawn levels;
 };
 
-// Draws characters with pauses, breaks, wrong bits and noise; the capture may begin anywhere.
+// Returns a random line of characters with pauses, breaks, wrong bits and noise; the capture may begin within a
+// character.
 Line any_line(Random& random, std::uint64_t ticks_per_second) {
   Line line;
   const double bit = below(random, 2) == 0 ? 3.0 + static_cast<double>(below(random, 1000)) / 100
@@ -80,7 +81,8 @@ constexpr std::array decode_setups{DecodeSetup{1, Content::samples}, DecodeSetup
                                    DecodeSetup{5, Content::samples}};
 
 std::size_t any_block_size(Random& random, std::size_t ticks) {
-  const std::size_t least = ticks / 200 + 1;  // with smaller blocks a test case would take a second
+  const std::size_t least = ticks / 200 + 1;  // smallest block in ticks: with smaller blocks a test case would take a
+                                              // second
   return least + below(random, below(random, 2) == 0 ? 8 : ticks);
 }
 
@@ -175,7 +177,7 @@ RC_GTEST_PROP(LinesProperty, BaudAndIdleLevelAreFound, (std::uint64_t seed)) {
       std::vector<std::uint8_t> bytes;
       for (const Character& c : decoded(reader, lines, threads, outcome)) bytes.push_back(c.value);
       RC_ASSERT(outcome.formats[0].idle_high == idle_high);
-      // Characters that follow each other at whole samples all have the same rounding error: half a sample in 8 bits.
+      // If characters follow each other at whole samples, all have the same rounding error: half a sample in 8 bits.
       RC_ASSERT(std::abs(outcome.formats[0].bit - bit) < 0.01 * bit + 1.0 / 8);
       RC_ASSERT(bytes == sent);
       if (first.formats.empty()) first = outcome;
@@ -249,7 +251,7 @@ RC_GTEST_PROP(LinesProperty, ClockedResultDoesNotDependOnThreadsAndBlocks, (std:
 
 // ---- Conversion of samples to changes
 
-// Returns all instruction sets of this processor, and 0 for none.
+// Returns the Highway targets of all instruction sets that this processor has, and 0 for no restriction.
 std::vector<std::int64_t> instruction_sets() {
   hwy::GetChosenTarget().DeInit();
   std::vector<std::int64_t> sets = hwy::SupportedAndGeneratedTargets();

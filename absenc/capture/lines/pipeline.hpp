@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Decodes a reader to characters or bursts with any number of threads; the result equals that of one thread exactly.
+// Decodes the capture of a reader to characters or bursts with any number of threads; the result equals that of one
+// thread exactly.
 #pragma once
 
 #include <functional>
@@ -14,51 +15,52 @@
 
 namespace absenc::capture {
 
-/// Items decoded since the previous part.
+/// Characters or bursts that were decoded since the previous part.
 struct DecodedPart {
-  Tick end = 0;  // no later item begins before this time
+  Tick end = 0;  // time before which no later character or burst begins
   std::span<const Character> characters;
   std::span<const Burst> bursts;
   std::span<const AsyncFormat> formats;  // formats of the asynchronous lines, complete from the first part on
 };
 
-/// Receives parts in the order of time, in the calling thread. Returns false to end the decoding.
+/// A function that receives parts in the order of time, in the calling thread. It returns false to end the decoding.
 using PartSink = std::function<bool(const DecodedPart& part)>;
 
 struct AsyncLine {
-  unsigned channel = 0;  // index of the file's channel
+  unsigned channel = 0;  // index of the line's channel in the file
   AsyncSettings settings{};
 };
 
 struct AsyncOutcome {
   std::string problem;  // reason why nothing could be decoded, as a sentence; "": none
   std::vector<AsyncFormat> formats;
-  std::vector<double> measured_baud;  // measured over the whole capture; 0: no good character, or a file without times
+  std::vector<double> measured_baud;  // baud rate of each line, measured over the whole capture; 0: no good character,
+                                      // or a file without times
   std::vector<AsyncDecoder::Statistics> statistics;
 };
 
 /// Decodes the characters of several lines, ordered by their start bits; `Character::channel` is the index in `lines`.
-/// Unknown settings are detected from the first 16384 changes of a line; a line with too few changes uses the baud rate
-/// of another. Memory does not grow with the file. Throws exceptions of the reader.
+/// Settings that are not given are detected from the first 16384 changes of a line; a line with too few changes uses
+/// the baud rate of another. Memory does not grow with the file. Throws exceptions of the reader.
 AsyncOutcome decode_async(Reader& reader, std::span<const AsyncLine> lines, unsigned threads, const PartSink& sink);
 
 /// The beginning of a capture, split into words at rests longer than `pause`.
 struct PauseReading {
   Tick pause = 0;
-  bool by_change = false;  // a shorter rest also ends a word if the data line changes in it
+  bool by_change = false;  // a shorter rest also ends a word if the data line changes during the rest
   std::vector<Burst> bursts{};
   bool timed_out = false;  // the data line changed in every rest that ended a word: the end of a timeout or a monoflop
 };
 
 struct ClockedLine {
   unsigned clock = 0;
-  std::optional<unsigned> in{};      // channel of the encoder's data
-  std::optional<unsigned> out{};     // channel of the host's data, for SPI
-  std::optional<unsigned> select{};  // channel of chip select, for SPI
-  bool rising = false;               // the clock edge that samples a bit
+  std::optional<unsigned> in{};      // index of the channel with the encoder's data
+  std::optional<unsigned> out{};     // index of the channel with the host's data, for SPI
+  std::optional<unsigned> select{};  // index of the channel with chip select, for SPI
+  bool rising = false;               // true: the rising edge of the clock samples a bit; false: the falling edge
   bool select_high = false;          // chip select is active high
-  Tick pause = 0;                    // without chip select: a clock that rests longer ends a word; 0: `choose` decides
-  Tick settle = 0;                   // sampling time of a word's last bit; see ClockedFormat
+  Tick pause = 0;   // without chip select: a clock that rests longer ends a word, in ticks; 0: `choose` decides
+  Tick settle = 0;  // sampling time of a word's last bit; see ClockedFormat
   Tick change_pause = 0;
   /// Returns the index of the reading to use, of all possible ways to split the beginning of the capture. Null: rests
   /// longer than three periods of the clock end a word.
@@ -67,7 +69,7 @@ struct ClockedLine {
 
 struct ClockedOutcome {
   std::string problem;  // reason why nothing could be decoded, as a sentence; "": none
-  Tick pause = 0;       // length of a rest that ended words
+  Tick pause = 0;       // length of a rest that ended words, in ticks
 };
 
 ClockedOutcome decode_clocked(Reader& reader, const ClockedLine& line, unsigned threads, const PartSink& sink);

@@ -11,7 +11,8 @@ namespace absenc::capture {
 namespace {
 
 constexpr std::size_t enough_changes = 16384;     // number of changes of a line that suffice to detect its settings
-constexpr std::size_t most_changes = 64 * 16384;  // limit for one line while another has too few changes
+constexpr std::size_t most_changes = 64 * 16384;  // limit for the changes stored of one line while another line has too
+                                                  // few
 constexpr double fewest_ticks = 2.5;              // shortest bit time, in ticks
 
 class AsyncDecoding {
@@ -68,7 +69,7 @@ class AsyncDecoding {
   [[nodiscard]] AsyncDecoder::Statistics statistics(std::size_t line) const { return decoders_[line].statistics(); }
 
  private:
-  // After a gap between two parts, characters in progress end.
+  // Prepares for a part. If a gap is before it, the characters in progress end.
   void begin(const Levels& levels) {
     if (begun_ && levels.first != end_) finish_lines();
     begun_ = true;
@@ -83,7 +84,8 @@ class AsyncDecoding {
     return least;
   }
 
-  // Characters of several lines are delivered when no earlier character of another line can follow.
+  // Delivers the characters of all lines that begin before `until`: no earlier character can follow on any line.
+  // Returns false if the sink ends the decoding.
   bool deliver(Tick until) {
     const Tick end = std::min(until, end_);
     if (characters_.size() == 1) {
@@ -114,7 +116,7 @@ class AsyncDecoding {
 
 bool unknown(const AsyncSettings& settings) { return settings.baud == 0 || settings.idle == Idle::automatic; }
 
-// The first changes of the lines, and the parts that were read for them.
+// The first changes of all lines, and the parts of the capture that were read for them.
 class FirstChanges {
  public:
   FirstChanges(LevelReader& reader, std::span<const AsyncLine> lines) : lines_(lines), changes_(lines.size()) {
@@ -149,7 +151,7 @@ class FirstChanges {
     return all || any;
   }
 
-  // Limits the changes, so that the rest does not depend on the sizes of the parts.
+  // Cuts the stored changes at their limit, so that the detected settings do not depend on the sizes of the parts.
   void cut() {
     for (const Changes& line : changes_) {
       if (line.at.size() > most_changes) end_ = std::min(end_, line.at[most_changes]);
@@ -189,7 +191,7 @@ std::string settings_problem(const LevelReader& reader, std::span<const AsyncLin
   return {};
 }
 
-// Finds the formats of all lines. Returns the problem as a sentence, or "".
+// Finds the formats of all lines. Returns the problem as a sentence, or "" without a problem.
 std::string find_formats(const LevelReader& reader, std::span<const AsyncLine> lines, const FirstChanges& first,
                          std::vector<AsyncFormat>& formats) {
   const std::uint64_t ticks_per_second = reader.layout().ticks_per_second;

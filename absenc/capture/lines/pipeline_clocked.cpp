@@ -11,9 +11,10 @@ namespace absenc::capture {
 namespace {
 
 constexpr std::size_t enough_clocks = 8194;    // number of clock changes that suffice to find the period
-constexpr std::size_t most_data = 64 * 16384;  // limit for data changes while the clock has too few
+constexpr std::size_t most_data = 64 * 16384;  // limit for the changes of the data line that are stored while the clock
+                                               // has too few
 
-// Indices of the wires among the channels.
+// Indices of the wires of a clocked line among the channels that are read.
 struct WireIndices {
   explicit WireIndices(const ClockedLine& line) : channels{line.clock} {
     const auto add = [this](const std::optional<unsigned>& channel) -> std::optional<std::size_t> {
@@ -72,7 +73,7 @@ class ClockedDecoding {
   [[nodiscard]] bool selected() const { return selected_; }
 
  private:
-  // After a gap between two parts, the burst in progress ends.
+  // Prepares for a part. If a gap is before it, the burst in progress ends.
   void begin(const Levels& levels) {
     if (begun_ && levels.first != end_) decoder_.finish(bursts_);
     const Changes& clock = levels.changes[0];
@@ -108,7 +109,7 @@ std::string no_clock(const std::string& name) {
   return name + " never changes its level, so there is no clock: is it the right channel, and was it connected?";
 }
 
-// Returns the bursts in the first parts, up to the clock change at `last`.
+// Returns the bursts in the first parts of the capture, up to the clock change at the time `last`.
 std::vector<Burst> bursts_until(Tick last, const std::vector<Levels>& parts, const WireIndices& wires,
                                 const ClockedFormat& format) {
   std::vector<Burst> bursts;
@@ -129,7 +130,7 @@ std::vector<Burst> bursts_until(Tick last, const std::vector<Levels>& parts, con
   return bursts;
 }
 
-// Returns whether the data line changed in each rest between two of these words, independently of clock edges.
+// Returns whether the data line changed in each rest between two of the bursts, independently of clock edges.
 bool changes_in_rests(const std::vector<Burst>& bursts, const std::vector<Levels>& parts, const WireIndices& wires,
                       Tick settle) {
   if (!wires.in || bursts.size() < 2) return false;
@@ -145,7 +146,7 @@ bool changes_in_rests(const std::vector<Burst>& bursts, const std::vector<Levels
   return true;
 }
 
-// Finds the times of `format`. Returns the problem as a sentence, or "".
+// Finds the times of `format` that end words. Returns the problem as a sentence, or "" without a problem.
 std::string find_pause(LevelReader& reader, const WireIndices& wires, const ClockedLine& line,
                        std::vector<Levels>& parts, ClockedFormat& format) {
   Changes clock;
@@ -174,10 +175,11 @@ std::string find_pause(LevelReader& reader, const WireIndices& wires, const Cloc
     word_formats.push_back(format);
     word_formats.back().pause = pause;
   }
-  // Rests in words and between them may be of any length, but a timeout or a monoflop ends only between words.
+  // Rests within words and between words may have any length, but a timeout or a monoflop ends only between words.
   if (wires.in) {
     word_formats.push_back(word_formats.back());
-    // An encoder that does not drive the line changes nothing: rests of at least half the longest length end its words.
+    // An encoder that does not drive the line changes nothing: rests of at least half the longest length end the words
+    // of such a line.
     word_formats.back().pause =
         std::max(rests->longest / 2, *std::max_element(rests->pauses.begin(), rests->pauses.end()));
     word_formats.back().change_pause = 2 * rests->half_period;

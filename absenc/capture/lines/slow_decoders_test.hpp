@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Simple decoders that process one sample after the other: the reference for the fast ones.
+// Simple decoders that process one sample after the other: the reference for the fast decoders in tests.
 #pragma once
 
 #include <algorithm>
@@ -57,7 +57,7 @@ class SlowDecoder {
     return std::nullopt;
   }
 
-  // Decodes from the falling edge `from` on. Returns the number of faults.
+  // Decodes characters from the falling edge at the tick `from` on. Returns the number of faults.
   std::size_t run(std::size_t from, std::size_t limit, std::vector<Character>* found) const {
     std::size_t faults = 0;
     for (std::optional<std::size_t> start = from; start && *start + middle(stop_) < limit;) {
@@ -114,7 +114,7 @@ class SlowDecoder {
 };
 
 struct SlowClocked {
-  const std::vector<Drawn>& levels;  // wires in the order clock, in, out, select
+  const std::vector<Drawn>& levels;  // levels of the wires in the order clock, in, out, select
   ClockedFormat format;
   std::vector<Burst> found{};
   Burst burst{};
@@ -152,7 +152,7 @@ struct SlowClocked {
     add(burst.out, levels[2][i - 1] != 0);
     ++burst.bits;
   }
-  // Returns whether the data line changes behind the clock change at `last`, up to `until`.
+  // Returns whether the data line changes behind the clock change at the tick `last`, up to the tick `until`.
   bool changes(Tick last, Tick until) const {
     for (Tick i = std::max<Tick>(last + format.settle, 1); i <= until && i < levels[1].size(); ++i) {
       if (levels[1][i] != levels[1][i - 1]) return true;
