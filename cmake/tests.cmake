@@ -14,12 +14,19 @@ set(absenc_long_python_tests
     serve_broker serve_cluster serve_history serve_mqtt serve_others serve_proxy serve_spool  # need brokers, proxies, full disks
     serve_browser serve_client serve_look  # need a browser, npm
     mqtt_failures_abuse mqtt_packets_abuse mqtt_spool_abuse serve_history_abuse serve_http_abuse)
-# GoogleTest filters for all series of faults but the first.
-set(absenc_long_series)
+# GoogleTest filters of long tests, by the executable. kit: all series of faults but the first.
+set(absenc_long_kit_tests)
 foreach(series RANGE 1 9)
-  list(APPEND absenc_long_series "Seeds/*/${series}_*")
+  list(APPEND absenc_long_kit_tests "Seeds/*/${series}_*")
 endforeach()
-list(JOIN absenc_long_series ":" absenc_long_series)
+# Every model on a bad line, every clause with its mutants, every command drawn and decoded, healthy encoders again and again.
+set(absenc_long_client_tests Models/Confirmed.* Units/ChangingClauses.* Units/LiveAndCaptured.* Units/HealthyEncoder.*
+    Units/Matrix.* Units/HostileEncoders.* Encoders/LatchTimes.*)
+set(absenc_long_capture_tests Seeds/RandomStream.*)
+set(absenc_long_host_tests Velocity.ErrorIsWithinItsUncertainty)
+foreach(name IN ITEMS kit client capture host)
+  list(JOIN absenc_long_${name}_tests ":" absenc_long_${name}_tests)
+endforeach()
 
 # GoogleTest's headers are compiled once for all tests. Tests are not optimised, so they compile in half the time. Of
 # the long campaigns, sanitizer builds run one series of faults (CMakePresets.json), and only a share of it
@@ -150,7 +157,7 @@ if(ABSENC_LIBRARY_TESTS AND NOT ABSENC_FUZZ)
     endif()
     target_link_libraries(${target} PRIVATE fuzz_seeds_main absenc::absenc absenc::capture)
     add_test(NAME fuzz_seeds.${stem} COMMAND ${target})
-    set_tests_properties(fuzz_seeds.${stem} PROPERTIES TIMEOUT 400)  # about a minute of processor time on an idle machine
+    set_tests_properties(fuzz_seeds.${stem} PROPERTIES LABELS long TIMEOUT 400)  # about a minute of processor time on an idle machine
   endforeach()
 endif()
 
