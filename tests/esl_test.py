@@ -581,7 +581,7 @@ class SharedLine(EslCase):
         self.assertEqual(set(last[3]["errors"]), {"timeout"})
         least, most = sorted(one["readings"] for one in last[:2])
         self.assertGreater(least, 10)  # timeouts of the other encoders limit the number of readings
-        self.assertLess(most, 2 * least + 10)
+        self.assertLess(most, 5 * least)  # neither encoder starves; a busy computer may delay one thread
 
     def test_names_of_one_bus(self):
         path = self.emulator("--also", "address=3&singleturn=70000").path
