@@ -338,8 +338,8 @@ constexpr void put_position(FieldSink& sink, const WordFormat& format, const Wor
   return word;
 }
 
-/// Returns the format of a word that has only the position and, before or after it, the turns. It is empty where a
-/// width is 0 or more than 64 bits.
+/// Returns the format of a word that has only the position and, before or after it, the turns. A part of 0 or more than
+/// 64 bits is left out.
 [[nodiscard]] constexpr WordFormat word_format(const PositionBits& bits) {
   WordFormat format;
   const auto bits_of = [](unsigned count) { return static_cast<std::uint8_t>(count <= 64 ? count : 0); };

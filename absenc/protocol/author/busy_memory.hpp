@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Host side of a memory that is busy for a while: repeats a request until the encoder executes it.
+// Host side of an encoder memory that is busy for a while: repeats a request until the encoder executes it.
 #pragma once
 
 #include <algorithm>
@@ -8,16 +8,17 @@
 
 namespace absenc::author {
 
-/// How long a host waits for a busy memory, and how.
+/// How often and how long a host repeats a request to a busy memory.
 struct BusyWait {
-  Time limit;               ///< Longest time from the first valid reply to the last attempt.
-  Time pause;               ///< Pause between two attempts.
-  unsigned attempts = 1;    ///< Attempts of each request until a valid reply.
-  bool after_busy = false;  ///< Whether a reply counts only when it follows a busy one.
+  Time limit;               ///< Longest time from the first valid reply to the last repetition.
+  Time pause;               ///< Pause before a repetition after a busy reply.
+  unsigned attempts = 1;    ///< How often each request is sent, at most, until its reply is valid.
+  bool after_busy = false;  ///< Whether the result must be a reply that follows a busy reply.
 };
 
-/// Returns the first valid reply whose member `busy` is false. A busy encoder has not executed the request, so even a
-/// write may be repeated. Errors: busy, or that of the last attempt.
+/// Sends `request` until a valid reply has `busy` false, and returns this reply. A busy encoder has not executed the
+/// request, so even a write may be repeated. Errors: busy (the time limit has passed), or the error of the last invalid
+/// reply.
 template <class P>
 Part<Result<typename P::Reply>> until_ready(DialogOf<P>& dialog, typename P::Request request, BusyWait wait) {
   Time last_attempt = never;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Host side of a procedure on a CAN bus: it sends a frame, or listens, and then awaits one received frame after the
-// other.
+// Host side of a procedure on a CAN bus: sends a frame, or listens, and then awaits the received frames one by one. A
+// protocol on CAN must have these members:
 //
 //   struct Protocol {
 //     using Item = CanFrame;
@@ -20,7 +20,7 @@
 
 namespace absenc::author {
 
-/// The dialog of a protocol on CAN.
+/// The conversation through which a procedure of a CAN protocol sends and receives frames.
 template <class P>
 requires std::same_as<typename P::Item, CanFrame>
 class DialogOf<P> : public CanEngine, public Routine {
@@ -31,15 +31,16 @@ class DialogOf<P> : public CanEngine, public Routine {
   /// Returns the format of the encoder.
   [[nodiscard]] const Format& format() const { return format_; }
 
-  /// Sends a frame, or only listens. One of these calls must precede the first await of a received frame.
+  /// Sends a frame not before `pause` after the last answer or request. `ask`, `ask_for` or `listen` must be called
+  /// before the first await of a received frame.
   void ask(const CanFrame& frame, Time pause = {}) { CanEngine::ask(frame, P::host_times(format_), pause); }
   using CanEngine::ask_for;
   using CanEngine::configure;
   using CanEngine::listen;
   using CanEngine::overhear;
 
-  /// Awaits the next frame on the bus, from any node; nothing when the time is over: `const std::optional<CanFrame>
-  /// frame = co_await dialog.heard()`.
+  /// Awaits the next frame on the bus, from any node. The result is nothing when the time limit of `ask` or `listen`
+  /// has passed: `const std::optional<CanFrame> frame = co_await dialog.heard()`.
   [[nodiscard]] auto heard() {
     struct Hear {
       DialogOf& dialog;
@@ -49,16 +50,16 @@ class DialogOf<P> : public CanEngine, public Routine {
     };
     return Hear{*this};
   }
-  /// Returns when the awaited frame was complete.
+  /// Returns the time at which the last awaited frame was complete.
   [[nodiscard]] Time heard_at() const { return heard_at_; }
-  /// Returns whether the frame was received before the request was sent: see `overhear`.
+  /// Returns whether the last awaited frame was received before the request was sent, which `overhear` permits.
   using CanEngine::came_early;
   [[nodiscard]] ChangeSent change_sent() const final { return change(); }
-  /// Stores the awaited frame as the answer.
+  /// Stores the last awaited frame as the answer to the request, for `exchange`.
   void keep() { CanEngine::keep(*frame_, heard_at_); }
 
  protected:
-  /// Talks to an encoder of this format; coroutines live in `arena`.
+  /// Runs a procedure with an encoder of this format; the coroutine frames are in `arena`.
   DialogOf(const Format& format, std::span<std::byte> arena) : Routine(arena), format_(format) {}
   ~DialogOf() = default;
 

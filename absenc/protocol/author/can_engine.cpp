@@ -66,8 +66,8 @@ void CanEngine::feed(const FrameEvent& event) {
       break;
     case Kind::received:
       for (const CanFrame& frame : event.items) {
-        // A frame that was complete before the request was sent cannot answer it, although it may be delivered late
-        // from a queue.
+        // A frame that was complete before the request was sent cannot answer the request, although a queue may deliver
+        // the frame late.
         early_ = state_ < State::receiving || event.at < since_;
         if (state_ <= State::receiving && (receives_early_ || !early_)) heard(frame, event.at);
       }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Host side of a CAN bus: sends a frame and receives all frames for a time, among the traffic of other nodes. It knows
-// no protocol, and is compiled once.
+// Host side of a CAN bus: sends a frame, and receives all frames on the bus for a time, including those of other nodes.
+// It knows no protocol, and is compiled once.
 #pragma once
 
 #include <cstdint>
@@ -11,33 +11,34 @@
 
 namespace absenc::author {
 
-/// How long a host waits for an answer.
+/// How long a host waits for an answer on a CAN bus.
 struct CanHostTimes {
-  Time answer_limit{};  ///< time without any frame on the bus
-  Time busy_limit{};    ///< time on a bus that other nodes keep busy
+  Time answer_limit{};  ///< time without any frame on the bus after which the host stops to wait
+  Time busy_limit{};    ///< time after which the host stops to wait although other nodes keep the bus busy
 };
 
-/// Sends one frame at a time and receives the frames after it; a subclass decides which frame is sent next. Frames that
-/// were complete before the request are not delivered to the subclass.
+/// Conversation that sends one frame at a time and receives frames; a subclass decides which frame is sent next. Frames
+/// that were complete before the request was sent are not delivered to the subclass, unless it calls `overhear`.
 class CanEngine : public Conversation<CanFrame> {
  public:
   /// Takes an event of the port.
   void feed(const Event<CanFrame>& event) final;
   /// Returns the next step of the port.
   Step<CanFrame> next(Time now) final;
-  /// Puts nothing: see Engine.
+  /// Puts nothing, so that names and texts of fields are only linked where they are used. Reported (command.hpp) puts
+  /// them.
   void report(FieldSink&) const override {}
   [[nodiscard]] Error error() const final { return outcome_.error; }
   [[nodiscard]] std::string_view detail() const override { return outcome_.detail; }
   [[nodiscard]] std::string_view advice() const override { return outcome_.advice; }
-  /// Returns the items of the last exchange.
+  /// Returns the last request, and the frame that `keep` stored as its answer.
   [[nodiscard]] Exchange<CanFrame> exchange() const final {
     return {{&request_, has_request_ ? 1u : 0u}, {&relevant_, has_relevant_ ? 1u : 0u}, sent_at_, relevant_at_};
   }
 
-  /// Returns when the last frame was sent.
+  /// Returns the time at which the last request was sent completely.
   [[nodiscard]] Time sent_at() const { return sent_at_; }
-  /// Returns whether frames were destroyed on the bus since the last request.
+  /// Returns whether a bus error destroyed frames since the last request.
   [[nodiscard]] bool is_disturbed() const { return disturbed_; }
   /// Returns why no answer was received: timeout, or bad_framing on a bus with errors.
   [[nodiscard]] Error missing() const { return disturbed_ ? Error::bad_framing : Error::timeout; }
@@ -48,29 +49,31 @@ class CanEngine : public Conversation<CanFrame> {
   CanEngine() = default;
   ~CanEngine() = default;
 
-  /// Sends `frame`, `pause` after the last answer or request, and receives until the bus was silent for the answer
-  /// limit.
+  /// Sends `frame`, `pause` after the last answer or request, and receives until the bus is silent for
+  /// `times.answer_limit`, or until `times.busy_limit` has passed.
   void ask(const CanFrame& frame, const CanHostTimes& times, Time pause = {});
-  /// Sends `frame` and receives for exactly `duration`.
+  /// Sends `frame` at once and receives frames for exactly `duration`.
   void ask_for(const CanFrame& frame, Time duration);
-  /// Delivers frames, from now on, that were received before the request was sent: they may answer earlier requests.
+  /// Sets whether frames that were received before the request was sent are delivered too: they may answer earlier
+  /// requests.
   void overhear(bool yes = true) { receives_early_ = yes; }
   /// Returns whether the delivered frame was received before the request was sent.
   [[nodiscard]] bool came_early() const { return early_; }
-  /// Receives unsolicited frames for `duration`.
+  /// Receives frames for `duration` without sending.
   void listen(Time duration);
-  /// Switches the rate of this end of the line, then receives for `duration`.
+  /// Switches this end of the bus to `rate` bits per second, then receives frames for `duration` without sending.
   void configure(std::uint32_t rate, Time duration);
-  /// Ends the conversation with this outcome.
+  /// Ends the conversation with the error and texts of `outcome`.
   void finish(const Outcome& outcome);
-  /// Stores the frame as the answer, for `exchange`.
+  /// Stores `frame`, which was complete at `at`, as the answer to the request, for `exchange`.
   void keep(const CanFrame& frame, Time at);
-  /// Returns whether a good reply needs no second one to be presented as good.
+  /// Returns whether the texts of the outcome replace all other explanations of the error (see `only`).
   [[nodiscard]] bool is_alone() const { return outcome_.alone; }
 
-  /// Handles a frame that was received after the request. Calls one of the functions above, or returns to receive more.
+  /// Handles a received frame, which was complete at `at`. To send, listen or end, it calls one of the functions above;
+  /// otherwise receiving continues.
   virtual void heard(const CanFrame& frame, Time at) = 0;
-  /// Handles the end of the time limit. Calls one of the functions above.
+  /// Handles the end of the time limit. Calls one of the functions above, otherwise the conversation ends.
   virtual void over() = 0;
 
  private:
@@ -86,10 +89,10 @@ class CanEngine : public Conversation<CanFrame> {
   std::uint32_t rate_ = 0;
   CanFrame request_{};
   CanFrame relevant_{};
-  Time silence_{};   // time without any frame that ends receiving; 0: it lasts exactly `duration_`
-  Time duration_{};  // longest time of receiving
+  Time silence_{};   // receiving ends after this time without any frame; 0: receiving lasts exactly `duration_`
+  Time duration_{};  // longest duration of receiving
   Time since_{};     // frames that were complete before this time are not delivered
-  Time until_{};     // end of receiving; before that the time of sending
+  Time until_{};     // end of receiving; before the request is sent: earliest time to send it
   Time sent_at_{};
   Time relevant_at_{};
   Outcome outcome_{};

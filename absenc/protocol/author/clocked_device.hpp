@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Device side of a clocked line: drives its bits while the host clocks. It knows no protocol, and is compiled once.
+// Device side of a clocked line: the virtual encoder drives its bits while the host clocks. It knows no protocol, and
+// is compiled once.
 #pragma once
 
 #include <cstddef>
@@ -13,7 +14,7 @@ namespace absenc::author {
 /// Bits that the encoder drives on the line, one for each clock. After them the line idles.
 using DrivenBits = BitBuffer<512>;
 
-/// A virtual encoder on a clocked link.
+/// A virtual encoder on a clocked link; a subclass provides the bits.
 class ClockedDevice : public EncoderOn<std::uint8_t> {
  public:
   /// Takes an event of the port.
@@ -25,26 +26,28 @@ class ClockedDevice : public EncoderOn<std::uint8_t> {
   [[nodiscard]] MutableBytes memory() override { return {}; }
 
  protected:
-  /// Is ready `start_time` after it was switched on.
+  /// Constructs an encoder that is ready `start_time` after it is switched on.
   explicit ClockedDevice(Time start_time = {}) : EncoderOn(start_time) {}
   ~ClockedDevice() = default;
 
-  /// The clock starts with this period; 0: unknown. `held_low`: the clock line was held low before, not idle, which few
-  /// protocols use. The encoder puts the bits that it drives into `bits`, which is empty.
+  /// Is called when the clock starts. Puts the bits that the encoder drives into `bits`, which is empty. `period`:
+  /// period of the clock; 0: unknown. `held_low`: the clock line was held low before, not idle, which few protocols
+  /// use.
   virtual void selected(Time at, Time period, bool held_low, DrivenBits& bits) = 0;
-  /// The host has stopped after `clocks` clocks, at least one.
+  /// Is called when the host has stopped the clock after `clocks` clocks, at least one.
   virtual void clocked(Time at, std::size_t clocks) = 0;
-  /// Drives the line low for `time` after the last edge of the clock. Call it from `selected`.
-  void hold_low(Time time) { low_after_ = time; }
-  /// Sets how many of the driven bits hosts read, which are those that a fault of the line damages. Call it from
+  /// Makes the encoder drive the data line low for `time` after the last edge of the clock. To be called from
   /// `selected`.
+  void hold_low(Time time) { low_after_ = time; }
+  /// Sets how many of the driven bits hosts read; only these bits can be damaged by simulated faults of the line. To be
+  /// called from `selected`.
   void hosts_take(std::size_t bits) { taken_ = bits; }
 
  private:
   DrivenBits bits_;
   Time low_after_{};
-  std::size_t taken_ = 0;  // 0: all bits
-  bool pending_ = false;   // bits are to be driven
+  std::size_t taken_ = 0;  // number of driven bits that hosts read; 0: all bits
+  bool pending_ = false;   // the step that drives `bits_` has not been returned yet
   bool driving_ = false;
 };
 

@@ -22,7 +22,7 @@ void ClockedEngine::finish(Error error) {
 // ---- Steps
 
 ByteStep ClockedEngine::next(Time now) {
-  // A function makes the step, as in Engine::next.
+  // A function makes the step, because the compiler would first zero a variable by a call.
   ByteStep step = [this]() -> ByteStep { return {.expect = (count_ + 7) / 8, .bits = count_, .at = never}; }();
   const bool begins = state_ != State::over && !begun_;
   if (begins) {
@@ -50,7 +50,7 @@ void ClockedEngine::feed(const ByteEvent& event) {
   if (state_ != State::clocking) return;
   if (event.kind == ByteEvent::Kind::sent) {
     sent_at_ = event.at;
-    // 32 bits, because a processor without division is slow with 64.
+    // Computed with 32 bits, because a processor without division is slow with 64.
     if (times_.rate != 0) begun_at_ = event.at - Time(count_ * (1'000'000'000u / times_.rate));
   }
   if (event.kind != ByteEvent::Kind::received) return;

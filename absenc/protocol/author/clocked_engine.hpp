@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Host side of a clocked line: lets the clock rest, clocks bits out of the encoder and delivers them. It knows no
-// protocol, and is compiled once.
+// Host side of a clocked line: waits until the clock has rested, clocks bits out of the encoder, and delivers them. It
+// knows no protocol, and is compiled once.
 #pragma once
 
 #include <cstddef>
@@ -11,15 +11,15 @@
 
 namespace absenc::author {
 
-/// Times of the clock, as the encoder's document has them.
+/// Rate and pause of the clock, as the encoder's document states them.
 struct ClockedHostTimes {
-  std::uint32_t rate = 0;  ///< rate of the clock in Hz, set first; 0: the line keeps its rate
-  Time rest{};             ///< rest of the clock before each transfer, after which the encoder latches a new position
+  std::uint32_t rate = 0;  ///< rate of the clock in Hz, set before the first transfer; 0: the line keeps its rate
+  Time rest{};  ///< shortest pause of the clock before each transfer, after which the encoder latches a new position
 };
 
-/// Clocks one transfer after the other; a subclass decides the number of clocks and handles the bits. The host drives
-/// the clock, so there is no timeout and nothing is repeated. It rests before the first transfer too, because another
-/// host may have clocked just before.
+/// Conversation that clocks one transfer after the other; a subclass decides the number of clocks and handles the bits.
+/// The host drives the clock, so there is no timeout and nothing is repeated. The clock rests before the first transfer
+/// too, because another host may have clocked just before.
 class ClockedEngine : public Conversation<std::uint8_t> {
  public:
   /// Takes an event of the port.
@@ -27,33 +27,34 @@ class ClockedEngine : public Conversation<std::uint8_t> {
   /// Returns the next step of the port.
   Step<std::uint8_t> next(Time now) override;
   [[nodiscard]] Error error() const final { return error_; }
-  /// Puts nothing: see Engine.
+  /// Puts nothing, so that names and texts of fields are only linked where they are used. Reported (command.hpp) puts
+  /// them.
   void report(FieldSink&) const override {}
-  /// Returns the items of the last exchange.
+  /// Returns the bits of the last transfer, as bytes, and its times.
   [[nodiscard]] Exchange<std::uint8_t> exchange() const final {
     return {{}, Bytes(storage_).first(size_), sent_at_, received_at_};
   }
 
-  /// Returns the first edge of the clock in the last transfer: when it was due, or computed from the end if the rate is
-  /// known.
+  /// Returns the time of the first clock edge of the last transfer: computed from the end of the transfer if the rate
+  /// is known, otherwise the time at which the transfer was due.
   [[nodiscard]] Time begun_at() const { return begun_at_; }
-  /// Returns when the last item was received.
+  /// Returns the time at which the last transfer was received completely.
   [[nodiscard]] Time received_at() const { return received_at_; }
-  /// Returns false: an encoder sends nothing but clocked bits.
+  /// Returns false: an encoder on a clocked line cannot send without a clock.
   [[nodiscard]] bool is_noisy() const { return false; }
 
  protected:
-  /// `storage`: for the bits of the longest transfer.
+  /// Constructs an engine. `storage` must have room for the bits of the longest transfer, and outlive the engine.
   ClockedEngine(const ClockedHostTimes& times, MutableBytes storage) : times_(times), storage_(storage) {}
   ~ClockedEngine() = default;
 
-  /// Gives `count` clocks after a rest of the clock line, at its idle level or held low. If `storage` is too small, the
-  /// conversation ends with invalid_argument.
+  /// Begins a transfer of `count` clocks after a pause of the clock, during which the clock line is idle (high) or,
+  /// with `hold_low`, held low. If the storage is too small, the conversation ends with invalid_argument.
   void clock(unsigned count, bool hold_low = false);
-  /// Ends the conversation.
+  /// Ends the conversation with `error`; `Error::none`: with success.
   void finish(Error error);
 
-  /// Handles the bits of a complete transfer. Calls `clock` or `finish`.
+  /// Handles the bits of a complete transfer. Calls `clock` for another transfer, or `finish`.
   virtual void clocked(BitView bits) = 0;
 
  private:

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Combines the engine of a clocked line with a protocol.
+// Combines the engine of a clocked line with a protocol: conversations with decoded replies, and the command that reads
+// one position.
 #pragma once
 
 #include <array>
@@ -29,9 +30,9 @@ concept Clocked = requires {
 };
 
 struct Later {};
-inline constexpr Later later{};  ///< Makes a host that begins its transfer later.
+inline constexpr Later later{};  ///< Argument of a constructor: the host begins no transfer until its subclass does.
 
-/// A conversation with typed replies; a subclass handles the bits.
+/// A conversation on a clocked line with decoded replies; a subclass handles the bits of each transfer.
 template <Clocked P>
 class ClockedHostOf : public ClockedEngine {
  public:
@@ -44,33 +45,33 @@ class ClockedHostOf : public ClockedEngine {
   [[nodiscard]] const Format& format() const { return format_; }
   /// Returns the last valid reply.
   [[nodiscard]] const Reply& last() const { return last_; }
-  /// Returns the empty request of clocked links.
+  /// Returns an empty request, because hosts of clocked links send none.
   [[nodiscard]] static constexpr NoRequest request() { return {}; }
-  /// Returns the position, or null if there is none.
+  /// Returns the position that is the result; null after an error or if there is none.
   [[nodiscard]] const Reading* reading() const override {
     return error() == Error::none && reading_.singleturn_bits != 0 ? &reading_ : nullptr;
   }
-  /// Returns the position of the last valid reply, even if invalid ones followed.
+  /// Returns the position of the last stored valid reply, even if invalid replies followed.
   [[nodiscard]] const Reading& position() const { return reading_; }
-  /// Returns false, as HostOf does.
+  /// Returns false: the explanation of a reply is added to the error's texts.
   [[nodiscard]] static constexpr bool is_alone() { return false; }
 
  protected:
-  /// Begins with a transfer at once.
+  /// Begins a transfer of one reading at once.
   explicit ClockedHostOf(const Format& format) : ClockedHostOf(format, later) { ask(); }
-  /// Clocks nothing until the subclass does.
+  /// Begins no transfer until the subclass does.
   ClockedHostOf(const Format& format, Later) : ClockedEngine(P::host_times(format), storage_), format_(format) {}
   ~ClockedHostOf() = default;
 
-  /// Begins a transfer.
+  /// Begins a transfer of one reading.
   void ask() { clock(P::clocks(format_)); }
-  /// Takes the bits of a transfer; returns the first error.
+  /// Decodes the bits of a transfer, and stores a valid reply. Returns the first error of an invalid one.
   [[nodiscard]] Error take(BitView bits) {
     const Result<Reply> reply = P::decode(format_, bits);
     if (reply) last_ = *reply;
     return reply.error();
   }
-  /// Stores a valid reply, whose position was latched at the first edge of the clock.
+  /// Stores a valid reply and its position, which was latched at the first edge of the clock.
   void keep(const Reply& reply) {
     last_ = reply;
     keep();
@@ -94,18 +95,19 @@ class ClockedHostOf : public ClockedEngine {
   std::array<std::uint8_t, (P::most_clocks + 7) / 8> storage_;
 };
 
-/// Reads one position with one transfer.
+/// Conversation that reads one position with one transfer.
 template <Clocked P>
 class ReadClocked : public ClockedHostOf<P> {
  public:
-  /// Reads from an encoder of this format.
+  /// Reads from an encoder with this format.
   explicit ReadClocked(const typename P::Format& format) : ClockedHostOf<P>(format) {}
 
  private:
   void clocked(BitView bits) final { this->conclude(this->take(bits)); }
 };
 
-/// Declares a command that Reader carries out, constructed from the format.
+/// Returns the declaration of a command on a clocked line that the conversation `Reader` executes, which is constructed
+/// from the format.
 template <const auto& unit_report, class Reader = ReadClocked<ReportedProtocol<unit_report>>>
 [[nodiscard]] constexpr CommandOf<ReportedProtocol<unit_report>> clocked_reading(const Command& info) {
   using Format = typename ReportedProtocol<unit_report>::Format;
@@ -117,7 +119,7 @@ template <const auto& unit_report, class Reader = ReadClocked<ReportedProtocol<u
           .size = sizeof(Made)};
 }
 
-/// Returns the bits of a clocked frame; all bits of its bytes if `bits` is 0.
+/// Returns the bits of a frame of a clocked link; if the member `bits` of the frame is 0, all bits of its bytes.
 [[nodiscard]] constexpr BitView to_bits(const Frame& frame) {
   return {frame.bytes, frame.bits != 0 ? frame.bits : frame.bytes.size() * 8};
 }

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Declares a command by its request and the conversation that executes it. Its storage and its report follow from them.
+// Declares commands of a unit: each by its request and the conversation that executes it. The storage that a command
+// needs, and the fields and texts that it reports, follow from the declaration.
 #pragma once
 
 #include <algorithm>
@@ -19,16 +20,16 @@ namespace absenc::author {
 template <class Item>
 class Refusal final : public Conversation<Item> {
  public:
-  /// Ends at once with this error and its reason.
+  /// Constructs a conversation that ends at once with `error`; `why` is the reason for people.
   explicit Refusal(Error error, std::string_view why) : error_(error), why_(why) {}
-  /// Takes an event of the port.
+  /// Ignores the event.
   void feed(const Event<Item>&) override {}
-  /// Returns the next step of the port.
+  /// Returns the step `done`.
   Step<Item> next(Time) override { return {.kind = Step<Item>::Kind::done}; }
   [[nodiscard]] Error error() const override { return error_; }
   [[nodiscard]] std::string_view detail() const override { return why_; }
   void report(FieldSink&) const override {}
-  /// Returns the items of the last exchange.
+  /// Returns an empty exchange: nothing was sent.
   [[nodiscard]] Exchange<Item> exchange() const override { return {}; }
 
  private:
@@ -48,12 +49,12 @@ struct ItemOf<P> {
 };
 }  // namespace detail
 
-/// The item that the lines of a protocol carry: `P::Item`, or characters without one.
+/// The item that the line of the protocol `P` carries: `P::Item` if the protocol has it, otherwise a byte.
 template <class P>
 using ItemOf = typename detail::ItemOf<P>::Item;
 
-/// The fields of a unit's requests and replies, and its texts for people, which firmware does not link. All
-/// conversations of the unit derive from `Host`.
+/// Functions that turn requests and replies of a unit into fields, and errors into texts for people. Firmware does not
+/// link them. All conversations of the unit derive from `Host`.
 template <class P, class Host = Conversation<ItemOf<P>>>
 struct Report {
   /// The protocol.
@@ -64,48 +65,52 @@ struct Report {
   using Request = typename P::Request;
   /// A reply of the protocol.
   using Reply = typename P::Reply;
-  /// Items of the line.
+  /// Items that the line carries.
   using Items = std::span<const ItemOf<P>>;
 
-  /// Puts the fields of a request. `put_values<fields, values>` makes such a function.
+  /// Puts the fields of a request into the sink. `put_values<fields, values>` makes such a function.
   void (*put_request)(FieldSink&, const Format&, const Request&) = nullptr;
-  /// Puts the fields of a valid reply to the request.
+  /// Puts the fields of a valid reply to the request into the sink.
   void (*put_reply)(FieldSink&, const Format&, const Request&, const Reply&) = nullptr;
-  /// Explains an invalid or missing reply by the document. Not called if a procedure has an advice of its own.
+  /// Returns the document's explanation of an invalid or missing reply. Not called if a procedure has an advice of its
+  /// own. Null: none.
   Explanation (*explain)(const Format&, Error, Items request, Items reply) = nullptr;
-  /// Used instead of `explain` for conversations, if only they know the reason.
+  /// Returns the explanation of the error of a conversation that ended, for units in which only the conversation knows
+  /// the reason. If set, it replaces `explain` there.
   Explanation (*explain_host)(const Host&) = nullptr;
-  /// Used instead of `explain` for conversations, to put an explanation together. The last exchange of `host` failed.
+  /// Writes the explanation of a failed last exchange of `host` into the sentence, for units that put explanations
+  /// together from parts. If set, it replaces `explain` for conversations.
   void (*tell)(Sentence&, const Host& host) = nullptr;
-  /// Advice about a line that is never silent.
+  /// Advice for the error that the line is never silent.
   std::string_view noise_advice = endless_noise.advice;
 };
 
-/// The fields of the result of a procedure, `Found`. `Subject` is the format, or a class that the conversation derives
-/// from if the format alone is not enough.
+/// Functions that turn the result of a procedure, of type `Found`, into fields. `Subject` is the format, or a class
+/// that the conversation derives from if the format alone is not enough.
 template <class Subject, class T>
 struct Finding {
-  /// The format, or the class that the conversation derives from.
+  /// The format, or the class of the conversation, that the functions get.
   using Of = Subject;
   /// Type of the result.
   using Found = T;
 
-  /// Puts the values of a finding into fields.
+  /// Puts the fields of the result of a successful procedure into the sink.
   void (*put)(FieldSink&, const Subject&, const T&) = nullptr;
-  /// Puts the fields of the changes that an interrupted procedure leaves behind.
+  /// Puts the fields of the changes that an interrupted procedure leaves in the encoder into the sink. Null: none.
   void (*put_left)(FieldSink&, const Subject&, const T&) = nullptr;
-  /// Returns the same changes in words.
+  /// Returns a sentence about the changes that a failed procedure leaves in the encoder; "": there are none. Null:
+  /// never.
   std::string_view (*left)(const T&) = nullptr;
 };
 
-/// Puts the fields of the values that `values(format, ...)` returns.
+/// Puts the fields of the struct that `values(what...)` returns into `sink`.
 template <const auto& fields, auto values, class... What>
 constexpr void put_values(FieldSink& sink, const What&... what) {
   fields.put(sink, values(what...));
 }
 
-/// A conversation of a unit, which reports fields and texts of `unit_report`. A procedure has a `finding`; without one
-/// the last reply is reported.
+/// The conversation `Base` with reports: it delivers the fields and texts of `unit_report`. A procedure has one
+/// `finding`, which delivers its result; without a finding the last reply is the result.
 template <const auto& unit_report, class Base, const auto&... finding>
 class Reported final : public Base {
  public:
@@ -113,7 +118,7 @@ class Reported final : public Base {
   static_assert(sizeof...(finding) == 1 || unit_report.put_reply != nullptr, "a report needs put_reply");
   static_assert(((finding.put != nullptr) && ...), "a finding needs put");
 
-  /// Puts the fields that were found.
+  /// Puts the fields of the command's result, and the reading if there is one, into `sink`; nothing after an error.
   void report(FieldSink& sink) const override {
     if (this->error() != Error::none) return;
     if constexpr (sizeof...(finding) == 0) {
@@ -123,9 +128,11 @@ class Reported final : public Base {
     }
     if (const Reading* reading = this->reading()) sink.put_reading(*reading);
   }
-  /// Puts the fields that are found when a command ends early.
+  /// Puts the fields of the changes that an interrupted procedure leaves in the encoder into `sink`; nothing if there
+  /// are none.
   void report_left(FieldSink& sink) const override { (put_left<finding>(sink), ...); }
-  /// Returns a sentence about the result; empty: none.
+  /// Returns a text about the result for people: the explanation of the error, the failed step, and changes left in the
+  /// encoder. Empty: none.
   [[nodiscard]] std::string_view detail() const override {
     words_.clear();
     const std::string_view own = Base::detail();
@@ -140,7 +147,7 @@ class Reported final : public Base {
     (words_.add_part(left<finding>()), ...);
     return words_.view();
   }
-  /// Returns what the user can try, "" for nothing.
+  /// Returns what the user can try after an error; "": the error's general advice stands.
   [[nodiscard]] std::string_view advice() const override {
     const std::string_view own = Base::advice();
     if (!own.empty()) return own;
@@ -182,16 +189,16 @@ class Reported final : public Base {
   mutable Sentence words_;
 };
 
-/// Returns whether the request is a pulse on a wire of its own.
+/// Returns whether the request is sent as a pulse on a separate wire instead of bytes.
 template <class P>
 constexpr bool asks_by_pulse(const typename P::Format& format, const typename P::Request& request) {
   return P::manner(format, request).pulse != Time{};
 }
 
-/// Request of a protocol whose host sends nothing but clocks.
+/// Empty request, for protocols whose host sends nothing but clocks.
 struct NoRequest {};
 
-/// A command with the request or procedure that executes it.
+/// Declaration of a command of the protocol `P`: its description, its request, and the conversation that executes it.
 template <class P>
 struct CommandOf {
   /// Format of the encoder: the values of its options.
@@ -200,34 +207,34 @@ struct CommandOf {
   using Request = typename P::Request;
 
   Command info;  ///< Description of the command.
-  /// Returns the request that does the work of the command; procedures send more. It returns an error, or a request
-  /// that P::encode refuses, if the arguments allow none. Null: the requests are not known beforehand.
+  /// Returns the request that does the work of the command, although a procedure may send more. It returns an error, or
+  /// a request that P::encode refuses, if the arguments allow none. Null: the requests are not known beforehand.
   Result<Request> (*request)(const Format&, Arguments);
-  /// Makes its conversation in storage of `size` bytes.
+  /// Constructs the conversation of the command in storage of at least `size` bytes, plus coroutine frames.
   Any<Conversation> (*make)(const Format&, Arguments, std::span<std::byte>);
-  std::size_t size;  ///< bytes of storage, without the frames of coroutines
-  /// Returns why an encoder of this format lacks the command, "" if it has it. Null: every encoder has it.
+  std::size_t size;  ///< bytes of storage that the conversation needs, without the frames of coroutines
+  /// Returns why an encoder of this format lacks the command; "": it has the command. Null: every encoder has it.
   std::string_view (*missing)(const Format&) = nullptr;
-  /// Used instead of `make` for formats for which `is_other` is true. Null: for none.
+  /// Constructs the conversation for formats for which `is_other` is true, instead of `make`. Null if `is_other` is.
   Any<Conversation> (*make_other)(const Format&, Arguments, std::span<std::byte>) = nullptr;
   /// Returns whether `make_other` makes the conversation for this format; null: never.
   bool (*is_other)(const Format&) = nullptr;
   /// Returns whether the options of this format are consistent; no conversation is made otherwise. Null: always.
   bool (*possible)(const Format&) = nullptr;
 
-  /// Returns this command, refused for formats of which `why` returns a reason.
+  /// Returns a copy of this command that is refused for formats for which `why` returns a reason.
   [[nodiscard]] constexpr CommandOf unless(std::string_view (*why)(const Format&)) const {
     CommandOf one = *this;
     one.missing = why;
     return one;
   }
-  /// Returns this command, made only for formats of which `is_possible` is true.
+  /// Returns a copy of this command whose conversation is made only for formats for which `is_possible` is true.
   [[nodiscard]] constexpr CommandOf only_if(bool (*is_possible)(const Format&)) const {
     CommandOf one = *this;
     one.possible = is_possible;
     return one;
   }
-  /// Lets `other` execute the command for formats for which `is` is true.
+  /// Returns a copy of this command that the conversation of `other` executes for formats for which `is` is true.
   [[nodiscard]] constexpr CommandOf or_when(bool (*is)(const Format&), const CommandOf& other) const {
     CommandOf one = *this;
     one.is_other = is;
@@ -235,7 +242,8 @@ struct CommandOf {
     one.size = std::max(size, other.size);
     return one;
   }
-  /// Returns whether these arguments make a request, or the conversation explains why not.
+  /// Returns whether a conversation can be made with these arguments: false if P::encode refuses the request. An error
+  /// of `request` gives true, because the conversation reports that error.
   [[nodiscard]] bool can_ask(const Format& format, Arguments arguments) const {
     if constexpr (std::is_same_v<Request, NoRequest>) {
       return true;
@@ -245,8 +253,8 @@ struct CommandOf {
       return !asked || !P::encode(format, *asked).empty() || asks_by_pulse<P>(format, *asked);
     }
   }
-  /// Makes its conversation in `storage`: one that refuses where the encoder does not have the command, none where
-  /// options or arguments contradict it.
+  /// Constructs the conversation of the command in `storage`. It is a Refusal if the encoder lacks the command. Returns
+  /// an empty Any if options or arguments contradict the command, or the storage is too small.
   [[nodiscard]] Any<Conversation> run(const Format& format, Arguments arguments, std::span<std::byte> storage) const {
     const std::string_view why = missing != nullptr ? missing(format) : std::string_view{};
     if (!why.empty()) return make_host<Refusal<ItemOf<P>>>(storage, Error::unsupported, why);
@@ -258,7 +266,7 @@ struct CommandOf {
 };
 
 namespace detail {
-// Makes a request from the format, for commands without arguments.
+// Returns the request of a command without arguments, made from the format.
 template <auto request, class Format>
 constexpr auto request_of(const Format& format) {
   if constexpr (std::is_invocable_v<decltype(request), const Format&>) {
@@ -281,12 +289,12 @@ Any<Conversation> make_run(const typename Machine::Format& format, Arguments arg
 }
 }  // namespace detail
 
-/// The protocol of a report.
+/// The protocol of the Report `unit_report`.
 template <const auto& unit_report>
 using ReportedProtocol = typename std::remove_cvref_t<decltype(unit_report)>::Protocol;
 
-/// Declares a command that reads a position, or another value, with one request, which `request` makes from the format.
-/// Reader reads it.
+/// Returns the declaration of a command that reads a position, or another value, with one request, which `request`
+/// makes from the format. The conversation `Reader` executes it.
 template <const auto& unit_report, auto request, class Reader = ReadPosition<ReportedProtocol<unit_report>>>
 [[nodiscard]] constexpr CommandOf<ReportedProtocol<unit_report>> reading(const Command& info) {
   using P = ReportedProtocol<unit_report>;
@@ -302,8 +310,8 @@ template <const auto& unit_report, auto request, class Reader = ReadPosition<Rep
           .size = sizeof(Made)};
 }
 
-/// Declares a command that a procedure executes. `request(format, arguments)` returns a Request or a Result; see
-/// CommandOf.
+/// Returns the declaration of a command that a procedure executes. `request(format, arguments)` returns a Request or a
+/// Result; see CommandOf::request. `finding` delivers the result of the procedure.
 template <const auto& unit_report, const auto& finding, auto procedure, auto request, auto... bound>
 [[nodiscard]] constexpr CommandOf<ReportedProtocol<unit_report>> command(const Command& info) {
   using P = ReportedProtocol<unit_report>;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Reads a position that one reply alone does not always prove.
+// Conversation that reads a position of an encoder whose single reply does not always prove that the position is right.
 #pragma once
 
 #include <optional>
@@ -15,7 +15,7 @@ namespace absenc::author {
 template <class P>
 class ReadConfirmed : public HostOf<P> {
  public:
-  /// Reads with this request.
+  /// Reads from an encoder of this format with `request`.
   ReadConfirmed(const typename P::Format& format, const typename P::Request& request) : HostOf<P>(format) {
     this->ask(request);
   }

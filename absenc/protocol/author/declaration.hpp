@@ -16,90 +16,103 @@
 
 namespace absenc::author {
 
-/// Declares a unit of the protocol `P` (dialog.hpp, device.hpp; clocked_host.hpp). `VirtualEncoder` is constructed from
-/// (format, shaft): BusDevice, ClockedDevice. `Host` is the Host of the Report.
+/// The properties of a unit of the protocol `P`, from which Descriptor (unit.hpp) makes the Unit. `P` has the functions
+/// that dialog.hpp, device.hpp or clocked_host.hpp list. `VirtualEncoder`, a BusDevice or ClockedDevice, is constructed
+/// from (format, shaft). `Host` is the Host of the Report.
 template <class P, class VirtualEncoder, class Host = Conversation<ItemOf<P>>>
 struct Declaration {
   /// The protocol.
   using Protocol = P;
-  /// Its virtual encoder.
+  /// Type of the protocol's virtual encoder.
   using Encoder = VirtualEncoder;
   /// Format of the encoder: the values of its options.
   using Format = typename P::Format;
   /// A request of the protocol.
   using Request = typename P::Request;
 
-  std::string_view id{};                         ///< Identifier: the part of an address before the colon.
-  std::string_view name{};                       ///< maker and protocol, for people
-  std::string_view document{};                   ///< title of the document
-  std::span<const std::string_view> known_as{};  ///< makers and families to find it by: "Tamagawa", "Smart-Abs"
-  LinkKind link{};                               ///< Kind of link between host and encoder.
-  std::span<const Option> options{};             ///< OptionsOf::infos (option.hpp)
-  Format (*format)(const Options&) = nullptr;    ///< `format_of<options>` if the options are members of the format
-  std::span<const ModelText> models{};           ///< option.hpp
-  std::span<const FieldInfo> fields{};           ///< FieldsOf::infos (field.hpp)
-  std::span<const CommandOf<P>> commands{};      ///< command.hpp
-  std::span<const VectorText> vectors{};         ///< text.hpp; a vector that does not decode as stated does not compile
-  bool frames_are_texts = false;  ///< frames of vectors are not hexadecimal; those of clocked links are 0 and 1
-  std::size_t frames_size = 0;    ///< most bytes of storage that the coroutine frames of the procedures need
-  Report<P, Host> report{};       ///< How requests, replies and findings are shown.
+  std::string_view id{};        ///< Identifier: the part of an address before the colon.
+  std::string_view name{};      ///< names of maker and protocol, for people
+  std::string_view document{};  ///< title of the protocol's document
+  /// Names of makers and families by which users find the unit: "Tamagawa", "Smart-Abs".
+  std::span<const std::string_view> known_as{};
+  LinkKind link{};                    ///< Kind of link between host and encoder.
+  std::span<const Option> options{};  ///< options of the unit: OptionsOf::infos (option.hpp)
+  /// Returns the format with these option values: `format_of` if the options are members of the format.
+  Format (*format)(const Options&) = nullptr;
+  std::span<const ModelText> models{};       ///< models, with their option values as text (option.hpp)
+  std::span<const FieldInfo> fields{};       ///< fields of the unit: FieldsOf::infos (field.hpp)
+  std::span<const CommandOf<P>> commands{};  ///< commands of the unit (command.hpp)
+  /// Test vectors (text.hpp); one that does not decode as stated does not compile.
+  std::span<const VectorText> vectors{};
+  /// True: frames of vectors are plain texts, not hexadecimal, as always on clocked links (texts of 0 and 1).
+  bool frames_are_texts = false;
+  std::size_t frames_size = 0;  ///< most bytes of storage that the coroutine frames of one procedure need
+  Report<P, Host> report{};     ///< Functions that deliver requests, replies and errors as fields and texts.
 
   // ---- Functions of the format
 
-  /// Null: `format.line()`.
+  /// Returns the settings of the line. Null: `format.line()` does.
   LineSettings (*line)(const Format&) = nullptr;
-  /// Null: `format.resolution()`.
+  /// Returns the numbers of bits of position and turns. Null: `format.resolution()` does.
   Resolution (*resolution)(const Format&) = nullptr;
-  /// Returns whether a virtual encoder can be made, and clocked frames decoded. Null: always.
+  /// Returns whether the options do not contradict each other, so that a virtual encoder can be made and clocked frames
+  /// can be decoded. Null: always.
   bool (*is_usable)(const Format&) = nullptr;
-  /// Returns the request that a reply answers, from the reply alone, or an error. Required if `decode` is null, except
-  /// on clocked lines.
+  /// Returns the request that this reply answers, as far as the reply alone shows it, or an error. Required if `decode`
+  /// is null, except on clocked lines.
   Result<Request> (*guess_request)(const Format&, Bytes reply) = nullptr;
-  /// Returns the length of a reply that begins with these bytes; 0: no reply does. Null: the longest.
+  /// Returns the length of the reply that begins with the bytes `begin`; 0: no reply does. Null: every reply has the
+  /// length P::longest_reply.
   std::size_t (*reply_size)(const Format&, Bytes begin) = nullptr;
-  /// Returns the error of an invalid request, from the reply to it. Null: the error of the request.
+  /// Returns the error to report for the reply to an invalid request: for example, that the encoder rejected it.
+  /// `error`: error of the request. Null: `error` is reported.
   Error (*answer_to_bad)(const Format&, Bytes request, Error error, Bytes reply) = nullptr;
-  /// Checks a frame and puts its fields. Null: the protocol and the report do.
+  /// Checks a frame and puts its fields into the sink. Null: functions of the protocol and the report do.
   Error (*decode)(const Format&, Frame request, Frame reply, FieldSink&) = nullptr;
 
-  /// Clocked links: writes the bits that the host sends for a command, as text of 0 and 1. Null: the host only clocks.
+  /// For clocked links: writes the bits that the host sends for a command into `out`, as text of 0 and 1, and returns
+  /// their number. Null: the host only clocks.
   Result<std::size_t> (*encode)(const Format&, const Command&, Arguments, MutableBytes out) = nullptr;
 
   // ---- As in Unit (protocol/unit.hpp)
 
-  FrameEnd (*frame_end)(const Options&, Direction, Bytes) = nullptr;  ///< null: by the sizes of requests and replies
-  bool (*is_answered)(const Options&, Frame request) = nullptr;       ///< null: by the manner of the request
-  /// Returns whether a flip of this bit of a good reply must be noticed; null: of every bit.
+  /// Returns where a frame ends. Null: the lengths of requests and replies decide.
+  FrameEnd (*frame_end)(const Options&, Direction, Bytes) = nullptr;
+  /// Returns whether a request is answered. Null: Protocol::manner decides.
+  bool (*is_answered)(const Options&, Frame request) = nullptr;
+  /// Returns whether the checks must detect that this bit of a valid reply was flipped; null: every bit.
   bool (*is_checked)(const Options&, Frame request, Frame reply, std::size_t bit) = nullptr;
-  /// Returns the bits of a field in request and reply; null: unknown.
+  /// Returns the bits of a valid reply that carry a field; null: unknown.
   BitRanges (*bits)(const Options&, Frame request, Frame reply, const FieldInfo&) = nullptr;
-  /// Finds options in captured frames; null: none can be found.
+  /// Finds the values of options that fit captured frames; null: frames do not show option values.
   bool (*probe)(Options&, std::span<const Capture>, EvidenceSink&) = nullptr;
-  /// Returns whether the encoder sends without requests; null: never.
+  /// Returns whether the encoder sends unsolicited replies; null: never.
   bool (*streams)(const Options&) = nullptr;
-  /// Returns the wires that these options need beside the data; null: none.
+  /// Returns the wires beside the data line that an encoder with these options needs; null: none.
   ExtraWires (*extra_wires)(const Options&) = nullptr;
-  /// Returns the index of the bit by which the encoder answers in each pause; null: no reply has one.
+  /// For clocked links: returns the index of the bit in a reply that the encoder sends in exchange for the level of the
+  /// clock line in the pause; null: no reply has such a bit.
   std::optional<std::size_t> (*control_bit)(const Options&, Frame reply) = nullptr;
-  /// Returns the alarms that replies can report; null: all.
+  /// Returns the alarms that an encoder with these options can report; null: all.
   std::uint32_t (*reportable)(const Options&) = nullptr;
   /// Completes a reading by values of earlier readings; null: each reading is complete.
   Reading (*remembered)(const Reading& before, Reading now) = nullptr;
-  /// Makes a follower, which completes replies of a capture; null: none is needed.
+  /// Constructs a Follower, which finds frames that several exchanges of a capture carried; null: there are no such
+  /// frames.
   Follower* (*follower)(const Options&, std::span<std::byte>) = nullptr;
-  std::size_t follower_storage = 0;           ///< Bytes that a follower needs.
-  const FieldInfo* status = nullptr;          ///< Field of the status; null: none.
-  const FieldInfo* alarms = nullptr;          ///< Field of the alarms; null: none.
-  const FieldInfo* second_status = nullptr;   ///< Field of the second status; null: none.
-  const FieldInfo* second_alarms = nullptr;   ///< Field of the second alarms; null: none.
-  std::span<const MemoryArea> memory{};       ///< Areas of the memory that hosts can reach.
-  std::span<const RegisterInfo> registers{};  ///< Registers that hosts can reach.
-  std::span<const Condition> conditions{};    ///< Conditions that a virtual encoder can be given.
-  LineTiming timing{};                        ///< Times of the line, for captures.
-  const Unit* over_spi = nullptr;             ///< The same encoder on SPI; null: none.
+  std::size_t follower_storage = 0;           ///< Bytes of storage that `follower` needs.
+  const FieldInfo* status = nullptr;          ///< Field that describes the flags of Reading::status; null: none.
+  const FieldInfo* alarms = nullptr;          ///< Field that describes the flags of Reading::alarms; null: none.
+  const FieldInfo* second_status = nullptr;   ///< Field of the status of channel 2; null: none.
+  const FieldInfo* second_alarms = nullptr;   ///< Field of the alarms of channel 2; null: none.
+  std::span<const MemoryArea> memory{};       ///< Areas of the encoder's memory that hosts can access.
+  std::span<const RegisterInfo> registers{};  ///< Registers of the encoder that hosts can access.
+  std::span<const Condition> conditions{};    ///< Conditions of the virtual encoder's environment that users can set.
+  LineTiming timing{};                        ///< Times of the line, which decoding captures needs.
+  const Unit* over_spi = nullptr;  ///< The unit of the same encoder on SPI, if that is another unit; null: it is not.
 };
 
-/// Returns the format whose members the options set.
+/// Returns the format whose members have the values `values` of `options`.
 template <const auto& options>
 constexpr auto format_of(const Options& values) {
   return options.format(values);

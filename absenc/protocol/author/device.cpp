@@ -8,9 +8,10 @@ namespace absenc::author {
 
 namespace {
 constexpr std::string_view turn_rule = "request during the encoder's transmission";
-// No host of a virtual encoder waits less before it repeats a request: a pseudo-terminal delays the bytes by this time.
+// Shortest timeout of a host that talks to a virtual encoder: a pseudo-terminal delays the bytes by this time.
 constexpr Time least_patience = std::chrono::milliseconds(1);
-// More replies in a row during which the host sent cannot be excused by a delay of this program.
+// Greatest number of consecutive replies during which the host may send without a violation, because a delay of this
+// program can explain it.
 constexpr unsigned most_excuses = 2;
 }  // namespace
 
@@ -29,7 +30,7 @@ ByteStep Responder::next(Time) {
     return {.kind = ByteStep::Kind::transfer, .out = reply_, .at = reply_at_};
   }
   ByteStep step{.expect = 1, .at = never};
-  // The other encoder may be absent, so any pause ends its reply.
+  // Another encoder that is addressed may be absent, so any pause ends its reply.
   if (damaged_ || skipping_ != 0) step.expect = 0;
   if (!damaged_ && !request_.empty()) step.expect = request_size(request_) - request_.size();
   if (damaged_ || !request_.empty() || skipping_ != 0 || refusing_) {
@@ -68,7 +69,7 @@ void Responder::forget() {
   skip_begins_ = damaged_ = false;
 }
 
-// The rest of a damaged request is ignored until the line is silent.
+// Notes a damaged character: the rest of the request is ignored until the line is silent.
 void Responder::damage(Time at) {
   if (!is_on(at) || transmitting_) return forget();
   received_at_ = at;
@@ -76,7 +77,7 @@ void Responder::damage(Time at) {
   refusing_ = is_refused(Flaw::damaged, request_) || refusing_;
 }
 
-// Silence ends an incomplete request.
+// Handles silence of the line, which ends an incomplete request.
 void Responder::end_run(Time at) {
   reply_.clear();
   if (is_on(at) && !transmitting_) {
@@ -114,7 +115,7 @@ void Responder::receive_byte(std::uint8_t byte, Time at) {
   request_.clear();
 }
 
-// No request begins with the first byte, but one may begin at a later byte.
+// Searches for a request at the later received bytes, because none begins with the first byte.
 void Responder::search_again(Time at) {
   refusing_ = is_refused(Flaw::unknown, request_);
   const ByteBuffer<32> heard = request_;
@@ -123,8 +124,8 @@ void Responder::search_again(Time at) {
   for (const std::uint8_t byte : heard.view().subspan(1)) receive_byte(byte, at);
 }
 
-// If this program was delayed, the host may have sent the request after its timeout, before the reply was sent. That
-// explains it only if the delay is longer than the host waits for each request.
+// Handles a byte received while the encoder sends, which breaks a rule. It is excused if this program was delayed so
+// long that the host may have repeated the request after its timeout: longer than the host waits for each request.
 void Responder::receive_while_transmitting(std::uint8_t byte, Time at) {
   if (!interruption_.begins_request(request_size({&byte, 1}), at, times_.character)) return;
   ++interrupted_;

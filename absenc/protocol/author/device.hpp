@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Device side of a line of characters: recognizes requests, ignores those of other encoders, answers in time, checks
-// the rules that hosts must follow, and has a memory. It knows no protocol, and is compiled once.
+// Device side of a line of characters (UART): recognizes requests, ignores those for other encoders, answers in time,
+// checks the rules that hosts must follow, and has a memory. It knows no protocol, and is compiled once.
 #pragma once
 
 #include <array>
@@ -17,17 +17,18 @@
 
 namespace absenc::author {
 
-/// Times of a virtual encoder, as its document has them.
+/// Times of a virtual encoder, as its document states them.
 struct DeviceTimes {
-  Time character{};    ///< time of a character; a pause of two ends an incomplete request
-  Time answer_time{};  ///< from the end of a request to its reply
-  Time start_time{};   ///< from power on to the first request that is answered
-  Time gap{};          ///< pause that ends an incomplete request; 0: two characters
-  /// Full duplex: requests received during a transmission are stored and answered afterwards.
+  Time character{};    ///< duration of a character on the line
+  Time answer_time{};  ///< time from the end of a request to the begin of its reply
+  Time start_time{};   ///< time from power on until requests are answered
+  Time gap{};          ///< pause that ends an incomplete request; 0: the time of two characters
+  /// Whether requests received during a transmission are stored and answered afterwards, as on full-duplex lines.
   bool keeps_requests = false;
 };
 
-/// A virtual encoder whose subclass recognizes requests and answers them. BusDevice makes one from a protocol.
+/// A virtual encoder on a line of characters; a subclass recognizes and answers requests. BusDevice makes such an
+/// encoder from a protocol.
 class Responder : public EncoderOn<std::uint8_t> {
  public:
   /// Takes an event of the port.
@@ -39,47 +40,48 @@ class Responder : public EncoderOn<std::uint8_t> {
   void power_off(Time now) override;
 
  protected:
-  /// Replies with these times.
+  /// Constructs an encoder that replies with these times.
   explicit Responder(const DeviceTimes& times) : EncoderOn(times.start_time), times_(times) {}
   ~Responder() = default;
 
-  /// Transmits without a request on the line: after chip select, or unsolicited.
+  /// Transmits `bytes` at `at` without a request on the line: after chip select, or unsolicited.
   void transmit(Bytes bytes, Time at);
-  /// Returns whether the encoder is sending.
+  /// Returns whether the encoder is sending, or is about to send a reply.
   [[nodiscard]] bool is_transmitting() const { return transmitting_; }
   /// Returns the earliest time at which bytes delivered at `at` may have arrived, because the carrier may have been
-  /// delayed. Times that a host must wait count from here.
+  /// delayed. Times that a host must wait are measured from this time.
   [[nodiscard]] Time earliest(Time at) const { return at - late_; }
 
-  /// Returns the length of the request that begins with these bytes, or how many bytes are needed to know it, at least
-  /// one; 0: no request begins with them, and the search continues at the next byte.
+  /// Returns the length of the request that begins with the bytes `begin`, or how many bytes are needed to know the
+  /// length, at least one. 0: no request begins with these bytes, and the search continues at the next byte.
   [[nodiscard]] virtual std::size_t request_size(Bytes begin) const = 0;
-  /// Returns the length of the reply to this request, which is for another encoder.
+  /// Returns the length of the reply to `request`, which is for another encoder; 0: none.
   [[nodiscard]] virtual std::size_t others_reply_size(Bytes request) const = 0;
-  /// Returns whether the other encoder's reply may begin with this byte; if not, the other encoder did not answer and a
-  /// request follows.
+  /// Returns whether the reply of another encoder may begin with this byte. If not, that encoder did not answer and the
+  /// byte belongs to a new request. By default true.
   [[nodiscard]] virtual bool begins_others_reply(std::uint8_t) const { return true; }
   /// Whether and how a request is answered.
   enum class Answer : std::uint8_t {
     sent,
     none,
     for_others,
-    refused,  ///< when the line is silent: see `refuse`
+    refused,  ///< the reply is made by `refuse` when the line is silent
   };
-  /// Delays the present reply by `time`. Call it from `respond`.
+  /// Delays the present reply by `time`. To be called from `respond`.
   void take_longer(Time time) { longer_ = time; }
-  /// Answers a complete request. The reply goes to `reply`.
+  /// Answers the complete request `request`, received at `at`: writes the reply into `reply`, and returns how the
+  /// request is answered.
   virtual Answer respond(Bytes request, Time at, ByteBuffer<64>& reply) = 0;
-  /// Error of a request.
+  /// Reason why received bytes are no valid request.
   enum class Flaw : std::uint8_t {
-    damaged,    ///< damaged character
+    damaged,    ///< a character was damaged
     unknown,    ///< no request begins with these bytes
-    cut_short,  ///< ended by silence
+    cut_short,  ///< silence ended the request before it was complete
   };
-  /// Returns whether an invalid request is refused; otherwise it is ignored. For a damaged one, `heard` has the bytes
-  /// before the damage, possibly none.
+  /// Returns whether the encoder replies to an invalid request with a refusal; false: the request is ignored. `heard`:
+  /// the received bytes; for a damaged request those before the damage, possibly none. By default false.
   virtual bool is_refused(Flaw, Bytes /*heard*/) { return false; }
-  /// Makes the reply to a refused request, when the line is silent.
+  /// Writes the reply to a refused request into `reply`; called when the line is silent. By default empty.
   virtual void refuse(Time, ByteBuffer<64>& /*reply*/) {}
 
  private:
@@ -98,8 +100,8 @@ class Responder : public EncoderOn<std::uint8_t> {
   Time received_at_{};
   Time late_{};               // longest delay with which the last bytes were delivered
   std::size_t skipping_ = 0;  // characters left of another encoder's reply
-  bool skip_begins_ = false;  // the first of these characters is still to be received
-  bool refusing_ = false;     // the refused request is answered when the line is silent
+  bool skip_begins_ = false;  // the first character of another encoder's reply is still to be received
+  bool refusing_ = false;     // a request was refused, and is answered when the line is silent
   ByteBuffer<64> reply_;
   Time reply_at_{};
   Time longer_{};
@@ -111,8 +113,8 @@ class Responder : public EncoderOn<std::uint8_t> {
   Interruption interruption_;
 };
 
-/// A virtual encoder of a protocol with requests and replies (dialog.hpp), with `memory_size` bytes that survive power
-/// off. The protocol needs these functions besides:
+/// A virtual encoder of a protocol with requests and replies. It has `memory_size` bytes that survive power off.
+/// Besides the functions of dialog.hpp the protocol needs these:
 ///
 ///   static DeviceTimes device_times(const Format&);
 ///   static std::size_t request_size(const Format&, Bytes begin);       // 0: no request begins with these bytes
@@ -135,7 +137,7 @@ class BusDevice : public Responder {
   /// Constructs an encoder that is off until `power_on`. `shaft` must outlive it.
   BusDevice(const Format& format, const Shaft& shaft)
       : Responder(P::device_times(format)), format_(format), shaft_(&shaft) {}
-  /// Returns the memory of the encoder, which outlasts power-off.
+  /// Returns the bytes of the encoder's memory, which survive power off.
   [[nodiscard]] MutableBytes memory() final { return memory_; }
 
  protected:
@@ -143,23 +145,23 @@ class BusDevice : public Responder {
 
   /// Returns the format of the encoder.
   [[nodiscard]] const Format& format() const { return format_; }
-  /// Returns position and motion of the shaft.
+  /// Returns position and motion of the shaft at the time `at`.
   [[nodiscard]] ShaftState shaft(Time at) const { return shaft_->at(at); }
-  /// Returns counts of 2^-bits revolution since the zero that `store_zero` stored in four bytes at this address;
-  /// continuous from turn to turn, negative below zero.
+  /// Returns the position of the shaft at `at` in counts of 2^-bits revolution, measured from the zero that
+  /// `store_zero` stored at `zero_address`. It is continuous from turn to turn, negative below the zero.
   [[nodiscard]] std::int64_t counts(Time at, unsigned bits, std::size_t zero_address) const {
     const auto zero = static_cast<std::int64_t>(load_little_endian(Bytes(memory_).subspan(zero_address, 4)));
     return (shaft(at).position - zero) >> (32 - bits);
   }
-  /// Stores the present position as the zero.
+  /// Stores the position of the shaft at `at` as the zero, in four bytes of the memory at `zero_address`.
   void store_zero(Time at, std::size_t zero_address) {
     const auto here = static_cast<std::uint64_t>(shaft(at).position) & low_mask(32);
     store_little_endian(MutableBytes(memory_).subspan(zero_address, 4), here);
     change_memory();
   }
-  /// Returns a byte of the memory.
+  /// Returns the byte of the memory at `address`.
   [[nodiscard]] std::uint8_t stored(std::size_t address) const { return memory_[address]; }
-  /// Writes a byte of the memory.
+  /// Writes `value` to the byte of the memory at `address`.
   void store(std::size_t address, std::uint8_t value) {
     memory_[address] = value;
     change_memory();

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Combines the engine with a protocol: conversations with one request, and procedures with several.
+// Combines the engine of a line of characters with a protocol: conversations with one request, and procedures with
+// several requests.
 #pragma once
 
 #include <array>
@@ -31,7 +32,7 @@ namespace absenc::author {
 ///     static Time latched(const Format&, Time sent_at);              // when the encoder latches the position; if the
 ///   };                                                               // document does not say: `sent_at`, the latest
 ///
-/// A conversation with typed requests and replies, which a subclass handles.
+/// A conversation with encoded requests and decoded replies; a subclass sends the requests and handles the replies.
 template <class P>
 class HostOf : public Engine {
  public:
@@ -44,7 +45,7 @@ class HostOf : public Engine {
 
   /// Returns the format of the encoder.
   [[nodiscard]] const Format& format() const { return format_; }
-  /// Returns the request.
+  /// Returns the last request.
   [[nodiscard]] const Request& request() const { return request_; }
   /// Returns the last valid reply.
   [[nodiscard]] const Reply& last() const { return last_; }
@@ -55,19 +56,19 @@ class HostOf : public Engine {
     reading.received = received_at();
     return reading;
   }
-  /// Returns whether the texts of a procedure replace all others; only a procedure has such texts.
+  /// Returns false: the explanation of a reply is added to the error's texts. Only procedures can replace it.
   [[nodiscard]] static constexpr bool is_alone() { return false; }
 
  protected:
-  /// Reads from an encoder of this format.
+  /// Constructs a conversation with an encoder of this format.
   explicit HostOf(const Format& format) : Engine(P::host_times(format), storage_), format_(format) {}
   ~HostOf() = default;
 
-  /// Sets the format when the encoder has reported what the options left open.
+  /// Sets the format, when the encoder has reported properties that the options left open.
   void set_format(const Format& format) { format_ = format; }
-  /// Sends a request, not before `earliest`.
+  /// Sends `request` as Protocol::manner states, not before `earliest`.
   void ask(const Request& request, Time earliest = {}) { ask(request, P::manner(format_, request), earliest); }
-  /// Sends a request with a manner of its own, not before `earliest`.
+  /// Sends `request` as `manner` states, not before `earliest`.
   void ask(const Request& request, const Manner& manner, Time earliest = {}) {
     request_ = request;
     request_bytes_ = P::encode(format_, request);
@@ -87,19 +88,20 @@ class HostOf : public Engine {
   Request request_{};
   decltype(P::encode(Format{}, Request{})) request_bytes_{};
   Reply last_{};
-  // Longer than the longest reply, so that a reply that is too long is detected.
+  // Bytes of the reply. There is more room than for the longest reply, so that a reply that is too long is detected.
   std::array<std::uint8_t, 3 * P::longest_reply> storage_;
 };
 
-/// Reads a position with one request: a drive does this ten thousand times a second.
+/// Conversation that reads a position with one request. It must be fast, because a drive reads ten thousand times a
+/// second.
 template <class P>
 class ReadPosition : public HostOf<P> {
  public:
-  /// Reads with this request.
+  /// Reads from an encoder of this format with `request`.
   ReadPosition(const typename P::Format& format, const typename P::Request& request) : HostOf<P>(format) {
     this->ask(request);
   }
-  /// Returns the position, or null if there is none.
+  /// Returns the position that is the result; null after an error, or if there is none.
   [[nodiscard]] const Reading* reading() const final {
     return reading_.singleturn_bits + reading_.multiturn_bits != 0 ? &reading_ : nullptr;  // only after a good end
   }
@@ -113,7 +115,8 @@ class ReadPosition : public HostOf<P> {
   Reading reading_{};
 };
 
-/// The engine and coroutine storage through which a procedure sends requests.
+/// A conversation that a procedure (a coroutine) controls: the procedure awaits replies to its requests, and its frames
+/// are in the given storage.
 template <class P>
 class DialogOf : public HostOf<P>, public Routine {
  public:
@@ -122,24 +125,24 @@ class DialogOf : public HostOf<P>, public Routine {
   /// A reply of the protocol.
   using Reply = typename P::Reply;
 
-  /// An awaitable request. With `must` the procedure ends without a valid reply, and the result is the reply; otherwise
-  /// the result is a Result.
+  /// A request that a procedure can await, after setting its properties. With `must` the procedure ends if there is no
+  /// valid reply, and the result is the reply; otherwise the result is the reply or the error.
   template <bool must>
   class [[nodiscard]] Question {
    public:
-    /// Belongs to this dialog.
+    /// Constructs the question for the request that `dialog` has prepared.
     explicit Question(DialogOf& dialog) : dialog_(dialog) {}
     /// Sends the request only after `pause` since the last received or sent character.
     Question& after(Time pause) {
       dialog_.earliest_ = dialog_.received_at() + pause;
       return *this;
     }
-    /// Never repeats the request.
+    /// Sends the request once: an invalid or missing reply is not followed by a repetition.
     Question& once() {
       dialog_.asking_.repeats = 0;
       return *this;
     }
-    /// Sends the request up to `attempts` times, at least once.
+    /// Sends the request up to `attempts` times (1 or more) until its reply is valid.
     Question& repeated(unsigned attempts) {
       dialog_.asking_.repeats = attempts - 1;
       return *this;
@@ -149,12 +152,12 @@ class DialogOf : public HostOf<P>, public Routine {
       dialog_.changing_ = true;
       return *this;
     }
-    /// Accepts the reply only when silence follows, as Manner::ends_by_silence.
+    /// Accepts the reply only when silence follows it, as with Manner::ends_by_silence.
     Question& until_silence() {
       dialog_.asking_.ends_by_silence = true;
       return *this;
     }
-    /// Sets the detail of the procedure's error if it ends here: the step that failed.
+    /// Sets the detail of the error if the procedure ends at this request: the step that failed.
     Question& or_say(std::string_view words) {
       dialog_.words_ = words;
       return *this;
@@ -162,9 +165,9 @@ class DialogOf : public HostOf<P>, public Routine {
 
     /// Returns false: a reply always takes time.
     [[nodiscard]] bool await_ready() const { return false; }
-    /// Sends the request.
+    /// Sends the request and suspends the procedure until the exchange has ended.
     void await_suspend(std::coroutine_handle<>) { dialog_.ask_it(must); }
-    /// Returns the reply.
+    /// Returns the reply; without `must` the reply or the error.
     auto await_resume() const {
       if constexpr (must) {
         return dialog_.last();
@@ -177,17 +180,18 @@ class DialogOf : public HostOf<P>, public Routine {
     DialogOf& dialog_;
   };
 
-  /// Sends a request; without a valid reply the procedure ends here.
+  /// Returns an awaitable that sends `request` and gives the reply. Without a valid reply the procedure ends there.
   [[nodiscard]] Question<true> ask(const Request& request) {
     prepare(request);
     return Question<true>(*this);
   }
-  /// Sends a request; returns the reply or the error.
+  /// Returns an awaitable that sends `request` and gives the reply or the error.
   [[nodiscard]] Question<false> attempt(const Request& request) {
     prepare(request);
     return Question<false>(*this);
   }
-  /// Sends nothing for `pause` after the last received or sent character: `co_await dialog.rest(10ms)`.
+  /// Returns an awaitable that waits until `pause` after the last received or sent character: `co_await
+  /// dialog.rest(10ms)`.
   [[nodiscard]] auto rest(Time pause) {
     struct Rest {
       DialogOf& dialog;
@@ -198,26 +202,28 @@ class DialogOf : public HostOf<P>, public Routine {
     };
     return Rest{*this, pause};
   }
-  /// Emits an intermediate result before the next request.
+  /// Delivers the present result to the caller (step `emit`) before the next request.
   void emit() { HostOf<P>::emit(); }
   using HostOf<P>::set_format;
-  /// Switches this end of the line to `rate` from now on, with these times.
+  /// Switches this end of the line to `rate` bits per second before the next request, and uses the time limits `times`
+  /// from then on.
   void set_rate(std::uint32_t rate, const HostTimes& times) {
     HostOf<P>::set_rate(rate);
     this->set_times(times);
   }
-  /// Listens for `duration` from the next await on, without sending. `heard` returns the received bytes until it is
-  /// over.
+  /// Listens without sending for `duration`, from the next await of `heard` on, which returns the received bytes until
+  /// the time is over.
   void listen(Time duration) {
     heard_ = {};
     HostOf<P>::listen(duration);
   }
-  /// Reply of an encoder that sends without requests.
+  /// Result of awaiting `heard`: bytes received while listening, or the end of the time.
   struct Heard {
-    Bytes bytes{};      ///< none, while not over: a damaged character. Valid until the next await
+    /// Received bytes, valid until the next await; empty, while not `over`: a damaged character was received.
+    Bytes bytes{};
     bool over = false;  ///< Whether the time of listening is over.
   };
-  /// Waits for the next reply of an encoder that sends without requests.
+  /// Returns an awaitable for the next bytes received while listening, or the end of the time of `listen`.
   [[nodiscard]] auto heard() {
     struct Hear {
       DialogOf& dialog;
@@ -229,13 +235,13 @@ class DialogOf : public HostOf<P>, public Routine {
   }
   [[nodiscard]] std::string_view detail() const override { return outcome_.detail; }
   [[nodiscard]] std::string_view advice() const override { return outcome_.advice; }
-  /// Returns whether a good reply needs no second one to be presented as good.
+  /// Returns whether the texts of the procedure's outcome replace all other explanations of its error (see `only`).
   [[nodiscard]] bool is_alone() const { return outcome_.alone; }
   [[nodiscard]] ChangeSent change_sent() const final { return change(); }
-  /// Promises that from now on the procedure restores the encoder when it is asked to end early; `is_aborted` returns
-  /// whether it was.
+  /// Declares that from now on the procedure, when it is asked to end early, restores the encoder before it ends. Such
+  /// a procedure must check `is_aborted`. `yes` false: withdraws the declaration.
   void restores(bool yes = true) { restores_ = yes; }
-  /// Returns whether the procedure was aborted from outside.
+  /// Returns whether the caller has asked the procedure to end early, while `restores` was declared.
   [[nodiscard]] bool is_aborted() const { return aborted_; }
   bool abort() final {
     aborted_ = aborted_ || restores_;
@@ -243,7 +249,7 @@ class DialogOf : public HostOf<P>, public Routine {
   }
 
  protected:
-  /// Talks to an encoder of this format; coroutines live in `arena`.
+  /// Runs a procedure with an encoder of this format; the coroutine frames are in `arena`.
   DialogOf(const typename P::Format& format, std::span<std::byte> arena) : HostOf<P>(format), Routine(arena) {}
   ~DialogOf() = default;
 
@@ -287,7 +293,7 @@ class DialogOf : public HostOf<P>, public Routine {
   Error failure_ = Error::none;
   Heard heard_{};
   bool must_ = false;
-  bool changing_ = false;  // the present request changes the encoder
+  bool changing_ = false;  // the present request changes the encoder if it is executed
   bool restores_ = false;
   bool aborted_ = false;
 };
@@ -304,19 +310,19 @@ struct ProcedureDialog<P> {
 };
 }  // namespace detail
 
-/// The dialog of the procedures of a protocol: `P::Dialog`, an Engine and Routine constructed from (format, arena), if
-/// the protocol does not answer each request with one reply.
+/// Type of the dialog of a protocol's procedures: `P::Dialog` if the protocol has it, because it does not answer each
+/// request with one reply; otherwise DialogOf. `P::Dialog` is an Engine and Routine constructed from (format, arena).
 template <class P>
 using ProcedureDialog = typename detail::ProcedureDialog<P>::Type;
 
-/// A running procedure: `procedure(dialog, found, bound..., arguments)`, the last only if it takes them. Its result is
-/// `Found`, whose member `reading`, if it has one, is the position; otherwise the dialog has the position. With
-/// `Found::streams` each `emit` is a result, and the procedure ends only with an error. Coroutine frames are in the
-/// storage after this object.
+/// A conversation that runs `procedure(dialog, found, bound..., arguments)`; the arguments are passed only if the
+/// procedure takes them. Its result is `Found`, whose member `reading`, if it has one, is the position; otherwise the
+/// dialog has the position. If `Found` has a member `streams`, each `emit` is a result, and the procedure ends only
+/// with an error. The coroutine frames are in the storage after this object.
 template <class P, class Found, auto procedure, auto... bound>
 class Run : public ProcedureDialog<P> {
  public:
-  /// Runs a procedure with these arguments; its coroutine lives in `arena`.
+  /// Begins the procedure with these arguments; the coroutine frames are in `arena`.
   Run(const typename P::Format& format, Arguments arguments, std::span<std::byte> arena)
       : ProcedureDialog<P>(format, arena) {
     for (const std::int64_t argument : arguments) static_cast<void>(arguments_.push_back(argument));
@@ -327,13 +333,13 @@ class Run : public ProcedureDialog<P> {
       this->begin(procedure(*this, found_, bound...).handle);
     }
   }
-  /// Returns the results so far.
+  /// Returns the result of the procedure, as far as it has been stored.
   [[nodiscard]] const Found& found() const { return found_; }
-  /// Returns the counts of a stream; null: the command does not stream.
+  /// Returns the counts of a procedure that streams; null: it ends by itself.
   [[nodiscard]] const StreamCounts* stream() const final { return goes_on ? &counts_ : ProcedureDialog<P>::stream(); }
-  /// Returns whether the stream sends requests.
+  /// Returns whether the procedure streams, and so sends a request for each result.
   [[nodiscard]] bool asks() const final { return goes_on; }
-  /// Returns the position, or null if there is none.
+  /// Returns the position that is the result; null after an error, or if there is none.
   [[nodiscard]] const Reading* reading() const final {
     if constexpr (requires { found_.reading; }) {
       return this->error() == Error::none && found_.reading.singleturn_bits != 0 ? &found_.reading : nullptr;
@@ -345,7 +351,7 @@ class Run : public ProcedureDialog<P> {
  private:
   static constexpr bool goes_on = requires { Found::streams; };
 
-  static constexpr StreamCounts counts_{};  // a polled procedure discards no frames
+  static constexpr StreamCounts counts_{};  // all zero: a procedure that polls the encoder discards no frames
 
   Found found_{};
   Buffer<std::int64_t, 6> arguments_;
