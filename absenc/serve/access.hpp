@@ -21,10 +21,10 @@ namespace absenc::serve {
 class Access {
  public:
   enum class Right : std::uint8_t {
-    open,    // the page itself and the health check: no token needed
-    read,    // to read what the server knows
-    poll,    // to poll the encoder or interrupt its readings, without changing it
-    change,  // to change the encoder, or to acknowledge an alarm
+    open,    // the page itself and the health check: a request needs no token
+    read,    // requests for data that the server has already read
+    poll,    // requests that poll the encoder or interrupt its readings, without changing it
+    change,  // requests that change the encoder or acknowledge an alarm
   };
 
   struct Choices {
@@ -32,24 +32,25 @@ class Access {
     std::string public_url{};  // URL at which a proxy on this computer shows the page; "": no proxy
     bool on_loopback = false;  // the server listens on loopback, so no other computer can reach it directly
   };
-  /// Throws Failure when the file cannot be read, others may read it, or a token is shorter than 16 characters; throws
-  /// UsageError when `choices` are inconsistent. `server_events` must outlive this object.
+  /// Throws Failure when the token file cannot be read, users other than its owner may read it, or a token is shorter
+  /// than 16 characters; throws UsageError when `choices` are inconsistent. `server_events` must outlive this object.
   Access(const Choices& choices, ServerEvents& server_events);
 
-  /// Reads the token file again: tokens that are no longer in it become invalid at once. Throws Failure like the
-  /// constructor; the previous tokens then stay valid.
+  /// Reads the token file again: a token that was removed from the file becomes invalid at once. Throws Failure like
+  /// the constructor; the previous tokens then stay valid.
   void reload();
 
   /// Returns the response that refuses the request; nothing if the request is allowed.
   [[nodiscard]] std::optional<Response> refusal(const Request& request, Right right) const;
-  /// Returns the address of the client. Behind a proxy on this computer it is the address that the proxy reports.
+  /// Returns the address of the client. For a request through a proxy on this computer it is the address that the proxy
+  /// reports.
   [[nodiscard]] std::string client_of(const Request& request) const;
   /// Returns the name of the token in the request; "" without a valid token.
   [[nodiscard]] std::string token_name(const Request& request) const;
   /// Returns the response to a missing or wrong token, and counts a wrong token.
   [[nodiscard]] Response refuse_token(const Request& request) const;
   [[nodiscard]] bool has_tokens() const { return !token_file_.empty(); }
-  /// Returns the number of requests with a wrong token.
+  /// Returns the number of requests with a wrong token since the start.
   [[nodiscard]] std::uint64_t wrong_tokens() const;
 
  private:
@@ -63,7 +64,7 @@ class Access {
   [[nodiscard]] bool needs_token(const Request& request, Right right) const;
 
   std::string token_file_;
-  std::string public_origin_;  // "https://encoders.example:8443"; "": no proxy
+  std::string public_origin_;  // origin of `public_url`, for example "https://encoders.example:8443"; "": no proxy
   bool on_loopback_;
   ServerEvents* server_events_;
   mutable std::mutex mutex_;  // guards all members below

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// HTTP API: maps paths to responses.
+// HTTP API of `absenc serve`: answers each path with data of the encoders, or carries out an order.
 #pragma once
 
 #include <memory>

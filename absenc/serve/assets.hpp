@@ -8,8 +8,8 @@
 namespace absenc::serve {
 
 struct Asset {
-  std::string_view path;  // path in the URL: "/app.js"
-  std::string_view type;  // content type: "text/javascript; charset=utf-8"
+  std::string_view path;  // path of the file in the URL: "/app.js"
+  std::string_view type;  // content type of the file: "text/javascript; charset=utf-8"
   std::string_view content;
 };
 

@@ -17,7 +17,7 @@
 
 namespace absenc::serve {
 
-/// Detects jumps of the calendar clock.
+/// A detector of jumps of the calendar clock.
 class ClockWatch {
  public:
   static constexpr std::int64_t smallest_jump_ms = 10'000;  // in milliseconds; NTP adjusts the clock by less
@@ -40,10 +40,11 @@ class Chronicler {
   /// Writes the remaining seconds and events.
   ~Chronicler();
 
-  /// `added` is the number of events since the start, including these (ServerEvents::added).
+  /// Adds events that are written to the history. `added` is the number of events since the start, including
+  /// `server_events` (ServerEvents::added).
   void add(const std::vector<ServerEvent>& server_events, std::uint64_t added);
-  /// Calls `then` in the thread of the history once the first `added` server events are in the file, where kill -9 does
-  /// not lose them, or writing them has failed.
+  /// Calls `then` in the history thread once the first `added` server events are in the history file, where kill -9
+  /// does not lose them, or writing them has failed.
   void when_written(std::uint64_t added, std::function<void()> then);
 
   struct Health {
@@ -66,7 +67,7 @@ class Chronicler {
   mutable std::mutex mutex_;  // guards all members below
   std::condition_variable_any changed_;
   std::vector<ServerEvent> unwritten_events_;
-  std::uint64_t added_ = 0;  // events since the start, including those in `unwritten_events_`
+  std::uint64_t added_ = 0;  // number of events since the start, including those in `unwritten_events_`
   std::vector<std::pair<std::uint64_t, std::function<void()>>> waiting_;
   Health health_;
   std::jthread thread_;  // last member: the thread uses all others

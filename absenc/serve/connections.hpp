@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Selects the connection to close when too many are open. One address cannot shut out others, and the longest idle
-// connection is closed first.
+// Selects the HTTP connection to close when too many are open: one address cannot shut out others, and the connection
+// that is idle for longest is closed first.
 #pragma once
 
 #include <cstddef>
@@ -12,24 +12,24 @@
 
 namespace absenc::serve {
 
-/// Not thread-safe.
+/// The open HTTP connections of the server. Not thread-safe.
 class Connections {
  public:
-  static constexpr std::size_t most = 480;             // connections for any request
-  static constexpr std::size_t most_of_address = 384;  // connections of one address, so that one client or proxy leaves
-                                                       // room for others
-  static constexpr std::size_t reserve = 32;           // additional connections, for vital requests only
-  static constexpr Time request_time = std::chrono::seconds(10);  // time limit for a whole request, even if bytes still
-                                                                  // arrive
+  static constexpr std::size_t most = 480;  // greatest number of connections that may carry any request
+  // Greatest number of connections of one address, so that one client or proxy leaves room for others.
+  static constexpr std::size_t most_of_address = 384;
+  static constexpr std::size_t reserve = 32;  // number of additional connections, which carry vital requests only
+  // Time limit for receiving a whole request, even if bytes still arrive.
+  static constexpr Time request_time = std::chrono::seconds(10);
 
   using Id = const void*;
-  /// `end` closes the connection of a socket; the call of `remove` may follow later.
+  /// `end` closes the connection of a socket; the server calls `remove` for it at once or later.
   explicit Connections(std::function<void(int socket)> end) : end_(std::move(end)) {}
 
-  /// Adds a connection. Closes another one, or this one, when the limit is exceeded.
+  /// Adds a connection. When a limit is exceeded, closes another connection, or this one.
   void add(Id id, int socket, std::string peer, Time now);
   void remove(Id id) { open_.erase(id); }
-  /// A whole request was received; the connection is not idle until `await_request`.
+  /// Records that a whole request was received: the connection is not idle until `await_request`.
   void begin_request(Id id);
   void await_request(Id id, Time now);
   /// Returns whether the connection belongs to the reserve, which serves vital requests only.
@@ -41,7 +41,7 @@ class Connections {
   struct Open {
     int socket = -1;
     std::string peer{};
-    Time idle_since = never;  // `never` while a request is being answered
+    Time idle_since = never;  // time since which no request is being answered; `never` while one is
     bool in_reserve = false;
     bool ended = false;
   };

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Serializes numbers and texts one after the other. Numbers have the byte order of this computer, so the bytes cannot
-// be read on another one.
+// be read on a computer with another byte order.
 #pragma once
 
 #include <cstddef>
@@ -23,7 +23,7 @@ class FieldWriter {
   std::string bytes_;
 };
 
-/// Reads fields with all checks needed for untrusted input: a truncated field throws client::Failure.
+/// A reader of serialized fields with all checks needed for untrusted input: a truncated field throws client::Failure.
 class FieldReader {
  public:
   explicit FieldReader(std::string bytes) : bytes_(std::move(bytes)) {}
@@ -32,7 +32,7 @@ class FieldReader {
   [[nodiscard]] std::uint64_t long_number();
   [[nodiscard]] std::string text();
   [[nodiscard]] bool at_end() const { return at_ == bytes_.size(); }
-  /// Checks that no bytes follow. Throws client::Failure.
+  /// Checks that no bytes follow the last field that was read. Throws client::Failure if bytes follow.
   void end() const;
 
  private:

@@ -16,14 +16,15 @@ class Fleet {
  public:
   using Watches = std::vector<std::shared_ptr<Watch>>;
 
-  /// `names` are as for `absenc read`; empty means all of absenc.toml. `rate`: readings per second of encoders without
-  /// `rate_hz` in the file; 0: as fast as possible. `server_events` must outlive this object. Throws UsageError.
+  /// `names` are encoder addresses as for `absenc read`; empty: all encoders of absenc.toml. `rate`: readings per
+  /// second of encoders without `rate_hz` in the file; 0: as fast as possible. `server_events` must outlive this
+  /// object. Throws UsageError.
   Fleet(std::vector<std::string> names, double rate, ServerEvents& server_events);
   ~Fleet();
   Fleet(const Fleet&) = delete;
   Fleet& operator=(const Fleet&) = delete;
 
-  /// Ends all reading threads and their orders. Statistics can still be read afterwards.
+  /// Ends all reading threads and their orders. The statistics of the encoders can still be read afterwards.
   void end();
 
   /// Reads absenc.toml again. Encoders with unchanged settings continue without interruption. Throws UsageError: then
@@ -31,9 +32,9 @@ class Fleet {
   std::string reload();
 
   [[nodiscard]] Watches all() const;
-  /// Returns null for an unknown name.
+  /// Returns the encoder of this name; null if none is served under it.
   [[nodiscard]] std::shared_ptr<Watch> find(std::string_view name) const;
-  /// Returns the names of the other encoders on the same line.
+  /// Returns the names of the other encoders on the same line as `watch`.
   [[nodiscard]] std::vector<std::string> others_on_line(const Watch& watch) const;
 
  private:

@@ -28,29 +28,29 @@ struct Range {
   std::int64_t to_s = 0;
 };
 
-/// Reads the history while HistoryWriter writes it. Thread-safe.
+/// A reader of the history, for use while HistoryWriter writes it. Thread-safe.
 class HistoryReader {
  public:
-  /// Opens no file yet: each query throws Failure if `path` has no history.
+  /// Opens no file yet: each query throws Failure if there is no history at `path`.
   explicit HistoryReader(std::string path);
   ~HistoryReader();
   HistoryReader(const HistoryReader&) = delete;
   HistoryReader& operator=(const HistoryReader&) = delete;
 
-  /// Returns at most `most` rows; each row covers as many seconds as this limit requires: [[at_s, least, mean,
-  /// greatest, speed least, mean, greatest, readings, errors],...]
+  /// Returns the history of an encoder in at most `most` rows; each row covers as many seconds as this limit requires:
+  /// [[at_s, least, mean, greatest, speed least, mean, greatest, readings, errors],...]
   [[nodiscard]] client::Json seconds(const std::string& encoder, Range range, std::int64_t most);
-  /// Returns the newest `most` events of an encoder; "": of all encoders and the server.
+  /// Returns the newest `most` events of `encoder`; for "" those of all encoders and of the server.
   [[nodiscard]] client::Json server_events(const std::string& encoder, Range range, std::int64_t most);
-  /// Returns up to `most` rows of CSV, and the time in seconds from which the next rows start; this is later than
-  /// `range.to_s` after the last row.
+  /// Returns up to `most` rows of the history as CSV, and the time in seconds at which the next rows start; after the
+  /// last row this time is later than `range.to_s`.
   [[nodiscard]] std::pair<std::string, std::int64_t> csv(const std::string& encoder, Range range, std::int64_t most);
   [[nodiscard]] static std::string_view csv_header();
 
  private:
   friend class HistoryWriter;
-  /// Closes the file, so that the writer can change to another file at the path: SQLite could not read that file with
-  /// the old log and index. Until `accept`, each query throws Failure with `why`.
+  /// Closes the history file, so that the writer can change to another file at the path: SQLite could not read that
+  /// file with the old log and index. Until `accept`, each query throws Failure with `why`.
   void refuse(const std::string& why);
   void accept();
   Sqlite& database();
@@ -61,11 +61,11 @@ class HistoryReader {
   std::string refused_;
 };
 
-/// Writes the history from one thread. After kill -9 or a power failure only the last second is missing.
+/// The writer of the history, used by one thread. After kill -9 or a power failure only the last second is missing.
 class HistoryWriter {
  public:
-  /// Throws HistoryInUse when another server writes to the file. Any other error is stored in `trouble`, and each
-  /// `write` tries again.
+  /// Throws HistoryInUse when another server writes to the history file. Any other error is stored in `trouble`, and
+  /// each `write` tries again.
   HistoryWriter(std::string path, const HistoryLimits& limits);
   ~HistoryWriter();
   HistoryWriter(const HistoryWriter&) = delete;
@@ -75,14 +75,14 @@ class HistoryWriter {
     std::string encoder;
     Second second;
   };
-  /// Writes all rows, or none when the disk is full, and counts rows that are lost. Starts a new file if the old one
-  /// was moved, removed, replaced, truncated or damaged; a damaged file is renamed.
+  /// Writes all rows and events, or none when the disk is full, and counts those that are lost. Starts a new file if
+  /// the old one was moved, removed, replaced, truncated or damaged; a damaged file is renamed.
   void write(const std::vector<Entry>& seconds, const std::vector<ServerEvent>& server_events);
-  /// Deletes rows beyond the limits; cheap when no row is. Age alone deletes rows only after a day of newer rows was
-  /// recorded, because the clock may be wrong.
+  /// Deletes rows beyond the limits of age and file size; fast when no row is beyond them. Age alone deletes rows only
+  /// after a day of newer rows was recorded, because the clock may be wrong.
   void trim();
 
-  /// Returns why the last `write` failed; "" after success.
+  /// Returns why the last `write` failed; "" if it succeeded.
   [[nodiscard]] const std::string& trouble() const { return trouble_; }
   [[nodiscard]] std::uint64_t lost() const { return lost_; }
   /// Returns sentences about changes of the history file since the last call.
@@ -108,7 +108,7 @@ class HistoryWriter {
   HistoryLimits limits_;
   std::string trouble_;
   std::uint64_t lost_ = 0;
-  std::uint64_t unreported_losses_ = 0;  // rows lost since the last report
+  std::uint64_t unreported_losses_ = 0;  // number of rows lost since the last event about losses
   std::int64_t lost_since_ms_ = 0;
   std::vector<std::string> notes_;
 };

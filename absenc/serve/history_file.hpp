@@ -32,20 +32,20 @@ class HistoryFile {
     replaced,
     damaged,
   };
-  /// Compares the file at the path with its state at the last `note_written`.
+  /// Returns how the file at the path differs from its state at the last `note_written`.
   [[nodiscard]] State check() const;
-  /// Stores the modification time. Call it after each transaction: a different time later means that another program
-  /// wrote.
+  /// Stores the modification time of the history file. Call it after each transaction: a different time later means
+  /// that another program wrote.
   void note_written();
 
-  /// Closes a `changed` file without changing it or its log.
+  /// Closes a history file in state `changed`, and changes neither the file nor its log.
   void close();
-  /// Closes a file that is `gone` or `replaced`. All written rows are in that file, and its log is removed from the
-  /// path.
+  /// Closes a history file in state `gone` or `replaced`. All written rows are in that file, and its log is removed
+  /// from the path.
   void close_moved();
-  /// Closes a `damaged` file and renames it. Returns the new name. Throws Failure.
+  /// Closes a history file in state `damaged` and renames it. Returns the new name. Throws Failure.
   std::string set_aside();
-  /// Renames the file at `path`. Returns the new name. Throws Failure.
+  /// Renames the history file at `path`. Returns the new name. Throws Failure.
   static std::string set_aside(const std::string& path);
 
  private:
@@ -56,8 +56,8 @@ class HistoryFile {
   std::unique_ptr<os::OwnedFile> owned_file_;  // stays open until the database is closed: closing it would release
                                                // SQLite's locks
   std::optional<Sqlite> sqlite_;
-  os::FileIdentity log_;    // write-ahead log of SQLite
-  os::FileIdentity index_;  // index of the write-ahead log
+  os::FileIdentity log_;    // identity of the write-ahead log of SQLite
+  os::FileIdentity index_;  // identity of the index of the write-ahead log
   std::int64_t modified_ns_ = 0;
 };
 

@@ -23,15 +23,15 @@ struct Request {
   std::string method;  // HTTP method: "GET", "POST" ...
   std::string path;
   std::multimap<std::string, std::string> query;
-  std::string peer;  // IP address of the client
-  std::string host;  // header Host; "" if it is missing, like the headers below
+  std::string peer;  // IP address of the client that is connected
+  std::string host;  // value of header Host; "" if it is missing; the same holds for the headers below
   std::string origin;
   std::string fetch_site;
   std::string authorization;
   bool is_forwarded = false;  // a header shows that a proxy forwarded the request
   std::string forwarded_for;  // header X-Forwarded-For; "" if it is missing or occurs twice
 
-  /// Returns the first query value of this name; "" without one.
+  /// Returns the first value of the query parameter `name`; "" if the query has none.
   [[nodiscard]] std::string value(const std::string& name) const;
 };
 
@@ -42,13 +42,14 @@ struct Response {
   std::vector<std::pair<std::string, std::string>> headers{};
 };
 
-/// A response body that is produced while it is sent. Texts wait in a bounded queue until the client has received the
-/// earlier ones. A slow client loses the oldest texts and delays no thread.
+/// The body of a response, which is produced while it is sent. Texts wait in a bounded queue until the client has
+/// received the earlier ones. A slow client loses the oldest texts and delays no thread.
 class Stream {
  public:
   using Text = std::shared_ptr<const std::string>;
 
-  /// `on_empty` is called in the thread of the connections when the queue is empty; it must return quickly.
+  /// `most`: greatest number of queued texts. `on_empty` is called in the connection thread when the queue is empty; it
+  /// must return quickly.
   explicit Stream(std::string type, std::size_t most = 64, std::function<void()> on_empty = {});
   ~Stream();
   Stream(const Stream&) = delete;
@@ -57,12 +58,12 @@ class Stream {
   void push(Text text);
   /// Ends the stream after the queued texts are sent.
   void end();
-  /// Closes the connection at once, even if the client receives nothing.
+  /// Closes the connection of the stream at once, even if the client receives nothing.
   void abort();
-  /// Returns whether the connection has ended.
+  /// Returns whether the connection of the stream has ended.
   [[nodiscard]] bool over() const;
   [[nodiscard]] std::uint64_t dropped() const;
-  /// Returns when the client last received data.
+  /// Returns when the client last received data of this stream.
   [[nodiscard]] Time taken_at() const;
 
  private:
@@ -71,8 +72,8 @@ class Stream {
   std::unique_ptr<Sending> sending_;
 };
 
-/// Answers one request, from any thread, immediately or later; only the first answer counts. If the last copy is
-/// destroyed without an answer, the server responds with status 500.
+/// The means to answer one HTTP request, from any thread, immediately or later; only the first answer is sent. If the
+/// last copy of this object is destroyed without an answer, the server responds with status 500.
 class Reply {
  public:
   void send(Response response) const;
@@ -89,8 +90,8 @@ class HttpServer {
  public:
   using Handler = std::function<void(const Request&, Reply)>;
 
-  /// `handler` is called in the thread of the connections and must return quickly. `vital`: paths that are answered
-  /// even when too many connections are open. Throws Failure.
+  /// `handler` is called in the connection thread for each request and must return quickly. `vital`: paths that are
+  /// answered even when too many connections are open. Throws Failure.
   HttpServer(os::Listener listener, Handler handler, std::vector<std::string> vital);
   /// Aborts responses that are still being sent. Threads that write to a Stream must have ended before.
   ~HttpServer();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Headers of an HTTP request, and checks of them.
+// Headers of an HTTP request, and checks whether they are ambiguous.
 #pragma once
 
 #include <cstdint>
@@ -12,13 +12,13 @@
 
 namespace absenc::serve {
 
-/// The headers in the order of the request. Names are compared without case.
+/// The headers of a request in their order. Names are compared without case.
 class Headers {
  public:
   void add(std::string name, std::string value) { all_.emplace_back(std::move(name), std::move(value)); }
 
   [[nodiscard]] std::size_t count(std::string_view name) const;
-  /// Returns the first value of this name; "" without one.
+  /// Returns the first value of the header `name`; "" if the request has none.
   [[nodiscard]] std::string first(std::string_view name) const;
 
   /// Returns why a proxy could interpret this request differently and take a part of it for another request (RFC 9112,
@@ -26,7 +26,7 @@ class Headers {
   [[nodiscard]] std::string_view ambiguity(std::string_view version) const;
   /// Returns the announced length of the body in bytes; 0 without Content-Length.
   [[nodiscard]] std::uint64_t announced_length() const;
-  /// Copies the headers that access control needs.
+  /// Copies the headers that access control needs to `request`.
   void copy_to(Request& request) const;
 
  private:

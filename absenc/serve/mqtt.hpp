@@ -20,27 +20,29 @@ struct MqttHealth {
   std::string broker{};
   std::string prefix{};
   bool connected = false;
-  std::string trouble{};      // why the broker is not connected, what it refuses, or why the spool cannot be written;
-                              // "" without an error
-  bool failing = false;       // new readings cannot be spooled, or the spool is full and drops the oldest
-  std::uint64_t waiting = 0;  // messages in the spool
+  std::string trouble{};  // why the broker is not connected, what it refuses, or why the spool cannot be written; ""
+                          // without an error
+  bool failing = false;   // new readings cannot be spooled, or the spool is full and drops the oldest
+  std::uint64_t waiting = 0;  // number of messages in the spool
   std::int64_t waiting_bytes = 0;
   std::uint64_t sent = 0;           // messages that the broker has acknowledged since the start
   std::uint64_t dropped = 0;        // readings lost since the start, because the spool was full or could not be written
   std::uint64_t client_deaths = 0;  // unexpected ends of the MQTT client process since the start
-  std::map<std::string, std::uint64_t> taken{};  // by encoder: number of its last reading that is in the spool or sent
+  // By encoder: number of its last reading that is in the spool or was sent.
+  std::map<std::string, std::uint64_t> taken{};
 
-  /// Returns "none" without a broker, "good", "away" while the broker is not connected and messages wait on disk, or
-  /// "failing" while readings are dropped.
+  /// Returns the state of MQTT: "none" without a broker, "good", "away" while the broker is not connected and messages
+  /// wait on disk, or "failing" while readings are dropped.
   [[nodiscard]] std::string_view state() const;
   [[nodiscard]] client::Json json() const;
-  /// Returns the metrics in the text format of Prometheus.
+  /// Returns the metrics of MQTT in the text format of Prometheus.
   [[nodiscard]] std::string metrics() const;
 };
 
 class Mqtt {
  public:
-  /// `fleet` and `server_events` must outlive this object. Throws Failure: the spool or a file cannot be used.
+  /// `fleet` and `server_events` must outlive this object. Throws Failure if the spool or a file of the connection
+  /// cannot be used.
   Mqtt(const MqttSettings& settings, const Fleet& fleet, ServerEvents& server_events);
   /// Spools the remaining readings. A connected broker has one second to receive them.
   ~Mqtt();

@@ -13,61 +13,62 @@
 
 namespace absenc::serve {
 
-/// Address and credentials of a broker. File names are "" if not used.
+/// Address and credentials of a broker. A file name is "" if the file is not used.
 struct Broker {
   std::string host{};
   std::uint16_t port = 0;
   bool tls = false;
   std::string login_file{};  // file with one line: USER PASSWORD
-  std::string ca_file{};     // certificate authority; "": those that this computer trusts
-  std::string cert_file{};   // client certificate, used with `key_file`
+  std::string ca_file{};     // file of the certificate authority; "": the authorities that this computer trusts
+  std::string cert_file{};   // file of the client certificate, used with `key_file`
   std::string key_file{};
 
   bool operator==(const Broker&) const = default;
-  /// Returns the address as a URL: "mqtts://host:8883".
+  /// Returns the address of the broker as a URL: "mqtts://host:8883".
   [[nodiscard]] std::string text() const;
 };
 
 enum class MqttVersion : std::uint8_t { v5, v3_1_1 };
 
-/// Identifies the client. The broker publishes `will`, retained, if the connection ends without a DISCONNECT packet.
+/// Identity of an MQTT client. The broker publishes `will`, retained, if the connection ends without a DISCONNECT
+/// packet.
 struct MqttIdentity {
   std::string id;
   std::string will_topic;
   std::string will;
 };
 
-/// Not thread-safe: one thread creates, uses and destroys it.
+/// A connection to a broker through the MQTT client process. Not thread-safe: one thread creates, uses and destroys it.
 class MqttClient {
  public:
-  /// Starts the MQTT client process. Throws Failure when the files cannot be used.
+  /// Starts the MQTT client process. Throws Failure when a file that `broker` names cannot be used.
   MqttClient(const Broker& broker, const MqttIdentity& identity, MqttVersion version);
   MqttClient(const MqttClient&) = delete;
   MqttClient& operator=(const MqttClient&) = delete;
 
   enum class State : std::uint8_t { connecting, connected, lost };
-  /// Starts to connect to the broker's name or to one of its addresses. `try_all`: tries all addresses of the name one
-  /// after the other until one accepts the connection.
+  /// Starts to connect to `host`, the broker's name or one of its addresses. `try_all`: tries all addresses of the name
+  /// one after the other until one accepts the connection.
   void connect(const std::string& host, bool try_all);
-  /// Sends and receives for at most `longest`.
+  /// Sends and receives for at most `longest`. Returns the state of the connection.
   State work(Time longest);
-  /// Returns why the connection is lost.
+  /// Returns why the connection to the broker is lost; "" if it is not.
   [[nodiscard]] const std::string& trouble() const { return trouble_; }
   /// Returns whether the broker does not support this version of MQTT.
   [[nodiscard]] bool wrong_version() const { return wrong_version_; }
-  /// Returns whether the process ended unexpectedly, as its library does at some malformed packets.
+  /// Returns whether the MQTT client process ended unexpectedly, as its library does at some malformed packets.
   [[nodiscard]] bool died() const { return died_; }
 
-  /// Returns the number that the acknowledgement of this message will have.
+  /// Sends a message to the broker. Returns the number that the acknowledgement of this message will have.
   int publish(const std::string& topic, const std::string& payload, int qos, bool retain);
 
   struct Acknowledgement {
     int number = 0;
-    std::string refused{};  // reason of the broker; "": the broker has accepted the message
+    std::string refused{};  // reason why the broker refused the message; "": the broker has accepted it
   };
   [[nodiscard]] std::vector<Acknowledgement> take_acknowledgements();
 
-  /// Sends a DISCONNECT packet, so that the will is not published.
+  /// Sends a DISCONNECT packet, so that the broker does not publish the will.
   void end();
 
  private:
@@ -85,7 +86,7 @@ class MqttClient {
   bool wrong_version_ = false;
   bool died_ = false;
   std::string trouble_;
-  Time last_frame_at_;  // when the process last sent a frame
+  Time last_frame_at_;  // time at which the MQTT client process last sent a frame
   int last_number_ = 0;
   std::vector<Acknowledgement> acknowledgements_;
 };

@@ -18,7 +18,7 @@ namespace absenc::serve {
 
 class MqttCollector {
  public:
-  /// All arguments must outlive this object. Throws Failure.
+  /// Starts the collector thread. All arguments must outlive this object. Throws Failure if the spool cannot be used.
   MqttCollector(const MqttSettings& settings, Spool& spool, const Fleet& fleet, ServerEvents& server_events);
   /// Spools the remaining readings and events.
   ~MqttCollector();
@@ -27,9 +27,9 @@ class MqttCollector {
 
   struct Figures {
     std::string trouble{};                         // why the spool cannot be written; "" without an error
-    std::uint64_t dropped = 0;                     // readings lost since the start
-    bool drops = false;                            // readings were dropped within the last 30 seconds
-    std::map<std::string, std::uint64_t> taken{};  // by encoder: number of its last reading on disk or sent
+    std::uint64_t dropped = 0;                     // number of readings lost since the start
+    bool drops = false;                            // whether readings were dropped within the last 30 seconds
+    std::map<std::string, std::uint64_t> taken{};  // by encoder: number of its last reading that is on disk or was sent
   };
   [[nodiscard]] Figures figures() const;
 
@@ -49,9 +49,9 @@ class MqttCollector {
   // The members below are used by the collector thread only.
   std::int64_t next_id_;
   std::map<std::string, std::uint64_t> next_numbers_;  // next number of a reading, by encoder
-  std::map<std::string, std::uint64_t> not_on_disk_;   // by encoder: number of its last reading, while messages wait in
-                                                       // memory
-  Spool::Counts unreported_{};                         // dropped messages that no event has reported yet
+  // By encoder: number of its last reading on disk, while messages wait in memory.
+  std::map<std::string, std::uint64_t> not_on_disk_;
+  Spool::Counts unreported_{};  // dropped messages that no event has reported yet
   std::string unreported_reason_;
   Time next_report_{};
 

@@ -19,30 +19,31 @@ namespace absenc::serve {
 /// Returns a name as one level of a topic: each character other than a letter, digit, - or _ becomes %XX.
 [[nodiscard]] std::string topic_level(std::string_view name);
 
-/// Returns PREFIX/ENCODER/KIND; for the server itself, whose `encoder` is "", PREFIX/KIND.
+/// Returns the topic PREFIX/ENCODER/KIND; for the server itself, whose `encoder` is "", PREFIX/KIND.
 [[nodiscard]] std::string topic_of(const std::string& prefix, std::string_view encoder, std::string_view kind);
 
-/// Returns the payload of a message with readings. `first` is the number of the first reading; numbers ascend by one.
+/// Returns the payload of a message with readings. `first` is the number of the first reading; each further reading has
+/// the next number.
 [[nodiscard]] std::string readings_text(const std::string& id, const Watch& watch, std::uint64_t first,
                                         std::span<const OutgoingReading> readings);
 [[nodiscard]] std::string event_text(const std::string& id, const ServerEvent& server_event);
 
-/// Returns the payload of the server's state; `state` is "online" or "offline".
+/// Returns the payload of the server's state message; `state` is "online" or "offline".
 [[nodiscard]] std::string server_state_text(std::string_view state, std::string_view why);
 
-/// A retained message. It is sent again when `condition` has changed.
+/// A retained message. The sender publishes it again when `condition` has changed.
 struct Retained {
   std::string topic;
   std::string condition;
   std::string payload;
 };
-/// Returns the state message of an encoder: whether it is live, and its alarms. It contains no position, because a
-/// retained position would become outdated.
+/// Returns the retained message with the state of an encoder: whether it is live, and its alarms. The message contains
+/// no position, because a retained position would become outdated.
 [[nodiscard]] Retained encoder_state(const std::string& prefix, const Watch& watch, const Snapshot& snapshot);
 
 /// Returns the discovery messages from which Home Assistant creates an encoder's entities: PREFIX/sensor/.../config.
 [[nodiscard]] std::vector<Retained> home_assistant_entities(const MqttSettings& settings, const Watch& watch);
-/// Returns all discovery topics that an encoder of this name may have.
+/// Returns the topics of all discovery messages that an encoder of this name may have.
 [[nodiscard]] std::vector<std::string> home_assistant_topics(const MqttSettings& settings, std::string_view encoder);
 
 }  // namespace absenc::serve

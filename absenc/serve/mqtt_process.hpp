@@ -14,7 +14,7 @@ namespace absenc::serve {
 /// The internal verb of `absenc` that starts the MQTT client process.
 inline constexpr std::string_view mqtt_process_verb = "serve-mqtt-client";
 
-/// Runs until the parent ends or sends Wire::leave. Returns the exit status for `main`.
+/// Runs the MQTT client process until the parent ends or sends Wire::leave. Returns the exit status for `main`.
 [[nodiscard]] int run_mqtt_process();
 
 }  // namespace absenc::serve

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Topics that the broker refuses. Each is tried again after a pause that doubles; messages of other topics are still
-// sent.
+// Topics that the broker refuses. Each topic is tried again after a pause that doubles; messages of other topics are
+// still sent.
 //
 // An MQTT 5 broker refuses a message with a reason. Other brokers just close the connection, so every topic without an
 // acknowledgement is a suspect. From the second such close on, suspects are sent one at a time, until the broker has
@@ -21,26 +21,27 @@ class MqttRefusals {
  public:
   enum class Verdict : std::uint8_t {
     send,
-    wait,  // until all messages sent so far are acknowledged
-    skip,  // the topic is refused and its pause is not over
+    wait,  // the message waits until all messages sent so far are acknowledged
+    skip,  // the message is skipped: the broker refuses its topic and the pause is not over
   };
-  /// `on_their_way`: number of messages without acknowledgement.
+  /// Returns whether a message of `topic` may be sent now. `on_their_way`: number of sent messages without
+  /// acknowledgement.
   [[nodiscard]] Verdict verdict(const std::string& topic, std::size_t on_their_way, Time now) const;
   void sent(const std::string& topic);
 
-  /// Stores that the broker refused the topic. Returns whether the refusal or its reason is new.
+  /// Records that the broker refused `topic`. Returns whether the refusal or its reason is new.
   bool refuse(const std::string& topic, const std::string& why, Time now);
-  /// Stores that the broker accepted the topic. Returns whether it was refused before.
+  /// Records that the broker accepted `topic`. Returns whether the topic was refused before.
   bool take(const std::string& topic);
 
   void begin_connection();
-  /// Handles the end of a connection with these topics unacknowledged; `soon`: shortly after its start. Returns the
-  /// topic that is refused from now on; "" without a new one.
+  /// Records the end of a connection; messages of the topics `on_their_way` were unacknowledged. `soon`: the end came
+  /// shortly after the start. Returns the topic that is refused from now on; "" if none is new.
   std::string end_connection(const std::set<std::string>& on_their_way, bool soon, Time now);
 
-  /// Returns whether the pause of a refused topic has ended; true once for each pause.
+  /// Returns whether the pause of a refused topic has ended; true only once for each pause.
   [[nodiscard]] bool take_due(Time now);
-  /// Returns a sentence that names the refused topics; "" without any.
+  /// Returns a sentence that names the refused topics; "" if no topic is refused.
   [[nodiscard]] std::string text() const;
   [[nodiscard]] bool has_suspects() const { return !suspects_.empty(); }
 
@@ -50,11 +51,11 @@ class MqttRefusals {
     Time pause{};
     Time retry{};
     bool ends_connection = false;
-    bool is_due = false;    // the pause has ended and the topic may be tried
-    bool is_tried = false;  // one message of the topic is sent and not acknowledged
+    bool is_due = false;    // the pause of the topic has ended and a message may be sent
+    bool is_tried = false;  // one message of the refused topic was sent as a trial and is not acknowledged
   };
 
-  std::map<std::string, Refused> refused_;  // refused topics
+  std::map<std::string, Refused> refused_;  // refused topics, with the state of each
   std::set<std::string> suspects_;
   bool suspect_is_out_ = false;
   int ends_in_a_row_ = 0;

@@ -23,22 +23,22 @@ namespace absenc::serve {
 
 class MqttSender {
  public:
-  /// All arguments must outlive this object. Throws Failure: a file for the connection cannot be used.
+  /// All arguments must outlive this object. Throws Failure if a file for the connection cannot be used.
   MqttSender(const MqttSettings& settings, Spool& spool, const Fleet& fleet, ServerEvents& server_events);
-  /// A connected broker has one second to receive the remaining messages.
+  /// Ends the sender thread. A connected broker has one second to receive the remaining messages.
   ~MqttSender();
 
   struct Figures {
     bool connected = false;
     std::string trouble{};
     std::uint64_t sent = 0;
-    std::uint64_t client_deaths = 0;  // unexpected ends of the MQTT client process
+    std::uint64_t client_deaths = 0;  // number of unexpected ends of the MQTT client process
   };
   [[nodiscard]] Figures figures() const;
 
  private:
   struct Outstanding {
-    std::int64_t message = 0;  // id of the message in the spool; 0: a retained state
+    std::int64_t message = 0;  // id of the message in the spool; 0: a retained state, which is not in the spool
     std::string topic{};
   };
 
@@ -74,17 +74,18 @@ class MqttSender {
   MqttVersion version_ = MqttVersion::v5;
   std::unordered_map<int, Outstanding> outstanding_;  // messages without acknowledgement, by their number at MqttClient
   std::set<std::int64_t> messages_out_;               // ids of the spooled messages in `outstanding_`
-  std::int64_t last_checked_id_ = 0;                  // last id that was sent, or skipped because its topic is refused
+  std::int64_t last_checked_id_ = 0;  // last message id that was sent, or skipped because its topic is refused
   MqttRefusals refusals_;
-  std::set<std::string> served_;                 // encoders that may have retained messages at the broker
+  std::set<std::string> served_;                 // names of encoders that may have retained messages at the broker
   std::map<std::string, std::string> retained_;  // by topic: condition of the retained message that was sent last
   Time next_states_{};
   Time next_values_{};
-  bool has_acknowledged_ = false;  // the broker has acknowledged a message on this connection
+  bool has_acknowledged_ = false;  // whether the broker has acknowledged a message on this connection
   Time connected_at_{};
-  bool connection_reported_ = false;  // an event has reported this connection
+  bool connection_reported_ = false;  // whether an event has reported this connection
   Time next_connection_report_{};
-  std::set<std::string> reported_losses_;  // reported reasons of lost connections, since the last reported connection
+  // Reasons of lost connections that were reported since the last reported connection.
+  std::set<std::string> reported_losses_;
 
   mutable std::mutex mutex_;  // guards all members below
   std::condition_variable_any changed_;

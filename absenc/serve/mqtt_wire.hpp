@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Frames between `absenc serve` and its MQTT client process: size (4 bytes), kind (1 byte), fields. Each side checks
+// Frames between `absenc serve` and its MQTT client process: size (4 bytes), kind (1 byte), fields. Each process checks
 // received frames like untrusted input.
 #pragma once
 
@@ -13,23 +13,23 @@
 
 namespace absenc::serve {
 
-/// The kind of a frame, with its fields.
+/// The kind of a frame, with the fields that follow it.
 enum class Wire : std::uint8_t {
-  // Frames to the client process:
+  // Frames to the MQTT client process:
   begin,    // host, port, tls, login_file, ca_file, cert_file, key_file, id, will topic, will, version
-  connect,  // host, whether to try all of its addresses
+  connect,  // host, whether to try all addresses of the host
   publish,  // number, topic, payload, QoS, retain
-  leave,    // disconnects from the broker and ends the process
-  // Frames from the client process:
-  ready,         // the settings can be used
-  failed,        // why the settings cannot be used
-  connected,     // no fields
-  lost,          // why, and whether the broker does not support the MQTT version
-  acknowledged,  // number, reason of a refusal or ""
-  alive,         // sign of life, every second
+  leave,    // no fields; the process disconnects from the broker and ends
+  // Frames from the MQTT client process:
+  ready,         // no fields; the settings of `begin` can be used
+  failed,        // reason why the settings of `begin` cannot be used
+  connected,     // no fields; the broker has accepted the connection
+  lost,          // reason of the lost connection, whether the broker does not support the MQTT version
+  acknowledged,  // number of the message, reason of a refusal or ""
+  alive,         // no fields; sign of life, every second
 };
 
-/// Builds one frame.
+/// A frame that is built field by field.
 class WireFrame {
  public:
   explicit WireFrame(Wire kind) : kind_(kind) {}
@@ -39,7 +39,7 @@ class WireFrame {
     return *this;
   }
 
-  /// Returns the bytes to send.
+  /// Returns the bytes of the whole frame.
   [[nodiscard]] std::string bytes() const;
 
  private:
@@ -47,22 +47,23 @@ class WireFrame {
   FieldWriter fields_;
 };
 
-/// The fields of a received frame.
+/// The kind and the fields of a received frame.
 struct WireFields : FieldReader {
   WireFields(Wire what, FieldReader fields) : FieldReader(std::move(fields)), kind(what) {}
 
   Wire kind;
 };
 
-/// Assembles frames from received bytes.
+/// An assembler of frames from received bytes.
 class WireReader {
  public:
-  /// `most`: largest size of a frame in bytes.
+  /// `most`: largest allowed size of a frame in bytes.
   explicit WireReader(std::size_t most) : most_(most) {}
 
-  /// Received bytes are appended here.
+  /// Received bytes of frames that are not complete yet; the caller appends to them.
   std::string bytes{};
-  /// Returns the next whole frame. Throws client::Failure at an invalid size or kind.
+  /// Returns the next complete frame; nothing if no frame is complete. Throws client::Failure at an invalid size or
+  /// kind.
   [[nodiscard]] std::optional<WireFields> next();
 
  private:

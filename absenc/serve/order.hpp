@@ -18,16 +18,16 @@ namespace absenc::serve {
 struct OrderResult {
   bool good = false;
   std::string text{};
-  client::Json json{};  // for a command: the fields of the reply
+  client::Json json{};  // fields of the reply to a command; null for other orders
   client::ChangeState change = client::ChangeState::none;
 };
 
 struct Order {
   enum class Kind : std::uint8_t {
     command,
-    settings,     // all readable settings and identification; with `command` only this setting
-    memory,       // bytes at `addresses`; for encoders with registers all readable registers
-    examination,  // the examination of `absenc doctor`
+    settings,  // reads all settings and identification; if `command` is set, only the setting that this command reads
+    memory,    // reads the memory bytes at `addresses`; for encoders with registers, all readable registers
+    examination,  // runs the examination of `absenc doctor`
   };
 
   Kind kind = Kind::command;
@@ -35,30 +35,31 @@ struct Order {
   std::vector<std::int64_t> arguments{};
   client::MemoryImage addresses{};
   std::string who{};
-  std::function<void(const OrderResult&)> done{};  // called once in the encoder's thread, after the event about the
-                                                   // order was added
+  std::function<void(const OrderResult&)>
+      done{};  // function that is called once in the encoder's thread, after the event about the order was added
 
-  /// Returns the name for messages: "zero", "doctor".
+  /// Returns the name of the order for messages: "zero", "doctor".
   [[nodiscard]] std::string_view name() const;
   [[nodiscard]] bool changes_encoder() const { return kind == Kind::command && command->changes_encoder; }
 };
 
-/// `setting` names the command that reads one setting; "": all settings. Throws UsageError if the unit has none or not
-/// this one.
+/// `setting` names the command that reads one setting; "": all settings. Returns an order that reads settings. Throws
+/// UsageError if the unit has no setting, or not this one.
 [[nodiscard]] Order settings_order(const Unit& unit, std::string_view setting);
-/// `page` < 0: the addresses that a memory dump contains. Throws UsageError also if they are too many for one request.
+/// Returns an order that reads memory page `page`; below 0: the addresses that a memory dump contains. Throws
+/// UsageError if the unit has no such memory, or the addresses are too many for one request.
 [[nodiscard]] Order memory_order(const Unit& unit, std::int64_t page);
 [[nodiscard]] Order examination_order();
 
-/// Carries out any order but an examination. `between` is called between two requests of an order that reads, and may
-/// read the position. Throws the exceptions of the encoder and its port.
+/// Carries out any order but an examination and returns its result. `between` is called between two requests of an
+/// order that reads, and may read the position. Throws the exceptions of the encoder and its port.
 [[nodiscard]] OrderResult carry_out(client::Encoder& encoder, const Order& order, const std::function<void()>& between);
 
-/// Returns the fields of a reply for people as a list of {"field","value","meaning"}, without fields of the exchange
-/// itself; an invalid value is null.
+/// Returns the fields of a reply for people as a list of {"field","value","meaning"}, without the fields that describe
+/// the exchange; an invalid value is null.
 [[nodiscard]] client::Json shown_values(const client::Answer& answer);
 
-/// Returns which settings and memory can be read:
+/// Returns which settings and memory of an encoder of this unit can be read:
 /// {"settings":[names],"memory":[{"page","first","count","meaning","in_dump"}],"registers":n}
 [[nodiscard]] client::Json readable_json(const Unit& unit);
 

@@ -12,11 +12,11 @@
 
 namespace absenc::serve {
 
-/// One good reading. Members without a valid value are empty.
+/// One good reading for other systems. Members without a valid value are empty.
 struct OutgoingReading {
-  std::int64_t at_us = 0;                         // calendar time at which the encoder latched the position
-  std::optional<double> place{};                  // position past the end of a turn; degrees, for linear encoders mm
-  std::optional<client::Estimate> speed{};        // speed; rpm, for linear encoders mm/s
+  std::int64_t at_us = 0;         // calendar time at which the encoder latched the position
+  std::optional<double> place{};  // position that continues past the end of a turn; degrees, for linear encoders mm
+  std::optional<client::Estimate> speed{};        // speed of the encoder; rpm, for linear encoders mm/s
   std::optional<double> joint{};                  // position of the joint, if the settings describe it; degrees or mm
   std::optional<client::Estimate> joint_speed{};  // speed of the joint; rpm, for linear encoders mm/s
   std::optional<double> electrical_deg{};
@@ -24,15 +24,15 @@ struct OutgoingReading {
   std::optional<std::int64_t> turns{};
 };
 
-/// A bounded queue of readings. A consumer that takes them too rarely loses the oldest, which are counted. The queue
-/// stores nothing before the first `take`.
+/// A bounded queue of readings. A consumer that takes readings too rarely loses the oldest, which are counted. The
+/// queue stores nothing before the first `take`.
 class Outbox {
  public:
   static constexpr std::size_t most = 2048;
 
   struct Taken {
-    std::vector<OutgoingReading> readings{};  // taken readings, oldest first
-    std::uint64_t dropped = 0;                // number of dropped readings before these
+    std::vector<OutgoingReading> readings{};  // the taken readings, oldest first
+    std::uint64_t dropped = 0;                // number of older readings that were dropped since the last `take`
   };
 
   [[nodiscard]] bool wanted() const { return wanted_; }

@@ -15,9 +15,9 @@ namespace absenc::serve {
 
 struct MqttSettings {
   Broker broker{};
-  std::string prefix{};          // prefix of all topics
-  std::string spool{};           // folder of the spool
-  std::int64_t spool_bytes = 0;  // maximum size of the spool
+  std::string prefix{};          // beginning of all topics of this server
+  std::string spool{};           // path of the folder of the spool
+  std::int64_t spool_bytes = 0;  // greatest size of the spool in bytes
   Time batch{};                  // readings within this time are sent as one message
   std::string home_assistant{};  // prefix of the discovery topics; "": no discovery
 
@@ -36,14 +36,14 @@ struct Outlets {
   std::optional<UdpSettings> udp{};
 };
 
-/// An option that overrides a setting of the file: "mqtt", "broker", "mqtts://hall.example".
+/// A command-line option that overrides a setting of absenc.toml: "mqtt", "broker", "mqtts://hall.example".
 struct OutletOption {
   std::string_view section;
   std::string_view setting;
   std::string value;
 };
 
-/// Reads absenc.toml, if it exists, and applies the options. Throws UsageError.
+/// Reads absenc.toml, if it exists, applies the options, and returns the settings of MQTT and UDP. Throws UsageError.
 [[nodiscard]] Outlets read_outlets(const std::vector<OutletOption>& options);
 
 }  // namespace absenc::serve

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Files of names and secrets that only their owner may read.
+// Files of names and secrets (tokens, passwords) that only their owner may read.
 #pragma once
 
 #include <string>
@@ -12,11 +12,11 @@ struct Secret {
   std::string secret;
 };
 
-/// Reads lines of NAME SECRET. `least` is the minimum length of a secret; `title` names the secrets in errors. Throws
-/// Failure if others may read the file, a line is invalid, or the file has no line.
+/// Reads a file of lines NAME SECRET and returns all of them. `least` is the minimum length of a secret; `title` names
+/// the secrets in errors. Throws Failure if others may read the file, a line is invalid, or the file has no line.
 [[nodiscard]] std::vector<Secret> read_secrets(const std::string& title, const std::string& path, std::size_t least);
 
-/// Reads a file with one line: user name and password.
+/// Reads a file with one line, and returns user name and password.
 [[nodiscard]] Secret read_secret(const std::string& path);
 
 }  // namespace absenc::serve

@@ -17,9 +17,9 @@ class Sending {
   /// Both arguments must outlive this object. Nothing is sent before `change_to`.
   Sending(const Fleet& fleet, ServerEvents& server_events) : fleet_(&fleet), server_events_(&server_events) {}
 
-  /// Applies new settings; unchanged outlets continue without interruption. Returns the changes in words, each with a
-  /// leading semicolon. Throws Failure, os::Failure: the outlet that could not be started is off, the others are as
-  /// before. Call it from one thread only.
+  /// Applies new settings of MQTT and UDP; an outlet with unchanged settings continues without interruption. Returns
+  /// the changes in words, each with a leading semicolon. Throws Failure, os::Failure: the outlet that could not be
+  /// started is off, the others are as before. Call it from one thread only.
   std::string change_to(const Outlets& outlets);
 
   void add(const std::vector<ServerEvent>& server_events);

@@ -14,34 +14,34 @@
 namespace absenc::serve {
 
 struct Choices {
-  std::vector<std::string> encoders{};  // addresses as for `absenc read`; empty: all of absenc.toml
-  double rate = 50;                     // readings per second of encoders without rate_hz in absenc.toml; 0: as fast as
-                                        // possible
+  // Addresses of encoders as for `absenc read`; empty: all encoders of absenc.toml.
+  std::vector<std::string> encoders{};
+  double rate = 50;  // readings per second of encoders without rate_hz in absenc.toml; 0: as fast as possible
   std::string host = "127.0.0.1";
   std::uint16_t port = 8420;  // TCP port; 0: any free one
-  std::string public_url{};   // URL of a proxy; "": no proxy
-  std::string token_file{};   // file with tokens; "": none
+  std::string public_url{};   // URL at which a proxy on this computer shows the page; "": no proxy
+  std::string token_file{};   // path of the file with tokens; "": no tokens
   std::string history{};      // path of the history file; "": no history
   HistoryLimits limits{};
-  std::vector<OutletOption> outlets{};  // override the settings of MQTT and UDP in absenc.toml
+  std::vector<OutletOption> outlets{};  // options that override the settings of MQTT and UDP in absenc.toml
 };
 
 class Server {
  public:
-  /// Starts all threads before it returns. Throws UsageError, Failure, os::Failure.
+  /// Starts reading and serving: all threads run when it returns. Throws UsageError, Failure, os::Failure.
   explicit Server(const Choices& choices);
-  /// Ends within the time that one reading may take.
+  /// Stops all threads, within the time that one reading may take.
   ~Server();
   Server(const Server&) = delete;
   Server& operator=(const Server&) = delete;
 
-  /// Returns the URL of the page: "http://127.0.0.1:8420/".
+  /// Returns the URL of the web page: "http://127.0.0.1:8420/".
   [[nodiscard]] const std::string& url() const;
   [[nodiscard]] std::size_t encoders() const;
-  /// Returns why the history cannot be written; "" without an error or without a history.
+  /// Returns why the history cannot be written; "" if it can, or if the server has no history.
   [[nodiscard]] std::string history_trouble() const;
-  /// Reads absenc.toml again and returns the changes in words. Throws UsageError: then nothing has changed. Call it
-  /// from one thread only.
+  /// Reads absenc.toml again and returns the changes in words. Throws UsageError if the file is invalid: then nothing
+  /// has changed. Call it from one thread only.
   std::string reload();
 
  private:

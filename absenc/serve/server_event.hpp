@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Events for people: alarms, losses, changes, commands.
+// Events that the server records for people: alarms, losses, changes, commands.
 #pragma once
 
 #include <chrono>
@@ -23,12 +23,12 @@ namespace absenc::serve {
 
 struct ServerEvent {
   std::int64_t at_ms = 0;
-  std::string encoder{};  // name of the encoder; "": the server itself
-  // One of alarm, alarm_over, acknowledged, failing, silent, lost, back, restarted, ended, examined, command, change,
-  // history, mqtt, access.
+  std::string encoder{};  // name of the encoder of the event; "": the server itself
+  // Kind of the event, one of alarm, alarm_over, acknowledged, failing, silent, lost, back, restarted, ended, examined,
+  // command, change, history, mqtt, access.
   std::string kind{};
   std::string text{};
-  std::string who{};  // for a command: the user who ordered it
+  std::string who{};  // user who ordered the command of the event; "" for other events
 
   [[nodiscard]] client::Json json() const {
     return client::Json::object()
@@ -55,7 +55,7 @@ class ServerEvents {
     ++dropped_;
   }
 
-  /// Returns the number of events since the start.
+  /// Returns the number of events added since the start.
   [[nodiscard]] std::uint64_t added() const {
     const std::lock_guard lock(mutex_);
     return added_;

@@ -24,7 +24,7 @@
 
 namespace absenc::serve {
 
-/// Thread-safe. Only the constructor throws: later disk errors are in `condition`.
+/// A store of messages on disk. Thread-safe. Only the constructor throws: `condition` reports later disk errors.
 class Spool {
  public:
   struct Counts {
@@ -35,26 +35,28 @@ class Spool {
     Counts& operator-=(const Counts& other);
   };
 
-  /// `bytes` limits the total size of the files. Throws Failure when another process uses the spool or the parent
-  /// folder is missing. A disk that is full or read-only is no error: messages wait in memory.
+  /// Opens the spool in the folder `path`; `bytes` limits the total size of its files. Throws Failure when another
+  /// process uses the spool or the parent folder is missing. A disk that is full or read-only is no error: messages
+  /// wait in memory.
   Spool(std::string path, std::int64_t bytes);
 
   /// Returns a random text of 16 characters that stays the same as long as the spool exists.
   [[nodiscard]] const std::string& source() const { return facts_.source; }
   /// Returns a random text of 16 characters that is different each time the spool is opened.
   [[nodiscard]] const std::string& run() const { return run_; }
-  /// Returns the next number for a reading of each encoder, by its name.
+  /// Returns for each encoder, by name, the number that its next reading gets.
   [[nodiscard]] std::map<std::string, std::uint64_t> next_numbers();
   /// Returns the smallest message id that is not used yet.
   [[nodiscard]] std::int64_t next_id();
 
-  /// Stores messages and the next reading number of each encoder. If space is short, the oldest messages are dropped.
+  /// Stores messages and the next reading number of each encoder. If the spool is full, its oldest messages are
+  /// dropped.
   void add(const std::vector<Message>& messages, const std::map<std::string, std::uint64_t>& next_numbers);
   /// Returns up to `most` messages with ids above `id`, in ascending order.
   [[nodiscard]] std::vector<Message> after(std::int64_t id, std::size_t most);
-  /// Removes acknowledged messages.
+  /// Removes messages that the broker has acknowledged, by their ids.
   void remove(const std::vector<std::int64_t>& ids);
-  /// Forgets the next reading number of an encoder.
+  /// Forgets the number of the next reading of `encoder`.
   void forget(const std::string& encoder);
 
   [[nodiscard]] Counts stored() const;
@@ -68,11 +70,11 @@ class Spool {
 
   struct Dropped {
     Counts counts{};
-    std::string why{};  // reason of the latest drop
+    std::string why{};  // reason why the latest messages were dropped
   };
-  /// Returns the messages dropped since the last call.
+  /// Returns how many messages were dropped since the last call, and why.
   [[nodiscard]] Dropped take_dropped();
-  /// Returns sentences about changes of the files since the last call.
+  /// Returns sentences about changes of the spool's files since the last call, for events.
   [[nodiscard]] std::vector<std::string> take_notes();
 
  private:
@@ -82,10 +84,10 @@ class Spool {
     Counts waiting{};
     std::int64_t waiting_bytes = 0;
     std::size_t bytes = 0;
-    bool damaged = false;  // a part of the file cannot be read: it will be renamed, not deleted
+    bool damaged = false;  // whether a part of the file cannot be read; then the file is renamed instead of deleted
   };
-  struct Place {            // where a message returned by `after` is stored
-    std::int64_t part = 0;  // number of the file; 0: in memory
+  struct Place {            // place and size of a stored message that `after` has returned
+    std::int64_t part = 0;  // number of the file with the message; 0: the message is in memory
     std::size_t offset = 0;
     std::uint64_t readings = 0;
     std::int64_t bytes = 0;
@@ -122,20 +124,20 @@ class Spool {
   std::map<std::string, std::uint64_t> unwritten_numbers_;
   std::optional<os::OwnedFolder> folder_;
   std::deque<Part> parts_;             // files of the spool, oldest first
-  std::unique_ptr<SpoolFile> newest_;  // file of the last part, which is appended to; null if there is none
+  std::unique_ptr<SpoolFile> newest_;  // file of the last part, to which messages are appended; null if there is none
   std::int64_t next_part_ = 1;
   std::size_t part_limit_ = 0;
-  std::unique_ptr<SpoolFile> older_;  // the file that was read last, other than `newest_`
+  std::unique_ptr<SpoolFile> older_;  // file that was read last, other than `newest_`
   std::int64_t older_number_ = 0;
   struct {
     std::int64_t part = 0, id = 0;
     std::size_t offset = 0;
-  } read_position_;             // where the last call of `after` stopped reading
+  } read_position_;             // place at which the last call of `after` stopped reading
   std::deque<Message> memory_;  // messages that are not on disk; newer than those in `parts_`
   Counts memory_counts_{};
   std::int64_t memory_bytes_ = 0;
   std::unordered_map<std::int64_t, Place> places_;
-  std::set<std::int64_t> unmarked_;  // acknowledged, but the disk did not store the mark
+  std::set<std::int64_t> unmarked_;  // ids of acknowledged messages whose mark the disk did not store
 
   mutable std::mutex shown_mutex_;  // guards all members below, so that reading them never waits for the disk
   Counts stored_{};

@@ -17,7 +17,7 @@
 namespace absenc::serve {
 
 struct Message {
-  std::int64_t id = 0;  // ascends for as long as the spool exists
+  std::int64_t id = 0;  // number of the message, which ascends for as long as the spool exists
   std::string topic{};
   std::string payload{};
   std::uint64_t readings = 0;  // number of readings in the message
@@ -28,7 +28,7 @@ struct Message {
   return static_cast<std::int64_t>(message.topic.size() + message.payload.size()) + 32;
 }
 
-/// Values that each file begins with, so that older files can be deleted.
+/// Facts at the beginning of each file of the spool, so that older files can be deleted.
 struct SpoolFacts {
   std::string source{};
   std::int64_t next_id = 1;
@@ -37,7 +37,7 @@ struct SpoolFacts {
 
 [[nodiscard]] std::string spool_record(const Message& message);
 [[nodiscard]] std::string spool_record(const SpoolFacts& facts);
-/// Returns a record that deletes an encoder's next reading number.
+/// Returns a record that deletes the number of the next reading of `encoder`.
 [[nodiscard]] std::string spool_record_without(std::string_view encoder);
 
 class SpoolFile {
@@ -52,14 +52,14 @@ class SpoolFile {
 
   struct StoredMessage {
     Message message{};
-    std::size_t offset = 0;  // offset of the record in the file
+    std::size_t offset = 0;  // offset of the record of the message in the file
     bool arrived = false;
   };
-  /// Returns the next message at or after `offset` and moves `offset` behind it. Facts before it are merged into
-  /// `facts`, unless that is null. Returns nothing at the end of the file, and at a damaged record: then `offset` stays
-  /// before the end. Throws os::Failure.
+  /// Returns the next message at or after `offset` and moves `offset` behind it. Facts in records before the message
+  /// are merged into `facts`, unless that is null. Returns nothing at the end of the file, and at a damaged record:
+  /// then `offset` stays before the end. Throws os::Failure.
   [[nodiscard]] std::optional<StoredMessage> next(std::size_t& offset, SpoolFacts* facts) const;
-  /// Marks the message as acknowledged. Returns 0 or the errno of the write.
+  /// Marks the message at `offset` as acknowledged. Returns 0 or the errno of the write.
   [[nodiscard]] int mark_arrived(std::size_t offset) const;
 
  private:

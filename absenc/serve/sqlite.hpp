@@ -14,27 +14,27 @@ struct sqlite3_stmt;
 
 namespace absenc::serve {
 
-/// Thrown when the file is no database or is damaged.
+/// Thrown when a file is no SQLite database or is damaged.
 struct DamagedFile : client::Failure {
   using client::Failure::Failure;
 };
 
-/// An open database. All functions throw client::Failure with SQLite's error text.
+/// An open SQLite database. All functions throw client::Failure with SQLite's error text.
 class Sqlite {
  public:
   enum class For : std::uint8_t { writing, reading };
-  /// `title` begins each error text.
+  /// Opens the database at `path`. `title` begins each error text.
   Sqlite(const std::string& title, const std::string& path, For what);
   ~Sqlite();
   Sqlite(const Sqlite&) = delete;
   Sqlite& operator=(const Sqlite&) = delete;
 
   void run(const std::string& sql);
-  /// Returns the number that a query with a single result yields; 0 without a row.
+  /// Returns the number that a query with a single result yields; 0 if the query yields no row.
   [[nodiscard]] std::int64_t number(const std::string& sql);
-  /// Returns whether a transaction is open. After an error, such as a full disk, SQLite may have ended it.
+  /// Returns whether a transaction is open. After an error, such as a full disk, SQLite may have ended the transaction.
   [[nodiscard]] bool in_transaction() const;
-  /// Leaves the write-ahead log unchanged on close: it is neither written into the database nor deleted.
+  /// Makes closing leave the write-ahead log unchanged: it is neither written into the database nor deleted.
   void keep_log_on_close();
 
  private:
@@ -58,9 +58,9 @@ class Statement {
   Statement& bind(int parameter, const std::string& value);
   Statement& bind_null(int parameter);
 
-  /// Returns true for each row. Returns false at the end; the statement can then be run again.
+  /// Moves to the next row of the result. Returns false behind the last row; the statement can then be run again.
   bool next();
-  /// Runs the statement to its end.
+  /// Runs the statement to its end, ignoring its rows.
   void run();
   /// Prepares the statement to run again, even after an error.
   void reset();

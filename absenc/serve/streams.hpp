@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The open event streams. Each event is formatted once for all streams.
+// The open event streams, through which web pages get events. Each event is formatted once for all streams.
 #pragma once
 
 #include <cstdint>
@@ -19,23 +19,24 @@ class Streams {
  public:
   static constexpr std::size_t most = 300;
   static constexpr std::size_t most_of_address = 200;
-  static constexpr Time stall_time = std::chrono::seconds(5);  // a client that received nothing for this time may lose
-                                                               // its stream to a new one
+  // A client that received nothing for this time may lose its stream to a new client.
+  static constexpr Time stall_time = std::chrono::seconds(5);
 
-  /// Opens a stream. `trace`: the encoder whose points it sends; "": none. `peer`: IP address of the client. Returns
-  /// null at the limit. At the limit, the address with the most streams loses one to an address with fewer.
+  /// Opens an event stream. `trace`: the encoder whose plot points the stream sends; "": none. `peer`: IP address of
+  /// the client. Returns null at the limit. At the limit, the address with the most streams loses one to an address
+  /// with fewer.
   [[nodiscard]] std::shared_ptr<Stream> open(const std::string& trace, const std::string& peer);
 
   /// Sends a server-sent event to all streams.
   void send(std::string_view event, const client::Json& data);
-  /// Sends an event to the streams that trace this encoder.
+  /// Sends a server-sent event to the streams that trace `encoder`.
   void send_traced(const std::string& encoder, std::string_view event, const client::Json& data);
 
   /// Removes streams whose client has disconnected.
   void tidy();
   [[nodiscard]] std::set<std::string> traced() const;
   [[nodiscard]] std::size_t count() const;
-  /// Returns the number of messages that slow clients have lost.
+  /// Returns the number of events that slow clients have lost.
   [[nodiscard]] std::uint64_t dropped() const;
 
  private:
@@ -49,7 +50,7 @@ class Streams {
 
   mutable std::mutex mutex_;
   std::vector<Open> open_;
-  std::uint64_t dropped_before_ = 0;  // messages lost by streams that are closed
+  std::uint64_t dropped_before_ = 0;  // number of messages lost by streams that are closed
 };
 
 }  // namespace absenc::serve

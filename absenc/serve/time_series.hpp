@@ -12,14 +12,15 @@
 
 namespace absenc::serve {
 
-/// Position, continued past the end of a turn, and speed; in degrees and rpm, for linear encoders mm and mm/s.
+/// A point of a plot: position, continued past the end of a turn, and speed; in degrees and rpm, for linear encoders mm
+/// and mm/s.
 struct Point {
   std::int64_t at_ms = 0;  // calendar time of the reading, ms since 1970
   double place = 0;
   std::optional<client::Estimate> speed{};
 };
 
-/// Minimum, maximum and sum of the values of one second.
+/// Number, minimum, maximum and sum of the values within one second.
 struct Spread {
   std::uint64_t count = 0;
   double least = 0;
@@ -35,26 +36,27 @@ struct Second {
   std::uint64_t readings = 0;
   std::uint64_t errors = 0;
   Spread place{};
-  Spread speed{};                      // measured speeds, without their uncertainties
-  std::optional<double> last_place{};  // needed because a mean is wrong across the end of a turn
+  Spread speed{};  // measured speeds of the second, without their uncertainties
+  // Last position of the second; needed because a mean is wrong across the end of a turn.
+  std::optional<double> last_place{};
 };
 
-/// Not thread-safe.
+/// The readings of one encoder over time. Not thread-safe.
 class TimeSeries {
  public:
   void count_errors(std::int64_t at_ms, std::uint64_t errors);
-  /// Counts a good reading. `place` is empty if the position is invalid, `speed` if it is unknown.
+  /// Counts a good reading. `place`: its position, empty if invalid; `speed`: empty if unknown.
   void count_reading(std::int64_t at_ms, std::optional<double> place, const std::optional<client::Estimate>& speed);
 
-  /// Starts or stops storing points for `take_points`, the newest 4096.
+  /// Starts or stops storing points for `take_points`, which returns at most the newest 4096.
   void trace(bool on);
   [[nodiscard]] std::vector<Point> take_points();
   /// Returns the points of the last 20 seconds with readings, at least 10 ms apart, oldest first.
   [[nodiscard]] std::vector<Point> recent_points() const { return {recent_.begin(), recent_.end()}; }
-  /// Takes the seconds before `now_s` that were not taken yet, the newest 120 of them.
+  /// Takes the seconds before `now_s` that were not taken yet, at most the newest 120.
   [[nodiscard]] std::vector<Second> take_seconds(std::int64_t now_s);
-  /// Returns the last 60 completed seconds with readings, oldest first. For a lost encoder these are from before the
-  /// loss.
+  /// Returns the last 60 completed seconds with readings, oldest first. For a lost encoder these seconds are from
+  /// before the loss.
   [[nodiscard]] std::vector<Second> last_minute() const { return {last_minute_.begin(), last_minute_.end()}; }
   [[nodiscard]] std::uint64_t errors_last_minute(std::int64_t now_s) const;
 
@@ -63,7 +65,7 @@ class TimeSeries {
   void end_second();
   void add_point(const Point& point);
 
-  Second second_{};  // the current second; at_s is 0 before the first reading or error
+  Second second_{};  // current second; its `at_s` is 0 before the first reading or error
   std::deque<Second> seconds_;
   std::deque<Second> last_minute_;
   bool traced_ = false;
@@ -73,7 +75,7 @@ class TimeSeries {
     std::int64_t at_s = 0;
     std::uint64_t count = 0;
   };
-  std::array<Errors, 60> errors_{};  // index: second within the minute
+  std::array<Errors, 60> errors_{};  // errors of the last 60 seconds; index: second within the minute
 };
 
 }  // namespace absenc::serve

@@ -15,7 +15,7 @@ namespace absenc::serve {
 
 class UdpSender {
  public:
-  /// `fleet` must outlive this object. Throws os::Failure if the host is unknown.
+  /// Starts the sender thread. `fleet` must outlive this object. Throws os::Failure if the host is unknown.
   UdpSender(const UdpSettings& settings, const Fleet& fleet);
   ~UdpSender();
 

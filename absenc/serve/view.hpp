@@ -19,33 +19,35 @@ namespace absenc::serve {
 /// errors of the last minute. Values are null if the encoder is not live or the value is invalid.
 [[nodiscard]] client::Json overview(const Watch& watch, const Snapshot& snapshot);
 
-/// Returns the part of the overview that changes rarely: state, why the encoder is not live, alarms in words, status;
-/// no position.
+/// Returns the part of an encoder's overview that changes rarely: state, why the encoder is not live, alarms in words,
+/// status; no position.
 [[nodiscard]] client::Json condition_json(const Watch& watch, const Snapshot& snapshot);
 
-/// Returns whether the encoder is linear: positions in mm instead of degrees.
+/// Returns whether the encoder of `watch` is linear: its positions are in mm instead of degrees.
 [[nodiscard]] bool is_linear(const Watch& watch);
 
-/// Returns the overview with counters, latencies, the last bad exchanges, the fields of the last reply, and the
-/// encoder's commands with their arguments.
+/// Returns the overview of an encoder, and its counters, latencies, last bad exchanges, the fields of the last reply,
+/// and its commands with their arguments.
 [[nodiscard]] client::Json details(const Watch& watch);
 
-/// Returns {"encoder":name,"points":[[at_ms,position,speed,speed_uncertainty],...]}; an unknown speed is null.
+/// Returns plot points of an encoder as {"encoder":name,"points":[[at_ms,position,speed,speed_uncertainty],...]}; an
+/// unknown speed is null.
 [[nodiscard]] client::Json points(const Watch& watch, std::span<const Point> taken);
 
-/// Returns {"encoders":[{"encoder":name,"seconds":[[at_s,position,speed],...]},...]}: last position and mean speed of
-/// the last 60 seconds with readings; null if the position or the speed was invalid.
+/// Returns the last minute of all encoders as
+/// {"encoders":[{"encoder":name,"seconds":[[at_s,position,speed],...]},...]}: last position and mean speed of the last
+/// 60 seconds with readings; null if the position or the speed was invalid.
 [[nodiscard]] client::Json last_minute(const Fleet::Watches& watches);
 
 /// Statistics of the server.
 struct ServerFigures {
   std::size_t streams = 0;
-  std::uint64_t stream_drops = 0;  // messages lost by slow clients
-  std::uint64_t history_lost = 0;  // rows that could not be written
-  std::uint64_t wrong_tokens = 0;  // requests with a wrong token
+  std::uint64_t stream_drops = 0;  // number of messages lost by slow clients
+  std::uint64_t history_lost = 0;  // number of rows of the history that could not be written
+  std::uint64_t wrong_tokens = 0;  // number of requests with a wrong token
 };
 
-/// Returns the metrics in the text format of Prometheus.
+/// Returns the metrics of the server and of all encoders in the text format of Prometheus.
 [[nodiscard]] std::string metrics(const Fleet::Watches& watches, const ServerFigures& figures);
 
 }  // namespace absenc::serve

@@ -24,10 +24,10 @@
 namespace absenc::serve {
 
 enum class State : std::uint8_t {
-  opening,   // the port was not available yet
+  opening,   // the port has not been available yet
   live,      // the last reading is recent
-  silent,    // no reading for a while
-  failing,   // the last attempt failed
+  silent,    // no reading was received for a while
+  failing,   // the last attempt to read failed
   lost,      // the port has disappeared
   ended,     // the encoder cannot be read: `message` reports why; the thread tries again every few seconds
   examined,  // an examination uses the port: `message` reports its current step
@@ -50,79 +50,81 @@ struct LatencyFigures {
   Time median{};
   Time percentile_99{};
   Time longest{};
-  std::array<std::uint64_t, latency_limits.size()> within{};  // cumulative: number of latencies up to each limit
+  std::array<std::uint64_t, latency_limits.size()>
+      within{};  // cumulative histogram: number of latencies up to each of `latency_limits`
   std::uint64_t count = 0;
   Time sum{};
 };
 
-/// A raised alarm and its acknowledgement. An acknowledged alarm is still raised.
+/// A raised alarm and whether a user has acknowledged it. An acknowledged alarm is still raised.
 struct RaisedAlarm {
-  std::string_view channel{};  // name of the field with the alarms of this channel
+  std::string_view channel{};  // name of the field that reports the alarm
   std::string_view name{};
   std::int64_t since_ms = 0;      // calendar time when the alarm was raised
-  std::string acknowledged_by{};  // name of the token; "": not acknowledged
+  std::string acknowledged_by{};  // name of the token of the user who acknowledged the alarm; "": not acknowledged
   std::int64_t acknowledged_ms = 0;
 };
 
-/// A copy of the state of an encoder.
+/// A copy of the state of an encoder at one time.
 struct Snapshot {
   State state = State::opening;
   Time age{};  // age of the last reading, or of the last change of state
   bool has_reading = false;
   std::optional<double> place{};  // last valid position, as in `Point`
-  client::Sample last{};          // current only while `live`
-  std::string message{};          // why the encoder is not live
+  client::Sample last{};          // last reading; current only in state `live`
+  std::string message{};          // reason why the encoder is not live; "" if it is
   host::Counters counters{};
   std::uint64_t readings = 0;
   std::uint64_t losses = 0;
-  std::uint64_t restarts = 0;  // restarts of the continued position
+  std::uint64_t restarts = 0;  // number of restarts of the continued position
   std::uint64_t errors_last_minute = 0;
   std::vector<RaisedAlarm> raised{};
-  double rate = 0;           // readings per second
-  LatencyFigures latency{};  // latencies, at most one second old
+  double rate = 0;           // rate of readings, per second
+  LatencyFigures latency{};  // latencies of the replies, as of at most one second ago
 };
 
-/// Additional data for the view of one encoder.
+/// Additional data for the detailed view of one encoder.
 struct Details {
-  std::vector<client::BadExchangeText> bad{};  // bad exchanges, newest first
+  std::vector<client::BadExchangeText> bad{};  // bad exchanges of the encoder, newest first
   client::Json fields{};                       // fields of the last reply, at most one second old
-  client::Json reply{};                        // the same fields for people, as in `shown_values`
+  client::Json reply{};                        // fields of the last reply for people, as in `shown_values`
 };
 
 class Watch {
  public:
-  /// The first reading is `offset` after the start. `server_events` must outlive this object.
+  /// Starts a thread that reads the encoder `rate` times per second. The first reading is `offset` after the start.
+  /// `server_events` must outlive this object.
   Watch(std::string name, const client::EncoderAddress& address, double rate, Time offset, ServerEvents& server_events);
   ~Watch();
   Watch(const Watch&) = delete;
   Watch& operator=(const Watch&) = delete;
 
-  /// Requests the thread to end, which happens within the time of one reading.
+  /// Requests the reading thread to end, which happens within the time of one reading.
   void request_stop() { thread_.request_stop(); }
-  /// Waits until the thread has ended. The destructor calls both functions.
+  /// Waits until the reading thread has ended. The destructor calls `request_stop` and `wait`.
   void wait();
 
   [[nodiscard]] Snapshot snapshot() const;
   [[nodiscard]] Details details() const;
-  /// The following functions are those of TimeSeries, but thread-safe.
+  /// The functions from `trace` to `last_minute` are those of TimeSeries, but thread-safe.
   void trace(bool on);
   [[nodiscard]] std::vector<Point> take_points();
   [[nodiscard]] std::vector<Point> recent_points() const;
   [[nodiscard]] std::vector<Second> take_seconds();
   [[nodiscard]] std::vector<Second> last_minute() const;
 
-  /// Takes all good readings since the last call. Each outlet has its own queue.
+  /// System to which readings are sent. Each outlet has its own queue of readings.
   enum class Outlet : std::uint8_t { mqtt, udp };
   [[nodiscard]] Outbox::Taken take_outgoing(Outlet outlet);
-  /// Stops storing readings for an outlet.
+  /// Stops storing readings for `outlet`.
   void stop_outgoing(Outlet outlet);
 
-  /// Gives an order to the thread. Returns "" or why the order is refused: another order waits, an examination runs, or
-  /// the thread has ended.
+  /// Gives an order to the reading thread. Returns "" or why the order is refused: another order waits, an examination
+  /// runs, or the thread has ended.
   [[nodiscard]] std::string_view give(Order order);
 
-  /// Acknowledges the alarm of this name, in all channels, until it is cleared. `who` is stored in the history. Returns
-  /// "" or why it is refused: the alarm is not raised.
+  /// Acknowledges the alarm of this name, in all channels, until it is cleared; `who` is stored in the history. Returns
+  /// "" or, if the alarm is not raised, this as the reason of the refusal.
   [[nodiscard]] std::string acknowledge(std::string_view alarm, const std::string& token, const std::string& who);
 
   [[nodiscard]] const std::string& name() const { return name_; }
@@ -158,17 +160,17 @@ class Watch {
   Details details_;
   Time current_since_{};  // time of the last reading, or of the last change of state
   std::optional<Order> order_;
-  bool has_ended_ = false;     // no more orders are accepted
-  bool is_examining_ = false;  // an examination runs; no orders are accepted meanwhile
+  bool has_ended_ = false;     // whether the thread has ended and accepts no more orders
+  bool is_examining_ = false;  // whether an examination runs; no orders are accepted meanwhile
   TimeSeries series_;
-  std::array<Outbox, 2> outboxes_;  // queues of readings, by Outlet
+  std::array<Outbox, 2> outboxes_;  // queues of readings for other systems, by Outlet
 
   // The members below are used by the reading thread only.
   Time next_summary_{};
-  Time next_failure_report_{};  // when the next failure may be reported
+  Time next_failure_report_{};  // time from which the next failure may be reported
   std::uint32_t alarms_ = 0;
   bool restarted_ = false;
-  bool command_runs_ = false;  // the running command must not be interrupted
+  bool command_runs_ = false;  // whether a command runs that must not be interrupted
 
   std::jthread thread_;  // last member: the thread uses all others
 };

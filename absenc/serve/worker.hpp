@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A thread for long tasks, so that no other thread waits for them.
+// A thread for long tasks, so that the threads that request them do not wait.
 #pragma once
 
 #include <condition_variable>
@@ -18,8 +18,8 @@ class Worker {
 
   Worker() : thread_([this](const std::stop_token& stop) { work(stop); }) {}
 
-  /// Adds a job, which must not throw. Returns false if too many jobs wait. `always`: adds the job anyway, because it
-  /// continues a previous one.
+  /// Adds a job, which must not throw. Returns false if too many jobs wait. `always`: the job is added anyway, because
+  /// it continues a previous job.
   bool add(std::function<void()> job, bool always = false) {
     const std::lock_guard lock(mutex_);
     if (jobs_.size() >= most && !always) return false;
