@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A virtual encoder that programs open like a real one, for tests of programs that read encoders.
+// Runs a virtual encoder on a port that programs open like a real one, for tests of programs that read encoders.
 #pragma once
 
 #include <cstddef>
@@ -14,11 +14,12 @@
 
 namespace absenc::client {
 
-/// Where programs reach the virtual encoder.
+/// Port on which programs reach the virtual encoder.
 struct EmulateChoices {
-  std::string link{};                  ///< Path of a symbolic link to the pseudo-terminal; "": no link.
-  std::optional<std::uint16_t> tcp{};  ///< Also listens on this port of 127.0.0.1; 0: on a free port.
-  /// Network interface of a CAN encoder, as "can0"; "": an emulated slcan adapter.
+  std::string link{};  ///< Path of a symbolic link to the pseudo-terminal; "": no link.
+  /// TCP port of 127.0.0.1 on which the encoder also listens; 0: a free port; without a value: none.
+  std::optional<std::uint16_t> tcp{};
+  /// Network interface of a CAN encoder, as "can0"; "": the encoder is on an emulated slcan adapter.
   std::string can{};
 };
 
@@ -31,20 +32,21 @@ struct RuleCount {
 
 /// Counts of requests that the virtual encoder received. CAN frames for other nodes are not counted.
 struct RequestCounts {
-  /// Number of requests that comply with the document, also for other encoders on the line.
+  /// Number of requests that comply with the document, including those for other encoders on the line.
   std::uint64_t good = 0;
-  /// Number of byte runs that are no request, and of damaged characters, since the first good request.
+  /// Number of byte runs that are no request, and of damaged characters, received after the first good request.
   std::uint64_t bad = 0;
-  /// Number of the same byte runs and characters before the first good request; 0 until there is one.
+  /// Number of byte runs that are no request, and of damaged characters, received before the first good request; 0
+  /// until there is one.
   std::uint64_t before = 0;
-  std::string first_bad = {};  ///< First byte run that counts in `bad`, as text.
+  std::string first_bad = {};  ///< First byte run that was counted in `bad`, as text.
 };
 
-/// A running virtual encoder, served by its own thread until destruction. Any thread may call the functions; a change
-/// is effective when the call returns.
+/// A running virtual encoder, served by its own thread until this object is destroyed. Any thread may call the
+/// functions; a change is effective when the call returns.
 class Emulation {
  public:
-  /// Starts the virtual encoder like `emulate`.
+  /// Starts the virtual encoder, as `emulate` does.
   Emulation(std::string_view text, const EmulateChoices& choices);
   /// Moves the emulation; the other one may only be destroyed or assigned to.
   Emulation(Emulation&&) noexcept;
@@ -55,9 +57,10 @@ class Emulation {
   /// Returns the path of the pseudo-terminal or of the link to it; for an encoder on a CAN bus, that of the slcan
   /// adapter or the name of the network interface.
   [[nodiscard]] const std::string& path() const;
-  /// Returns the TCP port; 0 if there is none.
+  /// Returns the TCP port on which the encoder listens; 0 if there is none.
   [[nodiscard]] std::uint16_t tcp_port() const;
-  /// Returns the address for `open`, without options: "tformat:/dev/pts/3", "raa38-can:slcan:/dev/pts/3".
+  /// Returns the address with which `open` reaches the encoder, without options: "tformat:/dev/pts/3",
+  /// "raa38-can:slcan:/dev/pts/3".
   [[nodiscard]] std::string address() const;
   /// Returns the unit that is emulated.
   [[nodiscard]] const Unit& unit() const;
@@ -66,14 +69,14 @@ class Emulation {
 
   /// Switches the virtual encoder off: it sends no replies until `power_on`.
   void power_off();
-  /// Switches the virtual encoder on. `real`: with the start-up time of the document.
+  /// Switches the virtual encoder on. With `real` it needs the start-up time of the document before it replies.
   void power_on(bool real = false);
   /// Raises an alarm by its name in the unit. Throws UsageError, which suggests the nearest name.
   void raise_alarm(std::string_view name);
-  /// Ends the cause of an alarm. An alarm that the encoder latches stays until a host clears it.
+  /// Ends the cause of an alarm. An alarm that the encoder latches stays until a host clears it. Throws UsageError.
   void lower_alarm(std::string_view name);
-  /// Sets a condition such as "temperature" or "battery", in its unit; `absenc list` prints the names. Throws
-  /// UsageError.
+  /// Sets a condition such as "temperature" or "battery" to a value in the unit of the condition; `absenc list` prints
+  /// names and units. Throws UsageError.
   void set_condition(std::string_view name, std::int64_t value);
   /// Sets the rate, 0 to 1, of a fault such as "corrupt" or "drop", named as in `emulate --fault`. Other faults keep
   /// their rates. Throws UsageError.
@@ -81,17 +84,17 @@ class Emulation {
   /// Sets the rate of every fault to 0.
   void clear_faults();
 
-  /// Returns the number of replies with this fault.
+  /// Returns the number of replies into which this fault was injected.
   [[nodiscard]] std::uint64_t fault_count(std::string_view kind) const;
-  /// Returns the number of answered requests.
+  /// Returns the number of requests that the encoder answered.
   [[nodiscard]] std::uint64_t answer_count() const;
-  /// Returns the number of violations of the document's rules by the host.
+  /// Returns how often the host broke a rule of the document.
   [[nodiscard]] std::uint32_t violations() const;
   /// Returns the first rule that the host broke, in words; empty: none.
   [[nodiscard]] std::string first_violation() const;
-  /// Returns the counts of each rule that the host's behaviour put to the test.
+  /// Returns, for each rule that the host's behaviour put to the test, how often it was checked and broken.
   [[nodiscard]] std::vector<RuleCount> rule_counts() const;
-  /// Returns how many requests the virtual encoder received, answered and refused.
+  /// Returns how many good and bad requests the virtual encoder received.
   [[nodiscard]] RequestCounts request_counts() const;
 
  private:
@@ -99,8 +102,9 @@ class Emulation {
   std::unique_ptr<Service> service_;
 };
 
-/// Starts a virtual encoder. `text` is an address without `sim:`, as
-/// "tformat?model=23-bit&motion=rpm=60&fault=corrupt=0.01". The link must be one of characters or CAN. Throws
+/// Starts a virtual encoder and returns it. `text` is an address without `sim:`, as
+/// "tformat?model=23-bit&motion=rpm=60&fault=corrupt=0.01". The link of the unit must carry characters or CAN frames.
+/// Throws UsageError, os::Failure.
 /// UsageError, os::Failure.
 [[nodiscard]] inline Emulation emulate(std::string_view text, const EmulateChoices& choices = {}) {
   return {text, choices};

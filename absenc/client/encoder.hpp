@@ -25,20 +25,20 @@
 
 namespace absenc::client {
 
-/// Whether the position of a sample can be used; `text_of` has a sentence for each.
+/// Whether the position of a sample can be used, or why not. `text_of` returns a sentence for each state.
 enum class PositionState : std::uint8_t {
   good,
-  unconfirmed,  ///< `Sample::doubtful` is true
-  starting,     ///< `Reading::ready` is false
-  invalid,      ///< the validity is `Validity::invalid`
-  unknown,      ///< the validity is `Validity::unknown`
+  unconfirmed,  ///< no second reading confirmed the position: `Sample::doubtful` is true
+  starting,     ///< the encoder is still starting: `Reading::ready` is false
+  invalid,      ///< the encoder reports that the position is invalid
+  unknown,      ///< no reply has reported whether the position is valid
   none,         ///< the sample is not a reading, or its reading has no position
 };
 
 /// Returns the state in words, for people.
 [[nodiscard]] std::string_view text_of(PositionState state);
 
-/// Result of one attempt to read. Times are those of os::now.
+/// Result of one attempt to read: a reading, a failure, or an event of the port. Times are those of os::now.
 struct Sample {
   /// The kind of a sample.
   enum class Kind : std::uint8_t {
@@ -49,41 +49,43 @@ struct Sample {
     back,    ///< the port is open again; nothing was read yet
   };
 
-  Kind kind = Kind::absent;  ///< What this sample holds.
-  Time at{};                 ///< Time at which a reading was latched, or of the event.
-  Reading reading{};         ///< The reading; default if `kind` is not a reading.
-  bool confirmed = false;    ///< Two consecutive readings agreed.
-  /// The position was valid but no second reading agreed with it, so it is marked invalid.
+  Kind kind = Kind::absent;  ///< Whether this sample holds a reading, a failure or an event.
+  Time at{};                 ///< Time at which the reading was latched, or at which the event occurred.
+  Reading reading{};         ///< The reading; default-constructed if `kind` is not `reading`.
+  /// Whether a second reading confirmed the position: the shaft can have moved from one to the other.
+  bool confirmed = false;
+  /// Whether the position was valid but no second reading confirmed it. It is then marked invalid.
   bool doubtful = false;
   bool position_valid = false;  ///< Whether `position` is valid.
-  std::int64_t position = 0;    ///< Position in counts, continued past the end of the encoder's counter.
-  /// The position jumped, or the distance since the last reading is unknown, so `position` starts again.
+  /// Position in counts, continued past the end of the encoder's counter; see `position_valid`.
+  std::int64_t position = 0;
+  /// Whether `position` starts again, because the position jumped or the distance since the last reading is unknown.
   bool restarted = false;
-  /// Whether `speed` is valid: the times of the positions must determine it closely enough.
+  /// Whether `speed` is valid: the times of the two positions must determine it closely enough.
   bool speed_valid = false;
-  /// Mean speed between two positions in rpm (mm/s for linear encoders), `speed_delay` before `at`.
+  /// Mean speed between two positions, in rpm (mm/s for linear encoders), at the time `speed_delay` before `at`.
   double speed = 0;
   /// Greatest distance of `speed` from the true mean between the instants at which the two positions were latched, in
   /// the same unit. It includes the times of requests and replies and one count of each position, but not errors and
   /// noise of the encoder.
   double speed_uncertainty = 0;
   Time speed_delay{};     ///< Time by which the speed lags behind the position.
-  JointAngles angles{};   ///< Angles of joint and motor, if the address has settings of the drive.
-  Trouble trouble{};      ///< Description of a failed attempt.
-  std::string message{};  ///< Text of the event: lost, absent, back or restarted.
+  JointAngles angles{};   ///< Angles of joint and motor; empty unless the address has settings of the drive.
+  Trouble trouble{};      ///< Description of the failure; empty unless `kind` is `failed`.
+  std::string message{};  ///< Text of the event: port lost, absent or back, or position restarted; "": no event.
 
-  /// Returns whether `reading.singleturn` can be used. For turns see `reading.multiturn_validity()`; for the position
-  /// past the end of the counter see `position_valid`.
+  /// Returns whether `reading.singleturn` can be used, or why not. For turns see `reading.multiturn_validity()`; for
+  /// the position past the end of the counter see `position_valid`.
   [[nodiscard]] PositionState position_state() const;
 
-  /// Returns the speed with its uncertainty, in rpm (mm/s for linear encoders); nothing if it is invalid.
+  /// Returns the speed with its uncertainty, in rpm (mm/s for linear encoders); nothing if the speed is invalid.
   [[nodiscard]] std::optional<Estimate> measured_speed() const;
-  /// Returns the speed of a rotary encoder in rpm; nothing for a linear one.
+  /// Returns the speed of a rotary encoder in rpm; nothing for a linear encoder or if the speed is invalid.
   [[nodiscard]] std::optional<Estimate> speed_rpm() const;
-  /// Returns the speed of a linear encoder in mm/s; nothing for a rotary one.
+  /// Returns the speed of a linear encoder in mm/s; nothing for a rotary encoder or if the speed is invalid.
   [[nodiscard]] std::optional<Estimate> speed_mm_s() const;
 
-  /// Returns the reason for a missing reading, or the event; "" for a reading without an event.
+  /// Returns the text of the failure or of the event; "" for a reading without an event.
   [[nodiscard]] std::string text() const { return kind == Kind::failed ? trouble.text() : message; }
 };
 
@@ -99,7 +101,7 @@ class Samples;
 /// An open encoder. One thread at a time may use it; only `cancel` may be called from another thread.
 class Encoder {
  public:
-  /// The connection and the state of an encoder. Only the library itself can use it.
+  /// Connection and state of an encoder, for the library itself only.
   struct Parts;
 
   /// Moves the encoder; the other one may only be destroyed or assigned to.
@@ -108,83 +110,88 @@ class Encoder {
   Encoder& operator=(Encoder&&) noexcept;
   ~Encoder();
 
-  /// Opens the port again after `disconnect` or after its loss. Throws os::Failure, UsageError.
+  /// Opens the port again after `disconnect` or after a loss of the port. Throws os::Failure, UsageError.
   void connect();
-  /// Closes the port and keeps counters and statistics. The next reading or command opens the port again.
+  /// Closes the port; counters and statistics remain. The next reading or command opens the port again.
   void disconnect();
   /// Returns whether the port is open: from `open` until `disconnect`, or until a sample reports the loss of the port.
   [[nodiscard]] bool connected() const;
 
-  /// Reads the position and all alarms that the encoder can report. A position that a second one did not confirm is
-  /// invalid. Opens a lost port again. Throws EncoderFailure, os::Failure, Cancelled, and DeadlinePassed without a
-  /// reading at `deadline` (a time of os::now), up to 20 ms and the duration of one exchange later.
+  /// Returns a reading of the position with all alarms that the encoder can report. A position that a second reading
+  /// did not confirm is marked invalid. Opens a lost port again. Throws EncoderFailure, os::Failure, Cancelled. Throws
+  /// DeadlinePassed if there is no reading at `deadline` (a time of os::now), up to 20 ms and the duration of one
+  /// exchange later.
   [[nodiscard]] Reading read(Time deadline = never);
-  /// Reads the alarms, with the command that reads each alarm by name if the unit has one.
+  /// Returns a reading with the alarms: by the command that reads each alarm by name if the unit has one, otherwise by
+  /// `read`.
   [[nodiscard]] Reading read_alarms();
   /// Returns samples for a loop, which continues after a lost port is back. The loop ends after `count` samples, at the
   /// deadline, or with `cancel`.
   [[nodiscard]] Samples samples(const SampleChoices& choices = {});
-  /// Takes one sample: reads once, or waits a quarter of a second and tries to open the port again. Throws
-  /// os::Interrupted, UsageError, Failure, Cancelled.
+  /// Takes one sample and returns it: reads once, or, while the port is lost, waits a quarter of a second and tries to
+  /// open the port again. Throws os::Interrupted, UsageError, Failure, Cancelled.
   Sample next();
 
-  /// Runs a command of the unit by name. Arguments that are left out have their defaults. Does not ask the user for
-  /// confirmation, even if the command changes the encoder, but reads back written values. Throws EncoderFailure,
-  /// os::Failure, UsageError, Cancelled.
+  /// Runs a command of the unit by name and returns the fields of its result. Arguments that are left out have their
+  /// defaults. Does not ask the user for confirmation, even if the command changes the encoder, but reads back written
+  /// values. Throws EncoderFailure, os::Failure, UsageError, Cancelled.
   Answer run(std::string_view command, std::span<const std::int64_t> arguments = {});
-  /// Runs a command of the unit with arguments in their order.
+  /// Runs a command of the unit by name, with arguments in the order of the command.
   Answer run(std::string_view command, std::initializer_list<std::int64_t> arguments) {
     return run(command, std::span(arguments.begin(), arguments.size()));
   }
 
-  /// Returns the memory of the encoder, which must be connected. This object must stay where it is.
+  /// Returns the memory of the encoder, which must be connected. This Encoder must not be moved while the result is
+  /// used.
   [[nodiscard]] Memory memory() { return Memory(*this); }
 
-  /// Returns the settings of the encoder, which must be connected. This object must stay where it is.
+  /// Returns the settings of the encoder, which must be connected. This Encoder must not be moved while the result is
+  /// used.
   [[nodiscard]] Settings settings() { return Settings(*this); }
 
-  /// Cancels from any thread: every wait, now or later, ends with Cancelled; a loop over samples ends without it.
+  /// Cancels from any thread: every wait, now or later, ends with Cancelled; a loop over samples ends without an
+  /// exception.
   void cancel();
   /// Withdraws `cancel`, so that the encoder can be used again.
   void resume();
 
-  /// Sets a function that is polled during every wait, also for the time of the next sample. Once it returns true, the
-  /// wait ends with Cancelled. Empty: none. Returns the previous function.
+  /// Sets a function that is polled during every wait, including the wait for the next sample, and returns the previous
+  /// function. Once the function returns true, the wait ends with Cancelled. Empty: no function.
   std::function<bool()> end_when(std::function<bool()> over);
 
-  /// Returns the state of the last command that changes the encoder; an exception of that command carries the same
-  /// (change.hpp).
+  /// Returns the state of the last command that changes the encoder. An exception of such a command carries the same
+  /// state (change.hpp).
   [[nodiscard]] const Change& change() const;
 
   /// Starts the continued position again at the next reading; for use after a command that moves the zero.
   void forget_position();
 
-  /// Returns protocol and port, without the settings: "tformat:/dev/ttyUSB0".
+  /// Returns protocol and port of the address, without settings: "tformat:/dev/ttyUSB0".
   [[nodiscard]] std::string address() const;
   /// Returns the unit of the encoder.
   [[nodiscard]] const Unit& unit() const;
   /// Returns the options of the encoder.
   [[nodiscard]] const Options& options() const;
-  /// Returns the settings of the drive in the address.
+  /// Returns the settings of the address that describe joint and motor.
   [[nodiscard]] const Joint& joint() const;
   /// Returns a sentence for each setting of the port that could be better.
   [[nodiscard]] const std::vector<std::string>& notes() const;
-  /// Returns counts of all exchanges: good ones, errors by kind, repetitions.
+  /// Returns the counts of all exchanges: good ones, errors by kind, repeated requests.
   [[nodiscard]] const host::Counters& counters() const;
-  /// Returns the latencies, from the end of a request to the end of its reply.
+  /// Returns the latencies of all good exchanges, from the end of a request to the end of its reply.
   [[nodiscard]] const host::Latencies& latencies() const;
-  /// Returns the last bad exchanges, the newest first, with times of os::now.
+  /// Returns the stored bad exchanges, the newest first, with times of os::now.
   [[nodiscard]] std::vector<BadExchangeText> bad_exchanges() const;
-  /// Returns the number of good readings so far.
+  /// Returns the number of good readings since the encoder was opened.
   [[nodiscard]] std::uint64_t readings() const;
-  /// Returns how often the port was lost.
+  /// Returns how often the port was lost since the encoder was opened.
   [[nodiscard]] std::uint64_t losses() const;
-  /// Returns how often the continued position started again, because of a jump or of a pause too long to count the
-  /// turns.
+  /// Returns how often the continued position started again, after a jump of the position or after a pause too long to
+  /// count the turns.
   [[nodiscard]] std::uint64_t restarts() const;
-  /// Returns the rate of good readings, per second.
+  /// Returns the number of good readings per second.
   [[nodiscard]] double rate() const;
-  /// Returns a sentence if the shaft can turn too fast for the intended rate to follow its turns; otherwise "".
+  /// Returns a warning if the shaft can turn too fast for the intended rate to follow its turns; otherwise "".
   [[nodiscard]] std::string rate_note() const;
 
  private:
@@ -193,12 +200,12 @@ class Encoder {
   std::unique_ptr<Parts> parts_;
 };
 
-/// Opens an encoder and connects it. `text` is an address, "tformat:/dev/ttyUSB0?model=23-bit" or "sim:esl", or a name
-/// of absenc.toml; `settings` ("name=value") act as if appended to it. Throws os::Failure; UsageError, which names the
-/// wrong part and the nearest right one.
+/// Opens and connects an encoder and returns it. `text` is an address, "tformat:/dev/ttyUSB0?model=23-bit" or
+/// "sim:esl", or a name of absenc.toml; `settings` ("name=value") are appended to it. Throws os::Failure. Throws
+/// UsageError, which names the wrong part and the nearest right one.
 [[nodiscard]] Encoder open(std::string_view text, std::span<const std::string> settings = {});
 
-/// An input range of samples at equal distances in time, without drift. A sample whose time has passed is left out.
+/// An input range of samples at equal distances in time, without drift. Samples whose time has passed are left out.
 class Samples {
  public:
   /// Type of the items.
@@ -206,7 +213,7 @@ class Samples {
   /// Iterator of the range.
   using Iterator = InputIterator<Samples>;
 
-  /// Samples `encoder`, which must outlive this object.
+  /// Takes samples of `encoder`, which must outlive this object.
   Samples(Encoder& encoder, const SampleChoices& choices);
   /// Moves the samples; the other object may only be destroyed or assigned to.
   Samples(Samples&&) noexcept;
@@ -214,13 +221,13 @@ class Samples {
   Samples& operator=(Samples&&) noexcept;
   ~Samples();
 
-  /// Takes the first sample; call it once.
+  /// Takes the first sample and returns an iterator to it; call it once.
   [[nodiscard]] Iterator begin();
-  /// Returns the end of the range.
+  /// Returns the end of the range, for comparison with an iterator.
   [[nodiscard]] static Iterator::End end() { return {}; }
   /// Returns the sample at the iterator, or null at the end. It is valid until `advance`.
   [[nodiscard]] const Sample* current() const;
-  /// Waits for the next sample.
+  /// Waits for the next sample and takes it.
   void advance();
 
  private:
@@ -229,10 +236,11 @@ class Samples {
   std::unique_ptr<Parts> parts_;
 };
 
-/// Returns "" for a reading, "lost" or "back" for those events, and the name of the error for a failed attempt.
+/// Returns a word for the sample: "" for a reading, "lost" or "back" for events of the port, and the name of the error
+/// for a failed attempt.
 [[nodiscard]] std::string_view event_name(const Sample& sample);
 
-/// Returns "rpm", or "mm/s" for a linear encoder.
+/// Returns the unit of the speed: "rpm", or "mm/s" for a linear encoder.
 [[nodiscard]] std::string_view speed_unit(const Reading& reading);
 
 }  // namespace absenc::client

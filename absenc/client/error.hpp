@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Exceptions of the client library; a port throws os::Failure and os::Interrupted. All are std::exceptions.
+// Exceptions of the client library. Ports also throw os::Failure and os::Interrupted. All are derived from
+// std::exception.
 #pragma once
 
 #include <stdexcept>
@@ -8,12 +9,12 @@
 
 namespace absenc::client {
 
-/// The caller requested something impossible. The text is a sentence with the wrong value and its place.
+/// The caller requested something impossible. The text is a sentence that names the wrong value and its place.
 struct UsageError : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// The content of a file or a well-formed reply is not as expected. The text is a sentence.
+/// A file or a well-formed reply has unexpected content. The text is a sentence that states the problem.
 struct Failure : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
@@ -21,9 +22,9 @@ struct Failure : std::runtime_error {
 /// Another thread or a callback cancelled the operation.
 using Cancelled = os::Ended;
 
-/// The operation reached the caller's deadline.
+/// The operation did not end before the caller's deadline.
 struct DeadlinePassed : Cancelled {
-  /// Returns what happened.
+  /// Returns a sentence about the deadline.
   [[nodiscard]] const char* what() const noexcept override { return "the deadline passed before there was a reading"; }
 };
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A measured value with its uncertainty, as people write it.
+// A measured value with its uncertainty, and its text for people.
 #pragma once
 
 #include <string>
@@ -13,10 +13,11 @@ struct Estimate {
   double uncertainty = 0;  ///< Greatest distance of the true value from `value`.
 };
 
-/// Returns "12.0 ± 0.3", with as many digits as the uncertainty justifies, at most four decimals. The uncertainty is
-/// rounded up and covers the rounding of the value. `sign` separates the two.
+/// Returns value and uncertainty as text, "12.0 ± 0.3", with as many digits as the uncertainty justifies, at most four
+/// decimals. The uncertainty is rounded up and covers the rounding of the value. `sign` is the text between the two
+/// numbers.
 [[nodiscard]] std::string to_text(const Estimate& estimate, std::string_view sign = "±");
-/// Returns the value without its uncertainty: "12.0".
+/// Returns the value alone as text, "12.0", with as many digits as the uncertainty justifies.
 [[nodiscard]] std::string value_text(const Estimate& estimate);
 
 }  // namespace absenc::client

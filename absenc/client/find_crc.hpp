@@ -14,25 +14,29 @@
 
 namespace absenc::client {
 
-/// A complete frame with its check: bytes, or bits of a clocked link, packed MSB first.
+/// A complete frame with its check: bytes, or bits of a clocked link, packed with the most significant bit first.
 struct CheckedFrame {
-  std::vector<std::uint8_t> bytes;  ///< The bytes, with the checksum.
-  std::size_t bits = 0;             ///< Number of bits; 0: whole bytes.
+  std::vector<std::uint8_t> bytes;  ///< Bytes of the frame, including the checksum.
+  std::size_t bits = 0;             ///< Number of bits of a frame on a clocked link; 0: the frame has whole bytes.
 };
 
-/// A check that explains the frames. Positions count from 0, in bytes, or in bits for frames of bits.
+/// A check that explains the searched frames. Positions in a frame count from 0, in bytes, or in bits for frames of
+/// bits.
 struct FoundCheck {
   std::string_view name;  ///< Kind of check: "crc", "sum", "negative_sum" or "xor".
-  /// Parameters of a CRC; for other checks, the width is 8 and `init` is the constant.
+  /// Parameters of a CRC; for the other kinds the width is 8 and `init` is the constant that is added.
   CrcParameters parameters{};
-  bool low_first = false;            ///< Whether the low byte of a check of more than 8 bits comes first.
-  bool padded = false;               ///< Whether the check also covers a byte 00 appended to the data.
-  bool init_open = false;            ///< All frames have the same length, so that any init fits with a matching xorout.
-  std::vector<std::size_t> first{};  ///< Possible positions of the first covered item; coverage ends at the check.
-  std::size_t check_size = 0;        ///< Size of the check, in positions.
-  std::size_t trailing = 0;          ///< Number of positions after the check.
-  double chance = 1;                 ///< Probability that a random check explains the frames as well, at most 1.
-  unsigned frames_to_settle = 0;     ///< Number of further frames with other data that would leave no doubt.
+  bool low_first = false;  ///< Whether the low byte of a check of more than 8 bits comes first.
+  bool padded = false;     ///< Whether the check also covers a byte 00 appended to the data.
+  /// Whether other values of init fit with a matching xorout, because all frames have the same length.
+  bool init_open = false;
+  /// Possible positions of the first byte or bit that the check covers; the covered part ends at the check.
+  std::vector<std::size_t> first{};
+  std::size_t check_size = 0;  ///< Size of the check, in positions.
+  std::size_t trailing = 0;    ///< Number of positions after the check, up to the end of the frame.
+  double chance = 1;           ///< Probability that a random check explains the frames as well, at most 1.
+  /// Number of further frames, with other data, that would leave no doubt about the check.
+  unsigned frames_to_settle = 0;
 };
 
 /// Result of a search for the checksum of frames.
@@ -40,24 +44,26 @@ struct CheckFindings {
   std::vector<FoundCheck> checks{};  ///< Checks that explain the frames, the least likely coincidence first.
   std::size_t shortest = 0;          ///< Length of the shortest frame, in positions.
   std::size_t longest = 0;           ///< Length of the longest frame, in positions.
-  /// The frames contain too little information to list all checks that explain them.
+  /// Whether the frames contain too little information to list all checks that explain them.
   bool is_open = false;
-  std::size_t odd = 0;   ///< Number, from 1, of the only frame that a check does not explain; 0: none.
-  std::string advice{};  ///< A sentence about open questions or about the reason why no check was found; "": neither.
+  std::size_t odd = 0;  ///< Number, from 1, of a frame without which a check explains all others; 0: there is none.
+  /// A sentence about open questions, or about the reason why no check was found; "": there is nothing to say.
+  std::string advice{};
 };
 
 /// Returns all checks of 3 to 16 bits that explain every frame. Throws UsageError for fewer than two frames, for bytes
 /// and bits together, and for frames that are too short or longer than 64 bytes or 128 bits.
 [[nodiscard]] CheckFindings find_crc(std::span<const CheckedFrame> frames);
 
-/// Options that configure a unit for a check.
+/// A unit with options that configure it for a found check.
 struct CheckOptions {
-  const Unit* unit;                  ///< The unit whose checksum it is.
-  std::vector<std::string> options;  ///< Options, as "crc_width=16"; empty if the unit always has this check.
+  const Unit* unit;  ///< Unit whose frames can have the check.
+  /// Options that select the check, as "crc_width=16"; empty if the unit always has this check.
+  std::vector<std::string> options;
 };
 
-/// Returns the units whose words can end with this check. `frame_size` is the length of the shortest frame and `link`
-/// the link of the frames.
+/// Returns the units whose frames can end with this check, with the options that select it. `frame_size` is the length
+/// of the shortest frame and `link` the link of the frames.
 [[nodiscard]] std::vector<CheckOptions> options_for(const FoundCheck& check, std::size_t frame_size, LinkKind link);
 
 }  // namespace absenc::client

@@ -14,43 +14,44 @@
 
 namespace absenc::client {
 
-/// An encoder that explains the received frames.
+/// An encoder that explains the received frames, and the evidence for it.
 struct FoundEncoder {
-  const Unit* unit = nullptr;           ///< The unit that explains the replies.
-  Options options{};                    ///< Options with which it does.
-  std::vector<std::string> settings{};  ///< Shortest list of settings that yields these options, as "model=23-bit".
+  const Unit* unit = nullptr;           ///< Unit whose protocol explains the replies.
+  Options options{};                    ///< Options of the unit with which the replies are explained.
+  std::vector<std::string> settings{};  ///< Shortest list of settings that yields `options`, as "model=23-bit".
   /// Address for `open`, as "tformat:/dev/ttyUSB0?model=23-bit"; "" for a capture.
   std::string address{};
-  /// Selects one of several encoders on the line, as "address=3"; "": the only one.
+  /// Setting that selects this encoder among several on the line, as "address=3"; "": it is the only one.
   std::string encoder{};
   std::string line{};         ///< Line of the encoder, as "RS-485 half duplex, 2.5 Mbit/s".
   std::size_t tried = 0;      ///< Number of exchanges that were checked.
-  std::size_t explained = 0;  ///< Number of exchanges that the encoder explains.
-  double log10_chance = 0;    ///< Decimal logarithm of the probability that noise explains as many.
-  bool sure = false;          ///< Whether this probability is small enough to be sure.
+  std::size_t explained = 0;  ///< Number of the checked exchanges that the encoder explains.
+  double log10_chance = 0;    ///< Decimal logarithm of the probability that random bytes are explained as often.
+  bool sure = false;          ///< Whether `log10_chance` is small enough to exclude chance.
   Answer identity{};          ///< Identity that the encoder on a line reports, such as its serial number.
 };
 
-/// Result of `identify`: the units that explain what the port received.
+/// Result of `identify`: the encoders that explain what the port or the capture contains.
 struct Identified {
   std::vector<FoundEncoder> found{};  ///< Encoders, the most probable first.
   std::vector<std::string> notes{};   ///< Sentences about attempts that were impossible and about damaged data.
   bool is_complete = true;            ///< False if the time limit ended the search early.
 };
 
-/// Limits of `identify`: the requests it may send, and how long it listens.
+/// Time limit and callback of `identify`.
 struct IdentifyChoices {
-  Time limit = std::chrono::seconds(60);                    ///< Time limit of the whole search.
-  std::function<void(const std::string& what)> progress{};  ///< Called with the step that is tried next.
+  Time limit = std::chrono::seconds(60);  ///< Time limit of the whole search.
+  /// Called with a description of each step before it is tried.
+  std::function<void(const std::string& what)> progress{};
 };
 
-/// Polls the line with every protocol that fits, at its rates and addresses, with reads that change nothing. `place` is
-/// a port with its settings: "/dev/ttyUSB0", "tcp:HOST:PORT?latency=50", "spi:/dev/spidev0.0", "can0". Throws
-/// os::Failure, UsageError, os::Interrupted.
+/// Polls the line with every protocol that fits, at its rates and addresses, by reads that change nothing, and returns
+/// the encoders that reply. `place` is a port with its settings: "/dev/ttyUSB0", "tcp:HOST:PORT?latency=50",
+/// "spi:/dev/spidev0.0", "can0". Throws os::Failure, UsageError, os::Interrupted.
 [[nodiscard]] Identified identify(std::string_view place, const IdentifyChoices& choices = {});
 
-/// Identifies the encoder in a capture. The model and options of `choices` limit the search. Throws UsageError,
-/// Failure.
+/// Returns the encoders that explain the frames of a capture. The model and options of `choices` limit the search.
+/// Throws UsageError, Failure.
 [[nodiscard]] Identified identify_capture(const std::string& path, const DecodeChoices& choices = {});
 
 }  // namespace absenc::client

@@ -1,36 +1,36 @@
 // SPDX-License-Identifier: Apache-2.0
-// An iterator for ranges that are read once, one value at a time.
+// Iterator for ranges that can be read only once, one value at a time.
 #pragma once
 
 #include <cstddef>
 
 namespace absenc::client {
 
-/// Input iterator of `Range`, which has a `value_type`, `current()`, which returns a pointer to the value or null at
-/// the end, and `advance()`.
+/// Input iterator of `Range`. The range has a type `value_type`, a function `current()`, which returns a pointer to the
+/// value or null at the end, and a function `advance()`.
 template <class Range>
 class InputIterator {
  public:
   struct End {};
-  /// Type of the items.
+  /// Type of the values that the iterator points to.
   using value_type = typename Range::value_type;
-  /// Type that iterators must have; no function returns a distance.
+  /// Type that an iterator must declare; no function returns a distance.
   using difference_type = std::ptrdiff_t;
 
   /// Points to the current item of `range`.
   explicit InputIterator(Range& range) : range_(&range) {}
-  /// Returns the current item.
+  /// Returns a reference to the current value.
   const value_type& operator*() const { return *range_->current(); }
-  /// Returns the current item.
+  /// Returns a pointer to the current value.
   const value_type* operator->() const { return range_->current(); }
-  /// Advances to the next item.
+  /// Moves the range to its next value.
   InputIterator& operator++() {
     range_->advance();
     return *this;
   }
-  /// Advances to the next item.
+  /// Moves the range to its next value.
   void operator++(int) { range_->advance(); }
-  /// Returns whether the range has ended.
+  /// Returns whether the range has no further value.
   bool operator==(End) const { return range_->current() == nullptr; }
 
  private:

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Runs a virtual encoder on a port and lets other code act on it between its steps.
+// Runs a virtual encoder on a port and calls other code between the encoder's steps.
 #pragma once
 
 #include <algorithm>
@@ -10,20 +10,20 @@
 
 namespace absenc::client {
 
-/// A transfer due within this time is sent at once: a host on a pseudo-terminal waits milliseconds anyway.
+/// Time by which the encoder may send early: a host on a pseudo-terminal waits milliseconds anyway.
 inline constexpr Time send_slack = std::chrono::microseconds(500);
 
-/// Runs an encoder and calls `look` between its steps, in the same thread, so that no second thread touches the
-/// encoder.
+/// A machine that passes events to an encoder and calls `look` between the encoder's steps, in the same thread, so that
+/// no second thread touches the encoder.
 template <class Item>
 class Attended final : public Machine<Item> {
  public:
-  /// Calls `look` every 20 ms, or at the next step after that, until it returns false.
+  /// Calls `look` every 20 ms, or at the next step after that, until `look` returns false.
   Attended(Machine<Item>& machine, std::function<bool(Time now)> look) : machine_(machine), look_(std::move(look)) {}
 
   void feed(const Event<Item>& event) override {
     if (event.kind == Event<Item>::Kind::timer) {
-      if (event.at < timer_) return;  // the timer was only for `look`
+      if (event.at < timer_) return;  // the timer was due only to call `look`, not for the encoder
       timer_ = never;
     }
     machine_.feed(event);
@@ -34,7 +34,7 @@ class Attended final : public Machine<Item> {
     if (now >= look_at_) look_at_ = look_(now) ? now + between_looks : never;
     Step<Item> step = machine_.next(now);
     if (step.kind != Step<Item>::Kind::wait) return step;
-    // As on ports, a timer that is due at the time of another event remains due.
+    // As on real ports, a timer that is due at the time of another event remains due.
     timer_ = step.at > now || step.at == timer_ ? step.at : never;
     step.at = std::min(look_at_, timer_);
     return step;
@@ -43,7 +43,7 @@ class Attended final : public Machine<Item> {
  private:
   Machine<Item>& machine_;
   std::function<bool(Time)> look_;
-  Time timer_ = never;  // timer of the machine's last wait
+  Time timer_ = never;  // time of the timer for which the encoder waits
   Time look_at_{};
 };
 

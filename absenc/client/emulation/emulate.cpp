@@ -28,7 +28,8 @@ namespace absenc::client {
 
 namespace {
 
-constexpr Time between_tries_to_look = std::chrono::milliseconds(20);  // period of retries while the interface is down
+// period of retries while the CAN interface is down
+constexpr Time between_tries_to_look = std::chrono::milliseconds(20);
 
 EncoderAddress virtual_address(std::string_view text) {
   EncoderAddress address = parse_address("sim:" + std::string(text));
@@ -121,7 +122,7 @@ struct Emulation::Service {
     serve_forever(attended, open, wait, [](PortEvent, std::string_view) {});
   }
 
-  // Runs the waiting orders between two steps of the encoder.
+  // Runs the orders of other threads between two steps of the encoder.
   bool look(Time now) {
     const std::lock_guard lock(mutex);
     if (stopped) throw Cancelled{};
@@ -132,7 +133,7 @@ struct Emulation::Service {
     return true;
   }
 
-  /// Runs `work` in the encoder's thread and returns when it is done.
+  /// Runs `work` in the encoder's thread and returns when it has ended.
   void carry_out(const std::function<void(Time)>& work) {
     const std::lock_guard turn(wishes);
     std::unique_lock lock(mutex);
@@ -155,19 +156,19 @@ struct Emulation::Service {
   EncoderAddress address;
   RuleCounter rules;
   VirtualDevice device;
-  std::string interface;  // the CAN interface; otherwise "" and `emulator` is set
+  std::string interface;  // name of the CAN interface; "": the encoder is on `port` instead
   std::shared_ptr<os::EmulatorPort> port;
-  std::unique_ptr<os::SocketCan> can;  // the opened interface, before the thread takes it
+  std::unique_ptr<os::SocketCan> can;  // the opened CAN interface, until the encoder's thread takes it
 
-  std::mutex wishes;  // one order at a time
-  std::mutex mutex;   // guards the members down to the thread
+  std::mutex wishes;  // lets only one thread at a time give an order
+  std::mutex mutex;   // guards all following members except the thread
   std::condition_variable changed;
   std::function<void(Time)> wish;
   bool stopped = false;
   std::exception_ptr thrown;
-  std::function<RequestCounts()> count_requests;  // set while the thread runs
+  std::function<RequestCounts()> count_requests;  // returns the present counts; set while the thread runs
 
-  std::jthread thread;  // last member: it uses all others
+  std::jthread thread;  // last member, because the thread uses all other members
 };
 
 Emulation::Emulation(std::string_view text, const EmulateChoices& choices)

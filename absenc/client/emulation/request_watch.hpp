@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Counts the requests of a host to a virtual encoder, and everything it sends that is no request of the document.
+// Counts the requests of a host to a virtual encoder, and all other bytes and frames that the host sends.
 #pragma once
 
 #include <algorithm>
@@ -18,11 +18,12 @@
 
 namespace absenc::client {
 
-/// Stands between the line and the virtual encoder. On a clocked line each start of the clock is a request.
+/// A machine between the line and the virtual encoder, which counts requests. On a clocked line each start of the clock
+/// is a request.
 template <class Item>
 class RequestWatch final : public Machine<Item> {
  public:
-  /// All arguments must outlive the object.
+  /// Takes the virtual encoder and its address, which must outlive the object.
   RequestWatch(Machine<Item>& device, const EncoderAddress& address)
       : device_(device),
         unit_(*address.unit),
@@ -42,7 +43,7 @@ class RequestWatch final : public Machine<Item> {
 
  private:
   using Kind = typename Event<Item>::Kind;
-  static constexpr int most_in_reply = 24;  // maximum number of characters
+  static constexpr int most_in_reply = 24;  // longest reply of an encoder, in characters
 
   void look(const Event<Item>& event) {
     if (unit_.link == LinkKind::clocked) {
@@ -64,7 +65,7 @@ class RequestWatch final : public Machine<Item> {
     }
   }
 
-  // Ignores frames that no host sends to such an encoder: they belong to other devices on the bus.
+  // Counts requests. Ignores frames that no host sends to such an encoder: they belong to other devices on the bus.
   void look_at_frames(std::span<const CanFrame> frames) {
     for (const CanFrame& frame : frames) {
       const Error error = error_of({.can = &frame});
@@ -73,7 +74,7 @@ class RequestWatch final : public Machine<Item> {
     }
   }
 
-  // The request is the beginning of its transfer.
+  // Counts an SPI transfer, whose beginning must be a request.
   void look_at_transfer(Bytes bytes) {
     const FrameEnd end = unit_.frame_end(options_, Direction::request, bytes);
     const bool good = end.kind == FrameEnd::Kind::complete && error_of({.bytes = bytes.first(end.size)}) == Error::none;
@@ -81,11 +82,12 @@ class RequestWatch final : public Machine<Item> {
     note_bad(to_hex(bytes));
   }
 
-  // Bytes that collide with a reply arrive damaged. The host's fault is then the collision, not a wrong request.
+  // Counts requests in received bytes. Skips bytes that collide with a reply and arrive damaged: the host's fault is
+  // then the collision, not a wrong request.
   void look_at_bytes(Bytes bytes, Time at, Time late) {
     const Time pause = at - character_ * static_cast<std::int64_t>(bytes.size()) - heard_at_;
     heard_at_ = at;
-    // If this program had run in time, the reply might have been sent between the two requests.
+    // A request that this program noticed late is no violation: in time, the reply might have been sent before it.
     const bool may_have_waited = late > unit_.timing.turnaround + most_in_reply * character_;
     if (pause > 2 * character_ || may_have_waited) skipping_ = waits_ = false;
     if (sending_ && unit_.link == LinkKind::half_duplex) skipping_ = true;
@@ -95,7 +97,7 @@ class RequestWatch final : public Machine<Item> {
     }
   }
 
-  // Returns whether the request may still be incomplete.
+  // Takes one request from the pending bytes; returns false if there is no complete one.
   bool take_one() {
     if (pending_.empty()) return false;
     const FrameEnd end = unit_.frame_end(options_, Direction::request, pending_);
@@ -127,7 +129,7 @@ class RequestWatch final : public Machine<Item> {
 
   [[nodiscard]] Error error_of(const Frame& request) const { return unit_.check(options_, request, {}); }
 
-  // Opening a port may produce a few bytes before the host sends anything.
+  // Bad bytes before the first good request are counted separately: opening a port may produce a few.
   void note_good() {
     if (++counts_.good > 1) return;
     counts_.before += counts_.bad;
@@ -144,9 +146,10 @@ class RequestWatch final : public Machine<Item> {
   Time character_;
   bool sending_ = false;
   Time heard_at_{};
-  bool waits_ = false;  // the encoder's reply is outstanding, so the host should wait
+  bool waits_ = false;  // whether the reply is outstanding, so that the host must wait
   bool skipping_ =
-      false;  // bytes are ignored until the line is silent, after a collision or bytes that begin no request
+      // whether bytes are ignored until the line is silent, after a collision or after bytes that begin no request
+      false;
   std::vector<std::uint8_t> pending_{};
   RequestCounts counts_{};
 };

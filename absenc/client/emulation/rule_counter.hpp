@@ -11,7 +11,7 @@
 
 namespace absenc::client {
 
-/// Returns the counter of this rule; adds one if there is none.
+/// Returns the counter of this rule in `counts`; adds one if there is none.
 [[nodiscard]] inline RuleCount& count_of(std::vector<RuleCount>& counts, std::string_view rule) {
   const auto found = std::ranges::find(counts, rule, &RuleCount::rule);
   return found != counts.end() ? *found : *counts.insert(found, {.rule = rule});

@@ -12,11 +12,11 @@
 
 namespace absenc::client {
 
-/// A change of the port that is reported.
+/// A change of the port that is reported to the caller.
 enum class PortEvent : std::uint8_t { opened, away, back };
 
-/// Moves an encoder from one port to the next. If the last port was lost between a transfer and its `sent`, `left`
-/// feeds the missing `sent`.
+/// An encoder that moves from one port to the next. If the last port was lost after a transfer began and before it was
+/// sent, `left` reports the transfer as sent.
 template <class Item>
 class Movable final : public Machine<Item> {
  public:
@@ -38,7 +38,7 @@ class Movable final : public Machine<Item> {
     if (sending_) feed({.kind = Event<Item>::Kind::sent, .at = now});
   }
 
-  /// Returns the rate that the encoder set on the last port; 0: none.
+  /// Returns the rate that the encoder set on the last port; 0: it set none.
   [[nodiscard]] std::uint32_t rate() const { return rate_; }
 
  private:
@@ -47,8 +47,9 @@ class Movable final : public Machine<Item> {
   std::uint32_t rate_ = 0;
 };
 
-/// Never returns: an exception of `open`, the port or `wait` ends it. `open()` opens the port. When the port is lost
-/// (os::Failure), calls `wait(time)` and `open()` again. Calls `told(what, why)` for each change of the port.
+/// Serves the encoder until `open`, the port or `wait` throws an exception; never returns. `open()` opens the port.
+/// When the port is lost (os::Failure), calls `wait(time)` and `open()` again. Calls `told(what, why)` for each change
+/// of the port.
 template <class Item, class Open, class Wait, class Told>
 [[noreturn]] void serve_forever(Machine<Item>& machine, const Open& open, const Wait& wait, const Told& told) {
   constexpr Time time_between_tries = std::chrono::milliseconds(250);
@@ -68,7 +69,7 @@ template <class Item, class Open, class Wait, class Told>
       is_open = was_open = true;
       host::drive(movable, *port, [] { return true; });
     } catch (const os::Failure& failure) {
-      // A rate that the port does not support now will not be supported later.
+      // Ends if the encoder set a rate that the port does not support, because it will not be supported later.
       const bool unable = is_open && failure.kind() == os::Failure::Kind::unsupported;
       if (!was_open || unable) throw;
       if (is_open) told(PortEvent::away, failure.what());

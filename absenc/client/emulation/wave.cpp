@@ -29,10 +29,10 @@ namespace {
 
 using namespace std::chrono_literals;
 
-constexpr Time first_request = 20us;              // time after power-on
-constexpr std::uint64_t fastest = 1'000'000'000;  // samples per second, the resolution of the drawing
+constexpr Time first_request = 20us;              // time from power-on to the first request
+constexpr std::uint64_t fastest = 1'000'000'000;  // highest sample rate: the drawing has a resolution of 1 ns
 
-// Idle time at the beginning and the end, which decoders need: 11 bits for CAN, 3.5 characters for Modbus, and more to
+// Idle time that decoders need at the beginning and at the end: 11 bits for CAN, 3.5 characters for Modbus, and more to
 // detect the rate.
 Time idle_around(const LineSettings& line) { return std::max(first_request, 5 * line.character()); }
 
@@ -84,7 +84,7 @@ struct Conversations {
 
   std::uint64_t results = 0;
   std::uint64_t failures = 0;
-  Time end{};  // end of the last conversation, which may have timed out
+  Time end{};  // time at which the last conversation ended, perhaps with a timeout
 
   template <class Item>
   void hold(Machine<Item>& device) {
@@ -103,8 +103,8 @@ struct Conversations {
     while (port.now() < until) static_cast<void>(port.wait({.at = until}));
   }
 
-  // A stream, which never ends by itself, ends with the last round; a command that polls without end ends after a
-  // result.
+  // Draws until the last result. A stream never ends by itself, so it ends with its last result; a command that polls
+  // without end is ended after one result.
   template <class Item>
   void hold(sim::SimPort<Item>& port, const Spoken& one) {
     std::vector<std::byte> storage(uri.unit->host_storage);
@@ -138,7 +138,7 @@ void converse(Conversations& conversations) {
   }
 }
 
-// Makes temporary files on the disk of the result, so that space is checked there.
+// Makes temporary files on the disk of the result, so that lack of space is found there.
 capture::ScratchFile scratch_file(const std::string& path) {
   os::Descriptor file = os::nameless_file(std::filesystem::path(path).parent_path());
   return capture::ScratchFile(::fdopen(file.release(), "w+"));
@@ -147,7 +147,7 @@ capture::ScratchFile scratch_file(const std::string& path) {
 void write_drawing(const WaveChoices& choices, const std::string& path, capture::Drawing& drawing,
                    const LineSettings& line) {
   const FileFormat format = format_of(path);
-  if (format == FileFormat::sigrok) {  // the sigrok writer replaces the old file itself
+  if (format == FileFormat::sigrok) {  // the sigrok writer replaces an existing file itself
     const std::uint64_t usual = std::min<std::uint64_t>(fastest, std::uint64_t{16} * line.rate);
     return capture::write_sigrok(path, drawing, choices.samples_per_second == 0 ? usual : choices.samples_per_second);
   }
@@ -159,7 +159,7 @@ void write_drawing(const WaveChoices& choices, const std::string& path, capture:
   file.take_place(os::Durable::no);
 }
 
-// "sim:" may be omitted, because only virtual encoders have wires to draw.
+// Adds "sim:" if the user left it out: only virtual encoders can be drawn.
 EncoderAddress virtual_encoder(std::string_view text, std::span<const std::string> settings) {
   const std::string_view id = text.substr(0, text.find_first_of("?:"));
   const bool bare = find_unit(id) != nullptr && (id.size() == text.size() || text[id.size()] == '?');

@@ -23,7 +23,7 @@ std::optional<std::int64_t> integer_in(const Value& value) {
   return std::nullopt;
 }
 
-// Returns the encoder's reply; nothing if there is none.
+// Runs a reading command and returns the fields of its reply; nothing if the command fails.
 std::optional<Answer> ask(Connection& connection, const Command& reader, Arguments arguments) {
   AnswerSink sink;
   try {
@@ -34,7 +34,7 @@ std::optional<Answer> ask(Connection& connection, const Command& reader, Argumen
   return std::move(sink.answer);
 }
 
-// Returns the address with this setting in place of the one of the same name.
+// Returns the address with the setting `name` set to `value`; an older value of the setting is removed.
 std::string with_setting(const std::string& address, std::string_view name, std::int64_t value) {
   const std::size_t question = std::min(address.find('?'), address.size());
   std::string result = address.substr(0, question);
@@ -78,8 +78,8 @@ void ChangeRecord::look_at_memory() {
   }
 }
 
-// Returns the value of the setting that the argument writes: the field that equals the argument after writing, or else
-// the only field.
+// Finds the old value of the field that the command's argument sets: the field that equals the argument after writing,
+// or else the only field. Stores nothing if several fields are possible.
 void ChangeRecord::find_old_value(bool good) {
   if (!old_ || arguments_.empty()) return;
   if (std::ranges::count_if(command_.arguments, &Argument::required) != 1) return;

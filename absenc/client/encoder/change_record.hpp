@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Writes a change into the journal; reads the old value before the change is sent.
+// Writes a change of an encoder into the journal, with the old value, which is read before the change is sent.
 #pragma once
 
 #include <cstdint>
@@ -17,12 +17,12 @@ class Connection;
 
 class ChangeRecord {
  public:
-  /// Reads the value that the command will overwrite, unless it is `known` or cannot be read. Throws the exceptions of
-  /// the port.
+  /// Reads the value that the command will overwrite, unless the value is `known` or cannot be read. Throws the
+  /// exceptions of the port.
   ChangeRecord(Connection& connection, const Command& command, Arguments arguments, std::optional<std::int64_t> known);
 
-  /// Appends the change to the journal if it was sent. `way` is the encoder's address before the change. Returns "", or
-  /// why the journal lacks the change.
+  /// Appends the change to the journal if its request was sent. `way` is the encoder's address before the change.
+  /// Returns "", or the reason why the journal lacks the change.
   [[nodiscard]] std::string keep(const EncoderAddress& way, const Change& change);
 
  private:
@@ -37,8 +37,8 @@ class ChangeRecord {
   Connection& connection_;
   const Command& command_;
   std::vector<std::int64_t> arguments_;
-  std::optional<Answer> old_{};              // old value of a setting, all of its fields
-  std::optional<std::int64_t> old_value_{};  // old value in the form that a command can write
+  std::optional<Answer> old_{};              // old value of a setting, as all fields of the reply
+  std::optional<std::int64_t> old_value_{};  // old value, in the form that the command can write
 };
 
 }  // namespace absenc::client

@@ -25,7 +25,8 @@ Frame to_frame(std::span<const CanFrame> frames, std::size_t = 0) {
   return {.can = frames.empty() ? nullptr : &frames.front()};
 }
 
-// Returns "it is reached with baud=57600 now", or "" if the address has not changed.
+// Returns the new address of a changed encoder in words, "it is reached with baud=57600 now"; "" if the address has not
+// changed.
 std::string new_way(const EncoderAddress& before, const Command& command, Arguments arguments) {
   if (command.changes_option.empty()) return {};
   const Options behind = options_behind(*before.unit, before.options, command, arguments.front());
@@ -33,7 +34,7 @@ std::string new_way(const EncoderAddress& before, const Command& command, Argume
   return fmt::format("it is reached with {} now", option_text(*before.unit, behind, command.changes_option));
 }
 
-// Returns how to check whether an encoder was changed.
+// Returns the advice that explains how to find out whether an encoder was changed.
 std::string advice_to_look(const EncoderAddress& before, const Command& command, Arguments arguments) {
   const Unit& unit = *before.unit;
   const std::string address = address_of(before);
@@ -54,11 +55,11 @@ std::string advice_to_look(const EncoderAddress& before, const Command& command,
   return fmt::format("`absenc read {}` shows how the encoder is now; look before you send it again", address);
 }
 
-/// Compares the life counters of a reading with those of the good reading before.
+/// Compares the life counters of each good reading with those of the good reading before.
 class LifeCounters final : public FieldSink {
  public:
   void clear() { before_.clear(); }
-  /// Ends a reading; `put` has received its fields if it was good.
+  /// Begins the comparison of the next reading, whose fields `put` then receives.
   void begin() { stand_ = false; }
   void put(const FieldValue& field) override {
     if (field.info->role != Role::life_counter) return;
@@ -66,8 +67,8 @@ class LifeCounters final : public FieldSink {
     stand_ = stand_ || (!is_first && known->second == field.number);
     known->second = field.number;
   }
-  /// Returns whether a life counter has not changed. It may have advanced by any number, because of errors and other
-  /// hosts.
+  /// Returns whether a life counter equals that of the reading before. A counter may have advanced by any number,
+  /// because of errors and other hosts.
   [[nodiscard]] bool stand() const { return stand_; }
 
  private:
@@ -109,7 +110,8 @@ class ConnectionOn final : public Connection {
     const Command* command = uri().reads != nullptr ? uri().reads : find_command(unit(), Verb::read);
     if (command == nullptr) throw UsageError(fmt::format("{} has no command that reads the position", unit().id));
     Outcome ended = read_once(*command, take);
-    // Another host may have read 64 frames since the last reading, so that the counter wrapped; reading again decides.
+    // Reads again before an unchanged counter is an error: another host may have read 64 frames, so that the counter
+    // wrapped.
     if (life_counters_.stand()) ended = read_once(*command, take);
     if (!life_counters_.stand()) return ended;
     session_.refuse_last(Error::sequence_mismatch);
@@ -212,7 +214,7 @@ class ConnectionOn final : public Connection {
     return trouble;
   }
 
-  // The clock of a virtual encoder is the simulated line's, on which requests are not delayed.
+  // A virtual encoder has exact latch times: requests are not delayed on its simulated line.
   void keep_latch_time(const Reading& reading, bool was_asked) {
     if (!was_asked) {
       arrivals_.add(reading.received, port_.nothing_until);
@@ -253,7 +255,7 @@ class ConnectionOn final : public Connection {
     return ended;
   }
 
-  // `before` is the address before the change.
+  // Returns the state of a change after its command. `before` is the address before the change.
   Change change_after(const EncoderAddress& before, const Command& command, Arguments arguments, bool good) const {
     const ChangeSent sent = port_.requests != requests_before_ ? session_.change_sent() : ChangeSent::no;
     if (sent == ChangeSent::no) return {ChangeState::not_sent};
@@ -262,7 +264,7 @@ class ConnectionOn final : public Connection {
     return {ChangeState::unknown, advice_to_look(before, command, arguments)};
   }
 
-  // Other encoders share the line, whose settings must not change.
+  // Tells the conversations that other encoders share the line, so that they do not change its settings.
   void tell_of_company() {
     Options options = uri().options;
     tell_shared(unit(), options);
@@ -278,7 +280,7 @@ class ConnectionOn final : public Connection {
             port_.take_aborted(),  conversation->reading(), {}};
   }
 
-  // A late reply needs another explanation than a missing one.
+  // Adds to a timeout that replies came late, because a late reply has other causes than a missing one.
   void tell_lateness(Trouble& trouble) const {
     const Time lateness = session_.lateness();
     if (trouble.error != Error::timeout || lateness == Time{}) return;
@@ -291,7 +293,7 @@ class ConnectionOn final : public Connection {
         std::chrono::ceil<std::chrono::milliseconds>(lateness * 3 / 2).count());
   }
 
-  // Adds the finding that `absenc doctor` would report.
+  // Returns the finding that `absenc doctor` would report.
   [[nodiscard]] std::string finding_text(const Outcome& outcome) const {
     Attempted last{.error = outcome.error, .detail = std::string(outcome.detail)};
     runner_.keep_exchange(last);
@@ -302,7 +304,7 @@ class ConnectionOn final : public Connection {
     return fmt::format("{}: {}", found.id, found.cause);
   }
 
-  // The conversation failed before it sent anything.
+  // Describes a failure of a conversation that had not sent anything yet.
   [[nodiscard]] Trouble unasked_trouble(const Outcome& outcome) const {
     const std::span<const Item> damaged = last_->exchange().received;
     const std::span<const Item> received = damaged.empty() ? std::span<const Item>(line_.received) : damaged;
@@ -343,7 +345,7 @@ class ConnectionOn final : public Connection {
     return fmt::format("{}; received {}{}", sent, trouble.received, later);
   }
 
-  // The bits received by the last clocks.
+  // Returns the bits that the last clocks received, as text.
   [[nodiscard]] std::string clocked_text() const {
     return to_wire_text(unit().link, to_frame(std::span<const Item>(line_.received), line_.clocks));
   }
@@ -365,7 +367,7 @@ class ConnectionOn final : public Connection {
   static constexpr unsigned attempts = 3;
 
   bool is_journaled_;
-  bool is_exact_;  // the times of the line are exact
+  bool is_exact_;  // whether times on the line are exact: the line is simulated
   OpenLink open_;
   std::shared_ptr<SharedLink> link_;
   Runner<Item> runner_;
@@ -376,9 +378,9 @@ class ConnectionOn final : public Connection {
   const Conversation<Item>* last_ = nullptr;
   LifeCounters life_counters_;
   ArrivalSpread arrivals_;
-  host::LatchTime latch_time_{};  // latch time of the last position
+  host::LatchTime latch_time_{};  // bounds of the time at which the encoder latched the last position
   Change change_{};
-  std::uint64_t requests_before_ = 0;  // request count before the last changing command
+  std::uint64_t requests_before_ = 0;  // number of requests before the last changing command
 };
 
 }  // namespace
@@ -390,7 +392,7 @@ std::string Trouble::text() const {
   return with_change(lines, change);
 }
 
-// Keeps the user's line settings, except for the rate if the encoder now has another.
+// Sets options; the user's line settings remain, except for the rate if the encoder now has another.
 void Connection::set_options(const Options& options) {
   const std::uint32_t rate = line_settings(unit(), options).rate;
   if (rate != line_settings(unit(), uri_.options).rate) uri_.line.rate = rate;

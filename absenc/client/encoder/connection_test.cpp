@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Checks life counters from one live reading to the next, for each unit that has them, with repeated frames.
+// Checks that life counters are compared from one live reading to the next, for each unit that has them, with an
+// encoder that repeats frames.
 #include "absenc/client/encoder/connection.hpp"
 
 #include <gtest/gtest.h>
@@ -15,14 +16,14 @@
 namespace absenc::client {
 namespace {
 
-/// Returns whether a unit reports a life counter.
+/// Returns whether the unit's readings report a life counter.
 class Seen final : public FieldSink {
  public:
   void put(const FieldValue& field) override { any = any || field.info->role == Role::life_counter; }
   bool any = false;
 };
 
-/// Forwards and records the frames of an encoder; after `play` it repeats the chosen frames.
+/// A machine that forwards and records the frames of an encoder, and repeats chosen frames after a call of `play`.
 class Recorder final : public Machine<std::uint8_t> {
  public:
   explicit Recorder(Machine<std::uint8_t>& encoder) : encoder_(&encoder) {}
@@ -60,7 +61,7 @@ struct Counting {
         })) {
     encoder.power_on(Time{});
     connection->connect();
-    // Frames 0 and 1 are those of the first reading, without a start sequence or a repetition.
+    // Frames 0 and 1 are the reply to the first reading, without a start sequence or a repetition.
     first = connection->read();
     connection->report(seen);
   }
@@ -102,7 +103,8 @@ TEST_P(LifeCounters, OneThatStandsStillIsAnError) {
 TEST_P(LifeCounters, OneThatHasComeRoundIsReadAgain) {
   Counting line(*GetParam());
   for (int i = 0; i < 2; ++i) EXPECT_EQ(line.connection->read().error, Error::none);
-  line.recorder.play({0, 1, 0, 1, 2, 3, 0, 1});  // after the first reading another host read 62 frames
+  // these frames arrive as if another host had read 62 frames after the first reading
+  line.recorder.play({0, 1, 0, 1, 2, 3, 0, 1});
   for (int i = 0; i < 3; ++i) EXPECT_EQ(line.connection->read().error, Error::none);
   EXPECT_EQ(line.recorder.left(), 0u);
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Uses the library as a program does, with virtual encoders in this process and on pseudo-terminals.
+// Uses the library as a program does: with virtual encoders in this process and on pseudo-terminals.
 #include <gmock/gmock-more-matchers.h>
 #include <gtest/gtest.h>
 
@@ -20,7 +20,7 @@ using testing::HasSubstr;
 using testing::IsEmpty;
 using Kind = Sample::Kind;
 
-// ---- The check of an unknown encoder
+// ---- Search for the checksum of an unknown encoder
 
 TEST(ClientFindCrc, TellsThePolynomialAndWhichFrameIsOdd) {
   std::vector<CheckedFrame> frames;
@@ -46,7 +46,7 @@ TEST(ClientFindCrc, TellsThePolynomialAndWhichFrameIsOdd) {
   EXPECT_THAT(thrown_by<UsageError>(one), HasSubstr("give several"));
 }
 
-// ---- An encoder by its name
+// ---- Encoders that are opened by name
 
 TEST(ClientEncoder, EveryUnitIsReadByItsName) {
   for (const Unit* unit : all_units()) {
@@ -86,7 +86,7 @@ TEST(ClientEncoder, AnAnswerOutlivesItsEncoder) {
   Answer answer;
   {
     Answer first = open("sim:ssi?word=a_long_name=value:4 position:13").run("position");
-    answer = first;  // also after the original was assigned
+    answer = first;  // the copy must stay valid after the original was overwritten
   }
   EXPECT_EQ(answer["a_long_name"], Value(std::uint64_t{0}));
   EXPECT_EQ(answer.columns[0].name, "a_long_name");
@@ -107,7 +107,7 @@ TEST(ClientEncoder, SettingsAreReadWrittenAndReadBack) {
   EXPECT_THAT(thrown_by<UsageError>(misspelt), HasSubstr("overheat-threshold"));
 }
 
-// After a change of the rate the encoder is reached at the new rate.
+// After a change of its rate the encoder is reached at the new rate.
 TEST(ClientEncoder, GoesOnWithTheAddressThatItWasSetTo) {
   Encoder encoder = open("sim:raa38-modbus");
   const std::int64_t address[] = {7};
@@ -115,7 +115,7 @@ TEST(ClientEncoder, GoesOnWithTheAddressThatItWasSetTo) {
   EXPECT_TRUE(encoder.read().singleturn_valid());
 }
 
-// The new rate also applies when the port was lost and is opened again.
+// The new rate must also be used when the port was lost and is opened again.
 TEST(ClientEncoder, GoesOnAtTheRateThatItWasSetTo) {
   for (const bool by_name : {true, false}) {
     Encoder encoder = open("sim:raa38-modbus");
@@ -130,8 +130,8 @@ TEST(ClientEncoder, GoesOnAtTheRateThatItWasSetTo) {
   }
 }
 
-// If a change of the rate is aborted at any point, the port has a known rate: an encoder at the old rate is read, one
-// at the new rate is not.
+// If a change of the rate is aborted at any point, the port must have a known rate: an encoder at the old rate is read,
+// one at the new rate is not.
 TEST(ClientEncoder, IsReadAtItsRateWhenAChangeOfItsRateWasBrokenOff) {
   unsigned whole = 0;
   unsigned there = 0;
@@ -160,7 +160,7 @@ TEST(ClientEncoder, IsReadAtItsRateWhenAChangeOfItsRateWasBrokenOff) {
   EXPECT_GT(elsewhere, 1u);
 }
 
-// Catches std::exception, as main of the examples does.
+// Catches std::exception, as `main` of the examples does.
 TEST(ClientEncoder, CancelIsAStandardExceptionAndTheEncoderCanBeUsedAgain) {
   Encoder encoder = open("sim:tformat?singleturn=7");
   encoder.cancel();
@@ -184,7 +184,7 @@ TEST(ClientEncoder, DisconnectedEncoderOpensItsPortForTheNextReading) {
   encoder.disconnect();
   const Sample sample = encoder.next();
   EXPECT_EQ(sample.kind, Sample::Kind::back);
-  EXPECT_EQ(sample.message, "the port is open");  // the port was not lost
+  EXPECT_EQ(sample.message, "the port is open");  // the port was not lost in between
   EXPECT_EQ(encoder.losses(), 0u);
 }
 
@@ -195,7 +195,7 @@ TEST(ClientEncoder, EndsAtItsDeadline) {
   encoder = open("sim:tformat?singleturn=7");
   EXPECT_EQ(encoder.read(os::now() + std::chrono::minutes(10)).singleturn, 7u);
   EXPECT_EQ(encoder.read().singleturn, 7u);
-  unsigned samples = 0;  // the next sample would be after 1000 s
+  unsigned samples = 0;  // number of samples; the second one would be due after 1000 s
   const Time end = os::now() + std::chrono::milliseconds(50);
   for (const Sample& sample : encoder.samples({.rate_hz = 1e-3, .deadline = end})) {
     EXPECT_EQ(sample.position_state(), PositionState::good);
@@ -253,7 +253,7 @@ TEST(ClientSamples, AreRowsOfNamedValues) {
   EXPECT_EQ(rows.of_gap(Time{}, 12).get<std::uint64_t>("missed"), 12u);
 }
 
-// The checksum of T-format is an XOR: two flipped bits of the same weight pass it.
+// Two flipped bits of the same weight pass the checksum of T-format, which is an XOR.
 TEST(ClientEncoder, APositionThatNoShaftReachesIsReadAgain) {
   Encoder encoder = open("sim:tformat?singleturn=1000&fault=corrupt=0.6");
   const std::uint64_t& refused = encoder.counters().errors[static_cast<std::size_t>(Error::cross_check_failed)];
@@ -272,7 +272,7 @@ TEST(ClientEncoder, APositionThatNoShaftReachesIsReadAgain) {
 }
 
 TEST(ClientEncoder, AZeroThatWasMovedIsAJump) {
-  // Nine turns take minutes of simulated time, however slow the computer is.
+  // Nine turns take minutes of simulated time, whatever the speed of this computer.
   Encoder encoder = open("sim:tformat?multiturn=9&max_rpm=6");
   EXPECT_EQ(encoder.next().position, 9 << 17);
   static_cast<void>(encoder.run("reset-multiturn"));
@@ -311,7 +311,7 @@ TEST(ClientEncoder, SamplesEndWithTheirCountOrByCancel) {
   EXPECT_EQ(count, 20u);
   EXPECT_EQ(encoder.readings(), 20u);
 
-  // With a reading every 10 s, a thread that waits for the second one is woken.
+  // Readings are due every 10 s; a thread that waits for the second one must be woken.
   std::atomic<unsigned> seen = 0;
   std::jthread other([&] {
     seen.wait(0);
@@ -376,7 +376,7 @@ TEST(ClientMemory, WhateverBecomesOfItSaysWhatIsWritten) {
                EncoderFailure);
   change.settle();
   EXPECT_EQ(change.written(), some_bytes(3));
-  EXPECT_EQ(change.unknown(), MemoryImage{});  // the request that writes the fourth byte did not go out
+  EXPECT_EQ(change.unknown(), MemoryImage{});  // the request that would write the fourth byte was not sent
   EXPECT_EQ(change.state(), ChangeState::not_sent);
   EXPECT_EQ(change.not_written().size(), 3u);
   emulation.power_on();

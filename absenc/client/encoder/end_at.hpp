@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Ends the waiting for an encoder at a deadline.
+// Ends waits for an encoder at a deadline.
 #pragma once
 
 #include <functional>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Computes when readings were latched from the times of their exchanges, as bounds, not as estimates.
+// Computes lower and upper bounds of the times at which readings were latched, from the times of their exchanges.
 #pragma once
 
 #include <algorithm>
@@ -12,24 +12,26 @@
 namespace absenc::client {
 
 /// Returns the bounds for a requested reading: the encoder latches between the end of the request and the beginning of
-/// its reply. `character` is the duration of a character on the line; 0 if unknown, or if bytes take no time. A
-/// constant delay between request and latching, as in the document, is ignored.
+/// its reply. `character` is the duration of a character on the line; 0 if it is unknown, or if bytes take no time. A
+/// constant delay between request and latching that the document states is ignored.
 template <class Item>
 [[nodiscard]] host::LatchTime asked_latch_time(const LineExchange<Item>& exchange, Time latched, Time character) {
-  // The encoder latches before the end of the request if the host clocks it, or if an earlier request triggered it.
+  // If the host clocks the encoder, or an earlier request triggered it, the encoder latches before the end of the
+  // request.
   const Time earliest = std::min(exchange.sent_at, latched) - exchange.sent_late;
-  // The last character may be reported before its stop bit ends, and the encoder's clock may be slightly fast.
+  // The reply may have begun later than computed: the last character may be reported before its stop bit ends, and the
+  // encoder's clock may be slightly fast.
   const auto characters = static_cast<std::int64_t>(std::max<std::size_t>(exchange.reply().size(), 1)) - 1;
   const Time reply = characters * character * 15 / 16;
   return {earliest, std::max(earliest, exchange.received_at - reply)};
 }
 
-/// Bounds for readings that an encoder sends by itself, from the spread of their arrivals. A reading was not latched
-/// before the one before arrived, if that arrived in time. Its delay is at most the sum of the excess of all longer
-/// pauses in the last seconds.
+/// Bounds for readings that an encoder sends unsolicited, from the spread of their arrivals. A reading was not latched
+/// before the previous reading arrived, if that arrived in time. The delay of a reading is at most the sum by which
+/// pauses of the last seconds exceeded the usual pause.
 class ArrivalSpread {
  public:
-  /// Adds the arrival of a reading, in order; no byte had arrived until `nothing_until`.
+  /// Adds the arrival of the next reading. No byte had arrived until `nothing_until`.
   void add(Time arrived, Time nothing_until) {
     const Time pause = arrived - std::max(arrived_, nothing_until);
     if (arrived_ == Time{}) usual_ = pause;
@@ -44,17 +46,17 @@ class ArrivalSpread {
   }
   void restart() { *this = {}; }
 
-  /// Returns the bounds of the last reading.
+  /// Returns the bounds of the time at which the last reading was latched.
   [[nodiscard]] host::LatchTime latch_time() const { return {arrived_ - usual_ - before_ - now_, arrived_}; }
 
  private:
   static constexpr Time one_second = std::chrono::seconds(1);
-  static constexpr int average = 16;  // number of readings in the average pause
+  static constexpr int average = 16;  // number of readings over which the usual pause is averaged
 
   Time arrived_{};
-  Time usual_{};  // usual pause between two readings
+  Time usual_{};  // average pause between two readings
   Time second_ends_{};
-  Time now_{};  // sum of the excess of longer pauses in this second
+  Time now_{};  // sum by which pauses exceeded the usual pause in the present second
   Time before_{};
 };
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Checks latch times for every unit in virtual time: the true instant is within the measured bounds, however late a
-// request leaves, an encoder replies or the host runs; and no speed is farther off than its uncertainty.
+// Checks latch times for every unit in virtual time. The true instant must be within the measured bounds, however late
+// a request leaves, an encoder replies or the host runs; and no speed may differ from the true one by more than its
+// uncertainty.
 #include "absenc/client/encoder/latch_times.hpp"
 
 #include <gtest/gtest.h>
@@ -30,7 +31,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-/// A motion in revolutions over seconds, which records when the encoder sampled it.
+/// A shaft that moves by a function from seconds to revolutions, and stores when the encoder sampled its position.
 struct WatchedShaft final : Shaft {
   explicit WatchedShaft(std::function<double(double)> motion) : turns(std::move(motion)) {}
   [[nodiscard]] double place(Time at) const { return turns(std::chrono::duration<double>(at).count()); }
@@ -42,7 +43,7 @@ struct WatchedShaft final : Shaft {
   mutable std::vector<Time> looked_at;
 };
 
-/// A busy computer: requests leave late, their end is noticed late, and received bytes are read late.
+/// A port on a busy computer: requests leave late, their end is noticed late, and received bytes are read late.
 template <class Item>
 class BusyPort final : public Port<Item> {
  public:
@@ -69,7 +70,7 @@ class BusyPort final : public Port<Item> {
   }
 
  private:
-  // Most delays are short.
+  // Most delays are short: seven of eight are at most 1/50 of the longest.
   Time lateness() {
     const Time most = random_() % 8 == 0 ? most_ : most_ / 50;
     return Time(std::uniform_int_distribution<Time::rep>(0, most.count())(random_));
@@ -107,13 +108,13 @@ std::vector<Case> cases() {
   return all;
 }
 
-// One revolution of a linear encoder is its whole range, several metres.
+// Returns a speed in revolutions per second. One revolution of a linear encoder is its whole range, several metres.
 double revolutions_a_second(const Case& one) {
   const EncoderAddress address = parse_address(one.address);
   return address.unit->resolution(address.options).unit_um > 0 ? 0.05 : 0.5;
 }
 
-/// An encoder on a line of a busy computer.
+/// An encoder that is read over the port of a busy computer.
 class Busy {
  public:
   Busy(const Case& one, std::function<double(double)> motion, Time most, std::uint64_t seed)
@@ -131,7 +132,8 @@ class Busy {
 
   [[nodiscard]] bool is_unsolicited() const { return host::sends_unsolicited(*address_.unit, address_.options); }
 
-  /// Reads `count` times, calls `use(reading, bounds)` for each good reading, and returns their number.
+  /// Reads `count` times with a pause before each reading, calls `use(reading, bounds)` for each good reading, and
+  /// returns the number of good readings.
   template <class Use>
   std::size_t read(std::size_t count, Time pause, const Use& use) {
     std::size_t good = 0;
@@ -147,7 +149,7 @@ class Busy {
     return good;
   }
 
-  /// Returns the speed after each reading, in counts per second; nothing if there is none.
+  /// Adds the reading and returns the speed after it, in counts per second; the speed may be invalid.
   [[nodiscard]] const host::Velocity& measured(const Reading& reading, const host::LatchTime& at) {
     if (unwrapper_.add(reading, at) != host::Unwrapper::Joined::continued) velocity_.restart();
     velocity_.add(unwrapper_.position(), at);
@@ -190,7 +192,8 @@ constexpr std::array most_late{0us, 400us, 8'000us};
 
 class LatchTimes : public ::testing::TestWithParam<Case> {};
 
-// Returns the last instant within the bounds at which the encoder sampled this position.
+// Returns the last instant within the bounds at which the encoder sampled the position of the reading; nothing if there
+// is none.
 std::optional<Time> true_instant(const WatchedShaft& shaft, const Reading& reading, const host::LatchTime& at) {
   const std::vector<Time> all = shaft.looked_at;
   const auto shows = [&](Time time) {
@@ -241,14 +244,14 @@ TEST_P(LatchTimes, MakeNoSpeedThatIsFartherOffThanItSays) {
   }
 }
 
-// The speed is the mean between the two instants, also if the shaft accelerates.
+// The measured speed must be the mean between the two instants, even if the shaft accelerates.
 TEST_P(LatchTimes, MakeTheMeanSpeedOfAShaftThatSwings) {
   const double swing = revolutions_a_second(GetParam()) / 5;
   for (const Time most : most_late) {
     Busy busy(
         GetParam(), [=](double seconds) { return swing * std::sin(2 * M_PI * seconds); }, most, 1);
     if (busy.is_unsolicited()) GTEST_SKIP() << "it sends by itself: only its arrival is known";
-    std::map<Time, Time> truths;  // true instants by the earliest time of their reading
+    std::map<Time, Time> truths;  // true instant of each reading, by the earliest time of its bounds
     std::size_t compared = 0;
     busy.read(600, 3ms, [&](const Reading& reading, const host::LatchTime& at) {
       const std::optional<Time> instant = true_instant(busy.shaft(), reading, at);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Equally spaced times that do not drift; missed times are skipped.
+// Equally spaced times that do not drift; times that have passed are skipped.
 #pragma once
 
 #include <algorithm>
@@ -13,11 +13,11 @@ namespace absenc::client {
 
 class Pace {
  public:
-  /// `rate` is the number of times per second; 0 means as fast as possible. The first time is `offset` from now.
+  /// Takes the number of times per second (0: as fast as possible) and the distance of the first time from now.
   explicit Pace(double rate, Time offset = {})
       : period_(rate > 0 ? static_cast<std::int64_t>(1e9 / rate) : 0), next_(os::now() + offset) {}
 
-  /// Returns the next time; with rate 0 a time in the past.
+  /// Returns the next time that is due; with rate 0 a time in the past.
   Time next() {
     if (period_ == Time{}) return {};
     next_ += period_;
@@ -26,7 +26,7 @@ class Pace {
     return next_;
   }
 
-  /// Sleeps until the next time or `end`. Throws as `sleep_until`.
+  /// Sleeps until the next time, or until `end` if that is earlier. Throws the exceptions of `sleep_until`.
   template <class SleepUntil>
   void wait(Time end, SleepUntil sleep_until) {
     if (period_ == Time{}) return;
@@ -43,8 +43,8 @@ class Pace {
 
   void wait() { wait(never, os::sleep_until); }
 
-  /// Skips missed times while the next time is not used yet. A time that passed less than a period ago is late, and
-  /// counts as missed only at the end.
+  /// Skips times that have passed before the next time is used. A time that passed less than a period ago is only late;
+  /// it is skipped only if `end` is reached.
   void leave_out(Time end) {
     const Time now = os::now();
     if (period_ == Time{} || now < next_) return;
@@ -59,11 +59,11 @@ class Pace {
     if (first < end) missed_ += static_cast<std::uint64_t>((end - first - Time{1}) / period_ + 1);
   }
 
-  /// Returns the number of times before the end that were skipped since the last call. Times are skipped if the caller
-  /// took longer than a period, or was stopped.
+  /// Returns the number of times before the end that were skipped since the last call, because the caller took longer
+  /// than a period or was stopped.
   [[nodiscard]] std::uint64_t take_missed() { return std::exchange(missed_, 0); }
 
-  /// Starts again from the first time.
+  /// Begins a new series of times, the first of which is `start`.
   void start_at(Time start) { next_ = start; }
 
   [[nodiscard]] Time period() const { return period_; }

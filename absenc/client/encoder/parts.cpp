@@ -21,7 +21,7 @@ namespace {
 using namespace std::chrono_literals;
 
 constexpr Time time_between_tries = 250ms;
-constexpr Time between_looks = 20ms;  // period of checks whether the wait was cancelled
+constexpr Time between_looks = 20ms;  // period of the checks whether a wait was cancelled
 
 host::Unwrapper make_unwrapper(const EncoderAddress& uri) {
   const bool unsolicited = host::sends_unsolicited(*uri.unit, uri.options);
@@ -39,8 +39,8 @@ double speed_of(const Reading& reading, double counts_per_second) {
   return std::ldexp(60 * counts_per_second, -static_cast<int>(reading.singleturn_bits));
 }
 
-// Returns the offset from the port's clock, which may be simulated, to ours. The thread may be interrupted between
-// reading both clocks, so the quickest of several attempts is used.
+// Returns the offset from the port's clock, which may be simulated, to os::now. The thread may be interrupted between
+// the readings of both clocks, so the quickest of five attempts is used.
 Time ahead_of(Connection& connection) {
   Time quickest = never;
   Time ahead{};
@@ -164,7 +164,7 @@ Sample Encoder::Parts::sample_of(Reading reading) {
   return sample;
 }
 
-// Only called for a sample with a valid position.
+// Called only for a sample with a valid position.
 JointAngles Encoder::Parts::angles_of(const Sample& sample) const {
   const Joint& one = connection->uri().joint;
   const Reading& reading = sample.reading;

@@ -29,12 +29,12 @@ struct Encoder::Parts {
 
   void connect();
   void disconnect();
-  /// Takes one sample; searches for the port while it is away.
+  /// Takes one sample; while the port is lost, tries to open it again.
   Sample next();
-  /// Throws Cancelled, os::Interrupted.
+  /// Waits until `time`. Throws Cancelled, os::Interrupted.
   void wait_until(Time time) const;
   void forget_position();
-  /// Returns whether `Encoder::cancel` was called, or `over` is true.
+  /// Returns whether `Encoder::cancel` was called, or the function `over` returns true.
   [[nodiscard]] bool must_end() const;
 
   std::atomic<bool> cancelled = false;
@@ -42,7 +42,7 @@ struct Encoder::Parts {
   std::unique_ptr<Connection> connection;
   Time period;  // intended time between readings; 0: as short as the line allows
   host::Rate rate;
-  Time offset{};  // from the clock of the port to os::now
+  Time offset{};  // offset from the clock of the port to os::now
   std::uint64_t readings = 0;
   std::uint64_t losses = 0;
   std::uint64_t restarts = 0;
@@ -55,16 +55,16 @@ struct Encoder::Parts {
 
   host::Unwrapper unwrapper_;
   host::Velocity velocity_;
-  std::optional<Time> lost_at_{};  // unless it is connected, or was disconnected on purpose
+  std::optional<Time> lost_at_{};  // time at which the port was lost; nothing while it is open, or after `disconnect`
   Time next_try_{};
-  Time unwrapped_at_{};  // the earliest time at which the last valid position was latched
+  Time unwrapped_at_{};  // lower bound of the time at which the last valid position was latched
 };
 
-/// Returns an encoder that is not connected yet. `period` is the intended time between readings; 0: as short as the
-/// line allows. Without `open` the connection opens the port of the address.
+/// Makes an encoder that is not connected yet. `period` is the intended time between readings; 0: as short as the line
+/// allows. Without `open` the connection opens the port of the address.
 [[nodiscard]] Encoder make_encoder(const EncoderAddress& address, Time period, OpenLink open = {});
 
-/// Returns the connection of an encoder. It lives as long as the encoder, also when that is moved.
+/// Returns the connection of the encoder. The connection lives as long as the encoder, even if the encoder is moved.
 [[nodiscard]] inline Connection& connection_of(Encoder& encoder) { return *Encoder::Parts::of(encoder).connection; }
 [[nodiscard]] inline const Connection& connection_of(const Encoder& encoder) {
   return *Encoder::Parts::of(encoder).connection;

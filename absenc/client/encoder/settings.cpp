@@ -39,7 +39,7 @@ std::size_t place_of(const Answer& answer, std::string_view name) {
                                   answer.columns.begin());
 }
 
-// Reports the state of the encoder if the port is lost during the command.
+// Runs a command that writes a setting. If the port is lost during the command, reports the state of the encoder.
 void write(Connection& encoder, const Command& setter, Arguments arguments, SettingSink& told) {
   try {
     run_into(encoder, setter, arguments, told);
@@ -59,7 +59,7 @@ void write(Connection& encoder, const Command& setter, Arguments arguments, Sett
   }
 }
 
-// The setter has verified its write; this reads the setting again with its own command.
+// Compares the setting, read again by its own command, with the value that the setter has verified.
 void require_same(const Answer& now, const Answer& written, std::string_view name) {
   for (std::size_t i = 0; i < written.columns.size(); ++i) {
     const std::size_t place = place_of(now, written.columns[i].name);
@@ -71,7 +71,7 @@ void require_same(const Answer& now, const Answer& written, std::string_view nam
   }
 }
 
-// The new setting may be part of the address, such as a rate.
+// Returns a sentence about the encoder's address if the new setting, such as a rate, is part of it.
 std::string note_of(const Unit& unit, const Options& before, const Command& setter, std::int64_t value) {
   if (options_behind(unit, before, setter, value).values == before.values) return {};
   return fmt::format("from now on it is reached with {}={}", setter.changes_option, value);

@@ -25,16 +25,16 @@ using namespace std::chrono_literals;
 using capture::Hypothesis;
 using capture::ObservedExchange;
 
-inline constexpr unsigned reads = 6;              // number of readings of each encoder that replies
-inline constexpr Time listening = 100ms;          // time of listening before the first request
-inline constexpr std::size_t stream_size = 2048;  // bytes of an unsolicited stream that are judged
-inline constexpr unsigned most_unanswered = 3;    // readings without a reply, until the attempt ends
+inline constexpr unsigned reads = 6;              // number of readings that are taken of each encoder that replies
+inline constexpr Time listening = 100ms;          // time for which the line is listened to before the first request
+inline constexpr std::size_t stream_size = 2048;  // number of bytes of an unsolicited stream that are judged
+inline constexpr unsigned most_unanswered = 3;    // number of readings without a reply after which the attempt ends
 inline constexpr Time settled = 5ms;              // silence after which no earlier reply is expected
-inline constexpr Time longest_settling = 200ms;   // limit of waiting for silence on a line that is never silent
+inline constexpr Time longest_settling = 200ms;   // limit of the wait for silence, on a line that is never silent
 inline constexpr Time late_window = 100ms;        // time after an unanswered request in which its reply may arrive late
 inline constexpr Time most_allowance = 400ms;     // greatest extension of the timeout if replies are late
 
-/// The encoders found by a scan.
+/// Collects the addresses of encoders that a scan finds, without those that two encoders share.
 struct ScannedAddresses final : FieldSink {
   void put(const FieldValue& value) override {
     if (value.info->role == Role::encoder) all.push_back(value.number);
@@ -43,17 +43,17 @@ struct ScannedAddresses final : FieldSink {
   std::vector<std::int64_t> all;
 };
 
-/// Why a conversation was aborted.
+/// Reason why a conversation was aborted.
 enum class TryEnd : std::uint8_t {
-  silent,   // no reply, or no valid one
-  harmful,  // its next request would be a changing command for another encoder
+  silent,   // no reply came, or no valid one
+  harmful,  // the next request would be a changing command for an encoder of another protocol
 };
 
-/// The identity that an encoder reports, and whether it agrees with the options of the request.
+/// Result of asking an encoder for its identity, and whether it agrees with the assumed options.
 struct Introduction {
   Answer identity{};
-  bool agrees = false;          // the encoder reported an identity that does not contradict the options
-  std::string contradiction{};  // the unit's explanation of the contradiction
+  bool agrees = false;          // whether the encoder reported an identity that does not contradict the options
+  std::string contradiction{};  // the unit's explanation of the contradiction between identity and options; "": none
 };
 
 /// Collects the identity fields of a reply.
@@ -64,7 +64,7 @@ struct IdentitySink final : FieldSink {
   AnswerSink all;
 };
 
-/// One attempt to find encoders of one unit at given port settings.
+/// One attempt to find encoders of one unit on the line at given port settings. Adds what it finds to `LineFindings`.
 template <class Item>
 class Attempt {
  public:
@@ -105,7 +105,7 @@ class Attempt {
     }
   }
 
-  /// Collects unsolicited bytes or frames.
+  /// Listens before the first request and returns the unsolicited bytes or frames.
   std::vector<Item> listen() {
     std::vector<Item> items;
     runner_.listen(listening, [&items](std::span<const Item> more) {
@@ -115,7 +115,7 @@ class Attempt {
     return items;
   }
 
-  /// Tries each set of options that changes the request, until an encoder replies.
+  /// Polls with each set of options that changes the request, until an encoder replies, and stores the candidates.
   void ask() {
     const Command* read = find_command(unit_, Verb::read);
     if (read == nullptr || read->changes_encoder) return;
@@ -134,7 +134,8 @@ class Attempt {
     }
   }
 
-  /// Reads the identity of a found encoder with these options. More requests are allowed than during the search.
+  /// Reads the identity of a found encoder with these options and returns it. More requests are allowed than during the
+  /// search.
   Introduction introduce(const Options& options) {
     Introduction all;
     IdentitySink identity;
@@ -156,15 +157,15 @@ class Attempt {
  private:
   static constexpr bool is_can = std::is_same_v<Item, CanFrame>;
 
-  /// The running conversation.
+  /// State of the running conversation.
   struct Talk {
     const Options& options;
     std::vector<ObservedExchange> exchanges{};
     Patience<Item> patience;
-    bool understood = false;  // a good reply has arrived
+    bool understood = false;  // whether a good reply has arrived in this conversation
   };
 
-  // Checks each step and event; throws Stop to abort the conversation.
+  // Checks each step of the conversation; throws TryEnd to abort it.
   void look_at(Step<Item>& step, Time now, Talk& talk) {
     using Kind = typename Step<Item>::Kind;
     if (step.kind == Kind::pulse && step.wire == ExtraWire::clear) throw TryEnd::harmful;
@@ -174,7 +175,7 @@ class Attempt {
     }
     if (step.answer != Time{}) step.answer += allowance_;
     talk.patience.see(step, now);
-    if constexpr (!is_can) {  // not on CAN, where identifiers distinguish nodes
+    if constexpr (!is_can) {  // skipped on CAN, where identifiers distinguish nodes
       if (step.kind == Kind::transfer && begins_harmful(step.out)) throw TryEnd::harmful;
     }
   }
@@ -192,9 +193,9 @@ class Attempt {
   }
 
   struct Conversed {
-    std::size_t heard = 0;  // number of received items that an encoder sent
+    std::size_t heard = 0;  // number of items that an encoder sent in this conversation
     Error error = Error::timeout;
-    std::string detail{};  // the unit's explanation of the error
+    std::string detail{};  // the unit's explanation of `error`
   };
 
   // Runs one conversation and stores its exchanges in `exchanges`. If a reply was late, repeats the conversation with a
@@ -261,7 +262,7 @@ class Attempt {
     exchanges.insert(exchanges.end(), talk.exchanges.begin(), talk.exchanges.end());
   }
 
-  // Returns whether an encoder sent the item: a clocked host also receives bits from an undriven line.
+  // Returns whether an encoder sent the reply: a clocked host also receives bits, all equal, from an undriven line.
   [[nodiscard]] bool is_alive(const ObservedExchange& exchange) const {
     if (unit_.link != LinkKind::clocked && unit_.link != LinkKind::spi) return true;
     const auto& bytes = exchange.reply.bytes;
@@ -271,7 +272,8 @@ class Attempt {
     return !same_as(0x00) && !same_as(0xFF);
   }
 
-  // Returns the settings of each encoder that replies to a scan.
+  // Scans the line; returns, for each encoder that replies, `settings` with its address. Empty if the unit has no scan
+  // or no encoder replies.
   std::vector<SettingTexts> scanned(const SettingTexts& settings, const Options& options) {
     std::vector<SettingTexts> targets;
     const Command* command = find_command(unit_, Verb::scan);
@@ -291,20 +293,22 @@ class Attempt {
     return targets;
   }
 
-  // Returns whether anything was received. `encoder` is the address setting of the polled encoder.
+  // Polls one encoder and stores the candidates; returns whether the encoder sent anything. `encoder` is the address
+  // setting of the polled encoder, "": none.
   bool ask_one(const Command& read, const SettingTexts& settings, const std::string& encoder) {
     const std::vector<OptionText> known = option_settings(unit_, settings, false);
     const Options options = require_options(unit_, {}, option_settings(unit_, settings, true));
     std::vector<ObservedExchange> exchanges;
     if (converse(read, options, exchanges).heard == 0) {
-      exchanges.clear();  // the reply may have been late, or the encoder missed the first request
+      // tries once more: the reply may have been late, or the encoder may have missed the first request
+      exchanges.clear();
       if (converse(read, options, exchanges).heard == 0) return false;
     }
     read_all(read, options, exchanges);
     if (exchanges.empty()) return false;
     ++findings_.searches;
     std::vector<Hypothesis> found = capture::find_hypotheses(unit_, known, exchanges);
-    // Options that explain more replies than those of the request may also make better requests.
+    // Polls again if other options explain more replies than those of the request: their requests may be better, too.
     if (!found.empty() && !found.front().evidence.explains_all() &&
         request_of(unit_, found.front().options, read) != request_of(unit_, options, read)) {
       std::vector<ObservedExchange> again;
@@ -323,7 +327,7 @@ class Attempt {
       if (os::interrupted()) throw os::Interrupted{};
       if (converse(read, options, exchanges).heard == 0 && ++unanswered == most_unanswered) break;
     }
-    // On a busy computer one reply may arrive too late.
+    // Removes readings without a reply, which may have come too late on a busy computer, and replies of other encoders.
     std::erase_if(exchanges, [&](const ObservedExchange& one) {
       return one.reply.frame().empty() || is_of_another(one, options);
     });
@@ -354,14 +358,14 @@ class Attempt {
   Time patience_;
   LineFindings& findings_;
   EncoderAddress address_;
-  Link link_;  // must outlive the runner
+  Link link_;  // the open port; must outlive the runner
   Runner<Item> runner_;
-  std::vector<std::vector<std::uint8_t>> harmful_;  // requests that must not be sent; empty on CAN
+  std::vector<std::vector<std::uint8_t>> harmful_;  // beginnings of requests that must not be sent; empty on CAN
   Talk* talk_ = nullptr;
   bool cut_ = false;
-  bool asked_ = false;          // a request was sent
-  bool is_unanswered_ = false;  // the last request has no reply yet
-  Time allowance_{};            // extension of each timeout if replies are late
+  bool asked_ = false;          // whether a request was sent
+  bool is_unanswered_ = false;  // whether the last request has no reply yet
+  Time allowance_{};            // time by which each timeout is extended, because replies were late
 };
 
 }  // namespace absenc::client

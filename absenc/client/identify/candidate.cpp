@@ -22,7 +22,7 @@ bool resolves_to(const Unit& unit, std::string_view model, const std::vector<std
   return error.kind == OptionError::Kind::none && options.values == wanted.values;
 }
 
-// Returns the options that must be given in addition to `model`; model "" is the default model.
+// Returns the settings that change the options of `model` into `options`; model "" is the default model.
 std::vector<std::string> differences(const Unit& unit, std::string_view model, const Options& options) {
   Options usual;
   static_cast<void>(resolve_options(unit, model, {}, usual));
@@ -39,7 +39,8 @@ std::vector<std::string> differences(const Unit& unit, std::string_view model, c
 bool is_found(const Candidate& candidate) { return candidate.hypothesis.chance() <= capture::is_found; }
 
 bool is_as_likely(const Candidate& one, const Candidate& best) {
-  constexpr double same_likelihood = 0.5;  // log10 of a factor of three
+  // log10 of the factor, three, by which the chances of two equally likely candidates may differ
+  constexpr double same_likelihood = 0.5;
   return one.hypothesis.is_proven() == best.hypothesis.is_proven() &&
          one.hypothesis.chance() <= best.hypothesis.chance() + same_likelihood;
 }
@@ -59,7 +60,7 @@ std::vector<std::string> settings_for(const Unit& unit, const Options& options) 
     if (by_model.size() <= settings.size()) return by_model;
   }
   if (resolves_to(unit, {}, settings, options)) return settings;
-  // A model that agrees with these options is more specific.
+  // Otherwise names all options: the shorter settings yield a more specific model that also has these options.
   return option_texts(unit, options);
 }
 

@@ -19,10 +19,10 @@ namespace {
 using capture::Hypothesis;
 using capture::ObservedExchange;
 
-constexpr std::size_t enough = 300;         // replies, good or bad, that suffice
-constexpr std::size_t enough_noise = 3000;  // bytes outside of frames that suffice
+constexpr std::size_t enough = 300;         // number of replies, good or bad, that suffice
+constexpr std::size_t enough_noise = 3000;  // number of bytes outside of frames that suffice
 
-/// Thrown when enough of the capture was read.
+/// Thrown to stop decoding when enough of the capture was read.
 struct Enough {};
 
 capture::ObservedFrame owned(const Frame& frame) {
@@ -31,12 +31,13 @@ capture::ObservedFrame owned(const Frame& frame) {
   return heard;
 }
 
-/// Collects replies with their requests. Each byte of noise could have begun a frame, so it counts as an exchange.
+/// Collects replies with their requests. A byte of noise is stored as an exchange, too, because each could have begun a
+/// frame.
 struct Collector final : capture::AnnotationSink {
   void put(const capture::Annotation& annotation) override {
     using Kind = capture::Annotation::Kind;
     if (os::interrupted()) throw os::Interrupted{};
-    // Skips composed frames: the exchanges with their parts are already counted.
+    // Skips frames that are composed of several exchanges, which are already counted.
     if (annotation.remark == capture::Remark::cut || annotation.composed) return;
     if (annotation.kind == Kind::noise) {
       for (const std::uint8_t byte : annotation.reply.bytes) exchanges.push_back({.reply = {.bytes = {byte}}});
@@ -65,11 +66,12 @@ std::vector<ObservedExchange> heard_as(const Unit& unit, const Options& options,
     }
   } catch (const Enough&) {
   }
-  if (collector.replies == 0) return {};  // only single bytes, which are a frame with no options
+  if (collector.replies == 0) return {};  // the capture has only single bytes, which would be frames with some options
   return std::move(collector.exchanges);
 }
 
-// Tries the models and the options that the document leaves open: with wrong options a frame may not be recognised.
+// Returns the sets of options with which the capture is decoded: each model, and each choice that the document leaves
+// open. With wrong options a frame may not be recognised.
 std::vector<Options> bases(const Unit& unit) {
   std::vector<Options> all = capture::likely_options(unit, {});
   if (all.empty()) return all;
@@ -86,8 +88,8 @@ std::vector<Options> bases(const Unit& unit) {
   return all;
 }
 
-// The division into frames depends on the options, and the options on the frames: searches again with the options
-// found.
+// Searches again with the options that were found: the division into frames depends on the options, and the options
+// depend on the frames.
 std::vector<Hypothesis> search_unit(const Unit& unit, const CaptureChoices& choices, std::size_t& searches,
                                     Sentences& damages) {
   std::vector<Hypothesis> best;
@@ -120,7 +122,7 @@ CaptureFindings search_capture(const CaptureChoices& choices, const std::functio
       for (Hypothesis& one : search_unit(*unit, choices, searches, findings.damages)) {
         findings.candidates.push_back({unit, std::move(one), {}, false, line_of(*unit)});
       }
-    } catch (const UsageError& error) {  // the protocol is of another kind of line
+    } catch (const UsageError& error) {  // the protocol needs another kind of capture
       findings.refusals.emplace_back(error.what());
     } catch (const Failure& failure) {
       findings.refusals.emplace_back(failure.what());

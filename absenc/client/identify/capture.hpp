@@ -13,11 +13,12 @@ namespace absenc::client {
 
 struct CaptureFindings {
   std::vector<Candidate> candidates{};
-  std::vector<std::string> damages{};   // damage in the part of the capture that was read, each once
-  std::vector<std::string> refusals{};  // why a protocol could not be tried, each reason once
+  std::vector<std::string> damages{};   // damage in the part of the capture that was read, each kind once
+  std::vector<std::string> refusals{};  // reasons why protocols could not be tried, each once
 };
 
-/// Reads the capture until the evidence suffices. Throws UsageError, Failure, os::Interrupted.
+/// Decodes the capture with each protocol until the evidence suffices, and returns the candidates. Throws UsageError,
+/// Failure, os::Interrupted.
 [[nodiscard]] CaptureFindings search_capture(const CaptureChoices& choices,
                                              const std::function<void(const std::string&)>& progress);
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Identifies encoders on lines in virtual time, with damage, echo and late replies.
+// Identifies virtual encoders on lines in virtual time, with damage, echo and late replies.
 #include <gtest/gtest.h>
 
 #include "absenc/client/identify/attempt.hpp"
@@ -10,7 +10,7 @@
 namespace absenc::client {
 namespace {
 
-/// A line with one encoder, which is powered on each time the line is opened.
+/// A line with one encoder, which is powered on again each time the port is opened.
 struct Place {
   explicit Place(const std::string& text, std::vector<std::string> faults = {}, VirtualPort between = {})
       : encoder(parse_address(text)), way(between) {
@@ -30,7 +30,8 @@ struct Place {
   VirtualClock clock;
 };
 
-/// Returns the evidence for the unit if only its requests are sent, and the number of requests.
+/// Identifies the encoder while only requests of its unit are sent; returns the evidence for the unit, and the number
+/// of requests.
 std::pair<capture::Evidence, std::size_t> asked(const std::string& text, const std::vector<std::string>& faults,
                                                 const VirtualPort& way = {}) {
   Place place(text, faults, way);
@@ -43,7 +44,8 @@ std::pair<capture::Evidence, std::size_t> asked(const std::string& text, const s
           findings.requests};
 }
 
-/// Returns how many of `readings` the runner takes for damaged, and the number of requests it sends.
+/// Takes `readings` readings and returns how many of them the runner judges damaged, and the number of requests it
+/// sends.
 struct Counted {
   std::size_t damaged = 0;
   std::size_t requests = 0;
@@ -55,7 +57,7 @@ Counted damaged_by_runner(const std::string& text, const std::vector<std::string
   Runner<std::uint8_t> runner(place.encoder);
   runner.attach(*link.bytes, link.latency);
   std::size_t damaged = 0;
-  // A scan also collects replies that arrive later.
+  // Skips units with a scan, which also collects replies that arrive later.
   if (const Command* scan = find_command(*place.encoder.unit, Verb::scan)) static_cast<void>(runner.once(*scan));
   for (std::size_t i = 0; i < count; ++i) {
     runner.start_again();
@@ -87,7 +89,8 @@ TEST_P(Damage, IsWhatTheRunnerSaysWithAndWithoutEcho) {
       SCOPED_TRACE(fmt::format("{}{}", fault, echo ? " with echo" : ""));
       const auto [evidence, requests] = asked(text, {fault}, {.echo = echo});
       const Counted wanted = damaged_by_runner(text, {fault}, evidence.tried, {.echo = echo});
-      // If the scan was repeated or found several encoders, the faults strike other readings.
+      // The faults strike other readings if the scan was repeated or found several encoders, so this is no fair
+      // comparison.
       if (wanted.requests != requests) continue;
       EXPECT_EQ(evidence.tried - evidence.explained, wanted.damaged);
       damaged += wanted.damaged;
@@ -110,9 +113,10 @@ TEST(Identify, GivesLateRepliesMoreTimeAndTakesEachForItsOwnRequest) {
   }
 }
 
-// ---- Which encoder it is
+// ---- Distinction of several encoders
 
-/// Returns the setting of the highest address of a bus; "" without a bus, or if its encoders are not polled.
+/// Returns the setting of the highest address on a bus, "address=31"; "" for a unit without addresses, or whose
+/// encoders are not polled.
 std::string at_last_number(const Unit& unit) {
   const Option* option = find_role(unit.options, Role::encoder);
   const Command* scan = find_command(unit, Verb::scan);
@@ -126,7 +130,8 @@ TEST_P(Found, TheFirstCandidateIsTheEncoderOfEachModelAndNumber) {
   const Unit& unit = *GetParam();
   if (unit.link == LinkKind::clocked || unit.link == LinkKind::spi) GTEST_SKIP() << "an SPI controller is needed";
   std::vector<std::string> settings{""};
-  // An encoder that sends by itself has no address in its frames, and finding it takes seconds.
+  // Tests addresses only of encoders that are polled: unsolicited frames have no address, and finding them takes
+  // seconds.
   if (!host::sends_unsolicited(unit, parse_address(fmt::format("sim:{}", unit.id)).options)) {
     settings.push_back(at_last_number(unit));
     for (const Model& model : unit.models) settings.push_back(fmt::format("model={}", model.name));
@@ -151,7 +156,7 @@ TEST_P(Found, TheFirstCandidateIsTheEncoderOfEachModelAndNumber) {
 
 INSTANTIATE_TEST_SUITE_P(Units, Found, ::testing::ValuesIn(all_units().begin(), all_units().end()), name_of_case);
 
-// ---- What only the encoder can say
+// ---- Identity that the encoder itself reports
 
 TEST(Identify, TheEncoderItselfTellsModelsApartWhoseRepliesAreAlike) {
   for (const Unit* unit : all_units()) {

@@ -21,19 +21,20 @@ namespace absenc::client {
 
 namespace {
 
-constexpr Time short_patience = 700ms;      // for a scan without replies
-constexpr Time brief_patience = 150ms;      // for other units after one has replied beyond doubt
-constexpr Time long_patience = 5s;          // at the end, if nothing was found
-constexpr std::size_t busy_line = 32;       // bytes received while listening, from which on no requests are sent
-constexpr std::size_t most_introduced = 4;  // candidates of one encoder that are asked for their identity
-constexpr double beyond_doubt = -3;         // log10 of chance, below which no further rates are tried
+constexpr Time short_patience = 700ms;  // time without a reply after which a scan ends
+// time without a reply after which a scan ends, once an encoder has replied beyond doubt
+constexpr Time brief_patience = 150ms;
+constexpr Time long_patience = 5s;     // time without a reply for scans at the end, if nothing was found
+constexpr std::size_t busy_line = 32;  // number of bytes received while listening from which on no requests are sent
+constexpr std::size_t most_introduced = 4;  // number of candidates of one encoder that are asked for their identity
+constexpr double beyond_doubt = -3;         // log10 of the chance below which no further rates are tried
 constexpr std::array<std::uint32_t, 10> common_rates{9600,    19'200,  38'400,    57'600,    115'200,
                                                      230'400, 460'800, 1'000'000, 2'500'000, 5'000'000};
 
-/// Unsolicited frames of one encoder.
+/// Unsolicited frames that came from the same encoder.
 struct Sender {
-  const Option* option = nullptr;  // the option with the encoder's address; null: none
-  std::string number{};            // value of that option
+  const Option* option = nullptr;  // the option that holds the encoder's address; null: the frames carry no address
+  std::string number{};            // value of the address option; "": none
   std::vector<ObservedExchange> exchanges{};
 
   [[nodiscard]] std::string name() const {
@@ -41,7 +42,7 @@ struct Sender {
   }
 };
 
-// Groups frames by the address in them, so that frames of two encoders are not mixed.
+// Groups frames by the encoder address in them, so that frames of two encoders are not mixed.
 std::vector<Sender> senders(const Unit& unit, std::span<const CanFrame> frames) {
   const std::vector<Options> likely = capture::likely_options(unit, {});
   std::vector<Sender> all;
@@ -65,7 +66,7 @@ std::vector<Sender> senders(const Unit& unit, std::span<const CanFrame> frames) 
   return all;
 }
 
-/// Makes all attempts, first with the usual settings of every unit.
+/// A search for encoders: makes all attempts, first with the usual settings of every unit.
 class Search {
  public:
   explicit Search(const LineSearch& search) : search_(search), deadline_(search.now() + search.limit) {}
@@ -104,8 +105,8 @@ class Search {
     for (const Unit* unit : std::exchange(cut_, {})) attempt(*unit, search_.settings);
   }
 
-  // Reads the identity for the likeliest candidate of each encoder and for equally likely ones, which the identity may
-  // distinguish.
+  // Reads the identity of each found encoder, with the options of its likeliest candidate and of all equally likely
+  // ones, which the identity may distinguish.
   void ask_who_they_are() {
     std::vector<Candidate>& all = findings_.candidates;
     std::set<std::pair<const Unit*, std::string>> asked;
@@ -122,7 +123,7 @@ class Search {
     std::erase_if(all, [](const Candidate& one) { return one.unit == nullptr; });
   }
 
-  // Returns the candidate and all equally likely ones of the same encoder.
+  // Returns the indexes of the candidate `first` and of all equally likely candidates of the same encoder.
   [[nodiscard]] std::vector<std::size_t> same_as(std::size_t first) const {
     const std::vector<Candidate>& all = findings_.candidates;
     std::vector<std::size_t> alike;
@@ -133,8 +134,8 @@ class Search {
     return alike;
   }
 
-  // Drops candidates that the encoder's identity contradicts if it agrees with another one; otherwise reports the
-  // contradiction.
+  // Drops candidates whose options the reported identity contradicts, if it agrees with those of another candidate;
+  // otherwise adds a note about the contradiction.
   void judge(const std::vector<std::size_t>& alike, const std::vector<Introduction>& said) {
     const bool known = std::any_of(said.begin(), said.end(), [](const Introduction& one) { return one.agrees; });
     for (std::size_t i = 0; i < alike.size(); ++i) {
@@ -153,7 +154,8 @@ class Search {
     if (candidate.unit->link == LinkKind::can) return introduce_on<CanFrame>(candidate);
     return introduce_on<std::uint8_t>(candidate);
   }
-  // The port may be lost meanwhile; the candidates found so far remain.
+  // Opens the port and reads the identity. If the port is lost meanwhile, adds a note; the candidates found so far
+  // remain.
   template <class Item>
   Introduction introduce_on(const Candidate& candidate) {
     try {
@@ -178,7 +180,7 @@ class Search {
       for (const std::uint32_t one : common_rates) rates.push_back(fmt::format("{}", one));
     }
     for (const std::string& value : rates) {
-      // An encoder that replies well at one rate is not searched at others.
+      // Skips other rates once an encoder of this unit replies well at one rate.
       if (is_beyond_doubt() || is_explained(unit)) return;
       SettingTexts settings = search_.settings;
       settings.push_back(fmt::format("{}={}", rate_setting, value));
@@ -192,7 +194,7 @@ class Search {
     attempt_on<std::uint8_t>(unit, settings);
   }
 
-  // Returns whether the unit supports the user's rate.
+  // Returns whether the unit supports the rate that the user set; true if the user set none.
   [[nodiscard]] bool takes_rate(const Unit& unit) const {
     const Option* rate = find_role(unit.options, Role::rate);
     if (rate == nullptr || rate->choices.empty()) return true;
@@ -208,7 +210,8 @@ class Search {
     if (search_.now() >= deadline_) throw OutOfTime{};
     const Time patience = is_beyond_doubt() ? brief_patience : patience_;
     Attempt<Item> one(search_, unit, settings, patience, deadline_, findings_);
-    if (one.line().rate == 0 && medium_of(search_) == Medium::serial) return;  // other rates are tried later
+    // units without a usual rate are tried at other rates later
+    if (one.line().rate == 0 && medium_of(search_) == Medium::serial) return;
     const std::string line = line_of(unit.link, one.line());
     if (search_.progress) {
       search_.progress(fmt::format("{}, {}: {} found so far", unit.id, line, findings_.candidates.size()));
@@ -227,8 +230,8 @@ class Search {
     if (one.cut() && settings == search_.settings) cut_.push_back(&unit);
   }
 
-  // Listens once for all units with these line settings. Returns whether an encoder sends by itself: then no request
-  // would be received.
+  // Listens once for all units with these line settings. Returns whether an encoder sends all the time, so that no
+  // request would be received.
   template <class Item>
   bool listen(Attempt<Item>& attempt, const Unit& unit) {
     const LineSettings& line = attempt.line();
@@ -283,7 +286,7 @@ class Search {
     }
   }
 
-  // Prefers candidates that reply to those that only send, and removes duplicates of one encoder.
+  // Removes candidates with the same options, and those that only send if an encoder of the same unit replies.
   void drop_repeated() {
     std::vector<Candidate> kept;
     for (const Candidate& one : findings_.candidates) {
@@ -313,7 +316,7 @@ class Search {
   LineFindings findings_;
   std::vector<std::pair<std::tuple<std::uint32_t, Parity, std::uint8_t>, bool>> listened_;
   Time patience_ = short_patience;
-  std::vector<const Unit*> cut_;  // units that have more addresses than could be polled in time
+  std::vector<const Unit*> cut_;  // units with more addresses than could be polled in the time
   std::optional<os::Failure> failure_;
   bool opened_ = false;
 };

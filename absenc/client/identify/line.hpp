@@ -16,33 +16,38 @@
 namespace absenc::client {
 
 struct LineSearch {
-  std::string place;                    // "/dev/ttyUSB0", "tcp:HOST:PORT", "spi:/dev/spidev0.0"
+  std::string place;                    // the port: "/dev/ttyUSB0", "tcp:HOST:PORT", "spi:/dev/spidev0.0"
   std::vector<std::string> settings{};  // settings of the port, such as "latency=5"
   Time limit{};                         // time limit of the whole search
   std::function<void(const std::string&)> progress{};
   OpenLink open = open_link;
-  std::function<Time()> now = os::now;  // the clock of the port
-  std::function<bool()> over{};         // the search ends with os::Ended when it returns true; empty: never
+  std::function<Time()> now = os::now;  // returns the time of the port's clock
+  // polled during the search; once it returns true, the search ends with os::Ended; empty: never
+  std::function<bool()> over{};
 };
 
 struct LineFindings {
   std::vector<Candidate> candidates{};
-  std::size_t requests = 0;     // number of requests sent
-  std::size_t heard = 0;        // number of bytes received, without echo
-  std::size_t unsolicited = 0;  // number of them received before the first request
+  std::size_t requests = 0;  // number of requests that were sent
+  std::size_t heard = 0;     // number of bytes or frames that were received after requests, without echo
+  // number of bytes or frames that were received while listening, before the first request
+  std::size_t unsolicited = 0;
   std::size_t searches =
-      0;                   // number of combinations of protocol, settings and encoder that were tried as an explanation
-  bool only_echo = false;  // only the adapter's echo was received
-  std::set<std::string> lines{};   // the kinds of lines that were tried
-  std::vector<std::string> notes;  // protocols that could not be tried, and why
+      // number of combinations of protocol, settings and encoder that were tried as an explanation of received frames
+      0;
+  bool only_echo = false;          // whether only the adapter's echo was received
+  std::set<std::string> lines{};   // the kinds of lines that were tried, in words
+  std::vector<std::string> notes;  // sentences about protocols that could not be tried, with the reason
   bool out_of_time = false;
   bool interrupted = false;
 };
 
-/// Parses a port with its settings: "/dev/ttyUSB0?latency=50". Throws UsageError, also if it names a protocol.
+/// Parses a port with its settings, "/dev/ttyUSB0?latency=50", and returns the search. Throws UsageError, also if the
+/// text names a protocol.
 [[nodiscard]] LineSearch parse_search(std::string_view text);
 
-/// Runs the search. Throws os::Failure if the port cannot be opened, UsageError.
+/// Searches the line for encoders and returns the findings. Throws UsageError. Throws os::Failure if the port cannot be
+/// opened.
 [[nodiscard]] LineFindings search_line(const LineSearch& search);
 
 }  // namespace absenc::client

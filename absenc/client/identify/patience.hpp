@@ -9,19 +9,19 @@
 
 namespace absenc::client {
 
-/// Ends a conversation without replies, or without valid ones. Time in which this process did not run counts neither as
-/// silence nor as invalid replies.
+/// Decides when to end a conversation without replies, or without valid ones. Time in which this process did not run is
+/// subtracted.
 template <class Item>
 class Patience {
  public:
   struct Limits {
-    Time quiet{};     // limit of time without any received item
-    Time nonsense{};  // limit of time without a good reply
+    Time quiet{};     // limit of the time in which no item at all is received
+    Time nonsense{};  // limit of the time in which items but no good reply are received
     Time latency{};   // latency that the port adds to the timeouts of a step
   };
   explicit Patience(const Limits& limits) : limits_(limits) {}
 
-  /// Takes each event of the conversation, without echo.
+  /// Takes each event of the conversation, without the echo of requests.
   void see(const Event<Item>& event) {
     using Kind = typename Event<Item>::Kind;
     if (event.at > due_) missed_ += event.at - due_;
@@ -38,7 +38,7 @@ class Patience {
     if (step.kind == Kind::transfer) asked_ = answered_ = false;
     due_ = step.kind == Kind::wait ? due(step, now) : never;
   }
-  /// Returns whether the conversation has lasted too long without a good reply.
+  /// Returns whether the limit of time without a good reply is reached.
   [[nodiscard]] bool is_over(Time now) {
     if (begun_ == never) begun_ = now;
     return now - begun_ - missed_ >= (heard_ == 0 ? limits_.quiet : limits_.nonsense);
@@ -46,7 +46,7 @@ class Patience {
   [[nodiscard]] std::size_t heard() const { return heard_; }
 
  private:
-  // The time at which the port must return from waiting.
+  // Returns the time at which the port must return from the wait `step`.
   [[nodiscard]] Time due(const Step<Item>& step, Time now) const {
     const Time limit = answered_ ? step.gap : step.answer;
     const Time quiet_end = asked_ && limit != Time{} ? quiet_since_ + limit + limits_.latency : never;
@@ -55,11 +55,11 @@ class Patience {
   }
 
   Limits limits_;
-  std::size_t heard_ = 0;  // number of received items
-  bool asked_ = false;     // the last request was sent
-  bool answered_ = false;  // something was received after it
+  std::size_t heard_ = 0;  // number of received items of the conversation
+  bool asked_ = false;     // whether the last request was sent
+  bool answered_ = false;  // whether something was received after the last request
   Time begun_ = never;
-  Time missed_{};  // total delay between events that were due and their handling
+  Time missed_{};  // sum of the delays between due events and their handling by this process
   Time due_ = never;
   Time quiet_since_{};
 };

@@ -16,7 +16,7 @@ Medium medium_of(const LineSearch& search) {
   const std::string& place = search.place;
   if (place.starts_with("spi:")) return Medium::spi;
   if (place.starts_with("tcp:")) return Medium::tcp;
-  // A place that is not a path must be a network interface.
+  // Takes a place that is no path for a network interface.
   return place.starts_with("slcan:") || place.find('/') == std::string::npos ? Medium::can : Medium::serial;
 }
 

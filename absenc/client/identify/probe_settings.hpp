@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Selects the units that may be on a line, the options to try for each, and the requests that could change another one.
+// Selects the units that may be on a line, the options to try for each unit, and the requests that could change another
+// unit.
 #pragma once
 
 #include <cstdint>
@@ -12,14 +13,14 @@
 
 namespace absenc::client {
 
-using SettingTexts = std::vector<std::string>;  // each as "address=3"
+using SettingTexts = std::vector<std::string>;  // settings, each as "address=3"
 
 enum class Medium : std::uint8_t { serial, tcp, spi, can };
 
-/// Returns the kind of port at the place that is searched.
+/// Returns the kind of port that is searched.
 [[nodiscard]] Medium medium_of(const LineSearch& search);
 
-/// Returns whether an encoder of this unit can be at such a port.
+/// Returns whether an encoder of this unit can be connected to the port that is searched.
 [[nodiscard]] bool fits(const Unit& unit, const LineSearch& search);
 
 /// Returns whether an encoder of this unit may receive requests at `rate`, in bits per second.
@@ -27,19 +28,20 @@ enum class Medium : std::uint8_t { serial, tcp, spi, can };
 
 [[nodiscard]] bool has_setting(const SettingTexts& settings, std::string_view name);
 
-/// Returns the settings that are options of the unit.
+/// Returns those of the settings that are options of the unit; with `with_model` also the model.
 [[nodiscard]] std::vector<OptionText> option_settings(const Unit& unit, const SettingTexts& settings, bool with_model);
 
-/// Returns the request of a command with its default arguments; empty if it has none.
+/// Returns the request of a command with its default arguments; empty if the command sends none.
 [[nodiscard]] std::vector<std::uint8_t> request_of(const Unit& unit, const Options& options, const Command& command);
 
-/// Returns the sets of settings to try in addition to `settings`, at most 8: none, each model, and single choices that
-/// change the request. On clocked lines the request is the same for all models, which differ in their number of bits.
-/// Settings with which the encoder sends by itself are left out.
+/// Returns the sets of settings to try in addition to `settings`, at most 8: no further setting, each model, and single
+/// choices that change the request. On clocked lines the request is the same for all models, which differ in their
+/// number of bits. Settings with which the encoder sends unsolicited are left out.
 [[nodiscard]] std::vector<SettingTexts> settings_to_try(const Unit& unit, const SettingTexts& settings,
                                                         const Command& read);
 
-/// Returns the requests that would change encoders of other units that may receive them.
+/// Returns the requests that would change an encoder of another unit, of those that may be on the line at `rate`.
+/// Requests of `unit` must not begin with one of them.
 [[nodiscard]] std::vector<std::vector<std::uint8_t>> harmful_to_others(const Unit& unit, std::uint32_t rate,
                                                                        const LineSearch& search);
 
