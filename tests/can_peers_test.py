@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tests against python-can, an independent implementation: it reads a virtual node, absenc reads a node that it plays,
-and it reads absenc's log."""
+"""Tests absenc on CAN against python-can, an independent implementation: python-can reads a virtual node, plays a node
+that absenc reads, and reads absenc's log."""
 import os
 import sys
 import threading
 import unittest
 
-SYSTEM_PYTHON = "/usr/bin/python3"  # the interpreter that has Debian's python3-can
+SYSTEM_PYTHON = "/usr/bin/python3"  # the Python interpreter that has Debian's package python3-can
 
 try:
     import can
@@ -34,7 +34,7 @@ def message(identifier, *data, **settings):
 
 
 class Reader(Case):
-    """python-can is the host of a virtual node."""
+    """Tests in which python-can is the host of a virtual node."""
 
     def setUp(self):
         super().setUp()
@@ -82,7 +82,8 @@ class Reader(Case):
     def test_node_ignores_extended_and_remote_frames(self):
         self.bus.send(message(0x220, 0x80, 0x20, is_extended_id=True))
         self.bus.send(can.Message(arbitration_id=0x220, is_remote_frame=True, dlc=8, is_extended_id=False))
-        self.bus.send(message(0x221, 0x80, 0x21))  # this standard request is sent after both frames
+        # The node answers this standard request, sent after the extended and the remote frame.
+        self.bus.send(message(0x221, 0x80, 0x21))
         while True:
             received = self.bus.recv(PATIENCE)
             self.assertIsNotNone(received)
@@ -104,7 +105,7 @@ class Reader(Case):
 
 
 class Node(threading.Thread):
-    """An RAA38S6 implemented from its manual with python-can, behind an emulated slcan adapter."""
+    """A fake RAA38S6, implemented from its manual with python-can, behind an emulated slcan adapter."""
 
     def __init__(self):
         super().__init__()
@@ -122,7 +123,8 @@ class Node(threading.Thread):
         self.crossing = threading.Thread(target=self.cross)
 
     def cross(self):
-        """Forwards the frames of each program to the other one; accepts adapter commands and acknowledges frames."""
+        """Thread between absenc and the fake node: forwards the frames of each to the other, accepts commands for the
+        slcan adapter, and acknowledges frames."""
         import select
         rest = {self.master: b"", self.inner: b""}
         while not self.ended.is_set():
@@ -165,7 +167,7 @@ class Node(threading.Thread):
 
 
 class Reads(Case):
-    """python-can is the encoder that absenc reads."""
+    """Tests in which absenc reads a node that python-can plays."""
 
     def test_reads_node_of_python_can(self):
         with Node() as node:

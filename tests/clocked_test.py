@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Tests encoders on clocked links: virtual ones (`sim:`), and addresses of real ones on an SPI controller."""
+"""Tests `absenc` with encoders on clocked links: virtual encoders (`sim:`), and addresses of real encoders on an SPI
+controller."""
 import csv
 import json
 import os
@@ -38,7 +39,7 @@ class VirtualClockedEncoder(Case):
                 self.assert_good(absenc("record", encoder, "--output", file, "--count", "5"))
                 with open(file, encoding="utf-8") as rows:
                     lines = [line for line in rows if not line.startswith("#")]
-                # a busy machine may cause gaps
+                # Rows without those for gaps, which a busy machine may cause.
                 taken = [row["singleturn"] for row in csv.DictReader(lines) if row["event"] != "gap"]
                 self.assertEqual(taken, [str(singleturn)] * 5)
 

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Shared by the end-to-end tests: the command, an emulator process, and pseudo-terminals with a fake encoder."""
+"""Shared by the tests of the absenc command: runs the command, emulator processes, and fake encoders on
+pseudo-terminals."""
 import contextlib
 import itertools
 import json
@@ -17,13 +18,13 @@ import tty
 import unittest
 
 ABSENC = os.path.abspath(os.environ.get("ABSENC", "build/release/bin/absenc"))
-os.environ.setdefault("ABSENC_CHANGES", "none")  # tests leave the user's journal of changes alone
-# Time limit of every wait, in seconds. Only a hang takes that long. A virtual machine sets a longer one.
+os.environ.setdefault("ABSENC_CHANGES", "none")  # tests do not write to the user's journal of changes
+# Time limit of every wait, in seconds. Only a hang takes that long. A test in a virtual machine sets a longer limit.
 PATIENCE = float(os.environ.get("ABSENC_PATIENCE", "60"))
 
 
 def absenc(*arguments, **settings):
-    """Runs the command and returns its result."""
+    """Runs the absenc command and returns its completed process: exit status, standard output and standard error."""
     settings.setdefault("stdin", subprocess.DEVNULL)
     settings.setdefault("timeout", PATIENCE)
     return subprocess.run([ABSENC, *arguments], capture_output=True, text=True, **settings)
@@ -52,7 +53,7 @@ def end(process, number=signal.SIGTERM):
 
 
 def wait_for_handler(process):
-    """Waits until the process catches SIGINT, which would kill it before."""
+    """Waits until the process has a handler for SIGINT. Before that, SIGINT would kill the process."""
     deadline = time.monotonic() + PATIENCE
     while time.monotonic() < deadline:
         with open(f"/proc/{process.pid}/status", encoding="ascii") as file:
@@ -63,13 +64,13 @@ def wait_for_handler(process):
 
 
 def character_units():
-    """Returns the entry of `absenc list --json` of each unit with a character link, by name."""
+    """Returns a dictionary from the name of each unit with a character link to its entry in `absenc list --json`."""
     return {unit["protocol"]: unit for unit in json_lines(absenc("list", "--json").stdout)
             if unit["link"] in ("half_duplex", "full_duplex")}
 
 
 class Busy:
-    """Processes that use all the processor time that they get."""
+    """A context with `count` processes that use all the processor time that they get."""
 
     def __init__(self, count):
         self.processes = [subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range(count)]
@@ -84,7 +85,7 @@ class Busy:
 
 
 class Emulator:
-    """An `absenc emulate` process whose port can be opened."""
+    """A process of `absenc emulate`. `path` is its port; the process is ready when the constructor returns."""
 
     def __init__(self, directory, *arguments, protocol="tformat", name="encoder", line="--pty",
                  stdin=subprocess.DEVNULL):
@@ -102,8 +103,8 @@ class Emulator:
         return end(self.process, number)
 
     def kill(self):
-        """Kills it as kill -9 does, and removes its link. A later test may get the same terminal number, and the link
-        would lead there."""
+        """Kills the emulator as `kill -9` does, and removes the link to its terminal: a later test may get a terminal
+        with the same number, to which the link would lead."""
         os.unlink(self.path)
         self.process.kill()
 
@@ -115,7 +116,8 @@ class Emulator:
 
 
 class FakeLine:
-    """A pseudo-terminal whose far end is a thread of the test: `serve` runs until `wake` can be read."""
+    """A pseudo-terminal whose far end is a thread of the test. Derived classes define `serve`, which runs in that
+    thread until `wake` can be read."""
 
     def __init__(self):
         self.master, self.slave = os.openpty()
@@ -136,7 +138,8 @@ class FakeLine:
 
 
 class FakeEncoder(FakeLine):
-    """Sends a fixed reply for the first byte of a request. `replies` is a dictionary, or the reply to 1A alone."""
+    """A fake encoder that sends a fixed reply for the first byte of a request. `replies` is a dictionary from first
+    byte to reply, or only the reply to 1A."""
 
     def __init__(self, replies=b""):
         super().__init__()
@@ -166,7 +169,7 @@ class BabblingLine(FakeLine):
     def serve(self):
         due = time.monotonic()
         for piece in itertools.cycle(self.pieces):
-            # After a delay the schedule starts again from now.
+            # If sending was delayed, the next period begins now.
             due = max(due + self.period, time.monotonic())
             writable = [self.master] if self.period == 0 else []
             timeout = None if self.period == 0 else max(due - time.monotonic(), 0)
@@ -193,8 +196,8 @@ class Case(unittest.TestCase):
         return path
 
     def watch(self, *arguments, until, **settings):
-        """Runs `monitor --json` until `until` is true, and returns its argument: the last live reading of each encoder,
-        by name. The only time limit is PATIENCE."""
+        """Runs `monitor --json` until `until(readings)` is true, and returns `readings`: a dictionary from encoder name
+        to its last live reading. The only time limit is PATIENCE."""
         process = subprocess.Popen([ABSENC, "monitor", *arguments, "--json", "--interval", "0.1"], bufsize=0,
                                    stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE, **settings)
         self.addCleanup(lambda: end(process, signal.SIGKILL) if process.poll() is None else None)
@@ -215,7 +218,8 @@ class Case(unittest.TestCase):
         self.assertEqual(result.returncode, 0, f"{result.stdout}\n{result.stderr}")
 
     def assert_wrong_usage(self, result, *words):
-        """Expects exit status 2, an error message with these words, and an empty standard output."""
+        """Expects that the command ended with exit status 2, an error message that contains these words, and an empty
+        standard output."""
         self.assertEqual(result.returncode, 2, f"{result.stdout}\n{result.stderr}")
         self.assertEqual(result.stdout, "")
         self.assert_sentence(result.stderr, *words)
@@ -231,7 +235,7 @@ class Case(unittest.TestCase):
 
 
 class EncoderCase(Case):
-    """A test with emulators and with commands that run in the background."""
+    """A test with emulators, and with absenc commands that run in the background."""
 
     def emulator(self, *arguments):
         emulator = Emulator(self.directory, *arguments)
@@ -239,7 +243,7 @@ class EncoderCase(Case):
         return emulator
 
     def encoder(self, *arguments, latency=300, more=""):
-        """Returns the address of an emulator, with a latency that a busy machine needs."""
+        """Returns the address of a new emulator, with a latency that allows for a busy machine."""
         return f"tformat:{self.emulator(*arguments).path}?latency={latency}{more}"
 
     def start(self, *arguments, **settings):

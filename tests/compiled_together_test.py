@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Sources of a folder are compiled as one file, so no two of them may define a local function of the same name. With
-other parameters the compiler would accept it as an overload, and a call might reach the wrong file's function."""
+"""Tests that no two sources of a folder define a local function of the same name, because the sources of a folder are
+compiled as one file. The compiler would accept a function with other parameters as an overload, and a call might reach
+the function of the wrong file."""
 
 import re
 import unittest
@@ -22,7 +23,8 @@ def own_functions(text):
 
 
 def shared_names():
-    """Returns "folder: name in one.cpp, other.cpp" for each name that two sources define."""
+    """Returns a line "folder: name in one.cpp, other.cpp" for each name of a local function that two sources of a
+    folder define."""
     found = []
     folders = defaultdict(list)
     for top in ("absenc", "python/src", "tools/absenc"):

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tests absenc.toml: encoders by name, where the file is searched, which setting overrides which, and errors in the
-file."""
+"""Tests the configuration file absenc.toml: names of encoders, where the file is searched, which setting overrides
+which, and errors in the file."""
 import json
 import os
 import resource
@@ -103,7 +103,7 @@ class Overriding(ConfigCase):
         self.config('[defaults]\nlatency = 5\nbaud = 9600\necho = "auto"\nmultiturn = 4\nstrict = false\n' + SIM)
         self.assertEqual(self.json("read", "elbow")["multiturn"], 4)
         self.assertEqual(self.json("info", "elbow")["options"]["strict"], False)
-        # A setting of a bus or of an encoder must be valid, unlike one in [defaults].
+        # A setting of a bus or of an encoder must suit its protocol. A setting in [defaults] need not.
         self.config(SIM + "latency = 5\n")
         self.assert_wrong_usage(self.absenc("read", "elbow"), "absenc.toml:4:1: latency cannot be set here", "tcp")
 
@@ -159,7 +159,8 @@ class ManyEncoders(ConfigCase):
         return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
 
     def test_file_is_parsed_once(self):
-        """The processor time must grow in proportion to the number of encoders, not with its square."""
+        """If the file is parsed once, the processor time grows in proportion to the number of encoders, not with its
+        square."""
         self.assertLess(self.processor_time(2000), 30 * max(self.processor_time(200), 0.01))
 
     def test_serve_with_many_encoders_ends_by_signal(self):

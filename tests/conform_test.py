@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Tests the output of `absenc conform` and `absenc conform-host`. Each clause and its mutants are tested in
-client/conform."""
+"""Tests the output of `absenc conform` and `absenc conform-host`. The tests in client/conform cover each clause and its
+mutants."""
 import json
 import pathlib
 import re
@@ -25,7 +25,7 @@ def content(path):
 
 class Documentation(unittest.TestCase):
     def test_page_has_numbers_of_clauses(self):
-        """Per protocol the page states three numbers: clauses tested by reading, clauses added by --changes, and
+        """For each protocol, the page states three numbers: clauses tested by reading, clauses added by --changes, and
         clauses for hosts."""
         page = content(ROOT / "docs/test-a-drive.md")
         listed = re.findall(r"Listed\{&(\w+)::(\w+),.*?(\w+)::(\w+)\}", content(ROOT / "absenc/protocol/all.cpp"))
@@ -49,7 +49,8 @@ class Conform(EncoderCase):
         answer = json.loads(result.stdout)
         self.assertEqual((answer["ok"], answer["protocol"], answer["left"]), (True, "tformat", []))
         for clause in answer["clauses"]:
-            # The reply may arrive before the port is back at its rate; conform then reports the clause as untested.
+            # The reply may arrive before the port has its former rate again; conform then reports the clause as
+            # untested.
             expected = "untested" if clause["id"] == "bad-delimiter" else "kept"
             self.assertEqual(clause["verdict"], expected, clause)
             self.assertTrue(clause["document"] and clause["paragraph"] and clause["evidence"], clause)
@@ -135,13 +136,15 @@ class ConformHost(EncoderCase):
         end(host, signal.SIGTERM)
         answer = json.loads(out)
         verdicts = {one["id"]: one["verdict"] for one in answer["clauses"]}
-        # A host that only reads positions sends no reset and no memory request.
+        # The clauses about reset and memory requests stay untested, because a host that only reads positions sends no
+        # such request.
         read = {"asks", "silence", "damage", "turn", "refusal"}
         self.assertEqual(verdicts, {name: "kept" if name in read else "untested" for name in verdicts}, err)
         self.assertEqual((judge.returncode, answer["ok"]), (0, True))
 
     def verdicts_of(self, host):
-        """Returns the verdicts about a host that runs `host` on the line and then sends nothing more."""
+        """Returns the exit status of `conform-host`, its JSON output, and its verdicts by clause. `host` is a function
+        that plays the host on the line and then sends nothing more."""
         path = self.file("encoder")
         judge = self.start("conform-host", "tformat", "--pty", path, "--answers", "2", "--patience", "1", "--json")
         self.assertIn("ready: ", read_line(judge.stderr, time.monotonic() + PATIENCE))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tokens of a C++ source formatted by clang-format, and the bounds of its operands and statements."""
+"""Splits a C++ source formatted by clang-format into tokens, and finds the bounds of its operands and statements."""
 
 import bisect
 import re
@@ -28,7 +28,7 @@ class Token(NamedTuple):
 
 
 class Source:
-    """Tokens of a source without comments and directives, and the pairs of matching brackets."""
+    """A C++ source as a list of tokens, without comments and directives, and the pairs of matching brackets."""
 
     def __init__(self, text):
         self.text = text
@@ -72,7 +72,7 @@ class Source:
         return bisect.bisect_right(self.lines, position)
 
     def tokens_of_lines(self, first, last):
-        """Returns the half-open range of indices of the tokens in these lines."""
+        """Returns the half-open range of the indices of the tokens in the lines `first` to `last`."""
         return bisect.bisect_left(self.line_of_token, first), bisect.bisect_right(self.line_of_token, last)
 
     def span(self, first, last):
@@ -80,7 +80,7 @@ class Source:
         return self.text[self.tokens[first].start : self.tokens[last - 1].end]
 
     def left(self, index, stops):
-        """Returns the first index of the operand that ends before `index`."""
+        """Returns the index of the first token of the operand that ends before the token `index`."""
         while index > 0 and self[index - 1] not in stops:
             index -= 1
             if self[index] in OPENING:
@@ -96,13 +96,13 @@ class Source:
         return before < 0 or self[before] in (")", ";", "{", "}", "else", "do")
 
     def right(self, index, stops):
-        """Returns the index after the operand that begins at `index`."""
+        """Returns the index after the last token of the operand that begins at the token `index`."""
         while index < len(self.tokens) and self[index] not in stops and self[index] not in CLOSING:
             index = max(self.partner.get(index, index), index) + 1
         return index
 
     def statement(self, index):
-        """Returns the index after the semicolon or brace of the statement that begins at `index`."""
+        """Returns the index after the semicolon or brace that ends the statement which begins at the token `index`."""
         while index < len(self.tokens) and self[index] not in CLOSING:
             if self[index] == ";":
                 return index + 1

@@ -15,7 +15,7 @@ BIT = 400  # bit time in ns at 2.5 Mbit/s
 
 
 def exchange(position, turns=0, alarms=0):
-    """Returns request and reply of tformat's data ID 3."""
+    """Returns a request for T-format's data ID 3 and its reply."""
     status = 0x20 if alarms & 0xF0 else 0
     reply = [0x1A, status, *position.to_bytes(3, "little"), 0x11, *turns.to_bytes(3, "little"), alarms]
     reply.append(functools.reduce(lambda a, b: a ^ b, reply))
@@ -23,7 +23,7 @@ def exchange(position, turns=0, alarms=0):
 
 
 class Wave:
-    """Wires with their level changes; times in nanoseconds."""
+    """A waveform: wires with their level changes; times in nanoseconds."""
 
     def __init__(self, **idle):
         self.changes = {name: [(0, level)] for name, level in idle.items()}
@@ -34,14 +34,15 @@ class Wave:
             self.changes[wire].append((at, value))
 
     def send(self, wire, data, bit=BIT):
-        """Appends asynchronous characters at the current time."""
+        """Appends asynchronous characters to a wire, from the current time on."""
         for byte in data:
             for level in [0, *((byte >> i) & 1 for i in range(8)), 1]:
                 self.level(wire, level, self.now)
                 self.now += bit
 
     def word(self, bits, half=2500):
-        """Appends a clocked word: one edge latches the position, then each rising edge shifts out a bit."""
+        """Appends a word on a clocked link: the first edge of the clock latches the position, then each rising edge
+        shifts out a bit. `half` is half a clock period in nanoseconds."""
         self.level("clock", 0, self.now)
         for bit in bits:
             self.now += half
@@ -73,7 +74,7 @@ class Wave:
         return text + f"#{self.now + 20_000}\n"
 
     def samples(self, wire, period):
-        """Returns the levels of a wire, one byte per sample."""
+        """Returns the levels of a wire as one byte per sample."""
         changes = [*self.changes[wire], (self.now + 20_000, None)]
         return b"".join(bytes([level]) * (end // period - begin // period)
                         for (begin, level), (end, _) in zip(changes, changes[1:]))
@@ -214,7 +215,8 @@ class Text(Case):
                         "--bits", "--json")
         self.assert_good(result)
         self.assertEqual(json.loads(result.stdout)["bits"]["singleturn"], [{"first": 0, "count": 13}])
-        # Active-low bits are marked as inverted. On CAN and SPI the bits count from the lowest of each byte.
+        # Bits that are active low are marked as inverted. On CAN and SPI, bit numbers count from the lowest bit of each
+        # byte.
         for arguments, field, places in (
             (["encolink", "--hex", "003e825200"], "warning", [{"first": 16, "count": 1, "inverted": True}]),
             (["raa38-modbus", "--hex", "0103021234B533"], "singleturn",

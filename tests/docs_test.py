@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Guide and references as HTML: built without a warning, every link leads somewhere, nothing is loaded from a network."""
+"""Tests the guide and the references as HTML: they are built without a warning, every link has a target, and no page
+loads anything from a network."""
 import os
 import re
 import subprocess
@@ -12,7 +13,7 @@ SOURCE = Path(os.environ["ABSENC_SOURCE_DIR"])
 BUILD = Path(os.environ["ABSENC"]).parent.parent
 sys.path.insert(0, str(SOURCE / "docs/site"))
 
-import build  # noqa: E402: it stands beside the pages
+import build  # noqa: E402: the module is in the folder of the pages
 import check  # noqa: E402
 
 
@@ -38,7 +39,8 @@ class Documents(unittest.TestCase):
                 self.assertTrue(text in " ".join(shown.split()), f"{text!r} is not on {page}")
 
     def test_every_namespace_is_described(self):
-        """Doxygen leaves out functions of a namespace without a description, and does not say so."""
+        """Every namespace must have a description, because Doxygen omits the functions of one without a description,
+        and gives no warning."""
         described = set(re.findall(r"\\namespace (\S+)", (SOURCE / "docs/site/namespaces.dox").read_text(encoding="utf-8")))
         for path in (self.html.parent / "installed/include").rglob("*.hpp"):
             names, before = [], ""
@@ -47,7 +49,8 @@ class Documents(unittest.TestCase):
                     names.append(opened[1])
                     name = "::".join(names)
                     internal = names[-1] in ("detail", "script", "shown", "vector_texts") or name in ("absenc::esl::choices", "absenc::esl::request")
-                    self.assertTrue(internal or before.startswith("///") or name in described, f"{path}: {name}")  # see Doxyfile.in for the internal ones
+                    # Doxyfile.in lists the internal namespaces.
+                    self.assertTrue(internal or before.startswith("///") or name in described, f"{path}: {name}")
                 elif line.startswith("}  // namespace"):
                     names.pop()
                 before = line

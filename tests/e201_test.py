@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Tests the E201-9S interface on a pseudo-terminal, read and configured with the command."""
+"""Tests `absenc` with the E201-9S interface on a pseudo-terminal: reading and configuration."""
 import json
 import os
 import pty
@@ -14,7 +14,7 @@ import unittest
 from command_support import ABSENC, PATIENCE, Case, Emulator, FakeEncoder, absenc
 
 CR = b"\r"
-# Each row: reply to `4`, error, evidence in the message, advice.
+# Each row: reply of the interface to the command `4`, expected error, evidence in the message, advice.
 FRAMES = [
     (b"0" * 16 + CR, "line_stuck", "never changed", "supply-on"),
     (b"f" * 16 + CR, "line_stuck", "never changed", "supply-on"),
@@ -31,7 +31,7 @@ FRAMES = [
 
 
 class FakeInterface(FakeEncoder):
-    """Sends fixed replies to `4` and `v`."""
+    """A fake E201-9S that sends fixed replies to the commands `4` and `v`."""
 
     def __init__(self, samples=b"", version=b"E201-9S V1.16" + CR):
         super().__init__()
@@ -101,7 +101,7 @@ class Interface(InterfaceCase):
             return self.run_json(path, "run", "decimal")["fields"]["counts"]
         with self.emulator("--singleturn", "1000") as emulator:
             self.assertEqual(counts(emulator.path), 1000)
-            # This zero does not affect `read`, so the command is not named `zero`.
+            # The zero that this command sets does not affect `read`, so the command is not named `zero`.
             self.assert_wrong_usage(absenc("zero", f"e201:{emulator.path}", "--yes"), "set-zero")
             self.assertEqual(counts(emulator.path), 1000)
             self.assert_good(absenc("run", f"e201:{emulator.path}", "set-zero", "--yes"))
@@ -173,7 +173,8 @@ class Failures(InterfaceCase):
 
 class ClockSweep(InterfaceCase):
     def start(self, path, frames):
-        """Starts the sweep with a terminal for its messages. Returns the process and the test's end of the terminal."""
+        """Starts the sweep command with a terminal for its messages. Returns the process and the test's end of the
+        terminal."""
         ours, terminal = pty.openpty()
         self.addCleanup(os.close, ours)
         process = subprocess.Popen([ABSENC, "run", f"e201:{path}", "clock-sweep", str(frames)],
@@ -182,7 +183,8 @@ class ClockSweep(InterfaceCase):
         return process, ours
 
     def read_until(self, descriptor, words=None):
-        """Returns the terminal's text up to `words`, or until it is closed if `words` is None."""
+        """Returns the terminal's text up to and including `words`, or, if `words` is None, until the process closes the
+        terminal."""
         deadline = time.monotonic() + PATIENCE
         text = ""
         while words is None or words not in text:
@@ -190,14 +192,14 @@ class ClockSweep(InterfaceCase):
                 raise AssertionError(f"in vain waited for {words}: {text}")
             try:
                 text += os.read(descriptor, 4096).decode()
-            except OSError:  # no program has the other end open any more
+            except OSError:  # no process has the other end of the terminal open
                 if words is None:
                     return text
                 raise AssertionError(f"{words} never came: {text}") from None
         return text
 
     def leave(self, process):
-        """Returns the exit status and standard output of a process that ends by itself."""
+        """Waits until the process ends by itself. Returns its exit status and standard output."""
         out, _ = process.communicate(timeout=PATIENCE)
         return process.returncode, out.decode()
 

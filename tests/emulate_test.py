@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tests `absenc emulate tformat` with an independent T-format client."""
+"""Tests `absenc emulate`, mostly for tformat with an independent T-format client."""
 import fcntl
 import itertools
 import json
@@ -23,11 +23,11 @@ from command_support import ABSENC, PATIENCE, Case, Emulator, absenc, end, read_
 REPLY_LENGTH = {0x0: 6, 0x1: 6, 0x2: 4, 0x3: 11, 0x6: 4, 0x7: 6, 0x8: 6, 0xC: 6, 0xD: 4}
 ALARMS = ["over_speed", "full_absolute_status", "counting_error", "counter_overflow", "over_heat", "multiturn_error",
           "battery_error", "battery_alarm"]
-COUNTING_ERROR, ALARM = 0x10, 0x20  # bits of the status field SF
+COUNTING_ERROR, ALARM = 0x10, 0x20  # bits of the status field SF: counting error, and summary of the alarms
 
 
 def rate_of(terminal):
-    """Returns the baud rate from struct termios2 (<asm-generic/ioctls.h>)."""
+    """Returns the baud rate of the terminal from struct termios2 (<asm-generic/ioctls.h>)."""
     tcgets2 = 0x802C542A
     return struct.unpack("IIIIB19sII", fcntl.ioctl(terminal, tcgets2, bytes(44)))[-1]
 
@@ -38,7 +38,7 @@ def control_field(data_id):
 
 
 def crc(data):
-    """Returns the CRC with polynomial X^8 + 1, least significant bit first."""
+    """Returns the CRC with the polynomial X^8 + 1, least significant bit first."""
     register = 0
     for byte in data:
         for bit in range(8):
@@ -48,7 +48,7 @@ def crc(data):
 
 
 class Client:
-    """The host's end of the line. `exchange` sends a request and returns the received bytes."""
+    """The host's end of a T-format line. `exchange` sends a request and returns the received bytes."""
 
     def __init__(self, descriptor):
         self.descriptor = descriptor
@@ -76,7 +76,7 @@ class Client:
                 break
             try:
                 part = os.read(self.descriptor, 256)
-            except OSError:  # the emulator has ended
+            except OSError:  # the emulator has ended and closed its end of the line
                 break
             if not part:
                 break
@@ -91,7 +91,7 @@ class Client:
         return self.receive(length or REPLY_LENGTH[data_id])
 
     def read_memory(self, address):
-        """Returns (busy, value)."""
+        """Returns (busy bit, value) of an EEPROM read."""
         reply = self.exchange(0xD, address)
         assert len(reply) == 4 and crc(reply[:3]) == reply[3] and reply[0] == 0xEA, reply
         assert reply[1] & 0x7F == address, reply
@@ -101,7 +101,8 @@ class Client:
         return self.exchange(0x6, address, value)
 
     def wait_until_written(self, address):
-        """Polls the busy bit. Returns whether it was ever set, and the value of the last reply."""
+        """Polls the busy bit until a write has ended. Returns whether the busy bit was ever set, and the value of the
+        last reply."""
         deadline = time.monotonic() + PATIENCE
         was_busy = False
         while time.monotonic() < deadline:
@@ -134,17 +135,18 @@ class EmulateCase(Case):
 
 
 class Gap(EmulateCase):
-    """Tests the pause that ends a request (--gap)."""
+    """Tests of the pause that ends a request (--gap)."""
 
     def trickle(self, client, request, pause):
-        """Writes byte by byte, and returns as many received bytes as were sent, or fewer after PATIENCE."""
+        """Sends the request byte by byte with pauses. Returns the received bytes: as many as the request has, or fewer
+        after PATIENCE."""
         for byte in request:
             client.send([byte])
             select.select([], [], [], pause)
         return client.receive(len(request))
 
     def test_slow_host_needs_longer_gap(self):
-        # 5 ms between two bytes: with the default gap these are four incomplete requests
+        # With the default gap, 5 ms between two bytes turn this request into four incomplete requests.
         page_select = bytes.fromhex("327f004d")
         client = self.client("--gap", "2000")
         self.assertEqual(self.trickle(client, page_select, 0.005), page_select)
@@ -154,7 +156,7 @@ class Gap(EmulateCase):
         present = {"esl": ("0875", 18), "raa38-modbus": ("010300000001840a", 7)}
         for protocol, gap in itertools.product(absent, ("2", "10000")):
             with self.subTest(protocol=protocol, gap=gap):
-                # On a busy machine the emulator may receive two requests as one, which only the gap ends.
+                # On a busy machine the emulator may receive these two requests as one; only the gap separates them.
                 self.assertTrue(any(self.answers(protocol, gap, number, absent[protocol], *present[protocol])
                                     for number in range(10)))
 
@@ -187,7 +189,7 @@ class DataIds(EmulateCase):
         self.assert_reply(client.exchange(3), 3, 0, [0xFF, 0xFF, 0x7F, 0x17, 0xFF, 0xFF, 0x00, 0x00])
 
     def reset(self, client, data_id, times):
-        """Sends the request `times` times, 100 us apart. Returns the last reply."""
+        """Sends the request `times` times, 100 us apart, as a reset demands. Returns the last reply."""
         reply = b""
         for _ in range(times):
             reply = client.exchange(data_id)
@@ -200,7 +202,7 @@ class DataIds(EmulateCase):
         client = self.client("--alarm", "over_speed", "--multiturn", "7")
         self.reset(client, 0x7, 9)
         self.assertEqual(client.exchange(3)[9], 0x01)
-        self.reset(client, 0x7, 9)  # another request in between restarts the count of resets
+        self.reset(client, 0x7, 9)  # a request with another data ID restarts the count of reset requests
         self.assertEqual(client.exchange(3)[9], 0x01)
         self.reset(client, 0xC, 5)
         self.reset(client, 0x7, 5)
@@ -208,7 +210,8 @@ class DataIds(EmulateCase):
 
     def test_clear_alarms(self):
         client = self.client("--alarm", "multiturn_error", "--multiturn", "7")
-        self.assert_reply(self.reset(client, 0x7, 10), 0x7, ALARM, [0, 0, 0])  # the tenth reply still shows the alarm
+        # The reply to the tenth reset request still shows the alarm.
+        self.assert_reply(self.reset(client, 0x7, 10), 0x7, ALARM, [0, 0, 0])
         self.assert_reply(client.exchange(3), 3, 0, [0, 0, 0, 0x11, 7, 0, 0, 0])
 
     def test_reset_multiturn(self):
@@ -239,7 +242,7 @@ class DataIds(EmulateCase):
         client.write_memory(5, 0x5A)
         reply = client.write_memory(6, 0x77)
         client.wait_until_written(5)
-        if reply[1] & 0x80:  # still busy, unless this machine took more than 18 ms
+        if reply[1] & 0x80:  # the encoder is still busy, unless this machine took more than 18 ms
             self.assertEqual(reply[2], 0)
             self.assertEqual(client.read_memory(6), (False, 0))
 
@@ -259,12 +262,13 @@ class DataIds(EmulateCase):
         client.select_page(7)
         self.assertEqual(client.read_memory(5), (False, 35))
         self.assertEqual(client.read_memory(4), (False, 0xDA))
-        client.write_memory(4, 0x80 + 20)  # sets the threshold to 20 degC, below the encoder's 35 degC
+        # Sets the overheat threshold to 20 degC, below the encoder's temperature of 35 degC.
+        client.write_memory(4, 0x80 + 20)
         client.wait_until_written(4)
         self.assertEqual(client.exchange(3)[9], 0x10)
 
     def test_invalid_requests(self):
-        """Most invalid requests are answered like ID 3. A wrong sync code is not answered at all."""
+        """The encoder answers most invalid requests like a request for ID 3, and a wrong sync code not at all."""
         client = self.client()
         everything = client.exchange(3)
         self.assertEqual(client.exchange(0x4, length=11), everything)  # an unknown data ID
@@ -275,7 +279,7 @@ class DataIds(EmulateCase):
         self.assertEqual(client.exchange(0x6, 127, 6, length=11), everything)  # a write to a closed page
         client.send([0xEA])  # a truncated request
         self.assertEqual(client.receive(11), everything)
-        client.send([0x19, 0x1A])  # a byte that is no sync code, then a request
+        client.send([0x19, 0x1A])  # a byte that is no sync code precedes a request
         self.assertEqual(client.receive(12, patience=0.05), everything)
 
 
@@ -299,7 +303,7 @@ class Behaviour(EmulateCase):
             replies = [client.exchange(3) for _ in range(20)]
         good = bytes([0x1A, 0, 0, 0, 0, 0x11, 0, 0, 0, 0, 0x0B])
         self.assertTrue(all(len(reply) == 11 and reply != good for reply in replies))
-        # Two flipped bits in the same column cancel out in this checksum.
+        # The E201's checksum is the XOR of its bytes, so two flipped bits in the same column cancel out.
         self.assertGreater(sum(crc(reply[:-1]) != reply[-1] for reply in replies), 10)
         self.assertIn("faults injected: 20 corrupt\n  replies with faults: 20\n", emulator.end()[2])
 
@@ -355,7 +359,7 @@ class Behaviour(EmulateCase):
         port = int(line.rsplit(":", 1)[1])
         with socket.create_connection(("127.0.0.1", port), timeout=PATIENCE) as connection:
             ends = [Client(connection.fileno()), Client.open(emulator.path)]
-            for asking, listening in (ends, ends[::-1]):  # both TCP clients share one line and receive the reply
+            for asking, listening in (ends, ends[::-1]):  # both TCP clients share one line, so both receive the reply
                 self.assert_reply(asking.exchange(0), 0, 0, [5, 0, 0])
                 self.assert_reply(listening.receive(6), 0, 0, [5, 0, 0])
             ends[1].__exit__()
@@ -364,10 +368,10 @@ class Behaviour(EmulateCase):
 
 
 class Console(EmulateCase):
-    """Lines on the standard input of a running emulator."""
+    """Tests of commands for a running emulator, which it reads as lines from its standard input."""
 
     def console(self, *arguments, **settings):
-        """Returns an emulator, and a function that sends it a line and returns its answer."""
+        """Returns an emulator, and a function that sends a line to its standard input and returns the answer."""
         emulator = self.emulator(*arguments, stdin=subprocess.PIPE, **settings)
 
         def send_line(line):
@@ -516,7 +520,8 @@ class Console(EmulateCase):
     def test_closed_output_does_not_end_emulator(self):
         emulator, _ = self.console()
         emulator.process.stdout.close()
-        emulator.process.stdout = open(os.devnull, "rb")  # gives `end` an output to read
+        # `end` reads this file instead of the emulator's standard output.
+        emulator.process.stdout = open(os.devnull, "rb")
         emulator.process.stdin.write(b"temperature=50\ntemperature=60\n")
         place = f"tformat:{emulator.path}?latency=300"
         deadline = time.monotonic() + PATIENCE
@@ -527,7 +532,7 @@ class Console(EmulateCase):
     def test_ignores_terminal_of_foreground_program(self):
         path = self.file("encoder")
         child, master = pty.fork()
-        if child == 0:  # plays the shell; the emulator runs in the background
+        if child == 0:  # the child process acts as a shell and runs the emulator in the background
             program = ("import os, signal, subprocess, sys\n"
                        "emulator = subprocess.Popen(sys.argv[1:], preexec_fn=os.setpgrp)\n"
                        "print('pid', emulator.pid, flush=True)\n"
@@ -571,7 +576,7 @@ class Console(EmulateCase):
 
 
 class SerialPort(EmulateCase):
-    """Emulates on an existing serial port; here it is one end of a pseudo-terminal."""
+    """Tests of `emulate` on an existing serial port, here one end of a pseudo-terminal."""
 
     def port(self, settings="", *arguments):
         ours, terminal = os.openpty()
@@ -606,7 +611,7 @@ class SerialPort(EmulateCase):
         for _ in range(4):
             reply = client.exchange(0)
             self.assert_reply(reply, 0, 0, [0xE8, 0x03, 0])
-            client.send(reply)  # this reply begins with the byte of a request
+            client.send(reply)  # this reply begins with a byte that also begins a request
         _, _, err = emulator.end()
         self.assertIn("4 requests answered", err)
         self.assertNotIn("rules", err)
@@ -622,7 +627,7 @@ class SerialPort(EmulateCase):
         link = os.path.join(self.directory, "port")
         ours, terminal = os.openpty()
         os.symlink(os.ttyname(terminal), link)
-        # The reply is delayed, so that the port disappears before it is sent.
+        # The encoder's reply is delayed, so that the port disappears before the reply is sent.
         emulator = self.emulator("--fault", "delay=1", "--singleturn", "1000", name=link, line="--port")
         os.close(terminal)
         client = Client(ours)
@@ -710,7 +715,8 @@ class Lifecycle(EmulateCase):
                 self.assertFalse(os.path.lexists(emulator.path))
 
     def test_refused_request_counts_once(self):
-        """ID D with a wrong parity bit, written at once: it is refused once, after its end, and violates no rule."""
+        """A request for ID D with a wrong parity bit, written at once, is refused once, after its end, and violates no
+        rule."""
         emulator = self.emulator()
         with Client.open(emulator.path) as client:
             client.send([0x6A, 0x05, 0xEF])
@@ -727,7 +733,7 @@ class Lifecycle(EmulateCase):
         with Client.open(emulator.path) as client:
             client.send([0xEA, 0x05, 0xEF])
             client.receive(11, 0.2)
-        self.assertIn("3 request_corrupt", emulator.end()[2])  # the help says that each damaged byte counts
+        self.assertIn("3 request_corrupt", emulator.end()[2])  # each damaged byte counts, as the help states
 
     def test_reports_violations(self):
         emulator = self.emulator()
@@ -738,7 +744,8 @@ class Lifecycle(EmulateCase):
         self.assertRegex(err, r"rules that the host broke: 1\n    at \d+\.\d{6} s: memory access before the page is ready")
 
     def test_reports_every_host_that_does_not_wait(self):
-        """Sends three requests at once. A delay of the machine excuses at most two replies in a row."""
+        """The host sends three requests at once. The emulator excuses a request before the reply at most twice in a
+        row, because a delay of the machine may be the cause."""
         emulator = self.emulator()
         with Client.open(emulator.path) as client:
             for _ in range(5):
@@ -837,7 +844,7 @@ class MemoryFile(EmulateCase):
     def test_lock_survives_save_and_ends_with_emulator(self):
         with Emulator(self.directory, "--memory", self.file("memory")) as emulator:
             with Client.open(emulator.path) as client:
-                client.write_memory(0, 0xAB)  # the write replaces the memory file
+                client.write_memory(0, 0xAB)  # the emulator saves its memory by replacing the file
                 client.wait_until_written(0)
             result = absenc("emulate", "tformat", "--memory", self.file("memory"), "--for", "60")
             self.assert_failed(result, "another emulator keeps its memory")
@@ -859,7 +866,7 @@ class MemoryFile(EmulateCase):
         with Client.open(emulator.path) as client:
             shutil.rmtree(self.file("sub"))
             client.send(bytes.fromhex("32 05 5a 6d"))
-            self.assertEqual(client.receive(4), b"")  # nothing arrives until the emulator has ended
+            self.assertEqual(client.receive(4), b"")  # no byte arrives before the emulator has ended
         self.assertEqual(emulator.process.wait(PATIENCE), 1)
         self.assert_sentence(emulator.end()[2], "memory file", "No such file")
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tests the virtual AksIM-2 over a pseudo-terminal with an independent EncoLink client, byte by byte."""
+"""Tests the virtual AksIM-2 encoder over a pseudo-terminal with an independent EncoLink client, byte by byte."""
 import os
 import select
 import tty
@@ -17,7 +17,7 @@ STATUSES = {OK, 0x26, 0x56, ACCESS_DENIED, 0xEE, LOCKED, BAD_WRITE_CRC, *BAD_REA
 
 
 def inverted_crc(data):
-    """Returns the inverted CRC x^8 + x^7 + x^4 + x^2 + x + 1, most significant bit first."""
+    """Returns the inverted CRC of the polynomial x^8 + x^7 + x^4 + x^2 + x + 1, most significant bit first."""
     register = 0
     for byte in data:
         register ^= byte
@@ -27,7 +27,7 @@ def inverted_crc(data):
 
 
 class Client:
-    """Sends position frames, and decodes channels 2 and 3 from their bytes."""
+    """An EncoLink client that sends position frames and decodes channels 2 and 3 from bytes in the replies."""
 
     def __init__(self, case, path, turns):
         self.case = case
@@ -35,9 +35,10 @@ class Client:
         self.port = os.open(path, os.O_RDWR | os.O_NOCTTY)
         case.addCleanup(os.close, self.port)
         tty.setraw(self.port)
-        self.pending = b""  # bytes of channel 3 that wait to be sent
-        self.cycle = None  # bytes of channel 2 since the start of its cycle
-        self.cycles = []  # (turns, position, status, channel 3)
+        self.pending = b""  # bytes for channel 3 that are still to be sent, one in each frame
+        # Bytes of channel 2 since its current cycle began; None before the first reset of the channels.
+        self.cycle = None
+        self.cycles = []  # complete cycles of channel 2: (turns, position, status, byte of channel 3)
 
     def read(self, size):
         data = b""
@@ -47,13 +48,13 @@ class Client:
         return data
 
     def frame(self, config=POSITION):
-        """Returns turns (or None), the position of 22 bits, error and warning."""
+        """Exchanges one frame. Returns turns (or None), the position of 22 bits, error and warning."""
         out, self.pending = self.pending[:1], self.pending[1:]
         os.write(self.port, bytes([config]) + (out or b"\0"))
         reply = self.read(self.size)
         position, turns = self.decode(reply[:-2], reply[-2])
         if config == RESET_CHANNELS:
-            self.cycle = b""  # the byte of this frame belongs to the previous cycle
+            self.cycle = b""  # the byte of channel 2 in this frame belongs to the previous cycle
         elif self.cycle is not None:
             self.channel2(reply[-1], position, turns)
         return turns, position >> 2, not position & 2, not position & 1
@@ -86,7 +87,8 @@ class Client:
         return self.next_cycle()[3]
 
     def access(self, kind, address, data=b"", size=0, spoil=False):
-        """Sends a register access. Returns its status and the data after it."""
+        """Accesses a register through channel 3. Returns the status of the access, and the data that follow the
+        status."""
         body = (size or len(data)).to_bytes(2, "big") + address.to_bytes(4, "big") + data
         self.pending = KEYS + bytes([kind]) + body + bytes([inverted_crc(body) ^ (1 if spoil else 0)])
         while self.pending:
@@ -172,7 +174,7 @@ class Encolink(Case):
         self.assertEqual(client.access(READ, 0x00, size=4), (OK, bytes(4)))
 
     def test_identity_as_vendor_library_reads_it(self):
-        """The vendor's library reads twenty bytes both for the identify frame and for the identity."""
+        """The vendor's library reads twenty bytes in reply to the identify frame, and again in the next frame."""
         client = self.client(*self.options(True), "--option", "identity_bytes=20")
         for config in (IDENTIFY, POSITION):
             os.write(client.port, bytes([config, 0]))

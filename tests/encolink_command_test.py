@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tests EncoLink with the command: over a pseudo-terminal (UART), and over UART and SPI in the simulator."""
+"""Tests EncoLink encoders with the absenc command: over a pseudo-terminal (UART), and over UART and SPI in the
+simulator."""
 import csv
 import json
 import os
@@ -55,7 +56,7 @@ class PseudoTerminal(Case):
 
 
 class TurnsAcrossPause(Case):
-    """The identity says that the encoder counts no turns, so the host must not assume any."""
+    """Tests that the host assumes no turns if the encoder's identity says that it counts none."""
 
     def record(self, motion, settings=""):
         emulator = Emulator(self.directory, "--option", "multiturn_bits=0", "--motion", motion, protocol="encolink")

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Tests QS35 ESL encoders on a pseudo-terminal, with an independent client and with the command."""
+"""Tests QS35 ESL encoders on a pseudo-terminal, with an independent client and with the absenc command."""
 import json
 import os
 import select
@@ -16,13 +16,13 @@ LENGTH = {POSITION: 18, QUICK: 6, TEMPERATURE: 4, READ: 4, WRITE: 4}
 READY, CHANNEL_2 = 0x40, 0x20
 REQUEST = "0875"  # request with ID 1 to address 0
 REPLY = "084000efcdab34125646b3086000abd6cd84"
-# The same reply with another profile, and with one wrong bit in channel 2.
+# REQUEST and REPLY with the CRC of another profile (crc_bit_order=msb), and REPLY with one wrong bit in channel 2.
 MSB_REQUEST, MSB_REPLY = "0857", "084000efcdab341255277e086000abd57f67"
 WRONG_CHANNEL_2 = "084000efcdab3412553b5e086000afd5b069"
 
 
 def control_field(data_id, address=0):
-    parity = (bin(data_id).count("1") + 1) & 1  # makes the number of ones odd
+    parity = (bin(data_id).count("1") + 1) & 1  # parity bit that makes the number of ones odd
     return parity << 7 | (data_id & 0xF) << 3 | address
 
 
@@ -96,13 +96,14 @@ class EslCase(EncoderCase):
 
 class VirtualEncoder(EslCase):
     def check_position(self, reply, singleturn, multiturn, address=0, alarms=0):
-        """Checks both channels of a position reply, alone and against each other. Returns both sequence counters."""
+        """Checks both channels of a position reply, each alone and against the other. Returns the sequence counters of
+        channels 1 and 2."""
         self.assertEqual(len(reply), 18, reply.hex(" "))
         one, two = reply[:11], reply[11:]
         self.assertEqual(one[9:], crc16(one[:9], 0x0000), reply.hex(" "))
         self.assertEqual(two[5:], crc16(two[:5], 0xFFFF), reply.hex(" "))
         self.assertEqual((one[0], two[0]), (control_field(POSITION, address),) * 2)
-        # compares the status without its error bits
+        # Compares the status fields without their error bits.
         self.assertEqual((one[1] & ~0x0C, two[1] & ~0x0C), (READY, READY | CHANNEL_2))
         self.assertEqual((one[2], two[2]), (alarms, alarms))
         self.assertEqual(int.from_bytes(one[3:6], "little"), singleturn)
@@ -129,7 +130,8 @@ class VirtualEncoder(EslCase):
         self.assertEqual((reply[0], reply[1], reply[3:]), (0xC8, READY, crc8(reply[:3])))
 
     def read_memory(self, client, address):
-        """Reads one EEPROM byte. The first replies are busy, and the next one has the byte."""
+        """Reads one EEPROM byte. The first replies have the busy flag, and the byte is in the next one. Returns the
+        byte."""
         was_busy = False
         deadline = time.monotonic() + PATIENCE
         while time.monotonic() < deadline:
@@ -174,12 +176,12 @@ class VirtualEncoder(EslCase):
         client = self.client("--singleturn", "1000", "--also", "address=3&singleturn=70000&multiturn=7",
                              "--also", "address=5&alarm=multiturn_error", "--also", "address=6&singleturn=0x5555",
                              "--also", "address=6&singleturn=0xAAAA")
-        for _ in range(3):  # without a pause between the requests
+        for _ in range(3):  # repeats the requests without a pause
             self.check_position(client.exchange(POSITION, address=0), 1000, 0)
             self.check_position(client.exchange(POSITION, address=3), 70000, 7, address=3)
             self.check_position(client.exchange(POSITION, address=5), 0, 0, address=5, alarms=2)
             clash = client.exchange(QUICK, address=6)
-            # two encoders with one address reply at once: 0x5555 AND 0xAAAA
+            # Two encoders with the same address reply at once, and the line carries 0x5555 AND 0xAAAA.
             self.assertEqual(clash[:5], bytes([control_field(QUICK, 6), READY, 0, 0, 0]))
             self.assertNotEqual(clash[5:], crc8(clash[:5]))
 
@@ -204,8 +206,8 @@ class Command(EslCase):
         encoder = self.encoder("--singleturn", "0x500000", "--multiturn", "5", "--alarm", "multiturn_error")
         self.assert_wrong_usage(absenc("zero", encoder), "--yes")
         for verb in ["zero", "reset-multiturn", "clear-alarms"]:
-            # On a busy machine the eight requests may arrive faster than the encoder allows. It then changes nothing,
-            # and the command reports that.
+            # On a busy machine the eight requests of a reset may arrive faster than the encoder allows. The encoder
+            # then changes nothing, and the command reports that.
             results = [absenc(verb, encoder, "--yes")]
             while results[-1].returncode != 0 and len(results) < 4:
                 results.append(absenc(verb, encoder, "--yes"))
@@ -257,7 +259,8 @@ class Command(EslCase):
         self.assert_sentence(result.stderr, "two encoders share the address")
 
     def test_scan_finds_encoder_that_refuses(self):
-        """Its replies are intact, so no other encoder has its address."""
+        """The replies of an encoder that refuses requests are intact, so scan must not report that two encoders share
+        its address."""
         encoder = self.encoder("--condition", "ch1_status_set=1")
         result = absenc("scan", encoder, "--json")
         self.assertEqual(result.returncode, 1)
@@ -278,7 +281,7 @@ class Command(EslCase):
 
 
 class DecodeReasons(EslCase):
-    """`decode` explains a bad reply like a host, for single frames and for captures."""
+    """`decode` must give the same reason for a bad reply as a host, for single frames and for captures."""
     ONE = bytes.fromhex("084000efcdab34125646b3")
     TWO = bytes.fromhex("086000abd6cd84")
 
@@ -307,7 +310,8 @@ class DecodeReasons(EslCase):
         self.assertEqual((second["ok"], second["error"]), (False, "sequence_mismatch"))
 
     def test_reports_refusal(self):
-        """The request's check is right, so the status of the reply is the error."""
+        """The check of this request is right, so `decode` must report the refusal in the reply's status as the
+        error."""
         good = absenc("encode", "esl", "position").stdout.strip()
         field = control_field(POSITION) ^ 0x80
         refused = bytes([field]) + crc8([field])
@@ -368,7 +372,7 @@ class Probe(EslCase):
 
 
 class ErrorMessages(EslCase):
-    """Tests the error messages about bad replies."""
+    """Tests the error messages about bad replies of an encoder."""
 
     def fake(self, *replies):
         fake = FakeEncoder({reply[0]: reply for reply in replies})
@@ -398,7 +402,7 @@ class ErrorMessages(EslCase):
         self.assert_good(absenc("read", f"{encoder}&crc16_byte_order=high"))
 
     def test_repeated_counter(self):
-        """Replies to IDs 1 and 2 that are valid alone but have the same sequence counter."""
+        """The replies to IDs 1 and 2 are valid, each alone, but have the same sequence counter."""
         one = bytes([control_field(0x2), READY, 0, 0xEF, 0xCD, 0xAB, 0x56])
         two = bytes([control_field(0x2), READY | CHANNEL_2, 0, 0xAB, 0x80 | 0x56])
         singleturn = one + crc16(one, 0x0000) + two + crc16(two, 0xFFFF)
@@ -414,7 +418,7 @@ class ErrorMessages(EslCase):
 
 
 class SafePositions(EslCase):
-    """Consecutive safe positions, each compared with the previous one."""
+    """Tests of consecutive safe positions, each of which is compared with the previous one."""
 
     def test_read(self):
         lines = json_lines(absenc("read", "sim:esl?singleturn=5&multiturn=3", "--command", "safe-position", "--count", "20",
@@ -441,7 +445,7 @@ class SafePositions(EslCase):
         self.assertEqual([row["singleturn"] for row in rows if "singleturn" in row], [77] * 30)
 
     def test_two_encoders_on_one_line(self):
-        """Requests to another encoder in between do not break the sequence."""
+        """Requests to another encoder on the line must not break the sequence of safe positions."""
         line = self.encoder("--also", "address=3&singleturn=70000", latency=300)
         live = self.watch(line, f"{line}&address=3", "--command", "safe-position", until=lambda live: len(live) == 2)
         self.assertEqual(sorted(one["singleturn"] for one in live.values()), [0, 70000])
@@ -470,7 +474,7 @@ class SingleTurn(EslCase):
 
 
 class Doctor(EslCase):
-    """Doctor reports the flags of a reply under the right finding."""
+    """Tests that doctor reports the flags of a reply in the finding that they belong to."""
 
     def verdict(self, settings, *words):
         result = absenc("doctor", f"sim:esl?{settings}")
@@ -488,20 +492,21 @@ class Doctor(EslCase):
         self.verdict("condition=temperature=120", "status: ", "temperature_warning")
         self.verdict("alarm=singleturn_error", "alarm: ", "singleturn_error")
         result = absenc("doctor", "sim:esl?alarm=singleturn_error", "--json")
-        self.assertEqual(len(json.loads(result.stdout)["findings"]), 1)  # safety_error only summarizes the alarm
+        # Doctor reports the alarm alone, because the status flag safety_error only summarizes it.
+        self.assertEqual(len(json.loads(result.stdout)["findings"]), 1)
 
     def test_repeated_replies_are_not_late(self):
         self.verdict("fault=repeat=1", "two_answer: ")
 
 
 class TwoChannels(EslCase):
-    """Flags that only one channel reports, in every output of a reading."""
+    """Tests that flags which only one channel reports are shown in every output of a reading."""
 
     NONE = {"ch1_status": ["ready"], "ch1_alarms": [], "ch2_status": ["channel_2", "ready"], "ch2_alarms": [],
             "alarms": []}
 
     def fake(self, status_2=READY | CHANNEL_2, alarms_2=0):
-        """Returns an encoder whose replies to IDs 1 and 2 have flags in channel 2 only."""
+        """Returns the address of a fake encoder whose replies to IDs 1 and 2 have these flags in channel 2 only."""
         replies = {}
         for data_id, turns in ((POSITION, b"\x34\x12"), (0x2, b"")):
             field = control_field(data_id)
@@ -574,14 +579,15 @@ class SharedLine(EslCase):
                             "address=6&singleturn=0xAAAA", latency=20)
         names = [line, f"{line}&address=3", f"{line}&address=6", f"{line}&address=7"]
         result, last = self.lines(*names, "--rate", "0", seconds=6)
-        self.assertEqual(result.returncode, 1)  # the readings of two encoders failed, so the status is 1
+        # The readings of two of the four encoders failed, so the exit status is 1.
+        self.assertEqual(result.returncode, 1)
         self.assertEqual([one["state"] for one in last], ["live", "live", "failing", "failing"])
         self.assertEqual([one["reading"]["singleturn"] for one in last[:2]], [0, 70000])
         self.assertEqual([one["errors"] for one in last[:2]], [{}, {}])
         self.assertEqual(set(last[3]["errors"]), {"timeout"})
         least, most = sorted(one["readings"] for one in last[:2])
-        self.assertGreater(least, 10)  # timeouts of the other encoders limit the number of readings
-        self.assertLess(most, 5 * least)  # neither encoder starves; a busy computer may delay one thread
+        self.assertGreater(least, 10)  # timeouts of other encoders on the line limit the number of readings
+        self.assertLess(most, 5 * least)  # both encoders get readings; a busy computer may delay one thread
 
     def test_names_of_one_bus(self):
         path = self.emulator("--also", "address=3&singleturn=70000").path
@@ -601,8 +607,8 @@ class SharedLine(EslCase):
         self.assertEqual([live[name]["singleturn"] for name in ("shoulder", "elbow")], [0, 70000])
 
     def test_memory_is_refused_on_shared_line(self):
-        """The encoder refuses if it knows of others on its line; the host refuses if the configuration file names
-        others."""
+        """An encoder that knows of others on its line refuses memory access. Otherwise the host refuses it, if the
+        configuration file names others."""
         emulator = self.emulator("--also", "address=3")
         encoder = f"esl:{emulator.path}?latency=20"
         self.assert_failed(absenc("memory", "read", encoder, "0"), "timeout", "others share its line")
@@ -627,7 +633,7 @@ class SharedLine(EslCase):
         for command in (["memory", "read", "elbow", "0"], ["memory", "write", "elbow", "0", "1", "--yes"]):
             self.assert_failed(absenc(*command, env=env), "unsupported", "several encoders on the line", "nothing was sent")
         result = json.loads(absenc("run", "elbow", "led-or-lissajous", "--json", env=env).stdout)["fields"]
-        # the flags come from SF, without a memory access
+        # The flags come from the field SF of a reply, without a memory access.
         self.assertEqual((result["led_error"], result["lissajous_error"]), (False, False))
         self.assert_good(absenc("memory", "read", "knee", "0", env=env))
         self.assert_failed(absenc("memory", "read", "elbow?bus=false", "0", env=env), "timeout")

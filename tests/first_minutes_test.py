@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Follows a new user from a port to a reading: each step runs the command that the previous one printed."""
+"""Follows a new user from a serial port to a reading: each step runs the command that the output of the previous step
+recommends."""
 import json
 import re
 import shlex
@@ -60,7 +61,8 @@ class FirstMinutes(Case):
             self.assert_failed(result, "which encoder is on", "nothing came back")
 
     def test_doctor_reports_uncertain_protocol(self):
-        with Emulator(self.directory, protocol="raa38") as emulator:  # the shaft stands, so the same frame repeats
+        # The shaft stands still, so the encoder repeats the same frame.
+        with Emulator(self.directory, protocol="raa38") as emulator:
             result = absenc("doctor", emulator.path)
             self.assert_failed(result, "It may be raa38", "may be chance")
             command = shlex.split(re.search(r"`absenc (doctor [^`]*)`", result.stderr).group(1))
@@ -122,7 +124,8 @@ class FirstMinutes(Case):
                 self.assertIn(unit["protocol"], named)
 
     def test_settings_have_same_form_in_every_verb(self):
-        """Settings after `?` have the same meaning in each verb that takes a protocol or an encoder."""
+        """Settings after `?` in an address have the same form and meaning in each verb that takes a protocol or an
+        encoder."""
         settings = "model=23-bit"
         capture = self.file("capture.vcd")
         for arguments in [["read", f"sim:tformat?{settings}"], ["wave", f"tformat?{settings}", capture],

@@ -17,19 +17,20 @@ UNITS = json_lines(absenc("list", "--json").stdout)
 
 
 def with_role(infos, role):
-    """Returns the options or fields of a unit that have this role."""
+    """Returns those of `infos`, options or fields of a unit, that have this role."""
     return [one for one in infos if one.get("role") == role]
 
 
 def another(option):
-    """Returns a value of the option other than its default."""
+    """Returns a valid value of the option that is not its default."""
     if "choices" in option:
         return next(one for one in option["choices"] if one != option["default"])
     return option["maximum"] if option["maximum"] != option["default"] else option["minimum"]
 
 
 def cases(unit):
-    """Yields (settings of the emulated encoder, options that identify must find)."""
+    """Yields (settings of the emulated encoder, options that identify must find) for each variant of the unit to be
+    tested."""
     yield {}, {}
     model = unit["models"][-1] if unit["models"] else {"options": {}}
     if model["options"]:
@@ -42,20 +43,22 @@ def cases(unit):
 
 
 def usual(unit, settings):
-    """Returns these settings with the default rate, in the form that follows a port in an address."""
+    """Returns these settings, but with the default rate, in the form in which they follow a port in an address."""
     rates = {option["name"]: option["default"] for option in with_role(unit["options"], "rate")}
     texts = [f"{name}={value}" for name, value in {**settings, **rates}.items()]
     return "?" + "&".join(texts) if texts else ""
 
 
-# Clocked and SPI encoders are excluded, because they need an SPI controller.
+# Encoders to identify: (unit, settings, options to find). Clocked and SPI encoders need an SPI controller, so they are
+# excluded.
 ENCODERS = [(unit, *case) for unit in UNITS if unit["link"] not in ("exchange", "clocked") for case in cases(unit)]
 
-SEARCH = 300  # time limit of a search in seconds, for a busy machine; alone it takes ten
+# Time limit of an identify search in seconds, for a busy machine; on an idle one a search takes ten seconds.
+SEARCH = 300
 
 
 def identify(*arguments, **settings):
-    """Returns the result of the command and the parsed output of --json."""
+    """Returns the result of `absenc identify` and its parsed JSON output, None if the output is empty."""
     result = absenc("identify", *arguments, "--json", **settings)
     return result, json.loads(result.stdout) if result.stdout else None
 
@@ -70,11 +73,11 @@ class IdentifyOnLine(EncoderCase):
             place = ("slcan:" if unit["link"] == "can" else "") + emulator.path
             result, found = identify(place, "--for", str(SEARCH), timeout=2 * SEARCH)
             self.assertEqual(result.returncode, 0, f"{protocol}: {result.stdout}{result.stderr}")
-            # The latency allows for a busy machine that delays the emulator.
+            # The added latency allows for a busy machine that delays the emulator.
             verb, encoder = found["candidates"][0]["command"].replace('"', "").split()[1:3]
             again = absenc(verb, encoder + ("&" if "?" in encoder else "?") + "latency=1000", "--json")
-            # A pseudo-terminal has no baud rate. Another rate is only visible if it makes replies too slow for the
-            # default rate.
+            # A pseudo-terminal has no baud rate. Another rate is only visible if it makes replies later than a host at
+            # the default rate expects.
             at_usual_rate = absenc("read", f"{protocol}:{place}{usual(unit, settings)}", "--json").returncode == 0
             return found["candidates"], again, at_usual_rate
 
@@ -91,12 +94,13 @@ class IdentifyOnLine(EncoderCase):
                 self.assertTrue(json_lines(again.stdout)[0]["ok"])
 
     def check(self, unit, wanted, best, shown):
-        """`shown`: the options that the replies reveal; any value of the others is correct."""
+        """Checks the best candidate. `shown`: the options that the encoder's replies reveal; any value of the other
+        options is correct."""
         self.assertEqual(best["protocol"], unit["protocol"])
         self.assertTrue(best["found"])
         self.assertGreater(best["explained"], 0.9 * best["tried"])
         if best["unasked"] and not best["encoder"]:
-            return  # its replies reveal only the position
+            return  # the unsolicited replies reveal only the position
         for option in shown:
             if option["name"] in wanted:
                 self.assertEqual(best["options"][option["name"]], wanted[option["name"]])
@@ -131,7 +135,7 @@ class UnknownLine(Case):
         self.addCleanup(os.close, self.master)
 
     def serve(self, answer):
-        """Answers every request with `answer` until the test ends."""
+        """A line whose far end answers every request with `answer` until the test ends."""
         wake, waker = os.pipe()
 
         def run():
@@ -198,7 +202,7 @@ class UnknownLine(Case):
     def test_interrupt_ends_it(self):
         process = subprocess.Popen([ABSENC, "identify", self.path], stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
                                    stderr=subprocess.PIPE)
-        os.read(self.master, 1)  # wait for the first byte of the search
+        os.read(self.master, 1)  # waits for the first byte that identify sends
         status, _, err = end(process, signal.SIGINT)
         self.assertEqual(status, 1)
         self.assertIn("interrupted", err)
@@ -218,7 +222,8 @@ class SeveralEncoders(EncoderCase):
 
     def test_streaming_can_node_is_found_by_its_number(self):
         with Emulator(self.directory, "--option", "node=0x21", "--option", "cyclic=100", protocol="raa38-can") as emulator:
-            _, found = identify(f"slcan:{emulator.path}", "--for", "0.4")  # 0.4 s is too short to send a request
+            # 0.4 s is too short for identify to send a request.
+            _, found = identify(f"slcan:{emulator.path}", "--for", "0.4")
         self.assertEqual({one["options"]["node"] for one in found["candidates"]}, {0x21})
 
 
@@ -260,12 +265,12 @@ class Frames(Case):
         result, found = identify(*[argument for word in moving for argument in ("--hex", word)])
         self.assertEqual(result.returncode, 0, result.stdout)
         self.assertEqual(found["candidates"][0]["protocol"], "ssi")
-        # A word without turns must not also be explained by the option that places turns.
+        # Identify must not explain a word without turns also by the option that places the turns.
         ssi = [one["options"] for one in found["candidates"] if one["protocol"] == "ssi"]
         self.assertEqual({options["multiturn_first"] for options in ssi}, {ssi[0]["multiturn_first"]})
 
     def test_two_protocols_explain_a_frame(self):
-        # EncoLink sends the same frames by UART and SPI.
+        # A captured frame of EncoLink may come from UART or SPI, because both carry the same frames.
         frames = ["0000000d131e00", "0000029c735600", "0000036a439e00", "0000052bd3ec00"]
         arguments = [argument for frame in frames for argument in ("--hex", frame)]
         result, found = identify(*arguments)

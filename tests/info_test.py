@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tests `absenc info` and `absenc alarms` over a pseudo-terminal."""
+"""Tests `absenc info` and `absenc alarms`, mostly over a pseudo-terminal."""
 import json
 import unittest
 
@@ -8,14 +8,14 @@ from command_support import Case, Emulator, absenc, json_lines
 
 class EncoderCase(Case):
     def encoder(self, *arguments, latency=300, more=""):
-        """Returns the address of an emulator, with a latency that a busy machine needs."""
+        """Returns the address of a new emulator, with a latency that allows for a busy machine."""
         emulator = Emulator(self.directory, *arguments)
         self.addCleanup(emulator.end)
         return f"tformat:{emulator.path}?latency={latency}{more}"
 
 
 def questions():
-    """Returns the commands without required arguments, in the order in which info sends them."""
+    """Returns the names of the commands without required arguments, in the order in which `info` runs them."""
     commands = json_lines(absenc("list", "tformat", "--json").stdout)[0]["commands"]
     free = [command for command in commands if not any(one["required"] for one in command["arguments"])]
     return [command["name"] for verb in ("info", "temperature", "config_get", "read")
@@ -39,7 +39,8 @@ class Info(EncoderCase):
         self.assertEqual(places, sorted(places))
 
     def test_summary_as_text(self):
-        """The summary has identity, options and state: no option at its default, no raw field, no setting."""
+        """The summary shows identity, options and state. It omits options at their defaults, raw fields and
+        settings."""
         result = absenc("info", self.encoder("--singleturn", "74565", "--multiturn", "4660"))
         self.assert_good(result)
         for row in [r"^model +TS5700N8500: ", r"^options +all at their defaults$", r"^encoder id +0x11$",
@@ -107,7 +108,8 @@ class Info(EncoderCase):
         self.assertEqual({answer["error"] for answer in answers.values()}, {"timeout"})
 
     def test_one_failure_does_not_stop_the_rest(self):
-        # The encoder id differs from the option. The reply to a memory request does not contain it.
+        # The option encoder_id differs from the encoder's ID. Only replies to memory requests are accepted, because
+        # they have no encoder ID.
         result = absenc("info", self.encoder(more="&encoder_id=23"), "--all")
         self.assert_failed(result, "unexpected_reply", "set model=TS5700N8500")
         self.assertRegex(result.stdout, r"(?m)^encoder-id +FAILED +unexpected_reply: ")
@@ -142,7 +144,7 @@ class Alarms(EncoderCase):
             "  battery_alarm: the battery is below 3.1 V. What to do: replace the battery with the encoder switched on; "
             "without a battery set battery=false\n"
             "status:\n"
-            # the text omits the advice to read the alarms
+            # the text omits the advice of the status to read the alarms
             "  alarm: over-heat, multi-turn error, battery error or battery alarm\n")
 
     def test_status_refers_to_alarms_only_if_not_shown(self):

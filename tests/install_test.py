@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tests the installation and the packages: they are complete, contain nothing else, work from another folder, and other
-projects can use them."""
+"""Tests the installation and the packages: they are complete, contain no other files, work from another folder, and
+other projects can use them."""
 import gzip
 import json
 import os
@@ -18,12 +18,13 @@ from command_support import absenc
 SOURCE = Path(os.environ["ABSENC_SOURCE_DIR"])
 BUILD = Path(os.environ["ABSENC"]).parent.parent
 VERSION = re.search(r"^project\(absenc VERSION ([\d.]+)", (SOURCE / "CMakeLists.txt").read_text(), re.MULTILINE)[1]
-# Each page of docs/ is a man page too.
+# Man pages made from the pages of docs/, one for each page.
 GUIDE = {f"share/man/man7/absenc-{page.stem}.7" for page in (SOURCE / "docs").glob("*.md")}
 
 BY_NAME = SOURCE / "examples/read_by_name.cpp"
-BY_NAME_SAYS = r"^(0\.0000 degrees\n)+0\.0 rpm, within \d"  # the speed appears as soon as its averaging window is full
-# A firmware-like program: a conversation with a virtual encoder at 7.25 turns.
+# The example prints the speed as soon as its averaging window is full.
+BY_NAME_SAYS = r"^(0\.0000 degrees\n)+0\.0 rpm, within \d"
+# A program like a firmware: a conversation with a virtual encoder, whose shaft is at 7.25 turns.
 FIRMWARE = """
 #include <cstdint>
 #include <cstdio>
@@ -52,8 +53,8 @@ int main() {
 """
 FIRMWARE_SAYS = "90.0000 degrees, 7 turns\n"
 
-# Every error of the library must be a std::exception, which the examples catch. Each line is printed after such a
-# catch.
+# A program that catches several errors of the library as std::exception, as the examples do. It prints a line after
+# each catch.
 ENDINGS = r"""
 #include <cstdio>
 #include <chrono>
@@ -147,7 +148,7 @@ if((ABSENC_CLIENT AND NOT TARGET absenc::client) OR (NOT ABSENC_CLIENT AND TARGE
   message(FATAL_ERROR "ABSENC_CLIENT is not what decides")
 endif()
 """
-# Emulates bash at the tab key, outside of which `compopt` does not work.
+# A script that emulates the tab key of bash, because `compopt` only works during completion.
 COMPLETE = r"""
 source "$1"
 shift
@@ -173,13 +174,13 @@ def files_below(folder):
 
 
 def pkg_config(root, *arguments):
-    """Returns pkg-config's output for the tree at `root`."""
+    """Returns the words that pkg-config prints for the library installed below `root`."""
     [pc] = root.rglob("absenc.pc")
     return run("pkg-config", *arguments, env={**os.environ, "PKG_CONFIG_PATH": str(pc.parent)}).split()
 
 
 def public_headers():
-    """Returns the paths at which the public headers are installed."""
+    """Returns the paths, below the installation folder, of the public headers."""
     patterns = [f"{layer}/**/*.hpp" for layer in ("core", "link", "protocol", "host", "sim")]
     patterns += ["client/*.hpp", "os/error.hpp"]
     sources = [path for pattern in patterns for path in (SOURCE / "absenc").glob(pattern)]
@@ -187,14 +188,14 @@ def public_headers():
 
 
 def verbs():
-    """Returns the help text of each verb."""
+    """Returns a dictionary from the name of each verb of absenc to its help text."""
     listed = re.findall(r"^  (\S+(?: \S+)?)  ", absenc("--help").stdout.split("\nVerbs:\n")[1].split("\nAn ")[0],
                         re.MULTILINE)
     return {verb: absenc(*verb.split(), "--help").stdout for verb in listed}
 
 
 class Case(unittest.TestCase):
-    """Installs the tree and moves it to another folder."""
+    """A test that installs the library and moves the installation to another folder."""
 
     @classmethod
     def setUpClass(cls):
@@ -227,7 +228,7 @@ class Installed(Case):
         for header in (self.root / "include").rglob("*.hpp"):
             text = header.read_text()
             for included in re.findall(r"^#include <(.+)>", text, re.MULTILINE):
-                # standard C++ headers only: no other library, no operating system
+                # The headers include standard C++ headers only, none of another library or of the operating system.
                 self.assertRegex(included, r"^(\w+|bits/chrono\.h)$", header)
             for included in re.findall(r'^#include "(.+)"', text, re.MULTILINE):
                 self.assertTrue((self.root / "include" / included).is_file(), f"{header}: {included}")
@@ -265,7 +266,7 @@ class Installed(Case):
         self.assertEqual(run(project / "build/firmware"), FIRMWARE_SAYS)
 
     def program(self, name, source, library):
-        """Compiles and links a program with the flags of pkg-config for `library`."""
+        """Compiles a program, and links it with the flags that pkg-config prints for `library`."""
         run("g++", "-std=c++20", "-O0", source, *pkg_config(self.root, "--cflags", "--libs", library), "-o",
             self.folder / name)
         return self.folder / name
@@ -301,7 +302,7 @@ class ManPage(Case):
         cls.path = cls.root / "share/man/man1/absenc.1"
 
     def shown(self, *options, path=None):
-        """Returns the page as shown by `man`, with warnings on standard error."""
+        """Returns the man page as `man` shows it, and its warnings on standard error."""
         environment = {**os.environ, "LC_ALL": "C.UTF-8", "MANWIDTH": "1000", "MANROFFOPT": "", "MANOPT": ""}
         return subprocess.run(["man", "-l", *options, path or self.path], stdin=subprocess.DEVNULL, capture_output=True,
                               text=True, timeout=60, check=True, env=environment)

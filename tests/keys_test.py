@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Tests that each quantity has the same name in JSON, CSV, recordings of each format, and samples in Python."""
+"""Tests that each quantity has the same name in JSON, in CSV, in recordings of each format, and in samples of the
+Python package."""
 import csv
 import json
 import os
@@ -11,11 +12,11 @@ from command_support import Case, absenc, json_lines
 from python_support import PACKAGE
 
 sys.path.insert(0, str(PACKAGE))
-import absenc as library  # noqa: E402 - the module of this build, not of the system
+import absenc as library  # noqa: E402 - the Python module of this build, not an installed one
 
-# Columns of a recording that describe its row, not the encoder.
+# Columns of a recording that describe the row, not the encoder's reading.
 ONLY_IN_ROWS = {"event", "missed"}
-# Keys that describe the line of JSON, not the encoder.
+# Keys that describe the line of JSON, not the encoder's reading.
 ONLY_IN_JSON = {"protocol", "ok", "event"}
 
 
@@ -43,10 +44,11 @@ class Keys(Case):
         shown = header(absenc("read", encoder, "--count", "1", "--csv").stdout)
         with open(self.recorded(encoder, "csv"), encoding="utf-8") as file:
             columns = header(file.read())
-        # A recording has the columns of `read` in the same order, then speed and lost readings.
+        # A recording has the columns of `read` in the same order, then columns for speed and lost readings.
         self.assertEqual([name for name in columns if name in shown], shown)
         with open(self.recorded(encoder, "jsonl"), encoding="utf-8") as file:
-            rows = [row for row in map(json.loads, file) if row.get("ok")]  # rows that are not ok describe events
+            # Rows without `ok` describe events, not readings.
+            rows = [row for row in map(json.loads, file) if row.get("ok")]
         self.assertEqual(len(rows), 3)
         computed = set(columns) - set(shown) - ONLY_IN_ROWS
         for row in rows:
@@ -54,8 +56,8 @@ class Keys(Case):
         for suffix in ("csv", "jsonl", "h5"):
             self.assertEqual(list(library.load(self.recorded(encoder, suffix)).keys()), columns, suffix)
 
-        # In Python, a sample has the computed values, and its reading has the transmitted ones. Flags and alarms are
-        # lists there, which name their channel.
+        # In Python, computed values are members of a sample, and transmitted values are members of its reading. There,
+        # flags and alarms are lists whose elements name their channel.
         with library.open(encoder) as opened:
             sample = next(iter(opened.samples(rate=200)))
         for name in set(columns) - ONLY_IN_ROWS | json_keys - ONLY_IN_JSON:

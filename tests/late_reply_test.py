@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tests late replies end to end, on pseudo-terminals and over TCP. A relay between the command and a virtual encoder
-delays replies. Every reported position must belong to the last request that was sent before its reply arrived."""
+"""Tests late replies with the absenc command, on pseudo-terminals and over TCP. A relay between the command and a
+virtual encoder delays replies. Every reported position must belong to the last request that was sent before its reply
+arrived."""
 import json
 import os
 import re
@@ -14,7 +15,7 @@ import unittest
 
 from command_support import Emulator, absenc, end
 
-ENCODERS = {  # address and options of a turning encoder, length of the request and of the reply of a position
+ENCODERS = {  # each entry: address and options of a turning encoder, bytes of a position request and of its reply
     "tformat": ("tformat", "", 1, 11),
     "esl": ("esl", "", 2, 18),
     "e201": ("e201", "", 1, 17),
@@ -24,15 +25,16 @@ ENCODERS = {  # address and options of a turning encoder, length of the request 
 
 
 class DelayingRelay(threading.Thread):
-    """Forwards bytes between a host and an encoder in order. The n-th reply is delayed by `delay(n)` seconds."""
+    """Forwards bytes between a host and an encoder in order. The n-th reply arrives `delay(n)` seconds late."""
 
     def __init__(self, host, encoder, delay):
         super().__init__(daemon=True)
         self.host, self.encoder, self.delay = host, encoder, delay
-        self.requests = 0  # bursts received from the host so far
-        # forwarded replies: (burst that the reply answers, bursts received when it was forwarded, bytes)
+        self.requests = 0  # number of bursts (requests) received from the host so far
+        # Forwarded replies: (number of the burst that the reply answers, number of bursts received when the reply was
+        # forwarded, bytes).
         self.forwarded = []
-        self.delayed = []  # replies that wait: (time at which to forward, burst, bytes)
+        self.delayed = []  # replies that are still delayed: (time at which to forward, number of the burst, bytes)
         self.replies = 0
         self.stop, self.wake = os.pipe()
 
@@ -56,7 +58,7 @@ class DelayingRelay(threading.Thread):
             if self.host in ready:
                 try:
                     data = os.read(self.host, 4096)
-                except OSError:  # a pseudo-terminal that the host has closed
+                except OSError:  # the host has closed its pseudo-terminal
                     time.sleep(0.001)
                     continue
                 if not data:
@@ -65,7 +67,7 @@ class DelayingRelay(threading.Thread):
                 os.write(self.encoder, data)
 
     def replies_in_time(self):
-        """Returns the replies that were forwarded before the host sent another request."""
+        """Returns those replies that were forwarded before the host sent another request."""
         return [data for burst, asked, data in self.forwarded if burst == asked]
 
     def end(self):
@@ -84,7 +86,7 @@ class LateReplyTest(unittest.TestCase):
         self.addCleanup(self.directory.cleanup)
 
     def pty_relay(self, encoder, delay):
-        """Returns a relay to a new emulator, and the path of the host's end."""
+        """Returns a relay to a new emulator, and the path of the pseudo-terminal for the host."""
         unit, _, _, _ = ENCODERS[encoder]
         options = [f"--option={option}" for option in ENCODERS[encoder][1].lstrip("?").split("&") if option]
         self.emulators = getattr(self, "emulators", 0) + 1
@@ -118,7 +120,7 @@ class LateReplyTest(unittest.TestCase):
         return f"{encoder}:tcp:127.0.0.1:{server.getsockname()[1]}{ENCODERS[encoder][1]}"
 
     def positions_in(self, encoder, replies):
-        """Returns the positions that the library decodes from these replies, each decoded alone."""
+        """Returns the positions that `decode` finds in these replies, each decoded alone."""
         unit, options, _, _ = ENCODERS[encoder]
         request = {"tformat": "1A", "esl": None, "e201": "34", "raa38": "BC AA B1", "raa38-modbus": None}[encoder]
         found = set()
@@ -159,7 +161,7 @@ class LateReplyTest(unittest.TestCase):
                 self.check(encoder, relay, rows)
                 self.assertEqual(done.returncode, 1, done.stdout)
                 self.assertIn("latency=", rows[-1]["advice"], rows)
-                # The advised latency must work.
+                # With the latency that the message advises, the encoder must be readable.
                 latency = re.search(r"latency=(\d+)", rows[-1]["advice"]).group(1)
                 joined = "&" if "?" in address else "?"
                 done = absenc("read", f"{address}{joined}latency={latency}", "--count", "3", "--json")
@@ -179,7 +181,7 @@ class LateReplyTest(unittest.TestCase):
     def test_over_tcp(self):
         for encoder in ("tformat", "e201"):
             with self.subTest(encoder):
-                # the timeout over a network is 250 ms, for E201 50 ms more
+                # The timeout over a network is 250 ms, and 50 ms more for E201.
                 address = self.tcp_relay(encoder, lambda n: 0.6)
                 done = absenc("read", address, "--count", "5", "--rate", "10", "--json")
                 rows = [json.loads(line) for line in done.stdout.splitlines()]

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tests linear encoders, which have millimetres instead of degrees: read, info, record and monitor."""
+"""Tests `absenc` with linear encoders, whose positions are in millimetres instead of degrees: read, info, record and
+monitor."""
 import csv
 import json
 import os
@@ -8,7 +9,7 @@ import unittest
 from command_support import Case, absenc, json_lines
 from monitor_test import Terminal
 
-# 32 bits of 0.05 um are 214748.3648 mm. The virtual encoder moves that far in one revolution.
+# Range of the scale: 32 bits of 0.05 um are 214748.3648 mm. A virtual encoder moves that far in one revolution.
 SLOW = "sim:biss?model=linear-32-0.05um&singleturn=1579271"
 FAST = "sim:biss?model=linear-26-1um&motion=rpm=60"
 
@@ -67,13 +68,14 @@ class Reading(Case):
 class Recording(Case):
     def record(self, name, *more):
         path = os.path.join(self.directory, name)
-        # Moves down from 0.1 mm, so that the position passes 0 at once.
+        # The carriage moves down from 0.1 mm, so that the position passes 0 at once.
         self.assert_good(absenc("record", "sim:biss?model=linear-26-1um&motion=rpm=-60&singleturn=100", "--output", path,
                                 "--for", "0.5", *more))
         return path
 
     def assert_motion(self, rows):
-        rows = [row for row in rows if row.get("event") != "gap"]  # a busy machine may cause gaps
+        # Rows without those for gaps, which a busy machine may cause.
+        rows = [row for row in rows if row.get("event") != "gap"]
         first = rows[0]
         for row in rows[5:]:
             self.assertAlmostEqual(float(row["speed_mm_s"]), -2**26 / 1000, delta=2)
@@ -125,7 +127,8 @@ class SpeedLimit(Case):
         self.assertIn("set max_rpm=RPM", result.stderr)
 
     def test_pause_names_option(self):
-        """On a scale of 67 m the position is ambiguous after a pause, if the carriage moves at up to 1000 m/s."""
+        """After a pause the position on a scale of 67 m is ambiguous if the carriage may move at up to 1000 m/s. The
+        message must name the option that limits the speed."""
         log = os.path.join(self.directory, "pause.csv")
         result = absenc("record", "sim:biss?model=linear-26-1um&max_mm_s=1000000", "--output", log, "--rate", "10", "--for", "0.5")
         self.assertIn("at up to 1000000 mm/s", result.stderr)
@@ -142,7 +145,7 @@ class Monitor(Case):
         self.assertNotIn("speed_rpm", shown)
 
     def test_screen(self):
-        # the carriage is in the middle of the scale
+        # The carriage is in the middle of the scale.
         terminal = Terminal(self, "sim:biss?model=linear-26-1um&singleturn=33554432")
         screen = terminal.wait_for(r"live +33554\.43")
         self.assertRegex(screen, r"state +mm +turns +mm/s +a second")

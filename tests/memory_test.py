@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tests `absenc memory` and `absenc config` over a pseudo-terminal, with faults, interruptions and all kinds of
-files."""
+"""Tests `absenc memory` and `absenc config` over a pseudo-terminal: with faults of the line, interruptions, and good
+and bad files."""
 import json
 import os
 import pty
@@ -19,7 +19,7 @@ EMPTY = {(page, address): 0 for page in range(PAGES) for address in range(ADDRES
 
 
 def crc(text):
-    """Returns the CRC-16 of docs/dump-format.md."""
+    """Returns the CRC-16 that docs/dump-format.md defines for a dump."""
     register = 0xFFFF
     for byte in text.encode():
         register ^= byte << 8
@@ -29,7 +29,7 @@ def crc(text):
 
 
 def parse(dump):
-    """Returns the bytes of a dump by page and address, after checking its checksum."""
+    """Returns the bytes of a dump as a dictionary by page and address, after checking the dump's checksum."""
     lines = [line for line in dump.splitlines() if line and not line.startswith("#")]
     assert lines.pop() == "checksum: " + crc("".join(line + "\n" for line in lines)), dump
     image = {}
@@ -41,7 +41,7 @@ def parse(dump):
 
 
 def addresses(words):
-    """Returns the addresses in a text such as "page 0 to 2: 0x05 to 0x07, 0x10; page 3: 0x00"."""
+    """Returns the (page, address) pairs in a text such as "page 0 to 2: 0x05 to 0x07, 0x10; page 3: 0x00"."""
     found = set()
     for part in words.split("; "):
         first, last, ranges = re.fullmatch(r"page (\d+)(?: to (\d+))?: (.*)", part).groups()
@@ -59,11 +59,11 @@ class MemoryCase(Case):
         return emulator
 
     def encoder(self, *arguments, latency=300):
-        """Returns the address of an emulator, with a latency that a busy machine needs."""
+        """Returns the address of a new emulator, with a latency that allows for a busy machine."""
         return f"tformat:{self.emulator(*arguments).path}?latency={latency}"
 
     def stored(self):
-        """Returns the bytes in the emulator's memory file."""
+        """Returns the bytes in the file in which the emulator saves its memory."""
         with open(self.file("memory"), encoding="ascii") as file:
             lines = file.read().splitlines()[4:]
         data = bytes.fromhex("".join(line.split(": ")[1] for line in lines))
@@ -75,7 +75,7 @@ class MemoryCase(Case):
         return parse(result.stdout)
 
     def partial(self, image):
-        """Writes a dump with only these bytes, as edited by hand, and returns its path."""
+        """Writes a dump with only these bytes of the memory, like one edited by hand, and returns the dump's path."""
         lines = [f"page {page} address {address}: {value:02x}\n" for (page, address), value in image.items()]
         return self.file("partial.dump", HEADER + "".join(lines) + "checksum: edited\n")
 
@@ -145,7 +145,8 @@ class Bytes(MemoryCase):
             self.assertEqual((answer["ok"], answer["error"]), (False, "timeout"))
 
     def ask(self, address, answer):
-        """Writes a byte from a terminal. Returns the exit status and the terminal's text."""
+        """Runs `memory write` on a terminal and answers its question with `answer`. Returns the exit status and the
+        terminal's text."""
         terminal, ours = pty.openpty()
         process = subprocess.Popen([ABSENC, "memory", "write", address, "5", "0x5A"], stdin=ours,
                                    stdout=subprocess.DEVNULL, stderr=ours)
@@ -158,7 +159,7 @@ class Bytes(MemoryCase):
         try:
             while True:
                 shown += os.read(terminal, 1024)
-        except OSError:  # the other end is closed and everything was read
+        except OSError:  # the process has closed its end of the terminal, and all text was read
             os.close(terminal)
         return process.wait(PATIENCE), shown.decode()
 
@@ -313,8 +314,8 @@ class Interruptions(MemoryCase):
     wanted = {(page, address): 1 + address for page in (0, 4) for address in range(30)}
 
     def progress_of(self, err):
-        """Returns the addresses that an unfinished load reports as written, unknown and not written. Together they must
-        be complete."""
+        """Returns the lists of addresses that the message of an interrupted load reports as written, unknown and not
+        written. Together the lists must have each address of the dump."""
         listed = []
         for words in ("written and read back", "not known whether written", "not written"):
             found = re.search(rf"^  {words}: (.*)$", err, re.MULTILINE)
@@ -322,7 +323,8 @@ class Interruptions(MemoryCase):
         return listed
 
     def assert_progress_is_true(self, err, image):
-        """Each address must be in exactly one list, and the lists must agree with the encoder's memory."""
+        """Checks that each address of the dump is in exactly one list of the message, and that the encoder's memory has
+        the content which the list states."""
         written, unknown, left = self.progress_of(err)
         self.assertEqual({at for at in written if image[at] != self.wanted[at]}, set(), err)
         self.assertEqual({at for at in left if image[at] == self.wanted[at]}, set(), err)
@@ -414,7 +416,8 @@ class Interruptions(MemoryCase):
         self.assertGreater(counts[0], 0)
 
     def test_load_over_bad_line(self):
-        """Almost every second reply is damaged. A load may fail, but repeating the command must succeed in the end."""
+        """The line damages almost every second reply. A load may fail on it, but repeated loads must succeed in the
+        end."""
         emulator = self.emulator("--fault", "corrupt=0.25", "--fault", "drop=0.25", "--seed", "3")
         address = f"tformat:{emulator.path}?latency=30"
         self.wanted = {(2, at): 0xA0 + at for at in range(40, 52)}
@@ -459,7 +462,7 @@ class Config(MemoryCase):
         self.assertEqual(absenc("memory", "read", address, "4", "--page", "7").stdout, "0x04  00  .\n")
 
     def test_refuses_threshold_of_zero_degrees(self):
-        """`config set` also accepts only 1 to 127 degC or off."""
+        """The threshold may be 1 to 127 degC, or off. `memory write` must refuse 0 degC, as `config set` does."""
         address = self.encoder()
         refused = absenc("memory", "write", address, "4", "0x80", "--page", "7", "--yes")
         self.assertEqual(refused.returncode, 1)

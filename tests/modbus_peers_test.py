@@ -43,7 +43,7 @@ def crc(data):
 
 
 class Mapping(ctypes.Structure):
-    """modbus_mapping_t of libmodbus 3.1."""
+    """The struct modbus_mapping_t of libmodbus 3.1."""
     _fields_ = [(name, ctypes.c_int) for name in (
         "nb_bits", "start_bits", "nb_input_bits", "start_input_bits", "nb_input_registers", "start_input_registers",
         "nb_registers", "start_registers")] + [("tab_bits", ctypes.POINTER(ctypes.c_uint8)),
@@ -124,7 +124,7 @@ class LibmodbusClient(PeerCase):
                            ("Illegal data address", lambda: client.read(0, 3))):
             with self.assertRaisesRegex(OSError, words):
                 ask()
-        # libmodbus itself refuses to send this invalid request.
+        # libmodbus refuses to send this invalid request (of no register), so the test sends its bytes as a raw request.
         client.check(MODBUS.modbus_send_raw_request(client.context, bytes([1, 3, 0, 0, 0, 0]), 6))
         reply = ctypes.create_string_buffer(260)
         size = client.check(MODBUS.modbus_receive_confirmation(client.context, reply))
@@ -156,7 +156,8 @@ class LibmodbusServer:
     def __init__(self, registers, address=1):
         self.master, self.slave = os.openpty()
         tty.setraw(self.slave)
-        # libmodbus opens a path, so it gets one end of a second pseudo-terminal, and a thread forwards the bytes.
+        # libmodbus needs a path to open, so it gets one end of a second pseudo-terminal. A thread forwards bytes
+        # between both pseudo-terminals.
         self.inner, self.inner_slave = os.openpty()
         tty.setraw(self.inner_slave)
         self.path = os.ttyname(self.slave)
@@ -215,7 +216,8 @@ class ReadsLibmodbus(PeerCase):
             self.assertEqual(self.position(server.path, "&registers=2&address=17"), 383)
 
     def test_replies_that_end_with_zero(self):
-        """If the CRC's last byte is 00, the frame also has a valid CRC without that byte."""
+        """If the last byte of the CRC is 00, the frame without that byte also has a valid CRC. The host must not end
+        such a reply one byte early."""
         positions = [low for low in range(2048) if crc(bytes([1, 3, 4, 0, 0x10, low >> 8, low & 0xFF])) < 0x100]
         self.assertGreater(len(positions), 3)
         with LibmodbusServer([0x0010, 0]) as server:

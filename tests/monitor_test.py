@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tests `absenc monitor`: its screen in a terminal driven by tmux, and its lines without a terminal."""
+"""Tests `absenc monitor`: its screen in a terminal emulated by tmux, and its lines without a terminal."""
 import json
 import os
 import re
@@ -19,7 +19,7 @@ class Terminal:
 
     def __init__(self, case, *arguments, columns=80, rows=24, environment=""):
         self.case = case
-        number = len(os.listdir(case.directory))  # a test may open several terminals
+        number = len(os.listdir(case.directory))  # number for the terminal's name, because a test may open several
         self.socket = os.path.join(case.directory, f"tmux-{number}")
         self.status = os.path.join(case.directory, f"status-{number}")
         command = f"env {environment} {shlex.join([ABSENC, 'monitor', *arguments])}; echo $? >{self.status}; read wait"
@@ -63,7 +63,7 @@ class Terminal:
 
 class MonitorCase(EncoderCase):
     def assert_screen(self, screen, *patterns):
-        """Compares line by line. Each pattern must match the whole line, apart from trailing spaces."""
+        """Checks the screen line by line. Each pattern must match the whole line, apart from trailing spaces."""
         lines = [line.rstrip() for line in screen.splitlines()]
         for number, pattern in enumerate(patterns):
             self.assertRegex(lines[number], f"^{pattern}$", f"line {number} of\n{screen}")
@@ -108,7 +108,7 @@ class Screen(MonitorCase):
         terminal.press("Up")
         terminal.wait_for(r"^> tformat:/dev/nothing")
         terminal.press("q")
-        self.assertEqual(terminal.exit_status(), 1)  # one encoder was never read
+        self.assertEqual(terminal.exit_status(), 1)  # one of the encoders was never read, so monitor fails
         self.assertIn("/dev/nothing: 0 readings", terminal.wait_for("of processor time each"))
 
     def test_zero_needs_confirmation(self):
@@ -219,7 +219,7 @@ class Screen(MonitorCase):
         self.assertEqual(screen.splitlines()[15].rstrip(), KEYS)
 
     def test_long_names_stay_distinguishable(self):
-        """At every width the screen shows the part of the name that differs, and the alarm mark."""
+        """At every width the screen must show the part in which long names differ, and the alarm mark."""
         path = self.emulator_of_two().path
         addresses = [f"esl:{path}?latency=300&address={number}" for number in (0, 3)]
         terminal = Terminal(self, *addresses, columns=64, rows=20)
@@ -246,7 +246,8 @@ class Screen(MonitorCase):
         self.assertNotRegex(screen, r"(?m)^  .*\bsingleturn \d")
         terminal.resize(64, 16)
         screen = terminal.wait_for(rf"\A(.*\n){{15}}{KEYS}")
-        self.assertRegex(screen.splitlines()[14], r"^ +\d+\.\d{3}  ")  # the trace stays in its line of the screen
+        # The graph of the position stays in its line of the screen.
+        self.assertRegex(screen.splitlines()[14], r"^ +\d+\.\d{3}  ")
         terminal.press("e")
         terminal.wait_for("no exchange has failed")
 
@@ -285,7 +286,8 @@ class Screen(MonitorCase):
 
 class Lines(MonitorCase):
     def test_summary_lines_agree(self):
-        """One encoder has occasional errors, and one uses all the available time."""
+        """The summary lines of two encoders have the same form: one with occasional errors, one that uses all the
+        available time."""
         result = absenc("monitor", "sim:tformat", "sim:esl?fault=corrupt=0.05", "sim:ssi", "--rate", "0", "--for", "0.73",
                         "--json", "--interval", "0.2")
         closing = re.findall(r"^absenc: (sim:\S+): (\d+) readings; (\d+) good(.*)", result.stderr, re.MULTILINE)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A fake MQTT 5 broker that follows the protocol unless a test's function replies otherwise."""
+"""A fake MQTT broker (5 and 3.1.1) that follows the protocol unless a test supplies other replies."""
 import json
 import socket
 import threading
@@ -24,11 +24,11 @@ class Closed(Exception):
 
 
 class Connection:
-    """One connection of one client."""
+    """One TCP connection of a client to the fake broker."""
 
     def __init__(self, connection):
         self.socket = connection
-        self.old = False  # whether the client speaks MQTT 3.1.1
+        self.old = False  # true: the client speaks MQTT 3.1.1; false: MQTT 5
         self.socket.settimeout(PATIENCE)
 
     def read(self, count):
@@ -44,7 +44,7 @@ class Connection:
         return data
 
     def packet(self):
-        """Returns (kind, flags, body)."""
+        """Returns (kind, flags, body) of the next packet. Raises Closed at the end of the connection."""
         first, size, shift = self.read(1)[0], 0, 0
         while True:
             byte = self.read(1)[0]
@@ -68,7 +68,8 @@ class Connection:
 
 
 def published(flags, body, old=False):
-    """Returns (topic, packet number or None, payload) of a PUBLISH without properties. `old` means MQTT 3.1.1."""
+    """Returns (topic, packet number or None, payload) of a PUBLISH packet without properties. `old`: the packet is of
+    MQTT 3.1.1."""
     size = int.from_bytes(body[:2], "big")
     topic, rest = body[2:2 + size].decode(), body[2 + size:]
     number = None
@@ -78,12 +79,12 @@ def published(flags, body, old=False):
 
 
 class FakeBroker:
-    """`answer(broker, connection, kind, flags, body, usual)` returns the reply to a packet, or None for the regular
-    reply `usual`."""
+    """An MQTT broker in a thread. The optional function `answer(broker, connection, kind, flags, body, usual)` returns
+    the bytes to send in reply to a packet; `usual` is the reply that the protocol demands."""
 
     def __init__(self, answer=None):
         self.answer = answer
-        self.payloads = {}  # received payloads by topic, as JSON or None, in the order of arrival
+        self.payloads = {}  # received messages: lists of payloads by topic, as JSON or None, in the order of arrival
         self.connections = 0
         self.lock = threading.Lock()
         self.open = set()
@@ -139,13 +140,14 @@ class FakeBroker:
         return packet(PINGRESP, b"") if kind == PINGREQ else b""
 
     def all(self, ending):
-        """Returns the payloads of all topics that end with `ending`."""
+        """Returns the payloads received so far in all topics whose names end with `ending`."""
         with self.lock:
             return [payload for topic, payloads in self.payloads.items() if topic.endswith(ending)
                     for payload in payloads]
 
     def after(self, topic, count):
-        """Returns the payloads of the topic after the first `count`, so that a polling test gets only new ones."""
+        """Returns the payloads received in the topic, without the first `count`, so that a polling test gets only new
+        ones."""
         with self.lock:
             return self.payloads.get(topic, [])[count:]
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Shared by the MQTT tests of `absenc serve`: brokers and a receiver."""
+"""Shared by the MQTT tests of `absenc serve`: starts real brokers, and collects the messages that they forward."""
 import json
 import os
 import pathlib
@@ -33,7 +33,8 @@ def answers(port):
 
 
 class Daemon:
-    """A third-party server, started until its port accepts connections."""
+    """A process of a server other than `absenc serve`. The constructor starts it and, if `wait`, waits until its port
+    accepts connections."""
 
     def __init__(self, command, port, log, wait=True):
         self.command, self.port, self.log = command, port, log
@@ -84,7 +85,7 @@ class Broker(Daemon):
 
 
 class Receiver:
-    """Collects all messages of a topic in order: (topic, payload as JSON or None, retained)."""
+    """A client that collects all messages of a topic in order: (topic, payload as JSON or None, retained)."""
 
     def __init__(self, port, topics="#", version=paho.MQTTv5, client_id="", login=None):
         self.messages = []
@@ -110,7 +111,7 @@ class Receiver:
             self.messages.append((message.topic, payload, bool(message.retain)))
 
     def all(self, kind):
-        """Returns the payloads of all topics that end with `kind`."""
+        """Returns the payloads of all received messages whose topic ends with `kind`."""
         with self.lock:
             return [payload for topic, payload, _ in self.messages if topic.endswith("/" + kind)]
 
@@ -125,7 +126,8 @@ class Receiver:
 
 
 def numbers(messages, encoder):
-    """Returns the numbers of an encoder's readings in the order of arrival, without repeated messages."""
+    """Returns the numbers of an encoder's readings in these messages, in the order of arrival. Repeated messages are
+    skipped."""
     found, seen = [], set()
     for one in messages:
         if one["encoder"] == encoder and one["id"] not in seen:
@@ -135,12 +137,12 @@ def numbers(messages, encoder):
 
 
 def twice(messages):
-    """Returns how many messages are repetitions."""
+    """Returns how many of the messages repeat an earlier one."""
     return len(messages) - len({one["id"] for one in messages})
 
 
 def waiting_in(spool):
-    """Returns the payloads that wait in the files of a spool (absenc/serve/spool_file.hpp)."""
+    """Returns the payloads in the files of a spool folder (absenc/serve/spool_file.hpp), which wait to be sent."""
     found = []
     for path in sorted(pathlib.Path(spool).glob("*.part")):
         data, at = path.read_bytes(), 0
